@@ -10,6 +10,7 @@ from imubench_pipeline.extensions.fusion.tables import RECORDINGS_OF_A_PAIR, Fus
 from imubench_pipeline.model.comparisons import ErrorBudgetRow, PooledRow
 from imubench_pipeline.model.estimates import ModelRow, ParameterRow
 from imubench_pipeline.model.recordings import FindingRow, RecordingRow
+from imubench_pipeline.model.verdicts import DoubtMark
 from imubench_pipeline.navigation.pooled import pooled_rows
 from imubench_pipeline.recordings.fitness import (
     UNFIT,
@@ -37,8 +38,12 @@ KEY = {"sensor": "s", "recording": "a", "channel": "gyro_x"}
 def test_what_is_not_sold_decides_nothing() -> None:
     (doubt,) = not_sold(typed(RecordingRow, [ABOUT, OTHER]), {"s"})
     row = verdict([doubt])
-    assert (row.fitness, row.decides, row.doubts) == ("unfit", False, "not sold")
-    assert left_out([row]) == {("s", "a"): "a does not decide: not sold"}
+    assert (row.fitness, row.decides, row.doubts) == ("unfit", False, (DoubtMark("a", "not_sold"),))
+    assert left_out([row]) == {("s", "a"): row.doubts}
+
+
+def marked(*codes: str, recording: str = "a") -> tuple[DoubtMark, ...]:
+    return tuple(DoubtMark(recording, code, ("gyro_x",)) for code in codes)
 
 
 def verdict(found: Iterable[Doubt], include: Sequence[str] = (), **changes: Any) -> RecordingRow:
@@ -69,7 +74,7 @@ def test_a_log_of_which_nothing_is_found_is_fit() -> None:
     assert found == []
     assert fitness(found) == "fit"
     row = verdict(found)
-    assert (row.fitness, row.decides, row.doubts) == ("fit", True, "")
+    assert (row.fitness, row.decides, row.doubts) == ("fit", True, ())
 
 
 @pytest.mark.parametrize("name", sorted(UNFIT))
@@ -78,8 +83,8 @@ def test_what_need_not_be_a_sensor_at_rest_in_its_unit_does_not_decide(name: str
     found = list(doubts([finding("noise_grows"), finding(name, severity)], [], []))
     row = verdict(found)
     assert (row.fitness, row.decides) == ("unfit", False)
-    assert row.doubts and row.doubts.startswith(f"{name.replace('_', ' ')} (gyro_x); noise grows")
-    assert left_out([row]) == {("s", "a"): f"a does not decide: {row.doubts}"}
+    assert row.doubts == marked(name, "noise_grows")
+    assert left_out([row]) == {("s", "a"): row.doubts}
     asked_for = verdict(found, ["s/a"])
     assert (asked_for.fitness, asked_for.decides) == ("unfit", True)
     assert left_out([asked_for]) == {}
@@ -89,14 +94,15 @@ def test_other_doubts_leave_the_figures_and_are_said() -> None:
     found = list(doubts([finding("bias_step")], [], [model("not explained"), model("x", False)]))
     row = verdict(found)
     assert (row.fitness, row.decides) == ("fit with doubts", True)
-    assert row.doubts == "bias step (gyro_x); not explained (gyro_x)"
-    assert found[0].row().parameters == "B, B_curve, K, R, T_B, bias, sigma_min, tau_min"
-    assert found[1].row().parameters is None
+    assert row.doubts == marked("bias_step", "not_explained")
+    slow = ("B", "B_curve", "K", "R", "T_B", "bias", "sigma_min", "tau_min")
+    assert found[0].row().parameters == slow
+    assert found[1].row().parameters == ()
 
 
 def test_a_doubtful_parameter_is_no_doubt_of_the_log() -> None:
     (one,) = doubts([], [parameter("doubtful")], [])
-    assert one.row().parameters == "K"
+    assert one.row().parameters == ("K",)
     assert one.reason == "drift"
     assert fitness([one]) == "fit"
 
@@ -116,13 +122,13 @@ def test_a_unit_of_time_mixed_up_has_a_factor_for_each_parameter() -> None:
         ("R",): pytest.approx(1e6),
     }
     assert fitness(found) == "unfit"
-    assert verdict(found).doubts == "rate implausible (gyro_x)"
+    assert verdict(found).doubts == marked("rate_implausible")
 
 
 def test_a_recording_that_was_not_analysed_does_not_decide() -> None:
     for status in ("rejected", "failed"):
         row = verdict(doubts([finding("rejected", "fatal")], [], []), status=status)
-        assert (row.fitness, row.decides, row.doubts) == (None, False, "")
+        assert (row.fitness, row.decides, row.doubts) == (None, False, ())
         assert left_out([row]) == {}  # that is told as rejected
 
 
@@ -133,34 +139,32 @@ def test_pools_are_those_without_the_unfit_recording_and_count_it() -> None:
         return about | limits | {"parameter": "N", "status": "ok", "unit": "x"}
 
     rows = typed(ParameterRow, [row("a", 1.0), row("b", 1.01), row("c", 57.3)])
-    apart = {("s", "c"): "c does not decide"}
+    apart = {("s", "c"): marked("motion", recording="c")}
     (pooled,) = pooled_rows(undecided(rows, apart), [], {})
     (without,) = pooled_rows(rows[:2], [], {})
     assert pooled["value"] == without["value"]
     assert (pooled["recordings"], pooled["left_out"]) == (2, 1)
-    assert "does not decide" in pooled["reason"]
+    assert "1 left out: not used" in pooled["reason"]
 
 
 def test_rows_carry_the_doubts_of_what_they_stand_on() -> None:
-    moved = {"device": "two", "decides": False, "doubts": "motion (gyro_x)"}
+    moved = {"device": "two", "decides": False, "doubts": marked("motion", recording="c")}
     about = typed(
         RecordingRow,
         [
-            ABOUT | {"device": "one", "decides": True, "doubts": "lines (gyro_x)"},
-            ABOUT | {"recording": "b", "device": "two", "decides": True, "doubts": ""},
+            ABOUT | {"device": "one", "decides": True, "doubts": marked("lines")},
+            ABOUT | {"recording": "b", "device": "two", "decides": True, "doubts": ()},
             ABOUT | {"recording": "c"} | moved,
         ],
     )
     rows = typed(ErrorBudgetRow, [{"sensor": "s", "recording": name} for name in "ab"])
-    assert [row.doubts for row in with_doubts(rows, about)] == ["lines (gyro_x)", ""]
+    assert [row.doubts for row in with_doubts(rows, about)] == [("lines",), ()]
     pair = {"sensor": "s", "recording": "b", "other": "s", "other_recording": "a"}
     pairs = typed(FusionRow, [pair])
-    assert [row.doubts for row in with_doubts(pairs, about, RECORDINGS_OF_A_PAIR)] == [
-        "lines (gyro_x)"
-    ]
+    assert [row.doubts for row in with_doubts(pairs, about, RECORDINGS_OF_A_PAIR)] == [("lines",)]
     pools = typed(PooledRow, [{"sensor": "s", "device": device} for device in (None, "one", "two")])
     said = [row.doubts for row in with_doubts_of_all(pools, about)]
-    assert said == ["a: lines (gyro_x)", "a: lines (gyro_x)", ""]
+    assert said == [marked("lines"), marked("lines"), ()]
 
 
 def asked() -> Requirement:
@@ -175,20 +179,22 @@ def test_a_ranking_stands_on_the_recordings_that_decide() -> None:
     requirement = {"robot": asked()}
     fine, moved = (list(errors_of({"s": gyro(N)}, requirement)) for N in (1e-4, 1e-2))
     both = fine + [row | {"recording": "moved"} for row in moved]
+    moved_doubts = marked("motion", recording="moved")
     told = ABOUT | {"device": "d", "simulated": False, "duration": 7200.0}
     about = [
-        told | {"recording": "r", "decides": True, "doubts": "lines (gyro_x)"},
-        told | {"recording": "moved", "decides": False, "doubts": "motion (gyro_x)"},
+        told | {"recording": "r", "decides": True, "doubts": marked("lines", recording="r")},
+        told | {"recording": "moved", "decides": False, "doubts": moved_doubts},
     ]
     prices = {"s": {"price_class": None}}
     (alone,) = build("ranking", ranking_rows(fine, requirement, prices, about[:1])).to_pylist()
     (found,) = build("ranking", ranking_rows(both, requirement, prices, about)).to_pylist()
-    assert found["left_out"] == "moved does not decide: motion (gyro_x)"
-    assert found["doubts"] == "lines (gyro_x)"
-    assert found | {"left_out": None} == alone
+    moved_mark = {"recording": "moved", "code": "motion", "channels": ["gyro_x"]}
+    assert found["left_out"] == [moved_mark]
+    assert found["doubts"] == [{"recording": "r", "code": "lines", "channels": ["gyro_x"]}]
+    assert found | {"left_out": []} == alone
     only = both[len(fine) :]
     (none,) = build("ranking", ranking_rows(only, requirement, prices, about)).to_pylist()
-    assert none["verdict"] == "not enough data"
-    assert none["reason"] == "moved does not decide: motion (gyro_x)"
+    assert none["verdict"] == "not_enough_data"
+    assert none["reason"] == "moved is not used: the sensor was moved"
     assert none["rank"] is None
-    assert none["unless"].startswith("as logged it ") and none["unless_verdict"] is None
+    assert none["logged_verdict"] == "fails" and none["corrected_verdict"] is None

@@ -429,10 +429,10 @@ def drift(name: str, verdict: str | None) -> dict[str, Any]:
             "reason": "above what the 3 before it lead one to expect"}  # fmt: skip
 
 
-def standing(sensor: str, verdict: str = "passes", margin: float = 2.0) -> dict[str, Any]:
+def standing(sensor: str, verdict: str = "meets", margin: float = 2.0) -> dict[str, Any]:
     return {"requirement": "robot", "sensor": sensor, "recording": "a", "verdict": verdict,
             "rank": 1, "decides": True, "error": "heading", "unit": "rad", "margin": margin,
-            "time": 1.0, "tied_with": None, "limit_verdict": verdict, "evidence": None}  # fmt: skip
+            "time": 1.0, "limit_verdict": verdict, "evidence": None}  # fmt: skip
 
 
 def state(
@@ -472,7 +472,7 @@ def test_at_the_first_run_all_is_new(tmp_path: Path) -> None:
     assert [one.finding for one in found.warnings] == ["knocks"]
     assert [(one.recording, one.new) for one in found.rejected] == [("s/b", True)]
     assert len(found.drift) == 1
-    assert found.first[0].said == "robot: s: passes"
+    assert found.first[0].said == "robot: s: meets the limits"
 
 
 def test_what_is_known_is_fine(tmp_path: Path) -> None:
@@ -508,7 +508,7 @@ def test_what_changed_is_told_with_its_reason(tmp_path: Path) -> None:
         {"log": 2, "settings": 1, "same": 1, "new": 1},
         recordings=[recording(name) for name in ("log", "settings", "same", "new")],
         fixed_bias=[bias("log", 2.0), bias("settings", 2.0), bias("same", 1.0), bias("new", 1.0)],
-        ranking=[standing("t", "surely fails", 0.5), standing("u", "surely fails", 0.9)],
+        ranking=[standing("t", "fails", 0.5), standing("u", "fails", 0.9)],
     )
     found = summary(compared(before, after, tables, []))
     assert {one.recording: one.because for one in found.changed} == {
@@ -518,7 +518,7 @@ def test_what_changed_is_told_with_its_reason(tmp_path: Path) -> None:
     assert (found.new, found.removed, STATUS[found.outcome]) == (["s/new"], ["s/gone"], 0)
     text = in_words(found)
     assert "1 new, 2 analysed again, 1 removed, 0 skipped; 4 in all" in text
-    assert "robot: no sensor fulfils it; nearest is u: surely fails (before: s)\n" in text
+    assert "robot: no sensor meets the limits; closest is u: fails (before: s)\n" in text
 
 
 @pytest.mark.parametrize(

@@ -23,9 +23,9 @@ def finding(sensor: str, name: str, severity: str = "warning") -> dict[str, Any]
 
 
 def standing(sensor: str, **values: object) -> dict[str, Any]:
-    row = {"requirement": "robot", "sensor": sensor, "recording": "run", "verdict": "passes",
+    row = {"requirement": "robot", "sensor": sensor, "recording": "run", "verdict": "meets",
            "rank": 1, "decides": True, "error": "heading", "unit": "rad", "margin": 2.0,
-           "time": 1.0, "tied_with": None, "conditions": None, "limit_verdict": "passes",
+           "time": 1.0, "limit_verdict": "meets",
            "evidence": "strong"}  # fmt: skip
     return row | values
 
@@ -53,7 +53,7 @@ def test_a_run_says_what_became_of_the_recordings(tmp_path: Path) -> None:
         "  rejected: b/night: the file is empty",
         "warnings in 1 of the recordings:",
         "  b/run: 1 warning: knock",
-        "robot: a: passes",
+        "robot: a: meets the limits",
         f"report: {tmp_path / 'report/index.html'}",
     ]
 
@@ -83,18 +83,18 @@ def test_the_recording_with_the_worst_warnings_comes_first() -> None:
 def test_a_line_says_which_sensor_leads_a_requirement() -> None:
     rows = [
         standing("second", rank=2),
-        standing("best", tied_with="other", evidence="weak"),
-        standing("best", decides=False, verdict="surely fails"),
-        standing("made", requirement="hard", verdict="surely fails"),
-        standing("short", requirement="vague", verdict="not enough data"),
-        standing("c", requirement="dear", rank=None, verdict="outside the price class"),
+        standing("best", tied_with=("other",), evidence="weak"),
+        standing("best", decides=False, verdict="fails"),
+        standing("made", requirement="hard", verdict="fails"),
+        standing("short", requirement="vague", verdict="not_enough_data"),
+        standing("c", requirement="dear", rank=None, verdict="excluded"),
     ]
     ranking = [RankingRow(**row) for row in rows]
     recordings = [RecordingRow(**recording("best")),
                   RecordingRow(**recording("made", simulated=True))]  # fmt: skip
     assert list(leaders(ranking, recordings)) == [
-        "robot: best: passes, on weak evidence, tied with other",
-        "hard: no sensor fulfils it; nearest is made (simulated): surely fails",
+        "robot: best: meets the limits; not significantly better than other; weak evidence",
+        "hard: no sensor meets the limits; closest is made (simulated): fails",
         "vague: short: not enough data",
         "dear: no sensor can be ranked",
     ]

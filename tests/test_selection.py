@@ -95,13 +95,13 @@ def test_sensors_are_ranked_with_ties() -> None:
     found = ranking(sensors, limit)
     ranks = {sensor: row["rank"] for sensor, row in found.items()}
     assert ranks == {"good": 1, "fair": 2, "alike": 2, "poor": 4, "accelerometer": None}
-    assert found["fair"]["tied_with"] == "alike" and found["good"]["tied_with"] is None
+    assert found["fair"]["tied_with"] == ["alike"] and found["good"]["tied_with"] == []
     # 0.1 deg at 95 % is 8.9e-4 rad; N sqrt(100 s) is 2e-4, 5e-4 and 1e-2.
-    assert found["good"]["verdict"] == "passes"
+    assert found["good"]["verdict"] == "meets"
     assert found["good"]["at_most"] == pytest.approx(0.1 * DEGREE)
     assert found["good"]["margin"] == pytest.approx(0.1 * DEGREE / 1.959964 / 2e-4, rel=0.03)
-    assert found["poor"]["verdict"] == "surely fails" and found["poor"]["chance"] < 1e-6
-    assert found["accelerometer"]["verdict"] == "not enough data"
+    assert found["poor"]["verdict"] == "fails" and found["poor"]["chance"] < 1e-6
+    assert found["accelerometer"]["verdict"] == "not_enough_data"
     assert "no gyro" in found["accelerometer"]["reason"]
     # N^2 (t + t^2 / 3600 s), with the error of the bias from the static hour, is the limit squared.
     squared = (0.1 * DEGREE / 1.959964 / 2e-5) ** 2
@@ -111,7 +111,7 @@ def test_sensors_are_ranked_with_ties() -> None:
 
 @pytest.mark.parametrize(
     ("N", "verdict"),
-    [(5e-5, "passes"), (8e-5, "probably passes"), (1e-4, "probably fails"), (2e-4, "surely fails")],
+    [(5e-5, "meets"), (8e-5, "likely_meets"), (1e-4, "likely_fails"), (2e-4, "fails")],
 )
 def test_verdicts_follow_the_chance(N: float, verdict: str) -> None:
     found = ranking({"s": {"gyro_x": white(N, 0.3)}}, requirement(("heading", "100 s", "0.1 deg")))
@@ -124,15 +124,15 @@ def test_what_the_log_does_not_tell_is_not_enough_data() -> None:
         {"N": known(1e-6), "K": Parameter(None, "not_identified", "x", 1e-7, 1e-4, None, 3e-6)},
     )
     found = ranking({"s": {"gyro_x": vague}}, requirement(("heading", "100 s", "0.3 deg")))
-    assert found["s"]["verdict"] == "not enough data"
-    assert "K of gyro_x is not identified" in found["s"]["reason"]
+    assert found["s"]["verdict"] == "not_enough_data"
+    assert "K of gyro_x is not determined" in found["s"]["reason"]
 
 
 def test_a_log_of_which_nothing_is_known_is_no_sensor_without_noise() -> None:
     silent = Estimate("likelihood", {"N": Parameter(None, "not_shown", "too short a log")})
     asked = requirement(("heading", "100 s", "0.3 deg"))
     found = ranking({"mute": {"gyro_x": silent}, "s": {"gyro_x": white(1e-5)}}, asked)
-    assert found["mute"]["verdict"] == "not enough data"
+    assert found["mute"]["verdict"] == "not_enough_data"
     assert found["mute"]["sigma"] is None
     assert "nothing is known of the noise of gyro_x: too short a log" in found["mute"]["reason"]
     assert (found["s"]["rank"], found["mute"]["rank"]) == (1, None)
@@ -160,7 +160,7 @@ def test_the_limit_with_the_least_margin_decides_and_the_source_is_named() -> No
 
 
 @pytest.mark.parametrize(
-    ("N", "verdict", "rank"), [(1e-3, "surely fails", 1), (1e-6, "not enough data", None)]
+    ("N", "verdict", "rank"), [(1e-3, "fails", 1), (1e-6, "not_enough_data", None)]
 )
 def test_what_surely_fails_fails_whatever_else_is_not_known(
     N: float, verdict: str, rank: int | None
@@ -173,9 +173,12 @@ def test_what_surely_fails_fails_whatever_else_is_not_known(
 def test_a_sensor_outside_the_price_class_is_not_ranked() -> None:
     asked = requirement(("heading", "100 s", "0.1 deg"), price_class=["chip"])
     found = ranking({"s": {"gyro_x": white(5e-5)}}, asked, "tactical")
-    assert found["s"]["rank"] is None and found["s"]["verdict"] == "outside the price class"
+    assert found["s"]["rank"] is None and found["s"]["verdict"] == "excluded"
+    expected = {"property": "price_class", "subject": "tactical", "asked": "chip", "has": []}
+    assert found["s"]["shortfalls"] == [expected]
     found = ranking({"s": {"gyro_x": white(5e-5)}}, asked, None)
-    assert found["s"]["verdict"] == "price class not stated"
+    assert found["s"]["verdict"] == "excluded"
+    assert found["s"]["shortfalls"] == [expected | {"subject": ""}]
 
 
 def test_ties_are_stable(rng: np.random.Generator) -> None:

@@ -7,6 +7,7 @@ from typing import Any
 import pytest
 from rich.cells import cell_len
 
+from imubench_pipeline.model.verdicts import UnitFactor
 from imubench_pipeline.report import show
 from imubench_pipeline.tables import write
 
@@ -28,10 +29,10 @@ def parameter(sensor: str, channel: str, symbol: str, **values: object) -> dict[
 
 
 def standing(sensor: str, **values: object) -> dict[str, Any]:
-    row = {"requirement": "robot", "sensor": sensor, "recording": "run", "verdict": "passes",
+    row = {"requirement": "robot", "sensor": sensor, "recording": "run", "verdict": "meets",
            "rank": 1, "decides": True, "error": "heading", "time": 60.0, "limit": DEGREE,
            "sigma": DEGREE / 4, "lower": DEGREE / 5, "upper": DEGREE / 3, "unit": "rad",
-           "margin": 4.0, "chance": 1.0, "limit_verdict": "passes"}  # fmt: skip
+           "margin": 4.0, "chance": 1.0, "limit_verdict": "meets"}  # fmt: skip
     return row | values
 
 
@@ -46,14 +47,15 @@ PARAMETERS = [
     parameter("made", "gyro_x", "N", method="curve", recommended=False, value=3 * N),
 ]  # fmt: skip
 RANKING = [
-    standing("good", tied_with="made"),
+    standing("good", tied_with=("made",)),
     standing("good", decides=False, error="position", unit="m", limit=2.0, sigma=1.0, margin=2.0),
-    standing("made", rank=2, margin=0.5, sigma=2 * DEGREE, verdict="surely fails", specimens=1,
+    standing("made", rank=2, margin=0.5, sigma=2 * DEGREE, verdict="fails", specimens=1,
              recordings=1, longest_log=660.0, evidence="weak",
-             evidence_reasons="one_specimen, short_log"),
-    standing("third", rank=None, verdict="not enough data", sigma=None, margin=None,
+             evidence_reasons=("one_specimen", "short_log")),
+    standing("third", rank=None, verdict="not_enough_data", sigma=None, margin=None,
              reason="no accelerometer in the recording",
-             unless="if the gyro is in °/s, and not rad/s, it passes (margin 7.5)"),
+             corrected_verdict="meets", corrected_margin=7.5,
+             corrected_units=(UnitFactor("gyro", DEGREE),)),
     standing("made", requirement="drone"),
 ]  # fmt: skip
 
@@ -77,7 +79,8 @@ def results(tmp_path: Path) -> Path:
         ],
         "ranking": RANKING,
         "next_steps": [
-            {"sensor": "third", "recording": "run", "requirements": "robot", "action": "check_unit",
+            {"sensor": "third", "recording": "run",
+             "requirements": ("robot",), "action": "check_unit",
              "verdicts_turned": 4 - i, "verdicts_strengthened": 0, "text": f"step {i}"}
             for i in range(4)
         ],
@@ -135,8 +138,8 @@ def test_weak_evidence_what_would_turn_a_verdict_and_what_to_do_are_said(
         "third: step 0 (robot) third: step 1 (robot) third: step 2 (robot)"
     )
     ranking = after(text, "Ranking for robot")
-    for part in ("on weak evidence: one specimen;", "log of 11 min",
-                 "if the gyro is in °/s, and not", "rad/s, it passes (margin 7.5)"):  # fmt: skip
+    for part in ("weak evidence: one unit; one log", "it meets the limits (margin 7.5)",
+                 "if the gyro data are in °/s, not", "rad/s"):  # fmt: skip
         assert part in ranking
 
 
@@ -146,9 +149,9 @@ def test_a_ranking_has_its_verdicts_in_words(
     text = shown(capsys, results, "--width", 120)
     lines = text.partition("Ranking for robot")[2].partition("\n\n")[0].splitlines()
     (good,) = (i for i, line in enumerate(lines) if line.startswith("1 "))
-    assert words(lines[good]) == "1 good passes 0.25 ° of 1 ° heading 4"
-    assert words(lines[good + 1]) == "tied with made 0.2 to 0.33 after 60 s"
-    assert "surely fails" in lines[good + 2] and "made (simulated)" in lines[good + 2]
+    assert words(lines[good]) == "1 good meets the limits 0.25 ° of 1 ° heading 4"
+    assert words(lines[good + 1]) == "similar to made 0.2 to 0.33 after 60 s"
+    assert "fails" in lines[good + 2] and "made (simulated)" in lines[good + 2]
     (third,) = (line for line in lines if "not enough data" in line)
     assert "no accelerometer in the recording" in third
     assert "position" not in text  # another limit decides
@@ -217,7 +220,7 @@ def test_a_terminal_gets_colours_unless_it_wants_none(
     monkeypatch.setenv("FORCE_COLOR", "1")
     monkeypatch.setenv("TERM", "xterm")
     text = shown(capsys, results)
-    assert "\x1b[32mpasses" in text
+    assert "\x1b[32mmeets the limits" in text
     (warning,) = (line for line in text.splitlines() if "suspicious" in line)
     assert warning.endswith("…") and len(warning) <= 80
     monkeypatch.setenv("NO_COLOR", "1")

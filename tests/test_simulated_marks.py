@@ -176,7 +176,9 @@ def test_a_measured_recording_of_any_sensor_leaves_out_simulated_ones(tmp_path: 
         "two/real": True,
     }
     for name in ("one/sim", "two/sim"):
-        assert found[name]["doubts"] == "simulated beside measured"
+        assert found[name]["doubts"] == [
+            {"recording": "sim", "code": "simulated_beside_measured", "channels": []}
+        ]
         assert found[name]["fitness"] == "unfit"
 
 

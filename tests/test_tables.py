@@ -2,6 +2,7 @@ import hashlib
 import json
 import math
 import os
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +11,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
+from imubench_pipeline.model.verdicts import DoubtMark, Share
 from imubench_pipeline.tables import (
     TableError,
     build,
@@ -181,3 +183,21 @@ def test_a_pipe_for_a_file_is_damaged(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "a.json")
     with pytest.raises(ValueError, match="digest"):
         read_sealed_json(tmp_path / "a.json")
+
+
+def test_texts_in_lists_and_structs_show_each_character() -> None:
+    about = {"sensor": "s", "recording": "a", "device": "d", "kind": "static", "simulated": False,
+             "status": "ok"}  # fmt: skip
+    mark = DoubtMark("a\x1b", "motion", ("gyro\x1b_x",))
+    shown = {"recording": "a\\x1b", "code": "motion", "channels": ["gyro\\x1b_x"]}
+    for doubts in ((mark,), [asdict(mark)]):
+        (row,) = build("recordings", [about | {"doubts": doubts}]).to_pylist()
+        assert row["doubts"] == [shown]
+
+
+def test_numbers_in_structs_are_finite_or_null() -> None:
+    row = {"requirement": "r", "sensor": "s", "verdict": "meets", "decides": True, "unit": "rad",
+           "error": "heading", "time": 1.0, "limit_verdict": "meets"}  # fmt: skip
+    parts = tuple(Share("gyro N", share) for share in (0.5, *NOT_FINITE))
+    (made,) = build("ranking", [row | {"parts": parts}]).to_pylist()
+    assert [part["share"] for part in made["parts"]] == [0.5, None, None, None]

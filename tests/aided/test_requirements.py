@@ -72,12 +72,12 @@ def test_a_sensor_is_held_against_the_error_of_one_axis() -> None:
     row = verdict(1.0)
     assert row["sigma"] == pytest.approx(1.0 / math.sqrt(2.0))
     assert row["margin"] == pytest.approx(allowed * math.sqrt(2.0))
-    assert (row["verdict"], row["trajectory"], row["time"]) == ("passes", "field", 30.0)
+    assert (row["verdict"], row["trajectory"], row["time"]) == ("meets", "field", 30.0)
     assert "simulated drives" in row["reason"]
-    assert verdict(2.0)["verdict"] == "surely fails"
+    assert verdict(2.0)["verdict"] == "fails"
     near = allowed * math.sqrt(2.0)
-    assert verdict(0.97 * near)["verdict"] == "probably passes"
-    assert verdict(1.03 * near)["verdict"] == "probably fails"
+    assert verdict(0.97 * near)["verdict"] == "likely_meets"
+    assert verdict(1.03 * near)["verdict"] == "likely_fails"
 
 
 @pytest.mark.parametrize(
@@ -87,7 +87,7 @@ def test_a_sensor_is_held_against_the_error_of_one_axis() -> None:
 )
 def test_a_run_of_something_else_does_not_answer(changes: dict[str, Any]) -> None:
     row = verdict(1.0, **changes)
-    assert row["verdict"] == "not enough data"
+    assert row["verdict"] == "not_enough_data"
     assert "navigate" in row["reason"]
 
 

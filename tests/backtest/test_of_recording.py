@@ -10,6 +10,7 @@ from imubench_pipeline.estimators.estimate import Estimate, Parameter
 from imubench_pipeline.estimators.likelihood import fit
 from imubench_pipeline.model.estimates import BacktestRow, DeterministicRow
 from imubench_pipeline.model.recordings import RecordingRow
+from imubench_pipeline.model.verdicts import DoubtMark
 from imubench_pipeline.navigation.backtest.comparison import findings, words
 from imubench_pipeline.navigation.backtest.of_recording import backtest_rows
 from imubench_pipeline.navigation.expected_errors import error_rows, of_requirement
@@ -113,7 +114,7 @@ def test_a_drift_that_no_model_has_is_a_doubt_and_stands_in_the_ranking(
         duration=SAMPLES / RATE,
     )
     (told,) = judged([about], [doubt], ())
-    assert told.doubts == "backtest contradicts (gyro_x)"
+    assert told.doubts == (DoubtMark("r", "backtest_contradicts", ("gyro_x",)),)
     questions = of_requirement("robot", ROBOT)
     errors = error_rows(NAMES, estimates, questions, draws=20, seed=1)
     ranking = build(

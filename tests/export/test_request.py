@@ -14,6 +14,7 @@ from imubench_pipeline.export.imu import ExportError
 from imubench_pipeline.export.request import Request, build_imu, load, make_content
 from imubench_pipeline.export.targets import TARGETS
 from imubench_pipeline.model.table import TableRow
+from imubench_pipeline.model.verdicts import DoubtMark
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.run.cli import main
 from imubench_pipeline.settings.config import ExportSettings
@@ -78,22 +79,26 @@ def judged(tables: dict[str, pa.Table], **changes: object) -> dict[str, pa.Table
     return tables | {"recordings": build("recordings", [about | changes])}
 
 
+def marked(code: str) -> tuple[DoubtMark, ...]:
+    return (DoubtMark("sim_a", code, ("gyro_x",)),)
+
+
 def test_an_unfit_recording_is_exported_with_a_reason_alone(tables: dict[str, pa.Table]) -> None:
-    moved = judged(tables, decides=False, fitness="unfit", doubts="motion (gyro_x)")
-    with pytest.raises(ExportError, match=r"sim_a does not decide: motion \(gyro_x\); .*--because"):
+    moved = judged(tables, decides=False, fitness="unfit", doubts=marked("motion"))
+    with pytest.raises(ExportError, match=r"sim_a is not used: the sensor was moved; .*--because"):
         make_content(moved, REQUEST)
     text = make_content(moved, replace(REQUEST, because="the car stood still"))
     assert isinstance(text, str)
     said = " ".join(text.replace("#", "").split())
-    assert "CAUTION: sim_a does not decide: motion (gyro_x); used all the same" in said
+    assert "CAUTION: sim_a is not used: the sensor was moved; used all the same" in said
     assert "because: the car stood still." in said
     assert yaml.safe_load(text) == yaml.safe_load(str(make_content(tables, REQUEST)))
 
 
 def test_doubts_stand_in_the_file(tables: dict[str, pa.Table]) -> None:
-    doubted = judged(tables, decides=True, doubts="lines (gyro_x)")
-    assert "CAUTION: sim_a is in doubt: lines (gyro_x)." in str(make_content(doubted, REQUEST))
-    assert make_content(judged(tables, decides=True, doubts=""), REQUEST) == make_content(
+    doubted = judged(tables, decides=True, doubts=marked("knocks"))
+    assert "CAUTION: sim_a is in doubt: knocks in gyro x." in str(make_content(doubted, REQUEST))
+    assert make_content(judged(tables, decides=True, doubts=()), REQUEST) == make_content(
         tables, REQUEST
     )
 

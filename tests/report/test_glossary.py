@@ -25,11 +25,17 @@ from imubench_pipeline.estimators import estimate, lines
 from imubench_pipeline.estimators.identifiability import bounds_of
 from imubench_pipeline.extensions.papers.page import words_of_reading
 from imubench_pipeline.extensions.papers.tables import AccuracyRow
+from imubench_pipeline.model.states import (
+    BacktestVerdict,
+    DriftVerdict,
+    GoodnessVerdict,
+    PoolVerdict,
+    ShortlistVerdict,
+    Verdict,
+)
 from imubench_pipeline.navigation import pooled
 from imubench_pipeline.navigation.backtest import comparison
 from imubench_pipeline.navigation.error_budget import Gyrocompass, Start, budget
-from imubench_pipeline.navigation.shortlist import rows as shortlist
-from imubench_pipeline.navigation.suitability import conditions
 from imubench_pipeline.noise import FLOOR, GaussMarkov, NoiseModel
 from imubench_pipeline.report import glossary as module
 from imubench_pipeline.report.datasheets import DEPENDS
@@ -271,17 +277,6 @@ def test_every_finding_has_an_entry_that_says_what_to_do() -> None:
         assert one.action is None or one.key in emitted(), f"nothing emits {one.key}"
 
 
-def strings_in(path: str, function: str, parts: type[ast.AST] = ast.Constant) -> set[str]:
-    """Return the texts in a function that are no docstring and no key."""
-    found: set[str] = set()
-    for node in ast.walk(ast.parse((SOURCE / path).read_text())):
-        if isinstance(node, ast.FunctionDef) and node.name == function:
-            for inner in node.body[1:]:
-                kept = [part for part in ast.walk(inner) if isinstance(part, parts)]
-                found |= {text for part in kept for text in literals(part)}  # type: ignore[arg-type]  # what `parts` names are nodes with literals
-    return found
-
-
 def values_in_tables() -> Iterator[tuple[str, str]]:
     for status in get_args(estimate.Status):
         yield status, ""
@@ -294,18 +289,10 @@ def values_in_tables() -> Iterator[tuple[str, str]]:
     ]:
         yield verdict, "verdict"
     yield DEPENDS, "verdict"
-    for verdict in strings_in("navigation/verdicts/standing.py", "verdict"):
-        yield verdict, "verdict"
-    for verdict in strings_in("navigation/verdicts/judgement.py", "_explain_exclusion"):
-        if "price class" in verdict:
+    for verdicts in (Verdict, GoodnessVerdict, DriftVerdict, PoolVerdict, BacktestVerdict):
+        for verdict in get_args(verdicts):
             yield verdict, "verdict"
-    for verdict in (conditions.EXCLUDED, *conditions.CONDITIONAL_VERDICTS.values()):
-        yield verdict, "verdict"
-    for verdict in strings_in("estimators/goodness.py", "goodness", ast.IfExp):
-        yield verdict, "verdict"
-    for verdict in ("changed", "as before"):  # of the table drift
-        yield verdict, "verdict"
-    for verdict in shortlist.VERDICTS:
+    for verdict in get_args(ShortlistVerdict):
         yield verdict, "shortlist"
     for published in get_args(coverage.Published):
         yield published, "published"
@@ -336,7 +323,7 @@ def test_every_status_and_verdict_has_an_entry(value: str, kind: str) -> None:
 
 def test_the_verdicts_are_all_found() -> None:
     verdicts = {value for value, kind in values_in_tables() if kind == "verdict"}
-    assert verdicts >= {"passes", "probably fails", "not enough data", "outside the price class"}
+    assert verdicts >= set(get_args(Verdict))
     assert verdicts >= {"explained", "not explained", "not sure", "agree", "differ"}
     spoken = {one.key for one in glossary().values() if one.key.startswith("verdict_")}
     assert spoken == {term(verdict, "verdict").key for verdict in verdicts}

@@ -6,8 +6,16 @@ import pytest
 
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
 from imubench_pipeline.model.comparisons import ErrorBudgetRow, RankingRow
+from imubench_pipeline.model.verdicts import Condition, DoubtMark
 from imubench_pipeline.navigation.expected_errors import error_rows, of_requirement, standard
-from imubench_pipeline.report.meaning import budget_tables, budget_words, rankings
+from imubench_pipeline.report.meaning import (
+    Group,
+    LimitLine,
+    budget_tables,
+    budget_words,
+    rankings,
+)
+from imubench_pipeline.report.sourced import SourcedNumber
 from imubench_pipeline.settings.requirements import Requirement
 from imubench_pipeline.tables import build
 from tests.ranking import ranking_rows
@@ -40,27 +48,28 @@ def test_sensors_stand_in_their_order_with_what_decides() -> None:
     about = {sensor: {"price_class": None} for sensor, _ in SIMULATED}
     table = RankingRow.rows_of(build("ranking", ranking_rows(errors(), requirements, about)))
     (shown,) = rankings(table, {"robot": ROBOT}, SIMULATED, "practical")
-    assert [(g["rank"], g["sensor"], g["verdict"]) for g in shown["groups"]] == [
-        (1, "good", "passes"),
-        (2, "poor", "surely fails"),
+    assert [(g.rank, g.sensor, g.stated) for g in shown.groups] == [
+        ("1", "good", "meets the limits"),
+        ("2", "poor", "fails"),
         ("–", "gyro", "not enough data"),
     ]
-    assert [group["simulated"] for group in shown["groups"]] == [True, False, False]
-    heading, position = shown["groups"][1]["limits"]
-    assert (heading["sigma"].unit, position["allowed"].unit) == ("°", "m")
+    assert [group.simulated for group in shown.groups] == [True, False, False]
+    heading, position = shown.groups[1].limits
+    assert (heading.sigma.unit, position.allowed.unit) == ("°", "m")
     # The bias from 10 s at rest, held for 100 s: N sqrt(t^2 / W) against N sqrt(t), known to 10 %.
-    assert heading["sigma"] == f"{math.degrees(1e-3 * math.sqrt(100 + 100**2 / 10)):.2g} °"
-    assert position["decides"] and position["source"].startswith("gyro N in the static window (")
+    assert heading.sigma == f"{math.degrees(1e-3 * math.sqrt(100 + 100**2 / 10)):.2g} °"
+    assert position.decides and position.source.startswith("gyro N in the static window (")
 
 
 def test_a_verdict_stands_beside_what_is_doubted_of_its_logs() -> None:
     requirements = {"robot": Requirement.model_validate(ROBOT)}
     about = {sensor: {"price_class": None} for sensor, _ in SIMULATED}
     table = RankingRow.rows_of(build("ranking", ranking_rows(errors(), requirements, about)))
-    doubted = [replace(row, doubts="knocks" if row.sensor != "good" else "") for row in table]
+    marks = (DoubtMark("r", "knocks", ("gyro_x",)),)
+    doubted = [replace(row, doubts=marks if row.sensor != "good" else ()) for row in table]
     (shown,) = rankings(doubted, {"robot": ROBOT}, SIMULATED, "practical")
     # Of the third nothing is known, and the reason says why.
-    assert [group["doubts"] for group in shown["groups"]] == ["", "knocks", ""]
+    assert [group.doubts for group in shown.groups] == ["", "knocks in gyro x", ""]
 
 
 def test_a_budget_names_its_sources_and_what_is_missing() -> None:
@@ -139,8 +148,8 @@ def test_an_error_of_more_than_a_right_angle_is_no_number() -> None:
     (line,) = shown(budget(sigma=2.0, error="north"))["lines"]
     assert line["cells"][0]["lines"][0] == "not to be found"
     assert not any(" to " in one for one in line["cells"][0]["lines"][1:])
-    limit = ranked(sigma=2.0, upper=9.0)
-    assert (limit["sigma"], limit["interval"]) == ("over 90 °", "–")
+    _, limit = ranked(sigma=2.0, upper=9.0)
+    assert (limit.sigma, limit.interval) == ("over 90 °", "–")
 
 
 def test_what_is_assumed_is_said_once_with_the_errors_that_it_is_about() -> None:
@@ -160,68 +169,71 @@ def test_words_of_a_budget_tell_the_rest_before_and_the_latitude() -> None:
     assert "over 60 s at rest right before" in words and "a latitude of 45 deg" in words
 
 
-def ranked(**changes: Any) -> dict[str, Any]:
-    row = {"requirement": "robot", "sensor": "s", "rank": 1, "verdict": "passes", "decides": True,
+def ranked(**changes: Any) -> tuple[Group, LimitLine]:
+    row = {"requirement": "robot", "sensor": "s", "rank": 1, "verdict": "meets", "decides": True,
            "recording": "r", "error": "heading", "time": 100.0, "limit": 0.01, "sigma": 0.005,
            "lower": 0.004, "upper": 0.006, "unit": "rad", "margin": 2.0, "chance": 0.987,
-           "limit_verdict": "passes", "source": "gyro N", "share": 0.75,
+           "limit_verdict": "meets", "source": "gyro N", "share": 0.75,
            "reached_after": 7200.0}  # fmt: skip
     rows = RankingRow.rows_of(build("ranking", [row | changes]))
     (one,) = rankings(rows, {"robot": ROBOT}, {("s", "r"): True}, "practical")
-    (group,) = one["groups"]
-    (limit,) = group["limits"]
-    return group | limit
+    (group,) = one.groups
+    (limit,) = group.limits
+    return group, limit
 
 
 def test_a_limit_is_told_with_what_it_comes_of() -> None:
-    limit = ranked()
-    assert limit["limit"] == "heading, 100 s"
-    assert (limit["allowed"], limit["sigma"]) == ("0.573 °", "0.29 °")
-    assert limit["sigma"].source == "ranking/robot/s/heading/100/sigma"
-    assert limit["interval"] == "0.23 to 0.34"
-    assert (limit["margin"], limit["chance"]) == ("2", "99 %")
+    group, limit = ranked()
+    assert limit.limit == "heading, 100 s"
+    assert (limit.allowed, limit.sigma) == ("0.573 °", "0.29 °")
+    assert isinstance(limit.sigma, SourcedNumber)
+    assert limit.sigma.source == "ranking/robot/s/heading/100/sigma"
+    assert limit.interval == "0.23 to 0.34"
+    assert (limit.margin, limit.chance) == ("2", "99 %")
     # 0.01 over 0.006 and 0.004.
-    assert limit["margins"] == "1.7 to 2.5"
-    assert (limit["source"], limit["reached"]) == ("gyro N (75 %)", "2 h")
-    assert limit["simulated"] is True
+    assert limit.margins == "1.7 to 2.5"
+    assert (limit.source, limit.reached) == ("gyro N (75 %)", "2 h")
+    assert group.simulated is True
 
 
 def test_a_limit_that_is_not_known_is_dashes_and_its_reason() -> None:
     nothing = dict.fromkeys(
         ("rank", "sigma", "lower", "upper", "margin", "chance", "source", "share", "reached_after")
     )
-    limit = ranked(**nothing, reason="no gyro", verdict="not enough data")
-    dashes = {
-        key: limit[key] for key in ("rank", "sigma", "interval", "margin", "chance", "source")
-    }
-    assert set(dashes.values()) == {"–"} and limit["reached"] == "–"
-    assert limit["reason"] == "no gyro"
+    group, limit = ranked(**nothing, reason="no gyro", verdict="not_enough_data")
+    dashes = {group.rank, limit.sigma, limit.interval, limit.margin, limit.chance, limit.source}
+    assert dashes == {"–"} and (limit.reached, limit.parts) == ("–", ["–"])
+    assert limit.reason == "no gyro"
 
 
 @pytest.mark.parametrize("margins", [[3.0, 2.0, 1.0], [1.0, 3.0, 2.0]])
 def test_tied_sensors_stand_in_the_order_of_their_margins(margins: list[float]) -> None:
     rows = [
-        {"requirement": "robot", "sensor": f"s{margin:g}", "rank": 1, "verdict": "passes",
+        {"requirement": "robot", "sensor": f"s{margin:g}", "rank": 1, "verdict": "meets",
          "decides": True, "error": "heading", "time": 1.0, "unit": "rad", "margin": margin,
-         "limit_verdict": "passes", "limit": 1.0, "sigma": 1 / margin, "chance": 1.0}
+         "limit_verdict": "meets", "limit": 1.0, "sigma": 1 / margin, "chance": 1.0}
         for margin in margins
     ]  # fmt: skip
     (one,) = rankings([RankingRow(**row) for row in rows], {"robot": ROBOT}, {}, "si")
-    assert [group["sensor"] for group in one["groups"]] == ["s3", "s2", "s1"]
+    assert [group.sensor for group in one.groups] == ["s3", "s2", "s1"]
 
 
 def test_a_requirement_that_nothing_answers_has_no_groups() -> None:
     (one,) = rankings([], {"robot": ROBOT}, {}, "si")
-    assert (one["name"], one["groups"]) == ("robot", [])
+    assert (one.name, one.groups) == ("robot", [])
 
 
 def test_of_tied_sensors_one_without_conditions_is_named_first() -> None:
     requirements = {"robot": Requirement.model_validate(ROBOT)}
     about = {sensor: {"price_class": None} for sensor, _ in SIMULATED}
     table = RankingRow.rows_of(build("ranking", ranking_rows(errors(), requirements, about)))
-    verdicts = {"good": "passes if", "poor": "probably passes"}
+    conditions = (Condition("scale_factor", None, "gyro", 1e-3),)
+    good = {"verdict": "meets", "conditions": conditions}
+    poor = {"verdict": "likely_meets"}
     given = [
-        replace(row, rank=1, verdict=verdicts[row.sensor]) for row in table if row.sensor != "gyro"
+        replace(row, rank=1, **(good if row.sensor == "good" else poor))
+        for row in table
+        if row.sensor != "gyro"
     ]
     (shown,) = rankings(given, {"robot": ROBOT}, SIMULATED, "practical")
-    assert [group["sensor"] for group in shown["groups"]] == ["poor", "good"]
+    assert [group.sensor for group in shown.groups] == ["poor", "good"]

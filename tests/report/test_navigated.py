@@ -11,6 +11,7 @@ import pytest
 
 from imubench_pipeline.extensions.aided.page import NAVIGATION, TUNINGS, answers, ranking
 from imubench_pipeline.extensions.aided.tables import NavigationRow
+from imubench_pipeline.model.verdicts import DoubtMark
 from imubench_pipeline.settings.config import Method
 from imubench_pipeline.tables import build
 from tests.report.browser.made import publish_some
@@ -107,12 +108,12 @@ def test_sensors_are_ranked_by_the_recommended_tuning_and_overlaps_are_said() ->
 def test_what_decides_nothing_has_no_place_and_says_why() -> None:
     sold, apart = (
         recording_rows(name, decides=not doubts, doubts=doubts)
-        for name, doubts in (("sold", ""), ("fused", "not sold"))
+        for name, doubts in (("sold", ()), ("fused", (DoubtMark("day1", "not_sold"),)))
     )
     run = {"navigation": [navigation_row("sold"), navigation_row("fused")]}
     context = NAVIGATION.page(site(joined(sold, apart, run))).context()
     assert [line["sensor"] for line in context["ranking"]] == ["sold"]
-    assert context["apart"] == {"fused": "day1 does not decide: not sold"}
+    assert context["apart"] == {"fused": "day1 is not used: this sensor is not sold"}
 
 
 def test_every_tuning_has_a_name() -> None:

@@ -15,6 +15,7 @@ import pyarrow.compute as pc
 import pytest
 
 from imubench_pipeline.estimators.estimate import Parameter
+from imubench_pipeline.model.verdicts import DoubtMark
 from imubench_pipeline.report import publish as publishing
 from imubench_pipeline.report import theory
 from imubench_pipeline.report.folder import attempt_at_pages, failed_pages
@@ -353,7 +354,9 @@ def test_requirements_are_answered_on_the_start_page_and_that_of_each_sensor(
 ) -> None:
     page = read["index.html"]
     (answer,) = (one for one in page.elements if one.attributes.get("class") == "answer")
-    assert "Of 2 the nearest is V & Co one, which surely fails, on weak evidence (" in answer.text
+    assert answer.text.startswith(
+        "No sensor meets the limits. V & Co one is closest, but fails. Best of 2 sensors (weak "
+    )
     cells = [one for one in page.elements if "data-word" in one.attributes]
     assert [one.attributes["data-word"] for one in cells] == ["fails", "fails"]
     for sensor in ("one", "two"):
@@ -556,17 +559,17 @@ def test_names_of_any_kind_break_nothing(tmp_path: Path) -> None:
 def test_what_is_not_sold_is_not_said_to_lack_a_recording(tmp_path: Path) -> None:
     board = recording_rows("board", "r", ("gyro_x", "accel_x"), requirements=ASKED)
     (row,) = board["recordings"]
-    board["recordings"] = [row | {"decides": False, "doubts": "not sold"}]
+    board["recordings"] = [row | {"decides": False, "doubts": (DoubtMark("r", "not_sold"),)}]
     other = recording_rows("a", "r", ("gyro_x", "accel_x"), requirements=ASKED)
     made = run(board, other, asked=ASKED, not_sold=["board"])
     ranking = made.tables["ranking"]
     made.tables["ranking"] = ranking.filter(pc.field("sensor") != "board")  # type: ignore[index]  # made so
     publish(made, tmp_path)
     read = sound(tmp_path)
-    assert not read["index.html"].naming("not judged", "tr")
-    (line,) = read["index.html"].naming("Not among them", "p")
+    assert not read["index.html"].naming("not enough data", "tr")
+    (line,) = read["index.html"].naming("Not compared", "p")
     assert "board" in line.text and "not sold" in line.text
-    assert "It is in no ranking: not sold." in read["sensors/board.html"].text
+    assert "Not ranked: this sensor is not sold." in read["sensors/board.html"].text
 
 
 @pytest.mark.release
@@ -574,7 +577,7 @@ def test_a_tie_of_sensors_with_commas_in_their_names_is_told(tmp_path: Path) -> 
     several = [recording_rows(f"a, {i}", "r", ("gyro_x", "accel_x"), requirements=ASKED)
                for i in range(2)]  # fmt: skip
     publish(run(*several, asked=ASKED), tmp_path)
-    assert "cannot be told apart" in sound(tmp_path)["index.html"].text
+    assert "is not statistically significant" in sound(tmp_path)["index.html"].text
 
 
 # What is written again, and what is not.

@@ -5,6 +5,7 @@ from typing import Any
 
 import pytest
 
+from imubench_pipeline.model.verdicts import Shortfall
 from imubench_pipeline.report.publish import publish
 from imubench_pipeline.tables import build
 from tests.report.pages import Read, sound_pages
@@ -14,12 +15,18 @@ pytestmark = pytest.mark.usefixtures("small_report")
 
 HOSTILE = "<b>grades</b> & more"
 ROW = {"requirement": "robot", "sensor": "one", "price_class": "consumer", "best_margin": 2.0,
-       "worst_margin": 0.25, "decides": "heading within 5 deg", "verdict": "worth logging",
+       "worst_margin": 0.25, "decides": "heading within 5 deg", "verdict": "worth_logging",
        "measured_margin_of": "simulated logs", "measured_margin": 1.234,
-       "measured_verdict": "probably passes", "assumed": HOSTILE}  # fmt: skip
+       "measured_verdict": "likely_meets", "assumed": (HOSTILE, "T_B: not known")}  # fmt: skip
 OTHERS: list[dict[str, Any]] = [
-    {"requirement": "robot", "sensor": "unlogged", "best_margin": 0.5, "verdict": "cannot pass"},
-    {"requirement": "robot", "sensor": "silent", "verdict": "not judged", "reason": "no gyro"},
+    {
+        "requirement": "robot",
+        "sensor": "unlogged",
+        "best_margin": 0.5,
+        "verdict": "cannot_meet",
+        "shortfalls": (Shortfall("mass", "", "15 g", (0.02,)),),
+    },
+    {"requirement": "robot", "sensor": "silent", "verdict": "not_judged", "reason": "no gyro"},
 ]
 REPEATED = {"sensor": "one", "device": "unit 7", "channel": "gyro_x", "recordings": 3,
             "power_cycled": "unknown", "printed": 4.0, "unit": "deg/h", "kind": "typ",
@@ -41,10 +48,11 @@ def read(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Read]:
 def test_best_worst_and_measured_stand_side_by_side(read: dict[str, Read]) -> None:
     page = read["shortlist.html"]
     (line,) = page.naming("one", "tr")
-    for text in ("worth logging", "0.25", "1.23 (simulated)", "probably passes", HOSTILE):
+    for text in ("worth logging", "0.25", "1.23 (simulated)", "likely meets", HOSTILE):
         assert text in line.text
     (line,) = page.naming("unlogged", "tr")
-    assert "cannot pass" in line.text and "0.5" in line.text
+    assert "cannot meet the limits" in line.text and "0.5" in line.text
+    assert "mass 20 g, required 15 g" in line.text
     (line,) = page.naming("silent", "tr")
     assert "not judged" in line.text and "no gyro" in line.text
 

@@ -63,8 +63,8 @@ def test_rows_go_to_their_recording_and_channel_whatever_their_order(seed: int) 
     for view in views:
         for table in ("allan", "parameters", "datasheet", "findings", "error_budget", "spectrum"):
             whole = [
-                row
-                for row in RUN[table].to_pylist()
+                dict(row)
+                for row in ROWS[table].rows_of(RUN[table])
                 if (row["sensor"], row["recording"]) == (view.sensor, view.name)
             ]
             key = repr

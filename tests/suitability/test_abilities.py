@@ -4,9 +4,11 @@ from typing import Any
 
 import pytest
 
+from imubench_pipeline.model.verdicts import Condition, Shortfall
 from imubench_pipeline.navigation.suitability.abilities import abilities, judge
 from imubench_pipeline.settings.requirements import Must
 from imubench_pipeline.settings.sensor import CHANNELS, Sensor
+from imubench_pipeline.words.verdicts import shortfall_text, subject_text
 
 FIGURES = {
     "full_scale": {"value": [125, 250], "unit": "deg/s", "kind": "choices"},
@@ -26,9 +28,15 @@ WHOLE: dict[str, Any] = {
 }
 
 
-def judged(must: dict[str, Any], **changes: Any) -> tuple[list[str], list[str]]:
+def of_sensor(must: dict[str, Any], **changes: Any) -> tuple[list[Shortfall], list[Condition]]:
     sensor = Sensor.model_validate(WHOLE | changes)
     return judge(Must.model_validate(must), abilities(sensor))
+
+
+def judged(must: dict[str, Any], **changes: Any) -> tuple[list[str], list[str]]:
+    """Return what a sensor lacks and what is not known of it, in words."""
+    lacking, unknown = of_sensor(must, **changes)
+    return list(map(shortfall_text, lacking)), list(map(subject_text, unknown))
 
 
 @pytest.mark.parametrize(
@@ -37,24 +45,24 @@ def judged(must: dict[str, Any], **changes: Any) -> tuple[list[str], list[str]]:
         ({"full_scale": {"gyro": "250 deg/s"}}, None),
         (
             {"full_scale": {"gyro": "300 deg/s"}},
-            "full scale of the gyro 250 deg/s, 300 deg/s asked",
+            "gyro full scale 250 deg/s, required 300 deg/s",
         ),
         ({"bandwidth": "60 Hz", "axes": ["gyro_xyz"]}, None),
         (
             {"bandwidth": "70 Hz", "axes": ["gyro_xyz"]},
-            "bandwidth of the gyro 60 Hz, 70 Hz asked",
+            "gyro bandwidth 60 Hz, required 70 Hz",
         ),
         ({"rate": "100 Hz"}, None),
         ({"temperature": ["-20 degC", "60 degC"]}, None),
         (
             {"temperature": ["-55 degC", "60 degC"]},
-            "temperature range -40 to 85 degC, -55 degC to 60 degC asked",
+            "temperature range -40 to 85 degC, required -55 degC to 60 degC",
         ),
         ({"axes": ["gyro_xyz"]}, None),
         ({"mass": "0.02 kg"}, None),
-        ({"mass": "15 g"}, "mass 20 g, 15 g asked"),
+        ({"mass": "15 g"}, "mass 20 g, required 15 g"),
         ({"power": "0.3 W"}, None),
-        ({"power": "0.2 W"}, "power 0.3 W, 0.2 W asked"),
+        ({"power": "0.2 W"}, "power 0.3 W, required 0.2 W"),
     ],
 )
 def test_what_a_sensor_is_known_to_have(must: dict[str, Any], lacking: str | None) -> None:
@@ -64,14 +72,22 @@ def test_what_a_sensor_is_known_to_have(must: dict[str, Any], lacking: str | Non
 @pytest.mark.parametrize(
     ("must", "unknown"),
     [
-        ({"full_scale": {"accel": "8 g"}}, "full scale of the accelerometer"),
-        ({"bandwidth": "10 Hz"}, "bandwidth of the accelerometer"),
-        ({"rate": "200 Hz"}, "rate"),  # The logs are slower, which the sensor need not be.
-        ({"axes": ["accel_z"]}, "axis accel_z"),
+        ({"full_scale": {"accel": "8 g"}}, "accelerometer full scale"),
+        ({"bandwidth": "10 Hz"}, "accelerometer bandwidth"),
+        ({"rate": "200 Hz"}, "sampling rate"),  # The logs are slower, which the sensor need not be.
+        ({"axes": ["accel_z"]}, "accel z axis"),
     ],
 )
 def test_what_nobody_knows(must: dict[str, Any], unknown: str) -> None:
     assert judged(must) == ([], [unknown])
+
+
+def test_a_shortfall_has_its_figures_in_si() -> None:
+    (lacking,), _ = of_sensor({"mass": "15 g"})
+    assert (lacking.property, lacking.subject, lacking.asked) == ("mass", "", "15 g")
+    assert lacking.has == pytest.approx((0.02,))
+    (lacking,), _ = of_sensor({"axes": ["accel_x"]}, datasheet={"gyro": FIGURES, "accel": None})
+    assert lacking == Shortfall("quantity", "accel", "accel_x")
 
 
 @pytest.mark.parametrize("key", ["mass", "power", "temperature_range"])
@@ -90,7 +106,10 @@ def test_a_sensor_without_a_quantity_lacks_its_axes() -> None:
 
 def test_the_highest_rate_is_that_of_the_sensor() -> None:
     assert judged({"rate": "400 Hz"}, rate="1 kHz") == ([], [])
-    assert judged({"rate": "2 kHz"}, rate="1 kHz") == (["rate 1000 Hz, 2 kHz asked"], [])
+    assert judged({"rate": "2 kHz"}, rate="1 kHz") == (
+        ["sampling rate 1000 Hz, required 2 kHz"],
+        [],
+    )
 
 
 def test_figures_of_other_options_do_not_count() -> None:
@@ -100,6 +119,6 @@ def test_figures_of_other_options_do_not_count() -> None:
     ]
     asked = {"full_scale": {"gyro": "1000 deg/s"}}
     sheet = {"gyro": {"full_scale": figures}}
-    assert judged(asked, datasheet=sheet) == ([], ["full scale of the gyro"])
+    assert judged(asked, datasheet=sheet) == ([], ["gyro full scale"])
     lacking, _ = judged(asked, datasheet=sheet | {"options": ["mode A"]})
-    assert lacking == ["full scale of the gyro 250 deg/s, 1000 deg/s asked"]
+    assert lacking == ["gyro full scale 250 deg/s, required 1000 deg/s"]

@@ -7,10 +7,10 @@ import pytest
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
 from imubench_pipeline.navigation.error_budget.printed_errors import in_use
 from imubench_pipeline.navigation.expected_errors import error_rows, of_requirement
-from imubench_pipeline.navigation.suitability.conditions import in_words
 from imubench_pipeline.settings.printed import Datasheet
 from imubench_pipeline.settings.requirements import Requirement
 from imubench_pipeline.tables import build
+from imubench_pipeline.units import from_si
 from tests.ranking import ranking_rows
 
 CHANNELS = ("gyro_x", "accel_x")
@@ -46,15 +46,18 @@ def ranking(asked: Requirement, **sensors: dict[str, Any]) -> dict[str, dict[str
     return {row["sensor"]: row for row in found}
 
 
-def largest_of(words: str) -> float:
-    """The number of a condition: 'its ... is below 1200 ppm (1 sigma)'."""
-    return float(words.partition("below ")[2].split()[0])
+UNITS = {
+    "scale_factor": ("scale_factor_error", "ppm", "ratio"),
+    "temperature": ("temperature_coefficient", "deg/s/K", "gyro_temperature_coefficient"),
+}
+"""Name of a figure in a data sheet, its unit and dimension."""
 
 
 def test_a_sensor_whose_figures_are_known_passes_without_a_condition() -> None:
     row = ranking(requirement(), known={"gyro": GYRO})["known"]
-    assert (row["verdict"], row["conditions"]) == ("passes", None)
-    assert "gyro scale factor (datasheet, typ)" in row["parts"]
+    assert (row["verdict"], row["conditions"]) == ("meets", [])
+    kinds = {part["source"]: part["kind"] for part in row["parts"]}
+    assert kinds["gyro scale factor"] == "typ" and kinds["gyro N"] is None
 
 
 @pytest.mark.parametrize("missing", [("scale_factor_error",), tuple(GYRO)])
@@ -65,19 +68,18 @@ def test_the_largest_figure_is_that_with_which_the_limit_is_just_kept(
     left = {name: one for name, one in GYRO.items() if name not in missing}
     asked = requirement()
     row = ranking(asked, unknown={"gyro": left})["unknown"]
-    assert row["verdict"] == "passes if"
-    said = row["conditions"].split("; ")
-    assert len(said) == len(missing)
-    for share, ending in ((0.97, "passes"), (1.05, "fails")):
+    assert row["verdict"] == "meets"
+    conditions = row["conditions"]
+    assert len(conditions) == len(missing)
+    for share, ending in ((0.97, "meets"), (1.05, "fails")):
         printed = dict(left)
-        for words in said:
-            size = share * largest_of(words)
-            name, unit = ("scale_factor_error", "ppm") if "scale" in words else (
-                "temperature_coefficient", "deg/s/K",
-            )  # fmt: skip
+        for condition in conditions:
+            assert (condition["subject"], condition["property"]) == ("gyro", None)
+            name, unit, dimension = UNITS[condition["figure"]]
+            size = share * from_si(condition["largest"], unit, dimension)
             printed[name] = {"value": size, "unit": unit}
         found = ranking(asked, s={"gyro": printed})["s"]
-        assert found["conditions"] is None
+        assert found["conditions"] == []
         assert found["verdict"].endswith(ending)
 
 
@@ -85,22 +87,26 @@ def test_a_tilt_has_the_turn_on_bias_of_the_datasheet() -> None:
     asked = requirement("attitude", "5 deg", environment={})
     found = ranking(asked, known={"accel": ACCEL}, unknown={})
     # 50 mg are 2.86 deg, 5.6 deg at 95 %: it fails as delivered, and its margin says so.
-    assert found["known"]["limit_verdict"] == "surely fails" and found["known"]["margin"] < 1.0
-    assert found["known"]["verdict"] == "passes if"
-    assert found["known"]["conditions"] == found["unknown"]["conditions"]
-    assert found["known"]["source"] == "initial tilt by accel turn-on bias (datasheet, typ)"
-    assert found["unknown"]["verdict"] == "passes if"
-    assert "its accelerometers are calibrated to 4" in found["unknown"]["conditions"]
-    assert "mg (1 sigma)" in found["unknown"]["conditions"]
+    assert found["known"]["limit_verdict"] == "fails" and found["known"]["margin"] < 1.0
+    assert found["known"]["verdict"] == "meets"
+    (known,), (condition,) = found["known"]["conditions"], found["unknown"]["conditions"]
+    assert known == condition | {"largest": pytest.approx(condition["largest"], rel=1e-6)}
+    assert found["known"]["source"] == "initial tilt by accel turn-on bias"
+    (part,) = found["known"]["parts"]
+    assert (part["source"], part["kind"]) == (found["known"]["source"], "typ")
+    assert found["unknown"]["verdict"] == "meets"
+    assert (condition["figure"], condition["subject"]) == ("turn_on_bias", "accel")
+    assert from_si(condition["largest"], "mg", "acceleration") == pytest.approx(44.5, abs=0.5)
 
 
 def test_a_bias_that_is_calibrated_as_it_says_keeps_the_limit() -> None:
     asked = requirement("attitude", "5 deg", environment={})
-    said = ranking(asked, s={"accel": ACCEL})["s"]["conditions"]
-    size = float(said.partition("calibrated to ")[2].split()[0])
-    for share, verdict in ((0.97, "passes"), (1.05, "passes if")):
+    (condition,) = ranking(asked, s={"accel": ACCEL})["s"]["conditions"]
+    size = from_si(condition["largest"], "mg", "acceleration")
+    for share, conditions in ((0.97, 0), (1.05, 1)):
         offset = {"offset": {"value": share * size, "unit": "mg", "kind": "1sigma"}}
-        assert ranking(asked, s={"accel": offset})["s"]["verdict"] == verdict
+        row = ranking(asked, s={"accel": offset})["s"]
+        assert (row["verdict"], len(row["conditions"])) == ("meets", conditions)
 
 
 def test_no_calibration_helps_where_another_limit_fails() -> None:
@@ -109,25 +115,25 @@ def test_no_calibration_helps_where_another_limit_fails() -> None:
         {"error": "heading", "after": "60 s", "at_most": "0.001 deg"},
     ]
     row = ranking(requirement(limits=limits, environment={}), s={"accel": ACCEL})["s"]
-    assert (row["verdict"], row["conditions"]) == ("surely fails", None)
+    assert (row["verdict"], row["conditions"]) == ("fails", [])
 
 
 def test_what_fails_already_has_no_condition() -> None:
     row = ranking(requirement(at_most="0.01 deg"), unknown={})["unknown"]
-    assert (row["verdict"], row["conditions"]) == ("surely fails", None)
+    assert (row["verdict"], row["conditions"]) == ("fails", [])
 
 
 def test_an_unknown_figure_does_not_make_a_sensor_better() -> None:
     found = ranking(requirement(at_most="9 deg"), known={"gyro": GYRO}, unknown={})
     assert found["unknown"]["margin"] > found["known"]["margin"]
     assert (found["unknown"]["rank"], found["known"]["rank"]) == (1, 1)
-    assert found["known"]["tied_with"] == "unknown"
+    assert found["known"]["tied_with"] == ["unknown"]
 
 
 def test_a_sensor_without_what_it_must_have_is_excluded() -> None:
     asked = requirement(must={"mass": "30 g", "axes": ["gyro_x"]})
     rows = ranking(asked, unknown={"gyro": GYRO})
-    assert rows["unknown"]["verdict"] == "passes if"
-    assert "not known: axis gyro_x, mass" in rows["unknown"]["conditions"]
-    assert in_words("excluded", "no gyro") == "excluded: no gyro"
-    assert in_words("passes", None) == "passes"
+    row = rows["unknown"]
+    assert (row["verdict"], row["shortfalls"]) == ("meets", [])
+    unknown = [(each["property"], each["subject"]) for each in row["conditions"]]
+    assert unknown == [("axis", "gyro_x"), ("mass", "")]

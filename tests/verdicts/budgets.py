@@ -6,6 +6,7 @@ from imubench_pipeline.estimators.estimate import Estimate
 from imubench_pipeline.model.comparisons import ErrorBudgetRow
 from imubench_pipeline.model.estimates import ParameterRow
 from imubench_pipeline.model.recordings import DoubtRow, RecordingRow
+from imubench_pipeline.model.verdicts import DoubtMark
 from imubench_pipeline.navigation.expected_errors import error_rows, of_requirement
 from imubench_pipeline.navigation.selection import ranked
 from imubench_pipeline.navigation.verdicts.basis import Basis
@@ -37,14 +38,19 @@ def gyro(margin: float, share: float = 0.01) -> dict[str, Estimate]:
 
 def about(sensor: str, recording: str, **values: Any) -> dict[str, Any]:
     row = {"sensor": sensor, "recording": recording, "device": recording, "status": "ok",
-           "simulated": False, "duration": 36000.0, "decides": True, "doubts": ""}  # fmt: skip
+           "simulated": False, "duration": 36000.0, "decides": True, "doubts": ()}  # fmt: skip
     return row | values
 
 
 def doubt(sensor: str, recording: str, code: str, **values: Any) -> dict[str, Any]:
     row = {"sensor": sensor, "recording": recording, "channel": "gyro_x", "code": code,
-           "parameters": None, "factor": None}  # fmt: skip
+           "parameters": (), "factor": None}  # fmt: skip
     return row | values
+
+
+def marked(recording: str, *codes: str, channels: tuple[str, ...] = ()) -> tuple[DoubtMark, ...]:
+    """Return the doubts of a row of the table ``recordings``."""
+    return tuple(DoubtMark(recording, code, channels) for code in codes)
 
 
 def three_axes(sensor: str, recording: str) -> Rows:

@@ -1,14 +1,22 @@
 import math
+from typing import Any
 
 import pytest
 
+from imubench_pipeline.model.comparisons import RankingRow
+from imubench_pipeline.tables import build
+from imubench_pipeline.words.verdicts import corrected_text
 from tests.test_selection import white
-from tests.verdicts.budgets import HEADING, about, doubt, gyro, judge, requirement
+from tests.verdicts.budgets import HEADING, about, doubt, gyro, judge, marked, requirement
 
 DEGREES = math.degrees(1.0)
 UNIT = [doubt("s", "r", "suspicious_unit", factor=1 / DEGREES)]
-UNFIT = about("s", "r", decides=False, doubts="suspicious unit (gyro_x)")
+UNFIT = about("s", "r", decides=False, doubts=marked("r", "suspicious_unit"))
 ALONG = requirement(("position", "10 s", "1 m"), static_window="10 s")
+
+
+def words(row: dict[str, Any]) -> str:
+    return corrected_text(RankingRow.rows_of(build("ranking", [row]))[0])
 
 
 def test_a_sensor_in_another_unit_stands_as_it_would_in_the_right_one() -> None:
@@ -19,57 +27,59 @@ def test_a_sensor_in_another_unit_stands_as_it_would_in_the_right_one() -> None:
     truth, _ = judge({"s": {"r": right}}, asked)
     rows, _ = judge({"s": {"r": wrong}}, asked, [UNFIT], UNIT)
     for row, true in zip(rows, truth, strict=True):
-        assert row["verdict"] == "not enough data" and row["rank"] is None
-        assert row["unless_margin"] == pytest.approx(true["margin"], rel=1e-9)
-        assert row["unless_verdict"] == true["verdict"]
-        assert row["logged_verdict"] == "surely fails"
+        assert row["verdict"] == "not_enough_data" and row["rank"] is None
+        assert row["corrected_margin"] == pytest.approx(true["margin"], rel=1e-9)
+        assert row["corrected_verdict"] == true["verdict"]
+        assert row["logged_verdict"] == "fails"
         assert row["logged_margin"] == pytest.approx(true["margin"] / DEGREES, rel=0.1)
-        same = true["verdict"] == "surely fails"
-        outcome = "does so too" if same else true["verdict"]
-        assert row["unless"] == (
-            f"as logged it surely fails (margin {row['logged_margin']:.3g}); if the gyro is in "
-            f"°/s, and not rad/s, it {outcome} (margin {true['margin']:.3g})"
+        assert row["corrected_units"] == [{"quantity": "gyro", "factor": 1 / DEGREES}]
+        outcome = {"fails": "still fails", "meets": "meets the limits"}[true["verdict"]]
+        assert words(row) == (
+            f"as logged it fails (margin {row['logged_margin']:.3g}); it {outcome} "
+            f"(margin {true['margin']:.3g}) if the gyro data are in °/s, not rad/s"
         )
-    assert {row["unless_verdict"] for row in rows} > {"surely fails"}
+    assert {row["corrected_verdict"] for row in rows} > {"fails"}
 
 
 def test_a_verdict_that_stands_is_said_with_what_would_turn_it() -> None:
     rows, _ = judge({"s": {"r": gyro(7.5 / DEGREES)}}, {"robot": HEADING}, doubts=UNIT)
-    assert rows[0]["verdict"] == "surely fails"
-    assert rows[0]["unless"] == "if the gyro is in °/s, and not rad/s, it passes (margin 7.5)"
-    assert (rows[0]["unless_verdict"], rows[0]["logged_verdict"]) == ("passes", None)
+    assert rows[0]["verdict"] == "fails"
+    expected = "it meets the limits (margin 7.5) if the gyro data are in °/s, not rad/s"
+    assert words(rows[0]) == expected
+    assert (rows[0]["corrected_verdict"], rows[0]["logged_verdict"]) == ("meets", None)
     quiet = [doubt("s", "r", "suspicious_unit", factor=DEGREES)]
     rows, _ = judge({"s": {"r": gyro(9.0)}}, {"robot": HEADING}, doubts=quiet)
-    assert (rows[0]["verdict"], rows[0]["unless_verdict"]) == ("passes", "surely fails")
+    assert (rows[0]["verdict"], rows[0]["corrected_verdict"]) == ("meets", "fails")
 
 
 def test_a_failure_that_a_unit_would_lift_may_leave_another_limit_open() -> None:
     both = requirement(("heading", "100 s", "0.1 deg"), ("position", "10 s", "1 m"))
     rows, _ = judge({"s": {"r": gyro(7.5 / DEGREES)}}, {"robot": both}, doubts=UNIT)
-    assert (rows[0]["verdict"], rows[0]["unless_verdict"]) == ("surely fails", "not enough data")
-    assert rows[0]["unless_margin"] is None
-    assert rows[0]["unless"] == (
-        "if the gyro is in °/s, and not rad/s, it cannot be judged "
+    assert (rows[0]["verdict"], rows[0]["corrected_verdict"]) == ("fails", "not_enough_data")
+    assert rows[0]["corrected_margin"] is None
+    assert rows[0]["corrected_reason"] == "no accelerometer in the recording"
+    assert words(rows[0]) == (
+        "it cannot be judged if the gyro data are in °/s, not rad/s "
         "(no accelerometer in the recording)"
     )
 
 
 def test_a_unit_that_turns_nothing_is_not_spoken_of() -> None:
     rows, _ = judge({"s": {"r": gyro(0.01 / DEGREES)}}, {"robot": HEADING}, doubts=UNIT)
-    assert rows[0]["unless"] is None
+    assert words(rows[0]) == "" and rows[0]["corrected_units"] == []
 
 
 def test_a_log_left_out_for_motion_says_what_it_gave_as_logged() -> None:
-    moved = about("s", "r", decides=False, doubts="motion (gyro_x)")
+    moved = about("s", "r", decides=False, doubts=marked("r", "motion"))
     rows, steps = judge({"s": {"r": gyro(3.0)}}, {"robot": HEADING}, [moved])
-    assert rows[0]["verdict"] == "not enough data"
-    assert rows[0]["unless"] == "as logged it passes (margin 3)"
-    assert rows[0]["unless_verdict"] is None
+    assert rows[0]["verdict"] == "not_enough_data"
+    assert words(rows[0]) == "as logged it meets the limits (margin 3)"
+    assert rows[0]["corrected_verdict"] is None
     assert steps[0]["action"] == "record_again"
     # Where another recording decides, nothing hangs on the one that was left out.
     logs = {"r": gyro(3.0), "fine": gyro(2.0)}
     rows, _ = judge({"s": logs}, {"robot": HEADING}, [moved, about("s", "fine")])
-    assert (rows[0]["verdict"], rows[0]["unless"]) == ("passes", None)
+    assert (rows[0]["verdict"], words(rows[0])) == ("meets", "")
 
 
 def test_a_turn_on_bias_that_is_stated_keeps_its_size() -> None:
@@ -78,18 +88,18 @@ def test_a_turn_on_bias_that_is_stated_keeps_its_size() -> None:
     truth, _ = judge({"s": {"r": {"gyro_x": white(1e-4)}}}, {"robot": asked})
     wrong = {"gyro_x": white(1e-4 * DEGREES)}
     rows, _ = judge({"s": {"r": wrong}}, {"robot": asked}, [UNFIT], UNIT)
-    assert rows[0]["unless_margin"] == pytest.approx(truth[0]["margin"], rel=1e-9)
+    assert rows[0]["corrected_margin"] == pytest.approx(truth[0]["margin"], rel=1e-9)
 
 
 @pytest.mark.parametrize(
-    ("factor", "words"),
-    [(9.80665, "g, and not m/s²"), (1 / 9.80665, "m/s², and not g"), (1e-3, "mg, and not g")],
+    ("factor", "units"),
+    [(9.80665, "g, not m/s²"), (1 / 9.80665, "m/s², not g"), (1e-3, "mg, not g")],
 )
-def test_an_accelerometer_in_another_unit_turns_what_it_makes(factor: float, words: str) -> None:
+def test_an_accelerometer_in_another_unit_turns_what_it_makes(factor: float, units: str) -> None:
     right = {"gyro_x": white(1e-7), "accel_x": white(1e-2)}
     truth, _ = judge({"s": {"r": right}}, {"along": ALONG})
     wrong = right | {"accel_x": white(1e-2 / factor)}
     unit = [doubt("s", "r", "suspicious_unit", channel="accel_x", factor=factor)]
     rows, _ = judge({"s": {"r": wrong}}, {"along": ALONG}, [UNFIT], unit)
-    assert rows[0]["unless_margin"] == pytest.approx(truth[0]["margin"], rel=1e-9)
-    assert f"if the accelerometer is in {words}, it " in rows[0]["unless"]
+    assert rows[0]["corrected_margin"] == pytest.approx(truth[0]["margin"], rel=1e-9)
+    assert words(rows[0]).endswith(f" if the accelerometer data are in {units}")

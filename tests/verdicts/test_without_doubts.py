@@ -4,11 +4,11 @@ from typing import Any
 
 import pytest
 
-from tests.verdicts.budgets import HEADING, about, doubt, gyro, judge, requirement
+from tests.verdicts.budgets import HEADING, about, doubt, gyro, judge, marked, requirement
 
 SAID = {
-    "doubts", "evidence", "evidence_reasons", "left_out", "unless", "unless_verdict",
-    "unless_margin", "logged_verdict", "logged_margin",
+    "doubts", "evidence", "evidence_reasons", "left_out", "corrected_units",
+    "corrected_verdict", "corrected_margin", "corrected_reason", "logged_verdict", "logged_margin",
 }  # fmt: skip
 """Columns of the table ``ranking`` that doubts may change."""
 
@@ -23,17 +23,17 @@ def figures(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
 @pytest.mark.parametrize("code", ["noise_grows", "not_explained", "backtest_contradicts"])
 def test_a_doubt_leaves_every_figure(code: str) -> None:
     clean, _ = judge(SENSORS, ASKED)
-    words = f"{code.replace('_', ' ')} (gyro_x)"
-    recordings = [about("s", "r", doubts=words), about("s", "q"), about("t", "r", doubts=words)]
+    marks = marked("r", code, channels=("gyro_x",))
+    recordings = [about("s", "r", doubts=marks), about("s", "q"), about("t", "r", doubts=marks)]
     told = [doubt("s", "r", code), doubt("t", "r", code)]
     doubted, _ = judge(SENSORS, ASKED, recordings, told)
-    assert all(words in row["doubts"] for row in doubted)
+    assert all([one["code"] for one in row["doubts"]] == [code] for row in doubted)
     assert figures(doubted) == figures(clean)
 
 
 def test_what_is_let_in_although_it_is_unfit_has_its_figures() -> None:
     clean, _ = judge(SENSORS, ASKED)
-    recordings = [about("s", "r", doubts="motion"), about("s", "q"), about("t", "r")]
+    recordings = [about("s", "r", doubts=marked("r", "motion")), about("s", "q"), about("t", "r")]
     let_in, _ = judge(SENSORS, ASKED, recordings, [doubt("s", "r", "motion")])
     assert figures(let_in) == figures(clean)
     recordings[0] |= {"decides": False}

@@ -34,7 +34,7 @@ GLOBAL_STEPS = dict.fromkeys(("sensor_tables", *TOGETHER), 1)
 METHODS = ['estimate={"methods": ["likelihood", "weighted"]}']
 
 RADIAN = np.pi / 180.0
-REASON = "c does not decide: suspicious unit (gyro_x)"
+REASON = "c is not used: the unit of gyro x looks wrong"
 
 
 def put_log_times(path: Path, seed: int, factor: float) -> None:
@@ -183,7 +183,8 @@ def test_pools_and_rankings_stand_on_the_others(project: Project) -> None:
     assert ranked
     for row in ranked:
         assert row["recording"] in ("a", "b")
-        assert row["left_out"].startswith(REASON)
+        first = {"recording": "c", "code": "suspicious_unit", "channels": ["gyro_x"]}
+        assert row["left_out"][0] == first
 
 
 def pooled_of_one(project: Project) -> dict:
@@ -198,10 +199,10 @@ def test_exports_and_pages_say_what_does_not_decide(project: Project) -> None:
     assert f"CAUTION: left out: {REASON}" in said
     assert yaml.safe_load(exported)["gyroscope_noise_density"] == pytest.approx(1e-4, rel=0.05)
     report = project.results / "report"
-    assert REASON in (report / "index.html").read_text()
-    assert "does not decide (suspicious unit" in (report / "recordings.html").read_text()
-    assert "Does not decide" in (report / "recordings/one/c.html").read_text()
-    assert "Does not decide" not in (report / "recordings/one/a.html").read_text()
+    assert "Not used: c: the unit of gyro x looks wrong" in (report / "index.html").read_text()
+    assert "not used (the unit of gyro x looks wrong" in (report / "recordings.html").read_text()
+    assert "Not used in comparisons" in (report / "recordings/one/c.html").read_text()
+    assert "Not used in comparisons" not in (report / "recordings/one/a.html").read_text()
 
 
 def test_to_include_it_makes_the_tables_and_the_report_anew(project: Project) -> None:

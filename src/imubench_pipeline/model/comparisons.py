@@ -321,6 +321,9 @@ class RankingRow(TableRow):
     ] = ()
     corrected_verdict: Annotated[Verdict | None, Column("with these factors")] = None
     corrected_margin: Annotated[float | None, Column("with these factors")] = None
+    corrected_reason: Annotated[
+        str | None, Column("why it cannot be judged with these factors")
+    ] = None
     logged_verdict: Annotated[Verdict | None, Column("with unused recordings, as logged")] = None
     logged_margin: Annotated[float | None, Column("with unused recordings, as logged")] = None
     backtest_channel: Annotated[

@@ -93,6 +93,7 @@ def _make_row(
         ),
         corrected_verdict=corrected.verdict if corrected else None,
         corrected_margin=_get_margin(corrected),
+        corrected_reason=corrected.total.reason if corrected and not corrected.known else None,
         logged_verdict=logged.verdict if logged else None,
         logged_margin=_get_margin(logged),
         backtest_channel=tested.channel if tested else None,

@@ -24,6 +24,7 @@ from imubench_pipeline.words.verdicts import (
     doubts_text,
     evidence_text,
     shortfall_text,
+    used_doubts_text,
 )
 
 _VERDICTS: tuple[Verdict, ...] = get_args(Verdict)
@@ -135,7 +136,9 @@ def matrix(site: Site) -> Matrix | None:
         cells = [cells[place] for cells in lines.values()]
         judged = sorted((cell for cell in cells if cell.judged), key=lambda cell: -cell.order)
         best = [rows[name, cell.sensor] for cell in judged]
-        columns.append(_column(name, declared, answer_text(best, site.names, len(cells))))
+        excluded = sum(cell.verdict == "excluded" for cell in cells)
+        answer = answer_text(best, site.names, len(cells), excluded)
+        columns.append(_column(name, declared, answer))
     return Matrix(
         columns,
         [(sensor, lines[sensor]) for sensor in order],
@@ -204,7 +207,7 @@ def _cell(row: RankingRow, scale: Scale) -> Cell:
         margin(row) if judged else None,
         bar,
         evidence_text(row) if judged else "",
-        doubts_text(row.doubts),
+        used_doubts_text(row),
         "" if judged else _explain(row),
         [] if judged else _alternatives(row, scale),
         _order(place, row.margin) if judged else -math.inf,
@@ -221,7 +224,7 @@ def _explain(row: RankingRow) -> str:
     if row.verdict == "excluded":
         return "; ".join(map(shortfall_text, row.shortfalls))
     if row.left_out:
-        return f"not used: {doubts_text(row.left_out)}"
+        return doubts_text(row.left_out)
     return row.reason or "too little is known"
 
 

@@ -23,10 +23,10 @@ from imubench_pipeline.words.numbers import NO_VALUE, Unit, duration_text, inter
 from imubench_pipeline.words.verdicts import (
     VERDICT_WORDS,
     corrected_text,
-    doubts_text,
     evidence_text,
     share_text,
     stated_verdict,
+    used_doubts_text,
 )
 
 Simulated = Mapping[tuple[str, str], bool]
@@ -130,7 +130,7 @@ def _group(limits: Sequence[RankingRow], simulated: Simulated, system: System) -
         verdict=VERDICT_WORDS[row.verdict],
         stated=stated_verdict(row),
         weak=evidence_text(row) if row.rank else "",
-        doubts=doubts_text(row.doubts, named=len(used) > 1) if row.rank else "",
+        doubts=used_doubts_text(row) if row.rank else "",
         corrected=corrected_text(row),
         limits=[_limit(limit, system) for limit in limits],
     )

@@ -185,7 +185,7 @@ def leaders(ranking: Iterable[RankingRow], recordings: Iterable[RecordingRow]) -
             shown = f"no sensor meets the limits; closest is {shown}"
         tied = f"; not significantly better than {', '.join(best.tied_with)}" * bool(best.tied_with)
         weak = "; weak evidence" * (best.evidence == "weak")
-        yield one_line(f"{name}: {shown}: {stated_verdict(best)}{weak}{tied}")
+        yield one_line(f"{name}: {shown}: {stated_verdict(best)}{tied}{weak}")
 
 
 def one_line(text: str, longest: int = _MOST_LETTERS) -> str:

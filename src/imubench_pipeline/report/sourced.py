@@ -25,9 +25,9 @@ class SourcedNumber(str):
 
     def __new__(cls, text: str, source: str, unit: str = "") -> SourcedNumber:
         """Return the text, with its source."""
-        told = super().__new__(cls, text)
-        told.source, told.unit = source, unit
-        return told
+        number = super().__new__(cls, text)
+        number.source, number.unit = source, unit
+        return number
 
     def __html__(self) -> Markup:
         """Return it as an element with its source."""
@@ -43,9 +43,9 @@ class SourcedInterval(str):
 
     def __new__(cls, lower: SourcedNumber, upper: SourcedNumber) -> SourcedInterval:
         """Return ``lower to upper``."""
-        between = super().__new__(cls, f"{lower} to {upper}")
-        between.ends = (lower, upper)
-        return between
+        interval = super().__new__(cls, f"{lower} to {upper}")
+        interval.ends = (lower, upper)
+        return interval
 
     def __html__(self) -> Markup:
         """Return them as elements with their sources."""

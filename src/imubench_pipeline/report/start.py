@@ -26,6 +26,7 @@ from imubench_pipeline.words.verdicts import (
     doubts_text,
     list_others,
     spread_text,
+    used_doubts_text,
 )
 
 _STEPS = 3
@@ -176,13 +177,25 @@ def _rankings(site: Site) -> Iterator[_Answer]:
             ranking.requirement,
             groups,
             requirement_text(ranking.requirement),
-            answer_text([group.row for group in ranked], site.names, len(groups)),
+            _answer(site, groups, ranked),
             list(_details(site, groups, ranked)),
             {
                 group.sensor: [site.names.get(name, name) for name in group.row.tied_with]
                 for group in groups
             },
         )
+
+
+def _answer(site: Site, groups: Sequence[Group], ranked: Sequence[Group]) -> str:
+    """Return which sensor to choose; a simulated one is marked."""
+    simulated = {
+        group.sensor: f"{site.names[group.sensor]} (simulated)"
+        for group in ranked
+        if group.simulated
+    }
+    excluded = sum(group.row.verdict == "excluded" for group in groups)
+    rows = [group.row for group in ranked]
+    return answer_text(rows, {**site.names, **simulated}, len(groups), excluded)
 
 
 def _details(site: Site, groups: Sequence[Group], ranked: Sequence[Group]) -> Iterator[str]:
@@ -194,7 +207,7 @@ def _details(site: Site, groups: Sequence[Group], ranked: Sequence[Group]) -> It
         )
         if decides.reason:
             text += f" Not counted: {decides.reason}."
-        yield f"{text} {_describe_data(site, group.row)}"
+        yield text + f" {_describe_data(site, group.row)}"  # still markup
         if conditions := group.row.conditions:
             yield f"Conditions: {'; '.join(map(condition_text, conditions))}."
         if tied := [site.names.get(name, name) for name in group.row.tied_with]:
@@ -241,7 +254,7 @@ def _describe_data(site: Site, row: RankingRow) -> str:
     if spread := spread_text(row):
         text += f" Spread: {spread}."
     if row.doubts:
-        text += f" Doubts: {doubts_text(row.doubts, named=row.recordings > 1)}."
+        text += f" Doubts: {used_doubts_text(row)}."
     return text + left_out
 
 

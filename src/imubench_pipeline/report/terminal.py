@@ -243,7 +243,7 @@ def _ranking_lines(group: Group, *, every: bool) -> Iterator[list[str | Text]]:
     row = group.row
     sensor = one_line(group.sensor + " (simulated)" * group.simulated)
     if row.tied_with:
-        sensor += "\n" + one_line(f"like {', '.join(row.tied_with)}")
+        sensor += "\n" + one_line(f"similar to {', '.join(row.tied_with)}")
     style = "yellow" if row.conditions else _STYLES[row.verdict]
     verdict = Text(one_line(group.stated), style=style)
     if group.weak:

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import contextlib
 import json
+import math
 import os
 import shutil
 import tempfile
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, is_dataclass
 from pathlib import Path
 from typing import Any
@@ -92,9 +93,20 @@ def _plain(value: Any) -> Any:
     """Return a value as Arrow takes it: each character of a text shows, structs are mappings."""
     if isinstance(value, str):
         return _shown(value)
-    if isinstance(value, tuple):
-        return [_plain(part) for part in value]
-    return asdict(value) if is_dataclass(value) and not isinstance(value, type) else value
+    if isinstance(value, (tuple, list)):
+        return [_plain_part(part) for part in value]
+    return value
+
+
+def _plain_part(value: Any) -> Any:
+    """Return an element of a list, or a field of a struct, as `_plain`; None if not finite."""
+    if is_dataclass(value) and not isinstance(value, type):
+        value = asdict(value)
+    if isinstance(value, Mapping):
+        return {name: _plain_part(part) for name, part in value.items()}
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return _plain(value)
 
 
 def _finite(column: pa.Array) -> pa.Array:

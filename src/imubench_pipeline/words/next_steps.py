@@ -9,27 +9,30 @@ from imubench_pipeline.model.comparisons import NextStepRow
 from imubench_pipeline.model.states import Action
 from imubench_pipeline.settings.printed import SENSORS
 from imubench_pipeline.words.doubts import doubt_text
-from imubench_pipeline.words.numbers import counted
+from imubench_pipeline.words.numbers import counted, join_names
 from imubench_pipeline.words.verdicts import subject_text
 
 
 def next_step_text(step: NextStepRow) -> str:
-    """Return a next step: ``Record 3 more units to settle 1 verdict``."""
-    return f"{_describe_action(step)} {_describe_effect(step)}"
+    """Return a next step: ``Record 3 more units: this could settle 1 verdict``."""
+    return f"{_describe_action(step)}: {_describe_effect(step)}"
 
 
 def _describe_action(step: NextStepRow) -> str:
     quantities = " and ".join(SENSORS[name] for name in step.quantities)
     match step.action:
         case "check_unit":
-            return f"Check the {quantities} unit of {step.recording}"
+            units = f"{quantities} unit" + "s" * (len(step.quantities) > 1)
+            return f"Check the {units.strip()} of {step.recording}"
         case "find_figures":
-            return f"Find the {', '.join(map(subject_text, step.figures))}"
+            return f"Look up the {join_names(list(map(subject_text, step.figures)))}"
         case "record_again":
-            return f"Record {step.recording} again ({'; '.join(map(doubt_text, step.doubts))})"
+            doubts = "; ".join(map(doubt_text, step.doubts))
+            return f"Record {step.recording} again" + f" ({doubts})" * bool(doubts)
         case "add_channels":
-            missing = f"the {quantities}" if quantities else "all three axes"
-            return f"Record {missing}, missing in {step.recording},"
+            if quantities:
+                return f"Record the {quantities} too ({step.recording} has none)"
+            return f"Record all three axes ({step.recording} has fewer)"
         case "log_longer":
             assert step.duration is not None  # of every such step
             more = step.duration - (step.logged or 0.0)
@@ -58,7 +61,7 @@ def _describe_effect(step: NextStepRow) -> str:
         parts.append(f"give {_count(step.verdicts_strengthened)} stronger evidence")
         if len(parts) == 1:
             parts[0] = f"this would {parts[0]}"
-    return f"({' and '.join(parts)})"
+    return " and ".join(parts)
 
 
 def _count(number: int) -> str:

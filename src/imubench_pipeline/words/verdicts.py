@@ -22,7 +22,13 @@ from imubench_pipeline.model.verdicts import (
 from imubench_pipeline.settings.printed import SENSORS
 from imubench_pipeline.units import from_si
 from imubench_pipeline.words.doubts import doubt_text
-from imubench_pipeline.words.numbers import counted, duration_text, number_text, percent_text
+from imubench_pipeline.words.numbers import (
+    counted,
+    duration_text,
+    join_names,
+    number_text,
+    percent_text,
+)
 
 VERDICT_WORDS: Mapping[Verdict, str] = {
     "meets": "meets the limits",
@@ -54,7 +60,7 @@ SHORTLIST_WORDS: Mapping[ShortlistVerdict, str] = {
     "cannot_meet": "cannot meet the limits",
     "worth_logging": "worth logging",
     "meets_at_worst": "meets the limits",
-    "not_judged": "not enough data",
+    "not_judged": "not judged",
 }
 """Verdict by the data sheet alone."""
 
@@ -62,11 +68,11 @@ SHORTLIST_MEANINGS: Mapping[ShortlistVerdict, str] = {
     "cannot_meet": "lacks a demanded property, or fails even with its best printed figures",
     "worth_logging": "meets the limits with its best figures, and may not with its worst",
     "meets_at_worst": "even with its worst printed figures",
-    "not_judged": "too little is published",
+    "not_judged": "too little is published, or its price class is another",
 }
 
 _NOUNS: Mapping[Figure, tuple[str, str, str]] = {
-    "turn_on_bias": ("calibrated bias", "deg/s", "mg"),
+    "turn_on_bias": ("bias after calibration", "deg/s", "mg"),
     "temperature": ("temperature coefficient", "deg/s/K", "mg/K"),
     "scale_factor": ("scale factor error", "ppm", "ppm"),
     "g_sensitivity": ("g-sensitivity", "deg/s/g", ""),
@@ -88,10 +94,10 @@ _DIMENSIONS = {
 _PROPERTIES: Mapping[Property, tuple[str, str, str]] = {
     "price_class": ("price class", "", ""),
     "quantity": ("{subject}", "", ""),
-    "axis": ("axis {subject}", "", ""),
+    "axis": ("{subject} axis", "", ""),
     "full_scale": ("{subject} full scale", "", ""),
     "bandwidth": ("{subject} bandwidth", "Hz", "frequency"),
-    "rate": ("rate", "Hz", "frequency"),
+    "rate": ("sampling rate", "Hz", "frequency"),
     "temperature": ("temperature range", "degC", "temperature"),
     "mass": ("mass", "g", "mass"),
     "power": ("power", "W", "power"),
@@ -124,7 +130,7 @@ _SPREAD_OF: Mapping[SpreadOf, str] = {
 def verdict_text(verdict: Verdict, conditions: Sequence[Condition] = ()) -> str:
     """Return a verdict with its conditions, such as ``meets the limits if its gyro ... is ...``."""
     text = VERDICT_WORDS[verdict]
-    return f"{text} if {' and '.join(map(condition_text, conditions))}" if conditions else text
+    return f"{text} if {join_names(list(map(condition_text, conditions)))}" if conditions else text
 
 
 def stated_verdict(row: RankingRow) -> str:
@@ -137,7 +143,9 @@ def stated_verdict(row: RankingRow) -> str:
 def condition_text(condition: Condition) -> str:
     """Return a condition: ``its gyro g-sensitivity is below 0.1 deg/s/g (1σ)``."""
     if condition.figure is None:
-        return f"its {subject_text(condition)} meets the requirement"
+        name = subject_text(condition)
+        owned = condition.property in ("quantity", "axis")
+        return f"it has a {name}" if owned else f"its {name} meets the requirement"
     _, *units = _NOUNS[condition.figure]
     unit = units[condition.subject == "accel"]
     largest = _round_down(from_si(condition.largest or 0.0, unit, _DIMENSIONS[unit]))
@@ -149,8 +157,11 @@ def subject_text(condition: Condition) -> str:
     if condition.figure is not None:
         return f"{SENSORS[condition.subject]} {_NOUNS[condition.figure][0]}"
     assert condition.property is not None  # one of the two
-    name = SENSORS.get(condition.subject, condition.subject)
-    return _PROPERTIES[condition.property][0].format(subject=name)
+    return _name_property(condition.property, condition.subject)
+
+
+def _name_property(of: Property, subject: str) -> str:
+    return _PROPERTIES[of][0].format(subject=SENSORS.get(subject, subject.replace("_", " ")))
 
 
 def _round_down(value: float) -> float:
@@ -165,10 +176,10 @@ def shortfall_text(shortfall: Shortfall) -> str:
     """Return a missing property: ``gyro full scale 250 deg/s, required 300 deg/s``."""
     if shortfall.property == "price_class":
         return f"price class {shortfall.subject or 'not stated'}, required {shortfall.asked}"
-    name, unit, dimension = _PROPERTIES[shortfall.property]
+    name = _name_property(shortfall.property, shortfall.subject)
+    _, unit, dimension = _PROPERTIES[shortfall.property]
     if shortfall.property == "full_scale":
         unit, dimension = _FULL_SCALES[shortfall.subject]
-    name = name.format(subject=SENSORS.get(shortfall.subject, shortfall.subject))
     if not shortfall.has:
         return f"no {name}"
     own = " to ".join(f"{from_si(value, unit, dimension):.4g}" for value in shortfall.has)
@@ -192,10 +203,10 @@ def _describe_weakness(code: str, row: RankingRow) -> str:
     match code:
         case "one_specimen":
             borrowed = row.spread_of == "other sensors"
-            return "one unit" + ", with the spread of other sensors" * borrowed
+            return "one unit" + ", spread taken from other sensors" * borrowed
         case "short_log":
             length = duration_text(row.longest_log)
-            return f"one log of {length}" if row.recordings == 1 else f"no log beyond {length}"
+            return f"one log of {length}" if row.recordings == 1 else f"no log longer than {length}"
         case "wide_interval" if row.spread_of == "specimens":
             return f"wide interval from {row.specimens} units"
         case "wide_interval":
@@ -214,7 +225,12 @@ def doubts_text(doubts: Iterable[DoubtMark], *, named: bool = False, most: int =
         )
     )
     more = len(texts) - most
-    return "; ".join(texts[:most]) + (f"; {more} more" if more > 0 else "")
+    return "; ".join(texts[:most]) + (f"; and {more} more" if more > 0 else "")
+
+
+def used_doubts_text(row: RankingRow) -> str:
+    """Return the doubts about the recordings of a row of ``ranking``, named if they are several."""
+    return doubts_text(row.doubts, named=(row.recordings or 0) > 1)
 
 
 def spread_text(row: RankingRow) -> str:
@@ -232,7 +248,8 @@ def corrected_text(row: RankingRow) -> str:
     if row.corrected_verdict is not None:
         outcome = _describe_outcome(row.corrected_verdict, row.corrected_margin)
         still = "still " * (row.logged_verdict == row.corrected_verdict)
-        parts.append(f"it {still}{outcome} if {_describe_units(row.corrected_units)}")
+        why = f" ({row.corrected_reason})" * bool(row.corrected_reason)
+        parts.append(f"it {still}{outcome} if {_describe_units(row.corrected_units)}{why}")
     return "; ".join(parts)
 
 
@@ -253,10 +270,12 @@ def _describe_units(factors: Iterable[UnitFactor]) -> str:
         else:
             times, way = (1.0 / factor, "large") if factor < 1.0 else (factor, "small")
             named.append(f"the {name} data are {number_text(times, 3)} times too {way}")
-    return " and ".join(named)
+    return ", and ".join(named)
 
 
-def answer_text(rows: Sequence[RankingRow], names: Mapping[str, str], asked: int) -> str:
+def answer_text(
+    rows: Sequence[RankingRow], names: Mapping[str, str], asked: int, excluded: int = 0
+) -> str:
     """Return in a line which sensor to choose: the best first, of those that are judged.
 
     Parameters
@@ -267,9 +286,12 @@ def answer_text(rows: Sequence[RankingRow], names: Mapping[str, str], asked: int
         Name of each sensor.
     asked : int
         Number of sensors, judged or not.
+    excluded : int
+        Number of those that lack a demanded property.
     """
+    having = "the demanded properties and usable data" if excluded else "usable data"
     if not rows:
-        return "No sensor has usable data." if asked else "No recording answers it."
+        return f"No sensor has {having}." if asked else "No recording answers it."
     best = rows[0]
     name = names[best.sensor]
     if best.verdict in ("meets", "likely_meets"):
@@ -278,12 +300,17 @@ def answer_text(rows: Sequence[RankingRow], names: Mapping[str, str], asked: int
             are = "is" if len(best.conditions) == 1 else "are"
             text += f"; {counted(len(best.conditions), 'figure')} {are} unknown"
     elif best.verdict == "not_enough_data":
-        text = f"No sensor is shown to meet the limits. {name} is closest: not enough data"
+        text = "No sensor is shown to meet the limits. "
+        text += f"{name} is closest, but there is not enough data"
+    elif best.verdict == "likely_fails":
+        text = f"No sensor is shown to meet the limits. {name} is closest, but likely fails"
     else:
         text = f"No sensor meets the limits. {name} is closest, but {VERDICT_WORDS[best.verdict]}"
     weak = evidence_text(best)
-    only = len(rows) == 1
-    rank = "Only sensor with usable data" if only else f"Best of {len(rows)} sensors"
+    if len(rows) == 1:
+        rank = f"Only sensor with {having}"
+    else:
+        rank = f"Best of {len(rows)} sensors" + f" with {having}" * (len(rows) < asked)
     return f"{text}. {rank}{f' (weak evidence: {weak})' if weak else ''}."
 
 

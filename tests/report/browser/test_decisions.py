@@ -7,6 +7,7 @@ from urllib.parse import unquote
 
 import pytest
 
+from imubench_pipeline.words.verdicts import SHORT_VERDICTS
 from tests.conftest import few
 from tests.report.browser import made
 from tests.report.browser.made import Report
@@ -114,21 +115,16 @@ def test_words_of_the_matrix_are_those_of_the_ranking(start: Reader, bench: Repo
     table = reader.page.locator("[data-decisions]")
     heads = table.locator("thead th").all_inner_texts()
     assert [head.split("\n")[0].strip() for head in heads] == ["Sensor", "Rover", "Wheels"]
-    words = {
-        "passes": "passes",
-        "probably fails": "open",
-        "not enough data": "not judged",
-    }
     for row in bench.of("ranking", decides=True):
         name = f"{made.SENSORS[row['sensor']].vendor} {made.SENSORS[row['sensor']].model}"
         line = table.get_by_role("row").filter(has=reader.page.get_by_role("rowheader", name=name))
         cell = line.locator("td").nth(list(made.REQUIREMENTS).index(row["requirement"]))
-        word = words[row["verdict"]]
+        word = SHORT_VERDICTS[row["verdict"]]
         assert cell.get_attribute("data-word") == word
         # Word and shape, so that the colour alone tells nothing.
         assert word in cell.inner_text() and cell.locator("svg.shape").count() == 1
         hatched = "hatched" in (cell.get_attribute("class") or "")
-        assert hatched == (word != "not judged" and row["evidence"] == "weak")
+        assert hatched == (row["margin"] is not None and row["evidence"] == "weak")
         assert cell.locator("svg.bar").count() == (row["margin"] is not None)
         if hatched:
             assert "weak evidence: " in (cell.text_content() or "")
@@ -180,7 +176,7 @@ def test_the_answer_is_on_the_first_screen(
             assert page.locator(f"#{name}").bounding_box()["y"] < height  # type: ignore[index]  # drawn
     answers = page.locator(".answers li").all_inner_texts()
     assert len(answers) == len(made.REQUIREMENTS)
-    assert "A-1 passes" in answers[0] and "A-1 is nearest" in answers[1]
+    assert "A-1 meets the limits" in answers[0] and "A-1 is closest" in answers[1]
     last = page.locator("[data-decisions] tbody tr").first.bounding_box()
     assert last is not None and last["y"] + last["height"] < height
     assert page.evaluate(TOO_WIDE) == []

@@ -118,18 +118,20 @@ def judge(must: Must, has: Abilities) -> tuple[list[Shortfall], list[Condition]]
     (list of Shortfall, list of Condition)
         Demanded properties that it does not have, and those that are not known.
     """
-    points = list(_compare(must, has))
+    points: dict[tuple[Property, str], _Point] = {}
+    for point in _compare(must, has):
+        points.setdefault((point.property, point.subject), point)
     lacking = [
         Shortfall(point.property, point.subject, point.asked, point.has)
-        for point in points
+        for point in points.values()
         if point.fulfilled is False
     ]
     unknown = [
         Condition(None, point.property, point.subject)
-        for point in points
+        for point in points.values()
         if point.fulfilled is None
     ]
-    return list(dict.fromkeys(lacking)), list(dict.fromkeys(unknown))
+    return lacking, unknown
 
 
 def _compare(must: Must, has: Abilities) -> Iterator[_Point]:

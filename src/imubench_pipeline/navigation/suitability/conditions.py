@@ -1,10 +1,10 @@
 """Conditions of a verdict other than the known errors: unknown figures and hard requirements.
 
-A sensor that does not meet a hard requirement is excluded. If its known errors pass, but a figure
-that matters in this use is not known, it passes if that figure is below the largest one within the
-limit. Several unknown figures share the remaining error budget: with all of them at their largest,
-the limit is just reached. If the printed turn-on bias alone exceeds a limit, the sensor passes if
-it is calibrated to within the remaining error budget.
+A sensor that does not meet a hard requirement is excluded. If its known errors meet the limits, but
+a figure that matters in this use is not known, it meets them if that figure is below the largest
+one within the limit. Several unknown figures share the remaining error budget: with all of them at
+their largest, the limit is just reached. If the printed turn-on bias alone exceeds a limit, the
+sensor meets it if it is calibrated to within the remaining error budget.
 """
 
 from __future__ import annotations

@@ -1,0 +1,345 @@
+"""Verdicts, conditions, shortfalls, evidence and the answer to a requirement, in words."""
+
+from collections.abc import Iterable
+from dataclasses import replace
+from itertools import product
+from typing import Any, get_args
+
+import pytest
+
+from imubench_pipeline.model.comparisons import RankingRow
+from imubench_pipeline.model.states import ShortlistVerdict, SpreadOf, Verdict
+from imubench_pipeline.model.verdicts import (
+    Condition,
+    Figure,
+    Property,
+    Share,
+    Shortfall,
+    UnitFactor,
+)
+from imubench_pipeline.navigation.verdicts.evidence import WEAKNESS_REASONS
+from imubench_pipeline.words.verdicts import (
+    SHORT_VERDICTS,
+    SHORTLIST_MEANINGS,
+    SHORTLIST_WORDS,
+    VERDICT_MEANINGS,
+    VERDICT_WORDS,
+    answer_text,
+    condition_text,
+    corrected_text,
+    evidence_text,
+    list_others,
+    share_text,
+    shortfall_text,
+    spread_text,
+    stated_verdict,
+    subject_text,
+    verdict_text,
+)
+
+SCALE = Condition("scale_factor", None, "gyro", 1.2e-3)
+MASS = Condition(None, "mass", "")
+SUBJECTS = {"quantity": "gyro", "axis": "gyro_x", "full_scale": "gyro", "bandwidth": "accel",
+            "price_class": "tactical"}  # fmt: skip
+DEGREE = 0.017453292519943295
+
+
+def row(sensor: str = "a", verdict: Verdict = "meets", **values: Any) -> RankingRow:
+    plain = {"requirement": "robot", "decides": True, "error": "heading", "time": 60.0,
+             "unit": "rad", "limit_verdict": verdict, "evidence": "strong"}  # fmt: skip
+    return RankingRow(sensor=sensor, verdict=verdict, **(plain | values))
+
+
+def is_plain(text: str) -> bool:
+    """Tell whether a text has no code, and no gap where a word should be."""
+    return bool(text) and not any(part in text for part in ("_", "  ", "{", "()", "None"))
+
+
+@pytest.mark.parametrize("verdict", get_args(Verdict))
+def test_every_verdict_has_words(verdict: Verdict) -> None:
+    for words in (VERDICT_WORDS, SHORT_VERDICTS, VERDICT_MEANINGS):
+        assert words.keys() == set(get_args(Verdict)) and is_plain(words[verdict])
+    assert verdict_text(verdict) == VERDICT_WORDS[verdict]
+    shortfalls = (Shortfall("quantity", "gyro", "gyro_x"),) if verdict == "excluded" else ()
+    assert is_plain(stated_verdict(row(verdict=verdict, shortfalls=shortfalls)))
+
+
+@pytest.mark.parametrize("verdict", get_args(ShortlistVerdict))
+def test_every_verdict_by_the_data_sheet_has_words(verdict: ShortlistVerdict) -> None:
+    assert is_plain(SHORTLIST_WORDS[verdict]) and is_plain(SHORTLIST_MEANINGS[verdict])
+
+
+@pytest.mark.parametrize(
+    ("figure", "quantity"),
+    [
+        (figure, quantity)
+        for figure, quantity in product(get_args(Figure), ("gyro", "accel"))
+        if (figure, quantity) != ("g_sensitivity", "accel")  # an accelerometer has none
+    ],
+)
+def test_every_unknown_figure_has_words_and_a_unit(figure: Figure, quantity: str) -> None:
+    text = condition_text(Condition(figure, None, quantity, 1.2345e-3))
+    assert text.startswith(f"its {'gyro' if quantity == 'gyro' else 'accelerometer'} ")
+    assert is_plain(text) and " is below " in text and text.endswith(" (1σ)")
+
+
+@pytest.mark.parametrize(
+    ("condition", "text"),
+    [
+        (SCALE, "its gyro scale factor error is below 1200 ppm (1σ)"),
+        # Rounded down, so that the limit is met.
+        (replace(SCALE, largest=1.2399e-3), "its gyro scale factor error is below 1230 ppm (1σ)"),
+        (replace(SCALE, largest=None), "its gyro scale factor error is below 0 ppm (1σ)"),
+        (
+            Condition("turn_on_bias", None, "accel", 0.0412),
+            "its accelerometer bias after calibration is below 4.2 mg (1σ)",
+        ),
+        (
+            Condition("temperature", None, "gyro", 0.1 * DEGREE),
+            "its gyro temperature coefficient is below 0.1 deg/s/K (1σ)",
+        ),
+        (MASS, "its mass meets the requirement"),
+        (Condition(None, "axis", "gyro_x"), "it has a gyro x axis"),
+        (
+            Condition(None, "full_scale", "accel"),
+            "its accelerometer full scale meets the requirement",
+        ),
+    ],
+)  # fmt: skip
+def test_a_condition_says_what_must_hold(condition: Condition, text: str) -> None:
+    assert condition_text(condition) == text
+
+
+@pytest.mark.parametrize("of", get_args(Property))
+def test_every_property_has_words(of: Property) -> None:
+    subject = SUBJECTS.get(of, "")
+    assert is_plain(condition_text(Condition(None, of, subject)))
+    assert is_plain(subject_text(Condition(None, of, subject)))
+    without = Shortfall(of, subject, "5 g")
+    assert is_plain(shortfall_text(without))
+    if of not in ("quantity", "axis"):
+        assert shortfall_text(replace(without, has=(1.0,))).endswith(", required 5 g")
+
+
+@pytest.mark.parametrize(
+    ("shortfall", "text"),
+    [
+        (Shortfall("quantity", "accel", "accel_x"), "no accelerometer"),
+        (Shortfall("axis", "gyro_z", "gyro_xyz"), "no gyro z axis"),
+        (Shortfall("mass", "", "15 g", (0.02,)), "mass 20 g, required 15 g"),
+        (
+            Shortfall("temperature", "", "-55 degC to 60 degC", (-40.0, 85.0)),
+            "temperature range -40 to 85 degC, required -55 degC to 60 degC",
+        ),
+        (
+            Shortfall("full_scale", "gyro", "300 deg/s", (250 * DEGREE,)),
+            "gyro full scale 250 deg/s, required 300 deg/s",
+        ),
+        (
+            Shortfall("price_class", "consumer", "tactical or chip"),
+            "price class consumer, required tactical or chip",
+        ),
+        (
+            Shortfall("price_class", "", "tactical"),
+            "price class not stated, required tactical",
+        ),
+    ],
+)  # fmt: skip
+def test_a_shortfall_says_what_is_missing(shortfall: Shortfall, text: str) -> None:
+    assert shortfall_text(shortfall) == text
+
+
+def test_a_verdict_has_its_conditions() -> None:
+    one = "its gyro scale factor error is below 1200 ppm (1σ)"
+    mass = "its mass meets the requirement"
+    assert stated_verdict(row(conditions=(SCALE,))) == f"meets the limits if {one}"
+    several = row(verdict="likely_meets", conditions=(SCALE, MASS, Condition(None, "power", "")))
+    assert stated_verdict(several) == (
+        f"likely meets the limits if {one}, {mass} and its power meets the requirement"
+    )
+
+
+def test_an_excluded_sensor_has_its_shortfalls() -> None:
+    shortfalls = (Shortfall("quantity", "gyro", "x"), Shortfall("mass", "", "15 g", (0.02,)))
+    excluded = row(verdict="excluded", shortfalls=shortfalls)
+    assert stated_verdict(excluded) == "excluded: no gyro; mass 20 g, required 15 g"
+
+
+def test_a_share_has_its_source() -> None:
+    assert share_text(Share("gyro N", 0.404)) == "gyro N 40 %"
+    assert share_text(Share("gyro scale factor", 0.1, "typ")) == (
+        "gyro scale factor (data sheet, typ) 10 %"
+    )
+
+
+def weak(*reasons: str, **values: Any) -> str:
+    about = {"recordings": 1, "specimens": 1, "longest_log": 660.0}
+    evidence = {"evidence_reasons": reasons, "evidence": "weak" if reasons else "strong"}
+    return evidence_text(row(**(evidence | about | values)))
+
+
+@pytest.mark.parametrize("reason", [*WEAKNESS_REASONS, "not_explained", "doubtful", "motion"])
+def test_every_weakness_has_words(reason: str) -> None:
+    assert is_plain(weak(reason)) and " " in weak(reason)
+
+
+def test_evidence_is_weak_for_reasons() -> None:
+    assert weak() == ""
+    assert evidence_text(row(evidence=None)) == ""
+    assert weak("one_specimen", "short_log", "few_axes") == (
+        "one unit; one log of 11 min; fewer than three axes"
+    )
+    assert weak("one_specimen", "periodic_drift", "not_explained", spread_of="other sensors") == (
+        "one unit, spread taken from other sensors; periodic drift of the data; "
+        "no model explains the spectrum of the data"
+    )
+    assert weak("short_log", "wide_interval", specimens=2, recordings=2, spread_of="specimens") == (
+        "no log longer than 11 min; wide interval from 2 units"
+    )
+    assert weak("wide_interval") == "wide interval"
+
+
+@pytest.mark.parametrize("of", get_args(SpreadOf))
+def test_every_spread_has_words(of: SpreadOf) -> None:
+    text = spread_text(row(spread=0.123, spread_of=of))
+    assert text.startswith("12 % between ") and is_plain(text)
+    assert spread_text(row(spread_of=of)) == spread_text(row(spread=0.1)) == ""
+
+
+# ------------------------------------------------------------ with a corrected unit, or as logged
+
+
+def corrected(logged: Verdict | None, verdict: Verdict | None, *units: UnitFactor) -> str:
+    values: dict[str, Any] = {"logged_verdict": logged, "logged_margin": 0.1}
+    values |= {"corrected_verdict": verdict, "corrected_margin": 7.5, "corrected_units": units}
+    return corrected_text(row(**values))
+
+
+GYRO = UnitFactor("gyro", DEGREE)
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        (corrected(None, None), ""),
+        (corrected("meets", None), "as logged it meets the limits (margin 0.1)"),
+        (
+            corrected(None, "meets", GYRO),
+            "it meets the limits (margin 7.5) if the gyro data are in °/s, not rad/s",
+        ),
+        (
+            corrected("fails", "fails", UnitFactor("gyro", 1 / 17.5)),
+            "as logged it fails (margin 0.1); "
+            "it still fails (margin 7.5) if the gyro data are 17.5 times too large",
+        ),
+        (
+            corrected("fails", "not_enough_data", GYRO, UnitFactor("accel", 2.0)),
+            "as logged it fails (margin 0.1); it cannot be judged if the gyro data are in °/s, "
+            "not rad/s, and the accelerometer data are 2 times too small",
+        ),
+    ],
+)
+def test_the_verdict_with_a_corrected_unit(text: str, expected: str) -> None:
+    assert text == expected
+
+
+def test_every_alternative_is_a_sentence() -> None:
+    judged = [verdict for verdict in get_args(Verdict) if verdict != "excluded"]
+    for logged, verdict in product(judged, judged):
+        text = corrected(logged, verdict, GYRO)
+        assert is_plain(text) and ("still" in text) == (logged == verdict)
+
+
+# ------------------------------------------------------------------------------------ the answer
+
+
+NAMES = {name: name.upper() for name in "abcdefgh"}
+
+
+def answer(*rows: RankingRow, asked: int | None = None, excluded: int = 0) -> str:
+    return answer_text(rows, NAMES, len(rows) if asked is None else asked, excluded)
+
+
+@pytest.mark.parametrize(
+    ("verdict", "text"),
+    [
+        ("meets", "A meets the limits."),
+        ("likely_meets", "A likely meets the limits."),
+        (
+            "not_enough_data",
+            "No sensor is shown to meet the limits. A is closest, but there is not enough data.",
+        ),
+        (
+            "likely_fails",
+            "No sensor is shown to meet the limits. A is closest, but likely fails.",
+        ),
+        ("fails", "No sensor meets the limits. A is closest, but fails."),
+    ],
+)
+def test_a_best_sensor_that_may_fail_is_not_said_to_meet_the_limits(
+    verdict: Verdict, text: str
+) -> None:
+    first = row(verdict=verdict)
+    assert answer(first) == f"{text} Only sensor with usable data."
+    assert answer(first, row("b", "fails")) == f"{text} Best of 2 sensors."
+
+
+def test_weak_evidence_stands_with_the_answer() -> None:
+    weak = row(evidence="weak", evidence_reasons=("short_log", "one_specimen"), recordings=1,
+               longest_log=660.0)  # fmt: skip
+    assert answer(weak) == (
+        "A meets the limits. Only sensor with usable data (weak evidence: one log of 11 min; "
+        "one unit)."
+    )
+
+
+def test_unknown_figures_are_counted_in_the_answer() -> None:
+    assert answer(row(conditions=(SCALE,))).startswith("A meets the limits; 1 figure is unknown. ")
+    two = row(verdict="likely_meets", conditions=(SCALE, MASS))
+    assert answer(two).startswith("A likely meets the limits; 2 figures are unknown. ")
+
+
+def test_sensors_that_cannot_be_judged_are_told_from_those_that_can() -> None:
+    assert answer(row(), asked=2).endswith(" Only sensor with usable data.")
+    assert answer(row(), row("c"), asked=3).endswith(" Best of 2 sensors with usable data.")
+    both = "the demanded properties and usable data"
+    assert answer(row(), asked=2, excluded=1).endswith(f" Only sensor with {both}.")
+    assert answer(asked=2) == "No sensor has usable data."
+    assert answer(asked=2, excluded=2) == f"No sensor has {both}."
+    assert answer() == "No recording answers it."
+
+
+def others(rows: Iterable[RankingRow]) -> str:
+    return " ".join(list_others(rows, NAMES))
+
+
+def test_the_others_are_listed_by_their_verdicts_in_the_order_of_merit() -> None:
+    rows = [
+        row("b", "fails"),
+        row("c", "likely_fails"),
+        row("d", "not_enough_data", reason="no accelerometer"),
+        row("e", "likely_meets"),
+        row("f", "excluded", shortfalls=(Shortfall("price_class", "chip", "tactical"),)),
+        row("h", "meets"),
+        row("g", "meets", conditions=(SCALE,)),
+    ]
+    assert others(rows) == (
+        "Also meet the limits: H. Also meet the limits on conditions: G. "
+        "Likely meet the limits: E. Not enough data (no accelerometer): D. Likely fail: C. "
+        "Fail: B. Excluded: F (price class chip, required tactical)."
+    )
+
+
+def test_sensors_without_enough_data_stand_by_their_reasons() -> None:
+    rows = [
+        row("a", "not_enough_data", reason="no gyro"),
+        row("b", "not_enough_data"),
+        row("c", "not_enough_data", reason="no gyro"),
+    ]
+    assert others(rows) == "Not enough data (no gyro): A, C. Not enough data: B."
+
+
+def test_many_sensors_of_one_verdict_are_counted() -> None:
+    assert others(row(name, "fails") for name in "bcdef") == "Fail: 5 sensors."
+    assert others(row(name, "fails") for name in "bcde") == "Fail: B, C, D, E."
+    assert others([]) == ""
