@@ -472,7 +472,7 @@ def test_at_the_first_run_all_is_new(tmp_path: Path) -> None:
     assert [one.finding for one in found.warnings] == ["knocks"]
     assert [(one.recording, one.new) for one in found.rejected] == [("s/b", True)]
     assert len(found.drift) == 1
-    assert found.first[0].said == "robot: s: meets the limits"
+    assert found.first[0].said == "robot: s meets the limits. Only sensor with usable data."
 
 
 def test_what_is_known_is_fine(tmp_path: Path) -> None:
@@ -518,7 +518,10 @@ def test_what_changed_is_told_with_its_reason(tmp_path: Path) -> None:
     assert (found.new, found.removed, STATUS[found.outcome]) == (["s/new"], ["s/gone"], 0)
     text = in_words(found)
     assert "1 new, 2 analysed again, 1 removed, 0 skipped; 4 in all" in text
-    assert "robot: no sensor meets the limits; closest is u: fails (before: s)\n" in text
+    assert (
+        "robot: No sensor meets the limits. u is closest, but fails. Best of 2 sensors. (before: s)\n"
+        in text
+    )
 
 
 @pytest.mark.parametrize(

@@ -53,7 +53,7 @@ def test_a_run_says_what_became_of_the_recordings(tmp_path: Path) -> None:
         "  rejected: b/night: the file is empty",
         "warnings in 1 of the recordings:",
         "  b/run: 1 warning: knock",
-        "robot: a: meets the limits",
+        "robot: a meets the limits. Only sensor with usable data.",
         f"report: {tmp_path / 'report/index.html'}",
     ]
 
@@ -83,7 +83,7 @@ def test_the_recording_with_the_worst_warnings_comes_first() -> None:
 def test_a_line_says_which_sensor_leads_a_requirement() -> None:
     rows = [
         standing("second", rank=2),
-        standing("best", tied_with=("other",), evidence="weak"),
+        standing("best", tied_with=("other",), evidence="weak", evidence_reasons=("one_specimen",)),
         standing("best", decides=False, verdict="fails"),
         standing("made", requirement="hard", verdict="fails"),
         standing("short", requirement="vague", verdict="not_enough_data"),
@@ -93,10 +93,13 @@ def test_a_line_says_which_sensor_leads_a_requirement() -> None:
     recordings = [RecordingRow(**recording("best")),
                   RecordingRow(**recording("made", simulated=True))]  # fmt: skip
     assert list(leaders(ranking, recordings)) == [
-        "robot: best: meets the limits; not significantly better than other; weak evidence",
-        "hard: no sensor meets the limits; closest is made (simulated): fails",
-        "vague: short: not enough data",
-        "dear: no sensor can be ranked",
+        "robot: best meets the limits. Best of 2 sensors (weak evidence: one unit). "
+        "The difference from other is not significant.",
+        "hard: No sensor meets the limits. made (simulated) is closest, but fails. "
+        "Only sensor with usable data.",
+        "vague: No sensor is shown to meet the limits. short is closest, but there is not enough "
+        "data. Only sensor with usable data.",
+        "dear: No sensor has the demanded properties and usable data.",
     ]
 
 

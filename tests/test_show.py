@@ -174,7 +174,7 @@ def test_parameters_have_units_intervals_and_reasons(
     heads, units, _, first, *more = gyro.splitlines()[1:]
     assert words(heads) == "N B T_B K"
     assert words(units) == "recording °/√h °/h s °/h/√h"
-    assert words(first) == "good / run gyro_x 1 not identified 300 (at bound) absent"
+    assert words(first) == "good / run gyro_x 1 not determined 300 (bounded) not in the model"
     assert words(more[0]) == "0.9 to 1.1 1 to 7 below 1"
     assert words(more[1]) == "(21 h would do)"
     assert words(more[2]) == "made / run gyro_x (simulated) 2 – – –"
@@ -202,7 +202,7 @@ def test_nothing_is_wider_than_the_terminal_and_no_number_is_broken(
     assert {"0.333", "0.9"} <= set(tables.split())
     assert ("no room for: " in text) == (width < 60)
     if width >= 60:
-        assert {"300", "(at", "identified", "(21", "below"} <= set(tables.split())
+        assert {"300", "(bounded)", "determined", "(needs", "below"} <= set(tables.split())
 
 
 def test_a_pipe_gets_whole_lines_of_plain_text(

@@ -80,7 +80,7 @@ def test_a_cell_has_value_interval_and_status() -> None:
     assert k["parts"][0]["status"] == "absent"
     assert k["parts"][0]["lower"] is None and k["parts"][0]["upper"] == 0.5 * MODEL.K
     # 0.05 °/h/√s is 3 °/h/√h.
-    assert k["words"] == "The data do not ask for K: it is below 3 °/h/√h."
+    assert k["words"] == "K is not in the model: the data do not support it; below 3 °/h/√h."
 
 
 def test_the_doubts_of_a_channel_stand_beside_its_parameters() -> None:

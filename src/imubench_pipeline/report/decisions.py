@@ -224,7 +224,7 @@ def _explain(row: RankingRow) -> str:
     if row.verdict == "excluded":
         return "; ".join(map(shortfall_text, row.shortfalls))
     if row.left_out:
-        return doubts_text(row.left_out)
+        return doubts_text(row.left_out[:1])
     return row.reason or "too little is known"
 
 
@@ -235,7 +235,7 @@ def _alternatives(row: RankingRow, scale: Scale) -> list[tuple[str, SourcedNumbe
         ("if corrected", "corrected_margin", row.corrected_margin),
     )
     return [
-        (words, of_ranking(row, name, number_text(size, 3)), scale.place(size))
+        (words, of_ranking(row, name, number_text(size, 2)), scale.place(size))
         for words, name, size in named
         if size is not None
     ]

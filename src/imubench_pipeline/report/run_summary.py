@@ -14,8 +14,8 @@ from imubench_pipeline.report.drop_zone import drop_zone_lines
 from imubench_pipeline.report.folder import failed_pages
 from imubench_pipeline.tables import read
 from imubench_pipeline.tables.findings import LEFT_OUT
-from imubench_pipeline.words.numbers import counted
-from imubench_pipeline.words.verdicts import stated_verdict
+from imubench_pipeline.words.numbers import counted, join_names
+from imubench_pipeline.words.verdicts import answer_text
 
 _NEEDED = ("recordings", "findings", "ranking", "failures")
 _MOST_LINES = 10
@@ -171,21 +171,23 @@ def serious(findings: Iterable[FindingRow]) -> Iterator[FindingRow]:
 
 
 def leaders(ranking: Iterable[RankingRow], recordings: Iterable[RecordingRow]) -> Iterator[str]:
-    """Yield a line for each requirement: the sensor that comes first, and whether it passes."""
+    """Yield a line for each requirement: the best sensor, and whether it meets the limits."""
     deciding = [row for row in ranking if row.decides]
     simulated = {(row.sensor, row.recording) for row in recordings if row.simulated}
+    names = {
+        row.sensor: row.sensor + " (simulated)" * ((row.sensor, row.recording) in simulated)
+        for row in deciding
+    }
     for name in dict.fromkeys(row.requirement for row in deciding):
-        first = [row for row in deciding if row.requirement == name and row.rank == 1]
-        if not first:
-            yield one_line(f"{name}: no sensor can be ranked")
-            continue
-        best = max(first, key=lambda row: row.margin or 0.0)
-        shown = best.sensor + " (simulated)" * ((best.sensor, best.recording) in simulated)
-        if best.verdict in ("likely_fails", "fails"):
-            shown = f"no sensor meets the limits; closest is {shown}"
-        tied = f"; not significantly better than {', '.join(best.tied_with)}" * bool(best.tied_with)
-        weak = "; weak evidence" * (best.evidence == "weak")
-        yield one_line(f"{name}: {shown}: {stated_verdict(best)}{tied}{weak}")
+        own = [row for row in deciding if row.requirement == name]
+        ranked = [row for row in own if row.rank is not None]
+        ranked.sort(key=lambda row: (row.rank, -(row.margin or 0.0)))
+        excluded = sum(row.verdict == "excluded" for row in own)
+        text = answer_text(ranked, names, len(own), excluded)
+        if ranked and ranked[0].tied_with:
+            others = join_names([names.get(each, each) for each in ranked[0].tied_with])
+            text += f" The difference from {others} is not significant."
+        yield one_line(f"{name}: {text}")
 
 
 def one_line(text: str, longest: int = _MOST_LETTERS) -> str:

@@ -303,16 +303,16 @@ def _cell(rows: Sequence[ParameterRow], unit: Unit, duration: float | None) -> s
     """Return the value of each component with its interval, or why there is none."""
     lines = []
     for row in rows:
-        status = STATUS_WORDS[row.status]
+        words = STATUS_WORDS[row.status]
         if row.value is None:
-            lines.append(status)
+            lines.append(words)
         else:
-            lines.append(unit.text(row.value) + f" ({status})" * (status != "ok"))
-        if status == "absent" and row.upper is not None:
+            lines.append(unit.text(row.value) + f" ({words})" * (row.status != "ok"))
+        if row.status == "absent" and row.upper is not None:
             lines.append(f"below {unit.text(row.upper, 3)}")
         elif row.lower is not None and row.upper is not None:
             lines.append(f"{unit.text(row.lower, 3)} to {unit.text(row.upper, 3)}")
         needed = row.duration_needed
-        if status != "ok" and needed is not None and needed > (duration or 0.0):
-            lines.append(f"({duration_text(needed)} would do)")
+        if row.status != "ok" and needed is not None and needed > (duration or 0.0):
+            lines.append(f"(needs {duration_text(needed)})")
     return "\n".join(lines) or "–"

@@ -18,7 +18,7 @@ STATUS_WORDS: Mapping[Status, str] = {
     "ok": "estimated",
     "doubtful": "doubtful",
     "not_shown": "not determined",
-    "at_bound": "not determined",
+    "at_bound": "bounded",
     "not_identified": "not determined",
     "absent": "not in the model",
     "does_not_decide": "not used",
@@ -56,10 +56,9 @@ def estimate_text(row: ParameterRow, unit: Unit, duration: float | None) -> str:
         return f"{text}{below}."
     if status == "not_identified":
         text = f"{symbol} is not determined"
+        text += f" by {duration_text(duration)} of data" if duration else ""
         if row.lower is not None and row.upper is not None:
             text += f"; 95 % interval: {interval_text(row.lower, row.upper, unit, 2)} {unit.sign}"
-        if duration:
-            text = f"{duration_text(duration)} is too short: {text}"
         return f"{text}{_describe_needed(row, duration)}."
     reason = (row.reason or STATUS_WORDS[status]).rstrip(".")
     return f"{symbol}: {reason}{_describe_needed(row, duration)}."
@@ -69,7 +68,7 @@ def _describe_needed(row: ParameterRow, duration: float | None) -> str:
     needed = row.duration_needed
     if needed is None or (duration is not None and needed <= duration):
         return ""
-    return f"; 10 % needs {duration_text(needed)}"
+    return f"; ± 10 % needs {duration_text(needed)}"
 
 
 def precision_text(row: ParameterRow, unit: Unit) -> str:

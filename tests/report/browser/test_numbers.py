@@ -143,7 +143,7 @@ def test_a_value_that_is_not_known_says_why(read: Open, bench: Report) -> None:
     falls = "no minimum is shown: the curve of the noise still falls at 4000 s, a ninth of the log."
     assert reader.page.locator("ul.untold").first.locator("li").all_inner_texts() == [
         f"σ_min and τ_min: {falls}",
-        "The data do not ask for K: it is below 1.2 °/h/√h.",
+        "K is not in the model: the data do not support it; below 1.2 °/h/√h.",
     ]
     # 1e-7 rad/s/√s are 1.24 °/h/√h.
     assert absent.inner_text().split("\n") == ["absent", "below 1.24"]

@@ -26,31 +26,36 @@ def test_a_value_that_is_known_needs_no_words() -> None:
 @pytest.mark.parametrize(
     ("given_", "sentence"),
     [
-        (row("absent"), "The data do not ask for K."),
-        (row("absent", upper=1.234), "The data do not ask for K: it is below 2.5 °/h."),
-        (row("absent", lower=0.0, upper=1.0), "The data do not ask for K: it is below 2 °/h."),
-        (row("not_identified"), "K cannot be told from 3 h of data."),
+        (row("absent"), "K is not in the model: the data do not support it."),
+        (
+            row("absent", upper=1.234),
+            "K is not in the model: the data do not support it; below 2.5 °/h.",
+        ),
+        (
+            row("absent", lower=0.0, upper=1.0),
+            "K is not in the model: the data do not support it; below 2 °/h.",
+        ),
+        (row("not_identified"), "K is not determined by 3 h of data."),
         (
             row("not_identified", lower=1.0, upper=50.0),
-            "K cannot be told from 3 h of data (it lies between 2 and 100 °/h).",
+            "K is not determined by 3 h of data; 95 % interval: 2 to 100 °/h.",
         ),
-        (row("not_identified", upper=50.0), "K cannot be told from 3 h of data."),
+        (row("not_identified", upper=50.0), "K is not determined by 3 h of data."),
         (
             row("not_identified", lower=1.0, upper=50.0, duration_needed=30 * HOUR),
-            "K cannot be told from 3 h of data (it lies between 2 and 100 °/h); "
-            "30 h would do for 10 %.",
+            "K is not determined by 3 h of data; 95 % interval: 2 to 100 °/h; ± 10 % needs 30 h.",
         ),
         (
             # The log is long enough for one like it: that it does not tell has another reason.
             row("not_identified", duration_needed=3 * HOUR),
-            "K cannot be told from 3 h of data.",
+            "K is not determined by 3 h of data.",
         ),
         (row("not_shown", reason="the curve does not rise."), "K: the curve does not rise."),
-        (row("not_shown"), "K: not shown."),
-        (row("at_bound"), "K: at bound."),
+        (row("not_shown"), "K: not determined."),
+        (row("at_bound"), "K: bounded."),
         (
             row("at_bound", reason="beyond the log", duration_needed=40 * HOUR),
-            "K: beyond the log; 40 h would do for 10 %.",
+            "K: beyond the log; ± 10 % needs 40 h.",
         ),
     ],
 )
@@ -60,8 +65,8 @@ def test_why_a_parameter_has_no_plain_value(given_: ParameterRow, sentence: str)
 
 def test_a_log_of_unknown_length_is_not_spoken_of() -> None:
     given_ = row("not_identified", duration_needed=HOUR)
-    assert estimate_text(given_, UNIT, None) == "K cannot be told; 60 min would do for 10 %."
-    assert estimate_text(row("not_identified"), UNIT, None) == "K cannot be told."
+    assert estimate_text(given_, UNIT, None) == "K is not determined; ± 10 % needs 60 min."
+    assert estimate_text(row("not_identified"), UNIT, None) == "K is not determined."
 
 
 @pytest.mark.parametrize(
