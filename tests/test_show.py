@@ -176,7 +176,7 @@ def test_parameters_have_units_intervals_and_reasons(
     assert words(units) == "recording °/√h °/h s °/h/√h"
     assert words(first) == "good / run gyro_x 1 not determined 300 (bounded) not in the model"
     assert words(more[0]) == "0.9 to 1.1 1 to 7 below 1"
-    assert words(more[1]) == "(21 h would do)"
+    assert words(more[1]) == "(needs 21 h)"
     assert words(more[2]) == "made / run gyro_x (simulated) 2 – – –"
     assert "Accelerometers" in text and "µg/√Hz" in text
 
