@@ -34,6 +34,7 @@ from imubench_pipeline.noise import FLOOR, GaussMarkov, NoiseModel
 from imubench_pipeline.report import glossary as module
 from imubench_pipeline.report.datasheets import DEPENDS
 from imubench_pipeline.report.glossary import UnknownTermError, glossary, term
+from imubench_pipeline.report.practical import STATUS_NAMES
 from imubench_pipeline.settings.validation import ConfigError
 from imubench_pipeline.tables import findings
 from imubench_pipeline.units import from_si, to_si
@@ -143,7 +144,8 @@ def test_an_unknown_term_is_an_error_that_names_close_ones() -> None:
 def test_what_a_table_holds_is_looked_up_by_its_kind() -> None:
     assert term("not comparable (condition)", "verdict").name == "not comparable (condition)"
     assert term("band", "line") is not term("band")
-    assert term("not_identified").name == "not identified"
+    assert term("not_identified").name == "not determined"
+    assert all(term(status).name == name for status, name in STATUS_NAMES.items())
 
 
 # --------------------------------------------------------- what the program can say has an entry

@@ -18,7 +18,13 @@ from markupsafe import Markup, escape
 
 from imubench_pipeline.registry import files_of
 from imubench_pipeline.report.glossary import term
-from imubench_pipeline.report.practical import PageUnit, System, page_unit, symbol_text
+from imubench_pipeline.report.practical import (
+    PageUnit,
+    System,
+    page_unit,
+    status_text,
+    symbol_text,
+)
 from imubench_pipeline.report.words import started_text
 from imubench_pipeline.words.numbers import NO_VALUE, duration_text, number_text
 
@@ -60,9 +66,8 @@ def environment(system: System) -> jinja2.Environment:
             if value is None:
                 text = f"{_hint(status)}"
             else:
-                shown = status.replace("_", " ")
                 text = f"{number(value)}" + (
-                    f' <span class="status">{shown}</span>' if status else ""
+                    f' <span class="status">{status_text(status)}</span>' if status else ""
                 )
             if upper is not None:
                 limits = f"{number(lower)} to" if lower is not None else "below"
@@ -88,6 +93,7 @@ def environment(system: System) -> jinja2.Environment:
     }
     templates.filters |= {"duration": duration_text, "number": number_text, "json": _json}
     templates.filters |= {"started": started_text, "symbol_text": symbol_text}
+    templates.filters["status_text"] = status_text
     templates.filters["attribute"] = _compact
     templates.filters["packed"] = packed
     templates.tests["hidden_row"] = _is_hidden

@@ -88,6 +88,20 @@ def symbol_text(symbol: str) -> str:
     return _SYMBOL_TEXTS.get(symbol, symbol)
 
 
+STATUS_NAMES = {
+    "not_identified": "not determined",
+    "not_shown": "not determined",
+    "at_bound": "bounded",
+    "absent": "not in the model",
+}
+"""How pages and figures write the status of a value that is not simply estimated."""
+
+
+def status_text(status: str) -> str:
+    """Return how a page writes the status of a value."""
+    return STATUS_NAMES.get(status, status.replace("_", " "))
+
+
 def page_unit(quantity: str, symbol: str, system: System) -> PageUnit:
     """Return the unit in which a page first shows a figure of a quantity.
 

@@ -17,7 +17,7 @@ from imubench_pipeline.report.glossary import glossary
 from imubench_pipeline.report.html import environment
 from imubench_pipeline.report.pages import ENTRIES, pages
 from imubench_pipeline.report.plotting import plotting_script
-from imubench_pipeline.report.practical import units_of_pages
+from imubench_pipeline.report.practical import STATUS_NAMES, units_of_pages
 from imubench_pipeline.report.run_summary import one_line
 from imubench_pipeline.report.search import index
 from imubench_pipeline.report.site import Page, Site
@@ -184,7 +184,7 @@ def _search(site: Site) -> dict[str, str]:
 
 
 def _script() -> str:
-    """Return the scripts of the pages, with the units that they know, as one."""
+    """Return all scripts of the pages as one, with units, status names and terms."""
     units = {
         quantity: {
             choice: {symbol: [unit.sign, unit.per_si] for symbol, unit in symbols.items()}
@@ -196,7 +196,7 @@ def _script() -> str:
     terms = {key: entry.short for key, entry in glossary().items()}
     head = "".join(
         f"const {name} = {json.dumps(value, ensure_ascii=False)};\n"
-        for name, value in (("UNITS", units), ("TERMS", terms))
+        for name, value in (("UNITS", units), ("STATUS_NAMES", STATUS_NAMES), ("TERMS", terms))
     )
     return '(() => {\n"use strict";\n' + head + "\n".join(parts) + "})();\n"
 

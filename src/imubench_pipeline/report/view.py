@@ -40,10 +40,10 @@ Name = tuple[str, str]
 METHOD_NAMES = {
     "likelihood": "likelihood",
     "likelihood_gm": "likelihood, papers' model",
-    "compensated": "likelihood, temperature taken out",
+    "compensated": "likelihood, temperature compensated",
     "curve": "read from the curve",
     "paper": "fit, weights as printed",
-    "weighted": "fit, right weights",
+    "weighted": "fit, correct weights",
     "authors": "read by the authors",
 }
 QUANTITY_NAMES = {"gyro": "Gyroscope", "accel": "Accelerometer"}

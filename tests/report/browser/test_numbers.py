@@ -139,16 +139,16 @@ def test_a_value_that_is_not_known_says_why(read: Open, bench: Report) -> None:
     tables = reader.page.get_by_role("table", name="Parameters by all methods")
     # Without a random walk the curve falls on: it has no lowest point.
     *lowest, absent = tables.nth(1).locator("tr.recommended td.none").all()
-    assert [one.inner_text() for one in lowest] == ["not shown", "not shown"]
+    assert [one.inner_text() for one in lowest] == ["not determined", "not determined"]
     falls = "no minimum is shown: the curve of the noise still falls at 4000 s, a ninth of the log."
     assert reader.page.locator("ul.untold").first.locator("li").all_inner_texts() == [
         f"σ_min and τ_min: {falls}",
         "The data do not ask for K: it is below 1.2 °/h/√h.",
     ]
     # 1e-7 rad/s/√s are 1.24 °/h/√h.
-    assert absent.inner_text().split("\n") == ["absent", "below 1.24"]
+    assert absent.inner_text().split("\n") == ["not in the model", "below 1.24"]
     unsure = tables.nth(2).locator("tr.recommended td.none")
-    assert unsure.inner_text().split("\n") == ["not identified", "20 to 500"]
+    assert unsure.inner_text().split("\n") == ["not determined", "20 to 500"]
     assert "10 h would do for 10 %" in reader.page.locator("ul.untold").last.inner_text()
 
 

@@ -60,12 +60,12 @@ kinds.allan = (figure) => {
     const times = array(view.compensated.tau);
     const [left, least, most] = ["adev", "lower", "upper"].map((name) => scaled(view.compensated[name], unit.factor));
     traces.push({
-      group: "compensated", type: "scatter", mode: "lines+markers", x: times, y: left, name: "temperature taken out", meta: { low: least, high: most },
+      group: "compensated", type: "scatter", mode: "lines+markers", x: times, y: left, name: "temperature compensated", meta: { low: least, high: most },
       line: { color: colourOf(without), width: 1.2 }, marker: { size: 4, color: colourOf(without) },
       text: times.map((t, i) => `τ ${numberText(t, 3)} s: <b>${numberText(left[i], 3)} ${unit.sign}</b><br>95 %: ${interval(least[i], most[i])} ${unit.sign}`),
-      hovertemplate: "temperature taken out<br>%{text}<extra></extra>",
+      hovertemplate: "temperature compensated<br>%{text}<extra></extra>",
     });
-    groups.push({ key: "compensated", label: `${what}, temperature taken out`, on: true, look: without });
+    groups.push({ key: "compensated", label: `${what}, temperature compensated`, on: true, look: without });
   }
   for (const [method, curve] of Object.entries(view.methods)) {
     const key = `method ${method}`;

@@ -196,7 +196,7 @@ function ownCell(one, unit, digitsFor = digitsOf) {
   const bounded = lower !== null && upper !== null;
   const digits = digitsFor(value, lower, upper);
   if (value !== null) cell.append(`${numberText(value, digits)} ${sign}`);
-  else cell.append(one.status === "absent" && upper !== null ? `below ${numberText(upper, 2)} ${sign}` : one.status.replaceAll("_", " "));
+  else cell.append(one.status === "absent" && upper !== null ? `below ${numberText(upper, 2)} ${sign}` : statusText(one.status));
   if (bounded && value !== null) {
     cell.append(document.createElement("br"), Object.assign(document.createElement("small"), { textContent: `${numberText(lower, digits)} to ${numberText(upper, digits)}` }));
   }

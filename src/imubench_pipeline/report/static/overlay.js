@@ -201,8 +201,8 @@ kinds.forest = (figure) => {
       extent.push(middle * unit.factor, ...(bounded ? [lower * unit.factor, upper * unit.factor] : []));
       const look = lookOf(view);
       const colour = colourOf(look);
-      const words = value !== null ? `<b>${numberText(value * unit.factor, 4)} ${unit.sign}</b>${identified ? "" : ` (${status.replaceAll("_", " ")})`}`
-        : status === "absent" ? `absent: below ${numberText(upper * unit.factor, 3)} ${unit.sign}` : status.replaceAll("_", " ");
+      const words = value !== null ? `<b>${numberText(value * unit.factor, 4)} ${unit.sign}</b>${identified ? "" : ` (${statusText(status)})`}`
+        : status === "absent" ? `${statusText(status)}: below ${numberText(upper * unit.factor, 3)} ${unit.sign}` : statusText(status);
       const limits = bounded ? `<br>95 %: ${interval(lower * unit.factor, upper * unit.factor)} ${unit.sign}` : "";
       traces.push({
         type: "scatter", mode: "markers", x: [middle * unit.factor], y: [place],

@@ -6,7 +6,7 @@ const RATIO_TAIL = 0.025;
 // Of { value, lower, upper, status }; limits by the distances of each on the logarithm (MOVER).
 function ratioOfParameters(first, second) {
   const doubts = [["the first", first], ["the second", second]]
-    .filter(([, one]) => one.status !== "ok").map(([which, one]) => `${which} is ${one.status.replaceAll("_", " ")}`);
+    .filter(([, one]) => one.status !== "ok").map(([which, one]) => `${which} is ${statusText(one.status)}`);
   const reason = doubts.join("; ") || null;
   if (!first.value || !second.value) {
     let low = over(first.lower ?? 0, second.upper);

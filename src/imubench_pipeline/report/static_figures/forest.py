@@ -15,7 +15,7 @@ from matplotlib.path import Path
 from imubench_pipeline.estimators.estimate import COMPARED
 from imubench_pipeline.model.estimates import ParameterRow
 from imubench_pipeline.report.palette import Appearance, sensor_appearances
-from imubench_pipeline.report.practical import System, page_unit
+from imubench_pipeline.report.practical import System, page_unit, status_text
 from imubench_pipeline.report.static_figures.names import SYMBOLS, channel_name
 from imubench_pipeline.report.static_figures.style import (
     DOUBLE,
@@ -283,7 +283,7 @@ def _draw_marks(
 def _say_why(axes: Axes, block: _Block, symbol: str) -> None:
     """Write why a row of a panel is empty."""
     statuses = {
-        row.status.replace("_", " ")
+        status_text(row.status)
         for view in block.views
         if view.recommended in view.parameters
         for row in view.named(view.recommended, symbol)
@@ -310,7 +310,7 @@ def _legend(kinds: set[str]) -> list[Line2D]:
             marker="o",
             markerfacecolor="white",
             ls=(0, (2, 1)),
-            label="not identified: as fitted, 95 % limits",
+            label="not determined: fitted value, 95 % limits",
             **black,
         ),
         "limit": Line2D(

@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from imubench_pipeline.noise import NoiseModel, Term
-from imubench_pipeline.report.practical import System, page_unit
+from imubench_pipeline.report.practical import System, page_unit, status_text
 from imubench_pipeline.report.static_figures.curves import channel_axes, draw_measured, finish
 from imubench_pipeline.report.static_figures.names import SYMBOLS, TERM_NAMES
 from imubench_pipeline.report.static_figures.style import style
@@ -141,14 +141,14 @@ def _mark_readings(
 
 
 def term_label(view: ChannelView, term: Term, system: System) -> str:
-    """Return the name of a term with its parameters, and whether the log does not tell them."""
+    """Return the name of a term with its parameters, and their status if not estimated."""
     values = ", ".join(
         f"{SYMBOLS[symbol]} = {unit.text(abs(value), 3)} {unit.sign}"
         for symbol, value in term.values.items()
         for unit in [page_unit(view.quantity, symbol, system)]
     )
     doubts = {
-        row.status.replace("_", " ")
+        status_text(row.status)
         for symbol, value in term.values.items()
         for row in view.named(view.recommended, symbol)
         if row.value is None and row.fitted is not None
