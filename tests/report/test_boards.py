@@ -233,8 +233,8 @@ def test_the_page_says_what_the_sensors_share_and_which_were_lost(read: dict[str
 
 def test_the_page_says_what_temperature_does(read: dict[str, Read]) -> None:
     text = read["boards.html"].text
-    assert text.count("The bias follows the temperature by 90 °/h/K.") == 2
-    assert text.count("The sensor's own low-pass cuts off at 64 Hz, of first order.") == 2
+    assert text.count("The bias changes with temperature by 90 °/h/K.") == 2
+    assert text.count("The sensor's own low-pass has its cut-off at 64 Hz (first order).") == 2
 
 
 def test_a_channel_of_which_nothing_is_published_has_no_table(read: dict[str, Read]) -> None:

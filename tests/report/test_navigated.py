@@ -285,4 +285,4 @@ def test_without_a_script_a_table_says_how_much_of_it_stands_there(
     source: str, drives: list[dict[str, Any]]
 ) -> None:
     (note,) = re.findall("<noscript>(.*?)</noscript>", source)
-    assert f"30 of {len(drives)} rows;" in note
+    assert f"30 of {len(drives)} rows." in note

@@ -231,7 +231,7 @@ def test_the_start_page_says_what_was_rejected_and_why(read: dict[str, Read]) ->
 def test_a_rejected_recording_says_why_wherever_it_is_listed(read: dict[str, Read]) -> None:
     reason = "line 3: found '<x>' & more"
     own = read["recordings/one/torn.html"]
-    assert reason in own.text and "could not be used" in own.text
+    assert reason in own.text and "was rejected" in own.text
     for path in ("index.html", "recordings.html", "sensors/one.html", "devices/one/unit 7.html"):
         assert reason in read[path].text, path
 
@@ -240,7 +240,7 @@ def test_figures_of_a_rejected_recording_are_not_offered(read: dict[str, Read]) 
     offered = "imubench figures results --sensor one --recording"
     assert offered in read["recordings/one/day1.html"].text
     assert offered not in read["recordings/one/torn.html"].text
-    assert "To make its results again: snakemake" in read["recordings/one/torn.html"].text
+    assert "To recompute the results: snakemake" in read["recordings/one/torn.html"].text
 
 
 def test_a_simulated_recording_is_called_so_on_every_page_that_names_it(
@@ -293,7 +293,7 @@ def test_a_channel_without_a_random_walk_says_so(read: dict[str, Read]) -> None:
     assert answer.text.startswith("N 0.33 °/√h (± 10 %); B 10 °/h (± 25 %); T_B 100 s (± 25 %);")
     assert "K" not in answer.text
     assert page.naming("The data do not ask for K: it is below 3 °/h/√h.", "li")
-    (row,) = (one for one in page.naming("likelihood", "tr") if "use this" in one.text)
+    (row,) = (one for one in page.naming("likelihood", "tr") if "recommended" in one.text)
     assert re.search(r"not in the model\s*below 3", row.text)
 
 
@@ -772,7 +772,7 @@ def test_another_file_with_the_same_samples_rewrites_the_page_of_its_recording(
     written("<log>.csv", 64 * "a")
     page = sound(tmp_path / "report")["recordings/one/day1.html"]
     assert re.sub(r"\s", "", page.naming(64 * "a", "tr")[0].text) == f"<log>.csv12345{64 * 'a'}"
-    assert re.search(r"Read as\s*found by its content", page.text)
+    assert re.search(r"Format\s*detected from the content", page.text)
     assert re.search(r"Segments\s*2", page.text)
     assert written("log.csv", 64 * "b") == ["recordings/one/day1.html"]
     assert written("log.csv", 64 * "b") == []

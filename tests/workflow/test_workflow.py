@@ -199,9 +199,9 @@ def test_exports_and_pages_say_what_does_not_decide(project: Project) -> None:
     assert yaml.safe_load(exported)["gyroscope_noise_density"] == pytest.approx(1e-4, rel=0.05)
     report = project.results / "report"
     assert REASON in (report / "index.html").read_text()
-    assert "does not decide (suspicious unit" in (report / "recordings.html").read_text()
-    assert "Does not decide" in (report / "recordings/one/c.html").read_text()
-    assert "Does not decide" not in (report / "recordings/one/a.html").read_text()
+    assert "not used (suspicious unit" in (report / "recordings.html").read_text()
+    assert ">Not used<" in (report / "recordings/one/c.html").read_text()
+    assert ">Not used<" not in (report / "recordings/one/a.html").read_text()
 
 
 def test_to_include_it_makes_the_tables_and_the_report_anew(project: Project) -> None:

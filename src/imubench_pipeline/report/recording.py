@@ -1,4 +1,4 @@
-"""The page of one recording: everything that is known of it and its channels."""
+"""The page of one recording and its channels."""
 
 from __future__ import annotations
 
@@ -40,12 +40,13 @@ from imubench_pipeline.words.numbers import (
     rates_text,
 )
 
-_EXACT = 1e-9
-"""Relative error of a rate that is not worth a word."""
+_MAX_HIDDEN_RATE_ERROR = 1e-9
+"""Relative error of a rate up to which the page does not state it."""
 
 _SHOWN_MODELS = 4
+"""Models with the lowest BIC that the page lists."""
 
-_RATE_FROM = {"stamps": "from the stamps", "stated": "as stated"}
+_RATE_FROM = {"stamps": "from the time stamps", "stated": "as stated"}
 
 
 Section = Callable[[Site, RecordingView], tuple[str, Any] | None]
@@ -134,8 +135,8 @@ STATIC = RecordingPage("recording.html.jinja", context)
 
 def _summary(view: RecordingView, channels: int) -> str:
     if view.left_out:
-        why = "could not be used" if view.rejected else "could not be analysed: a step failed"
-        return f"This recording {why}; nothing of it is in the comparison."
+        why = "was rejected" if view.rejected else "could not be analysed, because a step failed"
+        return f"This recording {why}; the comparison does not include it."
     row, parts = view.row, []
     if row.started:
         parts.append(f"from {started_text(row.started)}")
@@ -226,7 +227,7 @@ def _untold(symbols: Sequence[str], cells: Sequence[Mapping[str, Any]]) -> Itera
         if symbol == "T_B" and statuses["T_B"] == {"absent"}:
             # Where B is absent, that says it.
             if statuses["B"] != {"absent"}:
-                yield "B is flicker noise here, which has no correlation time T_B."
+                yield "B is flicker noise, which has no correlation time T_B."
         elif symbol == "sigma_min" and together:
             yield together
         elif cell["words"] and not (symbol == "tau_min" and together):
@@ -269,9 +270,8 @@ def _model_words(channel: ChannelView) -> str:
         return ""
     best = channel.models[0]
     text = (
-        f"{model_text(best.model)} is the model that the data favour ({best.verdict}). The "
-        f"deviance of a bin is {number_text(best.deviance, 3)}; it is about 1 where the model "
-        "is right."
+        f"{model_text(best.model)} has the lowest BIC ({best.verdict}). The deviance per bin is "
+        f"{number_text(best.deviance, 3)}; a correct model gives about 1."
     )
     notes = (best.note or "").split("; ")
     band = f"Band: {best.band_source.removeprefix('found: ')}" if best.band_source else ""
@@ -317,10 +317,10 @@ def _provenance(
     yield "Kind", row.kind + (", simulated" if row.simulated else "")
     yield "Started", started_text(row.started) or "not stated in the log"
     if "reader" in metadata:
-        yield "Read as", str(metadata["reader"] or "found by its content")
+        yield "Format", str(metadata["reader"] or "detected from the content")
     if row.rate is not None:
         error = ""
-        if row.rate_error is not None and row.rate_error > _EXACT * row.rate:
+        if row.rate_error is not None and row.rate_error > _MAX_HIDDEN_RATE_ERROR * row.rate:
             error = f" ± {number_text(row.rate_error, 2)} Hz"
         yield (
             "Rate",
@@ -328,7 +328,7 @@ def _provenance(
         )
         rates = {channel.channel: number_text(channel.rate, 6) for channel in channels}
         if len(set(rates.values())) > 1:
-            yield "Rate of each", ", ".join(f"{name} {rate} Hz" for name, rate in rates.items())
+            yield "Rate per channel", ", ".join(f"{name} {rate} Hz" for name, rate in rates.items())
     if row.samples is not None:
         yield "Samples", f"{row.samples:,}".replace(",", " ")
     segments: Sequence[Any] = metadata.get("segments", [])

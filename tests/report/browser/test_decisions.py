@@ -276,5 +276,5 @@ def test_the_same_model_of_a_log_has_the_same_numbers(
                 seen.setdefault((heads[model + 1], *what), set()).add(tuple(numbers))
         assert len(seen) > 5
         # The likelihood is as wide as all models that the log does not tell apart, and says so.
-        assert any("or 1 other" in key[-1] for key in seen)
+        assert any("(1 other model fits as well)" in key[-1] for key in seen)
         assert {key: found for key, found in seen.items() if len(found) > 1} == {}

@@ -97,7 +97,7 @@ def test_numbers_and_units_follow_the_reader(path: str, read: Open, bench: Repor
 
 def test_the_numbers_are_those_of_the_noise(read: Open, bench: Report) -> None:
     reader = read(bench.folder, OF_NIGHT)
-    used = reader.page.get_by_role("table", name="Parameters by all methods").first.locator(
+    used = reader.page.get_by_role("table", name="Parameters by method").first.locator(
         "tr.recommended"
     )
     cells = used.locator("td.number data").all_inner_texts()
@@ -136,7 +136,7 @@ def test_the_numbers_are_those_of_the_noise(read: Open, bench: Report) -> None:
 def test_a_value_that_is_not_known_says_why(read: Open, bench: Report) -> None:
     reader = read(bench.folder, OF_NIGHT)
     reader.page.get_by_role("button", name="all channels").click()
-    tables = reader.page.get_by_role("table", name="Parameters by all methods")
+    tables = reader.page.get_by_role("table", name="Parameters by method")
     # Without a random walk the curve falls on: it has no lowest point.
     *lowest, absent = tables.nth(1).locator("tr.recommended td.none").all()
     assert [one.inner_text() for one in lowest] == ["not determined", "not determined"]

@@ -223,11 +223,11 @@ def test_a_browser_that_unfolds_nothing_says_how_much_is_left_out(
     assert ("×10⁻" in rows.last.inner_text()) == script
     # Of each axis the recommended method and that of the papers.
     every = 2 * SENSORS * EACH * AXES
-    words = f"{rows.count()} of {every} rows; JavaScript unfolds the others."
+    words = f"{rows.count()} of {every} rows. The others need JavaScript"
     expect(page.locator("p.note", has_text=words).first).to_be_visible()
     path = "recordings/sensor_00/run_00.html"
     page.goto((many / path).as_uri())
-    words = f"What follows here, of {2 * AXES - 1} more"
+    words = f"{2 * AXES - 1} more sections need JavaScript"
     expect(page.locator("p.note", has_text=words)).to_be_visible()
     assert complaints == []
     context.close()
