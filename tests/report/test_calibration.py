@@ -101,7 +101,7 @@ def test_each_sensor_has_its_alignment_and_its_needs(read: dict[str, Read]) -> N
 
 def test_what_gave_nothing_stands_on_the_start_page(read: dict[str, Read]) -> None:
     text = read["index.html"].text
-    assert "1 of known rates without a calibration" in text
+    assert "1 recording without a calibration result" in text
     assert "The noise of this sensor is not known" in text
     assert "The noise of this sensor is not known" in read["recordings/s/unknown.html"].text
     assert "rate table" in read["recordings.html"].text

@@ -111,7 +111,8 @@ def test_a_run_whose_noise_is_not_known_says_so_and_shows_its_turns(read: dict[s
 def test_the_start_page_names_what_was_not_found(read: dict[str, Read]) -> None:
     text = read["index.html"].text
     assert (
-        "1 turned without an estimate" in text and "The noise of this sensor is not known" in text
+        "1 turned recording without an estimate" in text
+        and "The noise of this sensor is not known" in text
     )
     assert "two positions" in read["sensors/s.html"].text
 

@@ -564,9 +564,9 @@ def test_what_is_not_sold_is_not_said_to_lack_a_recording(tmp_path: Path) -> Non
     publish(made, tmp_path)
     read = sound(tmp_path)
     assert not read["index.html"].naming("not judged", "tr")
-    (line,) = read["index.html"].naming("Not among them", "p")
+    (line,) = read["index.html"].naming("Not in the table", "p")
     assert "board" in line.text and "not sold" in line.text
-    assert "It is in no ranking: not sold." in read["sensors/board.html"].text
+    assert "Not ranked: not sold." in read["sensors/board.html"].text
 
 
 @pytest.mark.release
@@ -934,7 +934,7 @@ def test_one_file_holds_every_page(report: Report, whole: Read) -> None:
         path = (one.attributes["id"] or "").removeprefix("page:")
         (main,) = (element for element in folder[path].elements if element.tag == "main")
         shown = main.text
-        for table in ("All tables, in SI units", "As printed: "):  # files that lie elsewhere
+        for table in ("All tables, in SI units", "For print: "):  # files that lie elsewhere
             shown = shown.partition(table)[0]
         assert " ".join(shown.split())[:5000] in " ".join(one.text.split()), path
 

@@ -1,7 +1,6 @@
-"""The page that sets sensors or recordings side by side: what its script draws and judges from.
+"""The page that compares sensors or recordings side by side: the data for its script.
 
-All that depends on which are chosen is made in the page: a pair has a ratio of each figure, with
-the same calculation as `navigation.ratios`, from what is kept of each recording alone.
+The script computes the ratios of the recordings that the reader chooses, like `navigation.ratios`.
 """
 
 from __future__ import annotations
@@ -24,11 +23,11 @@ from imubench_pipeline.units import quantity_to_si
 from imubench_pipeline.words.numbers import duration_text, number_text
 
 KEPT = ("error_growth", "drawn_deviations")
-"""The tables of each recording that the page is made of, beside the joined ones."""
+"""The tables of each recording that the page uses, besides the joined tables."""
 
 _ERRORS = ("attitude", "heading", "velocity", "position")
-_MANY = 100
-"""Recordings from which on models drawn are of whole decades of tau alone, errors of worst axes."""
+_MAX_DETAILED_RECORDINGS = 100
+"""With more recordings the page has draws at whole decades of tau, and errors of worst axes only."""
 
 
 def _context(site: Site) -> dict[str, Any]:
@@ -41,13 +40,15 @@ def _context(site: Site) -> dict[str, Any]:
     for recording in site.compared(views):
         view = recording.view
         kept = {table: _kept(site, view, table) for table in KEPT}
-        drawn = dict(_drawn(kept["drawn_deviations"], arrays, few=len(views) > _MANY))
+        drawn = dict(
+            _drawn(kept["drawn_deviations"], arrays, few=len(views) > _MAX_DETAILED_RECORDINGS)
+        )
         for channel in recording.channels:
             channels.append(channel.among(arrays) | {"drawn": drawn.get(channel.about["channel"])})
         own = datasheets.setdefault(view.sensor, {})
         for name, lines in recording.datasheet.items():
             own.setdefault(name, lines)
-        growth = _growth(kept["error_growth"], arrays, few=len(views) > _MANY)
+        growth = _growth(kept["error_growth"], arrays, few=len(views) > _MAX_DETAILED_RECORDINGS)
         recordings.append(_recording(view) | {"sold": site.is_sold(view.sensor), "growth": growth})
     return {
         "several": len(views) > 1,
@@ -68,12 +69,12 @@ def _context(site: Site) -> dict[str, Any]:
 
 
 def _views(site: Site) -> list[RecordingView]:
-    """Return the recordings that can be compared: those at rest of which a curve is known."""
+    """Return the static recordings, which can be compared."""
     return [view for view in site.views if view.static]
 
 
 def _files(site: Site) -> Iterator[Path]:
-    """Yield the files that are kept of each recording and that the page shows."""
+    """Yield the files of each recording that the page shows."""
     for view in _views(site):
         for table in KEPT:
             yield _path(site, view, table)
@@ -84,7 +85,7 @@ def _path(site: Site, view: RecordingView, table: str) -> Path:
 
 
 def _kept(site: Site, view: RecordingView, table: str) -> Mapping[str, Any]:
-    """Return columns of a table of a recording; none where a report is made without it."""
+    """Return the columns of a table of a recording; empty if the file is missing."""
     path = _path(site, view, table)
     if not path.is_file():
         return {}
@@ -120,7 +121,7 @@ def _recording(view: RecordingView) -> dict[str, Any]:
 
 
 def _units(site: Site, error: str) -> dict[str, Any]:
-    """Return the unit of an axis, and those of a number: from which size in SI, sign and factor."""
+    """Return the unit of an axis, and the units of numbers: smallest size in SI, sign, factor."""
     dimension = DIMENSIONS[error]
     axis = unit_of(dimension, site.system)
     sized = units_by_size(dimension, site.system)
@@ -148,7 +149,7 @@ def _limits(site: Site) -> Iterator[dict[str, Any]]:
 def _drawn(
     kept: Mapping[str, Any], arrays: Arrays, *, few: bool
 ) -> Iterator[tuple[str, dict[str, Any]]]:
-    """Yield of each channel its Allan deviation at some tau, and those of models drawn, sorted."""
+    """Yield the Allan deviation of each channel at some tau, and those of drawn models, sorted."""
     if not kept:
         return
     of_draw = np.isfinite(np.asarray(kept["draw"], dtype=np.float64))  # null: the estimate itself
@@ -170,7 +171,7 @@ def _drawn(
 
 
 def _growth(kept: Mapping[str, Any], arrays: Arrays, *, few: bool) -> dict[str, Any] | None:
-    """Return how errors grow, of the worst axes and of each alone; the only one is the worst."""
+    """Return the growth of errors of the worst axes and of each axis."""
     if not kept or not len(kept["error"]):
         return None
     windows, times = (np.unique(kept[name]) for name in ("window", "time"))
@@ -190,7 +191,7 @@ def _growth(kept: Mapping[str, Any], arrays: Arrays, *, few: bool) -> dict[str, 
 
 
 def _errors(kept: Mapping[str, Any], of_axis: Any, arrays: Arrays) -> dict[str, Any]:
-    """Return by error its totals with their limits, and shares of the variance by source."""
+    """Return the totals of each error with limits, and the shares of the variance by source."""
     errors = {}
     for error in dict.fromkeys(kept["error"][of_axis].tolist()):
         own = of_axis & (kept["error"] == error)
@@ -225,7 +226,7 @@ def _errors(kept: Mapping[str, Any], of_axis: Any, arrays: Arrays) -> dict[str, 
 
 
 def _axes(channels: Sequence[str | None]) -> list[str]:
-    """Return the channels that answer: one for all, or one for each window and time."""
+    """Return the channels that determine the error: one, or one per window and time."""
     named = [channel or "" for channel in channels]
     return named[:1] if len(set(named)) == 1 else named
 

@@ -1,4 +1,4 @@
-"""The pages of a sensor and of a device: whether its recordings agree, and have changed."""
+"""The pages of a sensor and of a device: agreement and change of its recordings."""
 
 from __future__ import annotations
 
@@ -27,8 +27,8 @@ from imubench_pipeline.report.start import summary
 from imubench_pipeline.report.view import QUANTITY_NAMES, RecordingView
 from imubench_pipeline.words.numbers import counted, limit_digits
 
-_MANY = 12
-"""Recordings of a sensor beyond which its page leaves budgets and deltas to those of recordings."""
+_MAX_DETAILED_RECORDINGS = 12
+"""With more recordings the page of a sensor has no budgets and no comparison with the datasheet."""
 
 
 def sensor_page(site: Site, sensor: str) -> Page:
@@ -51,7 +51,7 @@ def sensor_page(site: Site, sensor: str) -> Page:
 def _sensor(site: Site, sensor: str, own: Sequence[RecordingView]) -> dict[str, Any]:
     together = Comparison(site.compared(own), site.names)
     pooled = [_pooled(row) for row in site.rows(PooledRow) if row.sensor == sensor]
-    shown = own if len(own) <= _MANY else []
+    shown = own if len(own) <= _MAX_DETAILED_RECORDINGS else []
     simulated = {view.full_name: view.simulated for view in own}
     budget = [row for view in shown for row in view.budget]
     return {
@@ -70,7 +70,7 @@ def _sensor(site: Site, sensor: str, own: Sequence[RecordingView]) -> dict[str, 
         },
         "budgets": list(budget_tables(budget, simulated, site.system)),
         "budget_words": budget_words(site.settings["settings"]["error_budget"]),
-        "too_many": len(own) > _MANY,
+        "too_many": len(own) > _MAX_DETAILED_RECORDINGS,
         "deltas": list(_deltas(site, shown)),
         "repeated": list(repeatability_lines(site.rows(RepeatabilityRow), sensor, site.system)),
         "page": {
@@ -86,7 +86,7 @@ def _sensor(site: Site, sensor: str, own: Sequence[RecordingView]) -> dict[str, 
 
 
 def _deltas(site: Site, views: Sequence[RecordingView]) -> Iterator[dict[str, Any]]:
-    """Yield the comparison of each channel with the datasheet, where it prints something."""
+    """Yield the comparison of each channel with the figures of the datasheet, if there are any."""
     for view in views:
         for channel in view.channels():
             rows = list(delta_rows(channel, site.coverage, site.system))
@@ -129,7 +129,7 @@ def _device(site: Site, own: Sequence[RecordingView], rows: Sequence[DriftRow]) 
     sensor, device = own[0].sensor, own[0].row.device
     named = {view.full_name for view in own}
     rows = [row for row in rows if (row.sensor, row.recording) in named]
-    # As `navigation.drift.order_of` has it: stamps that are all the same tell no order.
+    # As in `navigation.drift.order_of`: equal time stamps give no order.
     stamps = {row.started for row in rows}
     dated = None not in stamps and len(stamps) > 1
     trends, payload = _trends(rows, dated=dated, simulated=own[0].simulated)
@@ -144,10 +144,10 @@ def _device(site: Site, own: Sequence[RecordingView], rows: Sequence[DriftRow]) 
             for row in rows
             if row.verdict == "changed"
         ],
-        "order": "The recordings stand at the time when they were started."
+        "order": "Recordings are plotted at their start times."
         if dated
-        else "The logs do not all say when they were started: the recordings stand in the order "
-        "of their names.",
+        else "Some logs have no start time, so the recordings are plotted in the order of their "
+        "names.",
         "trends": list(trends.items()),
         "page": {"trends": payload, "arrays": []},
     }
@@ -156,7 +156,7 @@ def _device(site: Site, own: Sequence[RecordingView], rows: Sequence[DriftRow]) 
 def _trends(
     rows: Sequence[DriftRow], *, dated: bool, simulated: bool
 ) -> tuple[dict[str, list[dict[str, Any]]], list[dict[str, Any]]]:
-    """Return the trends of a device by channel, and what their figures are drawn from."""
+    """Return the trends of a device by channel, and the data of their figures."""
     trends: dict[str, list[dict[str, Any]]] = {}
     payload: list[dict[str, Any]] = []
     mark = " (simulated)" * simulated
@@ -205,12 +205,12 @@ def _trends(
 
 
 def _trend_words(changes: Sequence[str], outside: Sequence[str]) -> str:
-    """Say which recordings are changed, and which would be if their figure were the only one."""
+    """Return which recordings have changed, and which lie outside the band without significance."""
     words = f"changed in {', '.join(changes)}." if changes else "no change."
     if outside:
         lie = "lies" if len(outside) == 1 else "lie"
         names = ", ".join(outside)
-        words += f" {names} {lie} outside the band; among so many figures that may be chance."
+        words += f" {names} {lie} outside the band, which may be chance among so many parameters."
     return words
 
 
@@ -223,4 +223,4 @@ def change_words(row: DriftRow, *, simulated: bool) -> str:
     chance = f"{row.p_value:.1g}" if row.p_value is not None else "–"
     where = row.channel.replace("_", " ")
     recording = row.recording + (" (simulated)" if simulated else "")
-    return f"{recording}, {where}: {name} changed{by} (chance if it had not: {chance})."
+    return f"{recording}, {where}: {name} changed{by} (p = {chance})."

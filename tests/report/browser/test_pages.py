@@ -145,7 +145,7 @@ def test_what_is_wrong_stands_in_words(seen: Seen) -> None:
         assert made.REASON in seen.pages[path]["text"], path
     start = seen.pages["index.html"]["text"]
     assert re.search(
-        rf"changed since earlier.*{re.escape(made.DEVICE)}.*{made.CHANGED}", start, re.S
+        rf"with a changed device.*{re.escape(made.DEVICE)}.*{made.CHANGED}", start, re.S
     )
     assert (
         "12 samples are missing"

@@ -32,7 +32,7 @@ kinds.trend = (figure) => {
       { key: "expected", label: "expected from the earlier recordings (95 %)", on: true, look: { ...look, filled: true } },
     ],
     layout: {
-      xaxis: { ...linearAxis(trend.dated ? "" : "recordings in their order"), type: trend.dated ? "date" : "category", nticks: 8 },
+      xaxis: { ...linearAxis(trend.dated ? "" : "recordings by name"), type: trend.dated ? "date" : "category", nticks: 8 },
       yaxis: linearAxis(`${trend.parameter === "bias" ? "fixed bias" : symbolMarkup(trend.parameter)} (${unit.sign})`),
     },
   };
