@@ -1,4 +1,4 @@
-"""The page of the boards: sensors that share a place, beside what a paper prints of them."""
+"""The page of the boards: sensors that share a place, compared with the figures of a paper."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from imubench_pipeline.report.site import Entry, Site
 from imubench_pipeline.report.view import ChannelView, RecordingView
 from imubench_pipeline.words.numbers import limit_digits, number_text
 
-_ALIKE = 0.05
-"""Relative difference up to which found and printed are one figure."""
+_MAX_AGREEING_DIFFERENCE = 0.05
+"""Relative difference up to which result and printed figure agree."""
 
-_UNIT = {"bias": "signal"}
-"""Unit of the page of a parameter, where it has another name."""
+_UNIT_SYMBOLS = {"bias": "signal"}
+"""Symbol of the unit of a parameter, where it differs from that of the parameter."""
 
 
 def _context(site: Site) -> dict[str, Any]:
@@ -83,8 +83,8 @@ BOARDS = Entry(
 def _shared(board: Mapping[str, Any]) -> str:
     shared = ["one temperature"] * board["temperature"] + ["one motion"] * bool(board["motion"])
     if not shared:
-        return "The sensors share nothing but their place."
-    return f"All sensors of the board have {' and '.join(shared)}."
+        return "The sensors share only their place."
+    return f"All sensors of the board share {' and '.join(shared)}."
 
 
 def _channel(
@@ -100,15 +100,15 @@ def _channel(
 
 
 def published_lines(rows: Iterable[PublishedFigureRow]) -> Iterator[dict[str, Any]]:
-    """Yield the lines of what a source prints of a channel, of rows of ``published_figures``."""
+    """Yield the lines of the printed figures of a channel, from rows of ``published_figures``."""
     for row in rows:
         quantity = row.channel.split("_")[0]
         ours = row.datasheet if row.of == "datasheet" else row.value
         ratio = ours / row.means if ours and row.means else None
         yield {
             **row,
-            "unit": f"{quantity}.{_UNIT.get(row.parameter, row.parameter)}",
+            "unit": f"{quantity}.{_UNIT_SYMBOLS.get(row.parameter, row.parameter)}",
             "digits": limit_digits(row.lower, row.upper, 4),
             "ratio": "–" if ratio is None else number_text(ratio, 3),
-            "differs": ratio is not None and abs(ratio - 1.0) > _ALIKE,
+            "differs": ratio is not None and abs(ratio - 1.0) > _MAX_AGREEING_DIFFERENCE,
         }

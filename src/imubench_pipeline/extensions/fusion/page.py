@@ -1,4 +1,4 @@
-"""What the pages say of fusion: how many of one sensor equal one of another."""
+"""The page of fusion: how many of one sensor match one of another."""
 
 from __future__ import annotations
 
@@ -39,13 +39,13 @@ def _context(site: Site) -> dict[str, Any]:
 FUSION = Entry(
     file="fusion.html", title="Fusion", context=_context, tables=("fusion", "grades"), place=2
 )
-"""The page that says how many of one sensor equal one of another."""
+"""The page that shows how many of one sensor match one of another."""
 
 
 def shared_words(common: Mapping[str, float]) -> str:
-    """Return what specimens of one sensor are taken to have in common, in words.
+    """Return the assumptions on common errors, as sentences.
 
-    Parts of the variance of N, B, K and R.
+    ``common`` has the common share of the variance of N, B, K and R.
     """
     named = [
         f"{percent_text(share)} of the variance of the {_PARAMETERS[name]} ({name})"
@@ -53,24 +53,23 @@ def shared_words(common: Mapping[str, float]) -> str:
         if share > 0.0
     ]
     if not named:
-        shared = "The noise of each specimen is taken to be independent."
+        shared = "The noise of each unit is assumed to be independent."
     else:
-        shared = f"Specimens of one sensor are taken to have in common {', '.join(named)}."
+        shared = f"The units of one sensor are assumed to share {', '.join(named)}."
     return (
-        f"{shared} What temperature adds to a log with readings of it is common to all: they are "
-        "taken to have the same sensitivity. What else they follow together, such as supply or "
-        "motion, or a temperature that is not logged, makes the numbers too small."
+        f"{shared} The effect of a logged temperature counts as common to all units. Other common "
+        "influences (supply, motion, a temperature that is not logged) make the numbers too small."
     )
 
 
 def equal_numbers(rows: Sequence[FusionRow]) -> Iterator[dict[str, Any]]:
-    """Yield the lines of the table: pairs of which the first is the worse one, or not known."""
+    """Yield the lines of the table: pairs whose first sensor is the noisier one, or unknown."""
     for row in rows:
         if row.adev is not None and row.other_adev is not None:
             if row.adev <= row.other_adev:
                 continue
         elif row.sensor > row.other:
-            continue  # what is not known of a pair is said once
+            continue  # an unknown pair is listed once
         yield {
             "sensor": row.sensor,
             "other": row.other,
@@ -91,10 +90,10 @@ def equal_numbers(rows: Sequence[FusionRow]) -> Iterator[dict[str, Any]]:
 
 
 def matrices(lines: Sequence[Mapping[str, Any]]) -> Iterator[dict[str, Any]]:
-    """Yield a matrix of each quantity and averaging time, of the lines of `equal_numbers`.
+    """Yield a matrix for each quantity and averaging time, from the lines of `equal_numbers`.
 
-    Rows and columns are the sensors, the quietest first; a cell says how many of its row equal one
-    of its column. A sensor that is at least as good needs one, and has no line.
+    Rows and columns are the sensors, the quietest first; a cell has the number of row sensors that
+    match one column sensor. A sensor that is at least as good needs one, and has no line.
     """
     groups: dict[tuple[str, str], list[Mapping[str, Any]]] = {}
     for line in lines:
@@ -103,7 +102,7 @@ def matrices(lines: Sequence[Mapping[str, Any]]) -> Iterator[dict[str, Any]]:
         by_pair = {(line["sensor"], line["other"]): line for line in own}
         levels = {line[of]: line[adev] for line in own for of, adev in _ENDS if line[adev]}
         sensors = sorted(levels, key=lambda sensor: (levels[sensor], sensor))
-        if 1 < len(sensors) <= _MOST:
+        if 1 < len(sensors) <= _MAX_MATRIX_SENSORS:
             cells = [[by_pair.get((row, column)) for column in sensors] for row in sensors]
             yield {
                 "name": f"{quantity}, {tau}",
@@ -115,19 +114,16 @@ def matrices(lines: Sequence[Mapping[str, Any]]) -> Iterator[dict[str, Any]]:
 
 
 _ENDS = (("sensor", "adev"), ("other", "other_adev"))
-_MOST = 40
-"""Sensors of a matrix that can still be read."""
+_MAX_MATRIX_SENSORS = 40
+"""Largest number of sensors for which a matrix is readable."""
 
 
 def grade_lines(rows: Sequence[GradeRow]) -> Iterator[dict[str, Any]]:
-    """Yield the lines of the table of how many reach a class: a sensor and an option each.
-
-    What is not printed of the class is said once of all sensors.
-    """
+    """Yield the lines of the table of classes: one per sensor and option with printed figures."""
     groups: dict[tuple[str, ...], dict[str, GradeRow]] = {}
     for row in rows:
         key = (row.quantity, row.sensor, row.grade, row.option or "")
-        # A density of which the side is not printed is there twice: the first reading is shown.
+        # A density of unknown sidedness has two rows: the first reading is shown.
         groups.setdefault(key, {}).setdefault(row.statistic, row)
     for (quantity, sensor, _, option), by in groups.items():
         if not any(row.printed for row in by.values()):
@@ -156,7 +152,7 @@ def grade_lines(rows: Sequence[GradeRow]) -> Iterator[dict[str, Any]]:
 
 
 def unprinted_grades(rows: Sequence[GradeRow]) -> dict[str, str]:
-    """Return the sensors of the class of which nothing is printed of a quantity, and why."""
+    """Return the sensors of the class without printed figures of a quantity, and the reasons."""
     groups: dict[tuple[str, str], list[GradeRow]] = {}
     for row in rows:
         groups.setdefault((row.quantity, row.grade_name), []).append(row)
@@ -188,9 +184,9 @@ def _common(row: FusionRow) -> str:
 
 
 def _number(row: FusionRow) -> str:
-    """Return the least whole number of sensors that is enough."""
+    """Return the smallest sufficient number of sensors."""
     if row.reachable is False:
-        return "no number"
+        return "not possible"
     return "–" if row.n is None else _whole(row.n)
 
 
@@ -204,5 +200,5 @@ def _limits(row: FusionRow) -> str:
 
 
 def _whole(number: float) -> str:
-    # A number that rounding alone puts above a whole one is that one.
+    # Tolerate rounding errors just above a whole number.
     return number_text(max(math.ceil(number * (1.0 - 1e-9)), 1), 4)
