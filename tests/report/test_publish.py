@@ -341,8 +341,8 @@ def test_samples_are_drawn_where_they_are_kept(read: dict[str, Read]) -> None:
 
 
 def test_a_sensor_without_a_datasheet_says_so(read: dict[str, Read]) -> None:
-    assert "No figures of a datasheet are stated" in read["sensors/two.html"].text
-    assert "No figures of a datasheet are stated" not in read["sensors/one.html"].text
+    assert "The sensor file states no figures of a datasheet" in read["sensors/two.html"].text
+    assert "The sensor file states no figures of a datasheet" not in read["sensors/one.html"].text
     assert read["sensors/one.html"].naming("0.005 deg/s/sqrt(Hz)", "tr")
     assert [one.attributes.get("data-sensor") for one in read["datasheets.html"].elements
             if one.attributes.get("data-sensor")] == ["V & Co one"] * 2  # fmt: skip

@@ -27,7 +27,7 @@ KEPT = ("error_growth", "drawn_deviations")
 
 _ERRORS = ("attitude", "heading", "velocity", "position")
 _MAX_DETAILED_RECORDINGS = 100
-"""With more recordings the page has draws at whole decades of tau, and errors of worst axes only."""
+"""With more recordings, draws are at whole decades of tau, and errors of worst axes only."""
 
 
 def _context(site: Site) -> dict[str, Any]:
@@ -37,18 +37,17 @@ def _context(site: Site) -> dict[str, Any]:
     channels: list[dict[str, Any]] = []
     datasheets: dict[str, dict[str, Any]] = {}
     recordings = []
+    few = len(views) > _MAX_DETAILED_RECORDINGS
     for recording in site.compared(views):
         view = recording.view
         kept = {table: _kept(site, view, table) for table in KEPT}
-        drawn = dict(
-            _drawn(kept["drawn_deviations"], arrays, few=len(views) > _MAX_DETAILED_RECORDINGS)
-        )
+        drawn = dict(_drawn(kept["drawn_deviations"], arrays, few=few))
         for channel in recording.channels:
             channels.append(channel.among(arrays) | {"drawn": drawn.get(channel.about["channel"])})
         own = datasheets.setdefault(view.sensor, {})
         for name, lines in recording.datasheet.items():
             own.setdefault(name, lines)
-        growth = _growth(kept["error_growth"], arrays, few=len(views) > _MAX_DETAILED_RECORDINGS)
+        growth = _growth(kept["error_growth"], arrays, few=few)
         recordings.append(_recording(view) | {"sold": site.is_sold(view.sensor), "growth": growth})
     return {
         "several": len(views) > 1,

@@ -1,4 +1,4 @@
-"""What the pages say of datasheets: measured against printed, and who publishes what."""
+"""Datasheets on the pages: measured against printed figures, and published figures by vendor."""
 
 from __future__ import annotations
 
@@ -28,8 +28,8 @@ _SYMBOLS = {
     "temperature_coefficient": "sensitivity",
 }
 
-_BESIDE = ("mean", "temperature")
-"""What stands in place of a method where no method has a part in a figure."""
+_WITHOUT_METHOD = ("mean", "temperature")
+"""Entries of the column ``method`` for figures that no estimation method gives."""
 
 _TITLES = {"gyro": "Gyroscope: published figures", "accel": "Accelerometer: published figures"}
 _SIGNS = {"yes": "yes", "no": "no", "other convention": "other", "not looked up": "?"}
@@ -38,11 +38,11 @@ _SIGNS = {"yes": "yes", "no": "no", "other convention": "other", "not looked up"
 def delta_rows(
     view: ChannelView, coverage: Mapping[tuple[str, str, str], str], system: System
 ) -> Iterator[dict[str, Any]]:
-    """Yield each figure of the datasheet with all its readings, what was measured, and a verdict.
+    """Yield each figure of the datasheet with all its readings, the measured value and a verdict.
 
-    ``coverage`` tells whether sensor, quantity and figure are published.
+    ``coverage`` has the publication status by sensor, quantity and figure.
     """
-    own = [row for row in view.datasheet if row.method in (view.recommended, *_BESIDE)]
+    own = [row for row in view.datasheet if row.method in (view.recommended, *_WITHOUT_METHOD)]
     for rows in _by_figure(own).values():
         first = rows[0]
         published = first.printed is not None
@@ -61,7 +61,7 @@ def delta_rows(
 
 
 def _reading(row: DatasheetRow, quantity: str, system: System) -> dict[str, Any]:
-    """Return one way to read a printed figure, and what was measured beside it."""
+    """Return one reading of a printed figure, with the measured value."""
     unit = page_unit(quantity, _SYMBOLS.get(row.quantity, "B"), system)
     return {
         "as": _read_as(row),
@@ -74,11 +74,11 @@ def _reading(row: DatasheetRow, quantity: str, system: System) -> dict[str, Any]
 
 
 _Figure = tuple[str, str, float | None, str | None, str | None, str | None]
-"""What names a printed figure of a channel, however it is read."""
+"""Identity of a printed figure of a channel: channel, quantity, number, unit, kind, condition."""
 
 
 def _by_figure(rows: Iterable[DatasheetRow]) -> dict[_Figure, list[DatasheetRow]]:
-    """Return the readings of each printed figure, by what names it."""
+    """Return the readings of each printed figure."""
     figures: dict[_Figure, list[DatasheetRow]] = {}
     for row in rows:
         name = (row.channel, row.quantity, row.printed, row.unit, row.kind, row.condition)
@@ -87,11 +87,10 @@ def _by_figure(rows: Iterable[DatasheetRow]) -> dict[_Figure, list[DatasheetRow]
 
 
 def one_verdict(readings: Sequence[DatasheetRow]) -> tuple[str, str]:
-    """Return the verdict on a printed figure, of the rows of its readings, and its reason.
+    """Return the verdict on a printed figure from the rows of its readings, and its reason.
 
-    A bias instability is judged by the minimum of the curve, which is what vendors print. A density
-    of which the datasheet does not say whether it is one-sided has a verdict where both readings
-    have the same.
+    A bias instability is judged by the minimum of the curve, as vendors print it. A density of
+    unknown sidedness has a verdict only if both readings have the same.
     """
     minima = [row for row in readings if row.statistic == "adev_minimum"]
     judged = minima or list(readings)
@@ -114,7 +113,7 @@ def deltas_of_sensors(views: Sequence[RecordingView], system: System) -> Iterato
         own = [
             row
             for row in view.rows(DatasheetRow)
-            if row.method in (recommended[row.channel], *_BESIDE) and row.delta is not None
+            if row.method in (recommended[row.channel], *_WITHOUT_METHOD) and row.delta is not None
         ]
         for figure, rows in _by_figure(own).items():
             groups.setdefault((view.sensor, view.simulated, figure), []).append(rows)
@@ -149,7 +148,7 @@ def _deltas(rows: Iterable[DatasheetRow]) -> list[float]:
 
 
 def _over_recordings(rows: Sequence[DatasheetRow], unit: PageUnit) -> dict[str, Any]:
-    """Return one way to read a printed figure against all recordings of a sensor."""
+    """Return one reading of a printed figure, compared with all recordings of a sensor."""
     deltas = sorted(_deltas(rows))
     measured = sorted(row.measured for row in rows if row.measured is not None)
     ends = (measured[0], measured[-1]) if measured else (None, None)
@@ -164,9 +163,9 @@ def _over_recordings(rows: Sequence[DatasheetRow], unit: PageUnit) -> dict[str, 
 def repeatability_lines(
     rows: Sequence[RepeatabilityRow], sensor: str, system: System
 ) -> Iterator[dict[str, Any]]:
-    """Yield how the fixed biases of each device of a sensor differ, against what is printed.
+    """Yield the scatter of the fixed biases of each device of a sensor, and the printed figure.
 
-    Of the table ``repeatability``.
+    ``rows`` are those of the table ``repeatability``.
     """
     for row in rows:
         if row.sensor != sensor:
@@ -192,7 +191,7 @@ def _figure_name(row: DatasheetRow) -> str:
 
 
 def _read_as(row: DatasheetRow) -> str:
-    """Return how a reading takes the printed figure, where there is more than one way."""
+    """Return the name of a reading of a printed figure, if there are several readings."""
     if row.sidedness:
         return f"read as {row.sidedness}"
     return _STATISTICS.get(row.statistic, "")
@@ -206,7 +205,7 @@ def _range(ends: Sequence[str]) -> str:
 
 
 def curve_distances(view: ChannelView, system: System) -> Iterator[str]:
-    """Yield how far the curve is from the lines of the datasheet, in words."""
+    """Yield the distance between the curve and the lines of the datasheet, as text."""
     unit = page_unit(view.quantity, "adev", system)
     for row in view.datasheet_curve:
         reading = f", density read as {row.sidedness}" if row.sidedness else ""
@@ -220,7 +219,7 @@ def _percent(share: float | None) -> str:
 
 
 def _with_limits(row: DatasheetRow | RepeatabilityRow, unit: PageUnit) -> list[str]:
-    """Return what was measured, and its 95 % limits below it."""
+    """Return the measured value, and its 95 % limits below it."""
     value, lower, upper = row.measured, row.lower, row.upper
     if value is None or lower is None or upper is None:
         return [unit.text(value)]
@@ -237,7 +236,7 @@ def _shares_with_limits(row: DatasheetRow) -> list[str]:
 
 
 def coverage_tables(rows: Sequence[CoverageRow]) -> Iterator[dict[str, Any]]:
-    """Yield a table a quantity: a line a sensor, a column a figure, of the table ``coverage``."""
+    """Yield a table per quantity with a line per sensor and a column per figure."""
     for quantity, title in _TITLES.items():
         own = [row for row in rows if row.quantity == quantity]
         figures = list(dict.fromkeys(row.figure for row in own))
@@ -271,7 +270,7 @@ def coverage_tables(rows: Sequence[CoverageRow]) -> Iterator[dict[str, Any]]:
 
 
 def _count(published: Counter[str]) -> str:
-    """Return of how many of those looked up a figure is published, and how many were not."""
+    """Return how many vendors publish a figure, and how many have not been looked up."""
     unknown = published["not looked up"]
     text = f"{published['yes']} of {published.total() - unknown} looked up"
     return f"{text}; {unknown} not looked up" if unknown else text

@@ -1,4 +1,4 @@
-"""The page of what datasheets alone say for each requirement, before anything is bought."""
+"""The page that judges sensors by their datasheets alone, before buying."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def _line(site: Site, row: ShortlistRow) -> dict[str, Any]:
 
 
 def cells(row: ShortlistRow) -> list[str]:
-    """Return sensor, verdict, margins at best, at worst and measured, and the limit, as texts."""
+    """Return sensor, verdict, margins (best, worst, measured) and deciding limit, as texts."""
     measured = _margin(row.measured_margin)
     if row.measured_margin_of == "simulated logs":
         measured += " (simulated)"
@@ -60,7 +60,7 @@ def cells(row: ShortlistRow) -> list[str]:
 
 
 def notes(rows: Sequence[ShortlistRow]) -> Iterator[str]:
-    """Yield what is assumed of each sensor, or why it is not judged, in a line each."""
+    """Yield a line per sensor with its assumptions, or the reason why it is not judged."""
     for row in rows:
         remarks = [row.reason, row.assumed]
         if any(remarks):
