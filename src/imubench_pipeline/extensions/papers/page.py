@@ -1,4 +1,4 @@
-"""The page of the papers, line by line: what is printed, what is found, and why they differ."""
+"""The page of the papers, line by line: printed values, results, and reasons for differences."""
 
 from __future__ import annotations
 
@@ -59,11 +59,11 @@ PAPERS_PAGE = Entry(
     views=_views,
     exists=lambda site: bool(site.rows(PublishedRow)),
 )
-"""The page of every table, figure and equation of the papers of which the run has logs."""
+"""The page of every table, figure and equation of the papers whose logs the run simulates."""
 
 
 def _drawn(site: Site) -> list[tuple[Drawn, RecordingView, ChannelView]]:
-    """Return the curves that stand for figures, those that there are."""
+    """Return the curves that reproduce figures of the papers, as far as they exist."""
     channels = {
         (*view.full_name, channel.channel): (view, channel)
         for view in _views(site)
@@ -78,7 +78,7 @@ def _drawn(site: Site) -> list[tuple[Drawn, RecordingView, ChannelView]]:
 
 
 def _panel(rows: Sequence[AccuracyRow]) -> dict[str, Any]:
-    """Return how far each method is from the bound: a line a method, a cell a parameter."""
+    """Return the errors of each method relative to the bound: a line per method."""
     symbols = list(dict.fromkeys(row.parameter for row in rows))
     by = {(row.method, row.parameter): row for row in rows}
     return {
@@ -106,7 +106,7 @@ def _cell(row: AccuracyRow) -> dict[str, str]:
 
 
 def _pages(site: Site) -> set[str]:
-    """Return the pages that a line may lead to."""
+    """Return the pages that a line may link to."""
     of_recordings = {view.page for view in site.views if not view.left_out}
     return of_recordings | {file for file, _ in site.navigation}
 
@@ -148,9 +148,9 @@ def _paper(paper: About, rows: Sequence[PublishedRow], there: set[str]) -> dict[
 
 
 def cells(row: PublishedRow) -> dict[str, str]:
-    """Return what is found, the ratio and its tolerance of a row of ``published``, as texts.
+    """Return result, ratio and tolerance of a row of ``published``, as texts.
 
-    What is found is in the unit of the paper, so that it can be held beside what is printed.
+    The result is in the unit of the paper, so that it can be compared with the printed value.
     """
     found = ""
     if row.found is not None:
