@@ -66,5 +66,5 @@ def _summary(view: RecordingView, points: Sequence[CalibrationPointRow]) -> str:
     if not points:
         return summary_words(view, [])
     most = math.degrees(max(abs(point.table_rate) for point in points))
-    rates = f"{counted(len(points), 'steady rate')} up to {number_text(most)} °/s"
+    rates = f"{counted(len(points), 'constant rate')} up to {number_text(most)} °/s"
     return summary_words(view, [rates])
