@@ -418,7 +418,7 @@ MTI_7_ACCEL = NoiseModel(N=9.6e-4, B=3.4e-4, T_B=38.3, K=1.7e-5)
 C102_ACCEL = NoiseModel(N=1.1e-3, B=7.2e-4, T_B=148.9, K=2.0e-5)
 PERFECT = Start.uncalibrated(gyro_bias=0.0, accel_bias=0.0, on_time=0.0)
 CAUSES: dict[str, tuple[NoiseModel, Start]] = {
-    "A bias b that is left over, 10 °/h": (
+    "A residual bias b, 10 °/h": (
         NOTHING,
         Start.uncalibrated(gyro_bias=GYRO.B, accel_bias=0.0, on_time=0.0),
     ),

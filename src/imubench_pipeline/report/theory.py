@@ -1,4 +1,4 @@
-"""The page of the theory: the noise terms, and every word of the glossary."""
+"""The page of the theory: the noise terms, and the terms of the glossary."""
 
 from __future__ import annotations
 
@@ -18,4 +18,4 @@ def _context(site: Site) -> dict[str, Any]:
 
 
 THEORY = Entry(file="theory.html", title="Theory", context=_context)
-"""The page that the terms of all others lead to."""
+"""The page that the terms of all other pages link to."""
