@@ -249,7 +249,7 @@ def test_filters_offer_what_the_others_leave(read: Open, bench: Report) -> None:
     assert bar.get_by_role("button", name="clear the filters").is_hidden()
     bar.get_by_role("searchbox", name="Find").fill("nothing like it")
     said = bar.locator("output").inner_text()
-    assert re.search("^0 of .*: none has Sensor “Other C” and Find “nothing like it”", said)
+    assert re.search("^0 of .*: no row has Sensor “Other C” and Find “nothing like it”", said)
     assert said.endswith("; 1 without Find")
     bar.get_by_role("button", name="clear the filters").click()
     assert len(cells(table, 1)) == len(bench.rows["recordings"])

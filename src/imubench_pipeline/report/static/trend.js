@@ -1,4 +1,4 @@
-// A device over time: each estimate beside what its earlier recordings let expect.
+// A device over time: each estimate, and the prediction from earlier recordings.
 
 kinds.trend = (figure) => {
   const trend = pageData.trends[figure.dataset.trend];
