@@ -314,7 +314,7 @@ def _provenance(
     row, metadata = view.row, metadata_of(folder)
     yield "Recording", f"{row.sensor} / {row.recording}"
     yield "Device", str(row.device)
-    yield "Kind", row.kind + (", simulated" if row.simulated else "")
+    yield "Kind", row.kind.replace("_", " ") + (", simulated" if row.simulated else "")
     yield "Started", started_text(row.started) or "not stated in the log"
     if "reader" in metadata:
         yield "Format", str(metadata["reader"] or "detected from the content")

@@ -114,7 +114,7 @@ def test_rows_are_found_and_counted(read: Open, bench: Report) -> None:
     bar.get_by_label("Sensor").select_option("Other C")
     assert cells(table, 2) == ["only"] and count(table) == f"1 of {rows} rows"
     search.fill("nothing like it")
-    assert cells(table, 2) == [] and count(table).startswith(f"0 of {rows} rows: none")
+    assert cells(table, 2) == [] and count(table).startswith(f"0 of {rows} rows: no row has")
     for label in ("Status", "Sensor"):
         bar.get_by_label(label).select_option("all")
     search.fill("")

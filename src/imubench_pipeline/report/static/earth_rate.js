@@ -83,7 +83,7 @@ kinds.dwells = (figure) => {
   }
   groups.push(
     { key: "drift", label: "drift, smoothed", on: true, look: COURSES.smoother },
-    { key: "band", label: "its 2σ", on: true, look: { ...COURSES.smoother, filled: true } },
+    { key: "band", label: "2σ of the drift", on: true, look: { ...COURSES.smoother, filled: true } },
   );
   return { traces, groups, layout: { xaxis: linearAxis(`time (${scale.name})`), yaxis: linearAxis(`mean of a dwell (${unit.sign})`) } };
 };
