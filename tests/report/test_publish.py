@@ -50,7 +50,7 @@ KEPT = {"pages.json", "settings.json"}
 ASKED = {"robot": ROBOT}
 THEORY_FIGURE = "data:image/svg+xml;base64,PHN2Zy8+"
 PLOTTING = "var Plotly = {};"
-MADE = publishing._made
+MADE = publishing._make_page
 
 
 @pytest.fixture(autouse=True, scope="module")
@@ -1004,7 +1004,7 @@ def test_a_page_that_fails_stops_no_other_page(
 
     tables = joined(recording_rows("one", "day1"))
     monkeypatch.setattr(publishing, "pages", broken)
-    monkeypatch.setattr(publishing, "_made", MADE)
+    monkeypatch.setattr(publishing, "_make_page", MADE)
     for attempt in range(2):
         assert attempt_at_pages(tmp_path) == attempt
         made = site(tables)
@@ -1024,7 +1024,7 @@ def test_a_full_disk_is_no_fault_of_a_page(tmp_path: Path, monkeypatch: pytest.M
     def full(*_: object) -> str:
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(publishing, "_made", MADE)
-    monkeypatch.setattr(publishing, "_rendered", full)
+    monkeypatch.setattr(publishing, "_make_page", MADE)
+    monkeypatch.setattr(publishing, "_render", full)
     with pytest.raises(OSError, match="No space"):
         publish(site(joined(recording_rows("one", "day1"))), tmp_path)

@@ -20,7 +20,7 @@ _STATISTIC_NAMES = {
     "K": "K",
     "T_B": "T_B",
 }
-_SYMBOLS = {
+_UNIT_SYMBOLS = {
     "N": "N",
     "K": "K",
     "T_B": "T_B",
@@ -31,8 +31,11 @@ _SYMBOLS = {
 _WITHOUT_METHOD = ("mean", "temperature")
 """Entries of the column ``method`` for figures that no estimation method gives."""
 
-_TITLES = {"gyro": "Gyroscope: published figures", "accel": "Accelerometer: published figures"}
-_SIGNS = {"yes": "yes", "no": "no", "other convention": "other", "not looked up": "?"}
+_COVERAGE_TITLES = {
+    "gyro": "Gyroscope: published figures",
+    "accel": "Accelerometer: published figures",
+}
+_COVERAGE_SIGNS = {"yes": "yes", "no": "no", "other convention": "other", "not looked up": "?"}
 
 
 def delta_rows(
@@ -43,32 +46,32 @@ def delta_rows(
     ``coverage`` has the publication status by sensor, quantity and figure.
     """
     own = [row for row in view.datasheet if row.method in (view.recommended, *_WITHOUT_METHOD)]
-    for rows in _by_figure(own).values():
+    for rows in _group_by_figure(own).values():
         first = rows[0]
         published = first.printed is not None
         figure = "B" if first.quantity == "bias_instability" else first.quantity
         verdict, why = one_verdict(rows)
         yield {
-            "quantity": _figure_name(first),
+            "quantity": _name_figure(first),
             "published": published,
             "coverage": coverage.get((view.sensor, view.quantity, figure), "not looked up"),
             "printed": printed_text(first),
             "about": ", ".join(filter(None, (first.kind, first.condition))),
-            "readings": [_reading(row, view.quantity, system) for row in rows],
+            "readings": [_describe_reading(row, view.quantity, system) for row in rows],
             "verdict": verdict,
             "reason": why if published else "",
         }
 
 
-def _reading(row: DatasheetRow, quantity: str, system: System) -> dict[str, Any]:
+def _describe_reading(row: DatasheetRow, quantity: str, system: System) -> dict[str, Any]:
     """Return one reading of a printed figure, with the measured value."""
-    unit = page_unit(quantity, _SYMBOLS.get(row.quantity, "B"), system)
+    unit = page_unit(quantity, _UNIT_SYMBOLS.get(row.quantity, "B"), system)
     return {
-        "as": _read_as(row),
+        "as": _name_reading(row),
         "comparable": unit.text(row.comparable),
-        "measured": _with_limits(row, unit),
+        "measured": _format_measured(row, unit),
         "unit": "" if row.comparable is None and row.measured is None else unit.sign,
-        "delta": _shares_with_limits(row),
+        "delta": _format_difference(row),
         "value": row.delta,
     }
 
@@ -77,7 +80,7 @@ _Figure = tuple[str, str, float | None, str | None, str | None, str | None]
 """Identity of a printed figure of a channel: channel, quantity, number, unit, kind, condition."""
 
 
-def _by_figure(rows: Iterable[DatasheetRow]) -> dict[_Figure, list[DatasheetRow]]:
+def _group_by_figure(rows: Iterable[DatasheetRow]) -> dict[_Figure, list[DatasheetRow]]:
     """Return the readings of each printed figure."""
     figures: dict[_Figure, list[DatasheetRow]] = {}
     for row in rows:
@@ -115,26 +118,26 @@ def deltas_of_sensors(views: Sequence[RecordingView], system: System) -> Iterato
             for row in view.rows(DatasheetRow)
             if row.method in (recommended[row.channel], *_WITHOUT_METHOD) and row.delta is not None
         ]
-        for figure, rows in _by_figure(own).items():
+        for figure, rows in _group_by_figure(own).items():
             groups.setdefault((view.sensor, view.simulated, figure), []).append(rows)
     for (sensor, simulated, (channel, *_)), group in groups.items():
         first = group[0][0]
-        unit = page_unit(quantity_of(channel), _SYMBOLS.get(first.quantity, "B"), system)
+        unit = page_unit(quantity_of(channel), _UNIT_SYMBOLS.get(first.quantity, "B"), system)
         verdicts = Counter(one_verdict(rows)[0] for rows in group)
         readings = [
-            [row for rows in group for row in rows if _read_as(row) == name]
-            for name in dict.fromkeys(_read_as(row) for rows in group for row in rows)
+            [row for rows in group for row in rows if _name_reading(row) == name]
+            for name in dict.fromkeys(_name_reading(row) for rows in group for row in rows)
         ]
         yield {
             "sensor": sensor,
             "simulated": simulated,
             "channel": channel,
-            "quantity": _figure_name(first),
+            "quantity": _name_figure(first),
             "printed": printed_text(first),
             "about": first.kind or "",
             "unit": unit.sign,
-            "readings": [_over_recordings(rows, unit) for rows in readings],
-            "delta": median(_deltas(readings[0])),
+            "readings": [_compare_recordings(rows, unit) for rows in readings],
+            "delta": median(_list_deltas(readings[0])),
             "recordings": len(group),
             "verdicts": ", ".join(
                 verdict if len(group) == 1 else f"{verdict} ({count})"
@@ -143,20 +146,20 @@ def deltas_of_sensors(views: Sequence[RecordingView], system: System) -> Iterato
         }
 
 
-def _deltas(rows: Iterable[DatasheetRow]) -> list[float]:
+def _list_deltas(rows: Iterable[DatasheetRow]) -> list[float]:
     return [row.delta for row in rows if row.delta is not None]
 
 
-def _over_recordings(rows: Sequence[DatasheetRow], unit: PageUnit) -> dict[str, Any]:
+def _compare_recordings(rows: Sequence[DatasheetRow], unit: PageUnit) -> dict[str, Any]:
     """Return one reading of a printed figure, compared with all recordings of a sensor."""
-    deltas = sorted(_deltas(rows))
+    deltas = sorted(_list_deltas(rows))
     measured = sorted(row.measured for row in rows if row.measured is not None)
     ends = (measured[0], measured[-1]) if measured else (None, None)
     return {
-        "as": _read_as(rows[0]),
+        "as": _name_reading(rows[0]),
         "comparable": unit.text(rows[0].comparable),
-        "measured": _range([unit.text(value, 3) for value in ends]),
-        "difference": _range([_percent(value) for value in (deltas[0], deltas[-1])]),
+        "measured": _format_range([unit.text(value, 3) for value in ends]),
+        "difference": _format_range([_format_percent(value) for value in (deltas[0], deltas[-1])]),
     }
 
 
@@ -178,29 +181,29 @@ def repeatability_lines(
             "printed": printed_text(row),
             "about": ", ".join(filter(None, (row.kind, row.condition))),
             "comparable": unit.text(row.comparable),
-            "measured": _with_limits(row, unit),
+            "measured": _format_measured(row, unit),
             "unit": unit.sign,
-            "delta": _percent(row.delta),
+            "delta": _format_percent(row.delta),
             "verdict": row.verdict,
             "reason": row.reason or "",
         }
 
 
-def _figure_name(row: DatasheetRow) -> str:
+def _name_figure(row: DatasheetRow) -> str:
     return _STATISTIC_NAMES.get(row.statistic, row.quantity.replace("_", " "))
 
 
-def _read_as(row: DatasheetRow) -> str:
+def _name_reading(row: DatasheetRow) -> str:
     """Return the name of a reading of a printed figure, if there are several readings."""
     if row.sidedness:
         return f"read as {row.sidedness}"
-    return _STATISTICS.get(row.statistic, "")
+    return _STATISTIC_TEXTS.get(row.statistic, "")
 
 
-_STATISTICS = {"adev_minimum": "lowest point of the curve", "plateau": "0.664 B alone"}
+_STATISTIC_TEXTS = {"adev_minimum": "lowest point of the curve", "plateau": "0.664 B alone"}
 
 
-def _range(ends: Sequence[str]) -> str:
+def _format_range(ends: Sequence[str]) -> str:
     return ends[0] if ends[0] == ends[1] else f"{ends[0]} to {ends[1]}"
 
 
@@ -214,11 +217,11 @@ def curve_distances(view: ChannelView, system: System) -> Iterator[str]:
         yield f"{unit.text(row.rms, 3)} {unit.sign}, {decades} decades{reading}"
 
 
-def _percent(share: float | None) -> str:
+def _format_percent(share: float | None) -> str:
     return "–" if share is None else f"{round(100 * share):+d} %".replace("-", "−")
 
 
-def _with_limits(row: DatasheetRow | RepeatabilityRow, unit: PageUnit) -> list[str]:
+def _format_measured(row: DatasheetRow | RepeatabilityRow, unit: PageUnit) -> list[str]:
     """Return the measured value, and its 95 % limits below it."""
     value, lower, upper = row.measured, row.lower, row.upper
     if value is None or lower is None or upper is None:
@@ -227,17 +230,17 @@ def _with_limits(row: DatasheetRow | RepeatabilityRow, unit: PageUnit) -> list[s
     return [unit.text(value, digits), f"{unit.text(lower, digits)} to {unit.text(upper, digits)}"]
 
 
-def _shares_with_limits(row: DatasheetRow) -> list[str]:
+def _format_difference(row: DatasheetRow) -> list[str]:
     """Return the difference, and its 95 % limits below it."""
     lower, upper = row.delta_lower, row.delta_upper
     if lower is None or upper is None:
-        return [_percent(row.delta)]
-    return [_percent(row.delta), f"{_percent(lower)} to {_percent(upper)}"]
+        return [_format_percent(row.delta)]
+    return [_format_percent(row.delta), f"{_format_percent(lower)} to {_format_percent(upper)}"]
 
 
 def coverage_tables(rows: Sequence[CoverageRow]) -> Iterator[dict[str, Any]]:
     """Yield a table per quantity with a line per sensor and a column per figure."""
-    for quantity, title in _TITLES.items():
+    for quantity, title in _COVERAGE_TITLES.items():
         own = [row for row in rows if row.quantity == quantity]
         figures = list(dict.fromkeys(row.figure for row in own))
         lines: dict[str, dict[str, Any]] = {}
@@ -247,7 +250,7 @@ def coverage_tables(rows: Sequence[CoverageRow]) -> Iterator[dict[str, Any]]:
                 row.sensor, {"name": name, "document": row.document or "–", "cells": {}}
             )
             line["cells"][row.figure] = {
-                "text": _SIGNS[row.published],
+                "text": _COVERAGE_SIGNS[row.published],
                 "note": row.as_printed or "",
                 "class": "" if row.published == "yes" else "none",
             }

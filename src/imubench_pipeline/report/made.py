@@ -20,7 +20,7 @@ _LIBRARIES = (
     "snakemake",
 )
 
-_RUN = (
+_RUN_COMMAND = (
     "snakemake -c2",
     "runs everything; later only the steps that new logs or changed settings affect. "
     "In a folder made by imubench init, use imubench run, with further flags after --",
@@ -38,12 +38,12 @@ _COMMANDS: tuple[tuple[str, dict[str, str], str], ...] = (
 """Commands of `imubench` for the results, their options, and their effect."""
 
 
-def _context(site: Site) -> dict[str, Any]:
+def _make_context(site: Site) -> dict[str, Any]:
     return {
         "commands": [(site.at_once, "writes these pages again")]
         if site.at_once
         else [
-            _RUN,
+            _RUN_COMMAND,
             *(
                 (imubench(name, site.results_name, options), words)
                 for name, options, words in _COMMANDS
@@ -62,5 +62,5 @@ def _context(site: Site) -> dict[str, Any]:
     }
 
 
-MADE = Entry(file="made.html", title="How this was made", context=_context)
+MADE = Entry(file="made.html", title="How this was made", context=_make_context)
 """The page that the footer of every page links to."""

@@ -41,7 +41,7 @@ def methods_table(
         for method in channel.parameters
     ]
     if channel.true_components:
-        cells = [_truth(channel.true_components.get(symbol, [])) for symbol in symbols]
+        cells = [_describe_truth(channel.true_components.get(symbol, [])) for symbol in symbols]
         lines.append({"method": None, "recommended": False, "model": "", "cells": cells})
     return symbols, lines
 
@@ -100,7 +100,7 @@ def digits_of(unit: PageUnit, value: float | None, lower: float | None, upper: f
     return max(unit.digits(value, lower, upper), limit_digits(lower, upper, 2))
 
 
-def _truth(rows: Sequence[SimulatedTruthRow]) -> dict[str, Any]:
+def _describe_truth(rows: Sequence[SimulatedTruthRow]) -> dict[str, Any]:
     if not rows:
         return {"parts": [], "words": "Not simulated.", "value": None, "digits": 3}
     parts = [

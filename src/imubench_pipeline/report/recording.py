@@ -95,11 +95,13 @@ def context(site: Site, view: RecordingView, folder: Path) -> dict[str, Any]:
     budgets = list(budget_tables(view.budget, {view.full_name: view.simulated}, site.system))
     return {
         **about_of(site, view, channels, folder),
-        "summary": _summary(view, len(channels)),
+        "summary": _summarise(view, len(channels)),
         "findings": numbered,
         "serious": [row for row in numbered if row["severity"] != "note"],
         "notes": [row for row in numbered if row["severity"] == "note"],
-        "channels": [_channel(site, view, channel, samples, of_models) for channel in channels],
+        "channels": [
+            _describe_channel(site, view, channel, samples, of_models) for channel in channels
+        ],
         "has_temperature": "temperature" in samples["envelope"],
         "added": [made for add in _SECTIONS.objects() if (made := add(site, view)) is not None],
         "budget": budgets[0] if budgets else None,
@@ -133,7 +135,7 @@ STATIC = RecordingPage("recording.html.jinja", context)
 """The page of a sensor that was at rest."""
 
 
-def _summary(view: RecordingView, channels: int) -> str:
+def _summarise(view: RecordingView, channels: int) -> str:
     if view.left_out:
         why = "was rejected" if view.rejected else "could not be analysed, because a step failed"
         return f"This recording {why}; the comparison does not include it."
@@ -149,13 +151,13 @@ def _summary(view: RecordingView, channels: int) -> str:
     return summary_words(view, parts)
 
 
-def _inside(score: ScoreRow) -> str:
+def _format_inside(score: ScoreRow) -> str:
     """Return the part of the curve inside the band of one reconstruction."""
     inside = score.inside_band
     return NO_VALUE if inside is None else f"{100 * inside:.0f} %"
 
 
-def _drawn(score: ScoreRow) -> tuple[str, str]:
+def _format_score(score: ScoreRow) -> tuple[str, str]:
     """Return the score of one reconstruction and its range, in decades."""
     ends = (score.drawn_log10_lower, score.drawn_log10_upper)
     low, high = (number_text(end, 2) for end in ends)
@@ -170,7 +172,7 @@ def summary_words(view: RecordingView, parts: Sequence[str]) -> str:
     return kind + ", ".join([length, *parts]) + "."
 
 
-def _channel(
+def _describe_channel(
     site: Site,
     view: RecordingView,
     channel: ChannelView,
@@ -183,19 +185,19 @@ def _channel(
         score = channel.scores.get(line["method"] or "")
         scored = score is not None and score.rms_log10 is not None
         line["score"] = number_text(score.rms_log10, 2) if scored and score else "–"
-        line["drawn"] = _drawn(score) if scored and score else ("–", "")
-        line["inside"] = _inside(score) if scored and score else "–"
+        line["drawn"] = _format_score(score) if scored and score else ("–", "")
+        line["inside"] = _format_inside(score) if scored and score else "–"
     best = channel.models[0] if channel.models else None
     return {
         "view": channel,
-        "answer": _answer(channel, site.system),
-        "words": list(_untold(symbols, used["cells"])),
+        "answer": _describe_values(channel, site.system),
+        "words": list(_describe_missing(symbols, used["cells"])),
         "symbols": symbols,
         "lines": lines,
         "has_spectrum": bool(channel.spectrum),
         "has_samples": channel.channel in samples["envelope"],
         "of_models": compared_samples.words(of_models, channel.channel),
-        "model": _model_words(channel),
+        "model": _describe_model(channel),
         "models": [
             {
                 "model": row.model,
@@ -204,7 +206,7 @@ def _channel(
                 "deviance": number_text(row.deviance, 3),
                 "verdict": row.verdict,
             }
-            for row in _best(channel.models)
+            for row in _select_models(channel.models)
         ],
         "spectral_lines": channel.lines,
         "thermal": thermal.answer(channel, site.system),
@@ -215,14 +217,14 @@ def _channel(
     }
 
 
-def _untold(symbols: Sequence[str], cells: Sequence[Mapping[str, Any]]) -> Iterator[str]:
+def _describe_missing(symbols: Sequence[str], cells: Sequence[Mapping[str, Any]]) -> Iterator[str]:
     """Yield what the log does not tell."""
     of = dict(zip(symbols, cells, strict=True))
     statuses = {symbol: {part["status"] for part in cell["parts"]} for symbol, cell in of.items()}
     words, of_time = (
         of[symbol]["words"] if symbol in of else "" for symbol in ("sigma_min", "tau_min")
     )
-    together = _of_lowest_point(words, of_time)
+    together = _merge_lowest_point(words, of_time)
     for symbol, cell in of.items():
         if symbol == "T_B" and statuses["T_B"] == {"absent"}:
             # Where B is absent, that says it.
@@ -234,7 +236,7 @@ def _untold(symbols: Sequence[str], cells: Sequence[Mapping[str, Any]]) -> Itera
             yield cell["words"]
 
 
-def _of_lowest_point(words: str, of_time: str) -> str:
+def _merge_lowest_point(words: str, of_time: str) -> str:
     """Return what is said of the lowest point and of its time, if that is the same."""
     lowest, time = (symbol_text(symbol) for symbol in ("sigma_min", "tau_min"))
     reason = words.removeprefix(f"{lowest}: ")
@@ -242,7 +244,7 @@ def _of_lowest_point(words: str, of_time: str) -> str:
     return f"{lowest} and {time}: {reason}" if same else ""
 
 
-def _answer(channel: ChannelView, system: System) -> str:
+def _describe_values(channel: ChannelView, system: System) -> str:
     """Return the values to use, with how well they are known, in a sentence."""
     parts = []
     for symbol in ("N", "B_curve", "B", "T_B", "K"):
@@ -260,12 +262,12 @@ def _answer(channel: ChannelView, system: System) -> str:
     return "; ".join(parts) + "."
 
 
-def _best(models: Sequence[ModelRow]) -> Sequence[ModelRow]:
+def _select_models(models: Sequence[ModelRow]) -> Sequence[ModelRow]:
     """Return the models that come close, and that of the papers."""
     return [row for i, row in enumerate(models) if i < _SHOWN_MODELS or row.model == "N+GM+K"]
 
 
-def _model_words(channel: ChannelView) -> str:
+def _describe_model(channel: ChannelView) -> str:
     if not channel.models:
         return ""
     best = channel.models[0]
@@ -286,7 +288,7 @@ def about_of(
         "view": view,
         "name": site.names[view.sensor],
         "sensor_page": site.sensor_page(view.sensor),
-        "provenance": list(_provenance(view, channels, folder)),
+        "provenance": list(_list_provenance(view, channels, folder)),
         "sources": metadata_of(folder).get("sources", []),
         "figures_command": None,
     }
@@ -307,7 +309,7 @@ def metadata_of(folder: Path) -> Mapping[str, Any]:
     return read_metadata(paths[0]) if paths else {}
 
 
-def _provenance(
+def _list_provenance(
     view: RecordingView, channels: Sequence[ChannelView], folder: Path
 ) -> Iterator[tuple[str, str]]:
     """Yield where a recording comes from, as names and texts; ``folder`` is the recording's."""

@@ -10,7 +10,7 @@ from imubench_pipeline.report.site import Entry, Site
 from imubench_pipeline.words.numbers import number_text
 
 
-def _context(site: Site) -> dict[str, Any]:
+def _make_context(site: Site) -> dict[str, Any]:
     rows = site.rows(ShortlistRow)
     asked = site.settings["requirements"]
     return {
@@ -18,7 +18,7 @@ def _context(site: Site) -> dict[str, Any]:
             {
                 "title": asked[name]["title"],
                 "note": asked[name].get("note"),
-                "rows": [_line(site, row) for row in rows if row.requirement == name],
+                "rows": [_format_line(site, row) for row in rows if row.requirement == name],
             }
             for name in dict.fromkeys(row.requirement for row in rows)
         ]
@@ -26,12 +26,12 @@ def _context(site: Site) -> dict[str, Any]:
 
 
 SHORTLIST = Entry(
-    file="shortlist.html", title="Before buying", context=_context, tables=("shortlist",)
+    file="shortlist.html", title="Before buying", context=_make_context, tables=("shortlist",)
 )
 """The page of all sensors of the catalogue, for every requirement."""
 
 
-def _line(site: Site, row: ShortlistRow) -> dict[str, Any]:
+def _format_line(site: Site, row: ShortlistRow) -> dict[str, Any]:
     sensor, verdict, best, worst, measured, _ = cells(row)
     return {
         **row,
@@ -46,14 +46,14 @@ def _line(site: Site, row: ShortlistRow) -> dict[str, Any]:
 
 def cells(row: ShortlistRow) -> list[str]:
     """Return sensor, verdict, margins (best, worst, measured) and deciding limit, as texts."""
-    measured = _margin(row.measured_margin)
+    measured = _format_margin(row.measured_margin)
     if row.measured_margin_of == "simulated logs":
         measured += " (simulated)"
     return [
         row.sensor,
         row.verdict,
-        _margin(row.best_margin),
-        _margin(row.worst_margin) if row.best_margin is not None else "–",
+        _format_margin(row.best_margin),
+        _format_margin(row.worst_margin) if row.best_margin is not None else "–",
         measured,
         row.decides or row.reason or "",
     ]
@@ -67,5 +67,5 @@ def notes(rows: Sequence[ShortlistRow]) -> Iterator[str]:
             yield f"{row.sensor}: {'; '.join(filter(None, remarks))}"
 
 
-def _margin(value: float | None) -> str:
+def _format_margin(value: float | None) -> str:
     return "–" if value is None else number_text(value, 3)

@@ -10,12 +10,12 @@ from imubench_pipeline.report.static_figures.files import figure_text
 from imubench_pipeline.report.static_figures.theory import theory_figure
 
 
-def _context(site: Site) -> dict[str, Any]:
+def _make_context(site: Site) -> dict[str, Any]:
     return {
         "figure": figure_text(theory_figure(site.system)),
         "terms": glossary(),
     }
 
 
-THEORY = Entry(file="theory.html", title="Theory", context=_context)
+THEORY = Entry(file="theory.html", title="Theory", context=_make_context)
 """The page that the terms of all other pages link to."""

@@ -14,20 +14,25 @@ from imubench_pipeline.report.view import ChannelView
 from imubench_pipeline.report.words import sentence
 from imubench_pipeline.words.numbers import limit_digits, number_text
 
-_TEMPERATURE = (
+_TEMPERATURE_TERMS = (
     ("sensitivity", "temperature_sensitivity", "sensitivity"),
     ("quadratic", "temperature_quadratic", "quadratic term"),
     ("lag", "thermal_lag", "thermal lag"),
     ("bias", "bias_at_reference", "bias at T₀"),
 )
-_LOW_PASS = (("cutoff", "cutoff", "cut-off"), (SENSOR, SENSOR, "N before the low-pass"))
-_TRUTHS = {"bias": None}
-_SWITCHED = {"sensitivity": "sensitivity", "quadratic": "quadratic", "bias": "signal", SENSOR: "N"}
+_LOW_PASS_TERMS = (("cutoff", "cutoff", "cut-off"), (SENSOR, SENSOR, "N before the low-pass"))
+_TRUTH_NAMES = {"bias": None}
+_UNIT_SYMBOLS = {
+    "sensitivity": "sensitivity",
+    "quadratic": "quadratic",
+    "bias": "signal",
+    SENSOR: "N",
+}
 """Symbol of the unit, for quantities whose unit the reader can choose."""
 
 _Figure = TemperatureRow | LowPassRow | ParameterRow
 
-_FIXED = {"lag": "s", "cutoff": "Hz"}
+_FIXED_UNITS = {"lag": "s", "cutoff": "Hz"}
 _SHOWN_TAU = np.array([100.0, 300.0, 1_000.0, 3_000.0, 10_000.0, 30_000.0])
 """Averaging times for which the effect of temperature is stated, s."""
 
@@ -45,19 +50,19 @@ def figures(channel: ChannelView) -> Iterator[dict[str, Any]]:
     before = {row.parameter: row for row in estimated if row.parameter == SENSOR}
     low_pass: Mapping[str, _Figure] = {**channel.low_pass, **before}
     entries: tuple[tuple[Mapping[str, _Figure], str, str, str], ...] = (
-        *((channel.temperature, *names) for names in _TEMPERATURE),
-        *((low_pass, *names) for names in _LOW_PASS),
+        *((channel.temperature, *names) for names in _TEMPERATURE_TERMS),
+        *((low_pass, *names) for names in _LOW_PASS_TERMS),
     )
     for rows, name, term, words in entries:
         row = rows.get(name)
         if row is None or row.status == "absent":
             continue
-        truth = channel.truth.get(_TRUTHS.get(name, name) or "")
+        truth = channel.truth.get(_TRUTH_NAMES.get(name, name) or "")
         yield {
             "term": term,
             "words": words,
-            "unit": f"{channel.quantity}.{_SWITCHED[name]}" if name in _SWITCHED else None,
-            "sign": _FIXED.get(name),
+            "unit": f"{channel.quantity}.{_UNIT_SYMBOLS[name]}" if name in _UNIT_SYMBOLS else None,
+            "sign": _FIXED_UNITS.get(name),
             "value": row.value,
             "lower": row.lower,
             "upper": row.upper,

@@ -27,7 +27,7 @@ TUNINGS = {
 }
 """Name of each tuning on the page."""
 
-_SIGNALS: Mapping[str | None, str] = {
+_SIGNAL_TEXTS: Mapping[str | None, str] = {
     None: NO_VALUE,
     "truth": "simulated from the truth",
     "estimate": "simulated from the estimate",
@@ -40,7 +40,7 @@ _MIN_RELEVANT_RATIO = 1.1
 """Ratio of the error to that of the true model from which a tuning matters."""
 
 
-def _context(site: Site) -> dict[str, Any]:
+def _make_context(site: Site) -> dict[str, Any]:
     rows = site.rows(NavigationRow)
     shown = [row for row in rows if row.position is not None]
     recordings = [view.row for view in site.views]
@@ -60,7 +60,7 @@ def _context(site: Site) -> dict[str, Any]:
         "lacking": [dict(row) | {"tuning": TUNINGS[row.tuning]} for row in rows if row.reason],
         "filters": {
             "trajectory": list(dict.fromkeys(row.trajectory for row in shown)),
-            "outage": list(dict.fromkeys(_outage(row) for row in shown)),
+            "outage": list(dict.fromkeys(_format_outage(row) for row in shown)),
             "tuning": list(dict.fromkeys(TUNINGS[row.tuning] for row in shown)),
             "sensor": list(dict.fromkeys(site.names[row.sensor] for row in shown)),
         },
@@ -70,7 +70,7 @@ def _context(site: Site) -> dict[str, Any]:
 NAVIGATION = Entry(
     file="navigation.html",
     title="Navigation",
-    context=_context,
+    context=_make_context,
     tables=("navigation",),
     exists=lambda site: bool(site.rows(NavigationRow)),
     place=1,
@@ -84,7 +84,7 @@ def answers(rows: Sequence[NavigationRow]) -> Iterator[dict[str, Any]]:
     The criterion is the position error after the longest outage, relative to the true model on the
     same signals.
     """
-    for (sensor, trajectory, signals), own in _grouped(
+    for (sensor, trajectory, signals), own in _group_rows(
         rows, lambda row: (row.sensor, row.trajectory, row.signals)
     ):
         longest = max(row.outage or 0.0 for row in own)
@@ -92,9 +92,9 @@ def answers(rows: Sequence[NavigationRow]) -> Iterator[dict[str, Any]]:
         known = [row for row in last if row.position_ratio is not None]
         if not known:
             continue
-        worse = [row for row in known if _ratio_limits(row)[0] > _MIN_RELEVANT_RATIO]
-        no_worse = [row for row in known if _ratio_limits(row)[1] < _MIN_RELEVANT_RATIO]
-        equal = [row for row in no_worse if _ratio_limits(row)[0] > 1.0 / _MIN_RELEVANT_RATIO]
+        worse = [row for row in known if _find_ratio_limits(row)[0] > _MIN_RELEVANT_RATIO]
+        no_worse = [row for row in known if _find_ratio_limits(row)[1] < _MIN_RELEVANT_RATIO]
+        equal = [row for row in no_worse if _find_ratio_limits(row)[0] > 1.0 / _MIN_RELEVANT_RATIO]
         no_worse = [row for row in no_worse if row not in equal]
         inconclusive = [row for row in known if row not in worse + equal + no_worse]
         smallest = next((row for row in own if row.smallest), None)
@@ -104,7 +104,7 @@ def answers(rows: Sequence[NavigationRow]) -> Iterator[dict[str, Any]]:
             "signals": signals,
             "recording": own[0].recording,
             "runs": own[0].runs,
-            "words": _SIGNALS[signals],
+            "words": _SIGNAL_TEXTS[signals],
             "outage": f"{number_text(longest)} s",
             "matters": _describe_effect(worse, equal, no_worse, inconclusive),
             "smallest": None
@@ -117,7 +117,7 @@ def answers(rows: Sequence[NavigationRow]) -> Iterator[dict[str, Any]]:
         }
 
 
-def _ratio_limits(row: NavigationRow) -> tuple[float, float]:
+def _find_ratio_limits(row: NavigationRow) -> tuple[float, float]:
     """Return the limits of the ratio of positions; unknown limits are the widest possible."""
     return _fill_limits(row.position_ratio_lower, row.position_ratio_upper)
 
@@ -152,21 +152,23 @@ def _describe_effect(
 
 def ranking(rows: Sequence[NavigationRow]) -> Iterator[dict[str, Any]]:
     """Yield the sensors by the position error after the longest outage, recommended tuning."""
-    for trajectory, own in _grouped(rows, lambda row: row.trajectory):
+    for trajectory, own in _group_rows(rows, lambda row: row.trajectory):
         chosen = [row for row in own if row.recommended and row.signals != "log"]
         longest = max((row.outage or 0.0 for row in chosen), default=0.0)
-        last = sorted((row for row in chosen if row.outage == longest), key=_position)
+        last = sorted((row for row in chosen if row.outage == longest), key=_get_position)
         for place, row in enumerate(last, start=1):
-            ties = [other.sensor for other in last if other is not row and _overlap(row, other)]
+            ties = [
+                other.sensor for other in last if other is not row and _is_overlapping(row, other)
+            ]
             yield line_of(row) | {"place": place, "ties": ties, "trajectory": trajectory}
 
 
-def _position(row: NavigationRow) -> float:
+def _get_position(row: NavigationRow) -> float:
     """Return the error of the position; infinity if unknown."""
     return math.inf if row.position is None else row.position
 
 
-def _overlap(one: NavigationRow, other: NavigationRow) -> bool:
+def _is_overlapping(one: NavigationRow, other: NavigationRow) -> bool:
     """Tell whether the limits of two positions overlap."""
     lower, upper = _fill_limits(one.position_lower, one.position_upper)
     other_lower, other_upper = _fill_limits(other.position_lower, other.position_upper)
@@ -182,19 +184,21 @@ def line_of(row: NavigationRow) -> dict[str, Any]:
         "states": row.states,
         "model": row.model,
         "assumed": row.assumed,
-        "outage": _outage(row),
+        "outage": _format_outage(row),
         "seconds": row.outage or 0.0,
-        "signals": _SIGNALS[row.signals],
+        "signals": _SIGNAL_TEXTS[row.signals],
         "tuning": TUNINGS[row.tuning],
         "recommended": row.recommended,
         "position": row.position,
-        "position_text": _figure(row.position, row.position_lower, row.position_upper),
+        "position_text": _format_figure(row.position, row.position_lower, row.position_upper),
         "ratio": row.position_ratio,
-        "ratio_text": _figure(
+        "ratio_text": _format_figure(
             row.position_ratio, row.position_ratio_lower, row.position_ratio_upper
         ),
-        "velocity_text": _figure(row.velocity, row.velocity_lower, row.velocity_upper),
-        "heading_text": _figure(row.heading, row.heading_lower, row.heading_upper, 180.0 / math.pi),
+        "velocity_text": _format_figure(row.velocity, row.velocity_lower, row.velocity_upper),
+        "heading_text": _format_figure(
+            row.heading, row.heading_lower, row.heading_upper, 180.0 / math.pi
+        ),
         "expected": number_text(row.position_predicted, 3),
         "inside": None if inside is None else 100.0 * inside,
         "inside_text": ""
@@ -206,11 +210,11 @@ def line_of(row: NavigationRow) -> dict[str, Any]:
     }
 
 
-def _outage(row: NavigationRow) -> str:
+def _format_outage(row: NavigationRow) -> str:
     return "none" if row.outage is None else f"{number_text(row.outage)} s"
 
 
-def _figure(
+def _format_figure(
     value: float | None, lower: float | None, upper: float | None, factor: float = 1.0
 ) -> str:
     if value is None:
@@ -224,7 +228,7 @@ def _figure(
 _Key = TypeVar("_Key")
 
 
-def _grouped(
+def _group_rows(
     rows: Sequence[NavigationRow], key: Callable[[NavigationRow], _Key]
 ) -> Iterator[tuple[_Key, list[NavigationRow]]]:
     groups: dict[_Key, list[NavigationRow]] = {}

@@ -25,13 +25,13 @@ WORDS = {
 }
 """Name of each figure on a page."""
 
-_PPM = 1e6
-_PERCENT = 1e2
+_PPM_PER_UNIT = 1e6
+_PERCENT_PER_UNIT = 1e2
 _RATIO_UNITS = {
     "scale_factor": ("", 1.0),
-    "asymmetry": (" ppm", _PPM),
-    "quadratic": (" ppm per °/s", _PPM * math.radians(1.0)),
-    "linearity": (" %", _PERCENT),
+    "asymmetry": (" ppm", _PPM_PER_UNIT),
+    "quadratic": (" ppm per °/s", _PPM_PER_UNIT * math.radians(1.0)),
+    "linearity": (" %", _PERCENT_PER_UNIT),
 }
 """Unit of each dimensionless quantity on a page, and the factor to it."""
 
@@ -54,29 +54,28 @@ def answer(rows: Sequence[CalibrationRow], system: System) -> str:
     if bias.value is None:
         return sentence(bias.reason)
     unit = page_unit("gyro", "adev", system)
-    text = (
-        f"The bias is {_around(bias.value, bias.lower, bias.upper, unit.text)} {unit.sign} (95 %)"
-    )
+    size = _format_half_width(bias.value, bias.lower, bias.upper, unit.text)
+    text = f"The bias is {size} {unit.sign} (95 %)"
     scale = by_parameter.get("scale_factor")
     if scale is not None and scale.value is not None:
         error, lower, upper = (
-            None if size is None else _PPM * (size - 1.0)
+            None if size is None else _PPM_PER_UNIT * (size - 1.0)
             for size in (scale.value, scale.lower, scale.upper)
         )
-        off = _around(error, lower, upper, number_text)
+        off = _format_half_width(error, lower, upper, number_text)
         text = f"The scale factor error is {off} ppm. " + text
     text += ". "
     straight = by_parameter.get("linearity")
     if straight is not None and straight.chance is not None and straight.value is not None:
         nonlinear = straight.chance < _MIN_LINEARITY_P_VALUE
-        largest = number_text(_PERCENT * straight.value, 3)
+        largest = number_text(_PERCENT_PER_UNIT * straight.value, 3)
         text += f"The largest deviation from the line is {largest} % of the largest rate. "
         text += f"Noise {'does not explain' if nonlinear else 'explains'} this deviation "
         text += f"(p = {percent_text(straight.chance, 2)})."
     return text.strip()
 
 
-def _around(
+def _format_half_width(
     value: float | None,
     lower: float | None,
     upper: float | None,
@@ -102,10 +101,10 @@ def lines(rows: Sequence[CalibrationRow]) -> Iterator[dict[str, Any]]:
             "percent": None if row.chance is None else percent_text(row.chance, 2),
             "why": sentence(row.reason),
         }
-        yield line | _texts(row)
+        yield line | _format_ratio(row)
 
 
-def _texts(row: CalibrationRow) -> dict[str, str]:
+def _format_ratio(row: CalibrationRow) -> dict[str, str]:
     """Return a dimensionless quantity with its limits as text."""
     name = row.parameter
     if row.value is None or name not in _RATIO_UNITS:
@@ -114,7 +113,7 @@ def _texts(row: CalibrationRow) -> dict[str, str]:
     if name == "scale_factor":
         digits = limit_digits(row.lower, row.upper, 4)
         value, low, high, true = (number_text(size, digits) for size in shown)
-        sigma = "–" if row.sigma is None else f"{number_text(_PPM * row.sigma, 3)} ppm"
+        sigma = "–" if row.sigma is None else f"{number_text(_PPM_PER_UNIT * row.sigma, 3)} ppm"
     else:
         _, per = _RATIO_UNITS[name]
         value, low, high, true, sigma = (
@@ -159,7 +158,7 @@ def earth_words(rows: Sequence[CalibrationRow], system: System) -> str:
     unit = page_unit("gyro", "adev", system)
     text = (
         f"The Earth's rate along the axis, {unit.text(row.earth_rate, 4)} {unit.sign} (latitude "
-        f"{degrees_text(row.latitude)}, {_direction(row)}), is subtracted"
+        f"{degrees_text(row.latitude)}, {_describe_direction(row)}), is subtracted"
     )
     if row.half_width:
         text += (
@@ -171,7 +170,7 @@ def earth_words(rows: Sequence[CalibrationRow], system: System) -> str:
     return text + "."
 
 
-def _direction(row: CalibrationRow) -> str:
+def _describe_direction(row: CalibrationRow) -> str:
     elevation = f"elevation {degrees_text(row.elevation)}"
     if row.heading is not None:
         return f"heading {degrees_text(row.heading)}, {elevation}"

@@ -41,11 +41,11 @@ def predicted(site: Site) -> list[RecordingView]:
     return [view for view in site.views if view.static and view.full_name in named]
 
 
-def _context(site: Site) -> dict[str, Any]:
+def _make_context(site: Site) -> dict[str, Any]:
     arrays = Arrays()
-    runs = [_run(site, view) for view in turned(site)]
+    runs = [_describe_run(site, view) for view in turned(site)]
     published = [row for view in turned(site) for row in view.rows(EarthRatePublishedRow)]
-    predicted = list(_predicted(site))
+    predicted = list(_list_predictions(site))
     aligned = alignments(site, arrays)
     return {
         "truth": EARTH_RATE,
@@ -65,7 +65,7 @@ def _context(site: Site) -> dict[str, Any]:
         "page": {
             "looks": {},
             "channels": [],
-            "published": [_drawn(row) for row in published],
+            "published": [_pack_estimates(row) for row in published],
             "predictions": {
                 line["place"]: prediction_payload(line["rows"], arrays) for line in predicted
             },
@@ -75,16 +75,16 @@ def _context(site: Site) -> dict[str, Any]:
     }
 
 
-def _views(site: Site) -> list[RecordingView]:
+def _select_recordings(site: Site) -> list[RecordingView]:
     return [*turned(site), *calibrated(site), *predicted(site)]
 
 
 EARTH_RATE_PAGE = Entry(
     file="earth_rate.html",
     title="Earth’s rate",
-    context=_context,
-    views=_views,
-    exists=lambda site: bool(_views(site)),
+    context=_make_context,
+    views=_select_recordings,
+    exists=lambda site: bool(_select_recordings(site)),
     place=4,
 )
 """The page of all experiments that estimate the Earth's rate."""
@@ -99,7 +99,7 @@ NOT_FOUND = Section(
 """Of which the Earth's rate could not be estimated, on the start page."""
 
 
-def _run(site: Site, view: RecordingView) -> dict[str, Any]:
+def _describe_run(site: Site, view: RecordingView) -> dict[str, Any]:
     rows = view.rows(EarthRateRow)
     whole = [row for row in rows if row.part == "whole"]
     shown = [row for row in rows if row.method in ESTIMATES]
@@ -117,7 +117,7 @@ def _run(site: Site, view: RecordingView) -> dict[str, Any]:
     }
 
 
-def _predicted(site: Site) -> Iterator[dict[str, Any]]:
+def _list_predictions(site: Site) -> Iterator[dict[str, Any]]:
     """Yield the recordings that each sensor would need, without duplicates."""
     yielded: list[tuple[str, Any]] = []
     for view in [*turned(site), *predicted(site)]:
@@ -131,7 +131,7 @@ def _predicted(site: Site) -> Iterator[dict[str, Any]]:
         yield needed | {"view": view, "place": place, "rows": rows, "latitude": latitude}
 
 
-def _drawn(row: EarthRatePublishedRow) -> dict[str, Any]:
+def _pack_estimates(row: EarthRatePublishedRow) -> dict[str, Any]:
     return {
         "name": row.recording + ("" if row.part == "whole" else f", {row.part}"),
         "published": row.published,
@@ -156,17 +156,17 @@ def published_words(rows: Sequence[EarthRatePublishedRow]) -> str:
             if len(rows) == 1
             else f"the errors of all {len(rows)} published estimates"
         )
-        return f"Noise explains {every}. {_gain(rows)}"
+        return f"Noise explains {every}. {_describe_gain(rows)}"
     within = len(rows) - len(beyond)
     return (
         f"The noise that the source prints explains {counted(within, 'published estimate')}. "
         f"{len(beyond)} of {len(rows)} {'has' if len(beyond) == 1 else 'have'} a larger error: "
         f"{names}. A filter cannot remove it. Possible causes are a warm-up, miscounted turns, or "
-        "samples of the turns in the means. " + _gain(rows)
+        "samples of the turns in the means. " + _describe_gain(rows)
     )
 
 
-def _gain(rows: Sequence[EarthRatePublishedRow]) -> str:
+def _describe_gain(rows: Sequence[EarthRatePublishedRow]) -> str:
     """Return the improvement of a filter over the mean of pairs, in a sentence."""
     gains = [
         1.0 - row.sigma_filter / row.sigma

@@ -66,7 +66,7 @@ def context(site: Site, view: RecordingView, folder: Path) -> dict[str, Any]:
     return {
         **about_of(site, view, [], folder),
         "channel": channel,
-        "summary": _summary(view, turning, rows),
+        "summary": _summarise(view, turning, rows),
         "answer": answer(whole, site.system),
         "doubts": [sentence(row.doubts) for row in turning if row.what == "doubt"],
         "findings": view.findings,
@@ -81,14 +81,14 @@ def context(site: Site, view: RecordingView, folder: Path) -> dict[str, Any]:
         "published": list(published_lines(view.rows(EarthRatePublishedRow))),
         "needs": needs(prediction),
         "has_prediction": bool(prediction),
-        "stretches": list(_stretches(turning)),
+        "stretches": list(_list_stretches(turning)),
         "command": site.again(view, "earth_rate"),
         "page": {
             "looks": {},
             "channels": [],
             "findings": [],
             "samples": samples_payload(envelope, [], arrays),
-            "turned": _payload(view, rows, turning, arrays),
+            "turned": _pack_figures(view, rows, turning, arrays),
             "prediction": prediction_payload(prediction, arrays),
             "arrays": arrays.texts,
         },
@@ -99,7 +99,7 @@ TURNED_PAGE = RecordingPage("turned.html.jinja", context, "two positions")
 """The page of a gyro that was turned between north and south."""
 
 
-def _summary(
+def _summarise(
     view: RecordingView, turning: Sequence[TurningRow], rows: Sequence[EarthRateRow]
 ) -> str:
     turns = sum(event.what == "turn" for event in turning)
@@ -219,7 +219,7 @@ def needs(rows: Sequence[EarthRatePredictionRow]) -> dict[str, Any] | None:
                 "time": duration_text(row.time),
                 "seconds": row.time,
                 "sigma": row.sigma,
-                "heading": _heading(row.heading),
+                "heading": _format_heading(row.heading),
             }
             for row in goals
         ],
@@ -254,13 +254,13 @@ _MAX_SMALL_HEADING = 0.5
 """Largest standard deviation of a heading for which the small-angle formula holds, rad."""
 
 
-def _heading(heading: float | None) -> str:
+def _format_heading(heading: float | None) -> str:
     if heading is not None and heading > _MAX_SMALL_HEADING:
         return f"above {degrees_text(_MAX_SMALL_HEADING, 2)}"
     return degrees_text(heading, 3)
 
 
-def _stretches(turning: Sequence[TurningRow]) -> Iterator[dict[str, Any]]:
+def _list_stretches(turning: Sequence[TurningRow]) -> Iterator[dict[str, Any]]:
     """Yield dwells, turns and knocks in the order of time."""
     listed = [row for row in turning if row.start is not None]
     for row in sorted(listed, key=lambda row: (row.start, row.what)):
@@ -268,7 +268,7 @@ def _stretches(turning: Sequence[TurningRow]) -> Iterator[dict[str, Any]]:
         yield {**row, "position": position}
 
 
-def _payload(
+def _pack_figures(
     view: RecordingView,
     rows: Sequence[EarthRateRow],
     turning: Sequence[TurningRow],
@@ -292,15 +292,15 @@ def _payload(
         "found_by": [row.found_by for row in turns],
         "parts": {
             part: {
-                "range": _range([row for row in series if row.part == part], rows[0].truth),
-                "courses": _courses([row for row in series if row.part == part], arrays),
+                "range": _find_range([row for row in series if row.part == part], rows[0].truth),
+                "courses": _pack_courses([row for row in series if row.part == part], arrays),
             }
             for part in dict.fromkeys(row.part for row in series)
         },
     }
 
 
-def _courses(series: Sequence[EarthRateSeriesRow], arrays: Arrays) -> dict[str, Any]:
+def _pack_courses(series: Sequence[EarthRateSeriesRow], arrays: Arrays) -> dict[str, Any]:
     courses: dict[str, Any] = {}
     for name in dict.fromkeys((row.quantity, row.method) for row in series):
         own = [row for row in series if (row.quantity, row.method) == name]
@@ -313,7 +313,7 @@ def _courses(series: Sequence[EarthRateSeriesRow], arrays: Arrays) -> dict[str, 
     return courses
 
 
-def _range(series: Sequence[EarthRateSeriesRow], truth: float) -> list[float]:
+def _find_range(series: Sequence[EarthRateSeriesRow], truth: float) -> list[float]:
     """Return the range of the rate in the figure of estimates, without the first estimates."""
     rates = [row for row in series if row.quantity == "rate"]
     if not rates:
@@ -324,7 +324,7 @@ def _range(series: Sequence[EarthRateSeriesRow], truth: float) -> list[float]:
     return [truth - 1.1 * high, truth + 1.1 * high]
 
 
-_ALONG: Mapping[str, Callable[[EarthRatePredictionRow], float]] = {
+_ABSCISSAE: Mapping[str, Callable[[EarthRatePredictionRow], float]] = {
     "time": lambda row: row.time,
     "dwell": lambda row: row.dwell,
 }
@@ -335,7 +335,7 @@ def prediction_payload(rows: Sequence[EarthRatePredictionRow], arrays: Arrays) -
     """Return the data of the figures of the prediction of a recording."""
     goals = [row.goal for row in rows if row.of == "goal"]
     payload: dict[str, Any] = {"goals": goals, "truth": EARTH_RATE}
-    for of, x in _ALONG.items():
+    for of, x in _ABSCISSAE.items():
         own = sorted((row for row in rows if row.of == of and row.sigma is not None), key=x)
         payload[of] = {
             "x": arrays.exact([x(row) for row in own]),

@@ -11,10 +11,10 @@ from imubench_pipeline.report.site import Entry, Site
 from imubench_pipeline.report.view import QUANTITY_NAMES
 from imubench_pipeline.words.numbers import number_text, percent_text
 
-_PARAMETERS = {"N": "white noise", "B": "bias instability", "K": "random walk", "R": "ramp"}
+_PARAMETER_TEXTS = {"N": "white noise", "B": "bias instability", "K": "random walk", "R": "ramp"}
 
 
-def _context(site: Site) -> dict[str, Any]:
+def _make_context(site: Site) -> dict[str, Any]:
     lines = list(equal_numbers(site.rows(FusionRow)))
     price_classes = {
         name: site.settings["sensors"].get(name, {}).get("price_class") for name in site.sensors
@@ -37,7 +37,7 @@ def _context(site: Site) -> dict[str, Any]:
 
 
 FUSION = Entry(
-    file="fusion.html", title="Fusion", context=_context, tables=("fusion", "grades"), place=2
+    file="fusion.html", title="Fusion", context=_make_context, tables=("fusion", "grades"), place=2
 )
 """The page that shows how many of one sensor match one of another."""
 
@@ -48,7 +48,7 @@ def shared_words(common: Mapping[str, float]) -> str:
     ``common`` has the common share of the variance of N, B, K and R.
     """
     named = [
-        f"{percent_text(share)} of the variance of the {_PARAMETERS[name]} ({name})"
+        f"{percent_text(share)} of the variance of the {_PARAMETER_TEXTS[name]} ({name})"
         for name, share in common.items()
         if share > 0.0
     ]
@@ -83,9 +83,9 @@ def equal_numbers(rows: Sequence[FusionRow]) -> Iterator[dict[str, Any]]:
             "seconds": row.tau,
             "adev": row.adev,
             "other_adev": row.other_adev,
-            "number": _number(row),
-            "limits": _limits(row),
-            "common": _common(row),
+            "number": _format_number(row),
+            "limits": _format_limits(row),
+            "common": _format_common(row),
         }
 
 
@@ -100,7 +100,7 @@ def matrices(lines: Sequence[Mapping[str, Any]]) -> Iterator[dict[str, Any]]:
         groups.setdefault((line["quantity"], line["tau"]), []).append(line)
     for (quantity, tau), own in groups.items():
         by_pair = {(line["sensor"], line["other"]): line for line in own}
-        levels = {line[of]: line[adev] for line in own for of, adev in _ENDS if line[adev]}
+        levels = {line[of]: line[adev] for line in own for of, adev in _PAIR_COLUMNS if line[adev]}
         sensors = sorted(levels, key=lambda sensor: (levels[sensor], sensor))
         if 1 < len(sensors) <= _MAX_MATRIX_SENSORS:
             cells = [[by_pair.get((row, column)) for column in sensors] for row in sensors]
@@ -113,7 +113,7 @@ def matrices(lines: Sequence[Mapping[str, Any]]) -> Iterator[dict[str, Any]]:
             }
 
 
-_ENDS = (("sensor", "adev"), ("other", "other_adev"))
+_PAIR_COLUMNS = (("sensor", "adev"), ("other", "other_adev"))
 _MAX_MATRIX_SENSORS = 40
 """Largest number of sensors for which a matrix is readable."""
 
@@ -141,8 +141,8 @@ def grade_lines(rows: Sequence[GradeRow]) -> Iterator[dict[str, Any]]:
                     "value": row.value if row else None,
                     "printed": row.printed if row else None,
                     "n": row.n if row else None,
-                    "number": "–" if row is None or row.n is None else _whole(row.n),
-                    "limits": "" if row is None else _number_limits(row),
+                    "number": "–" if row is None or row.n is None else _round_up(row.n),
+                    "limits": "" if row is None else _format_grade_limits(row),
                     "reason": (row.reason or "") if row else "",
                 }
                 for name in ("N", "sigma_min")
@@ -163,17 +163,17 @@ def unprinted_grades(rows: Sequence[GradeRow]) -> dict[str, str]:
     }
 
 
-def _number_limits(row: GradeRow) -> str:
+def _format_grade_limits(row: GradeRow) -> str:
     if row.n_upper is None:
         return ""
-    upper = _whole(row.n_upper)
+    upper = _round_up(row.n_upper)
     if row.n is None or row.n_lower is None:
         return f"at most {upper}"
-    lower = _whole(row.n_lower)
+    lower = _round_up(row.n_lower)
     return "" if lower == upper else f"{lower} to {upper}"
 
 
-def _common(row: FusionRow) -> str:
+def _format_common(row: FusionRow) -> str:
     if row.common_share is None:
         return "–"
     text = percent_text(row.common_share)
@@ -183,22 +183,22 @@ def _common(row: FusionRow) -> str:
     return text
 
 
-def _number(row: FusionRow) -> str:
+def _format_number(row: FusionRow) -> str:
     """Return the smallest sufficient number of sensors."""
     if row.reachable is False:
         return "not possible"
-    return "–" if row.n is None else _whole(row.n)
+    return "–" if row.n is None else _round_up(row.n)
 
 
-def _limits(row: FusionRow) -> str:
+def _format_limits(row: FusionRow) -> str:
     if row.lower is None:
         return ""
     if row.upper is None:
-        return f"{_whole(row.lower)} or more"
-    lower, upper = _whole(row.lower), _whole(row.upper)
+        return f"{_round_up(row.lower)} or more"
+    lower, upper = _round_up(row.lower), _round_up(row.upper)
     return lower if lower == upper else f"{lower} to {upper}"
 
 
-def _whole(number: float) -> str:
+def _round_up(number: float) -> str:
     # Tolerate rounding errors just above a whole number.
     return number_text(max(math.ceil(number * (1.0 - 1e-9)), 1), 4)

@@ -15,8 +15,8 @@ if TYPE_CHECKING:
 
     from imubench_pipeline.extensions.papers.tables import PublishedRow
 
-_KEYS = ("maia", "silva", "engers")
-_LEGEND = (
+_PAPER_KEYS = ("maia", "silva", "engers")
+_RATIO_LEGEND = (
     "Ratio: result / printed, ± the tolerance. A printed value inside the interval of the result "
     "agrees, too. Derived: not printed, but follows from printed values."
 )
@@ -30,7 +30,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         nargs="?",
         help="folder of the results of a run; default: only lines that need no log",
     )
-    parser.add_argument("--paper", choices=_KEYS, help="only this paper; default: all")
+    parser.add_argument("--paper", choices=_PAPER_KEYS, help="only this paper; default: all")
     parser.add_argument("--place", help='such as "Table 3"; default: all')
 
 
@@ -72,7 +72,7 @@ def run(arguments: argparse.Namespace) -> int:
                 if row.paper == paper.name and arguments.place in (None, row.place)
             ]
             if own:
-                yield from _parts(f"{paper.name}: {paper.title}", own, width)
+                yield from _make_parts(f"{paper.name}: {paper.title}", own, width)
 
     if not rows:
         print(expected)
@@ -80,7 +80,7 @@ def run(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _parts(title: str, rows: Sequence[PublishedRow], width: int) -> Iterator[RenderableType]:
+def _make_parts(title: str, rows: Sequence[PublishedRow], width: int) -> Iterator[RenderableType]:
     """Yield the table of a paper, and the reasons for differences."""
     from rich.text import Text
 
@@ -106,7 +106,7 @@ def _parts(title: str, rows: Sequence[PublishedRow], width: int) -> Iterator[Ren
     heads = ["Place", "Quantity", "Printed", "Result", "Ratio", "Verdict"]
     yield fitting(title, heads, lines, width, names=1)
     yield Text()
-    yield Text(_LEGEND)
+    yield Text(_RATIO_LEGEND)
     for number, reason in enumerate(reasons, start=1):
         yield Text(f"  [{number}] {reason}")
     meanings = {str(verdict): meaning for verdict, meaning in VERDICTS.items()}
