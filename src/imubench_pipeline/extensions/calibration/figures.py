@@ -195,7 +195,7 @@ class Estimated(Protocol):
 
     @property
     def model_from(self) -> str | None:
-        """What that is from."""
+        """Source of the noise model."""
 
 
 def calibrated(site: Site) -> list[RecordingView]:
@@ -211,7 +211,7 @@ def calibrated(site: Site) -> list[RecordingView]:
 def without_result(
     views: Sequence[RecordingView], rows_of: Callable[[RecordingView], Sequence[Estimated]]
 ) -> Iterator[dict[str, Any]]:
-    """Yield the recordings of an experiment of which nothing could be estimated, and why."""
+    """Yield the recordings of an experiment without an estimate, with the reasons."""
     for view in views:
         rows = rows_of(view)
         if rows and all(row.value is None for row in rows):
@@ -225,7 +225,7 @@ NOT_CALIBRATED = Section(
         list(without_result(calibrated(site), lambda view: view.rows(CalibrationRow))) or None
     ),
 )
-"""What could not be calibrated, on the start page."""
+"""The recordings without a calibration result, on the start page."""
 
 
 def at_rest(site: Site, view: RecordingView) -> tuple[str, dict[str, Any]] | None:
@@ -288,7 +288,7 @@ def attitude_lines(rows: Sequence[CalibrationRow]) -> Iterator[dict[str, Any]]:
 
 
 def noise_words(rows: Sequence[Estimated]) -> str:
-    """Return by which noise model figures of a recording are weighed, in a sentence."""
+    """Return the noise model behind the results of a recording, in a sentence."""
     fitted = next((row for row in rows if row.model), None)
     if fitted is None:
         return ""

@@ -36,7 +36,7 @@ def turned(site: Site) -> list[RecordingView]:
 
 
 def predicted(site: Site) -> list[RecordingView]:
-    """Return the recordings at rest by whose noise it is predicted what their sensor could find."""
+    """Return the static recordings with a prediction for the Earth's rate from their noise."""
     named = site.named_in(EarthRatePredictionRow)
     return [view for view in site.views if view.static and view.full_name in named]
 
@@ -96,7 +96,7 @@ NOT_FOUND = Section(
         list(without_result(turned(site), lambda view: view.rows(EarthRateRow))) or None
     ),
 )
-"""Of which the Earth's rate could not be estimated, on the start page."""
+"""The recordings without an estimate of the Earth's rate, on the start page."""
 
 
 def _describe_run(site: Site, view: RecordingView) -> dict[str, Any]:

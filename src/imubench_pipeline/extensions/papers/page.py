@@ -186,11 +186,11 @@ READING = Section(
     context=lambda site: words_of_reading(site.rows(AccuracyRow)) or None,
     tables=("accuracy",),
 )
-"""What comes of reading the curve, on the page of the theory."""
+"""The result of reading the curve, on the page of the theory."""
 
 
 def words_of_reading(rows: Sequence[AccuracyRow]) -> str:
-    """Return what comes of reading the curve, by the table ``accuracy``; empty where that is."""
+    """Return the result of reading the curve, from the table ``accuracy``; empty without rows."""
     of_curve = {row.parameter: row for row in rows if row.method == "curve"}
     if not of_curve:
         return ""
