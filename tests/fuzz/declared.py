@@ -29,7 +29,7 @@ import yaml
 from imubench_pipeline.extensions.nightly.state import State, StateError, read_state
 from imubench_pipeline.readers.bounded import limit_memory
 from imubench_pipeline.recordings.kept import Quality
-from imubench_pipeline.report.publish import _keys
+from imubench_pipeline.report.publish import _read_keys
 from imubench_pipeline.run.faults import Faults
 from imubench_pipeline.run.lock import _describe_holder, read_note
 from imubench_pipeline.run.recovery import restarted
@@ -274,7 +274,7 @@ def subjects() -> dict[str, Subject]:
         "state": Subject("state.json", read_state, _made(state.write, "state.json"), (StateError,)),
         "record": Subject("faults/recordings/s/estimate.json", _take_record, held[:1], ()),
         "note": Subject("lock", _take_note, held[1:2], ()),
-        "pages": Subject("pages.json", _keys, held[2:], ()),
+        "pages": Subject("pages.json", _read_keys, held[2:], ()),
     }  # fmt: skip
 
 

@@ -26,7 +26,7 @@ def _once() -> Iterator[None]:
         for (module, name), kept in ONCE.items():
             patch.setattr(module, name, kept)
         # A page that fails is written as one that says so; here it fails the test.
-        patch.setattr(publishing, "_made", publishing._rendered)
+        patch.setattr(publishing, "_make_page", publishing._render)
         yield
 
 

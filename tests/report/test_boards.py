@@ -149,7 +149,7 @@ def test_a_printed_figure_stands_with_its_unit_beside_what_is_found(read: dict[s
         for one in read["boards.html"].elements
         if "why" in (one.attributes.get("class") or "")
     ]
-    assert "Why they differ: it was read at 1 h" in reasons
+    assert "Reason for the difference: it was read at 1 h" in reasons
 
 
 def test_each_parameter_has_the_unit_of_the_page(read: dict[str, Read]) -> None:
@@ -212,7 +212,7 @@ def test_the_page_says_that_all_of_it_is_simulated(read: dict[str, Read]) -> Non
     assert len(heads) == 2
     assert all("simulated" in head for head in heads)
     (lead,) = (one.text for one in page.elements if one.attributes.get("class") == "lead")
-    assert "all simulated" in lead
+    assert lead.startswith("Several simulated sensors")
     drawn = page.data["channels"]
     assert [(one["sensor"], one["channel"]) for one in drawn] == [
         ("cheap", "gyro_x"), ("cheap", "gyro_y"), ("dear", "gyro_x")
@@ -224,7 +224,7 @@ def test_the_page_says_that_all_of_it_is_simulated(read: dict[str, Read]) -> Non
 def test_the_page_says_what_the_sensors_share_and_which_were_lost(read: dict[str, Read]) -> None:
     text = read["boards.html"].text
     assert "three on one board" in text and "what was assumed" in text
-    assert "All sensors of the board have one temperature. Not analysed: torn." in text
+    assert "All sensors of the board share one temperature. Not analysed: torn." in text
     captions = [one.text for one in read["boards.html"].elements if one.tag == "figcaption"]
     assert len(captions) == 3
     assert captions[0].rstrip().endswith("Figures of the source: curve: 29 and 30.")
@@ -233,15 +233,13 @@ def test_the_page_says_what_the_sensors_share_and_which_were_lost(read: dict[str
 
 def test_the_page_says_what_temperature_does(read: dict[str, Read]) -> None:
     text = read["boards.html"].text
-    assert text.count("The bias follows the temperature by 90 °/h/K.") == 2
-    assert text.count("The sensor's own low-pass cuts off at 64 Hz, of first order.") == 2
+    assert text.count("The bias changes with temperature by 90 °/h/K.") == 2
+    assert text.count("The sensor's own low-pass has its cut-off at 64 Hz (first order).") == 2
 
 
 def test_a_channel_of_which_nothing_is_published_has_no_table(read: dict[str, Read]) -> None:
     captions = [one.text for one in read["boards.html"].elements if one.tag == "caption"]
-    assert captions == [
-        "What the source prints of V & Co cheap, Gyroscope x, and what is found here"
-    ]
+    assert captions == ["Printed figures of V & Co cheap, Gyroscope x, and the results here"]
 
 
 def test_every_page_leads_to_the_boards(read: dict[str, Read]) -> None:
@@ -297,9 +295,9 @@ def test_recordings_of_other_sensors_and_measured_ones_are_not_of_the_board() ->
 @pytest.mark.parametrize(
     ("temperature", "motion", "said"),
     [
-        (True, ["gyro_x"], "All sensors of the board have one temperature and one motion."),
-        (False, ["gyro_x"], "All sensors of the board have one motion."),
-        (False, [], "The sensors share nothing but their place."),
+        (True, ["gyro_x"], "All sensors of the board share one temperature and one motion."),
+        (False, ["gyro_x"], "All sensors of the board share one motion."),
+        (False, [], "The sensors share only their place."),
     ],
 )
 def test_what_is_shared_is_said(temperature: bool, motion: list[str], said: str) -> None:

@@ -53,14 +53,14 @@ def read(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Read]:
 
 def test_the_page_of_a_rate_table(read: dict[str, Read]) -> None:
     page = read["recordings/s/table.html"]
-    assert "The scale factor is off by" in page.text and "A straight line fits" in page.text
-    assert "left out of the Allan variance" in page.text
-    assert "6 steady rates up to 50 °/s" in page.text
-    assert "10.64 °/h (latitude 45°, elevation 90°), is taken off" in page.text
+    assert "The scale factor error is" in page.text and "Noise explains" in page.text
+    assert "Allan variance, estimates and ranking do not use it" in page.text
+    assert "6 constant rates up to 50 °/s" in page.text
+    assert "10.64 °/h (latitude 45°, elevation 90°), is subtracted" in page.text
     kinds = {one.attributes.get("data-kind") for one in page.elements if one.tag == "figure"}
     assert kinds == {"table_line", "table_residuals"}
     assert page.data["table"]["number"] == [1, 2, 3, 4, 5, 6]
-    for name in ("scale factor", "quadratic term", "asymmetry", "deviation from the line"):
+    for name in ("scale factor", "quadratic term", "asymmetry", "linearity"):
         assert page.naming(name, "tr")
 
 
@@ -83,15 +83,15 @@ def test_the_page_of_all_has_them(read: dict[str, Read]) -> None:
 
 def test_each_sensor_has_its_alignment_and_its_needs(read: dict[str, Read]) -> None:
     page = read["earth_rate.html"]
-    assert "Attitude and heading at rest" in page.text and "What it would take" in page.text
+    assert "Attitude and heading at rest" in page.text and "Required recordings" in page.text
     assert "At latitude 45° (earth_rate: latitude)" in page.text
     assert "20 mg (earth_rate.accelerometer_bias), assumed" in page.text
-    assert "no gyro y and z, accelerometer x and y: the axes that are there stand" in page.text
+    assert "no gyro y and z, accelerometer x and y; the other axes replace them" in page.text
     assert "Check: 400 simulated triads" in page.text
-    assert "Where a heading is not to be had: What is not known of the gyros" in page.text
+    assert "No heading: What is not known of the gyros" in page.text
     (line,) = [one for one in page.naming("two opposite positions", "tr") if "60 min" in one.text
                and "fine" in one.text]  # fmt: skip
-    assert "not to be had" not in line.text
+    assert "not determined" not in line.text
     for goal in ("100 %", "10 %", "1 %"):
         assert page.naming(goal, "td")
     drawn = page.data["alignments"]["s"]
@@ -101,7 +101,7 @@ def test_each_sensor_has_its_alignment_and_its_needs(read: dict[str, Read]) -> N
 
 def test_what_gave_nothing_stands_on_the_start_page(read: dict[str, Read]) -> None:
     text = read["index.html"].text
-    assert "1 of known rates without a calibration" in text
+    assert "1 recording without a calibration result" in text
     assert "The noise of this sensor is not known" in text
     assert "The noise of this sensor is not known" in read["recordings/s/unknown.html"].text
     assert "rate table" in read["recordings.html"].text
@@ -116,14 +116,14 @@ def calibrated(parameter: str, **given: float | None) -> CalibrationRow:
 def test_sentences() -> None:
     bias = calibrated("bias", value=1e-3, lower=0.9e-3, upper=1.1e-3)
     assert answer([bias], "si") == "The bias is 0.001 ± 0.0001 rad/s (95 %)."
-    assert answer([], "si") == "Nothing was found of this recording."
+    assert answer([], "si") == "This recording has no result."
     bent = calibrated("linearity", value=0.0125, chance=1e-3)
-    assert "A straight line does not fit" in answer([bias, bent], "si")
+    assert "Noise does not explain" in answer([bias, bent], "si")
     assert "from the line is 1.25 % of the largest rate" in answer([bias, bent], "si")
     assert scatter_words([calibrated("bias", scatter=None)]) == ""
     assert "scatter more than the noise" in scatter_words([calibrated("bias", scatter=1e-4)])
-    assert earth_words([calibrated("bias", earth_rate=None)], "si").endswith(
-        "is a part of the bias."
+    assert earth_words([calibrated("bias", earth_rate=None)], "si").startswith(
+        "The bias includes the Earth's rate"
     )
     turned = calibrated(
         "bias",
@@ -134,4 +134,4 @@ def test_sentences() -> None:
         heading=0.5,
         elevation=0.0,
     )
-    assert "it is sure to 1×10⁻⁶ rad/s (1σ)." in earth_words([turned], "si")
+    assert "determines it to 1×10⁻⁶ rad/s (1σ)." in earth_words([turned], "si")

@@ -89,7 +89,7 @@ def test_of_many_recordings_whole_decades_are_kept(
         return len(page["arrays"][channel["tau"]][3])
 
     several = count()
-    monkeypatch.setattr("imubench_pipeline.report.compare._MANY", 1)
+    monkeypatch.setattr("imubench_pipeline.report.compare._MAX_DETAILED_RECORDINGS", 1)
     assert count() < several
 
 
@@ -97,5 +97,5 @@ def test_one_recording_is_not_compared(tmp_path: Path) -> None:
     made = site(joined(recording_rows("one", "day1")), tmp_path)
     publish_some(made, tmp_path / "report", ["compare.html"])
     page = read_pages(tmp_path / "report")["compare.html"]
-    assert "It takes two recordings." in page.text
+    assert "A comparison needs two recordings." in page.text
     assert np.ndim(page.data["recordings"]) == 1

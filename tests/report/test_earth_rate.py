@@ -88,10 +88,10 @@ def read(published: Path) -> dict[str, Read]:
 
 def test_the_page_of_a_run_says_what_was_found(read: dict[str, Read]) -> None:
     page = read["recordings/s/run.html"]
-    assert "The filter finds an Earth's rate of" in page.text
+    assert "The filter estimates an Earth's rate of" in page.text
     assert "19 turns between north and south, at latitude 0°" in page.text
-    assert "left out of the Allan variance" in page.text
-    assert "It cannot be used to find the rate" in page.text
+    assert "Allan variance, estimates and ranking do not use it" in page.text
+    assert "so it cannot estimate the rate" in page.text
     kinds = {one.attributes.get("data-kind") for one in page.elements if one.tag == "figure"}
     assert kinds == {"dwells", "earth_rate", "bound"}  # of samples none are kept here
     parts = [one.attributes.get("data-part") for one in page.elements
@@ -105,13 +105,14 @@ def test_the_page_of_a_run_says_what_was_found(read: dict[str, Read]) -> None:
 def test_a_run_whose_noise_is_not_known_says_so_and_shows_its_turns(read: dict[str, Read]) -> None:
     page = read["recordings/s/unknown.html"]
     assert "The noise of this sensor is not known" in page.text
-    assert page.naming("turn 19", "tr") and "What this gyro needs" not in page.text
+    assert page.naming("turn 19", "tr") and "Required recordings" not in page.text
 
 
 def test_the_start_page_names_what_was_not_found(read: dict[str, Read]) -> None:
     text = read["index.html"].text
     assert (
-        "1 turned without an estimate" in text and "The noise of this sensor is not known" in text
+        "1 turned recording without an estimate" in text
+        and "The noise of this sensor is not known" in text
     )
     assert "two positions" in read["sensors/s.html"].text
 
@@ -124,7 +125,7 @@ def test_a_rejected_run_stands_with_its_reason(read: dict[str, Read]) -> None:
 def test_the_page_of_all_runs(read: dict[str, Read]) -> None:
     page = read["earth_rate.html"]
     assert len(page.naming("run", "tr")) >= 2
-    assert "0 published estimates lie within what the noise" in page.text
+    assert "The noise that the source prints explains 0 published estimates" in page.text
     assert "run by −6.94 σ" in page.text and "0.0004846 deg/s" in page.text
     for goal in ("100 %", "10 %", "1 %"):
         assert page.naming(goal, "td")
@@ -200,27 +201,29 @@ def test_sentences() -> None:
                        latitude=0.0)  # fmt: skip
     row = estimate(method="filter", value=30 * HOUR, upper=32 * HOUR, status="ok", off_sigma=15.0)
     assert "15 standard deviations away" in answer([row], "practical")
-    assert "So far off is not noise" in answer([row], "practical")
-    assert answer([], "practical") == "Nothing was found of the turns of this recording."
+    assert "Noise does not explain this error" in answer([row], "practical")
+    assert answer([], "practical") == "This recording has no estimate of the Earth's rate."
     assert _best_of([300.0, 20.0, 5.0], [300.0], 300.0).endswith(
-        " It is the longest that was tried."
+        " It is the longest dwell that was tried."
     )
-    assert "tried; down to 20 s it is less" in _best_of([300.0, 20.0, 5.0], [300.0, 20.0], 300.0)
-    assert "shortest that was tried; up to 20 s" in _best_of([300.0, 20.0, 5.0], [20.0, 5.0], 5.0)
-    assert "From 19 s to 21 s" in _best_of([300.0, 21.0, 20.0, 19.0, 5.0], [21.0, 20.0, 19.0], 20.0)
-    assert "All others" in _best_of([300.0, 20.0, 5.0], [20.0], 20.0)
+    longest = _best_of([300.0, 20.0, 5.0], [300.0, 20.0], 300.0)
+    assert "tried; dwells down to 20 s are less" in longest
+    shortest = _best_of([300.0, 20.0, 5.0], [20.0, 5.0], 5.0)
+    assert "shortest dwell that was tried; dwells up to 20 s" in shortest
+    assert "Dwells from 19 s to 21 s" in _best_of(
+        [300.0, 21.0, 20.0, 19.0, 5.0], [21.0, 20.0, 19.0], 20.0
+    )
+    assert "All other dwells" in _best_of([300.0, 20.0, 5.0], [20.0], 20.0)
     names = {"sensor": "s", "recording": "a", "verdict": "within the noise"}
     assert published_words([EarthRatePublishedRow(**PUBLISHED | names)]) == (
-        "All 1 published estimates lie within what the noise allows. "
-        "A filter that does not know the rate has a σ that is 0.78 % less than that of the mean "
-        "over pairs in these runs: that is all that it improves."
+        "Noise explains the error of the published estimate. In these runs, σ of a filter that "
+        "does not know the rate is 0.78 % smaller than that of the mean over pairs."
     )
     given = estimate(status="given", method="known_rate", settled=900.0)
     later = estimate(status="given", method="known_rate", settled=1800.0)
     other = estimate(status="given", method="known_rate_radians")
-    assert (
-        "it stays after 15 min of data with P₀ in (°/s)²; not by the end with P₀ in (rad/s)²"
-        in (given_words([given, other]))
+    assert "given rate after 15 min of data with P₀ in (°/s)²; never with P₀ in (rad/s)²" in (
+        given_words([given, other])
     )
     assert "after 15 min to 30 min of data" in given_words([given, later])
     assert given_words([]) == ""

@@ -38,7 +38,7 @@ def test_numbers_are_rounded_up() -> None:
 
 def test_what_no_number_reaches_is_said() -> None:
     found = line(n=None, lower=None, upper=None, reachable=False, reason="a floor")
-    assert (found["number"], found["limits"], found["reason"]) == ("no number", "", "a floor")
+    assert (found["number"], found["limits"], found["reason"]) == ("not possible", "", "a floor")
     assert line(upper=None)["limits"] == "8 or more"
     assert line(n=None)["number"] == "–"
 
@@ -59,8 +59,8 @@ def test_what_is_not_known_of_a_pair_is_said_once() -> None:
 def test_the_page_says_what_it_assumes() -> None:
     assert "independent" in shared_words({"N": 0.0, "B": 0.0, "K": 0.0, "R": 0.0})
     assert shared_words({"N": 0.125, "B": 0.0, "K": 1.0, "R": 0.0}).startswith(
-        "Specimens of one sensor are taken to have in common 12.5 % of the variance of the white "
-        "noise (N), 100 % of the variance of the random walk (K). What temperature adds"
+        "The units of one sensor are assumed to share 12.5 % of the variance of the white noise "
+        "(N), 100 % of the variance of the random walk (K). The effect of a logged temperature"
     )
 
 
@@ -120,7 +120,7 @@ def test_what_is_not_printed_of_a_class_is_said_on_the_page(tmp_path: Path) -> N
     tables = joined(*(recording_rows(name) for name in ("one", "two"))) | {"grades": rows}
     publish(site(tables), tmp_path)
     page = (tmp_path / "fusion.html").read_text(encoding="utf-8")
-    assert "can be compared: V D, gyroscope (it prints none)." in page
+    assert "is comparable: V D, gyroscope (it prints none)." in page
 
 
 def test_a_matrix_has_the_quietest_first_and_a_number_where_one_is_not_enough() -> None:

@@ -40,6 +40,7 @@ from imubench_pipeline.noise import FLOOR, GaussMarkov, NoiseModel
 from imubench_pipeline.report import glossary as module
 from imubench_pipeline.report.datasheets import DEPENDS
 from imubench_pipeline.report.glossary import UnknownTermError, glossary, term
+from imubench_pipeline.report.practical import STATUS_NAMES
 from imubench_pipeline.settings.validation import ConfigError
 from imubench_pipeline.tables import findings
 from imubench_pipeline.units import from_si, to_si
@@ -149,7 +150,8 @@ def test_an_unknown_term_is_an_error_that_names_close_ones() -> None:
 def test_what_a_table_holds_is_looked_up_by_its_kind() -> None:
     assert term("not comparable (condition)", "verdict").name == "not comparable (condition)"
     assert term("band", "line") is not term("band")
-    assert term("not_identified").name == "not identified"
+    assert term("not_identified").name == "not determined"
+    assert all(term(status).name == name for status, name in STATUS_NAMES.items())
 
 
 # --------------------------------------------------------- what the program can say has an entry
@@ -403,7 +405,7 @@ MTI_7_ACCEL = NoiseModel(N=9.6e-4, B=3.4e-4, T_B=38.3, K=1.7e-5)
 C102_ACCEL = NoiseModel(N=1.1e-3, B=7.2e-4, T_B=148.9, K=2.0e-5)
 PERFECT = Start.uncalibrated(gyro_bias=0.0, accel_bias=0.0, on_time=0.0)
 CAUSES: dict[str, tuple[NoiseModel, Start]] = {
-    "A bias b that is left over, 10 °/h": (
+    "A residual bias b, 10 °/h": (
         NOTHING,
         Start.uncalibrated(gyro_bias=GYRO.B, accel_bias=0.0, on_time=0.0),
     ),

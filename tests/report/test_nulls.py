@@ -121,7 +121,7 @@ class Reports:
 
     def text(self, page: Page) -> str:
         made = self.site(self.tables)
-        return publishing._rendered(made, environment(made.system), page)
+        return publishing._render(made, environment(made.system), page)
 
     def check(self, tables: Tables) -> None:
         """Make what differs: every page comes, and shows nothing as Python writes it."""

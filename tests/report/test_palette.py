@@ -5,7 +5,7 @@ import pytest
 from imubench_pipeline.report.palette import (
     Appearance,
     method_appearance,
-    places,
+    recording_styles,
     sensor_appearances,
 )
 from imubench_pipeline.report.view import METHOD_NAMES
@@ -57,7 +57,7 @@ def test_sensors_of_one_colour_differ_in_marker_and_dash() -> None:
 
 def test_no_two_recordings_of_a_sensor_look_alike_until_the_looks_repeat() -> None:
     for own in sensor_appearances([str(i) for i in range(12)]).values():
-        looks = places(own)
+        looks = recording_styles(own)
         assert len(looks) == len(set(looks)) >= 50
         assert looks[0] == own
         # Its colour, only darker by day and lighter by night.
@@ -74,7 +74,7 @@ def test_methods_differ_in_more_than_their_colour() -> None:
 
 
 def test_markers_and_dashes_are_such_as_both_kinds_of_figures_know() -> None:
-    for look in [*all_looks(), *places(all_looks()[0])]:
+    for look in [*all_looks(), *recording_styles(all_looks()[0])]:
         assert look.marker in MARKERS
         assert look.dash in DASHES
         assert look.light != look.dark

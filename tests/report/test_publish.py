@@ -51,7 +51,7 @@ KEPT = {"pages.json", "settings.json"}
 ASKED = {"robot": ROBOT}
 THEORY_FIGURE = "data:image/svg+xml;base64,PHN2Zy8+"
 PLOTTING = "var Plotly = {};"
-MADE = publishing._made
+MADE = publishing._make_page
 
 
 @pytest.fixture(autouse=True, scope="module")
@@ -232,7 +232,7 @@ def test_the_start_page_says_what_was_rejected_and_why(read: dict[str, Read]) ->
 def test_a_rejected_recording_says_why_wherever_it_is_listed(read: dict[str, Read]) -> None:
     reason = "line 3: found '<x>' & more"
     own = read["recordings/one/torn.html"]
-    assert reason in own.text and "could not be used" in own.text
+    assert reason in own.text and "was rejected" in own.text
     for path in ("index.html", "recordings.html", "sensors/one.html", "devices/one/unit 7.html"):
         assert reason in read[path].text, path
 
@@ -241,7 +241,7 @@ def test_figures_of_a_rejected_recording_are_not_offered(read: dict[str, Read]) 
     offered = "imubench figures results --sensor one --recording"
     assert offered in read["recordings/one/day1.html"].text
     assert offered not in read["recordings/one/torn.html"].text
-    assert "To make its results again: snakemake" in read["recordings/one/torn.html"].text
+    assert "To recompute the results: snakemake" in read["recordings/one/torn.html"].text
 
 
 def test_a_simulated_recording_is_called_so_on_every_page_that_names_it(
@@ -293,9 +293,9 @@ def test_a_channel_without_a_random_walk_says_so(read: dict[str, Read]) -> None:
     (answer,) = (one for one in page.elements if one.attributes.get("class") == "answer")
     assert answer.text.startswith("N 0.33 °/√h (± 10 %); B 10 °/h (± 25 %); T_B 100 s (± 25 %);")
     assert "K" not in answer.text
-    assert page.naming("K is not in the model: the data do not support it; below 3 °/h/√h.", "li")
-    (row,) = (one for one in page.naming("likelihood", "tr") if "use this" in one.text)
-    assert re.search(r"absent\s*below 3", row.text)
+    assert page.naming("The data do not ask for K: it is below 3 °/h/√h.", "li")
+    (row,) = (one for one in page.naming("likelihood", "tr") if "recommended" in one.text)
+    assert re.search(r"not in the model\s*below 3", row.text)
 
 
 def test_findings_stand_on_the_page_of_their_recording(read: dict[str, Read]) -> None:
@@ -342,8 +342,8 @@ def test_samples_are_drawn_where_they_are_kept(read: dict[str, Read]) -> None:
 
 
 def test_a_sensor_without_a_datasheet_says_so(read: dict[str, Read]) -> None:
-    assert "No figures of a datasheet are stated" in read["sensors/two.html"].text
-    assert "No figures of a datasheet are stated" not in read["sensors/one.html"].text
+    assert "The sensor file states no figures of a datasheet" in read["sensors/two.html"].text
+    assert "The sensor file states no figures of a datasheet" not in read["sensors/one.html"].text
     assert read["sensors/one.html"].naming("0.005 deg/s/sqrt(Hz)", "tr")
     assert [one.attributes.get("data-sensor") for one in read["datasheets.html"].elements
             if one.attributes.get("data-sensor")] == ["V & Co one"] * 2  # fmt: skip
@@ -566,10 +566,10 @@ def test_what_is_not_sold_is_not_said_to_lack_a_recording(tmp_path: Path) -> Non
     made.tables["ranking"] = ranking.filter(pc.field("sensor") != "board")  # type: ignore[index]  # made so
     publish(made, tmp_path)
     read = sound(tmp_path)
-    assert not read["index.html"].naming("not enough data", "tr")
-    (line,) = read["index.html"].naming("Not compared", "p")
+    assert not read["index.html"].naming("not judged", "tr")
+    (line,) = read["index.html"].naming("Not in the table", "p")
     assert "board" in line.text and "not sold" in line.text
-    assert "Not ranked: this sensor is not sold." in read["sensors/board.html"].text
+    assert "Not ranked: not sold." in read["sensors/board.html"].text
 
 
 @pytest.mark.release
@@ -775,7 +775,7 @@ def test_another_file_with_the_same_samples_rewrites_the_page_of_its_recording(
     written("<log>.csv", 64 * "a")
     page = sound(tmp_path / "report")["recordings/one/day1.html"]
     assert re.sub(r"\s", "", page.naming(64 * "a", "tr")[0].text) == f"<log>.csv12345{64 * 'a'}"
-    assert re.search(r"Read as\s*found by its content", page.text)
+    assert re.search(r"Format\s*detected from the content", page.text)
     assert re.search(r"Segments\s*2", page.text)
     assert written("log.csv", 64 * "b") == ["recordings/one/day1.html"]
     assert written("log.csv", 64 * "b") == []
@@ -937,7 +937,7 @@ def test_one_file_holds_every_page(report: Report, whole: Read) -> None:
         path = (one.attributes["id"] or "").removeprefix("page:")
         (main,) = (element for element in folder[path].elements if element.tag == "main")
         shown = main.text
-        for table in ("All tables, in SI units", "As printed: "):  # files that lie elsewhere
+        for table in ("All tables, in SI units", "For print: "):  # files that lie elsewhere
             shown = shown.partition(table)[0]
         assert " ".join(shown.split())[:5000] in " ".join(one.text.split()), path
 
@@ -1007,7 +1007,7 @@ def test_a_page_that_fails_stops_no_other_page(
 
     tables = joined(recording_rows("one", "day1"))
     monkeypatch.setattr(publishing, "pages", broken)
-    monkeypatch.setattr(publishing, "_made", MADE)
+    monkeypatch.setattr(publishing, "_make_page", MADE)
     for attempt in range(2):
         assert attempt_at_pages(tmp_path) == attempt
         made = site(tables)
@@ -1027,7 +1027,7 @@ def test_a_full_disk_is_no_fault_of_a_page(tmp_path: Path, monkeypatch: pytest.M
     def full(*_: object) -> str:
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(publishing, "_made", MADE)
-    monkeypatch.setattr(publishing, "_rendered", full)
+    monkeypatch.setattr(publishing, "_make_page", MADE)
+    monkeypatch.setattr(publishing, "_render", full)
     with pytest.raises(OSError, match="No space"):
         publish(site(joined(recording_rows("one", "day1"))), tmp_path)

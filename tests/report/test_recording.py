@@ -53,5 +53,5 @@ def test_a_back_test_stands_on_the_pages_of_recording_and_comparison(
                  "contradicts the budget", "in the log, not in the model: warm up drift",
                  "log too short: it needs 6000 s"):  # fmt: skip
         assert text in own.text, text
-    said = "the log drifted 2 times the prediction at 100 s"
+    said = "observed / predicted heading of gyro x after 100 s: 2 (expected 0.93 to 1.1): outside"
     assert said in pages["index.html"].text

@@ -59,6 +59,6 @@ def test_best_worst_and_measured_stand_side_by_side(read: dict[str, Read]) -> No
 
 def test_the_spread_of_turn_ons_stands_on_the_page_of_the_sensor(read: dict[str, Read]) -> None:
     page = read["sensors/one.html"]
-    assert "Bias from one turn-on to the next" in page.text
+    assert "Repeatability of the turn-on bias" in page.text
     assert any("not sure" in one.text and "the power" in one.text
                for one in page.naming("unit 7", "tr"))  # fmt: skip

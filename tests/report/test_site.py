@@ -158,12 +158,10 @@ def test_a_change_is_told_in_words() -> None:
         change=-0.256,
         p_value=0.00012,
     )
-    assert change_words(row, simulated=False) == (
-        "r, gyro x: N changed by −26 % (chance if it had not: 0.0001)."
-    )
+    assert change_words(row, simulated=False) == ("r, gyro x: N changed by −26 % (p = 0.0001).")
     bias = replace(row, parameter="bias", change=None, p_value=0.002)
     assert change_words(bias, simulated=True) == (
-        "r (simulated), gyro x: fixed bias changed (chance if it had not: 0.002)."
+        "r (simulated), gyro x: fixed bias changed (p = 0.002)."
     )
 
 

@@ -202,13 +202,13 @@ def test_a_term_that_the_log_does_not_tell_is_called_so() -> None:
         )
     }
     view = view_of(parameters=unsure)
-    assert "rate random walk, K = 6 °/h/√h (not identified)" in written(made(terms_figure(view)))
+    assert "rate random walk, K = 6 °/h/√h (not determined)" in written(made(terms_figure(view)))
     (mark,) = marks(view, "K", 0.0)
     assert (mark.kind, mark.value, mark.lower) == ("not identified", MODEL.K, MODEL.K / 9)
     figure = forest_figure([view], ["imu"], "K")
     (dot,) = [each for each in figure.axes[0].lines if each.get_marker() == "o"]
     assert dot.get_markerfacecolor() == "white"
-    assert "not identified: as fitted, 95 % limits" in written(figure)
+    assert "not determined: fitted value, 95 % limits" in written(figure)
 
 
 @pytest.mark.release
@@ -220,7 +220,7 @@ def test_a_channel_without_k() -> None:
     assert "upper 95 % limit" in written(forest_figure([view], ["imu"], "K"))
     nothing = view_of(parameters=KNOWN | {"K": Parameter(None, "absent")})
     found = written(forest_figure([nothing], ["imu"], "K"))
-    assert "absent" in found and "no recording has a value" in found
+    assert "not in the model" in found and "no recording has a value" in found
 
 
 @pytest.mark.release

@@ -45,21 +45,20 @@ def lines(view: ChannelView) -> dict[str, dict[str, Any]]:
 def test_a_temperature_that_is_followed_is_said_with_what_is_left() -> None:
     said = answer(warm(), "practical")
     assert said == [
-        "The bias follows the temperature by 90 °/h/K. Without it the Allan deviation is lower: "
-        "2 times at τ = 100 s, 2 times at τ = 300 s, 2 times at τ = 1000 s.",
-        "Ranking, datasheet and budgets take the log as it comes, with what temperature does to "
-        "it: so it is in use, and so are the logs of sensors without readings. Method compensated "
-        "has the noise that is left, of which a datasheet of constant temperature speaks.",
-        "T₀, the mean temperature, is 22.5 °C.",
-        "The sensor's own low-pass cuts off at 64 Hz, of first order.",
+        "The bias changes with temperature by 90 °/h/K. Compensated, the Allan deviation is lower "
+        "by a factor of 2 at τ = 100 s, 2 at τ = 300 s, 2 at τ = 1000 s.",
+        "Ranking, datasheet comparison and budgets use the log with its temperature effect. The "
+        "method “likelihood, temperature compensated” gives the noise at constant temperature.",
+        "The mean temperature T₀ is 22.5 °C.",
+        "The sensor's own low-pass has its cut-off at 64 Hz (first order).",
     ]
     assert answer(warm(), "si")[0].startswith(
-        "The bias follows the temperature by 0.000436 rad/s/K."
+        "The bias changes with temperature by 0.000436 rad/s/K."
     )
     accel = warm(channels=("accel_x",))
     # The same number in m/s^2/K.
     assert answer(accel, "practical")[0].startswith(
-        "The bias follows the temperature by 44.5 µg/K."
+        "The bias changes with temperature by 44.5 µg/K."
     )
 
 
@@ -68,10 +67,11 @@ def test_only_where_the_curve_is_lower_it_is_said_so() -> None:
     for row, measured in zip(rows["allan_compensated"], rows["allan"], strict=True):
         row["adev"] = measured["adev"] / (3.0 if row["tau"] > 500 else 1.001)
     said = answer(channel(rows), "practical")[0]
-    assert said.endswith("Without it the Allan deviation is lower: 3 times at τ = 1000 s.")
+    assert said.endswith("the Allan deviation is lower by a factor of 3 at τ = 1000 s.")
     for row, measured in zip(rows["allan_compensated"], rows["allan"], strict=True):
         row["adev"] = 1.02 * measured["adev"]
-    assert answer(channel(rows), "practical")[0] == "The bias follows the temperature by 90 °/h/K."
+    said = answer(channel(rows), "practical")[0]
+    assert said == "The bias changes with temperature by 90 °/h/K."
 
 
 def test_the_times_that_are_told_are_those_of_the_curve() -> None:
@@ -102,14 +102,14 @@ def test_a_fall_is_read_at_equal_times() -> None:
         for t, a in zip(tau, adev, strict=True)
     ]
     said = answer(channel(rows), "practical")[0]
-    assert said.endswith("lower: 4 times at τ = 100 s, 4 times at τ = 300 s.")
+    assert said.endswith("lower by a factor of 4 at τ = 100 s, 4 at τ = 300 s.")
 
 
 def test_a_temperature_that_is_not_taken_out_says_why() -> None:
     said = answer(warm(CONFUSED), "practical")
     assert said[:2] == [
-        f"Temperature is not taken out: {CONFUSED}.",
-        "T₀, the mean temperature, is 22.5 °C.",
+        f"The temperature effect is not removed: {CONFUSED}.",
+        "The mean temperature T₀ is 22.5 °C.",
     ]
 
 
@@ -119,7 +119,7 @@ def test_a_log_without_temperature_says_nothing_of_it() -> None:
     rows = recording_rows(temperature="followed")
     rows["temperature"] = rows["allan_compensated"] = []
     assert answer(channel(rows), "practical") == [
-        "The sensor's own low-pass cuts off at 64 Hz, of first order."
+        "The sensor's own low-pass has its cut-off at 64 Hz (first order)."
     ]
     assert set(lines(channel(rows))) == {"cutoff", "N_sensor"}
 
@@ -130,7 +130,7 @@ def low_pass(**changes: Any) -> dict[tuple[str, str], dict[str, Any]]:
 
 def test_the_order_of_a_butterworth_filter_is_said() -> None:
     said = answer(warm(changes=low_pass(order=3)), "practical")
-    assert said[-1].endswith("cuts off at 64 Hz, as a Butterworth filter of order 3.")
+    assert said[-1].endswith("has its cut-off at 64 Hz (Butterworth, order 3).")
 
 
 def test_no_low_pass_is_said_and_has_no_line() -> None:

@@ -1,8 +1,8 @@
-"""The back-test on the pages: what logs show of their own error budgets."""
+"""The back-test on the pages: observed errors compared with the error budgets."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from imubench_pipeline.model.comparisons import RankingRow
@@ -15,7 +15,7 @@ from imubench_pipeline.words.numbers import duration_text, number_text
 def backtest_lines(
     rows: Sequence[BacktestRow], requirements: Mapping[str, Any], system: System
 ) -> list[dict[str, Any]]:
-    """Return the lines of the table of a recording's back-test, of rows of ``backtest``."""
+    """Return the lines of a recording's back-test, from rows of ``backtest``."""
     lines = []
     for row in rows:
         unit = unit_of(DIMENSIONS[row.error], system)
@@ -33,44 +33,40 @@ def backtest_lines(
                 else "–",
                 "ratio": number_text(row.ratio, 3) if has_ratio else "–",
                 "range": range_text(row.ratio_lower, row.ratio_upper) if has_ratio else "",
-                "windows": _windows(row) if has_ratio else "–",
+                "windows": f"{number_text(row.windows, 9)} "
+                f"({number_text(row.independent, 2)} independent)"
+                if has_ratio
+                else "–",
                 "verdict": row.verdict,
                 "contradicted": row.contradicted,
-                "why": "; ".join(_remarks(row)),
+                "why": row.reason or _describe_removed(row),
             }
         )
     return lines
 
 
-def _windows(row: BacktestRow) -> str:
-    independent = number_text(row.independent, 2)
-    return f"{number_text(row.windows, 9)} ({independent} independent)"
-
-
 def range_text(lower: float | None, upper: float | None) -> str:
-    """Return between what limits a ratio is to be expected."""
+    """Return the expected range of a ratio."""
     return f"{number_text(lower, 2)} to {number_text(upper, 2)}"
 
 
 def standing_text(row: RankingRow) -> str:
-    """Return what the log shows of the error by which a sensor stands, a row of ``ranking``.
-
-    Empty where it shows nothing.
-    """
+    """Return the back-test of the deciding error, from a row of ``ranking``; empty without one."""
     if row.backtest_ratio is None:
         return ""
     channel = (row.backtest_channel or "all channels").replace("_", " ")
-    expected = range_text(row.backtest_ratio_lower, row.backtest_ratio_upper)
+    lower, upper = row.backtest_ratio_lower, row.backtest_ratio_upper
+    place = ""
+    if lower is not None and upper is not None:
+        place = ": inside" if lower <= row.backtest_ratio <= upper else ": outside"
     return (
-        f"the log drifted {number_text(row.backtest_ratio, 3)} times the prediction at "
-        f"{duration_text(row.time)} ({channel}, {row.error}; "
-        f"{expected} is to be expected), "
-        f"{number_text(row.backtest_windows, 9)} windows"
+        f"observed / predicted {row.error} of {channel} after {duration_text(row.time)}: "
+        f"{number_text(row.backtest_ratio, 3)} (expected {range_text(lower, upper)}){place}"
     )
 
 
-def _remarks(row: BacktestRow) -> Iterator[str]:
-    if row.reason:
-        yield row.reason
-    elif row.taken_out:
-        yield f"in the log, not in the model: {row.taken_out.replace('_', ' ')}"
+def _describe_removed(row: BacktestRow) -> str:
+    """Return which signals the log contains and the noise model does not."""
+    if not row.taken_out:
+        return ""
+    return f"in the log, not in the model: {row.taken_out.replace('_', ' ')}"

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare what the command is given."""
+    """Add the arguments of the command to its parser."""
     parser.add_argument("results", type=Path, help="folder of the results of a run")
     add_output(
         parser,
@@ -36,7 +36,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Write the report; return the exit status: 2 where there are no results."""
-    # Templates and figures cost half a second, which the other commands need not wait for.
+    # Imported here, because templates and figures take half a second to load.
     with extra("workflow", "write the report"):
         from imubench_pipeline.report.publish import published
     from imubench_pipeline.tables.findings import RecordingError
@@ -69,7 +69,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _write(site: Site, arguments: argparse.Namespace) -> int:
-    """Write the pages of a site where they are asked for."""
+    """Write the pages of a site to the selected place."""
     from imubench_pipeline.report.publish import one_file, publish, remove_old_pages
     from imubench_pipeline.report.static_figures.of_run import draw_comparison
     from imubench_pipeline.tables.seals import seal_again
@@ -78,8 +78,8 @@ def _write(site: Site, arguments: argparse.Namespace) -> int:
         page = one_file(site).encode()
         arguments.one_file.write(page)
         print(f"{arguments.one_file}: {len(page) / 1e6:.1f} MB")
-        return _status(site)
-    say = _say if sys.stderr.isatty() else lambda _: None
+        return _report_failures(site)
+    say = _print_progress if sys.stderr.isatty() else lambda _: None
     output: OutputFolder | None = arguments.output
     if output is None:
         folder = arguments.results / "report"
@@ -92,15 +92,15 @@ def _write(site: Site, arguments: argparse.Namespace) -> int:
             draw_comparison(site.tables, site.system, made / "figures")
             remove_old_pages(folder, made)
     print(f"{folder / 'index.html'}: {len(written)} files written")
-    return _status(site)
+    return _report_failures(site)
 
 
-def _status(site: Site) -> int:
-    """Return the exit status of a report: 1 if pages could not be made, which are named."""
+def _report_failures(site: Site) -> int:
+    """Print the pages that could not be made; return the exit status, 1 if there are any."""
     for path, reason in site.failed.items():
         print(f"{path}: could not be made: {reason}", file=sys.stderr)
     return int(bool(site.failed))
 
 
-def _say(path: str) -> None:
+def _print_progress(path: str) -> None:
     print(path, file=sys.stderr)

@@ -1,7 +1,6 @@
-"""The page that sets sensors or recordings side by side: what its script draws and judges from.
+"""The page that compares sensors or recordings side by side: the data for its script.
 
-All that depends on which are chosen is made in the page: a pair has a ratio of each figure, with
-the same calculation as `navigation.ratios`, from what is kept of each recording alone.
+The script computes the ratios of the recordings that the reader chooses, like `navigation.ratios`.
 """
 
 from __future__ import annotations
@@ -24,31 +23,34 @@ from imubench_pipeline.units import quantity_to_si
 from imubench_pipeline.words.numbers import duration_text, number_text
 
 KEPT = ("error_growth", "drawn_deviations")
-"""The tables of each recording that the page is made of, beside the joined ones."""
+"""The tables of each recording that the page uses, besides the joined tables."""
 
-_ERRORS = ("attitude", "heading", "velocity", "position")
-_MANY = 100
-"""Recordings from which on models drawn are of whole decades of tau alone, errors of worst axes."""
+_COMPARED_ERRORS = ("attitude", "heading", "velocity", "position")
+_MAX_DETAILED_RECORDINGS = 100
+"""With more recordings, draws are at whole decades of tau, and errors of worst axes only."""
 
 
-def _context(site: Site) -> dict[str, Any]:
+def _make_context(site: Site) -> dict[str, Any]:
     arrays = Arrays()
-    views = _views(site)
+    views = _select_recordings(site)
     budget = site.settings["settings"]["error_budget"]
     channels: list[dict[str, Any]] = []
     datasheets: dict[str, dict[str, Any]] = {}
     recordings = []
+    few = len(views) > _MAX_DETAILED_RECORDINGS
     for recording in site.compared(views):
         view = recording.view
-        kept = {table: _kept(site, view, table) for table in KEPT}
-        drawn = dict(_drawn(kept["drawn_deviations"], arrays, few=len(views) > _MANY))
+        kept = {table: _read_columns(site, view, table) for table in KEPT}
+        drawn = dict(_pack_draws(kept["drawn_deviations"], arrays, few=few))
         for channel in recording.channels:
             channels.append(channel.among(arrays) | {"drawn": drawn.get(channel.about["channel"])})
         own = datasheets.setdefault(view.sensor, {})
         for name, lines in recording.datasheet.items():
             own.setdefault(name, lines)
-        growth = _growth(kept["error_growth"], arrays, few=len(views) > _MANY)
-        recordings.append(_recording(view) | {"sold": site.is_sold(view.sensor), "growth": growth})
+        growth = _pack_growth(kept["error_growth"], arrays, few=few)
+        recordings.append(
+            _describe_recording(view) | {"sold": site.is_sold(view.sensor), "growth": growth}
+        )
     return {
         "several": len(views) > 1,
         "page": {
@@ -59,33 +61,33 @@ def _context(site: Site) -> dict[str, Any]:
             "channels": channels,
             "datasheets": datasheets,
             "recordings": recordings,
-            "errors": {error: _units(site, error) for error in _ERRORS},
+            "errors": {error: _describe_units(site, error) for error in _COMPARED_ERRORS},
             "window": quantity_to_si(budget["static_window"], "time"),
-            "limits": list(_limits(site)),
+            "limits": list(_list_limits(site)),
             "arrays": arrays.texts,
         },
     }
 
 
-def _views(site: Site) -> list[RecordingView]:
-    """Return the recordings that can be compared: those at rest of which a curve is known."""
+def _select_recordings(site: Site) -> list[RecordingView]:
+    """Return the static recordings, which can be compared."""
     return [view for view in site.views if view.static]
 
 
-def _files(site: Site) -> Iterator[Path]:
-    """Yield the files that are kept of each recording and that the page shows."""
-    for view in _views(site):
+def _list_files(site: Site) -> Iterator[Path]:
+    """Yield the files of each recording that the page shows."""
+    for view in _select_recordings(site):
         for table in KEPT:
-            yield _path(site, view, table)
+            yield _make_path(site, view, table)
 
 
-def _path(site: Site, view: RecordingView, table: str) -> Path:
+def _make_path(site: Site, view: RecordingView, table: str) -> Path:
     return site.results / "recordings" / view.sensor / view.name / f"{table}.parquet"
 
 
-def _kept(site: Site, view: RecordingView, table: str) -> Mapping[str, Any]:
-    """Return columns of a table of a recording; none where a report is made without it."""
-    path = _path(site, view, table)
+def _read_columns(site: Site, view: RecordingView, table: str) -> Mapping[str, Any]:
+    """Return the columns of a table of a recording; empty if the file is missing."""
+    path = _make_path(site, view, table)
     if not path.is_file():
         return {}
     rows = read(table, [path])
@@ -96,7 +98,7 @@ def _kept(site: Site, view: RecordingView, table: str) -> Mapping[str, Any]:
     }
 
 
-def _recording(view: RecordingView) -> dict[str, Any]:
+def _describe_recording(view: RecordingView) -> dict[str, Any]:
     row = view.row
     temperature = None
     if row.temperature_min is not None:
@@ -119,8 +121,8 @@ def _recording(view: RecordingView) -> dict[str, Any]:
     }
 
 
-def _units(site: Site, error: str) -> dict[str, Any]:
-    """Return the unit of an axis, and those of a number: from which size in SI, sign and factor."""
+def _describe_units(site: Site, error: str) -> dict[str, Any]:
+    """Return the unit of an axis, and the units of numbers: smallest size in SI, sign, factor."""
     dimension = DIMENSIONS[error]
     axis = unit_of(dimension, site.system)
     sized = units_by_size(dimension, site.system)
@@ -130,12 +132,12 @@ def _units(site: Site, error: str) -> dict[str, Any]:
     }
 
 
-def _limits(site: Site) -> Iterator[dict[str, Any]]:
+def _list_limits(site: Site) -> Iterator[dict[str, Any]]:
     """Yield the limits of requirements, as 1 sigma."""
     for name, declared in site.settings["requirements"].items():
         requirement = Requirement.model_validate(declared)
         for limit in requirement.limits:
-            if limit.error in _ERRORS:
+            if limit.error in _COMPARED_ERRORS:
                 yield {
                     "requirement": name,
                     "title": requirement.title,
@@ -145,10 +147,10 @@ def _limits(site: Site) -> Iterator[dict[str, Any]]:
                 }
 
 
-def _drawn(
+def _pack_draws(
     kept: Mapping[str, Any], arrays: Arrays, *, few: bool
 ) -> Iterator[tuple[str, dict[str, Any]]]:
-    """Yield of each channel its Allan deviation at some tau, and those of models drawn, sorted."""
+    """Yield the Allan deviation of each channel at some tau, and those of drawn models, sorted."""
     if not kept:
         return
     of_draw = np.isfinite(np.asarray(kept["draw"], dtype=np.float64))  # null: the estimate itself
@@ -169,13 +171,13 @@ def _drawn(
         )
 
 
-def _growth(kept: Mapping[str, Any], arrays: Arrays, *, few: bool) -> dict[str, Any] | None:
-    """Return how errors grow, of the worst axes and of each alone; the only one is the worst."""
+def _pack_growth(kept: Mapping[str, Any], arrays: Arrays, *, few: bool) -> dict[str, Any] | None:
+    """Return the growth of errors of the worst axes and of each axis."""
     if not kept or not len(kept["error"]):
         return None
     windows, times = (np.unique(kept[name]) for name in ("window", "time"))
     by_axis = {
-        axis: _errors(kept, kept["axis"] == axis, arrays)
+        axis: _pack_errors(kept, kept["axis"] == axis, arrays)
         for axis in dict.fromkeys(kept["axis"].tolist())
         if axis == "worst" or not few
     }
@@ -189,8 +191,8 @@ def _growth(kept: Mapping[str, Any], arrays: Arrays, *, few: bool) -> dict[str, 
     }
 
 
-def _errors(kept: Mapping[str, Any], of_axis: Any, arrays: Arrays) -> dict[str, Any]:
-    """Return by error its totals with their limits, and shares of the variance by source."""
+def _pack_errors(kept: Mapping[str, Any], of_axis: Any, arrays: Arrays) -> dict[str, Any]:
+    """Return the totals of each error with limits, and the shares of the variance by source."""
     errors = {}
     for error in dict.fromkeys(kept["error"][of_axis].tolist()):
         own = of_axis & (kept["error"] == error)
@@ -213,8 +215,8 @@ def _errors(kept: Mapping[str, Any], of_axis: Any, arrays: Arrays) -> dict[str, 
             sources[source][place] = sigma**2 / variance[place] if variance[place] else 0.0
         errors[error] = {
             **{name: arrays.log(kept[name][total]) for name in ("sigma", "lower", "upper")},
-            "gyro": _axes(kept["gyro"][total]),
-            "accel": _axes(kept["accel"][total]),
+            "gyro": _merge_axes(kept["gyro"][total]),
+            "accel": _merge_axes(kept["accel"][total]),
             "sources": {
                 source: arrays.even(share)
                 for source, share in sources.items()
@@ -224,8 +226,8 @@ def _errors(kept: Mapping[str, Any], of_axis: Any, arrays: Arrays) -> dict[str, 
     return errors
 
 
-def _axes(channels: Sequence[str | None]) -> list[str]:
-    """Return the channels that answer: one for all, or one for each window and time."""
+def _merge_axes(channels: Sequence[str | None]) -> list[str]:
+    """Return the channels that determine the error: one, or one per window and time."""
     named = [channel or "" for channel in channels]
     return named[:1] if len(set(named)) == 1 else named
 
@@ -233,9 +235,9 @@ def _axes(channels: Sequence[str | None]) -> list[str]:
 COMPARE = Entry(
     file="compare.html",
     title="Side by side",
-    context=_context,
-    views=_views,
-    files=_files,
-    exists=lambda site: bool(_views(site)),
+    context=_make_context,
+    views=_select_recordings,
+    files=_list_files,
+    exists=lambda site: bool(_select_recordings(site)),
 )
 """The page that compares two or more sensors or recordings that the reader chooses."""

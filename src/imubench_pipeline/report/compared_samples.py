@@ -1,4 +1,4 @@
-"""Samples of a log beside those of the models that were found of it, on the page of a recording."""
+"""Samples of a log compared with logs simulated from its models, on the page of a recording."""
 
 from __future__ import annotations
 
@@ -10,16 +10,16 @@ from imubench_pipeline.report.payload import Arrays, numbers
 from imubench_pipeline.words.numbers import duration_text, number_text
 
 NAMES = {
-    "log": "the log",
+    "log": "log",
     "before": "model before the fit",
     "after": "model after the fit",
 }
 
 
 def words(rows: Sequence[ModelSampleRow], channel: str) -> str:
-    """Return how widely the samples of the models lie beside the log's, in a sentence, if any.
+    """Return the standard deviations of the simulated samples relative to the log, as a sentence.
 
-    Of rows of ``samples_of_models`` of a recording.
+    ``rows`` are those of ``samples_of_models`` of a recording; empty without such rows.
     """
     own = [row for row in rows if row.channel == channel and row.what == "deviation"]
     widths = {row.of: row.mean for row in own}
@@ -27,7 +27,7 @@ def words(rows: Sequence[ModelSampleRow], channel: str) -> str:
     if not of_log:
         return ""
     ratios = [
-        f"{number_text(width / of_log, 4)} times as widely {of} the fit"
+        f"{number_text(width / of_log, 4)} {of} the fit"
         for of in ("before", "after")
         if (width := widths.get(of)) is not None
     ]
@@ -35,13 +35,13 @@ def words(rows: Sequence[ModelSampleRow], channel: str) -> str:
         return ""
     length = next(row.end for row in own if row.of == "log")
     return (
-        f"Samples of the models lie {' and '.join(ratios)} as those of the log, of "
-        f"{duration_text(length)}."
+        f"Standard deviation relative to that of the log ({duration_text(length)}): "
+        f"{', '.join(ratios)}."
     )
 
 
 def payload(rows: Sequence[ModelSampleRow], arrays: Arrays) -> dict[str, Any]:
-    """Return what the figures are drawn from, by channel."""
+    """Return the data of the figures, by channel."""
     drawn: dict[str, Any] = {}
     for channel in dict.fromkeys(row.channel for row in rows):
         drawn[channel] = {}

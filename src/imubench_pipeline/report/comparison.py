@@ -13,12 +13,12 @@ from imubench_pipeline.report.payload import Arrays, ComparedChannel, compared, 
 from imubench_pipeline.report.practical import System
 from imubench_pipeline.report.view import QUANTITY_NAMES, RecordingView
 
-_PAPERS = "likelihood_gm"
+_PAPERS_METHOD = "likelihood_gm"
 
 
 @dataclass(frozen=True)
 class ComparedRecording:
-    """What pages compare of a recording: gathered once, whatever the number of pages."""
+    """The compared data of a recording, gathered once for all pages."""
 
     view: RecordingView
     channels: list[ComparedChannel]
@@ -28,7 +28,7 @@ class ComparedRecording:
 
 
 def compared_recording(view: RecordingView, system: System) -> ComparedRecording:
-    """Gather what pages compare of a recording; ``system`` is that of its numbers."""
+    """Gather the compared data of a recording; ``system`` is that of its numbers."""
     channels = view.channels()
     lines: dict[str, list[dict[str, Any]]] = {name: [] for name in QUANTITY_NAMES}
     symbols: dict[str, set[str]] = {name: set() for name in QUANTITY_NAMES}
@@ -36,8 +36,8 @@ def compared_recording(view: RecordingView, system: System) -> ComparedRecording
         shown = shown_symbols(chain(*channel.parameters.values()))
         symbols[channel.quantity].update(shown)
         methods = {channel.recommended: "recommended"}
-        if _PAPERS in channel.parameters:
-            methods.setdefault(_PAPERS, "papers' model")
+        if _PAPERS_METHOD in channel.parameters:
+            methods.setdefault(_PAPERS_METHOD, "papers' model")
         lines[channel.quantity] += [
             {
                 "view": view,
@@ -63,7 +63,7 @@ def compared_recording(view: RecordingView, system: System) -> ComparedRecording
 
 
 class Comparison:
-    """What is compared of recordings.
+    """The compared data of recordings.
 
     Parameters
     ----------
@@ -90,7 +90,7 @@ class Comparison:
 
     @property
     def page(self) -> dict[str, Any]:
-        """What the figures of the page are drawn from."""
+        """The data of the figures of the page."""
         return {
             "channels": self._curves,
             "datasheets": self._datasheets,
@@ -98,7 +98,7 @@ class Comparison:
         }
 
     def tables(self) -> Iterator[dict[str, Any]]:
-        """Yield a table a quantity: a line a channel, by the recommended method and the papers'."""
+        """Yield a table per quantity, with the recommended method and the papers' model."""
         for quantity, title in QUANTITY_NAMES.items():
             lines = self._lines[quantity]
             if not lines:

@@ -1,4 +1,4 @@
-"""What the pages say of datasheets: measured against printed, and who publishes what."""
+"""Datasheets on the pages: measured against printed figures, and published figures by vendor."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _STATISTIC_NAMES = {
     "K": "K",
     "T_B": "T_B",
 }
-_SYMBOLS = {
+_UNIT_SYMBOLS = {
     "N": "N",
     "K": "K",
     "T_B": "T_B",
@@ -28,57 +28,60 @@ _SYMBOLS = {
     "temperature_coefficient": "sensitivity",
 }
 
-_BESIDE = ("mean", "temperature")
-"""What stands in place of a method where no method has a part in a figure."""
+_WITHOUT_METHOD = ("mean", "temperature")
+"""Entries of the column ``method`` for figures that no estimation method gives."""
 
-_TITLES = {"gyro": "Gyroscope: published figures", "accel": "Accelerometer: published figures"}
-_SIGNS = {"yes": "yes", "no": "no", "other convention": "other", "not looked up": "?"}
+_COVERAGE_TITLES = {
+    "gyro": "Gyroscope: published figures",
+    "accel": "Accelerometer: published figures",
+}
+_COVERAGE_SIGNS = {"yes": "yes", "no": "no", "other convention": "other", "not looked up": "?"}
 
 
 def delta_rows(
     view: ChannelView, coverage: Mapping[tuple[str, str, str], str], system: System
 ) -> Iterator[dict[str, Any]]:
-    """Yield each figure of the datasheet with all its readings, what was measured, and a verdict.
+    """Yield each figure of the datasheet with all its readings, the measured value and a verdict.
 
-    ``coverage`` tells whether sensor, quantity and figure are published.
+    ``coverage`` has the publication status by sensor, quantity and figure.
     """
-    own = [row for row in view.datasheet if row.method in (view.recommended, *_BESIDE)]
-    for rows in _by_figure(own).values():
+    own = [row for row in view.datasheet if row.method in (view.recommended, *_WITHOUT_METHOD)]
+    for rows in _group_by_figure(own).values():
         first = rows[0]
         published = first.printed is not None
         figure = "B" if first.quantity == "bias_instability" else first.quantity
         verdict, why = one_verdict(rows)
         yield {
-            "quantity": _figure_name(first),
+            "quantity": _name_figure(first),
             "published": published,
             "coverage": coverage.get((view.sensor, view.quantity, figure), "not looked up"),
             "printed": printed_text(first),
             "about": ", ".join(filter(None, (first.kind, first.condition))),
-            "readings": [_reading(row, view.quantity, system) for row in rows],
+            "readings": [_describe_reading(row, view.quantity, system) for row in rows],
             "verdict": verdict,
             "reason": why if published else "",
         }
 
 
-def _reading(row: DatasheetRow, quantity: str, system: System) -> dict[str, Any]:
-    """Return one way to read a printed figure, and what was measured beside it."""
-    unit = page_unit(quantity, _SYMBOLS.get(row.quantity, "B"), system)
+def _describe_reading(row: DatasheetRow, quantity: str, system: System) -> dict[str, Any]:
+    """Return one reading of a printed figure, with the measured value."""
+    unit = page_unit(quantity, _UNIT_SYMBOLS.get(row.quantity, "B"), system)
     return {
-        "as": _read_as(row),
+        "as": _name_reading(row),
         "comparable": unit.text(row.comparable),
-        "measured": _with_limits(row, unit),
+        "measured": _format_measured(row, unit),
         "unit": "" if row.comparable is None and row.measured is None else unit.sign,
-        "delta": _shares_with_limits(row),
+        "delta": _format_difference(row),
         "value": row.delta,
     }
 
 
 _Figure = tuple[str, str, float | None, str | None, str | None, str | None]
-"""What names a printed figure of a channel, however it is read."""
+"""Identity of a printed figure of a channel: channel, quantity, number, unit, kind, condition."""
 
 
-def _by_figure(rows: Iterable[DatasheetRow]) -> dict[_Figure, list[DatasheetRow]]:
-    """Return the readings of each printed figure, by what names it."""
+def _group_by_figure(rows: Iterable[DatasheetRow]) -> dict[_Figure, list[DatasheetRow]]:
+    """Return the readings of each printed figure."""
     figures: dict[_Figure, list[DatasheetRow]] = {}
     for row in rows:
         name = (row.channel, row.quantity, row.printed, row.unit, row.kind, row.condition)
@@ -87,11 +90,10 @@ def _by_figure(rows: Iterable[DatasheetRow]) -> dict[_Figure, list[DatasheetRow]
 
 
 def one_verdict(readings: Sequence[DatasheetRow]) -> tuple[str, str]:
-    """Return the verdict on a printed figure, of the rows of its readings, and its reason.
+    """Return the verdict on a printed figure from the rows of its readings, and its reason.
 
-    A bias instability is judged by the minimum of the curve, which is what vendors print. A density
-    of which the datasheet does not say whether it is one-sided has a verdict where both readings
-    have the same.
+    A bias instability is judged by the minimum of the curve, as vendors print it. A density of
+    unknown sidedness has a verdict only if both readings have the same.
     """
     minima = [row for row in readings if row.statistic == "adev_minimum"]
     judged = minima or list(readings)
@@ -114,28 +116,28 @@ def deltas_of_sensors(views: Sequence[RecordingView], system: System) -> Iterato
         own = [
             row
             for row in view.rows(DatasheetRow)
-            if row.method in (recommended[row.channel], *_BESIDE) and row.delta is not None
+            if row.method in (recommended[row.channel], *_WITHOUT_METHOD) and row.delta is not None
         ]
-        for figure, rows in _by_figure(own).items():
+        for figure, rows in _group_by_figure(own).items():
             groups.setdefault((view.sensor, view.simulated, figure), []).append(rows)
     for (sensor, simulated, (channel, *_)), group in groups.items():
         first = group[0][0]
-        unit = page_unit(quantity_of(channel), _SYMBOLS.get(first.quantity, "B"), system)
+        unit = page_unit(quantity_of(channel), _UNIT_SYMBOLS.get(first.quantity, "B"), system)
         verdicts = Counter(one_verdict(rows)[0] for rows in group)
         readings = [
-            [row for rows in group for row in rows if _read_as(row) == name]
-            for name in dict.fromkeys(_read_as(row) for rows in group for row in rows)
+            [row for rows in group for row in rows if _name_reading(row) == name]
+            for name in dict.fromkeys(_name_reading(row) for rows in group for row in rows)
         ]
         yield {
             "sensor": sensor,
             "simulated": simulated,
             "channel": channel,
-            "quantity": _figure_name(first),
+            "quantity": _name_figure(first),
             "printed": printed_text(first),
             "about": first.kind or "",
             "unit": unit.sign,
-            "readings": [_over_recordings(rows, unit) for rows in readings],
-            "delta": median(_deltas(readings[0])),
+            "readings": [_compare_recordings(rows, unit) for rows in readings],
+            "delta": median(_list_deltas(readings[0])),
             "recordings": len(group),
             "verdicts": ", ".join(
                 verdict if len(group) == 1 else f"{verdict} ({count})"
@@ -144,29 +146,29 @@ def deltas_of_sensors(views: Sequence[RecordingView], system: System) -> Iterato
         }
 
 
-def _deltas(rows: Iterable[DatasheetRow]) -> list[float]:
+def _list_deltas(rows: Iterable[DatasheetRow]) -> list[float]:
     return [row.delta for row in rows if row.delta is not None]
 
 
-def _over_recordings(rows: Sequence[DatasheetRow], unit: Unit) -> dict[str, Any]:
-    """Return one way to read a printed figure against all recordings of a sensor."""
-    deltas = sorted(_deltas(rows))
+def _compare_recordings(rows: Sequence[DatasheetRow], unit: Unit) -> dict[str, Any]:
+    """Return one reading of a printed figure, compared with all recordings of a sensor."""
+    deltas = sorted(_list_deltas(rows))
     measured = sorted(row.measured for row in rows if row.measured is not None)
     ends = (measured[0], measured[-1]) if measured else (None, None)
     return {
-        "as": _read_as(rows[0]),
+        "as": _name_reading(rows[0]),
         "comparable": unit.text(rows[0].comparable),
-        "measured": _range([unit.text(value, 3) for value in ends]),
-        "difference": _range([_percent(value) for value in (deltas[0], deltas[-1])]),
+        "measured": _format_range([unit.text(value, 3) for value in ends]),
+        "difference": _format_range([_format_percent(value) for value in (deltas[0], deltas[-1])]),
     }
 
 
 def repeatability_lines(
     rows: Sequence[RepeatabilityRow], sensor: str, system: System
 ) -> Iterator[dict[str, Any]]:
-    """Yield how the fixed biases of each device of a sensor differ, against what is printed.
+    """Yield the scatter of the fixed biases of each device of a sensor, and the printed figure.
 
-    Of the table ``repeatability``.
+    ``rows`` are those of the table ``repeatability``.
     """
     for row in rows:
         if row.sensor != sensor:
@@ -179,34 +181,34 @@ def repeatability_lines(
             "printed": printed_text(row),
             "about": ", ".join(filter(None, (row.kind, row.condition))),
             "comparable": unit.text(row.comparable),
-            "measured": _with_limits(row, unit),
+            "measured": _format_measured(row, unit),
             "unit": unit.sign,
-            "delta": _percent(row.delta),
+            "delta": _format_percent(row.delta),
             "verdict": row.verdict,
             "reason": row.reason or "",
         }
 
 
-def _figure_name(row: DatasheetRow) -> str:
+def _name_figure(row: DatasheetRow) -> str:
     return _STATISTIC_NAMES.get(row.statistic, row.quantity.replace("_", " "))
 
 
-def _read_as(row: DatasheetRow) -> str:
-    """Return how a reading takes the printed figure, where there is more than one way."""
+def _name_reading(row: DatasheetRow) -> str:
+    """Return the name of a reading of a printed figure, if there are several readings."""
     if row.sidedness:
         return f"read as {row.sidedness}"
-    return _STATISTICS.get(row.statistic, "")
+    return _STATISTIC_TEXTS.get(row.statistic, "")
 
 
-_STATISTICS = {"adev_minimum": "lowest point of the curve", "plateau": "0.664 B alone"}
+_STATISTIC_TEXTS = {"adev_minimum": "lowest point of the curve", "plateau": "0.664 B alone"}
 
 
-def _range(ends: Sequence[str]) -> str:
+def _format_range(ends: Sequence[str]) -> str:
     return ends[0] if ends[0] == ends[1] else f"{ends[0]} to {ends[1]}"
 
 
 def curve_distances(view: ChannelView, system: System) -> Iterator[str]:
-    """Yield how far the curve is from the lines of the datasheet, in words."""
+    """Yield the distance between the curve and the lines of the datasheet, as text."""
     unit = page_unit(view.quantity, "adev", system)
     for row in view.datasheet_curve:
         reading = f", density read as {row.sidedness}" if row.sidedness else ""
@@ -215,12 +217,12 @@ def curve_distances(view: ChannelView, system: System) -> Iterator[str]:
         yield f"{unit.text(row.rms, 3)} {unit.sign}, {decades} decades{reading}"
 
 
-def _percent(share: float | None) -> str:
+def _format_percent(share: float | None) -> str:
     return "–" if share is None else f"{round(100 * share):+d} %".replace("-", "−")
 
 
-def _with_limits(row: DatasheetRow | RepeatabilityRow, unit: Unit) -> list[str]:
-    """Return what was measured, and its 95 % limits below it."""
+def _format_measured(row: DatasheetRow | RepeatabilityRow, unit: Unit) -> list[str]:
+    """Return the measured value, and its 95 % limits below it."""
     value, lower, upper = row.measured, row.lower, row.upper
     if value is None or lower is None or upper is None:
         return [unit.text(value)]
@@ -228,17 +230,17 @@ def _with_limits(row: DatasheetRow | RepeatabilityRow, unit: Unit) -> list[str]:
     return [unit.text(value, digits), f"{unit.text(lower, digits)} to {unit.text(upper, digits)}"]
 
 
-def _shares_with_limits(row: DatasheetRow) -> list[str]:
+def _format_difference(row: DatasheetRow) -> list[str]:
     """Return the difference, and its 95 % limits below it."""
     lower, upper = row.delta_lower, row.delta_upper
     if lower is None or upper is None:
-        return [_percent(row.delta)]
-    return [_percent(row.delta), f"{_percent(lower)} to {_percent(upper)}"]
+        return [_format_percent(row.delta)]
+    return [_format_percent(row.delta), f"{_format_percent(lower)} to {_format_percent(upper)}"]
 
 
 def coverage_tables(rows: Sequence[CoverageRow]) -> Iterator[dict[str, Any]]:
-    """Yield a table a quantity: a line a sensor, a column a figure, of the table ``coverage``."""
-    for quantity, title in _TITLES.items():
+    """Yield a table per quantity with a line per sensor and a column per figure."""
+    for quantity, title in _COVERAGE_TITLES.items():
         own = [row for row in rows if row.quantity == quantity]
         figures = list(dict.fromkeys(row.figure for row in own))
         lines: dict[str, dict[str, Any]] = {}
@@ -248,7 +250,7 @@ def coverage_tables(rows: Sequence[CoverageRow]) -> Iterator[dict[str, Any]]:
                 row.sensor, {"name": name, "document": row.document or "–", "cells": {}}
             )
             line["cells"][row.figure] = {
-                "text": _SIGNS[row.published],
+                "text": _COVERAGE_SIGNS[row.published],
                 "note": row.as_printed or "",
                 "class": "" if row.published == "yes" else "none",
             }
@@ -271,7 +273,7 @@ def coverage_tables(rows: Sequence[CoverageRow]) -> Iterator[dict[str, Any]]:
 
 
 def _count(published: Counter[str]) -> str:
-    """Return of how many of those looked up a figure is published, and how many were not."""
+    """Return how many vendors publish a figure, and how many have not been looked up."""
     unknown = published["not looked up"]
     text = f"{published['yes']} of {published.total() - unknown} looked up"
     return f"{text}; {unknown} not looked up" if unknown else text

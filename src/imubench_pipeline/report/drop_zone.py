@@ -1,4 +1,4 @@
-"""What became of every file in the drop zone, and what has changed there since the last run."""
+"""The outcome of every file in the drop zone, and its changes since the last run."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _MAX_NAMES = 5
 
 
 def drop_zone_lines(results: Path) -> list[str]:
-    """Return the balance of the last run, and what has changed in the drop zone since, as lines.
+    """Return the balance of the last run, and the changes in the drop zone since, as lines.
 
     Parameters
     ----------
@@ -36,7 +36,7 @@ def drop_zone_lines(results: Path) -> list[str]:
     if logs is None:
         return [*balance(files), *(["the drop zone of the run is not known"] if files else [])]
     if logs.is_dir():
-        return [*balance(files), *_changes(files, logs, results)]
+        return [*balance(files), *_list_changes(files, logs, results)]
     absent = f"the drop zone {logs} is not here: its files were not compared with the results"
     return [*balance(files), absent] if files else []
 
@@ -61,7 +61,7 @@ def balance(files: Sequence[FileRow]) -> Iterator[str]:
         yield f"  and {more} more in tables/files.csv"
 
 
-def _changes(files: Iterable[FileRow], logs: Path, results: Path) -> Iterator[str]:
+def _list_changes(files: Iterable[FileRow], logs: Path, results: Path) -> Iterator[str]:
     """Yield which files were added to the drop zone, removed or changed since the last run."""
     recordings = found_logs(logs)
     before = {row.file for row in files}

@@ -1,4 +1,4 @@
-"""What lies in the folder of the report."""
+"""The files in the folder of the report."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ from pathlib import Path
 from imubench_pipeline.tables import write_content
 
 KEYS = "pages.json"
-"""What each page of a report shows."""
+"""File with the digests of the pages."""
 
-_FAILED = "failed_pages.json"
+_FAILED_PAGES_FILE = "failed_pages.json"
 
 
 def failed_pages(folder: Path) -> dict[str, str]:
@@ -29,21 +29,21 @@ def write_failed_pages(failed: Mapping[str, str], folder: Path) -> None:
     """Write which pages could not be made, and why."""
     if failed:
         content = {"attempt": attempt_at_pages(folder), "pages": dict(failed)}
-        write_content(json.dumps(content, indent=1) + "\n", folder / _FAILED)
+        write_content(json.dumps(content, indent=1) + "\n", folder / _FAILED_PAGES_FILE)
     else:
-        (folder / _FAILED).unlink(missing_ok=True)
+        (folder / _FAILED_PAGES_FILE).unlink(missing_ok=True)
 
 
 def _read_failed(folder: Path) -> tuple[int, dict[str, str]]:
     try:
-        content = json.loads((folder / _FAILED).read_text("utf-8"))
+        content = json.loads((folder / _FAILED_PAGES_FILE).read_text("utf-8"))
         return int(content["attempt"]), {str(k): str(v) for k, v in content["pages"].items()}
     except (OSError, ValueError, KeyError, TypeError, AttributeError):
         return 0, {}
 
 
 def is_report(folder: Path) -> bool:
-    """Return whether a folder is a report that was written before."""
+    """Return whether a folder is an earlier report."""
     return all((folder / name).is_file() for name in (KEYS, "index.html", "assets/report.js"))
 
 

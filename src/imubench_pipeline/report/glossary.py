@@ -1,4 +1,4 @@
-"""The words of the report: what each term means, in a sentence, and where it is explained."""
+"""The terms of the report, each with a short explanation and a section of the theory page."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _FILE = Path(__file__).with_name("glossary.yaml")
 
 
 class _Entry(Strict):
-    """A term as the file has it."""
+    """A term in the file."""
 
     name: str
     short: str
@@ -57,8 +57,7 @@ class _Glossary(dict[str, Term]):
 def glossary() -> dict[str, Term]:
     """Return all terms by their keys, in the order of the file; read once, not to be changed.
 
-    Where it is asked for an unknown key, the result raises an UnknownTermError, which says which
-    terms are close.
+    An unknown key raises an UnknownTermError with similar terms.
 
     Raises
     ------

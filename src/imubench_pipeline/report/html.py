@@ -1,4 +1,4 @@
-"""The templates of the report, and what they may call."""
+"""The templates of the report, with their functions and filters."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from markupsafe import Markup, escape
 from imubench_pipeline.registry import files_of
 from imubench_pipeline.report.glossary import term
 from imubench_pipeline.report.practical import System, page_unit
-from imubench_pipeline.words.estimates import STATUS_WORDS, symbol_text
+from imubench_pipeline.words.estimates import status_text, symbol_text
 from imubench_pipeline.words.numbers import NO_VALUE, Unit, duration_text, number_text, started_text
 from imubench_pipeline.words.verdicts import doubts_text
 
@@ -33,7 +33,7 @@ def environment(system: System) -> jinja2.Environment:
         ),
         autoescape=True,
         undefined=jinja2.StrictUndefined,
-        finalize=_shown,
+        finalize=_format_missing,
         trim_blocks=True,
         lstrip_blocks=True,
     )
@@ -46,9 +46,9 @@ def environment(system: System) -> jinja2.Environment:
         if value is None or not math.isfinite(value):
             return Markup(number_text(value))
         rounded = f"{value:.7g}"
-        text = _unit(unit, system).text(float(rounded), digits)
+        text = _find_unit(unit, system).text(float(rounded), digits)
         of = "" if inside else f' data-unit="{unit}" data-digits="{digits}"'
-        # Numbers and names of our own: nothing to escape, and there are many of them.
+        # Escaping would be slow and is not necessary: numbers and units only.
         return Markup(f'<data value="{rounded}"{of}>{text}</data>')
 
     def parameter_cell(cell: Mapping[str, Any], unit: str) -> Markup:
@@ -59,11 +59,10 @@ def environment(system: System) -> jinja2.Environment:
         for part in cell["parts"]:
             value, status, lower, upper = (part[k] for k in ("value", "status", "lower", "upper"))
             if value is None:
-                text = f"{_hint(status)}"
+                text = f"{_explain_term(status)}"
             else:
-                shown = STATUS_WORDS.get(status, status)
                 text = f"{number(value)}" + (
-                    f' <span class="status">{shown}</span>' if status else ""
+                    f' <span class="status">{status_text(status)}</span>' if status else ""
                 )
             if upper is not None:
                 limits = f"{number(lower)} to" if lower is not None else "below"
@@ -71,50 +70,51 @@ def environment(system: System) -> jinja2.Environment:
             parts.append(text)
         none = " none" if cell["value"] is None else ""
         of_digits = f' data-digits="{digits}"' if digits != 3 else ""
-        # Numbers and words of our own: nothing to escape.
+        # Numbers and fixed texts only, which need no escaping.
         return Markup(f'<td class="number{none}"{of_digits}>{"<br>".join(parts) or NO_VALUE}</td>')
 
     def sign(unit: str) -> Markup:
         """Return the sign of a unit that the reader can switch."""
-        return Markup('<span data-sign="{}">{}</span>').format(unit, _unit(unit, system).sign)
+        return Markup('<span data-sign="{}">{}</span>').format(unit, _find_unit(unit, system).sign)
 
     templates.globals |= {
-        "action": _action,
+        "action": _find_action,
         "si": si,
         "sign": sign,
         "parameter_cell": parameter_cell,
-        "term": _term,
-        "hint": _hint,
-        "to": _to,
+        "term": _link_term,
+        "hint": _explain_term,
+        "to": _link_to,
     }
-    templates.filters |= {"duration": duration_text, "number": number_text, "json": _json}
+    templates.filters |= {"duration": duration_text, "number": number_text, "json": _make_json}
     templates.filters |= {"started": started_text, "symbol_text": symbol_text}
-    templates.filters["attribute"] = _compact
+    templates.filters["attribute"] = _make_compact_json
+    templates.filters["status_text"] = status_text
     templates.filters["doubts"] = doubts_text
     templates.filters["packed"] = packed
     templates.tests["hidden_row"] = _is_hidden
     return templates
 
 
-def _shown(value: Any) -> Any:
-    """Return a value as templates write it: a missing one as a dash."""
+def _format_missing(value: Any) -> Any:
+    """Return a value, or a dash if it is missing."""
     return NO_VALUE if value is None else value
 
 
 @cache
-def _unit(reference: str, system: System) -> Unit:
+def _find_unit(reference: str, system: System) -> Unit:
     quantity, symbol = reference.split(".")
     return page_unit(quantity, symbol, system)
 
 
 @jinja2.pass_context
-def _to(context: Context, path: str) -> str:
-    """Return the way from this page to another, or to a file beside the report."""
+def _link_to(context: Context, path: str) -> str:
+    """Return the relative link from this page to another page or file."""
     return str(context["root"]) + quote(path)
 
 
 @jinja2.pass_context
-def _term(context: Context, key: str, text: str | None = None) -> Markup:
+def _link_term(context: Context, key: str, text: str | None = None) -> Markup:
     """Return a term of the glossary, with its explanation and a link to the theory."""
     entry = term(key)
     return Markup('<a class="term" href="{}theory.html#{}" data-term="{}">{}</a>').format(
@@ -123,7 +123,7 @@ def _term(context: Context, key: str, text: str | None = None) -> Markup:
 
 
 @cache
-def _hint(key: str, text: str | None = None) -> Markup:
+def _explain_term(key: str, text: str | None = None) -> Markup:
     """Return a term with its explanation alone, for tables of many rows.
 
     An empty key, such as the status of a plain value that is not there, is `NO_VALUE`.
@@ -134,25 +134,25 @@ def _hint(key: str, text: str | None = None) -> Markup:
     return Markup('<i data-term="{}">{}</i>').format(entry.key, escape(text or entry.name))
 
 
-def _action(key: str) -> str:
-    """Return what to do about a finding."""
+def _find_action(key: str) -> str:
+    """Return the advice for a finding."""
     return term(key).action or ""
 
 
-def _json(value: Any) -> Markup:
+def _make_json(value: Any) -> Markup:
     """Return JSON that can stand inside a script element."""
-    return Markup(_compact(value).replace("<", "\\u003c"))
+    return Markup(_make_compact_json(value).replace("<", "\\u003c"))
 
 
 def packed(text: str) -> Markup:
-    """Return a text that is written in a page compressed, and unfolded when the page opens."""
+    """Return a compressed text, which a script unpacks when the page opens."""
     return Markup(base64.b64encode(zlib.compress(text.encode(), 6)).decode())
 
 
 def _is_hidden(row: str) -> bool:
-    """Tell whether a row of a table is there only when the reader asks for it."""
+    """Tell whether a row of a table is hidden at first."""
     return row.partition(">")[0].endswith(" hidden")
 
 
-def _compact(value: Any) -> str:
+def _make_compact_json(value: Any) -> str:
     return json.dumps(value, separators=(",", ":"), ensure_ascii=False, allow_nan=False)

@@ -1,4 +1,4 @@
-"""The page that says how a report was made: commands, versions, settings."""
+"""The page of commands, versions and settings of a report."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ _LIBRARIES = (
     "snakemake",
 )
 
-_RUN = (
+_RUN_COMMAND = (
     "snakemake -c2",
-    "makes everything, and afterwards only what new logs or changed settings ask for; "
-    "in a folder that imubench init has made it is imubench run, with further flags after --",
+    "runs everything; later only the steps that new logs or changed settings affect. "
+    "In a folder made by imubench init, use imubench run, with further flags after --",
 )
 _COMMANDS: tuple[tuple[str, dict[str, str], str], ...] = (
     ("show", {}, "prints the comparison in the terminal"),
@@ -31,19 +31,19 @@ _COMMANDS: tuple[tuple[str, dict[str, str], str], ...] = (
     (
         "report",
         {"--one-file": "report.html"},
-        "puts all of these pages into one file, to send by mail",
+        "writes all pages into one file, for example to send by mail",
     ),
-    ("export", {"--sensor": "NAME", "--target": "kalibr"}, "writes what a filter loads"),
+    ("export", {"--sensor": "NAME", "--target": "kalibr"}, "writes the noise model for a filter"),
 )
-"""Commands of `imubench` for the results, their options, and what they do."""
+"""Commands of `imubench` for the results, their options, and their effect."""
 
 
-def _context(site: Site) -> dict[str, Any]:
+def _make_context(site: Site) -> dict[str, Any]:
     return {
-        "commands": [(site.at_once, "makes these pages again")]
+        "commands": [(site.at_once, "writes these pages again")]
         if site.at_once
         else [
-            _RUN,
+            _RUN_COMMAND,
             *(
                 (imubench(name, site.results_name, options), words)
                 for name, options, words in _COMMANDS
@@ -62,5 +62,5 @@ def _context(site: Site) -> dict[str, Any]:
     }
 
 
-MADE = Entry(file="made.html", title="How this was made", context=_context)
-"""The page that every other leads to at its foot."""
+MADE = Entry(file="made.html", title="How this was made", context=_make_context)
+"""The page that the footer of every page links to."""

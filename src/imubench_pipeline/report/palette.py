@@ -1,8 +1,7 @@
-"""How sensors and methods look in every figure: never by their colour alone.
+"""The appearance of sensors and methods in all figures: colour, dash and marker.
 
-The colours are told apart by the colour-blind and have a contrast of 3 : 1 with their
-background: Okabe and Ito's, with the pale ones darkened for a light page and the dark ones
-lightened for a dark one.
+The colours are those of Okabe and Ito for colour-blind readers. Pale ones are darkened on light
+pages and dark ones lightened on dark pages, for a contrast of 3 : 1 with the background.
 """
 
 from __future__ import annotations
@@ -12,7 +11,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Appearance:
-    """The look of a line."""
+    """The appearance of a line."""
 
     # light, dark: colour on a light and on a dark background
     light: str
@@ -36,7 +35,7 @@ _COLOURS = (
 _MARKERS = ("circle", "square", "diamond", "triangle-up", "triangle-down", "cross", "x")
 _DASHES = ("solid", "dash", "dot", "dashdot", "longdash")
 
-_METHODS = {
+_METHOD_STYLES = {
     "likelihood": Appearance("#008F6B", "#2EC4A0", "solid", "diamond"),
     "likelihood_gm": Appearance("#9A6B00", "#E0A82E", "longdash", "square"),
     "compensated": Appearance("#5B5FC7", "#A3A6F2", "longdashdot", "x"),
@@ -48,7 +47,7 @@ _METHODS = {
 
 
 def sensor_appearances(sensors: list[str]) -> dict[str, Appearance]:
-    """Return the look of each sensor, by its place among all sensors of the run.
+    """Return the appearance of each sensor, by its place among all sensors of the run.
 
     Colours repeat after eight sensors; marker and dash then differ.
     """
@@ -61,35 +60,36 @@ def sensor_appearances(sensors: list[str]) -> dict[str, Appearance]:
 
 
 def method_appearance(method: str) -> Appearance:
-    """Return the look of an estimation method."""
-    return _METHODS[method]
+    """Return the appearance of an estimation method."""
+    return _METHOD_STYLES[method]
 
 
-def places(own: Appearance) -> list[Appearance]:
-    """Return the looks of the recordings of a sensor, by their place; they repeat.
+def recording_styles(sensor_style: Appearance) -> list[Appearance]:
+    """Return the appearances of the recordings of a sensor, by their place; they repeat.
 
     The first is that of the sensor; the others are shades of its colour towards the ink of the
-    page, with another marker, and in the end another dash.
+    page, with another marker, and finally another dash.
     """
-    first, shades = _MARKERS.index(own.marker), len(_TOWARDS_INK)
+    own = sensor_style
+    first, shades = _MARKERS.index(own.marker), len(_INK_SHARES)
     dashes = [own.dash, *(dash for dash in _DASHES if dash != own.dash)]
     return [
         Appearance(
-            _mixed(own.light, _INK[0], _TOWARDS_INK[place % shades]),
-            _mixed(own.dark, _INK[1], _TOWARDS_INK[place % shades]),
-            dashes[place // _ALIKE],
+            _mix_colours(own.light, _INK_COLOURS[0], _INK_SHARES[place % shades]),
+            _mix_colours(own.dark, _INK_COLOURS[1], _INK_SHARES[place % shades]),
+            dashes[place // _STYLES_PER_DASH],
             _MARKERS[(first + place) % len(_MARKERS)],
         )
-        for place in range(2 * _ALIKE)
+        for place in range(2 * _STYLES_PER_DASH)
     ]
 
 
-_INK = ("#1b1b1b", "#e8e8e8")
-_TOWARDS_INK = (0.0, 0.5, 0.25, 0.75)
-_ALIKE = len(_TOWARDS_INK) * len(_MARKERS)
-"""Recordings until the dash is another."""
+_INK_COLOURS = ("#1b1b1b", "#e8e8e8")
+_INK_SHARES = (0.0, 0.5, 0.25, 0.75)
+_STYLES_PER_DASH = len(_INK_SHARES) * len(_MARKERS)
+"""Recordings with the same dash."""
 
 
-def _mixed(colour: str, ink: str, share: float) -> str:
+def _mix_colours(colour: str, ink: str, share: float) -> str:
     pairs = ((int(one[at : at + 2], 16) for one in (colour, ink)) for at in (1, 3, 5))
     return "#" + "".join(f"{round(a + share * (b - a)):02X}" for a, b in pairs)

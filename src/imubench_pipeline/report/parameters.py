@@ -1,4 +1,4 @@
-"""Parameters in a table: a cell has a value with its interval, or says why there is none."""
+"""Parameters in a table: a cell has a value with its interval, or the reason why there is none."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ from imubench_pipeline.words.numbers import Unit, counted, limit_digits
 
 
 def shown_symbols(rows: Iterable[ParameterRow]) -> list[str]:
-    """Return the parameters of the papers' model, and those others that estimates have.
+    """Return the parameters of the papers' model, and others that were estimated.
 
-    N_sensor stands with the low-pass.
+    N_sensor is listed with the low-pass.
     """
     estimated = {row.parameter for row in rows if row.status != "absent"}
     return [s for s in SHOWN if s in PARAMETERS or (s in estimated and s != SENSOR)]
@@ -29,7 +29,7 @@ def shown_symbols(rows: Iterable[ParameterRow]) -> list[str]:
 def methods_table(
     channel: ChannelView, duration: float | None, system: System
 ) -> tuple[list[str], list[dict[str, Any]]]:
-    """Return symbols, and a line a method with its parameters; and the truth of a simulation."""
+    """Return the symbols, and one line per method; of a simulation also the true parameters."""
     symbols = shown_symbols(chain(*channel.parameters.values()))
     lines: list[dict[str, Any]] = [
         {
@@ -41,16 +41,16 @@ def methods_table(
         for method in channel.parameters
     ]
     if channel.true_components:
-        cells = [_truth(channel.true_components.get(symbol, [])) for symbol in symbols]
+        cells = [_describe_truth(channel.true_components.get(symbol, [])) for symbol in symbols]
         lines.append({"method": None, "recommended": False, "model": "", "cells": cells})
     return symbols, lines
 
 
 def model_words(channel: ChannelView, method: str) -> str:
-    """Return the model of a method, and how many more its intervals allow for.
+    """Return the model of a method, and how many other models its intervals include.
 
-    Those of the likelihood allow for all models that the log does not tell from the best, so that
-    the papers' model alone has others, even where it is the best.
+    The intervals of the likelihood include all models that fit nearly as well as the best; those of
+    the papers' model are for this model alone.
     """
     text = model_text(channel.parameters[method][0].model)
     if method != "likelihood" or not channel.models:
@@ -60,7 +60,9 @@ def model_words(channel: ChannelView, method: str) -> str:
         share >= MIN_AKAIKE_WEIGHT and not row.chosen and "R" not in row.model.split("+")
         for share, row in zip(shares, channel.models, strict=True)
     )
-    return f"{text} or {counted(others, 'other')}" if others else text
+    if not others:
+        return text
+    return f"{text} ({counted(others, 'other model fits', 'other models fit')} as well)"
 
 
 def cell(
@@ -89,18 +91,18 @@ def cell(
 
 
 def digits_of(unit: Unit, value: float | None, lower: float | None, upper: float | None) -> int:
-    """Return with how many digits a parameter and its limits are printed in a unit.
+    """Return the digits of a parameter and its limits in a unit.
 
-    Those that its interval leaves, and no fewer than tell the limits apart.
+    The interval determines them; the two limits must differ as printed.
     """
     if value is None or lower is None or upper is None:
         return limit_digits(lower, upper)
     return max(unit.digits(value, lower, upper), limit_digits(lower, upper, 2))
 
 
-def _truth(rows: Sequence[SimulatedTruthRow]) -> dict[str, Any]:
+def _describe_truth(rows: Sequence[SimulatedTruthRow]) -> dict[str, Any]:
     if not rows:
-        return {"parts": [], "words": "The simulation has none.", "value": None, "digits": 3}
+        return {"parts": [], "words": "Not simulated.", "value": None, "digits": 3}
     parts = [
         {
             "value": row.value,

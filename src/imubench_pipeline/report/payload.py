@@ -1,4 +1,4 @@
-"""What the figures of a page are drawn from: numbers in SI, as JSON that a page can hold."""
+"""The data of the figures of a page: numbers in SI, as JSON."""
 
 from __future__ import annotations
 
@@ -22,30 +22,30 @@ from imubench_pipeline.report.view import METHOD_NAMES, ChannelView
 FOREST = (*COMPARED, "B", "T_B")
 """The parameters that are drawn across sensors."""
 
-_SMOOTH = 80
+_SPECTRUM_POINTS = 80
 """Points of the curve of a term in a spectrum."""
 
-_FEW = 24
-"""Points of a model's curve among those of other channels."""
+_COMPARED_MODEL_POINTS = 24
+"""Points of the curve of a model in a comparison of channels."""
 
 
 Packed = tuple[str, float, float, bytes]
-"""An array with no more digits than are seen: kind, begin, step and codes."""
+"""An array quantised to the visible resolution: kind, begin, step and codes."""
 
 
 def packed_log(values: ArrayLike) -> Packed:
-    """Return positive numbers, array of shape (n,), packed: right to a few parts in 10,000."""
+    """Return positive numbers, shape (n,), packed with a relative error of a few 1e-4."""
     numbers = np.asarray(values, dtype=np.float64)
     with np.errstate(divide="ignore", invalid="ignore"):
         logarithms = np.where(numbers > 0.0, np.log10(numbers), np.nan)
-    low, step, codes = _levels(logarithms, 65534)
-    # Neighbours of a curve are near each other: their differences pack best, byte by byte.
+    low, step, codes = _quantise(logarithms, 65534)
+    # Neighbouring points are close, so their differences compress best, byte by byte.
     differences = codes.astype("<u2")
     differences[1:] -= differences[:-1].copy()
     return "l", low, step, differences.view("<u1").reshape(-1, 2).T.tobytes()
 
 
-def _levels(values: NDArray[np.float64], levels: int) -> tuple[float, float, NDArray[np.float64]]:
+def _quantise(values: NDArray[np.float64], levels: int) -> tuple[float, float, NDArray[np.float64]]:
     """Return begin and step of the codes of numbers, and the codes; 0 stands for none."""
     finite = np.isfinite(values)
     if finite.all():
@@ -59,7 +59,7 @@ def _levels(values: NDArray[np.float64], levels: int) -> tuple[float, float, NDA
 
 
 class Arrays:
-    """Arrays of a page: each stands in it once, as base64 of its codes.
+    """Arrays of a page: each is stored once, as base64 of its codes.
 
     ``levels``: 0 stands for no value, the others divide the range evenly, or its logarithm. Those
     of a logarithm are kept as differences modulo 65536, all low bytes before all high ones.
@@ -73,12 +73,12 @@ class Arrays:
         return self.place(("f", 0.0, 0.0, np.asarray(values, dtype="<f4").tobytes()))
 
     def log(self, values: ArrayLike) -> int:
-        """Return the place of an array of positive numbers, right to a few parts in 10,000."""
+        """Return the place of an array of positive numbers with a relative error of a few 1e-4."""
         return self.place(packed_log(values))
 
     def even(self, values: ArrayLike) -> int:
         """Return the place of an array that is drawn on an even axis, in 254 steps."""
-        low, step, codes = _levels(np.asarray(values, dtype=np.float64), 254)
+        low, step, codes = _quantise(np.asarray(values, dtype=np.float64), 254)
         return self.place(("e", low, step, codes.astype("<u1").tobytes()))
 
     def place(self, packed: Packed) -> int:
@@ -95,7 +95,7 @@ class Arrays:
 
 
 def looks(sensors: Mapping[str, Appearance]) -> dict[str, Any]:
-    """Return how sensors and methods look."""
+    """Return the appearance of sensors and methods."""
     return {
         "sensors": {name: asdict(look) for name, look in sensors.items()},
         "methods": {
@@ -107,7 +107,7 @@ def looks(sensors: Mapping[str, Appearance]) -> dict[str, Any]:
 
 @dataclass(frozen=True)
 class ComparedChannel:
-    """A channel as it is drawn among others, small enough that those of all recordings are kept."""
+    """The data of a channel in a comparison, small enough to keep those of all recordings."""
 
     about: Mapping[str, Any]  # names, recommended method, parameters by method
     curve: Mapping[str, Packed]
@@ -126,7 +126,7 @@ class ComparedChannel:
 
 
 def compared(view: ChannelView) -> ComparedChannel:
-    """Return a channel as it is drawn among others: curve, models, datasheet, parameters."""
+    """Return the data of a channel in a comparison: curve, models, parameters."""
     return ComparedChannel(
         about={
             "sensor": view.sensor,
@@ -135,7 +135,7 @@ def compared(view: ChannelView) -> ComparedChannel:
             "simulated": view.simulated,
             "recommended": view.recommended,
             "parameters": {
-                method: _estimates(view, method)
+                method: _list_estimates(view, method)
                 for method in dict.fromkeys((view.recommended, "likelihood_gm"))
                 if method in view.parameters
             },
@@ -146,19 +146,19 @@ def compared(view: ChannelView) -> ComparedChannel:
             "lower": packed_log(view.lower),
             "upper": packed_log(view.upper),
         },
-        models={method: _model(view.model(method), view.tau) for method in view.parameters},
+        models={method: _pack_model(view.model(method), view.tau) for method in view.parameters},
     )
 
 
-def _model(model: NoiseModel, tau: NDArray[np.float64]) -> tuple[Packed, Packed]:
+def _pack_model(model: NoiseModel, tau: NDArray[np.float64]) -> tuple[Packed, Packed]:
     """Return the curve of a model, on few points where it is smooth."""
     if not model.sinusoids:
-        tau = np.geomspace(tau[0], tau[-1], _FEW)
-    return packed_log(tau), packed_log(_curve(model, tau))
+        tau = np.geomspace(tau[0], tau[-1], _COMPARED_MODEL_POINTS)
+    return packed_log(tau), packed_log(_compute_curve(model, tau))
 
 
 def channel_payload(view: ChannelView, rate: float | None, arrays: Arrays) -> dict[str, Any]:
-    """Return everything that is drawn of one channel, but its samples; the rate is in Hz."""
+    """Return the data of all figures of a channel, except samples; ``rate`` is in Hz."""
     model = view.model(view.recommended)
     return {
         "channel": view.channel,
@@ -171,7 +171,7 @@ def channel_payload(view: ChannelView, rate: float | None, arrays: Arrays) -> di
         "lower": arrays.log(view.lower),
         "upper": arrays.log(view.upper),
         "methods": {
-            method: _method(view, method, curve, arrays)
+            method: _pack_method(view, method, curve, arrays)
             for method, curve in view.reconstruction.items()
         },
         "terms": [
@@ -179,32 +179,32 @@ def channel_payload(view: ChannelView, rate: float | None, arrays: Arrays) -> di
                 "name": name,
                 "adev": arrays.log(np.sqrt(term.allan_variance(view.tau))),
             }
-            for name, term in [*_named_terms(model), *_lines(model)]
+            for name, term in [*_name_terms(model), *_merge_lines(model)]
         ],
         "compensated": {name: arrays.log(values) for name, values in view.compensated.items()},
         "datasheet": datasheet_lines(view),
-        "spectrum": _spectrum(view, model, rate, arrays),
+        "spectrum": _pack_spectrum(view, model, rate, arrays),
     }
 
 
-def _method(
+def _pack_method(
     view: ChannelView, method: str, curve: Mapping[str, Any], arrays: Arrays
 ) -> dict[str, Any]:
     curves = {
         "tau": arrays.log(curve["tau"]),
-        "model": arrays.log(_curve(view.model(method), curve["tau"])),
+        "model": arrays.log(_compute_curve(view.model(method), curve["tau"])),
     }
     if method == view.recommended:
         curves |= {name: arrays.log(curve[name]) for name in ("lower", "upper", "reconstructed")}
     return curves
 
 
-def _curve(model: NoiseModel, tau: Any) -> Any:
+def _compute_curve(model: NoiseModel, tau: Any) -> Any:
     return np.sqrt(model.allan_variance(tau))
 
 
-def _named_terms(model: NoiseModel) -> list[tuple[str, Term]]:
-    """Return the terms but the lines with their names, such as ``white noise N``."""
+def _name_terms(model: NoiseModel) -> list[tuple[str, Term]]:
+    """Return the terms, except spectral lines, with names such as ``white noise N``."""
     return [
         (f"{term.label} {', '.join(term.values)}", term)
         for term in model.terms
@@ -212,8 +212,8 @@ def _named_terms(model: NoiseModel) -> list[tuple[str, Term]]:
     ]
 
 
-def _lines(model: NoiseModel) -> list[tuple[str, Any]]:
-    """Return the lines of a model together."""
+def _merge_lines(model: NoiseModel) -> list[tuple[str, Any]]:
+    """Return the spectral lines of a model as one term."""
     count = len(model.sinusoids)
     if count == 0:
         return []
@@ -241,26 +241,26 @@ def datasheet_lines(view: ChannelView) -> list[dict[str, Any]]:
     return lines
 
 
-def _estimates(view: ChannelView, method: str) -> dict[str, Any]:
+def _list_estimates(view: ChannelView, method: str) -> dict[str, Any]:
     """Return value, limits and status of each component of the parameters that are compared."""
     by_symbol: dict[str, list[list[Any]]] = {}
     for symbol in FOREST:
         for row in view.named(method, symbol):
-            numbers = (_rounded(number) for number in (row.value, row.lower, row.upper))
+            numbers = (_round_value(number) for number in (row.value, row.lower, row.upper))
             by_symbol.setdefault(symbol, []).append([*numbers, row.status])
     return by_symbol
 
 
-def _spectrum(
+def _pack_spectrum(
     view: ChannelView, model: NoiseModel, rate: float | None, arrays: Arrays
 ) -> dict[str, Any] | None:
     if not view.spectrum:
         return None
     spectrum = view.spectrum
     frequency = spectrum["frequency"]
-    smooth = np.geomspace(frequency[0], frequency[-1], _SMOOTH)
-    # The bins are denser than what a line between them shows.
-    some = np.unique(np.linspace(0, len(frequency) - 1, _SMOOTH).round().astype(int))
+    smooth = np.geomspace(frequency[0], frequency[-1], _SPECTRUM_POINTS)
+    # Fewer points than bins suffice for a line.
+    some = np.unique(np.linspace(0, len(frequency) - 1, _SPECTRUM_POINTS).round().astype(int))
     fitted, freedom = (np.take(spectrum[name], some) for name in ("fitted", "ordinates"))
     return {
         "frequency": arrays.log(frequency),
@@ -279,7 +279,7 @@ def _spectrum(
         if not rate
         else [
             {"name": name, "density": arrays.log(np.sqrt(term.psd(smooth, 1.0 / rate)))}
-            for name, term in _named_terms(model)
+            for name, term in _name_terms(model)
         ],
         "lines": [
             {"frequency": row.frequency, "amplitude": row.amplitude, "kind": row.kind}
@@ -293,7 +293,7 @@ def samples_payload(
 ) -> dict[str, Any]:
     """Return the envelope of the samples of a recording and their histogram, by channel."""
     payload: dict[str, Any] = {"envelope": {}, "histogram": {}}
-    for channel, rows in _by_channel(envelope).items():
+    for channel, rows in _group_by_channel(envelope).items():
         payload["envelope"][channel] = {
             "start": rows[0].start,
             "end": rows[-1].end,
@@ -301,7 +301,7 @@ def samples_payload(
             "high": arrays.even(numbers(row.high for row in rows)),
             "mean": arrays.even(numbers(row.mean for row in rows)),
         }
-    for channel, bins in _by_channel(histogram).items():
+    for channel, bins in _group_by_channel(histogram).items():
         payload["histogram"][channel] = {
             "edges": arrays.exact([bins[0].lower, *(row.upper for row in bins)]),
             "count": arrays.log([row.count for row in bins]),
@@ -312,15 +312,15 @@ def samples_payload(
 _OfChannel = TypeVar("_OfChannel", bound=ChannelRow)
 
 
-def _by_channel(rows: Sequence[_OfChannel]) -> dict[str, list[_OfChannel]]:
+def _group_by_channel(rows: Sequence[_OfChannel]) -> dict[str, list[_OfChannel]]:
     channels: dict[str, list[_OfChannel]] = {}
     for row in rows:
         channels.setdefault(row.channel, []).append(row)
     return channels
 
 
-def _rounded(value: float | None) -> float | None:
-    # As `report.html` writes a number into a page: what is printed of it is the same.
+def _round_value(value: float | None) -> float | None:
+    # As in `report.html`, so that both print the same digits.
     return None if value is None else float(f"{value:.7g}")
 
 

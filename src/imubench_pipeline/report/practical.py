@@ -18,7 +18,7 @@ from imubench_pipeline.words.numbers import NO_VALUE, Unit
 System = Literal["practical", "si"]
 
 
-def _signs(
+def _make_signs(
     level: str, *, Q: str, N: str, K: str, R: str, psd: str, signal: str | None = None
 ) -> dict[str, str]:
     """Return the signs of all symbols; ``level`` is that of B and of the Allan deviation."""
@@ -30,26 +30,28 @@ def _signs(
     }
 
 
-_CHOICES: dict[str, dict[str, dict[str, str]]] = {
+_UNIT_CHOICES: dict[str, dict[str, dict[str, str]]] = {
     "gyro": {
-        "°/h and °/√h": _signs(
+        "°/h and °/√h": _make_signs(
             "°/h", Q="°", N="°/√h", K="°/h/√h", R="°/h/h", psd="°/s/√Hz", signal="°/s"
         ),
-        "°/s": _signs("°/s", Q="°", N="°/s/√Hz", K="°/s/√s", R="°/s/s", psd="°/s/√Hz"),
-        "SI: rad/s": _signs(
+        "°/s": _make_signs("°/s", Q="°", N="°/s/√Hz", K="°/s/√s", R="°/s/s", psd="°/s/√Hz"),
+        "SI: rad/s": _make_signs(
             "rad/s", Q="rad", N="rad/s/√Hz", K="rad/s/√s", R="rad/s²", psd="rad/s/√Hz"
         ),
     },
     "accel": {
-        "µg and µg/√Hz": _signs(
+        "µg and µg/√Hz": _make_signs(
             "µg", Q="m/s", N="µg/√Hz", K="µg/√h", R="µg/h", psd="µg/√Hz", signal="mg"
         ),
-        "mg and m/s/√h": _signs("mg", Q="m/s", N="m/s/√h", K="mg/√h", R="mg/h", psd="mg/√Hz"),
-        "SI: m/s²": _signs("m/s²", Q="m/s", N="m/s²/√Hz", K="m/s²/√s", R="m/s³", psd="m/s²/√Hz"),
+        "mg and m/s/√h": _make_signs("mg", Q="m/s", N="m/s/√h", K="mg/√h", R="mg/h", psd="mg/√Hz"),
+        "SI: m/s²": _make_signs(
+            "m/s²", Q="m/s", N="m/s²/√Hz", K="m/s²/√s", R="m/s³", psd="m/s²/√Hz"
+        ),
     },
 }
 
-_OF_DIMENSION: dict[System, dict[str, str]] = {
+_SIGNS_OF_DIMENSIONS: dict[System, dict[str, str]] = {
     "practical": {"angle": "°", "velocity": "m/s", "length": "m"},
     "si": {"angle": "rad", "velocity": "m/s", "length": "m"},
 }
@@ -61,42 +63,42 @@ def page_unit(quantity: str, symbol: str, system: System) -> Unit:
     The symbol is a parameter, or ``adev``, ``psd`` (root of a density) or ``signal`` (the log
     itself).
     """
-    return _unit(quantity, symbol, _chosen(quantity, system))
+    return _find_unit(quantity, symbol, _choose_system(quantity, system))
 
 
 def units_of_pages() -> dict[str, dict[str, dict[str, Unit]]]:
     """Return quantity -> name of the choice -> symbol -> unit, the practical choice first."""
     return {
         quantity: {
-            name: {symbol: _unit(quantity, symbol, name) for symbol in symbols}
+            name: {symbol: _find_unit(quantity, symbol, name) for symbol in symbols}
             for name, symbols in choices.items()
         }
-        for quantity, choices in _CHOICES.items()
+        for quantity, choices in _UNIT_CHOICES.items()
     }
 
 
 def first_choices(system: System) -> Mapping[str, str]:
     """Return the name of the choice with which a page opens, by quantity."""
-    return {quantity: _chosen(quantity, system) for quantity in _CHOICES}
+    return {quantity: _choose_system(quantity, system) for quantity in _UNIT_CHOICES}
 
 
-def _chosen(quantity: str, system: System) -> str:
-    names = list(_CHOICES[quantity])
+def _choose_system(quantity: str, system: System) -> str:
+    names = list(_UNIT_CHOICES[quantity])
     return names[0] if system == "practical" else names[-1]
 
 
 @cache
-def _unit(quantity: str, symbol: str, choice: str) -> Unit:
+def _find_unit(quantity: str, symbol: str, choice: str) -> Unit:
     dimensions = DIMENSIONS[quantity]
     dimension = dimensions.get(symbol) or {
         "psd": f"{quantity}_density",
         "sensitivity": f"{quantity}_temperature_coefficient",
         "quadratic": f"{quantity}_temperature_curvature",
     }.get(symbol, QUANTITIES[quantity])
-    signs = _CHOICES[quantity][choice]
-    # A parameter without a unit of its own has that of the first of its dimension.
+    signs = _UNIT_CHOICES[quantity][choice]
+    # A parameter without its own unit uses that of the first parameter of its dimension.
     alike = next((other for other in signs if dimensions.get(other) == dimension), symbol)
-    return _page_unit(signs.get(symbol) or signs[alike], dimension)
+    return _make_unit(signs.get(symbol) or signs[alike], dimension)
 
 
 def unit_of(dimension: str, system: System, size: float | None = None) -> Unit:
@@ -105,25 +107,25 @@ def unit_of(dimension: str, system: System, size: float | None = None) -> Unit:
     ``size``, SI: of what is shown, for which a prefix is chosen; SI has none.
     """
     if not size:
-        return _page_unit(_OF_DIMENSION[system][dimension], dimension)
+        return _make_unit(_SIGNS_OF_DIMENSIONS[system][dimension], dimension)
     units = units_by_size(dimension, system)
     return next(unit for least, unit in units if abs(size) >= least)
 
 
 def units_by_size(dimension: str, system: System) -> list[tuple[float, Unit]]:
     """Return the units of an angle, a velocity or a length, each from a size in SI on."""
-    sign = _OF_DIMENSION[system][dimension]
-    prefixed = system == "practical" and dimension in _PREFIXED
-    prefixes = _PREFIXES if prefixed else ((0.0, ""),)
-    return [(least, _page_unit(prefix + sign, dimension)) for least, prefix in prefixes]
+    sign = _SIGNS_OF_DIMENSIONS[system][dimension]
+    prefixed = system == "practical" and dimension in _PREFIXED_DIMENSIONS
+    prefixes = _MIN_SIZE_OF_PREFIX if prefixed else ((0.0, ""),)
+    return [(least, _make_unit(prefix + sign, dimension)) for least, prefix in prefixes]
 
 
-_PREFIXED = ("velocity", "length")
-_PREFIXES = ((1e3, "k"), (0.1, ""), (1e-4, "m"), (0.0, "µ"))
-"""From which size in SI a prefix is easily read."""
+_PREFIXED_DIMENSIONS = ("velocity", "length")
+_MIN_SIZE_OF_PREFIX = ((1e3, "k"), (0.1, ""), (1e-4, "m"), (0.0, "µ"))
+"""Smallest size in SI for each prefix."""
 
 
-def _page_unit(sign: str, dimension: str) -> Unit:
+def _make_unit(sign: str, dimension: str) -> Unit:
     factor, _ = conversion(sign, dimension)
     return Unit(sign, 1.0 / factor)
 

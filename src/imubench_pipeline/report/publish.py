@@ -1,4 +1,4 @@
-"""Writing the report: a folder of pages of which only what changed is written, or one file."""
+"""Writing the report: changed pages of a folder, or one file."""
 
 from __future__ import annotations
 
@@ -27,12 +27,12 @@ from imubench_pipeline.tables.provenance import source_digest
 from imubench_pipeline.tables.schemas import OF_ONE_RECORDING, TABLES
 from imubench_pipeline.words.estimates import STATUS_WORDS
 
-_SETTINGS = "settings.json"
-_OF_SETTINGS = {"report", "settings", "sensors", "boards", "requirements"}
-"""Without which there are no pages."""
-_FOLDERS = ("recordings", "sensors", "devices")
-_STATIC = Path(__file__).with_name("static")
-_SCRIPTS = (
+_SETTINGS_FILE = "settings.json"
+_REQUIRED_SETTINGS = {"report", "settings", "sensors", "boards", "requirements"}
+"""Settings without which there are no pages."""
+_PAGE_FOLDERS = ("recordings", "sensors", "devices")
+_STATIC_FOLDER = Path(__file__).with_name("static")
+_SCRIPT_NAMES = (
     "address",
     "numbers",
     "terms",
@@ -53,70 +53,70 @@ _SCRIPTS = (
     "start",
 )
 
-_STYLES = ("report", "decisions")
+_STYLE_NAMES = ("report", "decisions")
 
 Progress = Callable[[str], None]
 
 
 def publish(site: Site, folder: Path, say: Progress = lambda _: None) -> list[str]:
-    """Write the pages of the report whose data changed, and remove those that are no more.
+    """Write the pages of the report whose data changed, and remove obsolete ones.
 
     A page that fails is replaced by one with the reason, is named in `Site.failed`, and is made
     again by the next call. ``say`` gets each path before it is written; the function returns the
     written paths, below the folder.
     """
     written = []
-    for path, content in (_assets() | _search(site)).items():
+    for path, content in (_make_assets() | _make_search(site)).items():
         written += _put(folder, path, content)
     every = list(pages(site))
     keys = {page.path: page.key for page in every}
-    before = _keys(folder / KEYS)
+    before = _read_keys(folder / KEYS)
     unchanged = {
         path: key
         for path, key in before.items()
         if path in keys
         and (folder / path).is_file()
-        and key == _key(keys[path], (folder / path).read_bytes())
+        and key == _make_key(keys[path], (folder / path).read_bytes())
     }
-    # A run that is killed must not leave the keys of pages that it has written anew.
+    # A killed run must not leave the digests of pages that it has already replaced.
     if unchanged != before:
-        _put(folder, KEYS, _text(unchanged))
+        _put(folder, KEYS, _format_json(unchanged))
     templates = environment(site.system)
     shown = dict(unchanged)
     for page in every:
         if page.path not in unchanged:
             say(page.path)
-            rendered = _made(site, templates, page).encode()
+            rendered = _make_page(site, templates, page).encode()
             if page.path not in site.failed:
-                shown[page.path] = _key(page.key, rendered)
+                shown[page.path] = _make_key(page.key, rendered)
             written += _put(folder, page.path, rendered)
-    for path in _pages_there(site, folder) - keys.keys():
+    for path in _list_pages(site, folder) - keys.keys():
         (folder / path).unlink()
-    _put(folder, _SETTINGS, _text(site.settings))
-    _put(folder, KEYS, _text(shown))
+    _put(folder, _SETTINGS_FILE, _format_json(site.settings))
+    _put(folder, KEYS, _format_json(shown))
     write_failed_pages(site.failed, folder)
     return written
 
 
 def remove_old_pages(folder: Path, made: Path) -> None:
-    """Remove the pages of an earlier report that one made anew no longer has, and no other file."""
-    gone = _keys(folder / KEYS).keys() - _keys(made / KEYS).keys()
+    """Remove the pages of an earlier report that the new one does not have, and no other file."""
+    gone = _read_keys(folder / KEYS).keys() - _read_keys(made / KEYS).keys()
     for path in folder.rglob("*.html"):
         if path.relative_to(folder).as_posix() in gone and not path.is_symlink():
             path.unlink()
 
 
-def _text(data: object) -> str:
+def _format_json(data: object) -> str:
     return json.dumps(data, indent=1, sort_keys=True, ensure_ascii=False) + "\n"
 
 
-def _key(key: str, content: bytes) -> str:
-    """Return what says that a page shows what it should, and is as it was written."""
+def _make_key(key: str, content: bytes) -> str:
+    """Return the digest of the data and of the file of a page."""
     return f"{key} {hashlib.sha256(content).hexdigest()}"
 
 
-def _keys(path: Path) -> dict[str, str]:
-    """Return what the pages that are there show; nothing where that is not known."""
+def _read_keys(path: Path) -> dict[str, str]:
+    """Return the digests of the existing pages; empty if they are unknown."""
     try:
         keys = read_json(path)
     except (OSError, ValueError):
@@ -126,15 +126,15 @@ def _keys(path: Path) -> dict[str, str]:
     return {page: str(key) for page, key in keys.items()}
 
 
-def _pages_there(site: Site, folder: Path) -> set[str]:
-    """Return the pages that lie in the report, whether it still has them or not."""
-    files = [path for of in _FOLDERS for path in (folder / of).rglob("*.html")]
+def _list_pages(site: Site, folder: Path) -> set[str]:
+    """Return all pages in the folder, including obsolete ones."""
+    files = [path for of in _PAGE_FOLDERS for path in (folder / of).rglob("*.html")]
     files += [path for entry in site.entries if (path := folder / entry.file).is_file()]
     return {path.relative_to(folder).as_posix() for path in files}
 
 
 def _put(folder: Path, path: str, content: str | bytes) -> list[str]:
-    """Write a file if it has another content; return its path if so."""
+    """Write a file if its content has changed; return its path if so."""
     data = content.encode() if isinstance(content, str) else content
     target = folder / path
     if target.is_file() and target.read_bytes() == data:
@@ -143,12 +143,12 @@ def _put(folder: Path, path: str, content: str | bytes) -> list[str]:
     return [path]
 
 
-def _made(
+def _make_page(
     site: Site, templates: jinja2.Environment, page: Page, base: str = "base.html.jinja"
 ) -> str:
-    """Return a page; if that fails, one that says why."""
+    """Return a page; if it fails, a page with the reason."""
     try:
-        return _rendered(site, templates, page, base)
+        return _render(site, templates, page, base)
     except OSError:  # such as a full disk, which is no fault of the page
         raise
     except Exception as error:
@@ -157,10 +157,10 @@ def _made(
         site.failed[page.path] = reason
         about = {"title": page.path, "reason": reason}
         instead = replace(page, template="failed.html.jinja", context=lambda: about)
-        return _rendered(site, templates, instead, base)
+        return _render(site, templates, instead, base)
 
 
-def _rendered(
+def _render(
     site: Site, templates: jinja2.Environment, page: Page, base: str = "base.html.jinja"
 ) -> str:
     alone = base != "base.html.jinja"
@@ -169,23 +169,23 @@ def _rendered(
     return template.render(site=site.shown(alone=alone), **of_page, **page.context()) + "\n"
 
 
-def _assets() -> dict[str, str]:
+def _make_assets() -> dict[str, str]:
     return {
         "assets/report.css": "".join(
-            (_STATIC / f"{name}.css").read_text(encoding="utf-8") for name in _STYLES
+            (_STATIC_FOLDER / f"{name}.css").read_text(encoding="utf-8") for name in _STYLE_NAMES
         ),
-        "assets/report.js": _script(),
+        "assets/report.js": _make_script(),
         "assets/plotly.min.js": plotting_script(),
     }
 
 
-def _search(site: Site) -> dict[str, str]:
-    # A page from disk may not read a file, but a script it may run.
+def _make_search(site: Site) -> dict[str, str]:
+    # A page opened from disk may not read files, but it may run scripts.
     return {"assets/search.js": f"imubenchSearch({index(site)});\n"}
 
 
-def _script() -> str:
-    """Return the scripts of the pages, with the units that they know, as one."""
+def _make_script() -> str:
+    """Return all scripts of the pages as one, with units, status names and terms."""
     units = {
         quantity: {
             choice: {symbol: [unit.sign, unit.per_si] for symbol, unit in symbols.items()}
@@ -193,11 +193,11 @@ def _script() -> str:
         }
         for quantity, choices in units_of_pages().items()
     }
-    parts = [(_STATIC / f"{name}.js").read_text(encoding="utf-8") for name in _SCRIPTS]
+    parts = [(_STATIC_FOLDER / f"{name}.js").read_text(encoding="utf-8") for name in _SCRIPT_NAMES]
     terms = {key: entry.short for key, entry in glossary().items()}
     head = "".join(
         f"const {name} = {json.dumps(value, ensure_ascii=False)};\n"
-        for name, value in (("UNITS", units), ("TERMS", terms), ("STATUSES", STATUS_WORDS))
+        for name, value in (("UNITS", units), ("STATUS_NAMES", STATUS_WORDS), ("TERMS", terms))
     )
     return '(() => {\n"use strict";\n' + head + "\n".join(parts) + "})();\n"
 
@@ -207,10 +207,10 @@ def one_file(site: Site) -> str:
     templates = environment(site.system)
     common = {"site": site.shown(alone=True), "path": "index.html", "root": ""}
     shown = [
-        {"path": page.path, "content": _made(site, templates, page, "fragment.html.jinja")}
+        {"path": page.path, "content": _make_page(site, templates, page, "fragment.html.jinja")}
         for page in pages(site)
     ]
-    assets = _assets()
+    assets = _make_assets()
     scripts = [
         assets[f"assets/{name}.js"].replace("</script", "<\\/script")
         for name in ("report", "plotly.min")
@@ -242,10 +242,10 @@ def published(results: Path) -> Site:
     ValueError
         If it is damaged, or that of another version.
     """
-    path = results / "report" / _SETTINGS
+    path = results / "report" / _SETTINGS_FILE
     settings = path.read_text(encoding="utf-8")
     try:
-        missing = _OF_SETTINGS - json.loads(settings).keys()
+        missing = _REQUIRED_SETTINGS - json.loads(settings).keys()
     except (ValueError, AttributeError) as error:
         raise ValueError(f"{path}: is damaged; remove it, and run snakemake -c2 again") from error
     if missing:

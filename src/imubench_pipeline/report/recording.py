@@ -1,4 +1,4 @@
-"""The page of one recording: everything that is known of it and its channels."""
+"""The page of one recording and its channels."""
 
 from __future__ import annotations
 
@@ -42,12 +42,13 @@ from imubench_pipeline.words.numbers import (
     started_text,
 )
 
-_EXACT = 1e-9
-"""Relative error of a rate that is not worth a word."""
+_MAX_HIDDEN_RATE_ERROR = 1e-9
+"""Relative error of a rate up to which the page does not state it."""
 
 _SHOWN_MODELS = 4
+"""Models with the lowest BIC that the page lists."""
 
-_RATE_FROM = {"stamps": "from the stamps", "stated": "as stated"}
+_RATE_FROM = {"stamps": "from the time stamps", "stated": "as stated"}
 
 
 Section = Callable[[Site, RecordingView], tuple[str, Any] | None]
@@ -96,11 +97,13 @@ def context(site: Site, view: RecordingView, folder: Path) -> dict[str, Any]:
     budgets = list(budget_tables(view.budget, {view.full_name: view.simulated}, site.system))
     return {
         **about_of(site, view, channels, folder),
-        "summary": _summary(view, len(channels)),
+        "summary": _summarise(view, len(channels)),
         "findings": numbered,
         "serious": [row for row in numbered if row["severity"] != "note"],
         "notes": [row for row in numbered if row["severity"] == "note"],
-        "channels": [_channel(site, view, channel, samples, of_models) for channel in channels],
+        "channels": [
+            _describe_channel(site, view, channel, samples, of_models) for channel in channels
+        ],
         "has_temperature": "temperature" in samples["envelope"],
         "added": [made for add in _SECTIONS.objects() if (made := add(site, view)) is not None],
         "budget": budgets[0] if budgets else None,
@@ -134,10 +137,10 @@ STATIC = RecordingPage("recording.html.jinja", context)
 """The page of a sensor that was at rest."""
 
 
-def _summary(view: RecordingView, channels: int) -> str:
+def _summarise(view: RecordingView, channels: int) -> str:
     if view.left_out:
-        why = "could not be used" if view.rejected else "could not be analysed: a step failed"
-        return f"This recording {why}; nothing of it is in the comparison."
+        why = "was rejected" if view.rejected else "could not be analysed, because a step failed"
+        return f"This recording {why}; the comparison does not include it."
     row, parts = view.row, []
     if row.started:
         parts.append(f"from {started_text(row.started)}")
@@ -150,13 +153,13 @@ def _summary(view: RecordingView, channels: int) -> str:
     return summary_words(view, parts)
 
 
-def _inside(score: ScoreRow) -> str:
+def _format_inside(score: ScoreRow) -> str:
     """Return the part of the curve inside the band of one reconstruction."""
     inside = score.inside_band
     return NO_VALUE if inside is None else f"{100 * inside:.0f} %"
 
 
-def _drawn(score: ScoreRow) -> tuple[str, str]:
+def _format_score(score: ScoreRow) -> tuple[str, str]:
     """Return the score of one reconstruction and its range, in decades."""
     ends = (score.drawn_log10_lower, score.drawn_log10_upper)
     low, high = (number_text(end, 2) for end in ends)
@@ -171,7 +174,7 @@ def summary_words(view: RecordingView, parts: Sequence[str]) -> str:
     return kind + ", ".join([length, *parts]) + "."
 
 
-def _channel(
+def _describe_channel(
     site: Site,
     view: RecordingView,
     channel: ChannelView,
@@ -184,19 +187,19 @@ def _channel(
         score = channel.scores.get(line["method"] or "")
         scored = score is not None and score.rms_log10 is not None
         line["score"] = number_text(score.rms_log10, 2) if scored and score else "–"
-        line["drawn"] = _drawn(score) if scored and score else ("–", "")
-        line["inside"] = _inside(score) if scored and score else "–"
+        line["drawn"] = _format_score(score) if scored and score else ("–", "")
+        line["inside"] = _format_inside(score) if scored and score else "–"
     best = channel.models[0] if channel.models else None
     return {
         "view": channel,
-        "answer": _answer(channel, site.system),
-        "words": list(_untold(symbols, used["cells"])),
+        "answer": _describe_values(channel, site.system),
+        "words": list(_describe_missing(symbols, used["cells"])),
         "symbols": symbols,
         "lines": lines,
         "has_spectrum": bool(channel.spectrum),
         "has_samples": channel.channel in samples["envelope"],
         "of_models": compared_samples.words(of_models, channel.channel),
-        "model": _model_words(channel),
+        "model": _describe_model(channel),
         "models": [
             {
                 "model": row.model,
@@ -205,7 +208,7 @@ def _channel(
                 "deviance": number_text(row.deviance, 3),
                 "verdict": row.verdict,
             }
-            for row in _best(channel.models)
+            for row in _select_models(channel.models)
         ],
         "spectral_lines": channel.lines,
         "thermal": thermal.answer(channel, site.system),
@@ -216,26 +219,26 @@ def _channel(
     }
 
 
-def _untold(symbols: Sequence[str], cells: Sequence[Mapping[str, Any]]) -> Iterator[str]:
+def _describe_missing(symbols: Sequence[str], cells: Sequence[Mapping[str, Any]]) -> Iterator[str]:
     """Yield what the log does not tell."""
     of = dict(zip(symbols, cells, strict=True))
     statuses = {symbol: {part["status"] for part in cell["parts"]} for symbol, cell in of.items()}
     words, of_time = (
         of[symbol]["words"] if symbol in of else "" for symbol in ("sigma_min", "tau_min")
     )
-    together = _of_lowest_point(words, of_time)
+    together = _merge_lowest_point(words, of_time)
     for symbol, cell in of.items():
         if symbol == "T_B" and statuses["T_B"] == {"absent"}:
             # Where B is absent, that says it.
             if statuses["B"] != {"absent"}:
-                yield "B is flicker noise here, which has no correlation time T_B."
+                yield "B is flicker noise, which has no correlation time T_B."
         elif symbol == "sigma_min" and together:
             yield together
         elif cell["words"] and not (symbol == "tau_min" and together):
             yield cell["words"]
 
 
-def _of_lowest_point(words: str, of_time: str) -> str:
+def _merge_lowest_point(words: str, of_time: str) -> str:
     """Return what is said of the lowest point and of its time, if that is the same."""
     lowest, time = (symbol_text(symbol) for symbol in ("sigma_min", "tau_min"))
     reason = words.removeprefix(f"{lowest}: ")
@@ -243,7 +246,7 @@ def _of_lowest_point(words: str, of_time: str) -> str:
     return f"{lowest} and {time}: {reason}" if same else ""
 
 
-def _answer(channel: ChannelView, system: System) -> str:
+def _describe_values(channel: ChannelView, system: System) -> str:
     """Return the values to use, with how well they are known, in a sentence."""
     parts = []
     for symbol in ("N", "B_curve", "B", "T_B", "K"):
@@ -261,19 +264,18 @@ def _answer(channel: ChannelView, system: System) -> str:
     return "; ".join(parts) + "."
 
 
-def _best(models: Sequence[ModelRow]) -> Sequence[ModelRow]:
+def _select_models(models: Sequence[ModelRow]) -> Sequence[ModelRow]:
     """Return the models that come close, and that of the papers."""
     return [row for i, row in enumerate(models) if i < _SHOWN_MODELS or row.model == "N+GM+K"]
 
 
-def _model_words(channel: ChannelView) -> str:
+def _describe_model(channel: ChannelView) -> str:
     if not channel.models:
         return ""
     best = channel.models[0]
     text = (
-        f"{model_text(best.model)} is the model that the data favour ({best.verdict}). The "
-        f"deviance of a bin is {number_text(best.deviance, 3)}; it is about 1 where the model "
-        "is right."
+        f"{model_text(best.model)} has the lowest BIC ({best.verdict}). The deviance per bin is "
+        f"{number_text(best.deviance, 3)}; a correct model gives about 1."
     )
     notes = (best.note or "").split("; ")
     band = f"Band: {best.band_source.removeprefix('found: ')}" if best.band_source else ""
@@ -288,7 +290,7 @@ def about_of(
         "view": view,
         "name": site.names[view.sensor],
         "sensor_page": site.sensor_page(view.sensor),
-        "provenance": list(_provenance(view, channels, folder)),
+        "provenance": list(_list_provenance(view, channels, folder)),
         "sources": metadata_of(folder).get("sources", []),
         "figures_command": None,
     }
@@ -309,20 +311,20 @@ def metadata_of(folder: Path) -> Mapping[str, Any]:
     return read_metadata(paths[0]) if paths else {}
 
 
-def _provenance(
+def _list_provenance(
     view: RecordingView, channels: Sequence[ChannelView], folder: Path
 ) -> Iterator[tuple[str, str]]:
     """Yield where a recording comes from, as names and texts; ``folder`` is the recording's."""
     row, metadata = view.row, metadata_of(folder)
     yield "Recording", f"{row.sensor} / {row.recording}"
     yield "Device", str(row.device)
-    yield "Kind", row.kind + (", simulated" if row.simulated else "")
+    yield "Kind", row.kind.replace("_", " ") + (", simulated" if row.simulated else "")
     yield "Started", started_text(row.started) or "not stated in the log"
     if "reader" in metadata:
-        yield "Read as", str(metadata["reader"] or "found by its content")
+        yield "Format", str(metadata["reader"] or "detected from the content")
     if row.rate is not None:
         error = ""
-        if row.rate_error is not None and row.rate_error > _EXACT * row.rate:
+        if row.rate_error is not None and row.rate_error > _MAX_HIDDEN_RATE_ERROR * row.rate:
             error = f" ± {number_text(row.rate_error, 2)} Hz"
         yield (
             "Rate",
@@ -330,7 +332,7 @@ def _provenance(
         )
         rates = {channel.channel: number_text(channel.rate, 6) for channel in channels}
         if len(set(rates.values())) > 1:
-            yield "Rate of each", ", ".join(f"{name} {rate} Hz" for name, rate in rates.items())
+            yield "Rate per channel", ", ".join(f"{name} {rate} Hz" for name, rate in rates.items())
     if row.samples is not None:
         yield "Samples", f"{row.samples:,}".replace(",", " ")
     segments: Sequence[Any] = metadata.get("segments", [])

@@ -1,4 +1,4 @@
-"""What the search of the pages finds: everything that has a name, and where it stands."""
+"""The index of the search: all named entries, and their addresses."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from imubench_pipeline.report.glossary import glossary, term
 from imubench_pipeline.report.site import Site
 
 Found = tuple[str, str, str, str]
-"""Kind, title, address (page and section), and further words by which it is found."""
+"""Kind, title, address (page and section), and further words for the search."""
 
 
 Search = Callable[[Site], Iterable[Found]]
@@ -21,11 +21,11 @@ _ADDED: Hook[Search] = Hook("search")
 
 
 def index(site: Site) -> str:
-    """Return what is found, as JSON."""
-    return json.dumps(list(_entries(site)), ensure_ascii=False, separators=(",", ":"))
+    """Return the index as JSON."""
+    return json.dumps(list(_list_entries(site)), ensure_ascii=False, separators=(",", ":"))
 
 
-def _entries(site: Site) -> Iterator[Found]:
+def _list_entries(site: Site) -> Iterator[Found]:
     for sensor in site.sensors:
         about = site.settings["sensors"].get(sensor, {}).get("price_class") or ""
         yield "sensor", site.names[sensor], quote(site.sensor_page(sensor)), f"{sensor} {about}"

@@ -1,4 +1,4 @@
-"""The pages of a sensor and of a device: whether its recordings agree, and have changed."""
+"""The pages of a sensor and of a device: agreement and change of its recordings."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from imubench_pipeline.report.comparison import Comparison
 from imubench_pipeline.report.datasheets import delta_rows, repeatability_lines
 from imubench_pipeline.report.evidence import evidence
 from imubench_pipeline.report.meaning import budget_bars, budget_tables, budget_words
-from imubench_pipeline.report.palette import places
+from imubench_pipeline.report.palette import recording_styles
 from imubench_pipeline.report.payload import FOREST, looks
 from imubench_pipeline.report.site import Page, Site
 from imubench_pipeline.report.start import summary
@@ -27,8 +27,8 @@ from imubench_pipeline.report.view import QUANTITY_NAMES, RecordingView
 from imubench_pipeline.words.estimates import symbol_text
 from imubench_pipeline.words.numbers import counted, limit_digits
 
-_MANY = 12
-"""Recordings of a sensor beyond which its page leaves budgets and deltas to those of recordings."""
+_MAX_DETAILED_RECORDINGS = 12
+"""With more recordings the page of a sensor has no budgets and no comparison with the datasheet."""
 
 
 def sensor_page(site: Site, sensor: str) -> Page:
@@ -44,22 +44,25 @@ def sensor_page(site: Site, sensor: str) -> Page:
         site.looks[sensor],
     )
     return Page(
-        site.sensor_page(sensor), "sensor.html.jinja", key, lambda: _sensor(site, sensor, own)
+        site.sensor_page(sensor),
+        "sensor.html.jinja",
+        key,
+        lambda: _make_sensor_context(site, sensor, own),
     )
 
 
-def _sensor(site: Site, sensor: str, own: Sequence[RecordingView]) -> dict[str, Any]:
+def _make_sensor_context(site: Site, sensor: str, own: Sequence[RecordingView]) -> dict[str, Any]:
     together = Comparison(site.compared(own), site.names)
-    pooled = [_pooled(row) for row in site.rows(PooledRow) if row.sensor == sensor]
-    shown = own if len(own) <= _MANY else []
+    pooled = [_format_pooled(row) for row in site.rows(PooledRow) if row.sensor == sensor]
+    shown = own if len(own) <= _MAX_DETAILED_RECORDINGS else []
     simulated = {view.full_name: view.simulated for view in own}
     budget = [row for view in shown for row in view.budget]
     return {
         "name": site.names[sensor],
-        "summary": _about(site, sensor) + summary(own, several=False),
+        "summary": _describe_price_class(site, sensor) + summary(own, several=False),
         "verdicts": list(evidence(site, sensor, own)),
         "beside": urlencode({"a": sensor}) if any(view.static for view in own) else "",
-        "devices": list(_devices(own)),
+        "devices": list(_list_devices(own)),
         "forest": FOREST,
         "several": sum(view.static for view in own) > 1,
         "parameter_tables": list(together.tables()),
@@ -70,14 +73,14 @@ def _sensor(site: Site, sensor: str, own: Sequence[RecordingView]) -> dict[str, 
         },
         "budgets": list(budget_tables(budget, simulated, site.system)),
         "budget_words": budget_words(site.settings["settings"]["error_budget"]),
-        "too_many": len(own) > _MANY,
-        "deltas": list(_deltas(site, shown)),
+        "too_many": len(own) > _MAX_DETAILED_RECORDINGS,
+        "deltas": list(_list_deltas(site, shown)),
         "repeated": list(repeatability_lines(site.rows(RepeatabilityRow), sensor, site.system)),
         "page": {
             "grouped": "recording",
             "recordings": [view.name for view in own],
             "looks": looks({sensor: site.looks[sensor]})
-            | {"places": [asdict(look) for look in places(site.looks[sensor])]},
+            | {"places": [asdict(look) for look in recording_styles(site.looks[sensor])]},
             "names": site.names,
             "budgets": [budget_bars(view.budget, site.system) for view in shown if view.budget],
             **together.page,
@@ -85,8 +88,8 @@ def _sensor(site: Site, sensor: str, own: Sequence[RecordingView]) -> dict[str, 
     }
 
 
-def _deltas(site: Site, views: Sequence[RecordingView]) -> Iterator[dict[str, Any]]:
-    """Yield the comparison of each channel with the datasheet, where it prints something."""
+def _list_deltas(site: Site, views: Sequence[RecordingView]) -> Iterator[dict[str, Any]]:
+    """Yield the comparison of each channel with the figures of the datasheet, if there are any."""
     for view in views:
         for channel in view.channels():
             rows = list(delta_rows(channel, site.coverage, site.system))
@@ -94,19 +97,19 @@ def _deltas(site: Site, views: Sequence[RecordingView]) -> Iterator[dict[str, An
                 yield {"view": channel, "rows": rows}
 
 
-def _about(site: Site, sensor: str) -> str:
+def _describe_price_class(site: Site, sensor: str) -> str:
     price_class = site.settings["sensors"].get(sensor, {}).get("price_class")
     return f"Price class: {price_class}. " if price_class else ""
 
 
-def _devices(own: Sequence[RecordingView]) -> Iterator[dict[str, Any]]:
+def _list_devices(own: Sequence[RecordingView]) -> Iterator[dict[str, Any]]:
     for device in dict.fromkeys((view.row.device, view.device_page) for view in own):
         views = [view for view in own if (view.row.device, view.device_page) == device]
         count = counted(len(views), "recording")
         yield {"name": device[0], "page": device[1], "views": views, "count": count}
 
 
-def _pooled(row: PooledRow) -> dict[str, Any]:
+def _format_pooled(row: PooledRow) -> dict[str, Any]:
     quantity = row.channel.split("_", maxsplit=1)[0]
     symbol = "signal" if row.parameter == "bias" else row.parameter
     return row.columns() | {
@@ -122,17 +125,19 @@ def device_page(site: Site, page: str) -> Page:
     own = [view for view in site.views if view.device_page == page]
     rows = [row for row in site.rows(DriftRow) if site.device_page_of(row) == page]
     key = site.key_of(*(view.key for view in own), rows)
-    return Page(page, "device.html.jinja", key, lambda: _device(site, own, rows))
+    return Page(page, "device.html.jinja", key, lambda: _make_device_context(site, own, rows))
 
 
-def _device(site: Site, own: Sequence[RecordingView], rows: Sequence[DriftRow]) -> dict[str, Any]:
+def _make_device_context(
+    site: Site, own: Sequence[RecordingView], rows: Sequence[DriftRow]
+) -> dict[str, Any]:
     sensor, device = own[0].sensor, own[0].row.device
     named = {view.full_name for view in own}
     rows = [row for row in rows if (row.sensor, row.recording) in named]
-    # As `navigation.drift.order_of` has it: stamps that are all the same tell no order.
+    # As in `navigation.drift.order_of`: equal time stamps give no order.
     stamps = {row.started for row in rows}
     dated = None not in stamps and len(stamps) > 1
-    trends, payload = _trends(rows, dated=dated, simulated=own[0].simulated)
+    trends, payload = _list_trends(rows, dated=dated, simulated=own[0].simulated)
     return {
         "sensor_page": site.sensor_page(sensor),
         "name": site.names[sensor],
@@ -144,19 +149,19 @@ def _device(site: Site, own: Sequence[RecordingView], rows: Sequence[DriftRow]) 
             for row in rows
             if row.verdict == "changed"
         ],
-        "order": "The recordings stand at the time when they were started."
+        "order": "Recordings are plotted at their start times."
         if dated
-        else "The logs do not all say when they were started: the recordings stand in the order "
-        "of their names.",
+        else "Some logs have no start time, so the recordings are plotted in the order of their "
+        "names.",
         "trends": list(trends.items()),
         "page": {"trends": payload, "arrays": []},
     }
 
 
-def _trends(
+def _list_trends(
     rows: Sequence[DriftRow], *, dated: bool, simulated: bool
 ) -> tuple[dict[str, list[dict[str, Any]]], list[dict[str, Any]]]:
-    """Return the trends of a device by channel, and what their figures are drawn from."""
+    """Return the trends of a device by channel, and the data of their figures."""
     trends: dict[str, list[dict[str, Any]]] = {}
     payload: list[dict[str, Any]] = []
     mark = " (simulated)" * simulated
@@ -183,7 +188,7 @@ def _trends(
                 "title": title,
                 "number": len(payload),
                 "label": f"{name} of {title} in {counted(len(series), 'recording')}",
-                "caption": f"{name}: {_trend_words(changes, outside)}",
+                "caption": f"{name}: {_describe_trend(changes, outside)}",
             }
         )
         payload.append(
@@ -204,13 +209,13 @@ def _trends(
     return trends, payload
 
 
-def _trend_words(changes: Sequence[str], outside: Sequence[str]) -> str:
-    """Say which recordings are changed, and which would be if their figure were the only one."""
+def _describe_trend(changes: Sequence[str], outside: Sequence[str]) -> str:
+    """Return which recordings have changed, and which lie outside the band without significance."""
     words = f"changed in {', '.join(changes)}." if changes else "no change."
     if outside:
         lie = "lies" if len(outside) == 1 else "lie"
         names = ", ".join(outside)
-        words += f" {names} {lie} outside the band; among so many figures that may be chance."
+        words += f" {names} {lie} outside the band, which may be chance among so many parameters."
     return words
 
 
@@ -223,4 +228,4 @@ def change_words(row: DriftRow, *, simulated: bool) -> str:
     chance = f"{row.p_value:.1g}" if row.p_value is not None else "–"
     where = row.channel.replace("_", " ")
     recording = row.recording + (" (simulated)" if simulated else "")
-    return f"{recording}, {where}: {name} changed{by} (chance if it had not: {chance})."
+    return f"{recording}, {where}: {name} changed{by} (p = {chance})."

@@ -1,4 +1,4 @@
-"""Commands that the pages print for a shell, whatever names stand in them."""
+"""Shell commands on the pages, with quoted names."""
 
 from __future__ import annotations
 
@@ -9,27 +9,26 @@ from collections.abc import Mapping, Sequence
 def imubench(name: str, results: str, options: Mapping[str, str] | None = None) -> str:
     """Return a command of `imubench`, such as ``figures``, for the results of a run.
 
-    By option, such as ``--sensor``, what is asked; a word in capitals stands for what the reader
-    puts there.
+    ``options`` has the values of options such as ``--sensor``; a word in capitals is a placeholder.
     """
-    asked = [word for key, value in (options or {}).items() for word in _option(key, value)]
-    return shlex.join(["imubench", name, _place(results), *asked])
+    asked = [word for key, value in (options or {}).items() for word in _make_option(key, value)]
+    return shlex.join(["imubench", name, _protect_path(results), *asked])
 
 
 def made_again(target: str, overrides: Sequence[str] = ()) -> str:
-    """Return the command that makes a file of a recording again, from its log.
+    """Return the command that recomputes a file of a recording from its log.
 
-    The overrides are what the run has beside its configuration, as ``snakemake --config`` takes it.
+    ``overrides`` are the settings of the run for ``snakemake --config``.
     """
     stated = ["--config", *overrides] if overrides else []
-    # What follows the two dashes is no option, whatever it begins with.
+    # After the two dashes, nothing is read as an option.
     return shlex.join(["snakemake", "-c2", *stated, "--forcerun", "ingest", "--", target])
 
 
-def _option(key: str, value: str) -> list[str]:
-    """Return an option as words; one that begins with a dash would be taken for another option."""
+def _make_option(key: str, value: str) -> list[str]:
+    """Return an option as words; a value with a leading dash is joined by an equals sign."""
     return [f"{key}={value}"] if value.startswith("-") else [key, value]
 
 
-def _place(path: str) -> str:
+def _protect_path(path: str) -> str:
     return f"./{path}" if path.startswith("-") else path

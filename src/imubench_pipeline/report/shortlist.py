@@ -11,7 +11,7 @@ from imubench_pipeline.words.numbers import number_text
 from imubench_pipeline.words.verdicts import SHORT_VERDICTS, SHORTLIST_WORDS, shortfall_text
 
 
-def _context(site: Site) -> dict[str, Any]:
+def _make_context(site: Site) -> dict[str, Any]:
     rows = site.rows(ShortlistRow)
     asked = site.settings["requirements"]
     return {
@@ -19,7 +19,7 @@ def _context(site: Site) -> dict[str, Any]:
             {
                 "title": asked[name]["title"],
                 "note": asked[name].get("note"),
-                "rows": [_line(site, row) for row in rows if row.requirement == name],
+                "rows": [_format_line(site, row) for row in rows if row.requirement == name],
             }
             for name in dict.fromkeys(row.requirement for row in rows)
         ]
@@ -27,12 +27,12 @@ def _context(site: Site) -> dict[str, Any]:
 
 
 SHORTLIST = Entry(
-    file="shortlist.html", title="Before buying", context=_context, tables=("shortlist",)
+    file="shortlist.html", title="Before buying", context=_make_context, tables=("shortlist",)
 )
 """The page of all sensors of the catalogue, for every requirement."""
 
 
-def _line(site: Site, row: ShortlistRow) -> dict[str, Any]:
+def _format_line(site: Site, row: ShortlistRow) -> dict[str, Any]:
     sensor, verdict, best, worst, measured, _ = cells(row)
     return {
         **row.columns(),
@@ -49,27 +49,27 @@ def _line(site: Site, row: ShortlistRow) -> dict[str, Any]:
 
 
 def cells(row: ShortlistRow) -> list[str]:
-    """Return sensor, verdict, margins at best, at worst and measured, and the limit, as texts."""
-    measured = _margin(row.measured_margin)
+    """Return sensor, verdict, margins (best, worst, measured) and deciding limit, as texts."""
+    measured = _format_margin(row.measured_margin)
     if row.measured_margin_of == "simulated logs":
         measured += " (simulated)"
     return [
         row.sensor,
         SHORTLIST_WORDS[row.verdict],
-        _margin(row.best_margin),
-        _margin(row.worst_margin) if row.best_margin is not None else "–",
+        _format_margin(row.best_margin),
+        _format_margin(row.worst_margin) if row.best_margin is not None else "–",
         measured,
         row.decides or row.reason or "; ".join(map(shortfall_text, row.shortfalls)),
     ]
 
 
 def notes(rows: Sequence[ShortlistRow]) -> Iterator[str]:
-    """Yield what is assumed of each sensor, or why it is not judged, in a line each."""
+    """Yield a line per sensor with its assumptions, or the reason why it is not judged."""
     for row in rows:
         remarks = [*map(shortfall_text, row.shortfalls), row.reason, *row.assumed]
         if any(remarks):
             yield f"{row.sensor}: {'; '.join(filter(None, remarks))}"
 
 
-def _margin(value: float | None) -> str:
+def _format_margin(value: float | None) -> str:
     return "–" if value is None else number_text(value, 3)

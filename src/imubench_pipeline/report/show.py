@@ -15,8 +15,8 @@ if TYPE_CHECKING:
     import pyarrow as pa
     from rich.console import RenderableType
 
-_NEEDED = ("recordings", "findings", "failures", "ranking", "next_steps", "parameters")
-_WIDTH = whole_number(40, 10_000, "40 to 10000 columns")
+_NEEDED_TABLES = ("recordings", "findings", "failures", "ranking", "next_steps", "parameters")
+_parse_width = whole_number(40, 10_000, "40 to 10000 columns")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -34,7 +34,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="practical: deg/h, ug and their like; si: rad/s, m/s^2; default: practical",
     )
     parser.add_argument(
-        "--width", type=_WIDTH, metavar="COLUMNS", help="default: the width of the terminal, or 80"
+        "--width",
+        type=_parse_width,
+        metavar="COLUMNS",
+        help="default: the width of the terminal, or 80",
     )
 
 
@@ -99,7 +102,7 @@ def _load(results: Path) -> dict[str, pa.Table]:
     from imubench_pipeline.tables import TableError, read, tables_of_run
 
     try:
-        paths = tables_of_run(results, _NEEDED)
+        paths = tables_of_run(results, _NEEDED_TABLES)
     except TableError as error:
         raise _ShowError(str(error)) from error
     try:

@@ -1,4 +1,4 @@
-"""The pages of the report: which there are, and which must be written again."""
+"""The pages of the report, and the digests that decide which are written again."""
 
 from __future__ import annotations
 
@@ -26,11 +26,11 @@ from imubench_pipeline.report.shell import made_again
 from imubench_pipeline.report.view import Name, RecordingView, recording_views
 from imubench_pipeline.tables.schemas import OF_ONE_RECORDING, TABLES
 
-_CHANNELS = ("gyro_x", "gyro_y", "gyro_z", "accel_x", "accel_y", "accel_z")
+_CHANNEL_ORDER = ("gyro_x", "gyro_y", "gyro_z", "accel_x", "accel_y", "accel_z")
 _FIRST_ROWS = 100
-"""Rows of a long table that are shown; the others are made when they are asked for."""
+"""Rows of a long table that are shown at first."""
 _PLAIN_ROWS = 30
-"""Rows of a long table that stand in the page as they are, for a reader without JavaScript."""
+"""Rows of a long table that are plain HTML, for readers without JavaScript."""
 _NOT_IN_NAMES = re.compile(r"[^\w .+()-]")
 
 
@@ -51,7 +51,7 @@ class Page:
 
 @dataclass(frozen=True, kw_only=True)
 class Entry:
-    """A page that a report has once, as it is declared beside what it shows."""
+    """A page that a report has once, as declared in the module of its content."""
 
     file: str  # its name; its template is called so, too, with ``.jinja``
     title: str  # what the navigation calls it
@@ -103,7 +103,7 @@ _SECTIONS: Hook[Section] = Hook("sections")
 
 @dataclass
 class Site:
-    """What the pages are made of."""
+    """The data of all pages."""
 
     tables: Mapping[str, pa.Table]  # all joined tables
     settings: Mapping[str, Any]  # as `imubench_pipeline.run.plan.Plan.report_settings` gives them
@@ -127,21 +127,21 @@ class Site:
 
     @property
     def results_name(self) -> str:
-        """The folder of the results, as the commands of the pages name it."""
+        """The folder of the results, as in the commands on the pages."""
         return str(self.settings.get("results", "results"))
 
     @property
     def at_once(self) -> str | None:
-        """The command that made all of it at once, and left no results; None: a run did."""
+        """The command that made the report without keeping results; None for a run."""
         return self.settings.get("at_once")
 
     def on_purpose(self, view: RecordingView) -> Mapping[str, str]:
-        """Return what a simulated recording was made to show, by finding."""
+        """Return the purpose of a simulated recording, by finding."""
         shown: Mapping[str, Mapping[str, str]] = self.settings.get("on_purpose", {})
         return shown.get(f"{view.sensor}/{view.name}", {})
 
     def again(self, view: RecordingView, table: str) -> str:
-        """Return the command that makes the results of a recording again, up to a table."""
+        """Return the command that recomputes the results of a recording, up to a table."""
         return self.at_once or made_again(
             f"{self.results_name}/recordings/{view.sensor}/{view.name}/{table}.parquet",
             self.settings.get("given", []),
@@ -159,11 +159,11 @@ class Site:
             view.page = f"recordings/{view.sensor}/{view.name}.html"
             device = (view.sensor, view.row.device, view.simulated)
             if together[device] > 1 or view.row.device != view.name:
-                view.device_page = _device_page(*device)
+                view.device_page = _make_device_path(*device)
         return views
 
     def compared(self, views: Iterable[RecordingView]) -> Iterator[ComparedRecording]:
-        """Yield what pages compare of recordings."""
+        """Yield the compared data of recordings."""
         for view in views:
             if view.full_name not in self._compared:
                 self._compared[view.full_name] = compared_recording(view, self.system)
@@ -183,7 +183,7 @@ class Site:
 
     @cached_property
     def navigation(self) -> list[tuple[str, str]]:
-        """The pages that every page leads to, with their names."""
+        """The pages of the navigation bar, with their names."""
         return [(entry.file, entry.title) for entry in self.entries if entry.exists(self)]
 
     @cached_property
@@ -197,20 +197,20 @@ class Site:
         return sensor_names(self.sensors, self.settings["sensors"])
 
     def is_sold(self, sensor: str) -> bool:
-        """Tell whether a sensor can be bought; of one without a file nothing else is stated."""
+        """Tell whether a sensor can be bought; True if it has no sensor file."""
         sold: bool = self.settings["sensors"].get(sensor, {}).get("sold", True)
         return sold
 
     @cached_property
     def looks(self) -> dict[str, Appearance]:
-        """How each sensor looks in every figure."""
+        """The appearance of each sensor in all figures."""
         return sensor_appearances(self.sensors)
 
     @cached_property
     def channel_names(self) -> list[str]:
-        """The channels that some recording has."""
+        """The channels that occur in the recordings."""
         present = set(self.tables["allan"]["channel"].unique().to_pylist())
-        return [name for name in _CHANNELS if name in present]
+        return [name for name in _CHANNEL_ORDER if name in present]
 
     def sensor_page(self, sensor: str) -> str:
         """Return the page of a sensor."""
@@ -229,7 +229,7 @@ class Site:
         return {(row.sensor, row.quantity, row.figure): row.published for row in rows}
 
     def changed_devices(self) -> list[dict[str, Any]]:
-        """Return the recordings that show a change of their device, with what has changed."""
+        """Return the recordings that show a change of their device, with the changed parameters."""
         devices: dict[tuple[str, str], dict[str, Any]] = {}
         for row in self.rows(DriftRow):
             if row.verdict != "changed":
@@ -254,12 +254,12 @@ class Site:
 
     @cached_property
     def common(self) -> str:
-        """Digest of what every page shows: settings, names, code."""
-        return _digest(self.settings, self.names, self.navigation, self.code, self.version)
+        """Digest of the common content of all pages: settings, names, code."""
+        return _make_digest(self.settings, self.names, self.navigation, self.code, self.version)
 
     def key_of(self, *parts: object) -> str:
-        """Return the digest of what a page shows."""
-        return _digest(self.common, *parts)
+        """Return the digest of the content of a page."""
+        return _make_digest(self.common, *parts)
 
     @property
     def version(self) -> str:
@@ -267,7 +267,7 @@ class Site:
         return version("imubench_pipeline")
 
     def shown(self, *, alone: bool = False) -> dict[str, Any]:
-        """Return what every template is given of the site.
+        """Return the data of the site for all templates.
 
         ``alone``: no other file lies beside the report.
         """
@@ -303,22 +303,22 @@ RECORDING_PAGES: Hook[RecordingPage] = Hook("recording_pages")
 """The pages of recordings that are not static, by their kind."""
 
 
-def _device_page(sensor: str, device: str, simulated: bool) -> str:
-    """Return the page of a device, whose name may hold what a file name cannot."""
+def _make_device_path(sensor: str, device: str, simulated: bool) -> str:
+    """Return the path of the page of a device, without characters that a file name cannot have."""
     safe = _NOT_IN_NAMES.sub("_", device)[:60]
     if safe != device:
         safe += "-" + hashlib.sha256(device.encode()).hexdigest()[:8]
     return f"devices/{sensor}/{'simulated/' if simulated else ''}{safe}.html"
 
 
-def _digest(*parts: object) -> str:
+def _make_digest(*parts: object) -> str:
     digest = hashlib.sha256()
-    for part in _flat(parts):
+    for part in _encode(parts):
         digest.update(part + b"\0")
     return digest.hexdigest()
 
 
-def _flat(parts: Iterable[object]) -> Iterable[bytes]:
+def _encode(parts: Iterable[object]) -> Iterable[bytes]:
     for part in parts:
         if isinstance(part, bytes):
             yield hashlib.sha256(part).digest()
@@ -329,7 +329,7 @@ def _flat(parts: Iterable[object]) -> Iterable[bytes]:
 def sensor_names(
     sensors: Iterable[str], described: Mapping[str, Mapping[str, str]]
 ) -> dict[str, str]:
-    """Return vendor and model of each sensor, with the name of its file where two are alike.
+    """Return vendor and model of each sensor, with the name of its file if two are equal.
 
     Of those described, which have a file.
     """

@@ -1,4 +1,4 @@
-"""Numbers of verdicts, which know the value of the tables that they are."""
+"""Numbers of verdicts with their source, a value of the tables."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from imubench_pipeline.words.numbers import digits_by, number_text
 
 
 class SourcedNumber(str):
-    """A number as a page prints it; in HTML it says from which value of the tables it is.
+    """A printed number; in HTML it names its source, a value of the tables.
 
     ``source`` is ``ranking/<requirement>/<sensor>/<error>/<time>/<column>``, or that of a total of
     ``error_budget``, with the recording after the sensor; two columns with a colon between them are
@@ -36,7 +36,7 @@ class SourcedNumber(str):
 
 
 class SourcedInterval(str):
-    """Two limits as a page prints them; in HTML each says from which value of the tables it is."""
+    """Two printed limits; in HTML each names its source."""
 
     __slots__ = ("ends",)
     ends: tuple[SourcedNumber, SourcedNumber]

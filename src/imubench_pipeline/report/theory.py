@@ -1,4 +1,4 @@
-"""The page of the theory: the noise terms, and every word of the glossary."""
+"""The page of the theory: the noise terms, and the terms of the glossary."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from imubench_pipeline.report.static_figures.files import figure_text
 from imubench_pipeline.report.static_figures.theory import theory_figure
 
 
-def _context(site: Site) -> dict[str, Any]:
+def _make_context(site: Site) -> dict[str, Any]:
     return {
         "figure": figure_text(theory_figure(site.system)),
         "terms": glossary(),
     }
 
 
-THEORY = Entry(file="theory.html", title="Theory", context=_context)
-"""The page that the terms of all others lead to."""
+THEORY = Entry(file="theory.html", title="Theory", context=_make_context)
+"""The page that the terms of all other pages link to."""

@@ -1,4 +1,4 @@
-"""What temperature and the sensor's own low-pass do to a channel, as a page says it."""
+"""Effect of temperature and of the sensor's own low-pass on a channel, for the pages."""
 
 from __future__ import annotations
 
@@ -13,49 +13,55 @@ from imubench_pipeline.report.practical import System, page_unit
 from imubench_pipeline.report.view import ChannelView
 from imubench_pipeline.words.numbers import limit_digits, number_text, sentence
 
-_TEMPERATURE = (
+_TEMPERATURE_TERMS = (
     ("sensitivity", "temperature_sensitivity", "sensitivity"),
-    ("quadratic", "temperature_quadratic", "square of the temperature"),
-    ("lag", "thermal_lag", "lag"),
+    ("quadratic", "temperature_quadratic", "quadratic term"),
+    ("lag", "thermal_lag", "thermal lag"),
     ("bias", "bias_at_reference", "bias at T₀"),
 )
-_LOW_PASS = (("cutoff", "cutoff", "cut-off"), (SENSOR, SENSOR, "N before the low-pass"))
-_TRUTHS = {"bias": None}
-_SWITCHED = {"sensitivity": "sensitivity", "quadratic": "quadratic", "bias": "signal", SENSOR: "N"}
-"""Unit of the page of what is shown in the units that the reader chooses."""
+_LOW_PASS_TERMS = (("cutoff", "cutoff", "cut-off"), (SENSOR, SENSOR, "N before the low-pass"))
+_TRUTH_NAMES = {"bias": None}
+_UNIT_SYMBOLS = {
+    "sensitivity": "sensitivity",
+    "quadratic": "quadratic",
+    "bias": "signal",
+    SENSOR: "N",
+}
+"""Symbol of the unit, for quantities whose unit the reader can choose."""
 
 _Figure = TemperatureRow | LowPassRow | ParameterRow
 
-_FIXED = {"lag": "s", "cutoff": "Hz"}
-_AT = np.array([100.0, 300.0, 1_000.0, 3_000.0, 10_000.0, 30_000.0])
-_AS_IT_COMES = (
-    "Ranking, datasheet and budgets take the log as it comes, with what temperature does to it: "
-    "so it is in use, and so are the logs of sensors without readings. Method compensated has the "
-    "noise that is left, of which a datasheet of constant temperature speaks."
+_FIXED_UNITS = {"lag": "s", "cutoff": "Hz"}
+_SHOWN_TAU = np.array([100.0, 300.0, 1_000.0, 3_000.0, 10_000.0, 30_000.0])
+"""Averaging times for which the effect of temperature is stated, s."""
+
+_NOT_COMPENSATED = (
+    "Ranking, datasheet comparison and budgets use the log with its temperature effect. The "
+    "method “likelihood, temperature compensated” gives the noise at constant temperature."
 )
-_SEEN = 1.05
-"""How many times lower an Allan deviation must be to be worth a word."""
+_MIN_SHOWN_RATIO = 1.05
+"""Ratio of Allan deviations without and with compensation from which it is stated."""
 
 
 def figures(channel: ChannelView) -> Iterator[dict[str, Any]]:
-    """Yield the lines of the table: temperature's, where its effect was sought; the low-pass's."""
+    """Yield the lines of the table: temperature effect, where it was fitted, and low-pass."""
     estimated = channel.parameters.get("likelihood", ())
     before = {row.parameter: row for row in estimated if row.parameter == SENSOR}
     low_pass: Mapping[str, _Figure] = {**channel.low_pass, **before}
     entries: tuple[tuple[Mapping[str, _Figure], str, str, str], ...] = (
-        *((channel.temperature, *names) for names in _TEMPERATURE),
-        *((low_pass, *names) for names in _LOW_PASS),
+        *((channel.temperature, *names) for names in _TEMPERATURE_TERMS),
+        *((low_pass, *names) for names in _LOW_PASS_TERMS),
     )
     for rows, name, term, words in entries:
         row = rows.get(name)
         if row is None or row.status == "absent":
             continue
-        truth = channel.truth.get(_TRUTHS.get(name, name) or "")
+        truth = channel.truth.get(_TRUTH_NAMES.get(name, name) or "")
         yield {
             "term": term,
             "words": words,
-            "unit": f"{channel.quantity}.{_SWITCHED[name]}" if name in _SWITCHED else None,
-            "sign": _FIXED.get(name),
+            "unit": f"{channel.quantity}.{_UNIT_SYMBOLS[name]}" if name in _UNIT_SYMBOLS else None,
+            "sign": _FIXED_UNITS.get(name),
             "value": row.value,
             "lower": row.lower,
             "upper": row.upper,
@@ -67,7 +73,7 @@ def figures(channel: ChannelView) -> Iterator[dict[str, Any]]:
 
 
 def answer(channel: ChannelView, system: System) -> list[str]:
-    """Return in sentences what was found of temperature and low-pass."""
+    """Return the results for temperature and low-pass, as sentences."""
     lines = []
     temperature, low_pass = channel.temperature, channel.low_pass
     if temperature:
@@ -75,36 +81,38 @@ def answer(channel: ChannelView, system: System) -> list[str]:
         if sensitivity.compensated:
             unit = page_unit(channel.quantity, "sensitivity", system)
             lines.append(
-                f"The bias follows the temperature by {unit.text(sensitivity.value, 3)} "
-                f"{unit.sign}.{_falls(channel)}"
+                f"The bias changes with temperature by {unit.text(sensitivity.value, 3)} "
+                f"{unit.sign}.{_describe_reduction(channel)}"
             )
-            lines.append(_AS_IT_COMES)
+            lines.append(_NOT_COMPENSATED)
         else:
-            lines.append(f"Temperature is not taken out: {sensitivity.reason}.")
-        lines.append(f"T₀, the mean temperature, is {number_text(temperature['T_0'].value)} °C.")
+            lines.append(f"The temperature effect is not removed: {sensitivity.reason}.")
+        lines.append(f"The mean temperature T₀ is {number_text(temperature['T_0'].value)} °C.")
     if low_pass and low_pass["cutoff"].status == "absent":
         lines.append("The spectrum shows no low-pass of the sensor.")
     elif low_pass:
         order = low_pass["cutoff"].order
-        kind = "of first order" if order == 1 else "as a Butterworth filter"
-        kind += f" of order {order}" if order not in (None, 1) else ""
+        kind = "first order" if order == 1 else "Butterworth"
+        kind += f", order {order}" if order not in (None, 1) else ""
         if low_pass["cutoff"].value is not None:
             cutoff = number_text(low_pass["cutoff"].value)
-            lines.append(f"The sensor's own low-pass cuts off at {cutoff} Hz, {kind}.")
+            lines.append(f"The sensor's own low-pass has its cut-off at {cutoff} Hz ({kind}).")
     return lines
 
 
-def _falls(channel: ChannelView) -> str:
-    """Return how much lower the Allan deviation is without what temperature adds."""
+def _describe_reduction(channel: ChannelView) -> str:
+    """Return by which factors compensation lowers the Allan deviation, as a sentence."""
     left = channel.compensated
     if not left:
         return ""
     ratio = np.interp(np.log(left["tau"]), np.log(channel.tau), channel.adev) / left["adev"]
-    taus = _AT[(_AT >= left["tau"][0]) & (_AT <= left["tau"][-1])]
+    taus = _SHOWN_TAU[(_SHOWN_TAU >= left["tau"][0]) & (_SHOWN_TAU <= left["tau"][-1])]
     at = np.interp(np.log(taus), np.log(left["tau"]), ratio)
     parts = [
-        f"{number_text(float(fall), 3)} times at τ = {number_text(float(tau))} s"
-        for tau, fall in zip(taus, at, strict=True)
-        if fall > _SEEN
+        f"{number_text(float(factor), 3)} at τ = {number_text(float(tau))} s"
+        for tau, factor in zip(taus, at, strict=True)
+        if factor > _MIN_SHOWN_RATIO
     ]
-    return f" Without it the Allan deviation is lower: {', '.join(parts)}." if parts else ""
+    if not parts:
+        return ""
+    return f" Compensated, the Allan deviation is lower by a factor of {', '.join(parts)}."

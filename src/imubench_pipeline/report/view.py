@@ -1,4 +1,4 @@
-"""What the tables say of each channel and each recording, gathered for the pages."""
+"""The data of each recording and channel, gathered from the tables for the pages."""
 
 from __future__ import annotations
 
@@ -40,10 +40,10 @@ Name = tuple[str, str]
 METHOD_NAMES = {
     "likelihood": "likelihood",
     "likelihood_gm": "likelihood, papers' model",
-    "compensated": "likelihood, temperature taken out",
+    "compensated": "likelihood, temperature compensated",
     "curve": "read from the curve",
     "paper": "fit, weights as printed",
-    "weighted": "fit, right weights",
+    "weighted": "fit, correct weights",
     "authors": "read by the authors",
 }
 QUANTITY_NAMES = {"gyro": "Gyroscope", "accel": "Accelerometer"}
@@ -51,7 +51,7 @@ QUANTITY_NAMES = {"gyro": "Gyroscope", "accel": "Accelerometer"}
 
 @dataclass
 class ChannelView:
-    """Everything that the tables say of one channel; numbers are SI."""
+    """All data of one channel from the tables, in SI units."""
 
     sensor: str
     recording: str
@@ -87,7 +87,7 @@ class ChannelView:
 
     @property
     def warnings(self) -> list[str]:
-        """Terms of what puts the results of the channel in doubt, each once."""
+        """Terms of the warnings of the channel, each once."""
         serious = [row.finding for row in self.findings if row.severity != "note"]
         if any(row.chosen and row.verdict == "not explained" for row in self.models):
             serious.append("verdict_not_explained")
@@ -126,7 +126,7 @@ class ChannelView:
 
 @dataclass
 class RecordingView:
-    """One recording: what the tables say of it alone.
+    """All data of one recording from the tables.
 
     The channels of a thousand recordings do not fit into memory at once: they are made when they
     are asked for, and are not kept.
@@ -162,32 +162,32 @@ class RecordingView:
 
     @property
     def left_out(self) -> bool:
-        """Whether it could not be used, or a step failed for it."""
+        """Whether it was rejected, or a step failed for it."""
         return self.row.status != "ok"
 
     @property
     def rejected(self) -> bool:
-        """Whether it could not be used."""
+        """Whether it was rejected."""
         return self.row.status == "rejected"
 
     @property
     def static(self) -> bool:
-        """Whether it could be used, and its sensor was at rest all the time."""
+        """Whether it was analysed, and its sensor was at rest."""
         return not self.left_out and self.row.kind == AT_REST
 
     @property
     def key(self) -> str:
-        """Digest of all that the tables say of it."""
+        """Digest of its rows in all tables."""
         return self.keys()[self.full_name]
 
     @cached_property
     def findings(self) -> list[FindingRow]:
-        """What is wrong with it or worth knowing, but that it is left out."""
+        """Its findings, except that it is left out."""
         return [row for row in self.rows(FindingRow) if row.finding not in LEFT_OUT]
 
     @property
     def warnings(self) -> list[FindingRow]:
-        """The findings that put results in doubt."""
+        """Its warnings."""
         return [row for row in self.findings if row.severity == "warning"]
 
     @property
@@ -214,13 +214,13 @@ class RecordingView:
 
     def channels(self) -> list[ChannelView]:
         """Return its channels, made anew."""
-        return _channels(self)
+        return _make_channels(self)
 
 
 def recording_views(tables: Mapping[str, pa.Table]) -> list[RecordingView]:
     """Gather the tables by recording, in the order of the table ``recordings``."""
-    divided = {name: _by(tables[name], "sensor", "recording") for name in BY_RECORDING}
-    keys = cache(partial(_keys, tables))
+    divided = {name: _divide(tables[name], "sensor", "recording") for name in BY_RECORDING}
+    keys = cache(partial(_make_keys, tables))
     views = []
     for row in RecordingRow.rows_of(tables["recordings"]):
         name = (row.sensor, row.recording)
@@ -232,14 +232,14 @@ def recording_views(tables: Mapping[str, pa.Table]) -> list[RecordingView]:
     return views
 
 
-_CURVE = ("tau", "adev", "lower", "upper")
+_CURVE_COLUMNS = ("tau", "adev", "lower", "upper")
 
 
-def _channels(view: RecordingView) -> list[ChannelView]:
+def _make_channels(view: RecordingView) -> list[ChannelView]:
     channels = {}
-    for (name,), part in _by(view.parts["allan"], "channel").items():
+    for (name,), part in _divide(view.parts["allan"], "channel").items():
         named = (view.sensor, view.name, name, view.simulated)
-        tau, adev, lower, upper = _floats(part, *_CURVE).values()
+        tau, adev, lower, upper = _read_floats(part, *_CURVE_COLUMNS).values()
         rate = float(part["cluster_size"][0].as_py() / tau[0])
         channels[name] = ChannelView(*named, tau, adev, lower, upper, rate)
     for row in view.rows(ParameterRow):
@@ -247,8 +247,8 @@ def _channels(view: RecordingView) -> list[ChannelView]:
         channel.parameters.setdefault(row.method, []).append(row)
         if row.recommended:
             channel.recommended = row.method
-    for (name, method), part in _by(view.parts["reconstruction"], "channel", "method").items():
-        channels[name].reconstruction[method] = _floats(part, *_CURVE, "reconstructed")
+    for (name, method), part in _divide(view.parts["reconstruction"], "channel", "method").items():
+        channels[name].reconstruction[method] = _read_floats(part, *_CURVE_COLUMNS, "reconstructed")
     of_channel: tuple[type[ChannelRow], ...] = (
         ModelRow,
         LineRow,
@@ -259,11 +259,11 @@ def _channels(view: RecordingView) -> list[ChannelView]:
     for of in of_channel:
         for one in view.rows(of):
             getattr(channels[one.channel], of.table).append(one)
-    for (name,), part in _by(view.parts["spectrum"], "channel").items():
+    for (name,), part in _divide(view.parts["spectrum"], "channel").items():
         columns = ("frequency", "ordinates", "density", "fitted", "used")
-        channels[name].spectrum = _floats(part, *columns)
-    for (name,), part in _by(view.parts["allan_compensated"], "channel").items():
-        channels[name].compensated = _floats(part, *_CURVE)
+        channels[name].spectrum = _read_floats(part, *columns)
+    for (name,), part in _divide(view.parts["allan_compensated"], "channel").items():
+        channels[name].compensated = _read_floats(part, *_CURVE_COLUMNS)
     for score in view.rows(ScoreRow):
         channels[score.channel].scores[score.method] = score
     for thermal in view.rows(TemperatureRow):
@@ -281,29 +281,31 @@ def _channels(view: RecordingView) -> list[ChannelView]:
     return list(channels.values())
 
 
-def _keys(tables: Mapping[str, pa.Table]) -> dict[Name, str]:
-    """Return a digest of all that the tables say of each recording."""
+def _make_keys(tables: Mapping[str, pa.Table]) -> dict[Name, str]:
+    """Return a digest of the rows of each recording in all tables."""
     digests: dict[Name, hashlib._Hash] = {}
     for name in BY_RECORDING:
         table = tables[name]
         if not table.num_rows:
             continue
-        named = table.select(["sensor", "recording"]).append_column("rows", pa.array(_rows(table)))
-        for (sensor, recording), part in _by(named, "sensor", "recording").items():
+        named = table.select(["sensor", "recording"]).append_column(
+            "rows", pa.array(_hash_rows(table))
+        )
+        for (sensor, recording), part in _divide(named, "sensor", "recording").items():
             digest = digests.setdefault((sensor, recording), hashlib.sha256())
             digest.update(f"{name} {part.num_rows}".encode() + part["rows"].to_numpy().tobytes())
     return {name: digest.hexdigest() for name, digest in digests.items()}
 
 
-_FACTOR = np.uint64(0x9E3779B97F4A7C15)
-"""Odd, and of no pattern: the place of a column in a row is part of what the row says."""
+_HASH_FACTOR = np.uint64(0x9E3779B97F4A7C15)
+"""Odd multiplier without a pattern, so that the digest depends on the order of the columns."""
 
 
-def _rows(table: pa.Table) -> NDArray[np.uint64]:
+def _hash_rows(table: pa.Table) -> NDArray[np.uint64]:
     """Return a digest of each row of a table."""
     rows = np.zeros(table.num_rows, dtype=np.uint64)
     for column in table.columns:
-        rows *= _FACTOR
+        rows *= _HASH_FACTOR
         if pa.types.is_dictionary(column.type):
             column = column.cast(pa.string())
         elif pa.types.is_list(column.type):
@@ -313,16 +315,16 @@ def _rows(table: pa.Table) -> NDArray[np.uint64]:
             texts = np.array([*encoded.dictionary.to_pylist(), None], dtype=object)
             rows += hash_array(texts, categorize=False)[encoded.indices.fill_null(-1).to_numpy()]
         else:
-            # Whether another recording lacks a number must not change how this one's are kept.
+            # Integers with nulls would become floats, depending on other recordings.
             rows += hash_array(np.asarray(column.cast(pa.float64()).to_numpy()))
     return rows
 
 
-def _floats(part: pa.Table, *columns: str) -> dict[str, NDArray[np.float64]]:
+def _read_floats(part: pa.Table, *columns: str) -> dict[str, NDArray[np.float64]]:
     return {name: np.asarray(part[name].to_numpy(), dtype=np.float64) for name in columns}
 
 
-def _by(table: pa.Table, *names: str) -> dict[tuple[str, ...], pa.Table]:
+def _divide(table: pa.Table, *names: str) -> dict[tuple[str, ...], pa.Table]:
     """Divide a table by the values of columns, in the order in which they appear."""
     if not table.num_rows:
         return {}

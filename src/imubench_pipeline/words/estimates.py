@@ -37,6 +37,11 @@ _MAX_SYMMETRIC = 0.3
 """Maximum half-width of an interval over its value that ± describes."""
 
 
+def status_text(status: str) -> str:
+    """Return the status of an estimate, or of a result of an experiment, in words."""
+    return {**STATUS_WORDS}.get(status, status.replace("_", " "))  # type: ignore[call-overload]
+
+
 def symbol_text(symbol: str) -> str:
     """Return the symbol of a parameter as it is printed."""
     return _SYMBOLS.get(symbol, symbol)

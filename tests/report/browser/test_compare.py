@@ -52,7 +52,12 @@ def same(shown: list[float | None], ratio: Ratio, rel: float) -> None:
 
 
 def words(ratio: Ratio) -> str:
-    return {"lower": "A better", "higher": "B better"}.get(ratio.verdict, ratio.verdict)
+    return {
+        "lower": "A better",
+        "higher": "B better",
+        "not told apart": "not significant",
+        "not known": "not determined",
+    }[ratio.verdict]
 
 
 @pytest.mark.release
@@ -181,7 +186,7 @@ def test_errors_of_the_chosen_axis_are_those_of_their_table(read: Open, bench: R
     )
     assert kept["x", "heading"]["sigma"] < kept["worst", "heading"]["sigma"]
     caption = reader.page.locator("table.errors caption")
-    for axis, words in (("x", "1σ of axis x"), ("worst", "1σ of the worst of the axes")):
+    for axis, words in (("x", "1σ of axis x"), ("worst", "1σ of the worst axis")):
         if axis == "worst":
             reader.page.locator("form.growth select").last.select_option("worst")
             assert "of=worst" in reader.page.url
@@ -203,9 +208,9 @@ def test_what_is_chosen_stands_in_the_address(
     reader = read(bench.folder, "compare.html#a=alpha&b=beta")
     page = reader.page
     assert "first" not in page.locator(".unfound").inner_text()
-    # A sensor stands for its longest measured recording that decides; the others can be chosen.
+    # The default of a sensor is its longest usable measured recording; others can be chosen.
     said = page.locator(".stands").inner_text()
-    assert f"{NIGHT.recording} stands for it" in said and "1 more to choose" in said
+    assert f"{NIGHT.recording} is shown" in said and "1 more above" in said
     page.get_by_role("button", name="+ one more").click()
     page.locator("select[data-letter=c]").select_option(f"alpha/{SIMULATED.recording}")
     page.get_by_label("Gyroscopes in").select_option("SI: rad/s")

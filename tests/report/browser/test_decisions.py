@@ -245,7 +245,7 @@ def test_filters_offer_what_the_others_leave(read: Open, bench: Report) -> None:
     assert bar.get_by_role("button", name="clear the filters").is_hidden()
     bar.get_by_role("searchbox", name="Find").fill("nothing like it")
     said = bar.locator("output").inner_text()
-    assert re.search("^0 of .*: none has Sensor “Other C” and Find “nothing like it”", said)
+    assert re.search("^0 of .*: no row has Sensor “Other C” and Find “nothing like it”", said)
     assert said.endswith("; 1 without Find")
     bar.get_by_role("button", name="clear the filters").click()
     assert len(cells(table, 1)) == len(bench.rows["recordings"])
@@ -272,5 +272,5 @@ def test_the_same_model_of_a_log_has_the_same_numbers(
                 seen.setdefault((heads[model + 1], *what), set()).add(tuple(numbers))
         assert len(seen) > 5
         # The likelihood is as wide as all models that the log does not tell apart, and says so.
-        assert any("or 1 other" in key[-1] for key in seen)
+        assert any("(1 other model fits as well)" in key[-1] for key in seen)
         assert {key: found for key, found in seen.items() if len(found) > 1} == {}

@@ -330,7 +330,7 @@ def test_the_histogram(night: Reader) -> None:
 def test_a_device_over_time(read: Open, bench: Report) -> None:
     reader = read(bench.folder, bench.page("devices/"))
     reader.draw_all()
-    # Three times the noise is outside of what four recordings let one expect, and yet no change
+    # Three times the noise is outside of what four recordings predict, and yet no change
     # among seven figures: p is 0.0018, and 0.01 / 7 the limit. Of the mean it is 1e-6.
     for number, factor, sign, last in (
         (0, 60 * DEGREES, "N (°/√h)", "circle"),
@@ -348,7 +348,7 @@ def test_a_device_over_time(read: Open, bench: Report) -> None:
         assert band[1]["y"][-1] == pytest.approx(highest) and highest < values["y"][-1]
     captions = reader.page.locator("figcaption").all_inner_texts()
     assert captions[0] == (
-        "N: no change. run_5 lies outside the band; among so many figures that may be chance."
+        "N: no change. run_5 lies outside the band, which may be chance among so many parameters."
     )
     assert captions[5:] == ["T_B: no change.", "fixed bias: changed in run_5."]
 

@@ -97,7 +97,7 @@ def test_numbers_and_units_follow_the_reader(path: str, read: Open, bench: Repor
 
 def test_the_numbers_are_those_of_the_noise(read: Open, bench: Report) -> None:
     reader = read(bench.folder, OF_NIGHT)
-    used = reader.page.get_by_role("table", name="Parameters by all methods").first.locator(
+    used = reader.page.get_by_role("table", name="Parameters by method").first.locator(
         "tr.recommended"
     )
     cells = used.locator("td.number data").all_inner_texts()
@@ -136,19 +136,19 @@ def test_the_numbers_are_those_of_the_noise(read: Open, bench: Report) -> None:
 def test_a_value_that_is_not_known_says_why(read: Open, bench: Report) -> None:
     reader = read(bench.folder, OF_NIGHT)
     reader.page.get_by_role("button", name="all channels").click()
-    tables = reader.page.get_by_role("table", name="Parameters by all methods")
+    tables = reader.page.get_by_role("table", name="Parameters by method")
     # Without a random walk the curve falls on: it has no lowest point.
     *lowest, absent = tables.nth(1).locator("tr.recommended td.none").all()
-    assert [one.inner_text() for one in lowest] == ["not shown", "not shown"]
+    assert [one.inner_text() for one in lowest] == ["not determined", "not determined"]
     falls = "no minimum is shown: the curve of the noise still falls at 4000 s, a ninth of the log."
     assert reader.page.locator("ul.untold").first.locator("li").all_inner_texts() == [
         f"σ_min and τ_min: {falls}",
         "K is not in the model: the data do not support it; below 1.2 °/h/√h.",
     ]
     # 1e-7 rad/s/√s are 1.24 °/h/√h.
-    assert absent.inner_text().split("\n") == ["absent", "below 1.24"]
+    assert absent.inner_text().split("\n") == ["not in the model", "below 1.24"]
     unsure = tables.nth(2).locator("tr.recommended td.none")
-    assert unsure.inner_text().split("\n") == ["not identified", "20 to 500"]
+    assert unsure.inner_text().split("\n") == ["not determined", "20 to 500"]
     assert "10 h would do for 10 %" in reader.page.locator("ul.untold").last.inner_text()
 
 

@@ -145,7 +145,7 @@ def test_what_is_wrong_stands_in_words(seen: Seen) -> None:
         assert made.REASON in seen.pages[path]["text"], path
     start = seen.pages["index.html"]["text"]
     assert re.search(
-        rf"changed since earlier.*{re.escape(made.DEVICE)}.*{made.CHANGED}", start, re.S
+        rf"with a changed device.*{re.escape(made.DEVICE)}.*{made.CHANGED}", start, re.S
     )
     assert (
         "12 samples are missing"
@@ -156,7 +156,7 @@ def test_what_is_wrong_stands_in_words(seen: Seen) -> None:
 
 
 def test_a_sensor_without_a_datasheet_says_so(seen: Seen) -> None:
-    assert "No figures of a datasheet" in seen.pages["sensors/beta.html"]["text"]
+    assert "states no figures of a datasheet" in seen.pages["sensors/beta.html"]["text"]
 
 
 @pytest.mark.release

@@ -94,8 +94,9 @@ def test_numbers_are_sorted_as_numbers(read: Open, bench: Report) -> None:
     table.get_by_role("button", name="Sort by K").click()
     *sizes, last = (text.split("\n")[0] for text in cells(table, column))
     # As texts, 15 would stand before 5.
-    assert [float(size) for size in sizes] == sorted(float(t) for t in before if t != "absent")
-    assert sizes[0] == "5" and last == "absent"
+    missing = "not in the model"
+    assert [float(size) for size in sizes] == sorted(float(t) for t in before if t != missing)
+    assert sizes[0] == "5" and last == missing
 
 
 def test_rows_are_found_and_counted(read: Open, bench: Report) -> None:
@@ -113,7 +114,7 @@ def test_rows_are_found_and_counted(read: Open, bench: Report) -> None:
     bar.get_by_label("Sensor").select_option("Other C")
     assert cells(table, 2) == ["only"] and count(table) == f"1 of {rows} rows"
     search.fill("nothing like it")
-    assert cells(table, 2) == [] and count(table).startswith(f"0 of {rows} rows: none")
+    assert cells(table, 2) == [] and count(table).startswith(f"0 of {rows} rows: no row has")
     for label in ("Status", "Sensor"):
         bar.get_by_label(label).select_option("all")
     search.fill("")
@@ -222,11 +223,11 @@ def test_a_browser_that_unfolds_nothing_says_how_much_is_left_out(
     assert ("×10⁻" in rows.last.inner_text()) == script
     # Of each axis the recommended method and that of the papers.
     every = 2 * SENSORS * EACH * AXES
-    words = f"{rows.count()} of {every} rows; JavaScript unfolds the others."
+    words = f"{rows.count()} of {every} rows. The others need JavaScript"
     expect(page.locator("p.note", has_text=words).first).to_be_visible()
     path = "recordings/sensor_00/run_00.html"
     page.goto((many / path).as_uri())
-    words = f"What follows here, of {2 * AXES - 1} more"
+    words = f"{2 * AXES - 1} more sections need JavaScript"
     expect(page.locator("p.note", has_text=words)).to_be_visible()
     assert complaints == []
     context.close()

@@ -227,23 +227,26 @@ def _describe_signal(channel: str, unit: str, signal: DeterministicSignal) -> Fi
     size = f"{signal.size:.4g} {unit}"
     limits = f"95 %: {signal.size_lower:.4g} to {signal.size_upper:.4g} {unit}"
     if signal.kind == "bias_step":
+        name = "bias_step"
         detail = (
             f"the bias of {channel} steps by {size} ({limits}) at {signal.start:.6g} s "
             f"(± {signal.place_error or 0.0:.2g} s); {_REMOVED}"
         )
     elif signal.kind == "warm_up_drift":
+        name = "warm_up_drift"
         detail = (
             f"{channel} begins {size} ({limits}) away from where it settles, with a time constant "
             f"of {signal.time:.4g} s ({signal.time_lower:.4g} to {signal.time_upper:.4g} s); "
             f"{_REMOVED}"
         )
     else:
+        name = "periodic_drift"
         detail = (
             f"the bias of {channel} swings with an amplitude of {size} ({limits}) and a period of "
             f"{signal.time:.5g} s ({signal.time_lower:.5g} to {signal.time_upper:.5g} s); "
             f"{_REMOVED}"
         )
-    return Finding(signal.kind, "warning", detail, signal.size, channel, signal.start, signal.end)
+    return Finding(name, "warning", detail, signal.size, channel, signal.start, signal.end)
 
 
 def _describe_nonstationarity(channel: str, steady: Stationarity) -> Finding:

@@ -1,4 +1,4 @@
-"""The page that says how sensors navigate, and whether it matters how a filter is tuned."""
+"""The page of navigation during outages of GNSS, with filters of different tunings."""
 
 from __future__ import annotations
 
@@ -19,29 +19,29 @@ TUNINGS = {
     "times_ten": "ten times the estimate",
     "table_1": "read by the authors",
     "overbound": "overbound",
-    "curve": "curve",
-    "paper": "weights of the paper",
-    "weighted": "weighted",
+    "curve": "read from the curve",
+    "paper": "printed weights",
+    "weighted": "correct weights",
     "likelihood": "likelihood",
     "likelihood_gm": "likelihood of the papers’ model",
-    "compensated": "temperature taken out",
+    "compensated": "temperature compensated",
 }
-"""What the page calls each tuning."""
+"""Name of each tuning on the page."""
 
-_SIGNALS: Mapping[str | None, str] = {
+_SIGNAL_TEXTS: Mapping[str | None, str] = {
     None: NO_VALUE,
     "truth": "simulated from the truth",
     "estimate": "simulated from the estimate",
     "log": "pieces of the log",
 }
 
-_AS_SURE = {True: "yes", False: "no: it goes astray from what it expects", None: "not told"}
+_CONSISTENT_TEXTS = {True: "yes", False: "no", None: "not determined"}
 
-_MATTERS = 1.1
-"""Times the error of the true model from which a tuning matters, surely so."""
+_MIN_RELEVANT_RATIO = 1.1
+"""Ratio of the error to that of the true model from which a tuning matters."""
 
 
-def _context(site: Site) -> dict[str, Any]:
+def _make_context(site: Site) -> dict[str, Any]:
     rows = site.rows(NavigationRow)
     shown = [row for row in rows if row.position is not None]
     recordings = [view.row for view in site.views]
@@ -63,7 +63,7 @@ def _context(site: Site) -> dict[str, Any]:
         "lacking": [row.columns() | {"tuning": TUNINGS[row.tuning]} for row in rows if row.reason],
         "filters": {
             "trajectory": list(dict.fromkeys(row.trajectory for row in shown)),
-            "outage": list(dict.fromkeys(_outage(row) for row in shown)),
+            "outage": list(dict.fromkeys(_format_outage(row) for row in shown)),
             "tuning": list(dict.fromkeys(TUNINGS[row.tuning] for row in shown)),
             "sensor": list(dict.fromkeys(site.names[row.sensor] for row in shown)),
         },
@@ -73,32 +73,33 @@ def _context(site: Site) -> dict[str, Any]:
 NAVIGATION = Entry(
     file="navigation.html",
     title="Navigation",
-    context=_context,
+    context=_make_context,
     tables=("navigation",),
     exists=lambda site: bool(site.rows(NavigationRow)),
     place=1,
 )
-"""The page of filters that were tuned by what is known of the sensors."""
+"""The page of navigation filters with different tunings."""
 
 
 def answers(rows: Sequence[NavigationRow]) -> Iterator[dict[str, Any]]:
     """Yield, for each sensor, trajectory and kind of signals, whether the tuning matters.
 
-    By the position after the longest outage, over that of the true model on the same signals.
+    The criterion is the position error after the longest outage, relative to the true model on the
+    same signals.
     """
-    for (sensor, trajectory, signals), own in _grouped(
+    for (sensor, trajectory, signals), own in _group_rows(
         rows, lambda row: (row.sensor, row.trajectory, row.signals)
     ):
         longest = max(row.outage or 0.0 for row in own)
         last = [row for row in own if row.outage == longest and row.tuning != "true"]
-        told = [row for row in last if row.position_ratio is not None]
-        if not told:
+        known = [row for row in last if row.position_ratio is not None]
+        if not known:
             continue
-        worse = [row for row in told if _limits(row)[0] > _MATTERS]
-        no_worse = [row for row in told if _limits(row)[1] < _MATTERS]
-        sure = [row for row in no_worse if _limits(row)[0] > 1.0 / _MATTERS]
-        no_worse = [row for row in no_worse if row not in sure]
-        open_ones = [row for row in told if row not in worse + sure + no_worse]
+        worse = [row for row in known if _find_ratio_limits(row)[0] > _MIN_RELEVANT_RATIO]
+        no_worse = [row for row in known if _find_ratio_limits(row)[1] < _MIN_RELEVANT_RATIO]
+        equal = [row for row in no_worse if _find_ratio_limits(row)[0] > 1.0 / _MIN_RELEVANT_RATIO]
+        no_worse = [row for row in no_worse if row not in equal]
+        inconclusive = [row for row in known if row not in worse + equal + no_worse]
         smallest = next((row for row in own if row.smallest), None)
         yield {
             "sensor": sensor,
@@ -106,76 +107,74 @@ def answers(rows: Sequence[NavigationRow]) -> Iterator[dict[str, Any]]:
             "signals": signals,
             "recording": own[0].recording,
             "runs": own[0].runs,
-            "words": _SIGNALS[signals],
+            "words": _SIGNAL_TEXTS[signals],
             "outage": f"{number_text(longest)} s",
-            "matters": _matters(worse, sure, no_worse, open_ones),
+            "matters": _describe_effect(worse, equal, no_worse, inconclusive),
             "smallest": None
             if smallest is None
             else f"{TUNINGS[smallest.tuning]}, {smallest.states} states",
-            "dishonest": _dishonest(own),
+            "dishonest": ", ".join(
+                dict.fromkeys(TUNINGS[row.tuning] for row in own if row.consistent is False)
+            )
+            or None,
         }
 
 
-def _limits(row: NavigationRow) -> tuple[float, float]:
-    """Return the limits of the ratio of positions; of one that is not known, the widest."""
-    return _known_or_widest(row.position_ratio_lower, row.position_ratio_upper)
+def _find_ratio_limits(row: NavigationRow) -> tuple[float, float]:
+    """Return the limits of the ratio of positions; unknown limits are the widest possible."""
+    return _fill_limits(row.position_ratio_lower, row.position_ratio_upper)
 
 
-def _known_or_widest(lower: float | None, upper: float | None) -> tuple[float, float]:
+def _fill_limits(lower: float | None, upper: float | None) -> tuple[float, float]:
     return 0.0 if lower is None else lower, math.inf if upper is None else upper
 
 
-def _matters(
+def _describe_effect(
     worse: Sequence[NavigationRow],
-    sure: Sequence[NavigationRow],
+    equal: Sequence[NavigationRow],
     no_worse: Sequence[NavigationRow],
-    open_ones: Sequence[NavigationRow],
+    inconclusive: Sequence[NavigationRow],
 ) -> str:
+    """Return which tunings are worse than the true model, equal to it, or undecided."""
     parts = []
     if worse:
         by = ", ".join(
             f"{TUNINGS[row.tuning]} {number_text(row.position_ratio, 3)} times" for row in worse
         )
-        parts.append(f"It matters: {by} the error of the true model")
-    if sure:
-        names = ", ".join(TUNINGS[row.tuning] for row in sure)
-        parts.append(f"no difference of a tenth: {names}")
-    if no_worse:
-        names = ", ".join(TUNINGS[row.tuning] for row in no_worse)
-        parts.append(f"no worse by a tenth: {names}")
-    if open_ones:
-        names = ", ".join(TUNINGS[row.tuning] for row in open_ones)
-        parts.append(f"these runs do not tell of {names}")
+        parts.append(f"The tuning matters: {by} the error of the true model")
+    for text, rows in (
+        ("within 10 %", equal),
+        ("at most 10 % worse", no_worse),
+        ("inconclusive", inconclusive),
+    ):
+        if rows:
+            parts.append(f"{text}: {', '.join(TUNINGS[row.tuning] for row in rows)}")
     text = "; ".join(parts)
     return f"{text[0].upper()}{text[1:]}."
 
 
-def _dishonest(rows: Sequence[NavigationRow]) -> str | None:
-    """Return which tunings are surely not as sure as they claim."""
-    names = dict.fromkeys(TUNINGS[row.tuning] for row in rows if row.consistent is False)
-    return ", ".join(names) or None
-
-
 def ranking(rows: Sequence[NavigationRow]) -> Iterator[dict[str, Any]]:
-    """Yield the sensors by the position after the longest outage, tuned as is recommended."""
-    for trajectory, own in _grouped(rows, lambda row: row.trajectory):
+    """Yield the sensors by the position error after the longest outage, recommended tuning."""
+    for trajectory, own in _group_rows(rows, lambda row: row.trajectory):
         chosen = [row for row in own if row.recommended and row.signals != "log"]
         longest = max((row.outage or 0.0 for row in chosen), default=0.0)
-        last = sorted((row for row in chosen if row.outage == longest), key=_position)
+        last = sorted((row for row in chosen if row.outage == longest), key=_get_position)
         for place, row in enumerate(last, start=1):
-            ties = [other.sensor for other in last if other is not row and _overlap(row, other)]
+            ties = [
+                other.sensor for other in last if other is not row and _is_overlapping(row, other)
+            ]
             yield line_of(row) | {"place": place, "ties": ties, "trajectory": trajectory}
 
 
-def _position(row: NavigationRow) -> float:
-    """Return the error of the position; of one that is not known, the largest."""
+def _get_position(row: NavigationRow) -> float:
+    """Return the error of the position; infinity if unknown."""
     return math.inf if row.position is None else row.position
 
 
-def _overlap(one: NavigationRow, other: NavigationRow) -> bool:
+def _is_overlapping(one: NavigationRow, other: NavigationRow) -> bool:
     """Tell whether the limits of two positions overlap."""
-    lower, upper = _known_or_widest(one.position_lower, one.position_upper)
-    other_lower, other_upper = _known_or_widest(other.position_lower, other.position_upper)
+    lower, upper = _fill_limits(one.position_lower, one.position_upper)
+    other_lower, other_upper = _fill_limits(other.position_lower, other.position_upper)
     return other_lower <= upper and lower <= other_upper
 
 
@@ -188,35 +187,37 @@ def line_of(row: NavigationRow) -> dict[str, Any]:
         "states": row.states,
         "model": row.model,
         "assumed": row.assumed,
-        "outage": _outage(row),
+        "outage": _format_outage(row),
         "seconds": row.outage or 0.0,
-        "signals": _SIGNALS[row.signals],
+        "signals": _SIGNAL_TEXTS[row.signals],
         "tuning": TUNINGS[row.tuning],
         "recommended": row.recommended,
         "position": row.position,
-        "position_text": _figure(row.position, row.position_lower, row.position_upper),
+        "position_text": _format_figure(row.position, row.position_lower, row.position_upper),
         "ratio": row.position_ratio,
-        "ratio_text": _figure(
+        "ratio_text": _format_figure(
             row.position_ratio, row.position_ratio_lower, row.position_ratio_upper
         ),
-        "velocity_text": _figure(row.velocity, row.velocity_lower, row.velocity_upper),
-        "heading_text": _figure(row.heading, row.heading_lower, row.heading_upper, 180.0 / math.pi),
+        "velocity_text": _format_figure(row.velocity, row.velocity_lower, row.velocity_upper),
+        "heading_text": _format_figure(
+            row.heading, row.heading_lower, row.heading_upper, 180.0 / math.pi
+        ),
         "expected": number_text(row.position_predicted, 3),
         "inside": None if inside is None else 100.0 * inside,
         "inside_text": ""
         if inside is None or error is None
         else f"{number_text(100.0 * inside, 3)} ± {percent_text(error, 2)}",
         "consistent": row.consistent,
-        "as_sure": _AS_SURE[row.consistent],
+        "as_sure": _CONSISTENT_TEXTS[row.consistent],
         "of": counted(row.outages, "outage") if row.outage and row.outages else "",
     }
 
 
-def _outage(row: NavigationRow) -> str:
+def _format_outage(row: NavigationRow) -> str:
     return "none" if row.outage is None else f"{number_text(row.outage)} s"
 
 
-def _figure(
+def _format_figure(
     value: float | None, lower: float | None, upper: float | None, factor: float = 1.0
 ) -> str:
     if value is None:
@@ -230,7 +231,7 @@ def _figure(
 _Key = TypeVar("_Key")
 
 
-def _grouped(
+def _group_rows(
     rows: Sequence[NavigationRow], key: Callable[[NavigationRow], _Key]
 ) -> Iterator[tuple[_Key, list[NavigationRow]]]:
     groups: dict[_Key, list[NavigationRow]] = {}

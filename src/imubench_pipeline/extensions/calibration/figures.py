@@ -1,4 +1,4 @@
-"""What a rate table, or rest with a known direction, tells of a gyro, in lines and sentences."""
+"""Calibration of gyros on a rate table, or at rest with a known direction, for the pages."""
 
 from __future__ import annotations
 
@@ -24,61 +24,63 @@ WORDS = {
     "scale_factor": "scale factor",
     "quadratic": "quadratic term",
     "asymmetry": "asymmetry",
-    "linearity": "deviation from the line, of the largest rate",
+    "linearity": "linearity, of the largest rate",
     "earth_rate": "the Earth's rate",
     "heading": "heading",
 }
 """Name of each figure on a page."""
 
-_PPM = 1e6
-_PERCENT = 1e2
-_OF_RATIO = {
+_PPM_PER_UNIT = 1e6
+_PERCENT_PER_UNIT = 1e2
+_RATIO_UNITS = {
     "scale_factor": ("", 1.0),
-    "asymmetry": (" ppm", _PPM),
-    "quadratic": (" ppm per °/s", _PPM * math.radians(1.0)),
-    "linearity": (" %", _PERCENT),
+    "asymmetry": (" ppm", _PPM_PER_UNIT),
+    "quadratic": (" ppm per °/s", _PPM_PER_UNIT * math.radians(1.0)),
+    "linearity": (" %", _PERCENT_PER_UNIT),
 }
-"""Unit on a page of what is no rate, and the factor to it."""
+"""Unit of each dimensionless quantity on a page, and the factor to it."""
 
-_DOUBTED = 0.05
-"""Chance below which a straight line is doubted."""
+_MIN_LINEARITY_P_VALUE = 0.05
+"""p-value below which the response of a gyro counts as nonlinear."""
+
+_MIN_SCATTER_P_VALUE = 0.01
+"""p-value below which the scatter of the means contradicts the noise model."""
 
 
 def answer(rows: Sequence[CalibrationRow], system: System) -> str:
-    """Return scale factor and bias of a recording in a sentence, or why there are none.
+    """Return scale factor and bias of a recording in a sentence, or the reason without them.
 
-    Of its rows of the table ``calibration``, as all below.
+    ``rows`` are those of the recording in the table ``calibration``, as in all functions below.
     """
     by_parameter = {row.parameter: row for row in rows}
     bias = by_parameter.get("bias")
     if bias is None:
-        return "Nothing was found of this recording."
+        return "This recording has no result."
     if bias.value is None:
         return sentence(bias.reason)
     unit = page_unit("gyro", "adev", system)
-    text = (
-        f"The bias is {_around(bias.value, bias.lower, bias.upper, unit.text)} {unit.sign} (95 %)"
-    )
+    size = _format_half_width(bias.value, bias.lower, bias.upper, unit.text)
+    text = f"The bias is {size} {unit.sign} (95 %)"
     scale = by_parameter.get("scale_factor")
     if scale is not None and scale.value is not None:
         error, lower, upper = (
-            None if size is None else _PPM * (size - 1.0)
+            None if size is None else _PPM_PER_UNIT * (size - 1.0)
             for size in (scale.value, scale.lower, scale.upper)
         )
-        off = _around(error, lower, upper, number_text)
-        text = f"The scale factor is off by {off} ppm. " + text
+        off = _format_half_width(error, lower, upper, number_text)
+        text = f"The scale factor error is {off} ppm. " + text
     text += ". "
     straight = by_parameter.get("linearity")
     if straight is not None and straight.chance is not None and straight.value is not None:
-        doubted = straight.chance < _DOUBTED
-        largest = number_text(_PERCENT * straight.value, 3)
+        nonlinear = straight.chance < _MIN_LINEARITY_P_VALUE
+        largest = number_text(_PERCENT_PER_UNIT * straight.value, 3)
         text += f"The largest deviation from the line is {largest} % of the largest rate. "
-        text += f"A straight line {'does not fit' if doubted else 'fits'}: noise alone departs as "
-        text += f"far from it with a chance of {percent_text(straight.chance, 2)}."
+        text += f"Noise {'does not explain' if nonlinear else 'explains'} this deviation "
+        text += f"(p = {percent_text(straight.chance, 2)})."
     return text.strip()
 
 
-def _around(
+def _format_half_width(
     value: float | None,
     lower: float | None,
     upper: float | None,
@@ -92,7 +94,7 @@ def _around(
 
 
 def lines(rows: Sequence[CalibrationRow]) -> Iterator[dict[str, Any]]:
-    """Yield the lines of the table of what was found; a figure that is no rate as text."""
+    """Yield the lines of the table of results; dimensionless quantities as text."""
     for row in rows:
         if row.status == "not_observable" and row.parameter in ("earth_rate", "heading"):
             continue
@@ -104,26 +106,26 @@ def lines(rows: Sequence[CalibrationRow]) -> Iterator[dict[str, Any]]:
             "percent": None if row.chance is None else percent_text(row.chance, 2),
             "why": sentence(row.reason),
         }
-        yield line | _texts(row)
+        yield line | _format_ratio(row)
 
 
-def _texts(row: CalibrationRow) -> dict[str, str]:
-    """Return a ratio with its limits as text."""
+def _format_ratio(row: CalibrationRow) -> dict[str, str]:
+    """Return a dimensionless quantity with its limits as text."""
     name = row.parameter
-    if row.value is None or name not in _OF_RATIO:
+    if row.value is None or name not in _RATIO_UNITS:
         return dict.fromkeys(("text", "limits", "sigma_text", "truth_text"), "–")
     shown = (row.value, row.lower, row.upper, row.truth)
     if name == "scale_factor":
         digits = limit_digits(row.lower, row.upper, 4)
         value, low, high, true = (number_text(size, digits) for size in shown)
-        sigma = "–" if row.sigma is None else f"{number_text(_PPM * row.sigma, 3)} ppm"
+        sigma = "–" if row.sigma is None else f"{number_text(_PPM_PER_UNIT * row.sigma, 3)} ppm"
     else:
-        _, per = _OF_RATIO[name]
+        _, per = _RATIO_UNITS[name]
         value, low, high, true, sigma = (
             number_text(None if size is None else per * size, 3) for size in (*shown, row.sigma)
         )
     return {
-        "text": value + _OF_RATIO[name][0],
+        "text": value + _RATIO_UNITS[name][0],
         "limits": f"{low} to {high}",
         "sigma_text": sigma,
         "truth_text": true,
@@ -131,7 +133,7 @@ def _texts(row: CalibrationRow) -> dict[str, str]:
 
 
 def not_observable(rows: Sequence[CalibrationRow]) -> list[dict[str, Any]]:
-    """Return what a recording cannot tell, each with the reason."""
+    """Return the quantities that a recording cannot determine, each with the reason."""
     return [
         {"words": WORDS[row.parameter], "why": sentence(row.reason), **row.columns()}
         for row in rows
@@ -140,41 +142,40 @@ def not_observable(rows: Sequence[CalibrationRow]) -> list[dict[str, Any]]:
 
 
 def scatter_words(rows: Sequence[CalibrationRow]) -> str:
-    """Return whether the scatter is that of the noise model, in a sentence."""
+    """Return whether the scatter agrees with the noise model, in a sentence."""
     chance = next((row.scatter for row in rows if row.scatter is not None), None)
     if chance is None:
         return ""
     text = percent_text(chance, 2)
-    if chance < _DOUBTED / 5.0:
+    if chance < _MIN_SCATTER_P_VALUE:
         return (
-            "The means scatter more than the noise model allows: that much or more has a chance of "
-            f"{text}. The noise was another one, or the sensor was warming up or moved: the limits "
-            "are too narrow."
+            f"The means scatter more than the noise model predicts (p = {text}), so the intervals "
+            "are too narrow. Check for other noise, a warm-up or motion."
         )
-    return f"The scatter of the means is that of the noise model: as much or more in {text}."
+    return f"The scatter of the means agrees with the noise model (p = {text})."
 
 
 def earth_words(rows: Sequence[CalibrationRow], system: System) -> str:
-    """Return what was taken off for the rotation of the Earth, in a sentence."""
+    """Return the correction for the Earth's rate, in a sentence."""
     row = next((row for row in rows if row.earth_rate is not None), None)
     if row is None:
-        return "What the Earth's rotation adds along the axis is a part of the bias."
+        return "The bias includes the Earth's rate along the axis."
     unit = page_unit("gyro", "adev", system)
     text = (
         f"The Earth's rate along the axis, {unit.text(row.earth_rate, 4)} {unit.sign} (latitude "
-        f"{degrees_text(row.latitude)}, {_direction(row)}), is taken off"
+        f"{degrees_text(row.latitude)}, {_describe_direction(row)}), is subtracted"
     )
     if row.half_width:
-        text += f"; with no heading it is within ± {unit.text(row.half_width, 3)} {unit.sign}"
-    elif row.earth_rate_sigma:
         text += (
-            f"; by the direction it is sure to {unit.text(row.earth_rate_sigma, 2)} {unit.sign} "
-            "(1σ)"
+            f"; without a heading it is uncertain by ± {unit.text(row.half_width, 3)} {unit.sign}"
         )
+    elif row.earth_rate_sigma:
+        sigma = f"{unit.text(row.earth_rate_sigma, 2)} {unit.sign}"
+        text += f"; the stated direction determines it to {sigma} (1σ)"
     return text + "."
 
 
-def _direction(row: CalibrationRow) -> str:
+def _describe_direction(row: CalibrationRow) -> str:
     elevation = f"elevation {degrees_text(row.elevation)}"
     if row.heading is not None:
         return f"heading {degrees_text(row.heading)}, {elevation}"
@@ -199,7 +200,7 @@ class Estimated(Protocol):
 
     @property
     def model_from(self) -> str | None:
-        """What that is from."""
+        """Source of the noise model."""
 
 
 def calibrated(site: Site) -> list[RecordingView]:
@@ -215,7 +216,7 @@ def calibrated(site: Site) -> list[RecordingView]:
 def without_result(
     views: Sequence[RecordingView], rows_of: Callable[[RecordingView], Sequence[Estimated]]
 ) -> Iterator[dict[str, Any]]:
-    """Yield the recordings of an experiment of which nothing could be estimated, and why."""
+    """Yield the recordings of an experiment without an estimate, with the reasons."""
     for view in views:
         rows = rows_of(view)
         if rows and all(row.value is None for row in rows):
@@ -229,11 +230,11 @@ NOT_CALIBRATED = Section(
         list(without_result(calibrated(site), lambda view: view.rows(CalibrationRow))) or None
     ),
 )
-"""What could not be calibrated, on the start page."""
+"""The recordings without a calibration result, on the start page."""
 
 
 def at_rest(site: Site, view: RecordingView) -> tuple[str, dict[str, Any]] | None:
-    """Return what the page of a static recording says of its bias; None without a direction."""
+    """Return the bias of a static recording for its page; None without a known direction."""
     rows = [row for row in view.rows(CalibrationRow) if row.run == "at_rest"]
     if not rows:
         return None
@@ -248,7 +249,7 @@ def at_rest(site: Site, view: RecordingView) -> tuple[str, dict[str, Any]] | Non
 
 
 def of_all(site: Site) -> dict[str, list[dict[str, Any]]]:
-    """Return the lines of the page that has all calibrated recordings, by kind of run."""
+    """Return the lines of all calibrated recordings, by kind of run."""
     by_run: dict[str, list[dict[str, Any]]] = {"rate_table": [], "at_rest": [], "positions": []}
     for view in calibrated(site):
         rows = view.rows(CalibrationRow)

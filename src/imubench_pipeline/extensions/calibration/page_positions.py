@@ -1,4 +1,4 @@
-"""The page of a recording of a triad that stood in several positions."""
+"""The page of a recording of a triad in several positions."""
 
 from __future__ import annotations
 

@@ -29,7 +29,7 @@ def context(site: Site, view: RecordingView, folder: Path) -> dict[str, Any]:
     points = view.rows(CalibrationPointRow)
     return {
         **about_of(site, view, [], folder),
-        "summary": _summary(view, points),
+        "summary": _summarise(view, points),
         "answer": answer(rows, site.system),
         "lines": list(lines(rows)),
         "open": not_observable(rows),
@@ -39,7 +39,7 @@ def context(site: Site, view: RecordingView, folder: Path) -> dict[str, Any]:
         "points": points,
         "findings": view.findings,
         "command": site.again(view, "calibration"),
-        "page": {"looks": {}, "channels": [], "findings": [], **_payload(points)},
+        "page": {"looks": {}, "channels": [], "findings": [], **_pack_points(points)},
     }
 
 
@@ -47,7 +47,7 @@ RATE_TABLE = RecordingPage("rate_table.html.jinja", context, "rate table")
 """The page of a gyro on a rate table."""
 
 
-def _payload(points: Sequence[CalibrationPointRow]) -> dict[str, Any]:
+def _pack_points(points: Sequence[CalibrationPointRow]) -> dict[str, Any]:
     arrays = Arrays()
     return {
         "table": {
@@ -62,9 +62,9 @@ def _payload(points: Sequence[CalibrationPointRow]) -> dict[str, Any]:
     }
 
 
-def _summary(view: RecordingView, points: Sequence[CalibrationPointRow]) -> str:
+def _summarise(view: RecordingView, points: Sequence[CalibrationPointRow]) -> str:
     if not points:
         return summary_words(view, [])
     most = math.degrees(max(abs(point.table_rate) for point in points))
-    rates = f"{counted(len(points), 'steady rate')} up to {number_text(most)} °/s"
+    rates = f"{counted(len(points), 'constant rate')} up to {number_text(most)} °/s"
     return summary_words(view, [rates])

@@ -1,4 +1,4 @@
-"""The page of the Earth's rate: what gyros find of it, and what they would need."""
+"""The page of the Earth's rate: estimates by gyros, and recordings that they would need."""
 
 from __future__ import annotations
 
@@ -36,16 +36,16 @@ def turned(site: Site) -> list[RecordingView]:
 
 
 def predicted(site: Site) -> list[RecordingView]:
-    """Return the recordings at rest by whose noise it is predicted what their sensor could find."""
+    """Return the static recordings with a prediction for the Earth's rate from their noise."""
     named = site.named_in(EarthRatePredictionRow)
     return [view for view in site.views if view.static and view.full_name in named]
 
 
-def _context(site: Site) -> dict[str, Any]:
+def _make_context(site: Site) -> dict[str, Any]:
     arrays = Arrays()
-    runs = [_run(site, view) for view in turned(site)]
+    runs = [_describe_run(site, view) for view in turned(site)]
     published = [row for view in turned(site) for row in view.rows(EarthRatePublishedRow)]
-    predicted = list(_predicted(site))
+    predicted = list(_list_predictions(site))
     aligned = alignments(site, arrays)
     return {
         "truth": EARTH_RATE,
@@ -65,7 +65,7 @@ def _context(site: Site) -> dict[str, Any]:
         "page": {
             "looks": {},
             "channels": [],
-            "published": [_drawn(row) for row in published],
+            "published": [_pack_estimates(row) for row in published],
             "predictions": {
                 line["place"]: prediction_payload(line["rows"], arrays) for line in predicted
             },
@@ -75,19 +75,19 @@ def _context(site: Site) -> dict[str, Any]:
     }
 
 
-def _views(site: Site) -> list[RecordingView]:
+def _select_recordings(site: Site) -> list[RecordingView]:
     return [*turned(site), *calibrated(site), *predicted(site)]
 
 
 EARTH_RATE_PAGE = Entry(
     file="earth_rate.html",
     title="Earth’s rate",
-    context=_context,
-    views=_views,
-    exists=lambda site: bool(_views(site)),
+    context=_make_context,
+    views=_select_recordings,
+    exists=lambda site: bool(_select_recordings(site)),
     place=4,
 )
-"""The page of all experiments that look for the Earth's rate."""
+"""The page of all experiments that estimate the Earth's rate."""
 
 NOT_FOUND = Section(
     page="index.html",
@@ -96,10 +96,10 @@ NOT_FOUND = Section(
         list(without_result(turned(site), lambda view: view.rows(EarthRateRow))) or None
     ),
 )
-"""Of which the Earth's rate could not be estimated, on the start page."""
+"""The recordings without an estimate of the Earth's rate, on the start page."""
 
 
-def _run(site: Site, view: RecordingView) -> dict[str, Any]:
+def _describe_run(site: Site, view: RecordingView) -> dict[str, Any]:
     rows = view.rows(EarthRateRow)
     whole = [row for row in rows if row.part == "whole"]
     shown = [row for row in rows if row.method in ESTIMATES]
@@ -117,8 +117,8 @@ def _run(site: Site, view: RecordingView) -> dict[str, Any]:
     }
 
 
-def _predicted(site: Site) -> Iterator[dict[str, Any]]:
-    """Yield what each sensor would need, once where several recordings say the same."""
+def _list_predictions(site: Site) -> Iterator[dict[str, Any]]:
+    """Yield the recordings that each sensor would need, without duplicates."""
     yielded: list[tuple[str, Any]] = []
     for view in [*turned(site), *predicted(site)]:
         rows = view.rows(EarthRatePredictionRow)
@@ -131,7 +131,7 @@ def _predicted(site: Site) -> Iterator[dict[str, Any]]:
         yield needed | {"view": view, "place": place, "rows": rows, "latitude": latitude}
 
 
-def _drawn(row: EarthRatePublishedRow) -> dict[str, Any]:
+def _pack_estimates(row: EarthRatePublishedRow) -> dict[str, Any]:
     return {
         "name": row.recording + ("" if row.part == "whole" else f", {row.part}"),
         "published": row.published,
@@ -142,7 +142,7 @@ def _drawn(row: EarthRatePublishedRow) -> dict[str, Any]:
 
 
 def published_words(rows: Sequence[EarthRatePublishedRow]) -> str:
-    """Return whether published estimates are within the noise, in sentences."""
+    """Return whether noise explains the errors of published estimates, in sentences."""
     if not rows:
         return ""
     beyond = [row for row in rows if row.verdict == "beyond the noise"]
@@ -151,21 +151,23 @@ def published_words(rows: Sequence[EarthRatePublishedRow]) -> str:
         for row in beyond
     )
     if not beyond:
-        return (
-            f"All {len(rows)} published estimates lie within what the noise allows. {_gain(rows)}"
+        every = (
+            "the error of the published estimate"
+            if len(rows) == 1
+            else f"the errors of all {len(rows)} published estimates"
         )
+        return f"Noise explains {every}. {_describe_gain(rows)}"
     within = len(rows) - len(beyond)
     return (
-        f"{counted(within, 'published estimate lies', 'published estimates lie')} within what the "
-        f"noise of the source's own figures allows, {len(beyond)} of {len(rows)} do not: {names}. "
-        "No filter takes that off: it is no noise, but another error of those runs, such as a "
-        "sensor that warms up, turns that are miscounted, or samples of the turns in the means. "
-        + _gain(rows)
+        f"The noise that the source prints explains {counted(within, 'published estimate')}. "
+        f"{len(beyond)} of {len(rows)} {'has' if len(beyond) == 1 else 'have'} a larger error: "
+        f"{names}. A filter cannot remove it. Possible causes are a warm-up, miscounted turns, or "
+        "samples of the turns in the means. " + _describe_gain(rows)
     )
 
 
-def _gain(rows: Sequence[EarthRatePublishedRow]) -> str:
-    """Return how much better a filter is than the mean over pairs, in a sentence."""
+def _describe_gain(rows: Sequence[EarthRatePublishedRow]) -> str:
+    """Return the improvement of a filter over the mean of pairs, in a sentence."""
     gains = [
         1.0 - row.sigma_filter / row.sigma
         for row in rows
@@ -176,6 +178,6 @@ def _gain(rows: Sequence[EarthRatePublishedRow]) -> str:
     ends = [number_text(100.0 * gain, 2) for gain in (min(gains), max(gains))]
     text = " to ".join(dict.fromkeys(ends))
     return (
-        f"A filter that does not know the rate has a σ that is {text} % less than that of "
-        "the mean over pairs in these runs: that is all that it improves."
+        f"In these runs, σ of a filter that does not know the rate is {text} % smaller than that "
+        "of the mean over pairs."
     )

@@ -1,4 +1,4 @@
-"""What the page of the Earth's rate says of how well sensors at rest find their attitude."""
+"""Alignment of sensors at rest, on the page of the Earth's rate."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from imubench_pipeline.report.practical import page_unit
 from imubench_pipeline.report.site import Site
 from imubench_pipeline.words.numbers import degrees_text, duration_text, number_text, sentence
 
-_SHOWN = (60.0, 600.0, 3600.0)
-"""Times of the table, s; the figure has more."""
+_TABLE_TIMES = (60.0, 600.0, 3600.0)
+"""Times at rest that the table shows, s; the figure has more."""
 
-_POSITIONS = {1: "one position", 2: "two opposite positions"}
+_POSITION_TEXTS = {1: "one position", 2: "two opposite positions"}
 
 
 def alignments(site: Site, arrays: Arrays) -> list[dict[str, Any]]:
-    """Return what is said of each sensor with gyros and accelerometers; arrays take its figures."""
+    """Return the section of each sensor with gyros and accelerometers; ``arrays`` gets its data."""
     entries = []
     for view in site.views:
         rows = view.rows(AlignmentRow)
@@ -37,18 +37,18 @@ def alignments(site: Site, arrays: Arrays) -> list[dict[str, Any]]:
                         f"{fine.text(about.accelerometer_bias, 3)} {fine.sign} "
                         f"({about.accelerometer_bias_from})."
                     ),
-                    "axes": _axes(about),
-                    "lines": [_line(row) for row in rows if row.time in _SHOWN],
+                    "axes": _describe_missing_axes(about),
+                    "lines": [_format_line(row) for row in rows if row.time in _TABLE_TIMES],
                     "none": list(dict.fromkeys(sentence(row.reason) for row in rows if row.reason)),
-                    "check": _check(rows),
-                    "drawn": _drawn(rows, arrays),
+                    "check": _describe_check(rows),
+                    "drawn": _pack_curves(rows, arrays),
                 }
             )
     return entries
 
 
-def _axes(row: AlignmentRow) -> str:
-    """Return which axes stand for others that the log has not, in a sentence."""
+def _describe_missing_axes(row: AlignmentRow) -> str:
+    """Return which axes are missing in the log and replaced by others, in a sentence."""
     lent_axes = []
     for channels, words in ((row.gyros, "gyro"), (row.accelerometers, "accelerometer")):
         pairs = [entry.split(": ") for entry in channels.split(", ")]
@@ -57,26 +57,26 @@ def _axes(row: AlignmentRow) -> str:
             lent_axes.append(f"{words} {' and '.join(lent)}")
     if not lent_axes:
         return ""
-    return f"The log has no {', '.join(lent_axes)}: the axes that are there stand for them."
+    return f"The log has no {', '.join(lent_axes)}; the other axes replace them."
 
 
-def _line(row: AlignmentRow) -> dict[str, Any]:
+def _format_line(row: AlignmentRow) -> dict[str, Any]:
     return {
-        "position": _POSITIONS[row.positions],
+        "position": _POSITION_TEXTS[row.positions],
         "method": row.method,
         "time": duration_text(row.time),
-        "roll": _angle(row.roll),
-        "pitch": _angle(row.pitch),
-        "heading": _angle(row.heading),
+        "roll": _format_angle(row.roll),
+        "pitch": _format_angle(row.pitch),
+        "heading": _format_angle(row.heading),
     }
 
 
-def _angle(value: float | None) -> str:
-    return "not to be had" if value is None else degrees_text(value, 3)
+def _format_angle(value: float | None) -> str:
+    return "not determined" if value is None else degrees_text(value, 3)
 
 
-def _check(rows: Sequence[AlignmentRow]) -> str:
-    """Return what simulated triads say of the standard deviations, in a sentence."""
+def _describe_check(rows: Sequence[AlignmentRow]) -> str:
+    """Return the check of the standard deviations by simulated triads, in a sentence."""
     comparisons = []
     for row in rows:
         if row.simulated is None:
@@ -89,26 +89,26 @@ def _check(rows: Sequence[AlignmentRow]) -> str:
         ratio_words = ", ".join(
             f"{name} {number_text(ratio, 3)}" for name, ratio in ratios if ratio is not None
         )
-        comparisons.append(f"in {_POSITIONS[row.positions]} {ratio_words}")
+        comparisons.append(f"in {_POSITION_TEXTS[row.positions]} {ratio_words}")
     if not comparisons:
         return ""
     number = next(row.simulated for row in rows if row.simulated is not None)
     last = duration_text(max(row.time for row in rows))
     return (
-        f"Check: {number} simulated triads of this noise, aligned for {last} by the filter; rms "
-        f"of their errors over the predicted σ: {'; '.join(comparisons)}."
+        f"Check: {number} simulated triads with this noise, aligned for {last} by the filter. "
+        f"Rms error / predicted σ: {'; '.join(comparisons)}."
     )
 
 
-def _drawn(rows: Sequence[AlignmentRow], arrays: Arrays) -> list[dict[str, Any]]:
-    """Return the courses of the figure: level is the worse of roll and pitch."""
+def _pack_curves(rows: Sequence[AlignmentRow], arrays: Arrays) -> list[dict[str, Any]]:
+    """Return the curves of the figure; ``level`` is the larger of roll and pitch."""
     courses = []
-    for positions in _POSITIONS:
+    for positions in _POSITION_TEXTS:
         for method in ("coarse", "fine"):
             own = [r for r in rows if r.positions == positions and r.method == method]
             values = {
                 "heading": [r.heading for r in own],
-                "level": [_worse(r.roll, r.pitch) for r in own],
+                "level": [_find_largest(r.roll, r.pitch) for r in own],
             }
             for angle, sigma in values.items():
                 points = [(r.time, s) for r, s in zip(own, sigma, strict=True) if s]
@@ -125,6 +125,6 @@ def _drawn(rows: Sequence[AlignmentRow], arrays: Arrays) -> list[dict[str, Any]]
     return courses
 
 
-def _worse(*angles: float | None) -> float | None:
-    """Return the largest angle; None where one is not known, which may be the largest."""
+def _find_largest(*angles: float | None) -> float | None:
+    """Return the largest angle; None if one is unknown."""
     return None if None in angles else max(angle for angle in angles if angle is not None)

@@ -50,7 +50,7 @@ METHOD_WORDS = {
     "known_rate_radians": "bias tracking with known rate, P₀ in (rad/s)²",
 }
 ESTIMATES = ("filter", "pairs", "triples")
-"""The methods that find the rate, the one to use first; the smoother's is that of the filter."""
+"""The methods that estimate the rate, the recommended one first; filter and smoother agree."""
 
 
 def context(site: Site, view: RecordingView, folder: Path) -> dict[str, Any]:
@@ -66,7 +66,7 @@ def context(site: Site, view: RecordingView, folder: Path) -> dict[str, Any]:
     return {
         **about_of(site, view, [], folder),
         "channel": channel,
-        "summary": _summary(view, turning, rows),
+        "summary": _summarise(view, turning, rows),
         "answer": answer(whole, site.system),
         "doubts": [sentence(row.doubts) for row in turning if row.what == "doubt"],
         "findings": view.findings,
@@ -81,14 +81,14 @@ def context(site: Site, view: RecordingView, folder: Path) -> dict[str, Any]:
         "published": list(published_lines(view.rows(EarthRatePublishedRow))),
         "needs": needs(prediction),
         "has_prediction": bool(prediction),
-        "stretches": list(_stretches(turning)),
+        "stretches": list(_list_stretches(turning)),
         "command": site.again(view, "earth_rate"),
         "page": {
             "looks": {},
             "channels": [],
             "findings": [],
             "samples": samples_payload(envelope, [], arrays),
-            "turned": _payload(view, rows, turning, arrays),
+            "turned": _pack_figures(view, rows, turning, arrays),
             "prediction": prediction_payload(prediction, arrays),
             "arrays": arrays.texts,
         },
@@ -99,7 +99,7 @@ TURNED_PAGE = RecordingPage("turned.html.jinja", context, "two positions")
 """The page of a gyro that was turned between north and south."""
 
 
-def _summary(
+def _summarise(
     view: RecordingView, turning: Sequence[TurningRow], rows: Sequence[EarthRateRow]
 ) -> str:
     turns = sum(event.what == "turn" for event in turning)
@@ -115,14 +115,14 @@ def latitude_text(rows: Sequence[EarthRateRow | EarthRatePredictionRow]) -> str:
 
 
 def answer(rows: Sequence[EarthRateRow], system: System) -> str:
-    """Return what was found in a sentence: the filter's estimate, or why there is none.
+    """Return the filter's estimate in a sentence, or the reason why there is none.
 
-    Of rows of the table ``earth_rate``, of the whole recording.
+    ``rows`` are those of the whole recording in the table ``earth_rate``.
     """
     by_method = {row.method: row for row in rows}
     best = by_method.get("filter")
     if best is None:
-        return "Nothing was found of the turns of this recording."
+        return "This recording has no estimate of the Earth's rate."
     if best.value is None:
         return sentence(best.reason)
     unit = page_unit("gyro", "adev", system)
@@ -130,21 +130,22 @@ def answer(rows: Sequence[EarthRateRow], system: System) -> str:
     size = None if best.upper is None else best.upper - best.value
     away = None if best.off_sigma is None else abs(best.off_sigma)
     text = (
-        f"The filter finds an Earth's rate of {value} ± {unit.text(size, 2)} {unit.sign} (95 %); "
-        f"it is {truth} {unit.sign}, {number_text(away, 2)} standard deviations away."
+        f"The filter estimates an Earth's rate of {value} ± {unit.text(size, 2)} {unit.sign} "
+        f"(95 %). The true rate is {truth} {unit.sign}, {number_text(away, 2)} standard deviations "
+        "away."
     )
-    if away is not None and away > _FAR:
+    if away is not None and away > _MAX_NOISE_ERROR:
         text += (
-            " So far off is not noise: a wrong sense, axis or latitude, a sensor that is warming "
-            "up, or another noise than at rest."
+            " Noise does not explain this error. Check sense, axis and latitude, a warm-up, and "
+            "whether the noise is that at rest."
         )
     return text + (f" {sentence(best.reason)}" if best.reason else "")
 
 
 def given_words(rows: Sequence[EarthRateRow]) -> str:
-    """Return from when on the filter that is given the rate stays near it, in a sentence.
+    """Return the settling time of the filter that is given the rate, in a sentence.
 
-    Of rows of ``earth_rate``, of one recording or of several; empty where none was given.
+    ``rows`` are those of ``earth_rate``, of one or several recordings; empty without this filter.
     """
     given = [row for row in rows if row.part == "whole" and row.status == "given"]
     parts = []
@@ -154,24 +155,24 @@ def given_words(rows: Sequence[EarthRateRow]) -> str:
         if not times:
             continue
         ends = [duration_text(time) for time in dict.fromkeys(reached[:1] + reached[-1:])]
-        text = f"after {' to '.join(ends)} of data" if ends else "not by the end"
+        text = f"after {' to '.join(ends)} of data" if ends else "never"
         if ends and len(reached) < len(times):
-            text += f", in {len(times) - len(reached)} of {len(times)} not by the end"
+            text += f" (never in {len(times) - len(reached)} of {len(times)} runs)"
         parts.append(f"{text} with P₀ in {unit}")
     if not parts:
         return ""
     return (
-        f"Within a tenth of the rate that it is given it stays {'; '.join(parts)}: till then its "
-        "mean has the noise of all that came, and has it whatever the filter is given."
+        f"It settles within 10 % of the given rate {'; '.join(parts)}. Until then, noise dominates "
+        "its mean."
     )
 
 
-_FAR = 4.0
-"""Standard deviations beyond which an estimate is not what noise makes of it."""
+_MAX_NOISE_ERROR = 4.0
+"""Error of an estimate in standard deviations beyond which noise does not explain it."""
 
 
 def line(row: EarthRateRow) -> dict[str, Any]:
-    """Return a line of the table of estimates, of a row of ``earth_rate``."""
+    """Return a line of the table of estimates, from a row of ``earth_rate``."""
     return {
         **row.columns(),
         "term": METHOD_TERMS[row.method],
@@ -184,7 +185,7 @@ def line(row: EarthRateRow) -> dict[str, Any]:
 
 
 def published_lines(rows: Sequence[EarthRatePublishedRow]) -> Iterator[dict[str, Any]]:
-    """Yield the lines of the table of what a source prints of its runs."""
+    """Yield the lines of the table of published estimates."""
     for row in rows:
         yield {
             **row.columns(),
@@ -194,14 +195,14 @@ def published_lines(rows: Sequence[EarthRatePublishedRow]) -> Iterator[dict[str,
 
 
 def off_words(row: EarthRatePublishedRow) -> str:
-    """Return by how many standard deviations a published estimate is off."""
+    """Return the error of a published estimate in standard deviations."""
     return f"{number_text(row.off_sigma, 3)} σ"
 
 
 def needs(rows: Sequence[EarthRatePredictionRow]) -> dict[str, Any] | None:
-    """Return what it takes to find the Earth's rate, for a table and a sentence.
+    """Return the recordings required to find the Earth's rate, for a table and a sentence.
 
-    Of rows of the table ``earth_rate_prediction``, of one recording.
+    ``rows`` are those of one recording in the table ``earth_rate_prediction``.
     """
     goals = [row for row in rows if row.of == "goal"]
     if not goals:
@@ -218,7 +219,7 @@ def needs(rows: Sequence[EarthRatePredictionRow]) -> dict[str, Any] | None:
                 "time": duration_text(row.time),
                 "seconds": row.time,
                 "sigma": row.sigma,
-                "heading": _heading(row.heading),
+                "heading": _format_heading(row.heading),
             }
             for row in goals
         ],
@@ -226,40 +227,40 @@ def needs(rows: Sequence[EarthRatePredictionRow]) -> dict[str, Any] | None:
         if best is None
         else (
             f"In a run of {duration_text(best.time)} the best dwell has "
-            f"{number_text(best.dwell, 3)} s of data ({counted(best.turns, 'turn')}): it "
-            f"gives the Earth's rate to {percent_text(best.relative)}. "
-            + _about_best(best.dwell, [row.dwell for row in curve], nearly)
+            f"{number_text(best.dwell, 3)} s of data ({counted(best.turns, 'turn')}) and gives "
+            f"the Earth's rate to {percent_text(best.relative)} (1σ). "
+            + _describe_near_best(best.dwell, [row.dwell for row in curve], nearly)
         ),
     }
 
 
-def _about_best(best: float, tried: Sequence[float], nearly: Sequence[float]) -> str:
-    """Return which dwells are as good as the best, in a sentence; at an edge of the search so."""
+def _describe_near_best(best: float, tried: Sequence[float], nearly: Sequence[float]) -> str:
+    """Return which dwells are nearly as good as the best, in a sentence."""
     near = [*nearly, best]
     low, high = (number_text(limit, 3) for limit in (min(near), max(near)))
     if best in (max(tried), min(tried)):
         longest = best == max(tried)
-        text = f"It is the {'longest' if longest else 'shortest'} that was tried"
+        text = f"It is the {'longest' if longest else 'shortest'} dwell that was tried"
         if low == high:
             return f"{text}."
         limit = f"down to {low}" if longest else f"up to {high}"
-        return f"{text}; {limit} s it is less than 1 % worse."
+        return f"{text}; dwells {limit} s are less than 1 % worse."
     if low == high:
-        return "All others that were tried are worse by 1 % or more."
-    return f"From {low} s to {high} s it is less than 1 % worse."
+        return "All other dwells that were tried are at least 1 % worse."
+    return f"Dwells from {low} s to {high} s are less than 1 % worse."
 
 
-_SMALL = 0.5
-"""Largest standard deviation of a heading, rad, of which the formula for small angles tells."""
+_MAX_SMALL_HEADING = 0.5
+"""Largest standard deviation of a heading for which the small-angle formula holds, rad."""
 
 
-def _heading(heading: float | None) -> str:
-    if heading is not None and heading > _SMALL:
-        return f"above {degrees_text(_SMALL, 2)}"
+def _format_heading(heading: float | None) -> str:
+    if heading is not None and heading > _MAX_SMALL_HEADING:
+        return f"above {degrees_text(_MAX_SMALL_HEADING, 2)}"
     return degrees_text(heading, 3)
 
 
-def _stretches(turning: Sequence[TurningRow]) -> Iterator[dict[str, Any]]:
+def _list_stretches(turning: Sequence[TurningRow]) -> Iterator[dict[str, Any]]:
     """Yield dwells, turns and knocks in the order of time."""
     listed = [row for row in turning if row.start is not None]
     for row in sorted(listed, key=lambda row: (row.start, row.what)):
@@ -267,13 +268,13 @@ def _stretches(turning: Sequence[TurningRow]) -> Iterator[dict[str, Any]]:
         yield {**row.columns(), "position": position}
 
 
-def _payload(
+def _pack_figures(
     view: RecordingView,
     rows: Sequence[EarthRateRow],
     turning: Sequence[TurningRow],
     arrays: Arrays,
 ) -> dict[str, Any]:
-    """Return what the figures of dwells and estimates are drawn from."""
+    """Return the data of the figures of dwells and estimates."""
     dwells, turns = ([row for row in turning if row.what == what] for what in ("dwell", "turn"))
     series = view.rows(EarthRateSeriesRow)
     return {
@@ -291,15 +292,15 @@ def _payload(
         "found_by": [row.found_by for row in turns],
         "parts": {
             part: {
-                "range": _range([row for row in series if row.part == part], rows[0].truth),
-                "courses": _courses([row for row in series if row.part == part], arrays),
+                "range": _find_range([row for row in series if row.part == part], rows[0].truth),
+                "courses": _pack_courses([row for row in series if row.part == part], arrays),
             }
             for part in dict.fromkeys(row.part for row in series)
         },
     }
 
 
-def _courses(series: Sequence[EarthRateSeriesRow], arrays: Arrays) -> dict[str, Any]:
+def _pack_courses(series: Sequence[EarthRateSeriesRow], arrays: Arrays) -> dict[str, Any]:
     courses: dict[str, Any] = {}
     for name in dict.fromkeys((row.quantity, row.method) for row in series):
         own = [row for row in series if (row.quantity, row.method) == name]
@@ -312,8 +313,8 @@ def _courses(series: Sequence[EarthRateSeriesRow], arrays: Arrays) -> dict[str, 
     return courses
 
 
-def _range(series: Sequence[EarthRateSeriesRow], truth: float) -> list[float]:
-    """Return what a figure of the estimates shows of the rate: the first ones are far off."""
+def _find_range(series: Sequence[EarthRateSeriesRow], truth: float) -> list[float]:
+    """Return the range of the rate in the figure of estimates, without the first estimates."""
     rates = [row for row in series if row.quantity == "rate"]
     if not rates:
         return [0.0, 2.0 * truth]
@@ -323,18 +324,18 @@ def _range(series: Sequence[EarthRateSeriesRow], truth: float) -> list[float]:
     return [truth - 1.1 * high, truth + 1.1 * high]
 
 
-_ALONG: Mapping[str, Callable[[EarthRatePredictionRow], float]] = {
+_ABSCISSAE: Mapping[str, Callable[[EarthRatePredictionRow], float]] = {
     "time": lambda row: row.time,
     "dwell": lambda row: row.dwell,
 }
-"""Along what the curves of a prediction are drawn, by what its rows are of."""
+"""Abscissa of the curves of a prediction, by the kind of its rows."""
 
 
 def prediction_payload(rows: Sequence[EarthRatePredictionRow], arrays: Arrays) -> dict[str, Any]:
-    """Return what the figures of the prediction of a recording are drawn from."""
+    """Return the data of the figures of the prediction of a recording."""
     goals = [row.goal for row in rows if row.of == "goal"]
     payload: dict[str, Any] = {"goals": goals, "truth": EARTH_RATE}
-    for of, x in _ALONG.items():
+    for of, x in _ABSCISSAE.items():
         own = sorted((row for row in rows if row.of == of and row.sigma is not None), key=x)
         payload[of] = {
             "x": arrays.exact([x(row) for row in own]),

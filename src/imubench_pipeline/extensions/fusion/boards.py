@@ -1,4 +1,4 @@
-"""The page of the boards: sensors that share a place, beside what a paper prints of them."""
+"""The page of the boards: sensors that share a place, compared with the figures of a paper."""
 
 from __future__ import annotations
 
@@ -12,19 +12,19 @@ from imubench_pipeline.report.site import Entry, Site
 from imubench_pipeline.report.view import ChannelView, RecordingView
 from imubench_pipeline.words.numbers import limit_digits, number_text
 
-_ALIKE = 0.05
-"""Relative difference up to which found and printed are one figure."""
+_MAX_AGREEING_DIFFERENCE = 0.05
+"""Relative difference up to which result and printed figure agree."""
 
-_UNIT = {"bias": "signal"}
-"""Unit of the page of a parameter, where it has another name."""
+_UNIT_SYMBOLS = {"bias": "signal"}
+"""Symbol of the unit of a parameter, where it differs from that of the parameter."""
 
 
-def _context(site: Site) -> dict[str, Any]:
+def _make_context(site: Site) -> dict[str, Any]:
     arrays = Arrays()
     boards = []
     payloads: list[dict[str, Any]] = []
     for name, board in site.settings["boards"].items():
-        views = _views(site, name)
+        views = _select_recordings(site, name)
         channels = {view.sensor: view.channels() for view in views}
         payloads += (
             channel_payload(channel, channel.rate, arrays)
@@ -36,13 +36,13 @@ def _context(site: Site) -> dict[str, Any]:
                 "name": name,
                 "title": board["title"],
                 "note": board["note"],
-                "shared": _shared(board),
+                "shared": _describe_shared(board),
                 "sensors": [
                     {
                         "view": view,
                         "name": site.names[view.sensor],
                         "channels": [
-                            _channel(site, view, channel, board["sensors"][view.sensor])
+                            _describe_channel(site, view, channel, board["sensors"][view.sensor])
                             for channel in channels[view.sensor]
                         ],
                     }
@@ -56,7 +56,7 @@ def _context(site: Site) -> dict[str, Any]:
     return {"boards": boards, "page": page}
 
 
-def _views(site: Site, board: str) -> list[RecordingView]:
+def _select_recordings(site: Site, board: str) -> list[RecordingView]:
     """Return the recordings of a board that could be analysed."""
     of_board = site.settings["boards"][board]["sensors"]
     return [
@@ -72,22 +72,24 @@ def _views(site: Site, board: str) -> list[RecordingView]:
 BOARDS = Entry(
     file="boards.html",
     title="Boards",
-    context=_context,
-    views=lambda site: [view for name in site.settings["boards"] for view in _views(site, name)],
+    context=_make_context,
+    views=lambda site: [
+        view for name in site.settings["boards"] for view in _select_recordings(site, name)
+    ],
     exists=lambda site: bool(site.settings.get("boards")),
     place=3,
 )
 """The page that shows every board."""
 
 
-def _shared(board: Mapping[str, Any]) -> str:
+def _describe_shared(board: Mapping[str, Any]) -> str:
     shared = ["one temperature"] * board["temperature"] + ["one motion"] * bool(board["motion"])
     if not shared:
-        return "The sensors share nothing but their place."
-    return f"All sensors of the board have {' and '.join(shared)}."
+        return "The sensors share only their place."
+    return f"All sensors of the board share {' and '.join(shared)}."
 
 
-def _channel(
+def _describe_channel(
     site: Site, view: RecordingView, channel: ChannelView, figures: Mapping[str, str | None]
 ) -> dict[str, Any]:
     rows = view.rows(PublishedFigureRow)
@@ -100,15 +102,15 @@ def _channel(
 
 
 def published_lines(rows: Iterable[PublishedFigureRow]) -> Iterator[dict[str, Any]]:
-    """Yield the lines of what a source prints of a channel, of rows of ``published_figures``."""
+    """Yield the lines of the printed figures of a channel, from rows of ``published_figures``."""
     for row in rows:
         quantity = row.channel.split("_")[0]
         ours = row.datasheet if row.of == "datasheet" else row.value
         ratio = ours / row.means if ours and row.means else None
         yield {
             **row.columns(),
-            "unit": f"{quantity}.{_UNIT.get(row.parameter, row.parameter)}",
+            "unit": f"{quantity}.{_UNIT_SYMBOLS.get(row.parameter, row.parameter)}",
             "digits": limit_digits(row.lower, row.upper, 4),
             "ratio": "–" if ratio is None else number_text(ratio, 3),
-            "differs": ratio is not None and abs(ratio - 1.0) > _ALIKE,
+            "differs": ratio is not None and abs(ratio - 1.0) > _MAX_AGREEING_DIFFERENCE,
         }

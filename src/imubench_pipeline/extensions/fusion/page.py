@@ -1,4 +1,4 @@
-"""What the pages say of fusion: how many of one sensor equal one of another."""
+"""The page of fusion: how many of one sensor match one of another."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from imubench_pipeline.report.site import Entry, Site
 from imubench_pipeline.report.view import QUANTITY_NAMES
 from imubench_pipeline.words.numbers import number_text, percent_text
 
-_PARAMETERS = {"N": "white noise", "B": "bias instability", "K": "random walk", "R": "ramp"}
+_PARAMETER_TEXTS = {"N": "white noise", "B": "bias instability", "K": "random walk", "R": "ramp"}
 
 
-def _context(site: Site) -> dict[str, Any]:
+def _make_context(site: Site) -> dict[str, Any]:
     lines = list(equal_numbers(site.rows(FusionRow)))
     price_classes = {
         name: site.settings["sensors"].get(name, {}).get("price_class") for name in site.sensors
@@ -37,40 +37,39 @@ def _context(site: Site) -> dict[str, Any]:
 
 
 FUSION = Entry(
-    file="fusion.html", title="Fusion", context=_context, tables=("fusion", "grades"), place=2
+    file="fusion.html", title="Fusion", context=_make_context, tables=("fusion", "grades"), place=2
 )
-"""The page that says how many of one sensor equal one of another."""
+"""The page that shows how many of one sensor match one of another."""
 
 
 def shared_words(common: Mapping[str, float]) -> str:
-    """Return what specimens of one sensor are taken to have in common, in words.
+    """Return the assumptions on common errors, as sentences.
 
-    Parts of the variance of N, B, K and R.
+    ``common`` has the common share of the variance of N, B, K and R.
     """
     named = [
-        f"{percent_text(share)} of the variance of the {_PARAMETERS[name]} ({name})"
+        f"{percent_text(share)} of the variance of the {_PARAMETER_TEXTS[name]} ({name})"
         for name, share in common.items()
         if share > 0.0
     ]
     if not named:
-        shared = "The noise of each specimen is taken to be independent."
+        shared = "The noise of each unit is assumed to be independent."
     else:
-        shared = f"Specimens of one sensor are taken to have in common {', '.join(named)}."
+        shared = f"The units of one sensor are assumed to share {', '.join(named)}."
     return (
-        f"{shared} What temperature adds to a log with readings of it is common to all: they are "
-        "taken to have the same sensitivity. What else they follow together, such as supply or "
-        "motion, or a temperature that is not logged, makes the numbers too small."
+        f"{shared} The effect of a logged temperature counts as common to all units. Other common "
+        "influences (supply, motion, a temperature that is not logged) make the numbers too small."
     )
 
 
 def equal_numbers(rows: Sequence[FusionRow]) -> Iterator[dict[str, Any]]:
-    """Yield the lines of the table: pairs of which the first is the worse one, or not known."""
+    """Yield the lines of the table: pairs whose first sensor is the noisier one, or unknown."""
     for row in rows:
         if row.adev is not None and row.other_adev is not None:
             if row.adev <= row.other_adev:
                 continue
         elif row.sensor > row.other:
-            continue  # what is not known of a pair is said once
+            continue  # an unknown pair is listed once
         yield {
             "sensor": row.sensor,
             "other": row.other,
@@ -84,26 +83,26 @@ def equal_numbers(rows: Sequence[FusionRow]) -> Iterator[dict[str, Any]]:
             "seconds": row.tau,
             "adev": row.adev,
             "other_adev": row.other_adev,
-            "number": _number(row),
-            "limits": _limits(row),
-            "common": _common(row),
+            "number": _format_number(row),
+            "limits": _format_limits(row),
+            "common": _format_common(row),
         }
 
 
 def matrices(lines: Sequence[Mapping[str, Any]]) -> Iterator[dict[str, Any]]:
-    """Yield a matrix of each quantity and averaging time, of the lines of `equal_numbers`.
+    """Yield a matrix for each quantity and averaging time, from the lines of `equal_numbers`.
 
-    Rows and columns are the sensors, the quietest first; a cell says how many of its row equal one
-    of its column. A sensor that is at least as good needs one, and has no line.
+    Rows and columns are the sensors, the quietest first; a cell has the number of row sensors that
+    match one column sensor. A sensor that is at least as good needs one, and has no line.
     """
     groups: dict[tuple[str, str], list[Mapping[str, Any]]] = {}
     for line in lines:
         groups.setdefault((line["quantity"], line["tau"]), []).append(line)
     for (quantity, tau), own in groups.items():
         by_pair = {(line["sensor"], line["other"]): line for line in own}
-        levels = {line[of]: line[adev] for line in own for of, adev in _ENDS if line[adev]}
+        levels = {line[of]: line[adev] for line in own for of, adev in _PAIR_COLUMNS if line[adev]}
         sensors = sorted(levels, key=lambda sensor: (levels[sensor], sensor))
-        if 1 < len(sensors) <= _MOST:
+        if 1 < len(sensors) <= _MAX_MATRIX_SENSORS:
             cells = [[by_pair.get((row, column)) for column in sensors] for row in sensors]
             yield {
                 "name": f"{quantity}, {tau}",
@@ -114,20 +113,17 @@ def matrices(lines: Sequence[Mapping[str, Any]]) -> Iterator[dict[str, Any]]:
             }
 
 
-_ENDS = (("sensor", "adev"), ("other", "other_adev"))
-_MOST = 40
-"""Sensors of a matrix that can still be read."""
+_PAIR_COLUMNS = (("sensor", "adev"), ("other", "other_adev"))
+_MAX_MATRIX_SENSORS = 40
+"""Largest number of sensors for which a matrix is readable."""
 
 
 def grade_lines(rows: Sequence[GradeRow]) -> Iterator[dict[str, Any]]:
-    """Yield the lines of the table of how many reach a class: a sensor and an option each.
-
-    What is not printed of the class is said once of all sensors.
-    """
+    """Yield the lines of the table of classes: one per sensor and option with printed figures."""
     groups: dict[tuple[str, ...], dict[str, GradeRow]] = {}
     for row in rows:
         key = (row.quantity, row.sensor, row.grade, row.option or "")
-        # A density of which the side is not printed is there twice: the first reading is shown.
+        # A density of unknown sidedness has two rows: the first reading is shown.
         groups.setdefault(key, {}).setdefault(row.statistic, row)
     for (quantity, sensor, _, option), by in groups.items():
         if not any(row.printed for row in by.values()):
@@ -145,8 +141,8 @@ def grade_lines(rows: Sequence[GradeRow]) -> Iterator[dict[str, Any]]:
                     "value": row.value if row else None,
                     "printed": row.printed if row else None,
                     "n": row.n if row else None,
-                    "number": "–" if row is None or row.n is None else _whole(row.n),
-                    "limits": "" if row is None else _number_limits(row),
+                    "number": "–" if row is None or row.n is None else _round_up(row.n),
+                    "limits": "" if row is None else _format_grade_limits(row),
                     "reason": (row.reason or "") if row else "",
                 }
                 for name in ("N", "sigma_min")
@@ -156,7 +152,7 @@ def grade_lines(rows: Sequence[GradeRow]) -> Iterator[dict[str, Any]]:
 
 
 def unprinted_grades(rows: Sequence[GradeRow]) -> dict[str, str]:
-    """Return the sensors of the class of which nothing is printed of a quantity, and why."""
+    """Return the sensors of the class without printed figures of a quantity, and the reasons."""
     groups: dict[tuple[str, str], list[GradeRow]] = {}
     for row in rows:
         groups.setdefault((row.quantity, row.grade_name), []).append(row)
@@ -167,17 +163,17 @@ def unprinted_grades(rows: Sequence[GradeRow]) -> dict[str, str]:
     }
 
 
-def _number_limits(row: GradeRow) -> str:
+def _format_grade_limits(row: GradeRow) -> str:
     if row.n_upper is None:
         return ""
-    upper = _whole(row.n_upper)
+    upper = _round_up(row.n_upper)
     if row.n is None or row.n_lower is None:
         return f"at most {upper}"
-    lower = _whole(row.n_lower)
+    lower = _round_up(row.n_lower)
     return "" if lower == upper else f"{lower} to {upper}"
 
 
-def _common(row: FusionRow) -> str:
+def _format_common(row: FusionRow) -> str:
     if row.common_share is None:
         return "–"
     text = percent_text(row.common_share)
@@ -187,22 +183,22 @@ def _common(row: FusionRow) -> str:
     return text
 
 
-def _number(row: FusionRow) -> str:
-    """Return the least whole number of sensors that is enough."""
+def _format_number(row: FusionRow) -> str:
+    """Return the smallest sufficient number of sensors."""
     if row.reachable is False:
-        return "no number"
-    return "–" if row.n is None else _whole(row.n)
+        return "not possible"
+    return "–" if row.n is None else _round_up(row.n)
 
 
-def _limits(row: FusionRow) -> str:
+def _format_limits(row: FusionRow) -> str:
     if row.lower is None:
         return ""
     if row.upper is None:
-        return f"{_whole(row.lower)} or more"
-    lower, upper = _whole(row.lower), _whole(row.upper)
+        return f"{_round_up(row.lower)} or more"
+    lower, upper = _round_up(row.lower), _round_up(row.upper)
     return lower if lower == upper else f"{lower} to {upper}"
 
 
-def _whole(number: float) -> str:
-    # A number that rounding alone puts above a whole one is that one.
+def _round_up(number: float) -> str:
+    # Tolerate rounding errors just above a whole number.
     return number_text(max(math.ceil(number * (1.0 - 1e-9)), 1), 4)

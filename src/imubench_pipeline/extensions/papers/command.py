@@ -1,4 +1,4 @@
-"""`imubench papers`: what the papers print beside what is found, in the terminal."""
+"""`imubench papers`: printed values of the papers and the results, in the terminal."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ if TYPE_CHECKING:
 
     from imubench_pipeline.extensions.papers.tables import PublishedRow
 
-_KEYS = ("maia", "silva", "engers")
-_LEGEND = (
-    "Ratio: found over printed; ± how far from 1 still agrees, as does what is printed inside the "
-    "interval of what is found. Derived: is not printed, but follows from what is."
+_PAPER_KEYS = ("maia", "silva", "engers")
+_RATIO_LEGEND = (
+    "Ratio: result / printed, ± the tolerance. A printed value inside the interval of the result "
+    "agrees, too. Derived: not printed, but follows from printed values."
 )
 
 
@@ -28,15 +28,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "results",
         type=Path,
         nargs="?",
-        help="folder of the results of a run; default: what follows from printed figures alone",
+        help="folder of the results of a run; default: only lines that need no log",
     )
-    parser.add_argument("--paper", choices=_KEYS, help="this one alone")
+    parser.add_argument("--paper", choices=_PAPER_KEYS, help="only this paper; default: all")
     parser.add_argument("--place", help='such as "Table 3"; default: all')
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Print the lines; return the exit status."""
-    # Only what computes or draws loads this: the other commands answer at once.
+    # Imported here, so that the other commands start fast.
     from imubench_pipeline.extensions.papers.about import PAPERS
     from imubench_pipeline.extensions.papers.tables import PublishedRow
     from imubench_pipeline.report.show import show
@@ -72,7 +72,7 @@ def run(arguments: argparse.Namespace) -> int:
                 if row.paper == paper.name and arguments.place in (None, row.place)
             ]
             if own:
-                yield from _parts(f"{paper.name}: {paper.title}", own, width)
+                yield from _make_parts(f"{paper.name}: {paper.title}", own, width)
 
     if not rows:
         print(expected)
@@ -80,8 +80,8 @@ def run(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _parts(title: str, rows: Sequence[PublishedRow], width: int) -> Iterator[RenderableType]:
-    """Yield the table of a paper, and why lines differ."""
+def _make_parts(title: str, rows: Sequence[PublishedRow], width: int) -> Iterator[RenderableType]:
+    """Yield the table of a paper, and the reasons for differences."""
     from rich.text import Text
 
     from imubench_pipeline.extensions.papers.about import VERDICTS
@@ -103,10 +103,10 @@ def _parts(title: str, rows: Sequence[PublishedRow], width: int) -> Iterator[Ren
                 row.verdict + note,
             ]
         )
-    heads = ["Place", "Quantity", "Printed", "Found", "Ratio", "Verdict"]
+    heads = ["Place", "Quantity", "Printed", "Result", "Ratio", "Verdict"]
     yield fitting(title, heads, lines, width, names=1)
     yield Text()
-    yield Text(_LEGEND)
+    yield Text(_RATIO_LEGEND)
     for number, reason in enumerate(reasons, start=1):
         yield Text(f"  [{number}] {reason}")
     meanings = {str(verdict): meaning for verdict, meaning in VERDICTS.items()}

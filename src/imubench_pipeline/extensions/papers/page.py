@@ -1,4 +1,4 @@
-"""The page of the papers, line by line: what is printed, what is found, and why they differ."""
+"""The page of the papers, line by line: printed values, results, and reasons for differences."""
 
 from __future__ import annotations
 
@@ -22,19 +22,19 @@ from imubench_pipeline.report.view import ChannelView, RecordingView
 from imubench_pipeline.words.numbers import limit_digits, number_text, percent_text
 
 
-def _context(site: Site) -> dict[str, Any]:
-    there = _pages(site)
+def _make_context(site: Site) -> dict[str, Any]:
+    there = _list_pages(site)
     rows = site.rows(PublishedRow)
     arrays = Arrays()
-    drawn = _drawn(site)
+    drawn = _select_curves(site)
     payloads = [channel_payload(channel, channel.rate, arrays) for _, _, channel in drawn]
     used = {channel["sensor"]: site.looks[channel["sensor"]] for channel in payloads}
     return {
         "bases": BASES,
         "verdicts": VERDICTS,
-        "panel": _panel(site.rows(AccuracyRow)),
+        "panel": _describe_accuracy(site.rows(AccuracyRow)),
         "papers": [
-            _paper(paper, own, there)
+            _describe_paper(paper, own, there)
             | {"figures": [figure for figure in drawn if figure[0] in paper.drawn]}
             for paper in PAPERS
             if (own := [row for row in rows if row.paper == paper.name])
@@ -43,7 +43,7 @@ def _context(site: Site) -> dict[str, Any]:
     }
 
 
-def _views(site: Site) -> list[RecordingView]:
+def _select_recordings(site: Site) -> list[RecordingView]:
     """Return the recordings whose curves are drawn."""
     names = dict.fromkeys((one.sensor, one.recording) for paper in PAPERS for one in paper.drawn)
     views = {view.full_name: view for view in site.views if view.simulated and not view.left_out}
@@ -54,19 +54,19 @@ PAPERS_PAGE = Entry(
     place=5,
     file="papers.html",
     title="Papers",
-    context=_context,
+    context=_make_context,
     tables=("published", "accuracy"),
-    views=_views,
+    views=_select_recordings,
     exists=lambda site: bool(site.rows(PublishedRow)),
 )
-"""The page of every table, figure and equation of the papers of which the run has logs."""
+"""The page of every table, figure and equation of the papers whose logs the run simulates."""
 
 
-def _drawn(site: Site) -> list[tuple[Drawn, RecordingView, ChannelView]]:
-    """Return the curves that stand for figures, those that there are."""
+def _select_curves(site: Site) -> list[tuple[Drawn, RecordingView, ChannelView]]:
+    """Return the curves that reproduce figures of the papers, as far as they exist."""
     channels = {
         (*view.full_name, channel.channel): (view, channel)
-        for view in _views(site)
+        for view in _select_recordings(site)
         for channel in view.channels()
     }
     return [
@@ -77,8 +77,8 @@ def _drawn(site: Site) -> list[tuple[Drawn, RecordingView, ChannelView]]:
     ]
 
 
-def _panel(rows: Sequence[AccuracyRow]) -> dict[str, Any]:
-    """Return how far each method is from the bound: a line a method, a cell a parameter."""
+def _describe_accuracy(rows: Sequence[AccuracyRow]) -> dict[str, Any]:
+    """Return the errors of each method relative to the bound: a line per method."""
     symbols = list(dict.fromkeys(row.parameter for row in rows))
     by = {(row.method, row.parameter): row for row in rows}
     return {
@@ -88,13 +88,13 @@ def _panel(rows: Sequence[AccuracyRow]) -> dict[str, Any]:
             percent_text(next(r.bound for r in rows if r.parameter == symbol)) for symbol in symbols
         ],
         "lines": [
-            {"method": method, "cells": [_cell(by[method, symbol]) for symbol in symbols]}
+            {"method": method, "cells": [_format_cell(by[method, symbol]) for symbol in symbols]}
             for method in dict.fromkeys(row.method for row in rows)
         ],
     }
 
 
-def _cell(row: AccuracyRow) -> dict[str, str]:
+def _format_cell(row: AccuracyRow) -> dict[str, str]:
     if row.rmse is None:
         return {"error": "no value", "ratio": ""}
     low, high = (number_text(end, 2) for end in (row.ratio_lower, row.ratio_upper))
@@ -105,13 +105,13 @@ def _cell(row: AccuracyRow) -> dict[str, str]:
     }
 
 
-def _pages(site: Site) -> set[str]:
-    """Return the pages that a line may lead to."""
+def _list_pages(site: Site) -> set[str]:
+    """Return the pages that a line may link to."""
     of_recordings = {view.page for view in site.views if not view.left_out}
     return of_recordings | {file for file, _ in site.navigation}
 
 
-_COUNTED: dict[Verdict, tuple[str, str]] = {
+_VERDICT_COUNTS: dict[Verdict, tuple[str, str]] = {
     "agrees": ("agrees", "agree"),
     "differs": ("differs", "differ"),
     "possible": ("is possible", "are possible"),
@@ -122,7 +122,7 @@ _COUNTED: dict[Verdict, tuple[str, str]] = {
 }
 
 
-def _paper(paper: About, rows: Sequence[PublishedRow], there: set[str]) -> dict[str, Any]:
+def _describe_paper(paper: About, rows: Sequence[PublishedRow], there: set[str]) -> dict[str, Any]:
     verdicts = Counter(row.verdict for row in rows)
     return {
         "about": paper,
@@ -136,7 +136,7 @@ def _paper(paper: About, rows: Sequence[PublishedRow], there: set[str]) -> dict[
         ],
         "counts": [
             f"{verdicts[verdict]} {words[verdicts[verdict] > 1]}"
-            for verdict, words in _COUNTED.items()
+            for verdict, words in _VERDICT_COUNTS.items()
             if verdicts[verdict]
         ],
         "filters": {
@@ -148,9 +148,9 @@ def _paper(paper: About, rows: Sequence[PublishedRow], there: set[str]) -> dict[
 
 
 def cells(row: PublishedRow) -> dict[str, str]:
-    """Return what is found, the ratio and its tolerance of a row of ``published``, as texts.
+    """Return result, ratio and tolerance of a row of ``published``, as texts.
 
-    What is found is in the unit of the paper, so that it can be held beside what is printed.
+    The result is in the unit of the paper, so that it can be compared with the printed value.
     """
     found = ""
     if row.found is not None:
@@ -186,11 +186,11 @@ READING = Section(
     context=lambda site: words_of_reading(site.rows(AccuracyRow)) or None,
     tables=("accuracy",),
 )
-"""What comes of reading the curve, on the page of the theory."""
+"""The result of reading the curve, on the page of the theory."""
 
 
 def words_of_reading(rows: Sequence[AccuracyRow]) -> str:
-    """Return what comes of reading the curve, by the table ``accuracy``; empty where that is."""
+    """Return the result of reading the curve, from the table ``accuracy``; empty without rows."""
     of_curve = {row.parameter: row for row in rows if row.method == "curve"}
     if not of_curve:
         return ""

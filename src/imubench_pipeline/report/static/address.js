@@ -1,5 +1,5 @@
-// What the reader chose stands in the address, so that a link opens the same: #axis=…&b=…, or
-// #/PATH#axis=… where all pages are in one file. What is as a page opens is left out.
+// The address holds the choices of the reader, so that a link opens the same view: #axis=…&b=…, or
+// #/PATH#axis=… in a report of one file. Default choices are left out.
 
 let state = new URLSearchParams();
 

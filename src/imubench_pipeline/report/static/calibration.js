@@ -42,10 +42,10 @@ kinds.table_residuals = () => {
       },
     ],
     groups: [
-      { key: "points", label: "reading less line, with 2σ", on: true, look: { ...TABLE_POINTS, line: false } },
+      { key: "points", label: "residual, with 2σ", on: true, look: { ...TABLE_POINTS, line: false } },
       { key: "line", label: "the line", on: true, look: TABLE_LINE },
     ],
-    layout: { xaxis: linearAxis(`rate of the table (${unit.sign})`), yaxis: linearAxis(`reading less line (${fine.sign})`) },
+    layout: { xaxis: linearAxis(`rate of the table (${unit.sign})`), yaxis: linearAxis(`residual (${fine.sign})`) },
   };
 };
 

@@ -10,7 +10,7 @@ const termLook = (place) => {
   return { light, dark: darkened, dash: TERM_DASHES[place % TERM_DASHES.length], width: 1.4 };
 };
 
-// Samples and curves of a recording look as its sensor does everywhere; the model to use is inked.
+// Samples and curves have the colour of the sensor on every page; the recommended model is black.
 function sensorLook(sensor) {
   const looks = pageData.looks?.sensors ?? {};
   return looks[sensor] ?? Object.values(looks)[0] ?? { light: "#0072B2", dark: "#4DA3D9", dash: "solid", marker: "circle" };
@@ -60,12 +60,12 @@ kinds.allan = (figure) => {
     const times = array(view.compensated.tau);
     const [left, least, most] = ["adev", "lower", "upper"].map((name) => scaled(view.compensated[name], unit.factor));
     traces.push({
-      group: "compensated", type: "scatter", mode: "lines+markers", x: times, y: left, name: "temperature taken out", meta: { low: least, high: most },
+      group: "compensated", type: "scatter", mode: "lines+markers", x: times, y: left, name: "temperature compensated", meta: { low: least, high: most },
       line: { color: colourOf(without), width: 1.2 }, marker: { size: 4, color: colourOf(without) },
       text: times.map((t, i) => `τ ${numberText(t, 3)} s: <b>${numberText(left[i], 3)} ${unit.sign}</b><br>95 %: ${interval(least[i], most[i])} ${unit.sign}`),
-      hovertemplate: "temperature taken out<br>%{text}<extra></extra>",
+      hovertemplate: "temperature compensated<br>%{text}<extra></extra>",
     });
-    groups.push({ key: "compensated", label: `${what}, temperature taken out`, on: true, look: without });
+    groups.push({ key: "compensated", label: `${what}, temperature compensated`, on: true, look: without });
   }
   for (const [method, curve] of Object.entries(view.methods)) {
     const key = `method ${method}`;
@@ -74,7 +74,7 @@ kinds.allan = (figure) => {
       group: key, hoverinfo: "name", name: look[method].name,
     }));
     const on = use || (figure.dataset.methods ?? "").split(" ").includes(method);
-    groups.push({ key, label: look[method].name + (use ? " (use this)" : ""), on, look: { ...look[method], marker: undefined } });
+    groups.push({ key, label: look[method].name + (use ? " (recommended)" : ""), on, look: { ...look[method], marker: undefined } });
   }
   view.terms.forEach((term, place) => {
     traces.push(line(tau, scaled(term.adev, unit.factor), termLook(place), { group: `term ${place}`, hoverinfo: "name", name: term.name }));
@@ -118,7 +118,7 @@ kinds.spectrum = (figure) => {
   const points = (keep, key, colour, symbol) => {
     const chosen = f.map((_, i) => i).filter((i) => left.has(i) !== keep);
     return {
-      group: key, type: "scatter", mode: "markers", name: keep ? "bins used" : "bins left out", x: chosen.map((i) => f[i]), y: chosen.map((i) => density[i]),
+      group: key, type: "scatter", mode: "markers", name: keep ? "bins used" : "bins excluded", x: chosen.map((i) => f[i]), y: chosen.map((i) => density[i]),
       marker: { color: colour, size: keep ? 4 : 5, symbol },
       text: chosen.map((i) => `${numberText(f[i], 4)} Hz: ${numberText(density[i], 3)} ${unit.sign}`),
       hovertemplate: "%{text}<extra></extra>",
@@ -127,13 +127,13 @@ kinds.spectrum = (figure) => {
   const traces = [points(false, "left", inks().soft, "x-thin-open"), points(true, "used", colourOf(own), own.marker)];
   const groups = [
     { key: "used", label: "bins used", on: true, look: { ...own, line: false } },
-    { key: "left", label: "bins left out", on: true, look: { light: inks().soft, dark: inks().soft, line: false, marker: "x" }, absent: left.size === 0 },
+    { key: "left", label: "bins excluded", on: true, look: { light: inks().soft, dark: inks().soft, line: false, marker: "x" }, absent: left.size === 0 },
   ];
   const [least, most] = ["lower", "upper"].map((of) => scaled(spectrum[of], unit.factor));
   traces.unshift(...band(array(spectrum.fit_frequency), least, most, look, 0.2).map((trace) => ({ ...trace, group: "scatter" })));
   traces.push(line(array(spectrum.fit_frequency), scaled(spectrum.fitted, unit.factor), { ...look, width: 2.2 }, { group: "fit", name: `fit ${spectrum.model}`, meta: { low: least, high: most } }));
   groups.push({ key: "fit", label: `fit ${spectrum.model}`, on: true, look: { ...look, marker: undefined } });
-  groups.push({ key: "scatter", label: "scatter of 95 % of the bins, if the fit is right", on: true, look: { ...look, marker: undefined, filled: true } });
+  groups.push({ key: "scatter", label: "95 % band of the bins if the model is right", on: true, look: { ...look, marker: undefined, filled: true } });
   spectrum.terms.forEach((term, place) => {
     traces.push(line(array(spectrum.smooth), scaled(term.density, unit.factor), termLook(place), { group: `term ${place}`, hoverinfo: "name", name: term.name }));
     groups.push({ key: `term ${place}`, label: term.name, on: false, look: termLook(place) });
@@ -184,12 +184,12 @@ kinds.series = (figure) => {
     text: x.map((t, i) => `${numberText(t, 4)} ${scale.name}: mean ${numberText(mean[i], 4)} ${unit.sign}<br>${interval(low[i], high[i])} ${unit.sign}`),
   });
   const groups = [
-    { key: "envelope", label: "least and largest sample", on: true, look: { ...look, filled: true } },
+    { key: "envelope", label: "smallest and largest sample", on: true, look: { ...look, filled: true } },
     { key: "mean", label: "mean", on: true, look: black() },
-    { key: "drift", label: "drift: the mean alone, less that of the whole log", on: true, look: { ...look, width: 2 } },
+    { key: "drift", label: "drift of the mean", on: true, look: { ...look, width: 2 } },
   ];
   const layout = { xaxis: linearAxis(`time (${scale.name})`), yaxis: linearAxis(`${channel.replace("_", " ")} (${unit.sign})`) };
-  const below = []; // panels below that of the samples
+  const below = []; // panels below the samples
   const panel = (title) => {
     const name = `y${below.length + 2}`;
     below.push(name);
@@ -222,7 +222,7 @@ kinds.series = (figure) => {
   if (marked.length > 0) {
     groups.push({ key: "findings", label: "findings", on: true, look: { light: "#B3001B", dark: "#FF8F8F", filled: true } });
     if (shown(figure, "findings")) {
-      // Knocks are moments between the first and the last: only their range is marked.
+      // Knocks are single events, so only the range from the first to the last is marked.
       layout.shapes = marked.map((finding) => ({
         type: "rect", xref: "x", yref: "paper", y0: finding.finding === "knocks" ? 0.97 : 0, y1: 1, x0: finding.start / scale.size, x1: (finding.end ?? finding.start) / scale.size,
         fillcolor: faint(inks().mark, 0.13), line: { color: inks().mark, width: 1, dash: "dot" }, layer: "below",

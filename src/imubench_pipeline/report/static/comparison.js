@@ -1,11 +1,11 @@
-// Which sensors or recordings are side by side, and what is judged of them in words and tables.
+// The sensors or recordings that are compared, and the verdicts on them in sentences and tables.
 
 const LETTERS = "abcdef";
 let chosen = []; // { letter, key, sensor, recording, row }
 let growthOf = { axes: "worst", error: "heading", window: 60, time: 600 };
-let crossed = 10; // s, where the crosshair stands
+let crossed = 10; // s, position of the crosshair
 
-// A sensor stands for its longest recording; one that decides, and is measured, goes first.
+// The default of a sensor is its longest recording; a usable, measured one is preferred.
 function recordingOf(key) {
   const [sensor, ...rest] = key.split("/");
   const own = pageData.recordings.filter((row) => row.sensor === sensor && (rest.length === 0 || row.recording === rest.join("/")));
@@ -70,7 +70,7 @@ function drawPickers(pickers, axes) {
       const own = pageData.recordings.filter((row) => row.sensor === sensor);
       const name = `${nameOf(sensor)}${own.every((row) => row.sold) ? "" : " (not sold)"}`;
       const group = Object.assign(document.createElement("optgroup"), { label: name });
-      group.append(new Option(own.length > 1 ? `${name}: ${recordingOf(sensor).recording}, which stands for it` : name, sensor));
+      group.append(new Option(own.length > 1 ? `${name}: ${recordingOf(sensor).recording} (default)` : name, sensor));
       if (own.length > 1) own.filter((row) => row !== recordingOf(sensor)).forEach((row) => group.append(new Option(`${name}: ${row.recording}`, `${sensor}/${row.recording}`)));
       select.append(group);
     }
@@ -87,7 +87,7 @@ function drawPickers(pickers, axes) {
     label.prepend(sign);
     if (chosen.length < 3) return label;
     const remove = Object.assign(document.createElement("button"), { type: "button", textContent: "×", className: "remove" });
-    remove.setAttribute("aria-label", `Take ${one.letter} away`);
+    remove.setAttribute("aria-label", `Remove ${one.letter}`);
     remove.addEventListener("click", () => {
       chosen = chosenFrom(chosen.filter((other) => other !== one).map((other) => other.key));
       again("select");
@@ -124,8 +124,8 @@ function drawPickers(pickers, axes) {
   pickers.replaceChildren(...selects, more, set);
 }
 
-// Each figure of the chosen channels: what it is, the value of each, the ratio of the first to each
-// other one.
+// Each figure of the chosen channels: its name, the value of each recording, and the ratio of the
+// first to each other.
 function comparedFigures() {
   const views = chosen.map((one) => channelFor(one, chosenChannel));
   if (views.some((view) => !view)) return [];
@@ -153,10 +153,12 @@ function comparedFigures() {
   return figures;
 }
 
-// Whichever has less noise is the better one.
+const RATIO_VERDICTS = { "not told apart": "not significant", "not known": "not determined" };
+
+// Less noise is better.
 function verdictOf(ratio, first, second) {
   const better = { lower: first, higher: second }[ratio.verdict];
-  return better ? { text: `${better.letter} better`, letter: better.letter, kind: "told" } : { text: ratio.verdict, kind: ratio.verdict === "not known" ? "unknown" : "even" };
+  return better ? { text: `${better.letter} better`, letter: better.letter, kind: "told" } : { text: RATIO_VERDICTS[ratio.verdict], kind: ratio.verdict === "not known" ? "unknown" : "even" };
 }
 
 function compareChosen(root) {
@@ -196,7 +198,7 @@ function ownCell(one, unit, digitsFor = digitsOf) {
   const bounded = lower !== null && upper !== null;
   const digits = digitsFor(value, lower, upper);
   if (value !== null) cell.append(`${numberText(value, digits)} ${sign}`);
-  else cell.append(one.status === "absent" && upper !== null ? `below ${numberText(upper, 2)} ${sign}` : STATUSES[one.status]);
+  else cell.append(one.status === "absent" && upper !== null ? `below ${numberText(upper, 2)} ${sign}` : statusText(one.status));
   if (bounded && value !== null) {
     cell.append(document.createElement("br"), Object.assign(document.createElement("small"), { textContent: `${numberText(lower, digits)} to ${numberText(upper, digits)}` }));
   }
@@ -233,19 +235,19 @@ function drawVerdicts(root, figures) {
   const missing = chosen.filter((one) => !channelFor(one, chosenChannel));
   table.tHead.replaceChildren(headOf("Figure", ...headsOfPairs(), ...chosen.map(shortName)));
   table.tBodies[0].replaceChildren(...linesOf(figures));
-  table.caption.textContent = `${CHANNEL_NAMES[chosenChannel]}: less noise is better, told apart where the 95 % interval of the ratio leaves 1 out`;
+  table.caption.textContent = `${CHANNEL_NAMES[chosenChannel]}: less noise is better; significant where the 95 % interval of the ratio excludes 1`;
   const words = missing.length > 0
     ? [`${missing.map(shortName).join(" and ")} ${missing.length > 1 ? "have" : "has"} no ${CHANNEL_NAMES[chosenChannel]}: choose another axis.`]
     : chosen.slice(1).map((other, place) => sentenceOf(figures, chosen[0], other, place));
   root.querySelector(".answer").textContent = words.join("\n");
   root.querySelector(".stands").textContent = chosen.filter((one) => !one.key.includes("/"))
     .map((one) => ({ one, others: pageData.recordings.filter((row) => row.sensor === one.sensor).length - 1 })).filter(({ others }) => others > 0)
-    .map(({ one, others }) => `${shortName(one)}: ${one.recording} stands for it, ${one.row.decides ? "the longest that decides" : "the longest, though it decides nothing"}${one.row.simulated ? " (simulated)" : ""}; ${others} more to choose above.`).join(" ");
+    .map(({ one, others }) => `${shortName(one)}: ${one.recording} is shown, ${one.row.decides ? "the longest usable recording" : "the longest recording, not used in rankings"}${one.row.simulated ? " (simulated)" : ""}; ${others} more above.`).join(" ");
   const doubted = chosen.filter((one) => doubtsOf(one).length > 0);
-  root.querySelector(".doubts").textContent = doubted.map((one) => `Doubtful: ${shortName(one)}: ${doubtsOf(one).join(", ")}.`).join(" ");
+  root.querySelector(".doubts").textContent = doubted.map((one) => `Warnings for ${shortName(one)}: ${doubtsOf(one).join(", ")}.`).join(" ");
 }
 
-const doubtsOf = ({ row }) => [...row.doubts, ...(row.decides ? [] : ["decides nothing"])];
+const doubtsOf = ({ row }) => [...row.doubts, ...(row.decides ? [] : ["not used in rankings"])];
 
 function sentenceOf(figures, first, second, place) {
   const groups = new Map();
@@ -263,7 +265,7 @@ function sentenceOf(figures, first, second, place) {
 
 function drawEvidence(root) {
   const table = root.querySelector("table.evidence");
-  table.tHead.replaceChildren(headOf("Compared", "Recording", "Hours", "Specimens of the sensor", "Temperature", "Rate", "Doubts"));
+  table.tHead.replaceChildren(headOf("Compared", "Recording", "Hours", "Units of the sensor", "Temperature", "Rate", "Warnings"));
   table.tBodies[0].replaceChildren(...chosen.map((one) => {
     const { row } = one;
     const line = document.createElement("tr");
@@ -271,7 +273,7 @@ function drawEvidence(root) {
     const named = cellOf("");
     named.append(Object.assign(document.createElement("a"), { href: row.page.split("/").map(encodeURIComponent).join("/"), textContent: row.recording }));
     if (row.simulated) named.append(" ", Object.assign(document.createElement("span"), { className: "badge", textContent: "simulated" }));
-    if (own.length > 1 && !one.key.includes("/")) named.append(` the longest of ${own.length}`);
+    if (own.length > 1 && !one.key.includes("/")) named.append(` (longest of ${own.length})`);
     const specimens = new Set(own.map((other) => other.device)).size;
     line.append(Object.assign(document.createElement("th"), { scope: "row", textContent: shortName(one) }), named,
       cellOf(numberText(row.seconds / 3600, 3), { className: "number" }), cellOf(`${specimens}, in ${own.length} ${own.length === 1 ? "recording" : "recordings"}`),

@@ -33,7 +33,7 @@ kinds.turning = (figure) => {
   const turns = array(turned.turns).map((time) => time / scale.size);
   const finite = (values) => values.filter(Number.isFinite);
   const [bottom, top] = [Math.min(...finite(low)), Math.max(...finite(high))];
-  // Many lines would hide the samples: then each turn has a tick at the top.
+  // Many lines would hide the samples, so each turn has a tick at the top instead.
   const marks = uprights(turns, turns.length > MANY_TURNS ? top - 0.05 * (top - bottom) : bottom, top);
   const traces = [
     ...band(x, low, high, look, 0.4).map((trace) => ({ ...trace, group: "envelope" })),
@@ -41,13 +41,13 @@ kinds.turning = (figure) => {
     { ...line(marks.x, marks.y, { ...TRUE_RATE, dash: "solid", width: 0.5 }), group: "turns", opacity: 0.6 },
     {
       group: "turns", type: "scatter", mode: "markers", x: turns, y: turns.map(() => top), marker: { color: colourOf(TRUE_RATE), symbol: "triangle-down", size: 6 },
-      text: turns.map((at, i) => `turn ${i + 1} at ${numberText(at * scale.size, 6)} s, found by ${turned.found_by[i]}`), hovertemplate: "%{text}<extra></extra>",
+      text: turns.map((at, i) => `turn ${i + 1} at ${numberText(at * scale.size, 6)} s, detected by ${turned.found_by[i]}`), hovertemplate: "%{text}<extra></extra>",
     },
   ];
   return {
     traces,
     groups: [
-      { key: "envelope", label: "least and largest sample", on: true, look: { ...look, filled: true } },
+      { key: "envelope", label: "smallest and largest sample", on: true, look: { ...look, filled: true } },
       { key: "mean", label: "mean", on: true, look: black() },
       { key: "turns", label: "turning points", on: true, look: { ...TRUE_RATE, dash: "dot", marker: "triangle-down" } },
     ],
@@ -83,7 +83,7 @@ kinds.dwells = (figure) => {
   }
   groups.push(
     { key: "drift", label: "drift, smoothed", on: true, look: COURSES.smoother },
-    { key: "band", label: "its 2σ", on: true, look: { ...COURSES.smoother, filled: true } },
+    { key: "band", label: "2σ of the drift", on: true, look: { ...COURSES.smoother, filled: true } },
   );
   return { traces, groups, layout: { xaxis: linearAxis(`time (${scale.name})`), yaxis: linearAxis(`mean of a dwell (${unit.sign})`) } };
 };
@@ -147,7 +147,7 @@ kinds.bound = (figure) => {
     }),
     hovertemplate: "%{text}<extra></extra>",
   }];
-  const groups = [{ key: "bound", label: "least σ", on: true, look: { ...look, marker: "circle" } }];
+  const groups = [{ key: "bound", label: "smallest σ", on: true, look: { ...look, marker: "circle" } }];
   const shownSigmas = [...sigma];
   if (overDwell && bound.best !== null) {
     const range = [Math.min(...bound.nearly), Math.max(...bound.nearly)];
@@ -205,8 +205,8 @@ kinds.published_rates = () => {
     ],
     groups: [
       { key: "published", label: "published", on: true, look: { ...printed, line: false } },
-      { key: "simulated", label: "found in the simulated log (pairs)", on: true, look: { ...made, line: false } },
-      { key: "noise", label: "95 % by the noise", on: true, look: { ...noise, filled: true } },
+      { key: "simulated", label: "simulated log (pairs)", on: true, look: { ...made, line: false } },
+      { key: "noise", label: "95 % range by the noise", on: true, look: { ...noise, filled: true } },
       { key: "truth", label: "true rate", on: true, look: TRUE_RATE },
     ],
     layout: {

@@ -1,9 +1,9 @@
-// Allan deviations of several sensors, or of several recordings of one, in one pair of axes.
+// Allan deviations of several sensors, or of several recordings of one sensor, in one figure.
 
 const CHANNEL_NAMES = {
   gyro_x: "gyro x", gyro_y: "gyro y", gyro_z: "gyro z", accel_x: "accel x", accel_y: "accel y", accel_z: "accel z",
 };
-const MANY = 40; // curves beyond which one recording a sensor is shown first
+const MANY = 40; // curves beyond which only one recording per sensor is shown at first
 let chosenChannel = null;
 let chosenMethod = "recommended";
 let everyRecording = true;
@@ -49,7 +49,7 @@ function startChooser(root) {
   chooser.append(set, labelled("Model drawn", method));
   if (pageData.grouped === "sensor" && new Set(pageData.channels.map((view) => view.recording)).size > 1) {
     const which = document.createElement("select");
-    which.append(new Option("all", "all"), new Option("the last of each sensor", "last"));
+    which.append(new Option("all", "all"), new Option("last of each sensor", "last"));
     which.value = everyRecording ? "all" : "last";
     which.addEventListener("change", () => {
       everyRecording = which.value === "all";
@@ -66,7 +66,7 @@ function comparedChannels(channel) {
   return [...new Map(views.map((view) => [view.sensor, view])).values()];
 }
 
-// Among sensors, a curve looks as its sensor; among recordings of one, as its place.
+// A curve has the style of its sensor, or of its place among the recordings of one sensor.
 function lookOf(view) {
   const own = pageData.looks.sensors[view.sensor];
   if (pageData.grouped === "sensor") return own;
@@ -169,11 +169,11 @@ kinds.overlay = (figure) => {
 };
 
 const FOREST_NAMES = {
-  N: "N, white noise", B_curve: "Bias instability of the curve", sigma_min: "Lowest point of the curve",
+  N: "N, white noise", B_curve: "B (curve), bias instability", sigma_min: "σ_min, lowest point of the curve",
   B: "B of the first term", T_B: "T_B, correlation time", K: "K, random walk",
 };
 
-// Dot and 95 % interval of a parameter; hollow where only the interval is known.
+// Dot and 95 % interval of a parameter; hollow where the value is not estimated.
 kinds.forest = (figure) => {
   const symbol = figure.dataset.symbol;
   const quantity = quantityOf(chosenChannel);
@@ -201,8 +201,8 @@ kinds.forest = (figure) => {
       extent.push(middle * unit.factor, ...(bounded ? [lower * unit.factor, upper * unit.factor] : []));
       const look = lookOf(view);
       const colour = colourOf(look);
-      const words = value !== null ? `<b>${numberText(value * unit.factor, 4)} ${unit.sign}</b>${identified ? "" : ` (${STATUSES[status]})`}`
-        : status === "absent" ? `not in the model: below ${numberText(upper * unit.factor, 3)} ${unit.sign}` : STATUSES[status];
+      const words = value !== null ? `<b>${numberText(value * unit.factor, 4)} ${unit.sign}</b>${identified ? "" : ` (${statusText(status)})`}`
+        : status === "absent" ? `${statusText(status)}: below ${numberText(upper * unit.factor, 3)} ${unit.sign}` : statusText(status);
       const limits = bounded ? `<br>95 %: ${interval(lower * unit.factor, upper * unit.factor)} ${unit.sign}` : "";
       traces.push({
         type: "scatter", mode: "markers", x: [middle * unit.factor], y: [place],
@@ -232,7 +232,7 @@ kinds.forest = (figure) => {
         range: [-0.6, names.length - 0.4], fixedrange: true,
       },
       annotations: unmarked.map((i) => ({
-        xref: "paper", x: 0.01, y: i, xanchor: "left", showarrow: false, text: "absent, or not to be told", font: { color: inks().soft, size: 12 },
+        xref: "paper", x: 0.01, y: i, xanchor: "left", showarrow: false, text: "not in the model, or not determined", font: { color: inks().soft, size: 12 },
       })),
     },
   };

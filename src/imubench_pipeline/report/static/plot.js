@@ -81,7 +81,7 @@ function band(x, low, high, look, opacity = 0.18) {
   const present = x.map((_, i) => Number.isFinite(low[i]) && Number.isFinite(high[i]));
   const stretches = present.filter((inside, i) => inside && !present[i - 1]).length;
   if (stretches < 2) return [{ ...edge, y: low }, { ...edge, y: high, fill: "tonexty", fillcolor }];
-  // "tonexty" would join the two sides of a gap: each stretch is a shape by itself.
+  // "tonexty" would bridge gaps, so each segment is a shape of its own.
   const shapes = { x: [], y: [] };
   for (let first = 0; first < x.length; first += 1) {
     if (!present[first]) continue;
@@ -214,7 +214,7 @@ function drawFigure(figure) {
   showZoom(figure);
 }
 
-// What is switched otherwise than the page opens with.
+// The choices that differ from those with which the page opens.
 function keepChoices(figure, groups) {
   const shownGroups = choices.get(figure);
   const other = groups.filter((group) => shownGroups.get(group.key) !== group.on).map((group) => group.key);
@@ -259,13 +259,13 @@ function drawControls(figure, groups) {
   if (groups.length > 8) controls.append(allOrNone(figure, groups, true), allOrNone(figure, groups, false));
 }
 
-// What is chosen among curves holds for the other figures of the page.
+// The choice of curves also applies to the other figures of the page.
 function redrawChosen(figure) {
   if (figure.dataset.kind === "overlay") redrawAll();
   else drawFigure(figure);
 }
 
-// Layers, such as the curves themselves, stay: without them none that is switched on would be seen.
+// Layers, such as the curves themselves, stay on: without them no curve would be visible.
 function allOrNone(figure, groups, on) {
   const button = document.createElement("button");
   button.type = "button";
@@ -281,7 +281,7 @@ function allOrNone(figure, groups, on) {
   return button;
 }
 
-// Colours follow the theme; what has no data under the present choices is not offered.
+// Colours follow the theme; groups without data are hidden.
 function syncControls(figure, groups) {
   const byKey = new Map(groups.map((group) => [group.key, group]));
   figure.querySelectorAll(".controls .toggle").forEach((label) => {
@@ -301,7 +301,7 @@ const watcher = new IntersectionObserver(
   { rootMargin: "300px" },
 );
 
-// The script that draws is large: the page is there, and works, before it.
+// The drawing script is large, so it is loaded after the page.
 let plotting = null;
 
 function loadPlotting() {
@@ -328,7 +328,7 @@ function startFigures(root) {
   afterPaint(() => loadPlotting().then(() => figures.forEach((figure) => watcher.observe(figure))));
 }
 
-// A page that lies behind others is not painted: there it does not wait for that.
+// A page in the background is not painted, so it does not wait for painting.
 function afterPaint(act) {
   let done = false;
   const once = () => {
@@ -345,8 +345,8 @@ function redrawAll() {
   [...drawn].filter((figure) => figure.isConnected).forEach(drawFigure);
 }
 
-// A printed page has its own width, that figures do not learn in time: they are given one. Those of
-// a channel stand in pairs.
+// Figures do not learn the width of a printed page in time, so it is fixed. Those of a channel are
+// printed in pairs.
 function onPaper(figure) {
   return figure.matches("section.channel .figures > *") ? { width: 330, height: 200 } : { width: 660, height: 240 };
 }

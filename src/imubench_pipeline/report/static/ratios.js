@@ -1,12 +1,12 @@
-// How many times a figure of one recording is that of another, and how sure that is: the same
-// calculation as `imubench_pipeline.navigation.ratios`, and the same numbers.
+// The ratio of a figure of two recordings, with its interval: the same calculation and the same
+// numbers as in `imubench_pipeline.navigation.ratios`.
 
 const RATIO_TAIL = 0.025;
 
-// Of { value, lower, upper, status }; limits by the distances of each on the logarithm (MOVER).
+// The ratio of { value, lower, upper, status }; limits by the MOVER method on logarithms.
 function ratioOfParameters(first, second) {
   const doubts = [["the first", first], ["the second", second]]
-    .filter(([, one]) => one.status !== "ok").map(([which, one]) => `${which} is ${STATUSES[one.status]}`);
+    .filter(([, one]) => one.status !== "ok").map(([which, one]) => `${which} is ${statusText(one.status)}`);
   const reason = doubts.join("; ") || null;
   if (!first.value || !second.value) {
     let low = over(first.lower ?? 0, second.upper);
@@ -37,8 +37,8 @@ function ratioOf(value, lower, upper, reason) {
   return { value, lower, upper, reason, verdict };
 }
 
-// Of the Allan deviations of two channels, at each tau that both logs tell: each pair of the models
-// drawn counts.
+// The ratios of the Allan deviations of two channels at each tau of both logs, over all pairs of
+// drawn models.
 function ratiosOfDeviations(first, second) {
   if (!first || !second) return [];
   const step = (tau) => Math.round(2 * Math.log10(tau));

@@ -1,5 +1,5 @@
-// A search over everything that has a name: what is found lies in a file that is read when it is
-// asked for, or in the page where all are in one file.
+// A search over all named entries. The index is a file that is loaded on the first search, or a part
+// of the page in a report of one file.
 
 const MOST_FOUND = 12;
 let searched = null;
@@ -16,7 +16,7 @@ function loadSearch() {
   return searched;
 }
 
-// Every word must be there; a title that begins with them goes first.
+// Every word must occur; entries whose title begins with them come first.
 function searchFor(text, entries) {
   const words = text.toLowerCase().split(/\s+/).filter(Boolean);
   if (words.length === 0) return [];

@@ -1,8 +1,8 @@
-// The figures of sensors side by side: curves and their ratio, parameters, errors, what these are of.
+// The figures of sensors side by side: curves and their ratio, parameters, errors and their sources.
 
 const SLOPES = [[-0.5, "−½", "white noise"], [0, "0", "bias instability"], [0.5, "+½", "random walk"]];
 
-// Short lines in the corner with the slope of each kind of noise, for the eye to lay beside a curve.
+// Short lines in the corner with the slope of each kind of noise, for comparison with a curve.
 function slopeGuides(xRange, yRange) {
   const length = Math.min(0.1 * (xRange[1] - xRange[0]), 0.24 * (yRange[1] - yRange[0]));
   const x = xRange[0] + 0.05 * (xRange[1] - xRange[0]);
@@ -20,7 +20,7 @@ function slopeGuides(xRange, yRange) {
   };
 }
 
-// The name of a curve at its end, those that would lie upon each other apart.
+// The name of each curve at its end, shifted where names would overlap.
 function directLabels(ends, yRange, yref = "y") {
   const step = 0.055 * (yRange[1] - yRange[0]);
   const sorted = [...ends].sort((a, b) => a.y - b.y);
@@ -107,7 +107,7 @@ kinds.pair = (figure) => {
       annotations: [
         ...directLabels(ends, ranges.y),
         ...(shown(figure, "slopes") ? slopes.annotations : []),
-        { xref: "paper", x: 0.995, xanchor: "right", yref: "y2", y: 0, yanchor: "bottom", text: "1: alike", showarrow: false, font: { size: 11, color: soft } },
+        { xref: "paper", x: 0.995, xanchor: "right", yref: "y2", y: 0, yanchor: "bottom", text: "1: equal", showarrow: false, font: { size: 11, color: soft } },
       ],
       shapes: [
         { type: "line", xref: "paper", x0: 0, x1: 1, yref: "y2", y0: 1, y1: 1, line: { color: ink, width: 1 } },
@@ -199,7 +199,7 @@ kinds.dumbbells = (figure) => {
   };
 };
 
-// Of the worst axes of a recording, or of that which is chosen; of a single axis both are one.
+// Errors of the worst axis of a recording, or of the chosen axis.
 function errorsOf(one) {
   const { growth } = one.row;
   if (!growth) return {};
@@ -207,10 +207,10 @@ function errorsOf(one) {
   return own === "worst" ? growth.errors : own ?? {};
 }
 const grownOf = (one) => errorsOf(one)[growthOf.error] ?? null;
-const axesText = () => (growthOf.axes === "worst" ? "the worst of the axes" : `axis ${chosenChannel.at(-1)}`);
+const axesText = () => (growthOf.axes === "worst" ? "the worst axis" : `axis ${chosenChannel.at(-1)}`);
 const place = (values, wanted) => values.reduce((best, value, i) => (Math.abs(Math.log(value / wanted)) < Math.abs(Math.log(values[best] / wanted)) ? i : best), 0);
 
-// The window and the time that are chosen, as far as a recording has them.
+// The nearest window and time of a recording to those that are chosen.
 function chosenPlace(one) {
   const [windows, times] = [array(one.row.growth.windows), array(one.row.growth.times)];
   return { windows, times, window: place(windows, growthOf.window), time: place(times, growthOf.time) };
@@ -257,8 +257,8 @@ function startGrowth(root) {
     redrawAll();
   });
   const axes = document.createElement("select");
-  axes.append(new Option("the worst of the axes", "worst"));
-  if (alone) axes.append(new Option(`axis ${chosenChannel.at(-1)} alone: its gyro, its accelerometer`, "axis"));
+  axes.append(new Option("worst axis", "worst"));
+  if (alone) axes.append(new Option(`axis ${chosenChannel.at(-1)}: its gyro and its accelerometer`, "axis"));
   axes.value = growthOf.axes;
   axes.addEventListener("change", () => {
     growthOf.axes = axes.value;
@@ -266,7 +266,7 @@ function startGrowth(root) {
     drawErrors(root);
     redrawAll();
   });
-  form.replaceChildren(labelled("Error", select), labelled("Of", axes), slider("window", windows, "At rest before"), slider("time", times, "After"));
+  form.replaceChildren(labelled("Error", select), labelled("Axes", axes), slider("window", windows, "At rest before"), slider("time", times, "After"));
 }
 
 function errorUnit(error, size) {
@@ -301,7 +301,7 @@ function drawErrors(root) {
   table.tHead.replaceChildren(headOf(`After ${timeText(growthOf.time)}`, ...headsOfPairs(), ...chosen.map(shortName)));
   table.tBodies[0].replaceChildren(...linesOf(figures));
   const without = chosen.filter((one) => !grownOf(one)).map(shortName);
-  table.caption.textContent = `1σ of ${axesText()} after ${timeText(growthOf.time)} of dead reckoning and ${timeText(growthOf.window)} at rest${without.length ? `; no ${growthOf.error} is known of ${without.join(", ")}` : ""}`;
+  table.caption.textContent = `1σ of ${axesText()} after ${timeText(growthOf.time)} of dead reckoning and ${timeText(growthOf.window)} at rest${without.length ? `; ${growthOf.error} not determined for ${without.join(", ")}` : ""}`;
 }
 
 kinds.growth = () => {
@@ -372,7 +372,7 @@ kinds.sources = (figure) => {
   );
 };
 
-// Bars of parts of a variance; parts below 2 % are one.
+// Bars of shares of a variance; shares below 2 % are merged.
 function stackedShares(rows, shares, titles, width) {
   const inner = Math.max(width - 190, 100); // px of a whole bar, about
   const total = new Map();
@@ -410,5 +410,5 @@ function stackedShares(rows, shares, titles, width) {
   };
 }
 
-// Sources of two sensors are one where they are of one kind: a correlation time is of a log.
+// Sources of two sensors are merged by kind, without the correlation time, which differs by log.
 const sourceKind = (source) => source.replace(/ GM [\d.e+-]+ s$/, " GM").replace(/line [\d.e+-]+ Hz/, "line");

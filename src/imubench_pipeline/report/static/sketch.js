@@ -1,5 +1,4 @@
-// The first look at a figure, as an SVG of our own: what draws figures is large, and takes a second
-// to be there. It has what the figure opens with, and gives way to it.
+// A preview of a figure as SVG, because loading plotly.js takes a second. The figure replaces it.
 
 const svg = (name, attributes, ...inside) => {
   const made = document.createElementNS("http://www.w3.org/2000/svg", name);
@@ -8,7 +7,7 @@ const svg = (name, attributes, ...inside) => {
   return made;
 };
 
-// The first figure of a page, and those that can be seen.
+// Draws the first figure of a page, and those in view.
 function sketchFigures(figures) {
   const seen = (figure) => figure.getBoundingClientRect().top < window.innerHeight && figure.clientWidth > 0;
   figures.filter((figure, place) => figure.clientWidth > 0 && (place === 0 || seen(figure))).forEach(sketchFigure);
@@ -20,7 +19,7 @@ function sketchFigure(figure) {
   const on = new Map(made.groups.map((group) => [group.key, group.on !== other.has(group.key)]));
   const layout = { ...baseLayout(), ...made.layout };
   const named = axesOf(layout).some((name) => layout[name].type !== "log" && layout[name].ticktext);
-  if (named || made.traces.some((trace) => trace.orientation === "h")) return; // names of its rows decide where it begins
+  if (named || made.traces.some((trace) => trace.orientation === "h")) return; // the left margin depends on the names of the rows
   zoomIn(figure, layout);
   const canvas = figure.querySelector(".canvas");
   if (made.height) canvas.style.height = `${made.height}px`;
@@ -121,7 +120,7 @@ class Sketch {
     else this.inside.append(svg("path", { d: pathOf(points).replaceAll("M", "ZM").replace("Z", ""), fill }));
   }
 
-  // Of a shape on a logarithmic axis the ends are values, of a note their logarithms.
+  // On a logarithmic axis, shapes have values and annotations have logarithms.
   at(of, reference, value, logarithm = false) {
     const { left, top, width, height } = this.box;
     if (reference === "paper") return of === "x" ? left + width * value : top + height * (1 - value);
@@ -149,7 +148,7 @@ class Sketch {
   }
 }
 
-// Lines between neighbours that are both known.
+// Lines between consecutive known points.
 function pathOf(points) {
   let open = false;
   return points.map(([x, y]) => {

@@ -1,6 +1,6 @@
-// What happens when a page opens; in a report of one file, when a page of it is chosen.
+// Runs when a page opens, or when the reader chooses a page of a report in one file.
 
-// What unfolds, and one of the youngest parts of the language: what the scripts need of a browser.
+// Features of the browser that the scripts need: decompression, and a recent part of the language.
 const ABLE = typeof DecompressionStream === "function" && typeof [].at === "function";
 
 async function openPage(main) {
@@ -25,8 +25,7 @@ function withoutPrototype(_key, value) {
   return value && typeof value === "object" && !Array.isArray(value) ? Object.setPrototypeOf(value, null) : value;
 }
 
-// What a page has packed (`html.packed`): its data, further rows of tables, and what stands for its
-// own markup.
+// Unpacks the parts of a page that `html.packed` has compressed: data, rows of tables, and markup.
 async function unfold(root) {
   if (!ABLE) return;
   await Promise.all([...root.querySelectorAll("script[data-packed]")].map(async (script) => {
@@ -39,15 +38,15 @@ async function unfold(root) {
   }));
 }
 
-// Where nothing can be unfolded, what stands in the page as it is stays to read, with the notes for a
-// reader without JavaScript.
+// Without decompression the plain part of the page stays readable, with the notes for readers without
+// JavaScript.
 function showPlain(main) {
   main.querySelectorAll("figure[data-kind]").forEach((figure) => figure.remove());
   main.querySelectorAll("noscript").forEach((note) => (note.outerHTML = note.textContent));
   showUnits(main);
   const note = Object.assign(document.createElement("p"), {
     className: "warnings",
-    textContent: "This browser shows a part of this report: no figures, and the first rows and sections alone, as it cannot unfold the rest. Chrome or Edge 92, Firefox 113, Safari 16.4 and later ones show it whole.",
+    textContent: "This browser shows a part of this report: no figures, and only the first rows and sections. Use Chrome or Edge 92, Firefox 113, Safari 16.4, or a later version.",
   });
   note.setAttribute("role", "alert");
   main.prepend(note);
@@ -90,8 +89,7 @@ async function startPages(main) {
     if (location.hash === hash) show();
     else location.hash = hash;
   });
-  // The address says where to be: a browser that restores the place of before, on a reload, would
-  // do so after this.
+  // The address determines the position: a browser would restore the previous one after this.
   history.scrollRestoration = "manual";
   window.addEventListener("hashchange", show);
   await show();

@@ -1,6 +1,6 @@
-// Tables that can be sorted by a column and filtered by their rows' data. Of a long one the first
-// rows stand in the page; the others lie beside it as text, and become rows when they are needed.
-// What is asked of a table stands in the address by its name: #recordings.status=rejected.
+// Tables that can be sorted by a column and filtered by the data of their rows. A long table has its
+// first rows in the page; the others are packed as text and become rows when they are needed.
+// The address holds sorting and filters by the name of the table: #recordings.status=rejected.
 
 const FEW = 100;
 
@@ -59,14 +59,14 @@ class LongTable {
     if (this.bar.childElementCount > 0) table.closest(".scroll").before(this.bar);
     const stated = this.restore();
     if (stated || (Object.values(this.asked).some(Boolean) && !this.further)) this.show();
-    if (this.unknown.length > 0) table.closest(".scroll").before(warned(`The address asks for what this table has not, and it is left out: ${this.unknown.join(", ")}.`));
+    if (this.unknown.length > 0) table.closest(".scroll").before(warned(`The address has filters that this table does not have; they are ignored: ${this.unknown.join(", ")}.`));
   }
 
   note(key, value) {
     keep(`${this.name}.${key}`, value);
   }
 
-  // What the address asks of this table; what there is not is told.
+  // Applies sorting and filters of the address; unknown ones are reported.
   restore() {
     let stated = false;
     for (const [whole, value] of [...state]) {
@@ -90,7 +90,7 @@ class LongTable {
     return stated;
   }
 
-  // All rows, those too that were not in the page yet.
+  // All rows, including those that were not in the page yet.
   get every() {
     if (this.further) {
       const holder = document.createElement("template");
@@ -117,7 +117,7 @@ class LongTable {
     button.className = "sort";
     button.setAttribute("aria-label", `Sort by ${head.dataset.name ?? head.textContent.trim()}`);
     button.addEventListener("click", () => {
-      // Where the largest is the best it stands first.
+      // The largest value comes first if it is the best.
       const [first, second] = head.dataset.first === "descending" ? [-1, 1] : [1, -1];
       const before = head.getAttribute("aria-sort");
       const direction = before === (first === 1 ? "ascending" : "descending") ? second : first;
@@ -187,16 +187,16 @@ class LongTable {
     this.offer();
   }
 
-  // Which filters leave no row, and how many there were without each.
+  // Which filters leave no row, and how many rows there would be without each.
   why() {
     const asked = Object.entries(this.asked).filter(([, value]) => value);
     const word = (key) => (key === "text" ? "Find" : capital(key));
     const without = asked.map(([key]) => [word(key), this.rows.filter((row) => this.fits(row, key)).length]).filter(([, left]) => left > 0);
-    const parts = [`none has ${asked.map(([key, value]) => `${word(key)} “${value}”`).join(" and ")}`, ...without.map(([name, left]) => `${left} without ${name}`)];
+    const parts = [`no row has ${asked.map(([key, value]) => `${word(key)} “${value}”`).join(" and ")}`, ...without.map(([name, left]) => `${left} without ${name}`)];
     return `: ${parts.join("; ")}`;
   }
 
-  // A filter offers what is left by the others.
+  // A filter offers the values that the other filters leave.
   offer() {
     this.selects.forEach((select, key) => {
       const left = new Set(this.rows.filter((row) => this.fits(row, key)).map((row) => row.dataset[key]));
@@ -210,7 +210,7 @@ function sortRows(rows, { column, direction, kind }) {
   const keys = new Map(rows.map((row) => [row, sortKey(row, column, kind)]));
   rows.sort((first, second) => {
     const [a, b] = [keys.get(first), keys.get(second)];
-    if (a === null || b === null) return (a === null) - (b === null); // what is not known stands last
+    if (a === null || b === null) return (a === null) - (b === null); // unknown values come last
     return direction * (typeof a === "number" ? a - b : collator.compare(a, b));
   });
 }

@@ -1,5 +1,5 @@
-// The channels of a recording as tabs, and matrices of which one is shown: what is not, is found by
-// the search of the browser all the same, and printed.
+// The channels of a recording as tabs, and matrices of which one is shown. The search of the browser
+// finds hidden ones, too, and they are printed.
 
 function startTabs(root) {
   const jump = root.querySelector("p.jump");
@@ -49,7 +49,7 @@ function startTabs(root) {
     tabs[next].focus();
   });
   panels.forEach((panel) => panel.addEventListener("beforematch", () => select(panel)));
-  // A link to what stands in another tab opens that.
+  // A link into another tab opens that tab.
   const panelOf = (name) => panels.find((panel) => panel.contains(document.getElementById(name)));
   root.addEventListener("click", (event) => {
     const link = event.target.closest?.("a[href^='#']");
@@ -82,7 +82,7 @@ function startMatrices(root) {
   put();
 }
 
-// What is printed must be there before the figures of it are drawn.
+// Hidden channels must be visible before their figures are drawn for print.
 function startPrintingTabs() {
   let before = [];
   window.addEventListener("beforeprint", () => {

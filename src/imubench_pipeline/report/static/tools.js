@@ -1,10 +1,10 @@
-// What can be done with a figure: back to the whole of it, as a picture, as numbers.
+// Tools of a figure: reset the zoom, save it as a picture, show or save its values.
 
 const zooms = new WeakMap(); // figure -> axis -> { range, title }
 const axesOf = (layout) => Object.keys(layout).filter((name) => /^[xy]axis\d*$/.test(name));
 const numberOf = (figure) => [...document.querySelectorAll("figure[data-kind]")].indexOf(figure);
 
-// The part that the reader looks at stays when units or choices change what is drawn.
+// The zoom is kept when units or choices change the figure.
 function zoomIn(figure, layout) {
   if (!zooms.has(figure)) {
     const parts = (state.get(`z${numberOf(figure)}`) ?? "").split("~");
@@ -39,7 +39,7 @@ function noteZoom(figure, canvas, changes) {
   showZoom(figure);
 }
 
-const wholes = new WeakMap(); // figure -> axis -> range that is drawn where nothing is zoomed
+const wholes = new WeakMap(); // figure -> axis -> range without zoom
 
 function showZoom(figure) {
   const zoom = zooms.get(figure) ?? {};
@@ -69,7 +69,7 @@ function save(address, name) {
   link.remove();
 }
 
-// As it is shown, with a legend and a ground, which the page has beside the figure.
+// The figure as shown, with the legend and the background of the page.
 async function saveImage(figure, format) {
   const canvas = figure.querySelector(".canvas");
   const { width, height } = canvas.getBoundingClientRect();
@@ -85,7 +85,7 @@ async function saveImage(figure, format) {
   save(await Plotly.toImage({ data, layout }, { format, width: Math.max(width, 700), height: Math.max(height, 420), scale: 2 }), fileName(figure, format));
 }
 
-// Curve and name, both axes, and limits where the curve has them.
+// Name, x, y, and limits of each curve, if it has them.
 function valuesOf(figure) {
   const canvas = figure.querySelector(".canvas");
   const title = (name, otherwise) => plainText(canvas.layout[name]?.title?.text ?? "") || otherwise;
@@ -145,8 +145,8 @@ function showValues(figure, button) {
     made.append(...cells(row, tag));
     return made;
   };
-  const more = rows.length > SHOWN_VALUES ? `; the first ${SHOWN_VALUES} of ${rows.length}, the CSV has all` : "";
-  table.append(Object.assign(document.createElement("caption"), { textContent: `Values that are drawn${more}` }));
+  const more = rows.length > SHOWN_VALUES ? `; first ${SHOWN_VALUES} of ${rows.length} (all in the CSV)` : "";
+  table.append(Object.assign(document.createElement("caption"), { textContent: `Values of the figure${more}` }));
   table.createTHead().append(line(heads, "th"));
   table.createTBody().append(...rows.slice(0, SHOWN_VALUES).map((row) => line(row, "td")));
   region.append(table);

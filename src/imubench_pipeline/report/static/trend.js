@@ -1,4 +1,4 @@
-// A device over time: each estimate beside what its earlier recordings let expect.
+// A device over time: each estimate, and the prediction from earlier recordings.
 
 kinds.trend = (figure) => {
   const trend = pageData.trends[figure.dataset.trend];
@@ -32,7 +32,7 @@ kinds.trend = (figure) => {
       { key: "expected", label: "expected from the earlier recordings (95 %)", on: true, look: { ...look, filled: true } },
     ],
     layout: {
-      xaxis: { ...linearAxis(trend.dated ? "" : "recordings in their order"), type: trend.dated ? "date" : "category", nticks: 8 },
+      xaxis: { ...linearAxis(trend.dated ? "" : "recordings by name"), type: trend.dated ? "date" : "category", nticks: 8 },
       yaxis: linearAxis(`${trend.parameter === "bias" ? "fixed bias" : symbolMarkup(trend.parameter)} (${unit.sign})`),
     },
   };

@@ -22,22 +22,22 @@ if TYPE_CHECKING:
     from imubench_pipeline.report.static_figures.files import Make
 
 NEEDED = ("recordings", "allan", "parameters")
-"""The tables without which there is no figure; the others add to them."""
+"""The tables that every figure needs; the others are optional."""
 
 KINDS = ("comparison", "forest", "allan", "methods", "terms", "datasheet", "spectrum", "theory")
-_NEEDS = {
+_KIND_NEEDS = {
     "methods": "an estimate with a model",
     "terms": "an estimate with a model",
     "datasheet": "a printed figure of the channel that is comparable",
     "spectrum": "the spectrum of the channel",
 }
-"""What a channel may lack; the other kinds need its curve alone."""
+"""What each kind needs besides the curve of a channel."""
 
-_FORMATS = ("svg", "pdf")
+_FILE_FORMATS = ("svg", "pdf")
 
 
 class SelectionError(ValueError):
-    """What was asked for is not in the results."""
+    """The results do not contain the selection."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -49,15 +49,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--channel", help="only this channel, such as gyro_x; default: all")
     parser.add_argument(
         "--kind",
-        type=_listed(KINDS),
+        type=_make_list_reader(KINDS),
         default=KINDS,
         metavar="KIND,...",
         help=f"some of {', '.join(KINDS)}; default: all",
     )
     parser.add_argument(
         "--format",
-        type=_listed(_FORMATS),
-        default=_FORMATS,
+        type=_make_list_reader(_FILE_FORMATS),
+        default=_FILE_FORMATS,
         metavar="FORMAT,...",
         help="svg, pdf; default: both",
     )
@@ -67,7 +67,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_output(parser, "--output", OutputFolder, metavar="FOLDER", help="default: RESULTS/figures")
 
 
-def _listed(choices: Sequence[str]) -> Callable[[str], tuple[str, ...]]:
+def _make_list_reader(choices: Sequence[str]) -> Callable[[str], tuple[str, ...]]:
     """Return a reader of names with commas between them; ``all`` stands for every one."""
 
     def names(text: str) -> tuple[str, ...]:
@@ -83,7 +83,7 @@ def _listed(choices: Sequence[str]) -> Callable[[str], tuple[str, ...]]:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Write the figures that are asked for; return the exit status."""
+    """Write the selected figures; return the exit status."""
     try:
         tables = _load(arguments.results)
         chosen = select(tables, arguments.sensor, arguments.recording, arguments.channel)
@@ -92,7 +92,9 @@ def run(arguments: argparse.Namespace) -> int:
         print(error, file=sys.stderr)
         return 2
     if not written:
-        needs = [f"{kind} needs {_NEEDS[kind]}" for kind in arguments.kind if kind in _NEEDS]
+        needs = [
+            f"{kind} needs {_KIND_NEEDS[kind]}" for kind in arguments.kind if kind in _KIND_NEEDS
+        ]
         print(f"found nothing to draw: {'; '.join(needs)}", file=sys.stderr)
         return 2
     return 0
@@ -125,17 +127,17 @@ def select(
             continue
         existing = chosen["allan"][column].unique().to_pylist()
         if asked not in existing:
-            reason = _rejection(chosen["recordings"], column, asked)
+            reason = _explain_missing(chosen["recordings"], column, asked)
             raise SelectionError(
                 f"found no {column} {asked!r}{reason}; there are: {', '.join(sorted(existing))}"
             )
-        chosen = {name: _part(table, column, asked) for name, table in chosen.items()}
+        chosen = {name: _select_rows(table, column, asked) for name, table in chosen.items()}
     if not chosen["allan"].num_rows:
         raise SelectionError("the results have no curve: no recording could be used")
     return chosen
 
 
-def _part(table: pa.Table, column: str, asked: str) -> pa.Table:
+def _select_rows(table: pa.Table, column: str, asked: str) -> pa.Table:
     if column not in table.schema.names:
         return table
     mask = pc.equal(table[column], asked)
@@ -143,13 +145,13 @@ def _part(table: pa.Table, column: str, asked: str) -> pa.Table:
     return table.filter(pc.fill_null(mask, True) if column == "channel" else mask)
 
 
-def _rejection(recordings: pa.Table, column: str, asked: str) -> str:
-    """Return why a recording or all of a sensor have no curve, where they are left out."""
+def _explain_missing(recordings: pa.Table, column: str, asked: str) -> str:
+    """Return why a recording, or all recordings of a sensor, have no curve."""
     if column == "channel":
         return ""
     reasons = [
         f"{row.status} one ({row.reason})"
-        for row in RecordingRow.rows_of(_part(recordings, column, asked))
+        for row in RecordingRow.rows_of(_select_rows(recordings, column, asked))
         if row.status != "ok"
     ]
     return f" but a {reasons[0]}" if reasons else ""
@@ -170,7 +172,7 @@ def _write(
     sensors = sorted(set(tables["recordings"]["sensor"].to_pylist()))
     written = []
     with output.filling() as folder:
-        for name, make in _figures(chosen, sensors, arguments):
+        for name, make in _list_figures(chosen, sensors, arguments):
             figure = make()
             if figure is None:
                 continue
@@ -182,10 +184,10 @@ def _write(
     return len(written)
 
 
-def _figures(
+def _list_figures(
     chosen: Mapping[str, pa.Table], sensors: Sequence[str], arguments: argparse.Namespace
 ) -> Iterator[tuple[str, Make]]:
-    """Yield name and maker of each figure that is asked for."""
+    """Yield name and maker of each selected figure."""
     from imubench_pipeline.report.static_figures.files import (
         CHANNEL_KINDS,
         CROSS_KINDS,

@@ -1,4 +1,4 @@
-"""The curves of one axis of all sensors (000, Figures 6 and 7)."""
+"""The curves of one axis of all sensors (Maia et al., Figures 6 and 7)."""
 
 from __future__ import annotations
 
@@ -31,14 +31,14 @@ from imubench_pipeline.report.static_figures.style import (
 from imubench_pipeline.report.view import ChannelView
 
 _MOST_BANDS = 8
-_MOST_IN_A_COLUMN = 6  # sensors, in a figure one column wide
+_MAX_SENSORS_IN_COLUMN = 6  # sensors, in a figure one column wide
 _MOST_CURVES_IN_A_COLUMN = 30
-_FEW = 3
-"""Recordings of a sensor that are drawn alike; of more, one stands for the others."""
+_MAX_EQUAL_RECORDINGS = 3
+"""Number of recordings of a sensor up to which all are drawn alike."""
 
-_MARKS = 9  # on the curves of a sensor
-_THIN, _PALE = 0.4, 0.45  # width in pt and opacity of a curve among many
-_LONGEST_NAME = 200.0  # pt
+_MARKERS_PER_SENSOR = 9  # on the curves of a sensor
+_THIN_WIDTH, _PALE_OPACITY = 0.4, 0.45  # width in pt and opacity of a curve among many
+_MAX_NAME_WIDTH = 200.0  # pt
 
 
 @style()
@@ -58,20 +58,29 @@ def comparison_figure(
 
     unit = page_unit(views[0].quantity, "adev", system)
     name = channel_name(views[0].channel)
-    wide = len(groups) > _MOST_IN_A_COLUMN or len(views) > _MOST_CURVES_IN_A_COLUMN
+    wide = len(groups) > _MAX_SENSORS_IN_COLUMN or len(views) > _MOST_CURVES_IN_A_COLUMN
     figure = new_figure(DOUBLE if wide else SINGLE, 95.0 if wide else 68.0, f"{name}: all sensors")
     axes = figure.add_subplot()
     handles = []
     for place, (sensor, simulated) in enumerate(ordered):
         of_group = groups[sensor, simulated]
         _draw(axes, of_group, looks[sensor], unit.per_si, place, bands=len(views) <= _MOST_BANDS)
-        label = shortened(figure, sensor, _LONGEST_NAME) + _about(len(of_group), simulated)
+        label = shortened(figure, sensor, _MAX_NAME_WIDTH) + _format_remarks(
+            len(of_group), simulated
+        )
         look = line_look(looks[sensor]) | marker_look(looks[sensor], hollow=simulated)
         handles.append(Line2D([], [], label=label, **look))
-    if any(len(each) > _FEW for each in groups.values()):
+    if any(len(each) > _MAX_EQUAL_RECORDINGS for each in groups.values()):
         handles += [
-            Line2D([], [], color="black", label="of several recordings: the middle one"),
-            Line2D([], [], color="black", alpha=_PALE, linewidth=_THIN, label="and the others"),
+            Line2D([], [], color="black", label="median of several recordings"),
+            Line2D(
+                [],
+                [],
+                color="black",
+                alpha=_PALE_OPACITY,
+                linewidth=_THIN_WIDTH,
+                label="other recordings",
+            ),
         ]
     log_x(axes, extent(*(view.tau for view in views)))
     log_y(axes, extent(*(view.adev * unit.per_si for view in views), margin=1.5))
@@ -91,11 +100,11 @@ def _draw(
     *,
     bands: bool,
 ) -> None:
-    """Draw the recordings of a sensor; of many all are thin but the middle one."""
+    """Draw the recordings of a sensor; if there are many, all but the middle one are thin."""
     lines = line_look(look)
     marked = views
-    if len(views) > _FEW:
-        middle = _middle(views)
+    if len(views) > _MAX_EQUAL_RECORDINGS:
+        middle = _find_middle(views)
         marked = [views[middle]]
         curves = [np.column_stack((view.tau, view.adev * scale)) for view in views]
         axes.add_collection(
@@ -103,8 +112,8 @@ def _draw(
                 curves,
                 colors=lines["color"],
                 linestyles=lines["linestyle"],
-                linewidths=_THIN,
-                alpha=_PALE,
+                linewidths=_THIN_WIDTH,
+                alpha=_PALE_OPACITY,
             ),
             autolim=False,
         )
@@ -113,7 +122,7 @@ def _draw(
             axes.fill_between(
                 view.tau, view.lower * scale, view.upper * scale, color=look.light, alpha=0.18, lw=0
             )
-        step = max(1, len(view.tau) * len(marked) // _MARKS)
+        step = max(1, len(view.tau) * len(marked) // _MARKERS_PER_SENSOR)
         # Sensors and recordings begin at different points, so that markers seldom coincide.
         start = (3 * place + number * step // len(marked)) % step
         axes.plot(
@@ -127,14 +136,14 @@ def _draw(
         )
 
 
-def _middle(views: Sequence[ChannelView]) -> int:
-    """Return which recording has the middle level, amid the averaging times that all have."""
+def _find_middle(views: Sequence[ChannelView]) -> int:
+    """Return the index of the recording with the median level over the common averaging times."""
     first, last = max(view.tau[0] for view in views), min(view.tau[-1] for view in views)
     amid = math.sqrt(first * last)
     levels = [np.interp(amid, view.tau, view.adev) for view in views]
     return int(np.argsort(levels, kind="stable")[len(levels) // 2])
 
 
-def _about(recordings: int, simulated: bool) -> str:
+def _format_remarks(recordings: int, simulated: bool) -> str:
     words = [f"{recordings} recordings"] * (recordings > 1) + ["simulated"] * simulated
     return f" ({', '.join(words)})" if words else ""

@@ -26,8 +26,8 @@ from imubench_pipeline.report.static_figures.style import (
 )
 from imubench_pipeline.report.view import METHOD_NAMES, ChannelView
 
-_WIDEST_RATIO = 4.0
-"""Of model and measurement: what is further off is seen in the panel above."""
+_MAX_RATIO = 4.0
+"""Largest ratio of model and measurement in the lower panel."""
 
 
 def channel_axes(view: ChannelView, system: System, what: str) -> tuple[Figure, Axes, float]:
@@ -61,7 +61,7 @@ def draw_measured(axes: Axes, view: ChannelView, scale: float, *, limits: bool =
 
 
 def finish(figure: Figure, axes: Axes, view: ChannelView, scale: float, *more: float) -> Figure:
-    """Set limits that show the curve, its 95 % limits within reason, and further levels."""
+    """Set axis limits for the curve, further levels and, within bounds, the 95 % limits."""
     near = [
         np.clip(limit, view.adev / 2.0, view.adev * 2.0) * scale
         for limit in (view.lower, view.upper)
@@ -74,7 +74,7 @@ def finish(figure: Figure, axes: Axes, view: ChannelView, scale: float, *more: f
 
 @style()
 def allan_figure(view: ChannelView, system: System = "practical") -> Figure:
-    """Draw the Allan deviation with its 95 % limits alone (003, Figure 2)."""
+    """Draw the Allan deviation with its 95 % limits alone (Silva et al., Figure 2)."""
     figure, axes, scale = channel_axes(view, system, "Allan deviation")
     draw_measured(axes, view, scale)
     return finish(figure, axes, view, scale)
@@ -84,8 +84,8 @@ def allan_figure(view: ChannelView, system: System = "practical") -> Figure:
 def methods_figure(view: ChannelView, system: System = "practical") -> Figure | None:
     """Draw the model of each method, and the reconstruction from the recommended one.
 
-    The lower panel has the models over the measured curve (000, Figures 2 to 5). None where no
-    method gave a model.
+    The lower panel has the ratio of models and measured curve (Maia et al., Figures 2 to 5). None
+    if no method gave a model.
     """
     models = {method: view.model(method) for method in view.parameters}
     models = {method: model for method, model in models.items() if model.terms}
@@ -105,7 +105,7 @@ def methods_figure(view: ChannelView, system: System = "practical") -> Figure | 
     deviations = [
         _draw_model(axes, ratio, view, method, model, scale) for method, model in models.items()
     ]
-    relative = np.clip([each / view.adev for each in deviations], 1 / _WIDEST_RATIO, _WIDEST_RATIO)
+    relative = np.clip([each / view.adev for each in deviations], 1 / _MAX_RATIO, _MAX_RATIO)
     log_y(ratio, extent(relative, view.lower / view.adev, margin=1.1), ticks=5)
     figure.align_ylabels()
     return finish(figure, axes, view, scale)
@@ -127,7 +127,7 @@ def _draw_model(
 
 
 def _draw_reconstruction(axes: Axes, ratio: Axes, view: ChannelView, scale: float) -> None:
-    """Draw what logs that are simulated from the recommended model look like, if there are."""
+    """Draw the band of logs simulated from the recommended model, if there is one."""
     curve = view.reconstruction.get(view.recommended)
     if curve is None:
         return

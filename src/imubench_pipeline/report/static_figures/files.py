@@ -1,4 +1,4 @@
-"""Which figures a run has, what they are called, and their files."""
+"""The figures of a run, their names, and their files."""
 
 from __future__ import annotations
 
@@ -42,12 +42,12 @@ CHANNEL_KINDS: dict[str, Callable[[ChannelView, System], Figure | None]] = {
 _CROSS_NAMES = {"comparison": "allan", "forest": "forest"}
 
 
-_COORDINATES = re.compile(rb' (?:d|x|y|points|transform)="[^"]*"')
-_DECIMALS = re.compile(rb"(\.\d\d)\d+")
-_MARKS = re.compile(
+_COORDINATE_PATTERN = re.compile(rb' (?:d|x|y|points|transform)="[^"]*"')
+_DECIMALS_PATTERN = re.compile(rb"(\.\d\d)\d+")
+_MARKS_PATTERN = re.compile(
     rb'(<g clip-path="[^"]*")>(\s*<use [^>]*?style="([^"]*)"/>(?:\s*<use [^>]*?style="\3"/>)+)'
 )
-_SPACE_BEFORE = re.compile(rb"\n\s+")
+_LEADING_SPACE_PATTERN = re.compile(rb"\n\s+")
 
 
 def cross_figures(
@@ -57,7 +57,7 @@ def cross_figures(
     sensors: Sequence[str] | None = None,
     kinds: Sequence[str] = tuple(CROSS_KINDS),
 ) -> Iterator[tuple[str, Callable[[], Figure]]]:
-    """Yield the name of each cross-IMU figure, and what makes it.
+    """Yield the name of each figure of all sensors, and its maker.
 
     The looks are those of all sensors of the run, or else of those of the views.
     """
@@ -77,7 +77,7 @@ def channel_figures(
     *,
     kinds: Sequence[str] = tuple(CHANNEL_KINDS),
 ) -> Iterator[tuple[str, Make]]:
-    """Yield the name of each figure of a channel, and what makes it or says that there is none."""
+    """Yield the name of each figure of a channel, and its maker, which may return None."""
     for kind in kinds:
         # A folder a recording: joined by any sign, two names could make the same one.
         name = f"{view.sensor}/{view.recording}/{view.channel}_{kind}"
@@ -85,17 +85,17 @@ def channel_figures(
 
 
 def save(figure: Figure, path: Path) -> None:
-    """Write a figure, atomically, as its ending says; the same figure has the same bytes."""
+    """Write a figure atomically, in the format of its suffix; equal figures have equal bytes."""
     with replacing(path) as temporary:
-        temporary.write_bytes(_bytes(figure, path.suffix[1:]))
+        temporary.write_bytes(_write_bytes(figure, path.suffix[1:]))
 
 
 def figure_text(figure: Figure) -> str:
     """Return a figure as SVG in a data URI, which a page can hold."""
-    return "data:image/svg+xml;base64," + base64.b64encode(_bytes(figure, "svg")).decode()
+    return "data:image/svg+xml;base64," + base64.b64encode(_write_bytes(figure, "svg")).decode()
 
 
-def _bytes(figure: Figure, kind: str) -> bytes:
+def _write_bytes(figure: Figure, kind: str) -> bytes:
     # No date, and no version of the program that drew it.
     metadata = {"Title": str(figure.get_label()), "Creator": "imubench_pipeline"} | (
         {"Date": None} if kind == "svg" else {"Producer": None, "CreationDate": None}
@@ -107,15 +107,15 @@ def _bytes(figure: Figure, kind: str) -> bytes:
     if kind != "svg":
         return data
     # Half the size: coordinates to a hundredth of a point, a style once for all of its marks.
-    data = _MARKS.sub(_styled_once, _COORDINATES.sub(_shortened, data))
-    return _SPACE_BEFORE.sub(b"\n", data)
+    data = _MARKS_PATTERN.sub(_move_style_to_group, _COORDINATE_PATTERN.sub(_shorten_number, data))
+    return _LEADING_SPACE_PATTERN.sub(b"\n", data)
 
 
-def _styled_once(match: re.Match[bytes]) -> bytes:
+def _move_style_to_group(match: re.Match[bytes]) -> bytes:
     group, marks, looks = match.groups()
     attribute = b' style="' + looks + b'"'
     return group + attribute + b">" + marks.replace(attribute, b"")
 
 
-def _shortened(match: re.Match[bytes]) -> bytes:
-    return _DECIMALS.sub(rb"\1", match[0])
+def _shorten_number(match: re.Match[bytes]) -> bytes:
+    return _DECIMALS_PATTERN.sub(rb"\1", match[0])

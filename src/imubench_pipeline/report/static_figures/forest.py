@@ -30,19 +30,19 @@ from imubench_pipeline.report.static_figures.style import (
     style,
 )
 from imubench_pipeline.report.view import ChannelView
-from imubench_pipeline.words.estimates import STATUS_WORDS
+from imubench_pipeline.words.estimates import status_text
 
 Kind = Literal["estimate", "not identified", "limit"]
 
-_SLOT = 2.6  # mm, of a recording where there is room
-_LEAST_ROW = 4.2  # mm, of a sensor: its name must fit
-_MOST = 205.0  # mm, of all sensors: the figure stands on one page
-_AROUND = 16.0  # mm, title and axis
-_WIDEST = 1.5
-"""Decades that an interval reaches beyond all values, before it is cut."""
+_SLOT_HEIGHT = 2.6  # mm, of a recording where there is room
+_MIN_ROW_HEIGHT = 4.2  # mm, of a sensor: its name must fit
+_MAX_HEIGHT = 205.0  # mm, of all sensors: the figure stands on one page
+_FRAME_HEIGHT = 16.0  # mm, title and axis
+_MAX_INTERVAL_DECADES = 1.5
+"""Maximum length of an interval beyond all values, decades."""
 
 # A bar at the limit and an arrow to the left of it, in units of the bar.
-_ARROW = Path(
+_ARROW_MARKER = Path(
     [(0, -0.3), (0, 0.3), (0, 0), (-1, 0), (-0.75, 0.2), (-1, 0), (-0.75, -0.2)],
     [Path.MOVETO, Path.LINETO, Path.MOVETO, Path.LINETO, Path.MOVETO, Path.LINETO, Path.LINETO],
 )
@@ -51,7 +51,7 @@ _ARROW_SIZE = 4.5  # of a dot
 
 @dataclass(frozen=True)
 class Mark:
-    """What the figure shows of one estimate."""
+    """The mark of one estimate."""
 
     place: float  # distance from the top, mm
     kind: Kind
@@ -71,14 +71,14 @@ def marks(view: ChannelView, symbol: str, place: float, spread: float = 0.0) -> 
         return
     rows = [row for row in view.named(view.recommended, symbol) if _is_shown(row)]
     for number, row in enumerate(rows):
-        yield _mark(row, place + spread * ((number + 0.5) / len(rows) - 0.5))
+        yield _make_mark(row, place + spread * ((number + 0.5) / len(rows) - 0.5))
 
 
 def _is_shown(row: ParameterRow) -> bool:
     return row.value is not None or bool(row.upper)
 
 
-def _mark(row: ParameterRow, place: float) -> Mark:
+def _make_mark(row: ParameterRow, place: float) -> Mark:
     lower, upper = row.lower, row.upper
     if lower is not None and lower < 0.0:
         # A ramp has a sign, and a logarithmic axis shows its size.
@@ -122,12 +122,12 @@ def forest_figure(
     """
     symbols = [symbol] if isinstance(symbol, str) else list(symbol)
     looks = sensor_appearances(list(sensors))
-    blocks = _blocks(views, sensors)
+    blocks = _make_blocks(views, sensors)
     total = blocks[-1].bottom
     name = channel_name(views[0].channel)
     figure = new_figure(
         SINGLE if len(symbols) == 1 else DOUBLE,
-        total + _AROUND,
+        total + _FRAME_HEIGHT,
         f"{name}: {', '.join(symbols)} of all sensors",
     )
     panels = figure.subplots(1, len(symbols), sharey=True, squeeze=False)[0]
@@ -139,26 +139,26 @@ def forest_figure(
     first = panels[0]
     first.set_ylim(total, 0.0)
     first.set_yticks([(block.top + block.bottom) / 2.0 for block in blocks])
-    first.set_yticklabels([_block_name(figure, block) for block in blocks])
+    first.set_yticklabels([_name_block(figure, block) for block in blocks])
     for panel in panels:
         panel.tick_params(axis="y", length=0, which="both")
         panel.grid(visible=False, axis="y")
     first.set_title(name, loc="left")
-    legend_below(figure, _legend(kinds))
+    legend_below(figure, _make_legend(kinds))
     return settled(figure)
 
 
-def _blocks(views: Sequence[ChannelView], sensors: Sequence[str]) -> list[_Block]:
-    """Give each sensor a row, higher the more recordings it has, as far as a page allows."""
+def _make_blocks(views: Sequence[ChannelView], sensors: Sequence[str]) -> list[_Block]:
+    """Return the rows of the sensors; their height grows with the recordings, within a page."""
     by_sensor = {
         sensor: [view for view in views if view.sensor == sensor]
         for sensor in sensors
         if any(view.sensor == sensor for view in views)
     }
-    slot = _SLOT
+    slot = _SLOT_HEIGHT
     while True:
-        heights = [max(_LEAST_ROW, slot * (len(each) + 0.5)) for each in by_sensor.values()]
-        if sum(heights) <= max(_MOST, _LEAST_ROW * len(heights)):
+        heights = [max(_MIN_ROW_HEIGHT, slot * (len(each) + 0.5)) for each in by_sensor.values()]
+        if sum(heights) <= max(_MAX_HEIGHT, _MIN_ROW_HEIGHT * len(heights)):
             break
         slot *= 0.95
     bottoms = np.cumsum(heights)
@@ -170,7 +170,7 @@ def _blocks(views: Sequence[ChannelView], sensors: Sequence[str]) -> list[_Block
     ]
 
 
-def _block_name(figure: Figure, block: _Block) -> str:
+def _name_block(figure: Figure, block: _Block) -> str:
     count = len(block.views)
     name = shortened(figure, block.sensor, 110.0)
     simulated = sum(view.simulated for view in block.views)
@@ -196,7 +196,7 @@ def _draw_panel(
     for number, block in enumerate(blocks):
         if number % 2:
             axes.axhspan(block.top, block.bottom, color="0.955", lw=0, zorder=0.0)
-        step = block.places[1] - block.places[0] if len(block.views) > 1 else _SLOT
+        step = block.places[1] - block.places[0] if len(block.views) > 1 else _SLOT_HEIGHT
         of_block = [
             mark
             for view, place in zip(block.views, block.places, strict=True)
@@ -209,7 +209,7 @@ def _draw_panel(
         ]
         _draw_marks(axes, of_block, looks[block.sensor], unit.per_si, step)
         if not of_block:
-            _say_why(axes, block, symbol)
+            _write_reason(axes, block, symbol)
         drawn += of_block
     if truths:
         axes.plot(
@@ -222,15 +222,15 @@ def _draw_panel(
             mew=0.8,
             zorder=3.5,
         )
-    _limit(axes, drawn, [value for _, value in truths], unit.per_si, ticks)
+    _set_limits(axes, drawn, [value for _, value in truths], unit.per_si, ticks)
     axes.set_xlabel(f"{SYMBOLS[symbol]} ({unit.sign})")
     return {mark.kind for mark in drawn} | ({"truth"} if truths else set())
 
 
-def _limit(
+def _set_limits(
     axes: Axes, drawn: Sequence[Mark], truths: Sequence[float], scale: float, ticks: int
 ) -> None:
-    """Set limits that hold all values, and their intervals within reason."""
+    """Set axis limits for all values and, within bounds, their intervals."""
     values = [mark.value * scale for mark in drawn if mark.value] + list(truths)
     # The arrow of a limit needs room at its left.
     values += [mark.value * scale / 2.5 for mark in drawn if mark.value and mark.kind == "limit"]
@@ -239,7 +239,7 @@ def _limit(
     if not values:
         axes.set_xticks([])
         return
-    reach = 10.0**_WIDEST
+    reach = 10.0**_MAX_INTERVAL_DECADES
     near = np.clip(ends, min(values) / reach, max(values) * reach)
     log_x(axes, extent(values, near, margin=1.6), ticks=ticks)
 
@@ -253,7 +253,11 @@ def _draw_marks(
     dots: dict[Kind, dict[str, Any]] = {
         "estimate": marker_look(look),
         "not identified": marker_look(look, hollow=True),
-        "limit": {"marker": _ARROW, "markerfacecolor": "none", "markeredgecolor": look.light},
+        "limit": {
+            "marker": _ARROW_MARKER,
+            "markerfacecolor": "none",
+            "markeredgecolor": look.light,
+        },
     }
     for kind, dot in dots.items():
         chosen = [mark for mark in of_block if mark.kind == kind]
@@ -281,10 +285,10 @@ def _draw_marks(
         )
 
 
-def _say_why(axes: Axes, block: _Block, symbol: str) -> None:
+def _write_reason(axes: Axes, block: _Block, symbol: str) -> None:
     """Write why a row of a panel is empty."""
     statuses = {
-        STATUS_WORDS[row.status]
+        status_text(row.status)
         for view in block.views
         if view.recommended in view.parameters
         for row in view.named(view.recommended, symbol)
@@ -300,8 +304,8 @@ def _say_why(axes: Axes, block: _Block, symbol: str) -> None:
     )
 
 
-def _legend(kinds: set[str]) -> list[Line2D]:
-    """Return the samples of the marks that there are, in black: colour tells the sensor."""
+def _make_legend(kinds: set[str]) -> list[Line2D]:
+    """Return the legend of the marks, in black, because colour identifies the sensor."""
     black: dict[str, Any] = {"color": "black", "markersize": 4.0}
     samples = {
         "estimate": Line2D([], [], marker="o", label="estimate, 95 % limits", **black),
@@ -311,14 +315,14 @@ def _legend(kinds: set[str]) -> list[Line2D]:
             marker="o",
             markerfacecolor="white",
             ls=(0, (2, 1)),
-            label="not identified: as fitted, 95 % limits",
+            label="not determined: fitted value, 95 % limits",
             **black,
         ),
         "limit": Line2D(
             [],
             [],
             ls="none",
-            marker=_ARROW,
+            marker=_ARROW_MARKER,
             markerfacecolor="none",
             label="upper 95 % limit",
             color="black",

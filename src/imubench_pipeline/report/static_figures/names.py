@@ -1,28 +1,28 @@
-"""What the figures call channels, logs and noise terms."""
+"""Names of channels, logs and noise terms in the figures."""
 
 from __future__ import annotations
 
 from imubench_pipeline.noise import PARAMETERS, TERMS
 from imubench_pipeline.report.view import QUANTITY_NAMES, ChannelView
 
-_OF_CHANNEL = {
+_QUANTITY_WORDS = {
     "gyro": {"signal": "rate", "integral": "angle"},
     "accel": {"signal": "acceleration", "integral": "velocity"},
 }
 
 TERM_NAMES = {
     quantity: {kind.symbol: kind.standard_name.format(**words) for kind in TERMS}
-    for quantity, words in _OF_CHANNEL.items()
+    for quantity, words in _QUANTITY_WORDS.items()
 }
-"""The field's names of the terms, by quantity and symbol of the term."""
+"""Standard names of the terms, by quantity and symbol of the term."""
 
-_GREEK = ("beta", "omega", "sigma", "tau")
+_GREEK_LETTERS = ("beta", "omega", "sigma", "tau")
 
 
 def _set(symbol: str) -> str:
-    """Return a symbol as mathematics sets it."""
+    """Return a symbol in TeX notation."""
     letter, _, index = symbol.partition("_")
-    letter = f"\\{letter}" if letter in _GREEK else letter
+    letter = f"\\{letter}" if letter in _GREEK_LETTERS else letter
     return letter + (f"_{index}" if len(index) < 2 else f"_{{{index}}}") * bool(index)
 
 
@@ -42,12 +42,12 @@ def channel_name(channel: str) -> str:
 
 
 def log_name(view: ChannelView) -> str:
-    """Return what the curve of a log is called: never measured, where it is simulated."""
+    """Return the name of the curve of a log: measured or simulated."""
     return "simulated log" if view.simulated else "measured"
 
 
 def entitled(view: ChannelView) -> tuple[str, str]:
-    """Return the names of the user, and what follows them in the title of a channel's figure."""
+    """Return sensor and recording, and the rest of the title of a channel's figure."""
     name = channel_name(view.channel)
     rest = " (simulated)" * view.simulated + f": {name[0].lower()}{name[1:]}"
     return f"{view.sensor} / {view.recording}", rest

@@ -32,7 +32,7 @@ def figures_of(
     *,
     kinds: Sequence[str] = tuple(CROSS_KINDS),
 ) -> Sequence[Callable[[], None]]:
-    """Return what writes the figures, each by itself: of each channel those of all sensors."""
+    """Return a function for each figure of all sensors that writes it."""
     folder.mkdir(parents=True, exist_ok=True)
     unused = {name: schema(name).empty_table() for name in BY_RECORDING}
     views = recording_views(unused | dict(tables))

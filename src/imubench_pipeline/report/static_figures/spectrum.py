@@ -24,12 +24,12 @@ from imubench_pipeline.report.static_figures.style import (
 from imubench_pipeline.report.static_figures.terms import SUM_LOOK, TERM_LOOKS
 from imubench_pipeline.report.view import ChannelView
 
-_METHOD = "likelihood"
+_SPECTRUM_METHOD = "likelihood"
 """The method whose model the table ``spectrum`` has."""
 
 _MOST_NAMED = 3
-_BESIDE = 0.05  # of the frequency axis: the height of a letter, and more
-_CURVES = 200  # points of a term: it is smooth
+_LABEL_OFFSET = 0.05  # of the frequency axis: the height of a letter, and more
+_TERM_POINTS = 200  # points of a term: it is smooth
 
 
 @style()
@@ -49,7 +49,7 @@ def spectrum_figure(view: ChannelView, system: System = "practical") -> Figure |
     level = np.sqrt(spectrum["density"]) * unit.per_si
     fitted = np.sqrt(spectrum["fitted"]) * unit.per_si
     _draw_bins(axes, view, level, fitted)
-    if _METHOD in view.parameters:
+    if _SPECTRUM_METHOD in view.parameters:
         _draw_terms(axes, view, unit.per_si)
     if np.isfinite(fitted).any():
         name = next((f": {row.model}" for row in view.models if row.chosen), "")
@@ -66,7 +66,7 @@ def spectrum_figure(view: ChannelView, system: System = "practical") -> Figure |
 def _draw_bins(
     axes: Axes, view: ChannelView, level: NDArray[np.float64], fitted: NDArray[np.float64]
 ) -> None:
-    """Draw the bins, and where 95 % of them lie if the fit is right."""
+    """Draw the bins, and their 95 % band if the model is right."""
     spectrum = view.spectrum
     used = spectrum["used"] > 0
     nu = spectrum["ordinates"]
@@ -97,9 +97,9 @@ def _draw_bins(
 def _draw_terms(axes: Axes, view: ChannelView, scale: float) -> None:
     """Draw each term as sampled, so that the terms add up to the fit."""
     frequency = view.spectrum["frequency"]
-    grid = np.geomspace(frequency[0], frequency[-1], _CURVES)
+    grid = np.geomspace(frequency[0], frequency[-1], _TERM_POINTS)
     interval = view.tau[0]  # the first cluster is one sample
-    for term in view.model(_METHOD).terms:
+    for term in view.model(_SPECTRUM_METHOD).terms:
         density = term.sampled_spectrum(2.0 * np.pi * grid * interval, interval) * interval
         if density.any():
             axes.plot(
@@ -113,9 +113,9 @@ def _draw_terms(axes: Axes, view: ChannelView, scale: float) -> None:
 
 
 def _draw_lines(axes: Axes, view: ChannelView) -> None:
-    """Draw the lines that were found; the largest have their frequency beside them."""
+    """Draw the spectral lines, the largest with their frequency."""
     frequency = view.spectrum["frequency"]
-    apart = (frequency[-1] / frequency[0]) ** _BESIDE
+    apart = (frequency[-1] / frequency[0]) ** _LABEL_OFFSET
     named: list[float] = []
     look = TERM_LOOKS["S"]
     strongest = sorted(view.lines, key=lambda row: -(row.ratio or 0.0))

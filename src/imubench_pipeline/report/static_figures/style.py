@@ -29,15 +29,15 @@ FONT_SIZE = 7.0
 """pt; no text of a figure is smaller."""
 
 _TITLE_SIZE = FONT_SIZE + 0.5
-_EDGE = 4.0  # pt
-_LEGEND_ROW = 3.7  # mm
-_HANDLE = 24.0  # pt: the sample of a line in a legend, and the space beside it
-_BETWEEN = 9.0  # pt: between columns of a legend
-_LEAST_SPAN = 0.7  # decades of an axis, below which its ticks would say too little
+_EDGE_WIDTH = 4.0  # pt
+_LEGEND_ROW_HEIGHT = 3.7  # mm
+_HANDLE_WIDTH = 24.0  # pt: the sample of a line in a legend, and the space beside it
+_COLUMN_GAP = 9.0  # pt: between columns of a legend
+_MIN_SPAN = 0.7  # decades of an axis, below which its ticks would say too little
 _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 # Newer releases of Matplotlib have a type of their own for the names of settings.
-_STYLE: Any = {
+_STYLE_SETTINGS: Any = {
     # Matplotlib brings this font, so a figure has the same layout on every machine.
     "font.family": "sans-serif",
     "font.sans-serif": ["DejaVu Sans"],
@@ -106,7 +106,7 @@ def style() -> Iterator[None]:
     """Set the look of figures that are made or saved inside; settings of the user do not count."""
     with mpl.rc_context():
         mpl.rcdefaults()
-        mpl.rcParams.update(_STYLE)
+        mpl.rcParams.update(_STYLE_SETTINGS)
         yield
 
 
@@ -140,7 +140,7 @@ def new_figure(width: float, height: float, title: str) -> Figure:
 
 
 def plain(text: str) -> str:
-    """Return a name of the user such that nothing in it is read as a formula."""
+    """Return a name of the user, escaped so that Matplotlib reads no formula in it."""
     return text.replace("$", r"\$")
 
 
@@ -153,7 +153,7 @@ def text_width(figure: Figure, text: str) -> float:
 
 
 def shortened(figure: Figure, name: str, width: float) -> str:
-    """Return a name, its middle left out where it is wider than ``width`` pt."""
+    """Return a name, shortened in the middle if it is wider than ``width`` pt."""
     text, length = name, len(name)
     while length > 2 and (excess := text_width(figure, plain(text)) / width) > 1.0:
         length = min(length - 1, int(length / excess))
@@ -166,40 +166,42 @@ def entitle(figure: Figure, name: str, rest: str) -> None:
     """Write a name of the user, and what is shown of it, above all axes."""
     width = figure.get_figwidth() * 72.0
     enlarged = _TITLE_SIZE / FONT_SIZE
-    room = (width - 2.0 * _EDGE) / enlarged - text_width(figure, rest)
+    room = (width - 2.0 * _EDGE_WIDTH) / enlarged - text_width(figure, rest)
     figure.suptitle(
-        shortened(figure, name, room) + rest, x=_EDGE / width, ha="left", fontsize=_TITLE_SIZE
+        shortened(figure, name, room) + rest, x=_EDGE_WIDTH / width, ha="left", fontsize=_TITLE_SIZE
     )
 
 
 def legend_below(figure: Figure, handles: Sequence[Artist]) -> None:
     """Name lines below the axes, in as many columns as fit; the figure grows by the rows."""
     width, height = figure.get_size_inches()
-    room = width * 72.0 - 2.0 * _EDGE
-    labels = [_broken(figure, str(handle.get_label()), room - _HANDLE) for handle in handles]
-    widths = [text_width(figure, label) + _HANDLE for label in labels]
+    room = width * 72.0 - 2.0 * _EDGE_WIDTH
+    labels = [
+        _break_label(figure, str(handle.get_label()), room - _HANDLE_WIDTH) for handle in handles
+    ]
+    widths = [text_width(figure, label) + _HANDLE_WIDTH for label in labels]
     columns = len(handles)
-    while columns > 1 and _legend_width(widths, columns) > room:
+    while columns > 1 and _measure_legend(widths, columns) > room:
         columns -= 1
     rows = math.ceil(len(handles) / columns)
     # As many rows as before, but filled evenly.
     columns = math.ceil(len(handles) / rows)
     rows += sum(label.count("\n") for label in labels)
-    figure.set_size_inches(width, height + rows * _LEGEND_ROW / 25.4)
+    figure.set_size_inches(width, height + rows * _LEGEND_ROW_HEIGHT / 25.4)
     figure.legend(handles, labels, loc="outside lower center", ncols=columns)
 
 
-def _broken(figure: Figure, label: str, width: float) -> str:
-    """Return a label, its last remark on a line of its own where it is too wide."""
+def _break_label(figure: Figure, label: str, width: float) -> str:
+    """Return a label, with its last remark on a new line if it is too wide."""
     head, bracket, remark = label.rpartition(" (")
     fits = not bracket or text_width(figure, label) <= width
     return label if fits else f"{head}\n({remark}"
 
 
-def _legend_width(widths: Sequence[float], columns: int) -> float:
+def _measure_legend(widths: Sequence[float], columns: int) -> float:
     """Return the width of a legend in pt; Matplotlib fills it column by column."""
     parts = np.array_split(np.asarray(widths), columns)
-    return sum(float(part.max()) for part in parts) + _BETWEEN * (columns - 1)
+    return sum(float(part.max()) for part in parts) + _COLUMN_GAP * (columns - 1)
 
 
 def settled(figure: Figure) -> Figure:
@@ -214,7 +216,7 @@ def extent(*values: ArrayLike, margin: float = 1.25) -> tuple[float, float]:
     joined = np.concatenate([np.ravel(np.asarray(each, dtype=np.float64)) for each in values])
     positive = joined[np.isfinite(joined) & (joined > 0)]
     low, high = (positive.min(), positive.max()) if len(positive) else (1.0, 1.0)
-    missing = max(0.0, _LEAST_SPAN - math.log10(high / low)) / 2.0
+    missing = max(0.0, _MIN_SPAN - math.log10(high / low)) / 2.0
     return float(low / margin / 10.0**missing), float(high * margin * 10.0**missing)
 
 
@@ -233,37 +235,39 @@ def log_y(axes: Axes, limits: tuple[float, float], *, ticks: int = 8) -> None:
 
 
 def _label_decades(axis: Axis, limits: tuple[float, float], ticks: int) -> None:
-    """Label the decades; between them too where there are few."""
+    """Label the decades, and ticks between them if there are few decades."""
     low, high = limits
     span = math.log10(high / low)
     decades = math.floor(math.log10(high)) - math.ceil(math.log10(low)) + 1
     ordinary = low > 0.5e-3 and high < 2e4
     axis.set_major_locator(LogLocator(10.0, numticks=ticks))
-    axis.set_major_formatter(FuncFormatter(_number if ordinary else _power))
+    axis.set_major_formatter(FuncFormatter(_format_number if ordinary else _format_power))
     axis.set_minor_locator(LogLocator(10.0, subs=range(2, 10), numticks=ticks))
     # A power of ten is wide; between two of them there is no room for others.
     if (decades > 1 and span > 1.3) or (decades > 0 and not ordinary):
         axis.set_minor_formatter(NullFormatter())
     else:
         labelled = (2, 3, 5) if span < 1.0 and ordinary else (2, 5)
-        axis.set_minor_formatter(FuncFormatter(partial(_between, labelled, ordinary)))
+        axis.set_minor_formatter(FuncFormatter(partial(_list_between, labelled, ordinary)))
 
 
-def _between(labelled: Sequence[int], ordinary: bool, value: float, _: int | None = None) -> str:
-    factor = round(value / 10.0 ** _exponent(value))
+def _list_between(
+    labelled: Sequence[int], ordinary: bool, value: float, _: int | None = None
+) -> str:
+    factor = round(value / 10.0 ** _find_exponent(value))
     if factor not in labelled:
         return ""
-    return _number(value) if ordinary else f"{factor}×{_power(value)}"
+    return _format_number(value) if ordinary else f"{factor}×{_format_power(value)}"
 
 
-def _exponent(value: float) -> int:
+def _find_exponent(value: float) -> int:
     # The ticks are multiples of powers of ten, but for rounding.
     return math.floor(math.log10(value) + 1e-9)
 
 
-def _number(value: float, _: int | None = None) -> str:
+def _format_number(value: float, _: int | None = None) -> str:
     return f"{value:g}"
 
 
-def _power(value: float, _: int | None = None) -> str:
-    return "10" + f"{_exponent(value):d}".translate(_SUPERSCRIPTS)
+def _format_power(value: float, _: int | None = None) -> str:
+    return "10" + f"{_find_exponent(value):d}".translate(_SUPERSCRIPTS)

@@ -18,7 +18,7 @@ from imubench_pipeline.report.static_figures.curves import channel_axes, draw_me
 from imubench_pipeline.report.static_figures.names import SYMBOLS, TERM_NAMES
 from imubench_pipeline.report.static_figures.style import style
 from imubench_pipeline.report.view import ChannelView
-from imubench_pipeline.words.estimates import STATUS_WORDS
+from imubench_pipeline.words.estimates import status_text
 
 TERM_LOOKS: dict[str, dict[str, Any]] = {
     "Q": {"color": "#9A6B00", "linestyle": (0, (1, 1.4))},
@@ -36,16 +36,16 @@ _WRITTEN_BELOW = frozenset({"F", "K"})
 
 SUM_LOOK: dict[str, Any] = {"color": "#008F6B", "linestyle": "-", "linewidth": 1.2}
 
-_REPEATED: list[dict[str, Any]] = [
+_REPEATED_LOOKS: list[dict[str, Any]] = [
     {"linestyle": (0, (3, 1, 1, 1, 1, 1))},
     {"linestyle": (0, (1, 1))},
 ]
 
-_DEEPEST = 300.0
-"""A point is shown at most so far below the curve: else the curve would be a strip at the top."""
+_MAX_POINT_RATIO = 300.0
+"""Maximum ratio of the curve to a point below it; more would compress the curve."""
 
-_END = 0.15
-"""Part of the axis of tau at its end, where a text is written to the left of its point."""
+_END_SHARE = 0.15
+"""Share of the axis of tau at its end, in which a text is written to the left of its point."""
 
 
 @style()
@@ -53,8 +53,8 @@ def terms_figure(view: ChannelView, system: System = "practical") -> Figure | No
     """Draw every term of the recommended model, their sum, and where N, B and K are read.
 
     N is the white noise at tau = 1 s, 0.664 B the plateau of flicker noise or the peak of a
-    Gauss-Markov process, K the random walk at tau = 3 s (000, Figure 1; 003, Figure 3). None where
-    there is no model.
+    Gauss-Markov process, K the random walk at tau = 3 s (Maia et al., Figure 1; Silva et al.,
+    Figure 3). None if there is no model.
     """
     if view.recommended not in view.parameters:
         return None
@@ -66,7 +66,7 @@ def terms_figure(view: ChannelView, system: System = "practical") -> Figure | No
     # Lines fold at the averaging times of the curve; between them they would be a smear.
     tau = view.tau if model.sinusoids else np.geomspace(view.tau[0], view.tau[-1], 200)
     smooth = [term for term in model.terms if term not in model.sinusoids]
-    for term, look in _looks(smooth):
+    for term, look in _list_looks(smooth):
         deviation = np.sqrt(term.allan_variance(tau)) * scale
         axes.plot(tau, deviation, label=term_label(view, term, system), **look)
     name = "+".join(term.symbol for term in smooth)
@@ -78,15 +78,19 @@ def terms_figure(view: ChannelView, system: System = "practical") -> Figure | No
     total = np.sqrt(model.allan_variance(tau)) * scale
     axes.plot(tau, total, label=f"sum: {name}", zorder=2.8, **SUM_LOOK)
     levels = _mark_readings(axes, smooth, scale, tau, floor_tau=float(tau[np.argmin(total)]))
-    lowest = float(total.min()) / _DEEPEST
+    lowest = float(total.min()) / _MAX_POINT_RATIO
     return finish(figure, axes, view, scale, *(level for level in levels if level > lowest))
 
 
-def _looks(terms: Sequence[Term]) -> Iterator[tuple[Term, dict[str, Any]]]:
+def _list_looks(terms: Sequence[Term]) -> Iterator[tuple[Term, dict[str, Any]]]:
     """Yield the terms with their looks; a repeated term has another dash."""
     drawn: Counter[str] = Counter()
     for term in terms:
-        dash = _REPEATED[min(drawn[term.symbol], len(_REPEATED)) - 1] if drawn[term.symbol] else {}
+        dash = (
+            _REPEATED_LOOKS[min(drawn[term.symbol], len(_REPEATED_LOOKS)) - 1]
+            if drawn[term.symbol]
+            else {}
+        )
         drawn[term.symbol] += 1
         yield term, TERM_LOOKS[term.symbol] | dash
 
@@ -122,7 +126,7 @@ def _mark_readings(
         where, level = reading.tau, reading.level
         factor = "" if reading.factor == 1.0 else f"{reading.factor:.3f} "
         colour = TERM_LOOKS[term.symbol]["color"]
-        at_end = where > tau[-1] * (tau[0] / tau[-1]) ** _END
+        at_end = where > tau[-1] * (tau[0] / tau[-1]) ** _END_SHARE
         below = term.symbol in _WRITTEN_BELOW
         levels.append(level * scale * (0.6 if below else 1.6))
         if reading.peak:
@@ -142,14 +146,14 @@ def _mark_readings(
 
 
 def term_label(view: ChannelView, term: Term, system: System) -> str:
-    """Return the name of a term with its parameters, and whether the log does not tell them."""
+    """Return the name of a term with its parameters, and their status if not estimated."""
     values = ", ".join(
         f"{SYMBOLS[symbol]} = {unit.text(abs(value), 3)} {unit.sign}"
         for symbol, value in term.values.items()
         for unit in [page_unit(view.quantity, symbol, system)]
     )
     doubts = {
-        STATUS_WORDS[row.status]
+        status_text(row.status)
         for symbol, value in term.values.items()
         for row in view.named(view.recommended, symbol)
         if row.value is None and row.fitted is not None

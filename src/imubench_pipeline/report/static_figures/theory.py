@@ -1,4 +1,4 @@
-"""The characteristic curve of the Allan deviation (Figure 1 of 000 and of 003), computed."""
+"""The characteristic curve of the Allan deviation (Figure 1 of Maia et al. and Silva et al.)."""
 
 from __future__ import annotations
 
@@ -29,30 +29,30 @@ CHARACTERISTIC = NoiseModel(
 )
 """A gyroscope whose three slopes are seen, each over a decade or more: rad/s and s."""
 
-_TAU = np.geomspace(1e-2, 1e5, 281)
+_DRAWN_TAU = np.geomspace(1e-2, 1e5, 281)
 
 
 @style()
 def theory_figure(system: System = "practical") -> Figure:
-    """Draw a curve with white noise N, bias instability B and random walk K, and how it is read."""
+    """Draw a curve with white noise, bias instability and random walk, with the reading points."""
     unit = page_unit("gyro", "adev", system)
     model = CHARACTERISTIC
     figure = new_figure(SINGLE, 68.0, "Characteristic curve of the Allan deviation")
     axes = figure.add_subplot()
-    total = np.sqrt(model.allan_variance(_TAU)) * unit.per_si
+    total = np.sqrt(model.allan_variance(_DRAWN_TAU)) * unit.per_si
     for symbol, label, term in (
         ("N", "white noise: $N$ / √τ", NoiseModel(N=model.N)),
         ("F", f"bias instability: {FLOOR:.3f} $B$", NoiseModel(B=model.B)),
         ("K", "random walk: $K$ √(τ / 3)", NoiseModel(K=model.K)),
     ):
-        deviation = np.sqrt(term.allan_variance(_TAU)) * unit.per_si
-        axes.plot(_TAU, deviation, label=label, lw=0.8, **TERM_LOOKS[symbol])
-    axes.plot(_TAU, total, label="Allan deviation of the sum", zorder=2.8, **SUM_LOOK)
-    log_x(axes, (float(_TAU[0]), float(_TAU[-1])))
+        deviation = np.sqrt(term.allan_variance(_DRAWN_TAU)) * unit.per_si
+        axes.plot(_DRAWN_TAU, deviation, label=label, lw=0.8, **TERM_LOOKS[symbol])
+    axes.plot(_DRAWN_TAU, total, label="Allan deviation of the sum", zorder=2.8, **SUM_LOOK)
+    log_x(axes, (float(_DRAWN_TAU[0]), float(_DRAWN_TAU[-1])))
     log_y(axes, extent(total, model.K * unit.per_si, margin=2.0))
     axes.set_xlabel("averaging time τ (s)")
     axes.set_ylabel(f"Allan deviation σ(τ) ({unit.sign})")
-    flat = _flat_tau(model)
+    flat = _find_flat_tau(model)
     white, walk = model.N * unit.per_si, model.K * unit.per_si
     mark_point(axes, "N", 1.0, white)
     _write(axes, "N", 1.0, white, "$N$: at τ = 1 s", (6.0, 6.0))
@@ -61,7 +61,7 @@ def theory_figure(system: System = "practical") -> Figure:
     plateau = FLOOR * model.B * unit.per_si
     mark_point(axes, "F", flat, plateau)
     # Beside the point the three lines cross; at their end there is room.
-    _write(axes, "F", float(_TAU[-1]), plateau, f"{FLOOR:.3f} $B$", (-4.0, -6.0))
+    _write(axes, "F", float(_DRAWN_TAU[-1]), plateau, f"{FLOOR:.3f} $B$", (-4.0, -6.0))
     legend_below(figure, axes.get_legend_handles_labels()[0])
     settled(figure)
     # How steep a slope looks is known when the layout is.
@@ -71,8 +71,8 @@ def theory_figure(system: System = "practical") -> Figure:
     return figure
 
 
-def _flat_tau(model: NoiseModel) -> float:
-    """Return where the curve is flat: N / sqrt(tau) and K sqrt(tau / 3) are equal."""
+def _find_flat_tau(model: NoiseModel) -> float:
+    """Return the tau of the flat part of the curve, where N / sqrt(tau) = K sqrt(tau / 3)."""
     return math.sqrt(3.0) * model.N / model.K
 
 
