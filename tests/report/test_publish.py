@@ -293,7 +293,7 @@ def test_a_channel_without_a_random_walk_says_so(read: dict[str, Read]) -> None:
     (answer,) = (one for one in page.elements if one.attributes.get("class") == "answer")
     assert answer.text.startswith("N 0.33 °/√h (± 10 %); B 10 °/h (± 25 %); T_B 100 s (± 25 %);")
     assert "K" not in answer.text
-    assert page.naming("The data do not ask for K: it is below 3 °/h/√h.", "li")
+    assert page.naming("K is not in the model: the data do not support it; below 3 °/h/√h.", "li")
     (row,) = (one for one in page.naming("likelihood", "tr") if "recommended" in one.text)
     assert re.search(r"not in the model\s*below 3", row.text)
 

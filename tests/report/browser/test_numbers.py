@@ -149,7 +149,7 @@ def test_a_value_that_is_not_known_says_why(read: Open, bench: Report) -> None:
     assert absent.inner_text().split("\n") == ["not in the model", "below 1.24"]
     unsure = tables.nth(2).locator("tr.recommended td.none")
     assert unsure.inner_text().split("\n") == ["not determined", "20 to 500"]
-    assert "10 h would do for 10 %" in reader.page.locator("ul.untold").last.inner_text()
+    assert "± 10 % needs 10 h" in reader.page.locator("ul.untold").last.inner_text()
 
 
 @pytest.mark.parametrize("drawn", few([False], [True]))
