@@ -112,5 +112,5 @@ def test_what_is_kept_goes_with_the_log(drop_zone: Path) -> None:
 
 
 def test_an_array_without_a_channel_that_can_be_used_is_refused() -> None:
-    with pytest.raises(RecordingError, match="gyro_x never changes"):
+    with pytest.raises(RecordingError, match="gyro x never changes"):
         imu.estimate(np.zeros(1000), 100.0, channels="gyro_x")

@@ -181,7 +181,8 @@ def _find_bad_values(
         coarse = samples.Coarse(steps.levels, steps.step, settings.fewest_levels, steps.hidden)
         yield find(coarse, "warning", steps.levels, channel)
     elif steps is not None and steps.over_noise > settings.step_over_noise:
-        quantised = samples.Quantised(steps.step, steps.over_noise, is_rounded=steps.hidden)
+        over_noise = steps.over_noise if math.isfinite(steps.over_noise) else None
+        quantised = samples.Quantised(steps.step, over_noise, is_rounded=steps.hidden)
         yield find(quantised, "note", steps.step, channel)
     length, end = column.longest_run
     stuck = length > max(3.0 * levels.longest_by_chance(column), settings.longest_stuck * rate)

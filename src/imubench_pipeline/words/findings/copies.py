@@ -37,15 +37,15 @@ def _describe_repeat(channel: str, start: float, end: float, original: float, nu
     """Return sentences about repeated parts of a log, s; ``number``: of them."""
     repeats = f"{channel_name(channel) if channel else 'The log'} repeats itself bit for bit"
     span = f"{number_text(start, 5)} s to {number_text(end, 5)} s"
-    where = f"{span} is a copy of the data from {number_text(original, 5)} s on"
+    where = f"is a copy of the data from {number_text(original, 5)} s on"
     if number > 1:
-        return f"{repeats}, {number} times. The longest part, {where}"
-    return f"{repeats}: {where}"
+        return f"{repeats}, {number} times. The longest part, {span}, {where}"
+    return f"{repeats}: {span} {where}"
 
 
 @dataclass(frozen=True)
 class LogTwice(
-    FindingData, code="log_twice", affects=ALL, unfit=True, doubt="the log is a copy of itself"
+    FindingData, code="log_twice", affects=ALL, unfit=True, doubt="the log repeats itself"
 ):
     """A large part of a log is a copy of an earlier part."""
 

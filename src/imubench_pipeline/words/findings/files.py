@@ -56,7 +56,9 @@ class WarmUpTrimmed(FindingData, code="warm_up_trimmed", affects=NONE):
 
 
 @dataclass(frozen=True)
-class ShortRecording(FindingData, code="short_recording", affects=SLOW):
+class ShortRecording(
+    FindingData, code="short_recording", affects=SLOW, doubt="the recording is short"
+):
     """A recording that is too short for slow noise."""
 
     duration: float
@@ -125,9 +127,10 @@ class UnusedFiles(FindingData, code="unused_files", affects=NONE):
 
     def text(self, channel: str) -> str:
         """Return the finding in sentences."""
-        more = ", ..." if self.number > len(self.files) else ""
+        more = self.number - len(self.files)
+        names = join_names([*self.files, *([f"{more} more"] if more else [])])
         return (
-            f"No channel is read from {', '.join(self.files)}{more}. Name the file of a channel "
+            f"No channel is read from {names}. Name the file of a channel "
             "with 'file:' in the sensor file. Notes belong beside the folder, as "
             f"{self.folder}.yaml"
         )
@@ -145,9 +148,11 @@ class UnequalLength(
     def text(self, channel: str) -> str:
         """Return the finding in sentences."""
         lengths = zip(self.files, self.samples, strict=True)
-        listed = join_names([f"{samples} in {file}" for file, samples in lengths])
+        listed = join_names(
+            [f"{counted(samples, 'sample')} in {file}" for file, samples in lengths]
+        )
         return (
-            f"Files without time stamps differ in length: {listed} samples. The shorter ones may "
+            f"Files without time stamps differ in length: {listed}. The shorter ones may "
             "be cut short"
         )
 

@@ -39,6 +39,7 @@ class Quantised(FindingData, code="quantised", affects=NONE):
 
     step: float
     step_over_noise: float | None = None
+    """None: the noise is not known, as most samples are equal."""
     lowest: float | None = None
     highest: float | None = None
     is_rounded: bool = False
@@ -51,11 +52,10 @@ class Quantised(FindingData, code="quantised", affects=NONE):
                 f"The temperature has steps of {number_text(self.step, 3)} °C, from "
                 f"{number_text(self.lowest)} to {number_text(self.highest)} °C"
             )
-        rounded = _ROUNDED if self.is_rounded else ""
-        return (
-            f"{channel_name(channel)} is quantised in steps of {_value_text(channel, self.step)}, "
-            f"{number_text(self.step_over_noise, 2)} times its noise{rounded}"
-        )
+        text = f"{channel_name(channel)} is quantised in steps of {_value_text(channel, self.step)}"
+        if self.step_over_noise is not None:
+            text += f", {number_text(self.step_over_noise, 2)} times its noise"
+        return text + (_ROUNDED if self.is_rounded else "")
 
 
 @dataclass(frozen=True)
@@ -90,8 +90,9 @@ class RepeatedSamples(
         """Return the finding in sentences."""
         return (
             f"{channel_name(channel)} repeats its previous sample in {percent_text(self.share, 2)} "
-            f"of the records; rounding explains {percent_text(self.share_by_chance, 2)}. It is "
-            "read faster than it is sampled. State its own rate, and record each sample once"
+            f"of the records; rounding explains {percent_text(self.share_by_chance, 2)}. The "
+            "logger reads faster than the sensor samples. State the rate of the sensor, and record "
+            "each sample once"
         )
 
 
@@ -285,8 +286,8 @@ class Motion(FindingData, code="motion", affects=ALL, unfit=True, doubt="the sen
     def text(self, channel: str) -> str:
         """Return the finding in sentences."""
         return (
-            f"{channel_name(channel)} was shaken from {_at(self.start)} to {_at(self.end)}. Use a "
-            "part of the log without it: 'use:' in the notes beside the log"
+            f"{channel_name(channel)} was shaken from {_at(self.start)} to {_at(self.end)}. Leave "
+            "this part out: 'use:' in the notes beside the log"
         )
 
 
@@ -323,12 +324,12 @@ class WarmUp(
 
     def text(self, channel: str) -> str:
         """Return the finding in sentences."""
-        later = "later it does not drift"
+        later = "; later it does not drift"
         if self.ratio is not None:
-            later = f"{number_text(self.ratio, 2)} times as much as later"
+            later = f", {number_text(self.ratio, 2)} times as much as later"
         return (
             f"{channel_name(channel)} drifts by {_value_text(channel, self.drift)} in its first "
-            f"{_at(self.end)}, {later}. Leave this out with 'use: {{start: {ceil(self.end)}}}' in "
+            f"{_at(self.end)}{later}. Leave this out with 'use: {{start: {ceil(self.end)}}}' in "
             "the notes beside the log, or with quality.trim_warm_up"
         )
 
@@ -365,8 +366,8 @@ class Joined(FindingData, code="joined", affects=ALL, unfit=True, doubt="two log
         """Return the finding in sentences."""
         changed = join_names([_CHANGES[change] for change in self.changes])
         return (
-            f"{changed.capitalize()} of {channel_name(channel)} change at once at {_at(self.at)}; its noise is "
-            f"{number_text(self.noise_ratio, 3)} times as large after that. Two sensors, or two "
+            f"The {changed} of {channel_name(channel)} change at once at {_at(self.at)}. The noise "
+            f"is {number_text(self.noise_ratio, 3)} times as large after that. Two sensors, or two "
             "ranges of one, are joined in this log. Use one part: 'use:' in the notes beside the "
             "log"
         )
@@ -392,8 +393,8 @@ class Interleaved(
         changed = join_names([_CHANGES[change] for change in self.changes])
         verb = "alternates" if len(self.changes) == 1 else "alternate"
         return (
-            f"{changed.capitalize()} of {channel_name(channel)} {verb} from sample to sample. The levels are "
-            f"{number_text(self.level, 3)} standard deviations apart, and the noise differs by a "
-            f"factor of {number_text(self.noise_ratio, 3)}. Every other sample seems to be from "
+            f"The {changed} of {channel_name(channel)} {verb} from sample to sample. The levels "
+            f"are {number_text(self.level, 3)} standard deviations apart, and the noise differs by "
+            f"a factor of {number_text(self.noise_ratio, 3)}. Every other sample seems to be from "
             "another sensor. Write each sensor to its own log"
         )

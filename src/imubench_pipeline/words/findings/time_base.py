@@ -109,8 +109,8 @@ class MissingSamples(FindingData, code="missing_samples", affects=ALL, doubt="sa
         )
         text = (
             f"{self.missing} of {counted(self.expected, 'sample')} "
-            f"{'is' if self.missing == 1 else 'are'} missing ({gaps}). The Allan variance leaves "
-            "out their clusters"
+            f"{'is' if self.missing == 1 else 'are'} missing ({gaps}). The Allan variance uses "
+            "the others"
         )
         if self.rate_of_bursts is not None:
             text += (
@@ -153,10 +153,11 @@ class RepeatedStamps(FindingData, code="repeated_stamps", affects=NONE):
 
     def text(self, channel: str) -> str:
         """Return the finding in sentences."""
-        records = counted(self.records, "record repeats", "records repeat")
+        one = self.records == 1
+        records = "record repeats a stamp or goes" if one else "records repeat a stamp or go"
         return (
-            f"{records} a stamp or {'goes' if self.records == 1 else 'go'} back to an earlier one; "
-            "left out. They were written twice, or the clock was set back"
+            f"{self.records} {records} back to an earlier one; left out. "
+            f"{'It was' if one else 'They were'} written twice, or the clock was set back"
         )
 
 
