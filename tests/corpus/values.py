@@ -155,6 +155,6 @@ ENTRIES = [
         "log of 99 samples",
         file(lambda: log(99)),
         STAMPED,
-        Rejected("gyro_x has 99 samples, expected at least 100"),
+        Rejected("gyro x has 99 samples; at least 100 are required"),
     ),
 ]

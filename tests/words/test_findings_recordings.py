@@ -149,7 +149,7 @@ def test_the_data_of_a_finding_can_be_read_again(channel: str, data: FindingData
 
 @pytest.mark.parametrize("one", list(classes()))
 def test_a_doubt_is_short_and_plain(one: type[FindingData]) -> None:
-    text = one.doubt.format(channels="gyro x")
+    text = one.doubt.format(channels="gyro x", are="is")
     if one.affects:
         assert "_" not in text and "(" not in text and len(text.split()) <= 12
 

@@ -180,7 +180,7 @@ def _ingest(
         written.append((assembled, folder / name))
     summary = _summary(parts, bases, metadata["started"]) | {"simulated": simulated}
     if all(channel in unusable for channel in log.channels):
-        reasons = "; ".join(f.detail for f in findings if f.severity == "fatal")
+        reasons = ". ".join(f.detail for f in findings if f.severity == "fatal")
         raise RecordingError(f"no channel can be used: {reasons}")
     for temporary, final in written:
         temporary.replace(final)

@@ -14,7 +14,7 @@ class ChannelTwice(
     code="channel_twice",
     affects=ALL,
     unfit=True,
-    doubt="{channels} is a copy of another channel",
+    doubt="{channels} {are} a copy of another channel",
 ):
     """A channel has the samples of another one."""
 
@@ -111,7 +111,7 @@ class RecordingTwice(
 
 @dataclass(frozen=True)
 class SharedNoise(
-    FindingData, code="shared_noise", affects=ALL, doubt="{channels} shares noise with another axis"
+    FindingData, code="shared_noise", affects=ALL, doubt="correlated noise of {channels}"
 ):
     """The noise of two axes is correlated."""
 

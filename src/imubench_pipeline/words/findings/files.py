@@ -72,7 +72,7 @@ class ShortRecording(
 
 
 @dataclass(frozen=True)
-class Knocks(FindingData, code="knocks", affects=WHITE, doubt="{channels} was knocked"):
+class Knocks(FindingData, code="knocks", affects=WHITE, doubt="knocks in {channels}"):
     """Short disturbances, which are left out."""
 
     knocks: int

@@ -59,7 +59,7 @@ class Quantised(FindingData, code="quantised", affects=NONE):
 
 
 @dataclass(frozen=True)
-class Coarse(FindingData, code="coarse", affects=ALL, doubt="{channels} has too few levels"):
+class Coarse(FindingData, code="coarse", affects=ALL, doubt="coarse resolution of {channels}"):
     """The noise is rounding noise."""
 
     levels: float
@@ -79,7 +79,7 @@ class Coarse(FindingData, code="coarse", affects=ALL, doubt="{channels} has too 
 
 @dataclass(frozen=True)
 class RepeatedSamples(
-    FindingData, code="repeated_samples", affects=WHITE, doubt="{channels} repeats samples"
+    FindingData, code="repeated_samples", affects=WHITE, doubt="repeated samples in {channels}"
 ):
     """Samples repeat their predecessor more often than rounding explains."""
 
@@ -98,7 +98,7 @@ class RepeatedSamples(
 
 @dataclass(frozen=True)
 class HeldSamples(
-    FindingData, code="held_samples", affects=WHITE, doubt="{channels} repeats samples regularly"
+    FindingData, code="held_samples", affects=WHITE, doubt="repeated samples in {channels}"
 ):
     """Every n-th sample repeats its predecessor."""
 
@@ -116,7 +116,7 @@ class HeldSamples(
 
 
 @dataclass(frozen=True)
-class NoSamples(FindingData, code="no_samples", affects=ALL, doubt="{channels} has no samples"):
+class NoSamples(FindingData, code="no_samples", affects=ALL, doubt="no samples in {channels}"):
     """A channel without a number."""
 
     def text(self, channel: str) -> str:
@@ -125,7 +125,7 @@ class NoSamples(FindingData, code="no_samples", affects=ALL, doubt="{channels} h
 
 
 @dataclass(frozen=True)
-class TooShort(FindingData, code="too_short", affects=ALL, doubt="{channels} has too few samples"):
+class TooShort(FindingData, code="too_short", affects=ALL, doubt="too few samples in {channels}"):
     """Too few samples, or too few adjacent ones for an Allan variance."""
 
     samples: int
@@ -168,7 +168,7 @@ class Stuck(FindingData, code="stuck", affects=ALL, unfit=True, doubt="{channels
 
 @dataclass(frozen=True)
 class EmptyCells(
-    FindingData, code="empty_cells", affects=ALL, doubt="{channels} has missing samples"
+    FindingData, code="empty_cells", affects=ALL, doubt="missing samples in {channels}"
 ):
     """Records without a number."""
 
@@ -190,7 +190,7 @@ class EmptyCells(
 
 @dataclass(frozen=True)
 class NotFinite(
-    FindingData, code="not_finite", affects=ALL, doubt="{channels} has values that are not finite"
+    FindingData, code="not_finite", affects=ALL, doubt="values of {channels} that are not finite"
 ):
     """Infinities, or values that are too large for a measurement."""
 
@@ -241,7 +241,9 @@ class StuckForAWhile(
 
 
 @dataclass(frozen=True)
-class Saturated(FindingData, code="saturated", affects=ALL, doubt="{channels} is saturated"):
+class Saturated(
+    FindingData, code="saturated", affects=ALL, doubt="saturated samples in {channels}"
+):
     """Samples at an end of the range."""
 
     samples: int
@@ -259,7 +261,7 @@ class Saturated(FindingData, code="saturated", affects=ALL, doubt="{channels} is
 
 @dataclass(frozen=True)
 class PiledUp(
-    FindingData, code="piled_up", affects=ALL, doubt="{channels} has one value too often"
+    FindingData, code="piled_up", affects=ALL, doubt="one value is too frequent in {channels}"
 ):
     """One value is far more frequent than its neighbours."""
 
@@ -292,9 +294,7 @@ class Motion(FindingData, code="motion", affects=ALL, unfit=True, doubt="the sen
 
 
 @dataclass(frozen=True)
-class Step(
-    FindingData, code="step", affects=SLOW | {"bias"}, doubt="the mean of {channels} jumped"
-):
+class Step(FindingData, code="step", affects=SLOW | {"bias"}, doubt="a step in {channels}"):
     """A sudden change of the mean."""
 
     size: float
@@ -313,7 +313,7 @@ class Step(
 
 @dataclass(frozen=True)
 class WarmUp(
-    FindingData, code="warm_up", affects=SLOW | {"bias"}, doubt="{channels} drifted after its start"
+    FindingData, code="warm_up", affects=SLOW | {"bias"}, doubt="warm-up drift of {channels}"
 ):
     """The beginning drifts."""
 
