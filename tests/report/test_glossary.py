@@ -251,6 +251,8 @@ def emitted() -> dict[str, str]:
             named = [keyword.value for keyword in call.keywords if keyword.arg == "finding"]
             if not (stated := [*call.args, *named]):
                 continue  # of a row of a table, whose finding another module has said
+            if ast.unparse(stated[0]) == "data.code":
+                continue  # of a declared finding
             for name in texts(stated[0], function, tree):
                 found[name] = name_of_module
     return found

@@ -57,7 +57,7 @@ class FindingData:
     scales: ClassVar[Mapping[str, float]]
     """If its value is a factor that corrects samples or times: the power for each parameter."""
     doubt: ClassVar[str]
-    """The doubt in a few words; ``{channels}`` stands for the channels, ``{are}`` for their verb."""
+    """The doubt in a few words; ``{channels}`` stands for the channels, ``{are}`` for is or are."""
 
     def __init_subclass__(
         cls,
