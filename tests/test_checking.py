@@ -51,7 +51,7 @@ def test_warnings_and_rejections_set_the_exit_status(
     (logs / "one/empty.csv").write_text("")
     assert check(logs) == 1
     printed = capsys.readouterr().out
-    assert "one/moved: warnings\n  warning  step: the mean of gyro_x changes by 0.01" in printed
+    assert "one/moved: warnings\n  warning  step: The mean of gyro x changes by 0.57" in printed
     assert "one/empty: rejected\n  fatal    rejected: empty.csv: the file is empty" in printed
     # Nothing is left behind.
     assert sorted(path.name for path in logs.rglob("*")) == ["empty.csv", "moved.csv", "one"]

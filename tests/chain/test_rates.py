@@ -67,7 +67,7 @@ def test_a_channel_in_every_nth_record_has_its_own_rate(
         )
     (note,) = (found for found in log.findings if found.finding == "own_rate")
     assert note.severity == "note"
-    assert "accel_x, accel_z: have numbers in" in note.detail
+    assert "accel x and accel z have numbers in" in note.detail
 
 
 @pytest.mark.parametrize("jitter", [0.0, 0.3, 0.9])
@@ -194,7 +194,7 @@ def test_a_log_that_changes_its_rate_is_named(tmp_path: Path) -> None:
     assert log.rates == pytest.approx({"gyro_z": 100.0})
     (found,) = (f for f in log.findings if f.finding == "rate_changes")
     assert found.value == pytest.approx(50.0)
-    assert "N is 29 % low" in found.detail
+    assert "N is 29 % too low" in found.detail
 
 
 @pytest.mark.parametrize("lost", [0.1, 0.5, 0.7])

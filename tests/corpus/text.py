@@ -161,7 +161,7 @@ DAMAGED = [
         "csv of one record",
         file(LINES[0] + LINES[1]),
         UNSTAMPED,
-        Rejected("no channel can be used: .*gyro_x has 1 samples, expected at least 100"),
+        Rejected("no channel can be used: .*gyro x has 1 sample; at least 100 are required"),
     ),
     Entry(
         "csv of one stamped record",

@@ -5,11 +5,11 @@ import pytest
 
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.simulate import simulate
-from imubench_pipeline.recordings.fitness import UNFIT
 from imubench_pipeline.recordings.quality.columns import column_findings
 from imubench_pipeline.recordings.quality.summary import ColumnSummary
 from imubench_pipeline.settings.quality import QualitySettings
 from imubench_pipeline.tables.findings import Finding
+from imubench_pipeline.words.findings.base import FINDINGS
 from tests.conftest import few
 
 RATE = 100.0
@@ -179,7 +179,7 @@ def test_an_axis_that_is_zero_throughout_is_told_as_such() -> None:
     (finding,) = findings(np.zeros(5000))
     assert (finding.finding, finding.severity, finding.value) == ("stuck", "fatal", 0.0)
     assert "is exactly 0 in all 5000 samples" in finding.detail
-    assert finding.finding in UNFIT
+    assert FINDINGS[finding.finding].unfit
 
 
 def test_steps_of_the_temperature_are_noted(rng: np.random.Generator) -> None:

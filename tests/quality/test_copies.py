@@ -94,7 +94,7 @@ def test_a_gyro_that_is_another_one_in_another_unit(shared: Path, factor: float)
     assert set(found) == {"gyro_x", "gyro_y"}
     assert found["gyro_y"].value == pytest.approx(factor, rel=1e-9)
     assert found["gyro_x"].value == pytest.approx(1.0 / factor, rel=1e-9)
-    assert "gyro_y has the samples of gyro_x" in found["gyro_y"].detail
+    assert "gyro y has the samples of gyro x" in found["gyro_y"].detail
 
 
 def test_gyros_that_are_the_accelerometers_columns(shared: Path) -> None:

@@ -55,7 +55,7 @@ def test_halves_of_two_registers_and_levels(shared: Path) -> None:
     fine(other)
     log["gyro_x"][50_000:] = another(other["gyro_x"][50_000:], 1e-4, 1.0, 0.01)
     (found,) = [f for f in findings(log) if f.finding == "joined"]
-    assert found.detail.startswith("level and steps of gyro_x change at once at ")
+    assert found.detail.startswith("The level and resolution of gyro x change at once at ")
     assert found.start == pytest.approx(500.0, abs=3.0)
 
 
@@ -186,4 +186,4 @@ def test_a_real_register_behind_rounded_figures(shared: Path) -> None:
     assert column.step == pytest.approx(8e-4)
     (found,) = findings({"gyro_x": np.round(np.radians(log), 4)})
     assert found.finding == "quantised"
-    assert found.detail.endswith("the figures were rounded after it")
+    assert found.detail.endswith("The values were rounded again afterwards")

@@ -224,5 +224,5 @@ def test_a_unit_in_the_log_that_the_sensor_file_contradicts(
         "unit_contradicts": {f"gyro_{axis}": pytest.approx(57.29578) for axis in "xyz"}
     }
     first = next(row["detail"] for row in found if row["finding"] == "unit_contradicts")
-    assert f"states rad/s for gyro_x {where}" in first
-    assert "the sensor file deg/s (log.channels.gyro_x.unit)" in first
+    assert f"states rad/s for gyro x {where}" in first
+    assert "The sensor file states deg/s (log.channels.gyro_x.unit)" in first

@@ -1,7 +1,7 @@
 from imubench_pipeline.model.estimates import FixedBiasRow, ModelRow
 from imubench_pipeline.model.table import R
-from imubench_pipeline.recordings.fitness import UNFIT
 from imubench_pipeline.recordings.quality.copies import recorded_twice
+from imubench_pipeline.words.findings.base import FINDINGS
 from tests.rows import typed
 
 
@@ -20,8 +20,8 @@ def test_a_log_that_lies_in_the_folder_twice_is_found() -> None:
     models = likelihoods(-51255.770919, -51255.7709190001, -51255.771)
     (found,) = recorded_twice(models, rows(FixedBiasRow, 0.01, 0.01, 0.01))
     assert (found.finding, found.recording) == ("recording_twice", "run_2")
-    assert "run_2 has the samples of run_1 (gyro_x)" in found.detail
-    assert found.finding in UNFIT
+    assert "run_2 has the samples of run_1 (gyro x)" in found.detail
+    assert FINDINGS[found.finding].unfit
 
 
 def test_logs_that_share_one_figure_are_two() -> None:

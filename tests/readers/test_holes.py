@@ -67,8 +67,8 @@ def test_zeros_of_letters_of_two_bytes_are_counted_in_bytes(tmp_path: Path) -> N
 @pytest.mark.parametrize(
     ("middle", "rows", "lost"),
     [
-        (b"%s7,8\n", 4, "the text of 1 line that"),  # 7 may be the end of 17
-        (b"7,%s8\n", 4, "the text of 1 line that"),
+        (b"%s7,8\n", 4, "the text of 1 line that has them"),  # 7 may be the end of 17
+        (b"7,%s8\n", 4, "the text of 1 line that has them"),
         (b"%s\n", 4, ""),
         (b"7%swx,ax\n", 4, ""),
     ],

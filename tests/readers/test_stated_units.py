@@ -21,7 +21,7 @@ def contradicted(path: Path, gyro: dict[str, object], **log: object) -> list[tup
     for _ in file.batches():
         pass
     return [
-        (found.detail.partition(" (")[2].partition("), the sensor file")[0], found.value)
+        (found.detail.partition(" (")[2].partition("). The sensor file")[0], found.value)
         for found in file.contradicted_units()
     ]
 

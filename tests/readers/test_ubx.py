@@ -276,7 +276,7 @@ def test_damaged_messages_are_left_out_and_counted(tmp_path: Path) -> None:
     assert sum(counts_of(file).values()) == 3
     assert {f.finding: f.severity for f in file.findings}["wrong_checksum"] == "warning"
     _, _, file = columns(written(tmp_path, data), log_format())
-    assert "state 'time'" in file.findings[0].detail
+    assert "State 'time'" in file.findings[0].detail
 
 
 def test_a_message_that_was_lost_shifts_no_other(tmp_path: Path) -> None:

@@ -5,10 +5,12 @@ import pytest
 from imubench_pipeline.model.verdicts import DoubtMark
 from imubench_pipeline.recordings.fitness import AFFECTED_PARAMETERS, BESIDE_MEASURED, UNFIT
 from imubench_pipeline.words.doubts import doubt_text
+from imubench_pipeline.words.findings import FINDINGS
 from imubench_pipeline.words.verdicts import doubts_text
 
-CODES = sorted({*UNFIT, *AFFECTED_PARAMETERS, BESIDE_MEASURED, "not_sold", "not_explained",
-                "doubtful"})  # fmt: skip
+DECLARED = {code for code, kind in FINDINGS.items() if kind.affects or kind.unfit}
+CODES = sorted({*UNFIT, *AFFECTED_PARAMETERS, *DECLARED, BESIDE_MEASURED, "not_sold",
+                "not_explained", "doubtful"})  # fmt: skip
 
 
 @pytest.mark.parametrize("code", CODES)

@@ -23,8 +23,10 @@ from imubench_pipeline.settings.sensor import (
     LogFormat,
     quantity_of,
 )
-from imubench_pipeline.tables.findings import Finding
+from imubench_pipeline.tables.findings import Finding, find
 from imubench_pipeline.units import conversion
+from imubench_pipeline.words.findings.base import FindingData
+from imubench_pipeline.words.findings.files import UnitContradicts
 
 SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 """Seconds in a unit of time stamps."""
@@ -93,9 +95,9 @@ class LogFile(ABC):
         Raise `RecordingError` if the file does not match its sensor file, or is corrupt.
         """
 
-    def note(self, finding: str, text: str, value: float, severity: Severity = "warning") -> None:
+    def note(self, data: FindingData, value: float, severity: Severity = "warning") -> None:
         """Add a finding about the whole file."""
-        self.findings.append(Finding(finding, severity, f"{self.path.name}: {text}", value))
+        self.findings.append(find(data, severity, value))
 
     def contradicted_units(self) -> list[Finding]:
         """Return findings on channels for which log and sensor file state different units."""
@@ -112,14 +114,15 @@ class LogFile(ABC):
             factor = conversion(in_log.unit, dimension)[0] / read
             if 1.0 / _MIN_FACTOR_OF_OTHER_UNIT < factor < _MIN_FACTOR_OF_OTHER_UNIT:
                 continue
-            scaled = "" if source.scale == 1 else f", times {source.scale:g}"
-            detail = (
-                f"{self.path.name} states {in_log.unit} for {channel} ({in_log.where}), the sensor "
-                f"file {source.unit}{scaled} (log.channels.{channel}.unit), which is used; if the "
-                f"log is right, the figures are to be multiplied by {factor:.5g}: mend the one "
-                "that is wrong"
+            data = UnitContradicts(
+                file=self.path.name,
+                in_log=in_log.unit,
+                where=in_log.where,
+                in_sensor_file=source.unit,
+                scale=source.scale,
+                factor=factor,
             )
-            findings.append(Finding("unit_contradicts", "warning", detail, factor, channel))
+            findings.append(find(data, "warning", factor, channel))
         return findings
 
     def seconds(self, stamps: NDArray[Any], first: Any) -> NDArray[np.float64]:

@@ -28,7 +28,8 @@ from imubench_pipeline.readers.bounds import (
 )
 from imubench_pipeline.readers.holes import FileWithoutHoles, ZeroRuns
 from imubench_pipeline.settings.validation import cut
-from imubench_pipeline.tables.findings import Finding, RecordingError
+from imubench_pipeline.tables.findings import Finding, RecordingError, find
+from imubench_pipeline.words.findings.files import TruncatedFile
 
 if sys.version_info >= (3, 14):
     from compression import zstd
@@ -512,5 +513,4 @@ def blocks(path: Path, findings: list[Finding], least_zeros: int) -> Iterator[by
 
 def ended_early(path: Path) -> Finding:
     """Return the finding about a log with truncated compressed data."""
-    detail = f"{path.name}: the compressed file ends early; read as far as it goes"
-    return Finding("truncated_file", "warning", detail, 1)
+    return find(TruncatedFile(path.name, "compressed"), "warning", 1)

@@ -11,7 +11,8 @@ import os
 import re
 from pathlib import Path
 
-from imubench_pipeline.tables.findings import Finding
+from imubench_pipeline.tables.findings import Finding, find
+from imubench_pipeline.words.findings.files import ZeroBytes
 
 _MAX_HOLE_READ = 1 << 16
 _REPLACEMENT_ZEROS = 512  # bytes: the zeros that are returned in place of a longer hole
@@ -121,20 +122,17 @@ class ZeroRuns:
                 self.first = self._run_begin
         self.count += end - begin
 
-    def finding(self, name: str, where: str, total: int, fate: str = "") -> Finding | None:
+    def finding(
+        self, name: str, where: str, total: int, *, damaged: int = 0, shifted: bool = False
+    ) -> Finding | None:
         """Return the finding about the zero bytes; None if there are none.
 
         ``name``: name of the file. ``where``: place of the first run. ``total``: number of zero
-        bytes, with those in holes (`FileWithoutHoles`). ``fate``: treatment of text between zeros.
+        bytes, with those in holes (`FileWithoutHoles`). ``damaged``: number of lines with
+        zeros between their letters. ``shifted``: later samples are shifted in time.
         """
         if not self.count:
             return None
-        zeros = f"{name}: {total} zero byte{'s' if total > 1 else ''}"
-        if self.at_end and self.places == 1:
-            detail = (
-                f"{zeros} from {where} to the end of the file; left out: the logger reserved "
-                "space, or lost its power"
-            )
-            return Finding("zero_bytes", "note", detail, total)
-        places = f"{self.places} places, the first in {where}" if self.places > 1 else where
-        return Finding("zero_bytes", "warning", f"{zeros} in {places}; left out{fate}", total)
+        at_end = self.at_end and self.places == 1
+        data = ZeroBytes(name, total, self.places, where, at_end, damaged, shifted)
+        return find(data, "note" if at_end else "warning", total)

@@ -38,6 +38,7 @@ from imubench_pipeline.readers.file_format import (
 from imubench_pipeline.readers.stamps import WrapState, unwrapped
 from imubench_pipeline.readers.ubx_frames import Frames
 from imubench_pipeline.tables.findings import RecordingError
+from imubench_pipeline.words.findings.files import IncompleteLastRecord, WrongChecksum
 
 _ESF_MEAS, ESF_RAW, _NAV_PVT = b"\x10\x02", b"\x10\x03", b"\x01\x07"
 KINDS = {_ESF_MEAS: "ESF-MEAS", ESF_RAW: "ESF-RAW"}
@@ -193,14 +194,18 @@ class UbxFile(LogFile):
                 f"{_describe_types(absent)}; mend 'column' or 'variable' in the sensor file"
             )
         if wrong := frames.wrong[kind]:
-            detail = f"{wrong} {name} messages have a wrong checksum; left out"
-            if self.log.time is None:
-                detail += "; state 'time' (column time_tag, unit ms), for without it what follows "
-                detail += "is shifted in time"
-            self.note("wrong_checksum", detail, wrong)
+            data = WrongChecksum(
+                self.path.name,
+                wrong,
+                name,
+                is_sentence=False,
+                is_left_out=True,
+                is_shifted=self.log.time is None,
+            )
+            self.note(data, wrong)
         if cut := frames.cut[kind]:
-            detail = f"{cut} {name} messages are cut short by the end of the log; left out"
-            self.note("incomplete_last_record", detail, cut, "note")
+            last = IncompleteLastRecord(self.path.name, messages=cut, message=name)
+            self.note(last, cut, "note")
 
 
 def _describe_types(columns: list[str]) -> str:

@@ -39,7 +39,8 @@ from imubench_pipeline.readers.file_format import (
 from imubench_pipeline.readers.stamps import Clock, date_of
 from imubench_pipeline.readers.text.cells import is_number
 from imubench_pipeline.readers.text.stamps import StampError, stamps_of
-from imubench_pipeline.tables.findings import Finding, RecordingError
+from imubench_pipeline.tables.findings import Finding, RecordingError, find
+from imubench_pipeline.words.findings import files
 
 _APPENDED_FIELDS = re.compile(rb"(?:,S[0-9A-Fa-f]{4})?(?:,T(\d{1,18}))?$")
 """Fields that the device appends on request: a status, and a counter or time."""
@@ -184,9 +185,8 @@ def lines_of(path: Path, findings: list[Finding]) -> Iterator[bytes]:
         yield rest
     elif rest.strip(b"\0\r\t "):
         shown = rest[:60].decode("ascii", "replace")
-        why = "the last line has no line break and no right checksum"
-        detail = f"{path.name}: {why}; left out: {shown!r}"
-        findings.append(Finding("incomplete_last_record", "note", detail, 1))
+        data = files.IncompleteLastRecord(path.name, shown, has_checksum=True)
+        findings.append(find(data, "note", 1))
 
 
 def right_checksums(bodies: list[bytes], checks: list[bytes]) -> list[bool]:
@@ -322,7 +322,7 @@ class VectorNavFile(LogFile):
         both = [kind for kind in able if kind in present]
         if len(both) == 1:
             return both[0]
-        seen = _join_names(present) or "no sentence with a right checksum"
+        seen = ", ".join(_shorten_names(present)) or "no sentence with a right checksum"
         if not both:
             raise RecordingError(
                 f"{self.path.name}: found {seen}; expected one of {', '.join(able)}, each with "
@@ -398,26 +398,23 @@ class VectorNavFile(LogFile):
                 f"with a wrong one; expected ${kind},...* and 2 or 4 digits; is 'column' in the "
                 "sensor file right, and the checksum on (register 30)?"
             )
-        fate = "left out" if self.log.time is not None else "missing samples"
+        file, timed = self.path.name, self.log.time is not None
         if count := records.wrong:
-            text = f"{count} ${kind} sentences are cut short or have a wrong checksum; {fate}"
-            self.note("wrong_checksum", text, count)
-        if count := records.unread:
-            text = (
-                f"{count} ${kind} sentences have a right checksum but not the "
-                f"{len(FIELDS[kind])} numbers expected; their figures are missing"
+            wrong = files.WrongChecksum(
+                file, count, f"${kind}", is_sentence=True, is_left_out=timed
             )
-            self.note("unreadable_sentence", text, count)
+            self.note(wrong, count)
+        if count := records.unread:
+            self.note(files.UnreadableSentence(file, count, f"${kind}", len(FIELDS[kind])), count)
         if count := records.others.total():
-            text = f"{count} other sentences ({_join_names(records.others)}) passed over"
-            self.note("other_sentences", text, count, "note")
+            names = _shorten_names(records.others)
+            self.note(files.OtherSentences(file, count, names), count, "note")
         if count := records.garbage:
-            text = f"{count} lines or parts of lines are no sentence; passed over"
-            self.note("not_sentences", text, count, "note")
+            self.note(files.NotSentences(file, count), count, "note")
 
 
-def _join_names(names: Iterable[str]) -> str:
-    return ", ".join(name[:_MAX_SHOWN_NAME] for name in sorted(names)[:_MAX_LISTED_NAMES])
+def _shorten_names(names: Iterable[str]) -> tuple[str, ...]:
+    return tuple(name[:_MAX_SHOWN_NAME] for name in sorted(names)[:_MAX_LISTED_NAMES])
 
 
 _MAX_DESCRIBED_BYTES = 1 << 21  # bytes

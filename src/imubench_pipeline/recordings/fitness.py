@@ -20,16 +20,12 @@ from imubench_pipeline.model.states import Fitness
 from imubench_pipeline.model.table import ChannelRow, OfRecordingRow, TableRow
 from imubench_pipeline.model.verdicts import DoubtMark
 from imubench_pipeline.tables.findings import LEFT_OUT
+from imubench_pipeline.words.findings import FINDINGS
 
 Key = tuple[str, str]  # sensor, recording
 
-UNFIT = frozenset(
-    {
-        *("motion", "turning", "suspicious_unit", "unit_contradicts", "rate_implausible", "stuck"),
-        *("channel_twice", "log_twice", "recording_twice", "joined", "interleaved"),
-    }
-)
-"""Findings after which a log may not be of one sensor at rest in its unit."""
+UNFIT = frozenset({"turning", "suspicious_unit", "rate_implausible"})
+"""Findings after which a log may not be of one sensor at rest in its unit, besides `FINDINGS`."""
 
 _SLOW = frozenset({"B", "B_curve", "sigma_min", "tau_min", "T_B", "K", "R"})
 _WHITE = frozenset({"N", "Q"})
@@ -38,7 +34,6 @@ _OF_TIME = {"N": 0.5, "Q": 1.0, "T_B": 1.0, "tau_min": 1.0, "K": -0.5, "R": -1.0
 
 SCALES: Mapping[str, Mapping[str, float]] = {
     "suspicious_unit": _OF_UNIT,
-    "unit_contradicts": _OF_UNIT,
     "rate_implausible": _OF_TIME,
 }
 """Findings whose value is a factor that mends samples, or times, and the power of it that mends
@@ -54,12 +49,7 @@ WITH_DOUBTS: Mapping[str, type[ErrorBudgetRow] | type[DatasheetRow]] = {
 """Tables of one recording whose rows repeat the doubts about it."""
 
 AFFECTED_PARAMETERS: Mapping[str, frozenset[str]] = {
-    "knocks": _WHITE,
-    "rate_changes": _WHITE,
-    "held_samples": _WHITE,
-    "step": _SLOW | {"bias"},
     "bias_step": _SLOW | {"bias"},
-    "warm_up": _SLOW | {"bias"},
     "warm_up_drift": _SLOW | {"bias"},
     "periodic_drift": _SLOW,
     "telegraph_noise": _SLOW | {"bias"},
@@ -125,14 +115,17 @@ def doubts(
     every: list[Doubt] = []
     for finding in findings:
         code = finding.finding
+        declared = FINDINGS.get(code)
+        unfit = code in UNFIT if declared is None else declared.unfit
+        scales = SCALES.get(code, {}) if declared is None else declared.scales
         affected = finding.affects if finding.data else AFFECTED_PARAMETERS.get(code, ())
         harmless = finding.severity != "warning" or (finding.data and not affected)
-        if code in LEFT_OUT or (harmless and code not in UNFIT):
+        if code in LEFT_OUT or (harmless and not unfit):
             continue
         # One doubt for each factor by which parameters may change.
         by_factor: dict[float | None, list[str]] = {}
         if finding.value is not None:
-            for name, power in SCALES.get(code, {}).items():
+            for name, power in scales.items():
                 by_factor.setdefault(finding.value**power, []).append(name)
         every += [
             Doubt(
@@ -140,7 +133,7 @@ def doubts(
                 code,
                 finding.detail,
                 parameters=tuple(sorted(names)),
-                unfit=code in UNFIT,
+                unfit=unfit,
                 factor=factor,
                 start=finding.start,
                 end=finding.end,

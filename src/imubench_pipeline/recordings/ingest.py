@@ -31,9 +31,11 @@ from imubench_pipeline.recordings.separation import separate_clocks
 from imubench_pipeline.settings.quality import QualitySettings
 from imubench_pipeline.settings.sensor import TEMPERATURE, LogFormat, RecordingNotes, UsedPart
 from imubench_pipeline.tables.failures import Failure
-from imubench_pipeline.tables.findings import Finding, RecordingError, UnavailableError
+from imubench_pipeline.tables.findings import Finding, RecordingError, UnavailableError, find
+from imubench_pipeline.words.findings import files
 
 _MAX_NAMES = 5
+_MAX_TIMES = 5  # of knocks that are listed
 
 
 @dataclass(frozen=True)
@@ -107,8 +109,7 @@ def ingest(
             return whole
         later = notes.model_copy(update={"use": UsedPart(start=end, end=notes.use.end)})
         trimmed = _ingest(source, log, later, settings, folder, scratch, provenance, sources)
-        detail = f"the first {end:.5g} s, a warm-up, are left out (quality.trim_warm_up)"
-        note = Finding("warm_up_trimmed", "note", detail, end, start=0.0, end=end)
+        note = find(files.WarmUpTrimmed(end), "note", end, start=0.0, end=end)
         return replace(trimmed, findings=[note, *trimmed.findings])
     except BaseException:
         rejected.set()
@@ -152,11 +153,7 @@ def _ingest(
     findings = _findings(parts, bases, groups, settings, scratch, static=static)
     marked = [part.source.path.name for part in parts if part.source.simulated]
     if marked and notes.simulated is False:
-        detail = (
-            f"the notes say 'simulated: false', but {marked[0]} has the mark of a simulated log: "
-            "it is taken for simulated; remove the key from the notes, or the mark if it is wrong"
-        )
-        findings.append(Finding("simulated_by_mark", "warning", detail, len(marked)))
+        findings.append(find(files.SimulatedByMark(marked[0]), "warning", len(marked)))
     findings += _unused_files(source, parts)
     unusable = {finding.channel for finding in findings if finding.severity == "fatal"}
     names = names_of(parts, groups)
@@ -183,7 +180,7 @@ def _ingest(
         written.append((assembled, folder / name))
     summary = _summary(parts, bases, metadata["started"]) | {"simulated": simulated}
     if all(channel in unusable for channel in log.channels):
-        reasons = "; ".join(f.detail for f in findings if f.severity == "fatal")
+        reasons = ". ".join(f.detail for f in findings if f.severity == "fatal")
         raise RecordingError(f"no channel can be used: {reasons}")
     for temporary, final in written:
         temporary.replace(final)
@@ -201,8 +198,8 @@ def _ingest(
         f if f.start is None else replace(f, start=f.start + begin, end=(f.end or 0.0) + begin)
         for f in findings
     ]
-    files = identified(log_paths(folder))
-    return Ingested(summary, findings, channels, files, _gravity(parts, bases), sources.result())
+    kept = identified(log_paths(folder))
+    return Ingested(summary, findings, channels, kept, _gravity(parts, bases), sources.result())
 
 
 def _unused_files(source: Path, parts: list[Part]) -> list[Finding]:
@@ -213,12 +210,8 @@ def _unused_files(source: Path, parts: list[Part]) -> list[Finding]:
     unused = [file.relative_to(source).as_posix() for file in log_files(source) if file not in used]
     if not unused:
         return []
-    shown = ", ".join(unused[:_MAX_NAMES]) + ", ..." * (len(unused) > _MAX_NAMES)
-    detail = (
-        f"no channel is read from {shown}; name the file of a channel with 'file:' in the sensor "
-        f"file; notes belong beside the folder, as {source.name}.yaml"
-    )
-    return [Finding("unused_files", "note", detail, len(unused))]
+    data = files.UnusedFiles(tuple(unused[:_MAX_NAMES]), len(unused), source.name)
+    return [find(data, "note", len(unused))]
 
 
 def _findings(
@@ -231,9 +224,9 @@ def _findings(
     static: bool,
 ) -> list[Finding]:
     """Return the findings about the files, their columns and their clocks."""
-    files = {id(part.source): part.source for part in parts}.values()
-    findings = [finding for file in files for finding in file.findings]
-    findings += [finding for file in files for finding in file.contradicted_units()]
+    read_files = {id(part.source): part.source for part in parts}.values()
+    findings = [finding for file in read_files for finding in file.findings]
+    findings += [finding for file in read_files for finding in file.contradicted_units()]
     for part, base in zip(parts, bases, strict=True):
         columns = part.columns | part.left_out
         found = column_findings(columns, base.rate, settings, static=static)
@@ -245,20 +238,12 @@ def _findings(
     findings += copied_channels({n: c for n, c in channels.items() if n not in BESIDE})
     whole = [part for part in parts if part.base is None]
     if len({part.rows for part in whole if not part.stamped}) > 1:
-        lengths = ", ".join(f"{part.source.path.name} {part.rows}" for part in whole)
-        rows = [part.rows for part in whole]
-        detail = (
-            f"files without stamps differ in length ({lengths} samples): the shorter ones may "
-            "be cut short"
-        )
-        findings.append(Finding("unequal_length", "warning", detail, max(rows) - min(rows)))
+        rows = tuple(part.rows for part in whole)
+        data = files.UnequalLength(tuple(part.source.path.name for part in whole), rows)
+        findings.append(find(data, "warning", max(rows) - min(rows)))
     duration = max(base.grid / base.rate for base in bases)
     if static and duration < settings.short:
-        detail = (
-            f"the recording lasts {duration:.5g} s: it shows white noise, but bias instability and "
-            "random walk take hours"
-        )
-        findings.append(Finding("short_recording", "note", detail, duration))
+        findings.append(find(files.ShortRecording(duration), "note", duration))
     for group in groups:
         findings += [f for f in bases[group[0]].findings if f not in findings]
     return findings
@@ -302,15 +287,11 @@ def _knock_findings(
     findings = []
     for channel, events in leave_out_knocks(part, settings.knock, longest, scratch).items():
         worst = max(events, key=lambda knock: knock.size)
-        at = ", ".join(f"{max(knock.first, 0) / rate:.5g}" for knock in events[:5])
-        more = " ..." if len(events) > 5 else ""
-        detail = (
-            f"{channel} has {len(events)} knocks, up to {worst.size:.0f} standard deviations "
-            f"(at {at}{more} s); {part.knocks[channel]} samples about them are left out"
-        )
+        times = tuple(max(knock.first, 0) / rate for knock in events[:_MAX_TIMES])
         begin, end = max(events[0].first, 0) / rate, events[-1].last / rate
         number = part.knocks[channel]
-        findings.append(Finding("knocks", "warning", detail, number, channel, begin, end))
+        data = files.Knocks(len(events), worst.size, times, number)
+        findings.append(find(data, "warning", number, channel, begin, end))
     return findings
 
 
@@ -430,4 +411,4 @@ def _stated_simulated(plan: dict[str, Any]) -> bool:
 def rejected(error: RecordingError, notes: RecordingNotes) -> Ingested:
     """Return the results of a recording that cannot be used."""
     summary = {"started": notes.started, "reason": str(error)}
-    return Ingested(summary, [Finding("rejected", "fatal", str(error), 1)])
+    return Ingested(summary, [find(files.Rejected(str(error)), "fatal", 1)])

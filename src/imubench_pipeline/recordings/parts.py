@@ -24,6 +24,7 @@ from imubench_pipeline.settings.sensor import UsedPart
 from imubench_pipeline.tables import checked_parquet, checked_row_group
 from imubench_pipeline.tables.findings import Finding, RecordingError
 from imubench_pipeline.typing import Array
+from imubench_pipeline.words.findings.files import NotUsed
 
 STAMP_BLOCK = ROW_GROUP
 """Records of a block of stamps, equal to the records of a row group."""
@@ -148,8 +149,7 @@ def read_part(file: LogFile, use: UsedPart, scratch: Path, number: int) -> Part:
             f"(use: start {use.start} s, end {use.end or 'open'})"
         )
     if not_used:
-        detail = f"{not_used} samples lie outside the part to use"
-        file.note("not_used", detail, not_used, "note")
+        file.note(NotUsed(file.path.name, not_used), not_used, "note")
     return part
 
 

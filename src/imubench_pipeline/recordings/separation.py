@@ -24,8 +24,9 @@ from imubench_pipeline.recordings.timebase import TimeBase
 from imubench_pipeline.settings.quality import QualitySettings
 from imubench_pipeline.settings.sensor import quantity_of
 from imubench_pipeline.tables import checked_parquet, checked_row_group
-from imubench_pipeline.tables.findings import Finding, RecordingError
+from imubench_pipeline.tables.findings import RecordingError, find
 from imubench_pipeline.typing import Array
+from imubench_pipeline.words.findings.time_base import OwnRate
 
 _MIN_COMMON_RECORDS = 0.5
 """Least share of common records, of the sparser channel, for two channels of one clock."""
@@ -330,13 +331,9 @@ def _write_parts(part: Part, clocks: list[_Clock], records: _Records, scratch: P
             replace(each, channel=name) for name in clock.channels for each in base.findings
         ]
         if of_clock.rows < part.rows:
-            names = [name for name in of_clock.columns if name in clock.channels]
-            verb = "has a number" if len(clock.channels) == 1 else "have numbers"
-            detail = (
-                f"{', '.join(names)}: {verb} in {of_clock.rows} of {part.rows} records, and a "
-                f"clock of its own: analysed at {base.rate:.6g} Hz"
-            )
-            findings.append(Finding("own_rate", "note", detail, base.rate))
+            own = tuple(name for name in of_clock.columns if name in clock.channels)
+            data = OwnRate(own, of_clock.rows, part.rows, base.rate)
+            findings.append(find(data, "note", base.rate))
         of_clock.base = replace(base, findings=tuple(findings))
     parts[0].left_out = {
         name: column

@@ -28,8 +28,9 @@ from imubench_pipeline.recordings.stamps import (
     typical_interval,
 )
 from imubench_pipeline.settings.quality import QualitySettings
-from imubench_pipeline.tables.findings import Finding, RecordingError
+from imubench_pipeline.tables.findings import Finding, RecordingError, find
 from imubench_pipeline.typing import Array
+from imubench_pipeline.words.findings import time_base
 
 _MAX_INTERVAL_ERROR = 1e-5
 """Largest relative error of the interval at which stamps get the same grid points."""
@@ -221,18 +222,9 @@ def rate_changes(
     for step, count in sorted(samples.items()):
         if count < _MIN_SLOW_WINDOWS * total:
             continue
-        percent = 100.0 * (1.0 - math.sqrt(1.0 / step))
         first, last = begin[step] / rate, end[step] / rate
-        name = f"{channel}: " if channel else ""
-        detail = (
-            f"{name}the sampling rate changes: {100.0 * count / total:.0f} % of the samples, "
-            f"from {first:.5g} s to {last:.5g} s, are {step} intervals apart ({rate / step:.5g} Hz "
-            f"instead of {rate:.5g} Hz). They are analysed at {rate:.5g} Hz with missing samples: "
-            f"if the sensor was set to the lower rate, their N is {percent:.0f} % low. Analyse the "
-            "parts separately, with 'use' in the notes"
-        )
-        slower = rate / step
-        findings.append(Finding("rate_changes", "warning", detail, slower, channel, first, last))
+        data = time_base.RateChanges(count / total, first, last, rate / step, rate)
+        findings.append(find(data, "warning", rate / step, channel, first, last))
     return findings
 
 
@@ -246,18 +238,7 @@ def _describe_coarse_stamps(rate: float, other: float) -> Finding:
 
     ``other``: rate, Hz, if double steps are lost samples and zero steps are copies, not rounding.
     """
-    steps, instead, change = "repeated stamps", "records are written twice so regularly", "more"
-    if other > rate:
-        steps, instead, change = "double steps", "samples are lost so regularly", "less"
-    percent = 100.0 * abs(1.0 - math.sqrt(rate / other))
-    return Finding(
-        "coarse_stamps",
-        "warning",
-        f"the stamps have {steps} at regular distances: taken as rounded, at {rate:.6g} Hz; if "
-        f"{instead} instead, the rate is {other:.6g} Hz and N is {percent:.2g} % {change}; state "
-        "'rate' in the sensor file",
-        rate,
-    )
+    return find(time_base.CoarseStamps(rate, other), "warning", rate)
 
 
 def _describe_grid(track: Track, interval: float) -> list[Finding]:
@@ -267,31 +248,20 @@ def _describe_grid(track: Track, interval: float) -> list[Finding]:
         begin = track.longest_at * interval
         end = (track.longest_at + track.longest) * interval
         severity: Severity = "note" if missing < 0.01 * track.grid else "warning"
-        detail = (
-            f"{missing} of {track.grid} samples are missing ({track.holes} holes, the longest "
-            f"{end - begin:.3g} s, from {begin:.5g} s on); they are left out of the clusters"
-        )
+        data = time_base.MissingSamples(missing, track.grid, track.holes, end - begin, begin)
         if missing > 0.5 * track.grid:
             share = (track.rows - track.duplicates) / track.grid
-            detail += (
-                f". If the samples came in bursts, and none is missing, the rate is "
-                f"{share / interval:.4g} Hz and N is {1.0 / math.sqrt(share):.2g} times as large: "
-                "state 'rate' in the sensor file"
-            )
-        findings.append(Finding("missing_samples", severity, detail, missing, start=begin, end=end))
+            data = replace(data, rate_of_bursts=share / interval, noise_ratio=share**-0.5)
+        findings.append(find(data, severity, missing, start=begin, end=end))
     if len(track.starts) > 1:
         times = [point * interval for point in track.starts[1:]]
-        findings.append(_describe_segments("the clock jumps or stops", times, track.jumps[1:]))
+        findings.append(_describe_segments(times, track.jumps[1:], has_grid=True))
     if track.duplicates:
-        detail = (
-            f"{track.duplicates} records repeat a stamp or fall on an earlier one: they were "
-            "written twice, or the clock was set back; left out"
-        )
-        findings.append(Finding("repeated_stamps", "note", detail, track.duplicates))
+        repeated = time_base.RepeatedStamps(track.duplicates)
+        findings.append(find(repeated, "note", track.duplicates))
     if track.unstamped:
-        detail = f"{track.unstamped} records have no time stamp, or one far astray; taken as "
-        detail += "consecutive"
-        findings.append(Finding("missing_stamps", "warning", detail, track.unstamped))
+        unstamped = time_base.MissingStamps(track.unstamped)
+        findings.append(find(unstamped, "warning", track.unstamped))
     return findings
 
 
@@ -304,20 +274,15 @@ def _check_segments(number: int) -> None:
         )
 
 
-def _describe_segments(what: str, times: list[float], jumps: list[float]) -> Finding:
+def _describe_segments(times: list[float], jumps: list[float], *, has_grid: bool) -> Finding:
     """Return the finding about pauses, with the position of the longest one.
 
     ``times``: duration of the samples before each pause, s. ``jumps``: steps of the stamps, s;
-    negative ones go backwards.
+    negative ones go backwards. ``has_grid``: the stamps lie on a uniform grid.
     """
     jump, at = max(zip(jumps, times, strict=True), key=lambda place: abs(place[0]))
-    direction = "backwards" if jump < 0 else "forward"
-    segments = len(jumps) + 1
-    detail = (
-        f"{what} {len(jumps)} times, by up to {abs(jump):.5g} s {direction}, after {at:.5g} s of "
-        f"samples; the recording is analysed as {segments} segments"
-    )
-    return Finding("segments", "warning", detail, segments, start=at, end=at)
+    data = time_base.Segments(has_grid, len(jumps), float(jump), float(at))
+    return find(data, "warning", len(jumps) + 1, start=at, end=at)
 
 
 def _compare_rates(rate: float, stated: float | None, settings: QualitySettings) -> list[Finding]:
@@ -329,11 +294,7 @@ def _compare_rates(rate: float, stated: float | None, settings: QualitySettings)
             f"the stamps say {rate:.6g} Hz, stated are {stated:.6g} Hz: 'unit' of "
             "'time' is probably another one of s, ms, us, ns"
         )
-    detail = (
-        f"stated are {stated:.6g} Hz, in the sensor file or in the log itself; the stamps say "
-        f"{rate:.6g} Hz, which is used; mend 'rate', or drop it"
-    )
-    return [Finding("rate_contradicts_stamps", "warning", detail, rate)]
+    return [find(time_base.RateContradictsStamps(stated, rate), "warning", rate)]
 
 
 def _find_drift(track: Track, settings: QualitySettings) -> list[Finding]:
@@ -349,11 +310,7 @@ def _find_drift(track: Track, settings: QualitySettings) -> list[Finding]:
     drift = late / early - 1.0
     if abs(drift) < settings.rate_drift:
         return []
-    detail = (
-        f"the interval between samples is {1e6 * drift:+.0f} ppm longer in the second half of "
-        "the recording: the clock of the sensor or of the host drifts; one rate is used"
-    )
-    return [Finding("rate_drifts", "warning", detail, drift)]
+    return [find(time_base.RateDrifts(drift), "warning", drift)]
 
 
 def _assume_consecutive(
@@ -396,24 +353,16 @@ def _assume_consecutive(
     _check_segments(len(starts))
     rate, others = groups.rate()
     at_worst = worst_at / rate
-    detail = (
-        f"the stamps lie on no uniform grid ({100 * track.off_grid / track.rows:.0f} % of them "
-        f"off it, {track.holes} pauses, intervals up to {1e3 * worst:.3g} ms, at {at_worst:.5g} s);"
-        f" the samples are taken as consecutive at the mean rate of {rate:.6g} Hz, so lost samples "
-        "cannot be seen"
-    )
-    findings = [Finding("jittered_stamps", "warning", detail, worst, start=at_worst, end=at_worst)]
+    off_grid = track.off_grid / track.rows
+    data = time_base.JitteredStamps(off_grid, track.holes, worst, at_worst, rate)
+    findings = [find(data, "warning", worst, start=at_worst, end=at_worst)]
     if others:
-        detail = (
-            f"{others} stamps have more or fewer samples than the others: the clock was set, "
-            f"or samples are lost; the rate of {rate:.6g} Hz is taken from the others"
-        )
-        findings.append(Finding("irregular_stamps", "warning", detail, others))
+        findings.append(find(time_base.IrregularStamps(others, rate), "warning", others))
     findings += _compare_rates(rate, stated, settings)
     segments = tuple(zip(starts, [*starts[1:], rows], strict=True))
     if len(segments) > 1:
         times = [start / rate for start in starts[1:]]
-        findings.append(_describe_segments("the stamps stop or run backwards", times, jumps))
+        findings.append(_describe_segments(times, jumps, has_grid=False))
     found, error = tuple(findings), rate * worst / groups.elapsed
     return TimeBase(rate, "stamps", rows, rows, segments, False, False, found, rate_error=error)
 

@@ -17,12 +17,12 @@ from imubench_pipeline.recordings.recording import ChannelLog
 from imubench_pipeline.settings.config import AllanSettings
 from imubench_pipeline.tables.findings import Finding, find
 from imubench_pipeline.tables.keys import Key
-from imubench_pipeline.words.findings.estimation import TooSparse
+from imubench_pipeline.words.findings.samples import TooShort
 
 
 def too_sparse(channel: str, log: ChannelLog) -> Finding:
     """Return why a channel has no Allan variance, and so no estimates."""
-    return find(TooSparse(log.grid, log.rate), "fatal", log.grid, channel)
+    return find(TooShort(log.grid, rate=log.rate), "fatal", log.grid, channel)
 
 
 def curves(

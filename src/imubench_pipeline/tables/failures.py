@@ -22,7 +22,8 @@ import pyarrow.parquet as pq
 from imubench_pipeline.model.recordings import FailureRow, FindingRow, RecordingRow
 from imubench_pipeline.model.table import R
 from imubench_pipeline.tables.files import build, joined, read_json, read_part, schema, write_arrow
-from imubench_pipeline.tables.findings import Finding, UnavailableError, without_addresses
+from imubench_pipeline.tables.findings import Finding, UnavailableError, find, without_addresses
+from imubench_pipeline.words.findings.files import Failed
 
 Cause = Literal["error", "killed", "time"]
 QUALITY = "quality.json"
@@ -63,8 +64,7 @@ class Failure:
 
     def finding(self) -> Finding:
         """Return the finding about the recording."""
-        detail = f"{self.reason}; the recording is left out, and tried again by the next run"
-        return Finding("failed", "fatal", detail, 1.0)
+        return find(Failed(self.reason), "fatal", 1.0)
 
 
 def describe_error(error: BaseException) -> str:

@@ -4,30 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+from imubench_pipeline.words.findings import FINDINGS
 from imubench_pipeline.words.numbers import join_names
 
 _TEXTS: Mapping[str, str] = {
     "suspicious_unit": "the unit of {channels} looks wrong",
-    "unit_contradicts": "the unit of {channels} contradicts the file",
     "rate_implausible": "the sampling rate looks wrong",
-    "motion": "the sensor was moved",
     "turning": "the sensor was turning",
-    "stuck": "{channels} did not change",
-    "channel_twice": "{channels} {are} a copy of another channel",
-    "log_twice": "the log is a copy of another one",
-    "recording_twice": "the recording is a copy of another one",
-    "joined": "two logs are joined",
-    "interleaved": "samples of two sensors are interleaved",
     "simulated_beside_measured": "it is simulated, and other recordings are measured",
     "not_sold": "this sensor is not sold",
     "not_explained": "no model explains the spectrum of {channels}",
     "doubtful": "the decisive parameter is doubtful",
-    "knocks": "knocks in {channels}",
-    "rate_changes": "the sampling rate changes",
-    "held_samples": "repeated samples in {channels}",
-    "step": "a step in {channels}",
     "bias_step": "the bias of {channels} changes suddenly",
-    "warm_up": "warm-up drift of {channels}",
     "warm_up_drift": "warm-up drift of {channels}",
     "periodic_drift": "periodic drift of {channels}",
     "telegraph_noise": "telegraph noise in {channels}",
@@ -44,6 +32,7 @@ _TEXTS: Mapping[str, str] = {
 def doubt_text(code: str, channels: Sequence[str] = ()) -> str:
     """Return a doubt in words: ``the unit of gyro z looks wrong``."""
     where = join_names([channel.replace("_", " ") for channel in channels])
-    if text := _TEXTS.get(code):
+    declared = FINDINGS.get(code)
+    if text := _TEXTS.get(code) or (declared and declared.doubt):
         return text.format(channels=where or "the data", are="is" if len(channels) == 1 else "are")
     return code.replace("_", " ") + (f" ({where})" if where else "")

@@ -36,6 +36,7 @@ from imubench_pipeline.readers.rosbag.version_2 import Bag2, check_database, che
 from imubench_pipeline.readers.stamps import Clock, date_of
 from imubench_pipeline.settings.validation import cut
 from imubench_pipeline.tables.findings import RecordingError
+from imubench_pipeline.words.findings import files
 
 # ---------------------------------------------------------------------------------- messages
 #
@@ -259,33 +260,20 @@ class RosbagFile(LogFile):
         )
 
     def _report(self, topic: str, unclosed: bool, damaged: int, absent: dict[str, int]) -> None:
-        fate = "left out" if self.log.time is not None else "missing samples"
+        name = self.path.name
         if damaged:
-            self.note(
-                "damaged_message",
-                f"{damaged} messages of {topic} are not as their type says; {fate}",
-                damaged,
-            )
+            timed = self.log.time is not None
+            self.note(files.DamagedMessage(name, damaged, topic, timed), damaged)
         for quantity, count in absent.items():
             if count:
-                self.note(
-                    "not_measured",
-                    f"{count} messages of {topic} say (covariance -1) that they hold no "
-                    f"{quantity}; missing samples",
-                    count,
-                )
+                self.note(files.NotMeasured(name, count, topic, quantity), count)
         if unclosed:
-            self.note("truncated_file", "the bag was not closed; read as far as it goes", 1)
+            self.note(files.TruncatedFile(name, "bag"), 1)
         # The journals of SQLite have the latest records.
         beside = [self.path.with_name(f"{self.path.name}-wal")]
         for journal in self.path.glob("*-wal") if self.path.is_dir() else beside:
             if journal.is_file() and journal.stat().st_size:
-                self.note(
-                    "truncated_file",
-                    f"{journal.name} holds records that are not yet in the bag and are not read; "
-                    "merge them with sqlite3 and 'pragma wal_checkpoint'",
-                    1,
-                )
+                self.note(files.TruncatedFile(name, "journal", journal.name), 1)
 
 
 def _join_names(names: Iterable[str]) -> str:

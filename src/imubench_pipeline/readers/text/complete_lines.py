@@ -13,7 +13,8 @@ import numpy as np
 from imubench_pipeline.readers.bounds import MAX_LINE_LENGTH
 from imubench_pipeline.readers.compressed import ended_early, open_bytes
 from imubench_pipeline.readers.holes import ZeroRuns
-from imubench_pipeline.tables.findings import Finding, RecordingError
+from imubench_pipeline.tables.findings import Finding, RecordingError, find
+from imubench_pipeline.words.findings.files import IncompleteLastRecord
 
 _READ_BLOCK = 1 << 16
 _ZERO_RUN = re.compile(rb"\0{2,}")
@@ -168,11 +169,12 @@ class CompleteLines:
         self.rest = block[cut:]
         return lines
 
-    def zeros(self, fate: str) -> Finding | None:
-        """Return the finding about zero bytes, if any; ``fate``: text on lines with them."""
+    def zeros(self, damaged: int, *, shifted: bool) -> Finding | None:
+        """Return the finding about zero bytes, if any; ``damaged``: number of lines with them."""
         zeros = self._text.zeros
         total = zeros.count * self._text.letter + self._text.bytes.omitted
-        return zeros.finding(self._path.name, f"line {zeros.first[1]}", total, fate)
+        where = f"line {zeros.first[1]}"
+        return zeros.finding(self._path.name, where, total, damaged=damaged, shifted=shifted)
 
     def _end(self) -> bytes:
         """Return the lines after the last line feed that end in carriage returns."""
@@ -185,11 +187,7 @@ class CompleteLines:
             self._findings.append(ended_early(self._path))
         if self.rest.strip(b"\0\r\n\t "):
             shown = self.rest.strip(b"\0")[:60].decode("utf-8", "replace")
-            detail = (
-                f"{self._path.name}: the last record has no line break and may be cut short; left "
-                f"out: {shown!r}"
-            )
-            self._findings.append(Finding("incomplete_last_record", "note", detail, 1))
+            self._findings.append(find(IncompleteLastRecord(self._path.name, shown), "note", 1))
         return lines
 
 

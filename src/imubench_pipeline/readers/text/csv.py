@@ -39,6 +39,7 @@ from imubench_pipeline.readers.text.stamps import (
     time_columns,
 )
 from imubench_pipeline.tables.findings import RecordingError
+from imubench_pipeline.words.findings import files
 
 _BLOCK_BYTES = 1 << 20  # pyarrow reads 32 of them ahead
 _ADVICE = (
@@ -125,12 +126,7 @@ class CsvFile(LogFile):
         self._report(layout, records)
         if time is not None and time.leap_seconds:
             number = time.leap_seconds
-            self.note(
-                "leap_second",
-                f"the stamps count {number} leap second{'s' * (number > 1)}",
-                number,
-                "note",
-            )
+            self.note(files.LeapSecond(self.path.name, number), number, "note")
 
     def _parts(
         self, layout: TextLayout, figures: set[int], time: TextTime | None, records: Records
@@ -178,40 +174,25 @@ class CsvFile(LogFile):
                     raise self._explained(error, fault, layout, time) from None
             self._note_zeros(lines, records.damaged)
         if fault.row is not None:
-            self.note(
-                "incomplete_last_record",
-                f"the last record has {fault.row.actual_columns} of {fault.row.expected_columns} "
-                "columns; left out",
-                1,
-                "note",
+            data = files.IncompleteLastRecord(
+                self.path.name,
+                columns=fault.row.actual_columns,
+                expected=fault.row.expected_columns,
             )
+            self.note(data, 1, "note")
 
     def _report(self, layout: TextLayout, records: Records) -> None:
         if layout.passed_over:
             count, (number, text) = len(layout.passed_over), layout.passed_over[0]
-            if layout.header:
-                name, what = "not_records", "stand under the names and are no units"
-            else:
-                name, what = "incomplete_first_record", "lack a part of their record"
-            detail = f"{count} lines from line {number} {what}; left out: {text[:60]!r}"
-            self.note(name, detail, count, "note")
+            kind = files.NotRecords if layout.header else files.IncompleteFirstRecord
+            self.note(kind(self.path.name, count, number, text[:60]), count, "note")
         if records.restarts:
-            cut = f" after a record cut short in {records.cut} places" if records.cut else ""
-            self.note(
-                "restarted_log",
-                f"the header stands again {records.restarts} times{cut}: the logger was started "
-                "again; these lines are left out",
-                records.restarts,
-                "note",
-            )
+            data = files.RestartedLog(self.path.name, records.restarts, records.cut)
+            self.note(data, records.restarts, "note")
 
     def _note_zeros(self, lines: CompleteLines, damaged: int) -> None:
-        fate = ""
-        if damaged:
-            fate = f", with the text of {damaged} line{'s' if damaged > 1 else ''} that hold them"
-            if self.log.time is None:
-                fate += "; state 'time', since without it all later samples are shifted in time"
-        if (finding := lines.zeros(fate)) is not None:
+        shifted = damaged > 0 and self.log.time is None
+        if (finding := lines.zeros(damaged, shifted=shifted)) is not None:
             self.findings.append(finding)
 
     def _wrong_width(self, row: pacsv.InvalidRow, layout: TextLayout) -> RecordingError:

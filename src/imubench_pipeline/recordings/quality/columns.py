@@ -15,18 +15,15 @@ from imubench_pipeline.recordings.quality.copies import shared_noise
 from imubench_pipeline.recordings.quality.summary import MAX_MEASUREMENT, ColumnSummary
 from imubench_pipeline.recordings.recording import BESIDE
 from imubench_pipeline.settings.quality import QualitySettings
-from imubench_pipeline.settings.sensor import QUANTITIES, TEMPERATURE, quantity_of
-from imubench_pipeline.tables.findings import Finding
-from imubench_pipeline.units import SI_UNITS, from_si
+from imubench_pipeline.settings.sensor import TEMPERATURE
+from imubench_pipeline.tables.findings import Finding, find
+from imubench_pipeline.words.findings import samples
 
 _COUNT_SIGMAS = 4.0  # upper confidence bound of a count, in standard errors
 _MIN_DIFFERENCE_SD, _MAX_DIFFERENCE_SD = 0.6, 300.0
 """Range of the standard deviation of the difference between neighbours, in steps of the register,
 that the share of one-step changes determines. Below it all changes are by one step, and the share
 depends on the position of the mean between two steps."""
-
-_DISPLAY_UNITS = {"gyro": ("deg/s", "°/s"), "accel": ("mg", "mg")}
-"""Unit in which the values of each quantity are shown, and its symbol."""
 
 _MAX_HARMLESS_EMPTY_SHARE = 0.01
 """Share of empty cells of a channel below which the finding is a note only."""
@@ -114,11 +111,8 @@ def column_findings(
     for channel, column in columns.items():
         span = column.high - column.low
         if channel == TEMPERATURE and 0.0 < column.step < math.inf and span <= 2000.0 * column.step:
-            detail = (
-                f"the temperature has steps of {column.step:.3g} °C, from {column.low:.4g} to "
-                f"{column.high:.4g} °C"
-            )
-            findings.append(Finding("quantised", "note", detail, column.step, TEMPERATURE))
+            data = samples.Quantised(column.step, None, column.low, column.high)
+            findings.append(find(data, "note", column.step, TEMPERATURE))
         if channel in BESIDE:
             continue
         fatal = _find_unusable(channel, column, settings)
@@ -140,64 +134,39 @@ def column_findings(
         beyond, chance = repeats_beyond_chance(column)
         if beyond > settings.repeated and not (regularly or rounded):
             share = column.repeats / max(column.present - 1, 1)
-            detail = (
-                f"{channel} repeats the sample before in {100 * share:.0f} % of the records, of "
-                f"which rounding explains {100 * chance:.2g} %: it is read faster than it samples; "
-                "state its own rate, and record each sample once"
-            )
-            findings.append(Finding("repeated_samples", "warning", detail, share, channel))
+            repeated = samples.RepeatedSamples(share, chance)
+            findings.append(find(repeated, "warning", share, channel))
     findings += copies.repeated_stretches(usable, steps, rate)
     if static:
         findings += shared_noise(usable)
     return findings
 
 
-def _format_value(channel: str, value: float) -> str:
-    """Return a value of a channel in SI and in its usual unit."""
-    quantity = quantity_of(channel)
-    (usual, sign), dimension = _DISPLAY_UNITS[quantity], QUANTITIES[quantity]
-    written = from_si(value, usual, dimension)
-    return f"{value:.4g} {SI_UNITS[dimension]} ({written:.4g} {sign})"
-
-
 def _find_unusable(
     channel: str, column: ColumnSummary, settings: QualitySettings
 ) -> Finding | None:
     if column.present == 0:
-        return Finding("no_samples", "fatal", f"{channel} holds no number", 0, channel)
+        return find(samples.NoSamples(), "fatal", 0, channel)
     if column.present < settings.shortest:
-        detail = (
-            f"{channel} has {column.present} samples, expected at least {settings.shortest} "
-            "(quality.shortest); record for longer"
-        )
-        return Finding("too_short", "fatal", detail, column.present, channel)
+        data = samples.TooShort(column.present, settings.shortest)
+        return find(data, "fatal", column.present, channel)
     if column.low == column.high:
-        value = _format_value(channel, column.low)
-        stays = "is exactly 0" if column.low == 0.0 else f"stays at {value}"
-        detail = (
-            f"{channel} never changes (it {stays} in all {column.present} samples); the axis is "
-            "dead or was not read, or the column is not the one meant"
-        )
-        return Finding("stuck", "fatal", detail, column.low, channel)
+        return find(samples.Stuck(column.low, column.present), "fatal", column.low, channel)
     return None
 
 
 def _find_missing_cells(channel: str, column: ColumnSummary, rate: float) -> Iterator[Finding]:
     length, last = column.longest_gap
     begin, end = (last - length) / rate, last / rate
-    most = f"; at most {length} records in a row ({length / rate:.3g} s), from {begin:.5g} s on"
     if column.missing:
-        detail = f"{channel} has {column.missing} records without a number"
-        detail += f"{most}; treated as missing samples"
         few = column.missing < _MAX_HARMLESS_EMPTY_SHARE * (column.missing + column.present)
         severity: Severity = "note" if few else "warning"
-        yield Finding("empty_cells", severity, detail, column.missing, channel, begin, end)
+        empty = samples.EmptyCells(column.missing, length, length / rate, begin)
+        yield find(empty, severity, column.missing, channel, begin, end)
     if column.not_finite:
-        detail = (
-            f"{channel} has {column.not_finite} infinities, or figures beyond "
-            f"{MAX_MEASUREMENT:g}{most}; treated as missing samples"
-        )
-        yield Finding("not_finite", "warning", detail, column.not_finite, channel, begin, end)
+        number = column.not_finite
+        infinite = samples.NotFinite(number, MAX_MEASUREMENT, length, length / rate, begin)
+        yield find(infinite, "warning", number, channel, begin, end)
 
 
 def _find_bad_values(
@@ -208,46 +177,29 @@ def _find_bad_values(
     settings: QualitySettings,
 ) -> Iterator[Finding]:
     """Yield findings about steps, stuck, saturated and piled-up values."""
-    rounded = "; the figures were rounded after it" if steps is not None and steps.hidden else ""
     if steps is not None and _has_few_levels(steps, settings):
-        detail = (
-            f"{channel} has {steps.levels:.0f} levels of {_format_value(channel, steps.step)}, "
-            f"fewer than {settings.fewest_levels}: its noise is that of the rounding; record "
-            f"in more digits or in a finer range{rounded}"
-        )
-        yield Finding("coarse", "warning", detail, steps.levels, channel)
+        coarse = samples.Coarse(steps.levels, steps.step, settings.fewest_levels, steps.hidden)
+        yield find(coarse, "warning", steps.levels, channel)
     elif steps is not None and steps.over_noise > settings.step_over_noise:
-        detail = (
-            f"{channel} is quantised in steps of {_format_value(channel, steps.step)}, "
-            f"{steps.over_noise:.2g} of its noise{rounded}"
-        )
-        yield Finding("quantised", "note", detail, steps.step, channel)
+        over_noise = steps.over_noise if math.isfinite(steps.over_noise) else None
+        quantised = samples.Quantised(steps.step, over_noise, is_rounded=steps.hidden)
+        yield find(quantised, "note", steps.step, channel)
     length, end = column.longest_run
     stuck = length > max(3.0 * levels.longest_by_chance(column), settings.longest_stuck * rate)
     # A level midway between two edges of a register can stay at one value for any time.
     if stuck and not _has_only_rounding(steps, settings):
         seconds, start = length / rate, (end - length) / rate
-        detail = f"{channel} stays at one value for {seconds:.4g} s ({length} samples)"
-        yield Finding("stuck_for_a_while", "warning", detail, seconds, channel, start, end / rate)
+        constant = samples.StuckForAWhile(seconds, length)
+        yield find(constant, "warning", seconds, channel, start, end / rate)
     at_end = levels.saturated(column, steps, settings.saturated)
     if at_end is not None:
         side, number = at_end
         value = column.low if side == "lowest" else column.high
-        detail = (
-            f"{channel} has {number} samples at its {side} value, "
-            f"{_format_value(channel, value)}: it is saturated; use a wider range"
-        )
-        yield Finding("saturated", "warning", detail, number, channel)
+        yield find(samples.Saturated(number, value, side), "warning", number, channel)
     heap = None if stuck else levels.piled(column, steps)
     if heap is not None:
         value, share = heap
-        detail = (
-            f"{100 * share:.2g} % of the samples of {channel} are "
-            f"{_format_value(channel, value)}, many times as many as at the values beside it: lost "
-            "samples were filled in, or a dead band holds the output; leave the cells of lost "
-            "samples empty"
-        )
-        yield Finding("piled_up", "warning", detail, share, channel)
+        yield find(samples.PiledUp(share, value), "warning", share, channel)
 
 
 def _find_changes(
@@ -267,43 +219,24 @@ def _find_changes(
         if any(first - step.window <= step.sample <= last + step.window for step in moves):
             continue  # the spread is large because of the step
         begin, end, length = first / rate, last / rate, (last - first) / rate
-        detail = (
-            f"{channel} is shaken from {begin:.5g} s to {end:.5g} s; use a part without it ('use:' "
-            "beside the log)"
-        )
-        yield Finding("motion", "warning", detail, length, channel, begin, end)
+        yield find(samples.Motion(begin, end), "warning", length, channel, begin, end)
     for step in moves:
         if abs(step.size) < 1.5 * step_size:
             continue
         at = step.sample / rate
-        detail = (
-            f"the mean of {channel} changes by {_format_value(channel, step.size)} at {at:.5g} s "
-            f"({step.sigmas:.0f} times its usual changes): the sensor was moved, or its range "
-            "or its temperature jumped"
-        )
-        yield Finding("step", "warning", detail, step.size, channel, at, at)
+        yield find(samples.Step(step.size, at, step.sigmas), "warning", step.size, channel, at, at)
     warm = stationarity.warm_up(blocks, settings.warm_up)
     if warm is not None and abs(warm.drift) >= 1.5 * step_size:
-        than = "a later part not at all"  # the steps of the register are too coarse
-        if warm.usual > 0.0:
-            than = f"{abs(warm.drift) / warm.usual:.0f} times as much as in a later part"
-        detail = (
-            f"{channel} drifts by {_format_value(channel, warm.drift)} in its first "
-            f"{warm.end / rate:.5g} s, {than}; leave it out with 'use: {{start: "
-            f"{math.ceil(warm.end / rate)}"
-            "}' beside the log, or quality.trim_warm_up"
-        )
-        yield Finding("warm_up", "warning", detail, warm.drift, channel, 0.0, warm.end / rate)
+        # Behind a coarse register the usual drift may be 0.
+        usual = abs(warm.drift) / warm.usual if warm.usual > 0.0 else None
+        data = samples.WarmUp(warm.drift, warm.end / rate, usual)
+        yield find(data, "warning", warm.drift, channel, 0.0, warm.end / rate)
     change = stationarity.variance_change(blocks)
     if change is None or _is_rounding_dominant(steps):
         return
     ratio, begin, end = change[0], change[1] / rate, change[2] / rate
     if ratio > settings.variance_ratio:
-        detail = (
-            f"the noise of {channel} is {ratio:.3g} times as large from {begin:.5g} s to "
-            f"{end:.5g} s as where it is calmest: it is not stationary"
-        )
-        yield Finding("not_stationary", "warning", detail, ratio, channel, begin, end)
+        yield find(samples.NotStationary(ratio, begin, end), "warning", ratio, channel, begin, end)
 
 
 def _is_rounding_dominant(steps: levels.Quantisation | None) -> bool:

@@ -20,8 +20,16 @@ from imubench_pipeline.model.table import ChannelRow
 from imubench_pipeline.recordings.quality import levels
 from imubench_pipeline.recordings.quality.repeats import WINDOW, Stretch
 from imubench_pipeline.recordings.quality.summary import ColumnSummary, Excerpt, common_samples
-from imubench_pipeline.tables.findings import Finding
+from imubench_pipeline.tables.findings import Finding, find
 from imubench_pipeline.typing import Array
+from imubench_pipeline.words.findings.base import FindingData
+from imubench_pipeline.words.findings.copies import (
+    ChannelTwice,
+    LogTwice,
+    RecordingTwice,
+    RepeatedStretch,
+    SharedNoise,
+)
 
 _MIN_NONZERO_INCREMENTS = 64  # least number of increments of a piece that are not 0
 _MIN_COPY_CORRELATION = 1.0 - 1e-6
@@ -64,12 +72,7 @@ def copied_channels(columns: Mapping[str, ColumnSummary]) -> Iterator[Finding]:
                 if channel in named:
                     continue
                 named.add(channel)
-                scaled = "" if abs(times - 1.0) < 1e-6 else f", times {times:.6g} in SI"
-                detail = (
-                    f"{channel} has the samples of {of}{scaled}: one column is used for both; "
-                    "give each channel its own column in the sensor file"
-                )
-                yield Finding("channel_twice", "warning", detail, times, channel)
+                yield find(ChannelTwice(of, times), "warning", times, channel)
 
 
 def _find_copy_factor(first: list[Excerpt], other: list[Excerpt]) -> float | None:
@@ -144,21 +147,13 @@ def _describe_repeats(
 ) -> Finding:
     longest = max(stretches, key=lambda stretch: stretch.last - stretch.first)
     total = sum(stretch.last - stretch.first for stretch in stretches)
-    often = f"{len(stretches)} times; the longest stretch, " if len(stretches) > 1 else ""
     begin, end = longest.first / rate, longest.last / rate
-    detail = (
-        f"{channel or 'the log'} repeats itself bit for bit: {often}{begin:.5g} s to {end:.5g} s "
-        f"is what was from {begin - longest.lag / rate:.5g} s on"
-    )
+    original = begin - longest.lag / rate
     share = total / present
+    data: FindingData = RepeatedStretch(begin, end, original, len(stretches))
     if share > _MIN_SHARE_LOG_TWICE:
-        detail += (
-            f"; {100 * share:.0f} % of the log are copies, as of one that was appended to itself; "
-            "use the part before them ('use:' beside the log)"
-        )
-        return Finding("log_twice", "warning", detail, total, channel, begin, end)
-    detail += "; find what wrote them twice (a buffer, a paste), or use a part without them"
-    return Finding("repeated_stretch", "warning", detail, total, channel, begin, end)
+        data = LogTwice(begin, end, original, len(stretches), share)
+    return find(data, "warning", total, channel, begin, end)
 
 
 def recorded_twice(
@@ -185,12 +180,8 @@ def recorded_twice(
             copies.setdefault((sensor, recording), {}).setdefault(of, []).append(channel)
     for (sensor, recording), originals in copies.items():
         for of, channels in originals.items():
-            detail = (
-                f"{recording} has the samples of {of} ({', '.join(channels)}): one log lies in the "
-                "folder of the sensor twice, and would count as two; remove one of them"
-            )
-            finding = Finding("recording_twice", "warning", detail, float(len(channels)))
-            yield finding.row(sensor, recording)
+            data = RecordingTwice(recording, of, tuple(channels))
+            yield find(data, "warning", float(len(channels))).row(sensor, recording)
 
 
 def _get_channel_key(row: ChannelRow) -> tuple[str, str, str]:
@@ -237,12 +228,7 @@ def shared_noise(columns: Mapping[str, ColumnSummary]) -> Iterator[Finding]:
             if abs(correlation) > abs(strongest.get(channel, (0.0, ""))[0]):
                 strongest[channel] = (correlation, beside)
     for channel, (correlation, beside) in strongest.items():
-        detail = (
-            f"the noise of {channel} is correlated with that of {beside}, by {correlation:.2f}: it "
-            "is of a vibration, of the supply, or of a column that was computed from several "
-            "axes; axes are fused and pooled as independent"
-        )
-        yield Finding("shared_noise", "warning", detail, correlation, channel)
+        yield find(SharedNoise(beside, correlation), "warning", correlation, channel)
 
 
 def _autocorrelate(values: Array) -> Array:

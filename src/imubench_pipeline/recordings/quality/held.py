@@ -10,7 +10,8 @@ from numba import njit
 from numpy.typing import NDArray
 
 from imubench_pipeline.recordings.quality.summary import PIECE_SIZE, ColumnSummary, Excerpt
-from imubench_pipeline.tables.findings import Finding
+from imubench_pipeline.tables.findings import Finding, find
+from imubench_pipeline.words.findings.samples import HeldSamples
 
 _MAX_PERIOD = 256  # longest period of repeats that is tested, records
 _MAX_PIECES = 8  # pieces that are tested; each is tested for every period
@@ -81,9 +82,5 @@ def held_samples(channel: str, column: ColumnSummary) -> Iterator[Finding]:
     regular = regular_repeats(column.excerpts())
     if regular is None:
         return
-    detail = (
-        f"one sample in {regular.every} of {channel} repeats the one before, in regular turn (of "
-        f"the others {100 * regular.share:.2g} % do by chance): the logger asks more often than "
-        "the sensor samples, or fills in what it lost; record each sample once"
-    )
-    yield Finding("held_samples", "warning", detail, regular.every, channel)
+    data = HeldSamples(regular.every, regular.share)
+    yield find(data, "warning", regular.every, channel)

@@ -15,8 +15,9 @@ from numpy.typing import NDArray
 
 from imubench_pipeline.recordings.quality.register import hidden_step
 from imubench_pipeline.recordings.quality.summary import PIECE_SIZE, ColumnSummary, Excerpt
-from imubench_pipeline.tables.findings import Finding
+from imubench_pipeline.tables.findings import Finding, find
 from imubench_pipeline.typing import Array
+from imubench_pipeline.words.findings.samples import Change, Interleaved, Joined
 
 _CHANGE_SIGMAS = 8.0  # least change of level or noise, in standard deviations
 _MIN_LOG_NOISE_CHANGE = math.log(1.2)
@@ -61,7 +62,7 @@ def joined(channel: str, column: ColumnSummary, rate: float) -> Iterator[Finding
             around = np.arange(max(1, place - _LEVEL_WIDTH), last)
             place = int(around[np.argmax(np.abs(mean[around + 1] - mean[around - 1]))])
         record = int(filled[place]) * blocks.size + blocks.size // 2
-        changes = {
+        changes: dict[Change, bool] = {
             "level": bool(np.abs(level[near]).max() > _CHANGE_SIGMAS),
             "noise": bool(np.abs(noise[near]).max() > _CHANGE_SIGMAS)
             and _is_lasting(logs, place)
@@ -80,12 +81,7 @@ def joined(channel: str, column: ColumnSummary, rate: float) -> Iterator[Finding
             continue
         ratio = math.exp(float(np.median(logs[place:]) - np.median(logs[:place])))
         at = record / rate
-        detail = (
-            f"{' and '.join(changed)} of {channel} change at once at {at:.5g} s (its noise is "
-            f"{ratio:.3g} times as large after): two sensors, or two ranges of one, are joined in "
-            "this log; use one part ('use:' beside the log)"
-        )
-        yield Finding("joined", "warning", detail, ratio, channel, at, at)
+        yield find(Joined(tuple(changed), at, ratio), "warning", ratio, channel, at, at)
         return
 
 
@@ -179,7 +175,7 @@ def interleaved(channel: str, column: ColumnSummary) -> Iterator[Finding]:
     if not levels:
         return
     level, noise = float(np.median(levels)), float(np.median(noises))
-    changes = {
+    changes: dict[Change, bool] = {
         "level": level > _CHANGE_SIGMAS * float(np.median(units)),
         "noise": noise > max(_CHANGE_SIGMAS * float(np.median(sizes)), _MIN_LOG_NOISE_ALTERNATION),
     }
@@ -192,12 +188,8 @@ def interleaved(channel: str, column: ColumnSummary) -> Iterator[Finding]:
     changed = [name for name, differs in changes.items() if differs]
     if len(changed) < 2 and not (changed == ["level"] and level > _MIN_LEVEL_ALTERNATION):
         return
-    detail = (
-        f"{' and '.join(changed)} of {channel} alternate from sample to sample (levels "
-        f"{level:.3g} standard deviations apart, noise {math.exp(noise):.3g} times as large): "
-        "every other sample seems to be of another sensor; write each sensor into a log of its own"
-    )
-    yield Finding("interleaved", "warning", detail, level, channel)
+    data = Interleaved(tuple(changed), level, math.exp(noise))
+    yield find(data, "warning", level, channel)
 
 
 def _compare_even_and_odd(values: Array) -> tuple[float, float, int] | None:

@@ -57,7 +57,7 @@ class FindingData:
     scales: ClassVar[Mapping[str, float]]
     """If its value is a factor that corrects samples or times: the power for each parameter."""
     doubt: ClassVar[str]
-    """The doubt in a few words; ``{channels}`` stands for the channels."""
+    """The doubt in a few words; ``{channels}`` stands for the channels, ``{are}`` for is or are."""
 
     def __init_subclass__(
         cls,
@@ -76,3 +76,8 @@ class FindingData:
     def text(self, channel: str) -> str:
         """Return the finding in sentences, with what to do; ``channel`` may be empty."""
         raise NotImplementedError
+
+
+def channel_name(channel: str) -> str:
+    """Return a channel as it stands in a sentence: ``gyro x``."""
+    return channel.replace("_", " ")

@@ -1,0 +1,497 @@
+"""Findings about files: what was not read, states another unit, or was rejected."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+from imubench_pipeline.words.findings.base import (
+    ALL,
+    NONE,
+    POWERS_OF_UNIT,
+    SLOW,
+    WHITE,
+    FindingData,
+    channel_name,
+)
+from imubench_pipeline.words.numbers import counted, duration_text, join_names, number_text
+
+
+@dataclass(frozen=True)
+class Rejected(FindingData, code="rejected", affects=ALL, doubt="the recording was rejected"):
+    """A recording that cannot be used."""
+
+    reason: str
+
+    def text(self, channel: str) -> str:
+        """Return the reason."""
+        return self.reason
+
+
+@dataclass(frozen=True)
+class Failed(FindingData, code="failed", affects=ALL, doubt="the analysis failed"):
+    """A recording of which a step failed."""
+
+    reason: str
+
+    def text(self, channel: str) -> str:
+        """Return the reason, and what becomes of the recording."""
+        return (
+            f"{self.reason.rstrip('.')}. The recording is left out, and tried again by the next run"
+        )
+
+
+@dataclass(frozen=True)
+class WarmUpTrimmed(FindingData, code="warm_up_trimmed", affects=NONE):
+    """A warm-up that is left out."""
+
+    end: float
+
+    def text(self, channel: str) -> str:
+        """Return the finding in a sentence."""
+        return (
+            f"The first {number_text(self.end, 5)} s, a warm-up, are left out "
+            "(quality.trim_warm_up)"
+        )
+
+
+@dataclass(frozen=True)
+class ShortRecording(
+    FindingData, code="short_recording", affects=SLOW, doubt="the recording is short"
+):
+    """A recording that is too short for slow noise."""
+
+    duration: float
+
+    def text(self, channel: str) -> str:
+        """Return the finding in sentences."""
+        return (
+            f"The recording lasts {duration_text(self.duration)}. This is enough for white noise, "
+            "but bias instability and random walk take hours"
+        )
+
+
+@dataclass(frozen=True)
+class Knocks(FindingData, code="knocks", affects=WHITE, doubt="knocks in {channels}"):
+    """Short disturbances, which are left out."""
+
+    knocks: int
+    sigmas: float
+    """Size of the largest one over the noise."""
+    times: tuple[float, ...]
+    """Positions of the first ones, s."""
+    samples: int
+    """Samples that are left out."""
+
+    def text(self, channel: str) -> str:
+        """Return the finding in sentences."""
+        at = ", ".join(number_text(time, 5) for time in self.times)
+        more = ", ..." if self.knocks > len(self.times) else ""
+        samples = counted(self.samples, "sample", "samples")
+        return (
+            f"{channel_name(channel)} has {counted(self.knocks, 'knock')}, up to "
+            f"{number_text(self.sigmas, 3)} standard deviations (at {at}{more} s). {samples} about "
+            f"{'it' if self.knocks == 1 else 'them'} {'is' if self.samples == 1 else 'are'} left "
+            "out"
+        )
+
+
+@dataclass(frozen=True)
+class SimulatedByMark(
+    FindingData,
+    code="simulated_by_mark",
+    affects=NONE,
+    doubt="the log is marked as simulated, and the notes say that it is not",
+):
+    """The notes contradict the mark of a simulated log."""
+
+    file: str
+
+    def text(self, channel: str) -> str:
+        """Return the finding in sentences."""
+        return (
+            f"The notes say 'simulated: false', but {self.file} has the mark of a simulated log, "
+            "and is treated as simulated. Remove the key from the notes, or the mark if it is wrong"
+        )
+
+
+@dataclass(frozen=True)
+class UnusedFiles(FindingData, code="unused_files", affects=NONE):
+    """Files of a folder from which no channel is read."""
+
+    files: tuple[str, ...]
+    """The first ones."""
+    number: int
+    """Number of all."""
+    folder: str
+
+    def text(self, channel: str) -> str:
+        """Return the finding in sentences."""
+        more = self.number - len(self.files)
+        names = join_names([*self.files, *([f"{more} more"] if more else [])])
+        return (
+            f"No channel is read from {names}. Name the file of a channel "
+            "with 'file:' in the sensor file. Notes belong beside the folder, as "
+            f"{self.folder}.yaml"
+        )
+
+
+@dataclass(frozen=True)
+class UnequalLength(
+    FindingData, code="unequal_length", affects=NONE, doubt="files may be cut short"
+):
+    """Files without time stamps that have different numbers of samples."""
+
+    files: tuple[str, ...]
+    samples: tuple[int, ...]
+
+    def text(self, channel: str) -> str:
+        """Return the finding in sentences."""
+        lengths = zip(self.files, self.samples, strict=True)
+        listed = join_names(
+            [f"{counted(samples, 'sample')} in {file}" for file, samples in lengths]
+        )
+        return (
+            f"Files without time stamps differ in length: {listed}. The shorter ones may "
+            "be cut short"
+        )
+
+
+@dataclass(frozen=True)
+class NotUsed(FindingData, code="not_used", affects=NONE):
+    """Samples outside of the part to use."""
+
+    file: str
+    samples: int
+
+    def text(self, channel: str) -> str:
+        """Return the finding in a sentence."""
+        return (
+            f"{self.file}: {counted(self.samples, 'sample lies', 'samples lie')} outside the part "
+            "to use"
+        )
+
+
+@dataclass(frozen=True)
+class UnitContradicts(
+    FindingData,
+    code="unit_contradicts",
+    affects=frozenset(POWERS_OF_UNIT),
+    unfit=True,
+    scales=POWERS_OF_UNIT,
+    doubt="the unit of {channels} contradicts the file",
+):
+    """Log and sensor file state different units."""
+
+    file: str
+    in_log: str
+    where: str
+    """Place of the unit in the log."""
+    in_sensor_file: str
+    scale: float
+    """Scale in the sensor file."""
+    factor: float
+    """Unit of the log over the one that is used."""
+
+    def text(self, channel: str) -> str:
+        """Return the finding in sentences."""
+        scaled = "" if self.scale == 1.0 else f", times {number_text(self.scale)}"
+        return (
+            f"{self.file} states {self.in_log} for {channel_name(channel)} ({self.where}). The "
+            f"sensor file states {self.in_sensor_file}{scaled} (log.channels.{channel}.unit), "
+            f"which is used. If the log is right, multiply the values by "
+            f"{number_text(self.factor, 5)}. Correct the one that is wrong"
+        )
+
+
+@dataclass(frozen=True)
+class ZeroBytes(FindingData, code="zero_bytes", affects=ALL, doubt="the file has zero bytes"):
+    """Runs of zero bytes, which are left out."""
+
+    file: str
+    zeros: int
+    places: int
+    first: str
+    """Place of the first run: ``line 3``."""
+    is_at_end: bool
+    """They are the end of the file."""
+    damaged_lines: int = 0
+    """Lines with zeros between their letters."""
+    is_shifted: bool = False
+    """Later samples are shifted in time, since no stamps are read."""
+
+    def text(self, channel: str) -> str:
+        """Return the finding in sentences."""
+        zeros = f"{self.file}: {counted(self.zeros, 'zero byte')}"
+        if self.is_at_end:
+            return (
+                f"{zeros} from {self.first} to the end of the file; left out. The logger reserved "
+                "space, or lost its power"
+            )
+        where = f"in {self.first}"
+        if self.places > 1:
+            where = f"in {self.places} places, the first in {self.first}"
+        text = f"{zeros} {where}; left out"
+        if self.damaged_lines:
+            lines = counted(self.damaged_lines, "line that has", "lines that have")
+            text += f", with the text of {lines} them"
+        if self.is_shifted:
+            text += ". State 'time': without it, all later samples are shifted in time"
+        return text
+
+
+@dataclass(frozen=True)
+class TruncatedFile(
+    FindingData, code="truncated_file", affects=NONE, doubt="the end of the file is missing"
+):
+    """A file without its end, or with records in a journal beside it."""
+
+    file: str
+    what: Literal["compressed", "bag", "journal"]
+    journal: str = ""
+
+    def text(self, channel: str) -> str:
+        """Return the finding in sentences."""
+        if self.what == "journal":
+            return (
+                f"{self.file}: {self.journal} has records that are not yet in the bag and are not "
+                "read. Merge them with sqlite3 and 'pragma wal_checkpoint'"
+            )
+        what = "the compressed file ends early"
+        if self.what == "bag":
+            what = "the bag was not closed"
+        return f"{self.file}: {what}; read as far as possible"
+
+
+@dataclass(frozen=True)
+class IncompleteLastRecord(FindingData, code="incomplete_last_record", affects=NONE):
+    """A last record that is cut short, and left out."""
+
+    file: str
+    shown: str | None = None
+    """Its first letters, if it has no line break."""
+    has_checksum: bool = False
+    """Its kind has a checksum, which is wrong."""
+    columns: int | None = None
+    expected: int | None = None
+    """Number of its columns, and of those of a whole record."""
+    messages: int | None = None
+    message: str = ""
+    """Number of messages that are cut short, and their name."""
+
+    def text(self, channel: str) -> str:
+        """Return the finding in sentences."""
+        if self.messages is not None:
+            number = counted(self.messages, f"{self.message} message")
+            verb = "is" if self.messages == 1 else "are"
+            return f"{self.file}: {number} {verb} cut short by the end of the log; left out"
+        if self.columns is not None:
+            return (
+                f"{self.file}: the last record has {self.columns} of {self.expected} columns; left "
+                "out"
+            )
+        why = "the last record has no line break and may be cut short"
+        if self.has_checksum:
+            why = "the last line has no line break and no right checksum"
+        return f"{self.file}: {why}; left out: {self.shown!r}"
+
+
+@dataclass(frozen=True)
+class IncompleteFirstRecord(FindingData, code="incomplete_first_record", affects=NONE):
+    """First lines that are only parts of records, and left out."""
+
+    file: str
+    lines: int
+    first: int
+    """Number of the first line."""
+    shown: str
+    """Its first letters."""
+
+    def text(self, channel: str) -> str:
+        """Return the finding in a sentence."""
+        return (
+            f"{self.file}: {counted(self.lines, 'line')} from line {self.first} on "
+            f"{'lacks' if self.lines == 1 else 'lack'} a part of the record; left out: "
+            f"{self.shown!r}"
+        )
+
+
+@dataclass(frozen=True)
+class NotRecords(FindingData, code="not_records", affects=NONE):
+    """Lines under the names of columns that are neither units nor records."""
+
+    file: str
+    lines: int
+    first: int
+    """Number of the first line."""
+    shown: str
+    """Its first letters."""
+
+    def text(self, channel: str) -> str:
+        """Return the finding in a sentence."""
+        verb, are = ("follows", "is") if self.lines == 1 else ("follow", "are")
+        return (
+            f"{self.file}: {counted(self.lines, 'line')} from line {self.first} on {verb} the "
+            f"column names and {are} neither units nor records; left out: {self.shown!r}"
+        )
+
+
+@dataclass(frozen=True)
+class RestartedLog(FindingData, code="restarted_log", affects=NONE):
+    """Headers within a log."""
+
+    file: str
+    restarts: int
+    cut: int
+    """Places where a record before the header is cut short."""
+
+    def text(self, channel: str) -> str:
+        """Return the finding in sentences."""
+        cut = ""
+        if self.cut:
+            cut = f", after a record that is cut short in {counted(self.cut, 'place')}"
+        return (
+            f"{self.file}: the header appears {counted(self.restarts, 'more time')}{cut}. The "
+            "logger was restarted. These lines are left out"
+        )
+
+
+@dataclass(frozen=True)
+class LeapSecond(FindingData, code="leap_second", affects=NONE):
+    """Time stamps that count leap seconds."""
+
+    file: str
+    seconds: int
+
+    def text(self, channel: str) -> str:
+        """Return the finding in a sentence."""
+        return f"{self.file}: the time stamps count {counted(self.seconds, 'leap second')}"
+
+
+@dataclass(frozen=True)
+class DamagedMessage(
+    FindingData, code="damaged_message", affects=ALL, doubt="messages are damaged"
+):
+    """Messages of a bag that do not match their type."""
+
+    file: str
+    messages: int
+    topic: str
+    is_left_out: bool
+    """Otherwise they are missing samples."""
+
+    def text(self, channel: str) -> str:
+        """Return the finding in a sentence."""
+        verb = "message of {} does" if self.messages == 1 else "messages of {} do"
+        return (
+            f"{self.file}: {self.messages} {verb.format(self.topic)} not match "
+            f"{'its' if self.messages == 1 else 'their'} type; {_fate(self.is_left_out)}"
+        )
+
+
+@dataclass(frozen=True)
+class NotMeasured(
+    FindingData, code="not_measured", affects=ALL, doubt="messages without a measurement"
+):
+    """Messages that state that a quantity was not measured."""
+
+    file: str
+    messages: int
+    topic: str
+    quantity: str
+
+    def text(self, channel: str) -> str:
+        """Return the finding in a sentence."""
+        messages = "message of {} states" if self.messages == 1 else "messages of {} state"
+        return (
+            f"{self.file}: {self.messages} {messages.format(self.topic)} (covariance -1) that "
+            f"{self.quantity} was not measured; treated as missing samples"
+        )
+
+
+@dataclass(frozen=True)
+class WrongChecksum(
+    FindingData, code="wrong_checksum", affects=ALL, doubt="messages have a wrong checksum"
+):
+    """Messages or sentences with a wrong checksum."""
+
+    file: str
+    number: int
+    name: str
+    is_sentence: bool
+    """A line of text, which may also be cut short."""
+    is_left_out: bool
+    """Otherwise they are missing samples."""
+    is_shifted: bool = False
+    """Later samples are shifted in time, since no stamps are read."""
+
+    def text(self, channel: str) -> str:
+        """Return the finding in sentences."""
+        kind = "sentence" if self.is_sentence else "message"
+        number = counted(self.number, f"{self.name} {kind}")
+        has = "has" if self.number == 1 else "have"
+        if self.is_sentence:
+            has = ("is" if self.number == 1 else "are") + f" cut short or {has}"
+        text = f"{self.file}: {number} {has} a wrong checksum; {_fate(self.is_left_out)}"
+        if self.is_shifted:
+            text += (
+                ". State 'time' (column time_tag, unit ms): without it, later samples are shifted "
+                "in time"
+            )
+        return text
+
+
+@dataclass(frozen=True)
+class UnreadableSentence(
+    FindingData, code="unreadable_sentence", affects=ALL, doubt="sentences are not readable"
+):
+    """Sentences with other fields than expected."""
+
+    file: str
+    sentences: int
+    name: str
+    expected: int
+    """Numbers of a sentence."""
+
+    def text(self, channel: str) -> str:
+        """Return the finding in sentences."""
+        return (
+            f"{self.file}: {counted(self.sentences, f'{self.name} sentence')} "
+            f"{'has' if self.sentences == 1 else 'have'} a right checksum, but not the "
+            f"{self.expected} numbers expected; treated as missing samples"
+        )
+
+
+@dataclass(frozen=True)
+class OtherSentences(FindingData, code="other_sentences", affects=NONE):
+    """Sentences of other kinds, which are not read."""
+
+    file: str
+    sentences: int
+    names: tuple[str, ...]
+    """Names of the first kinds."""
+
+    def text(self, channel: str) -> str:
+        """Return the finding in a sentence."""
+        return (
+            f"{self.file}: {counted(self.sentences, 'other sentence')} ({', '.join(self.names)}) "
+            "not read"
+        )
+
+
+@dataclass(frozen=True)
+class NotSentences(FindingData, code="not_sentences", affects=NONE):
+    """Lines that are no sentence, and not read."""
+
+    file: str
+    lines: int
+
+    def text(self, channel: str) -> str:
+        """Return the finding in a sentence."""
+        lines = counted(self.lines, "line or part of one", "lines or parts of them")
+        are = "is no sentence" if self.lines == 1 else "are no sentences"
+        return f"{self.file}: {lines} {are}; not read"
+
+
+def _fate(is_left_out: bool) -> str:
+    return "left out" if is_left_out else "treated as missing samples"

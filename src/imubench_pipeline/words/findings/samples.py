@@ -1,0 +1,400 @@
+"""Findings about the samples of a channel: values, quantisation, repeats, changes, joined logs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import ceil
+from typing import Literal
+
+from imubench_pipeline.settings.sensor import QUANTITIES, TEMPERATURE, quantity_of
+from imubench_pipeline.units import from_si
+from imubench_pipeline.words.findings.base import ALL, NONE, SLOW, WHITE, FindingData, channel_name
+from imubench_pipeline.words.numbers import counted, join_names, number_text, percent_text
+
+Change = Literal["level", "noise", "steps"]
+"""A property of the samples that changes where another sensor begins."""
+
+_CHANGES: dict[str, str] = {"level": "level", "noise": "noise", "steps": "resolution"}
+_UNITS = {"gyro": ("deg/s", "°/s"), "accel": ("mg", "mg")}
+"""Unit in which values of each quantity are printed, and its sign."""
+
+_ROUNDED = ". The values were rounded again afterwards"
+
+
+def _value_text(channel: str, value: float) -> str:
+    """Return a value of a channel, SI, in the unit of its quantity."""
+    quantity = quantity_of(channel)
+    unit, sign = _UNITS[quantity]
+    return f"{number_text(from_si(value, unit, QUANTITIES[quantity]), 3)} {sign}"
+
+
+def _at(seconds: float) -> str:
+    """Return a position in a recording, in s as in ``use:``."""
+    return f"{number_text(seconds, 5)} s"
+
+
+@dataclass(frozen=True)
+class Quantised(FindingData, code="quantised", affects=NONE):
+    """The values are multiples of a visible step."""
+
+    step: float
+    step_over_noise: float | None = None
+    """None: the noise is not known, as most samples are equal."""
+    lowest: float | None = None
+    highest: float | None = None
+    is_rounded: bool = False
+    """The values were rounded again, so their differences are no multiples of the step."""
+
+    def text(self, channel: str) -> str:
+        """Return the finding in sentences."""
+        if channel == TEMPERATURE:
+            return (
+                f"The temperature has steps of {number_text(self.step, 3)} °C, from "
+                f"{number_text(self.lowest)} to {number_text(self.highest)} °C"
+            )
+        text = f"{channel_name(channel)} is quantised in steps of {_value_text(channel, self.step)}"
+        if self.step_over_noise is not None:
+            text += f", {number_text(self.step_over_noise, 2)} times its noise"
+        return text + (_ROUNDED if self.is_rounded else "")
+
+
+@dataclass(frozen=True)
+class Coarse(FindingData, code="coarse", affects=ALL, doubt="coarse resolution of {channels}"):
+    """The noise is rounding noise."""
+
+    levels: float
+    step: float
+    required: int
+    is_rounded: bool
+
+    def text(self, channel: str) -> str:
+        """Return the finding in sentences."""
+        rounded = _ROUNDED if self.is_rounded else ""
+        return (
+            f"{channel_name(channel)} has {counted(round(self.levels), 'level')}, "
+            f"{_value_text(channel, self.step)} apart; at least {self.required} are required. Its "
+            "noise is rounding noise. Record more digits, or use a finer range" + rounded
+        )
+
+
+@dataclass(frozen=True)
+class RepeatedSamples(
+    FindingData, code="repeated_samples", affects=WHITE, doubt="repeated samples in {channels}"
+):
+    """Samples repeat their predecessor more often than rounding explains."""
+
+    share: float
+    share_by_chance: float
+
+    def text(self, channel: str) -> str:
+        """Return the finding in sentences."""
+        return (
+            f"{channel_name(channel)} repeats its previous sample in {percent_text(self.share, 2)} "
+            f"of the records; rounding explains {percent_text(self.share_by_chance, 2)}. The "
+            "logger reads faster than the sensor samples. State the rate of the sensor, and record "
+            "each sample once"
+        )
+
+
+@dataclass(frozen=True)
+class HeldSamples(
+    FindingData, code="held_samples", affects=WHITE, doubt="repeated samples in {channels}"
+):
+    """Every n-th sample repeats its predecessor."""
+
+    period: int
+    share_by_chance: float
+
+    def text(self, channel: str) -> str:
+        """Return the finding in sentences."""
+        return (
+            f"One sample in {self.period} of {channel_name(channel)} repeats its predecessor, at "
+            f"regular intervals; of the others, {percent_text(self.share_by_chance, 2)} do by "
+            "chance. The logger reads faster than the sensor samples, or fills in lost samples. "
+            "Record each sample once"
+        )
+
+
+@dataclass(frozen=True)
+class NoSamples(FindingData, code="no_samples", affects=ALL, doubt="no samples in {channels}"):
+    """A channel without a number."""
+
+    def text(self, channel: str) -> str:
+        """Return the finding in a sentence."""
+        return f"{channel_name(channel)} contains no number"
+
+
+@dataclass(frozen=True)
+class TooShort(FindingData, code="too_short", affects=ALL, doubt="too few samples in {channels}"):
+    """Too few samples, or too few adjacent ones for an Allan variance."""
+
+    samples: int
+    """Samples; of an Allan variance, points of the grid."""
+    required: int | None = None
+    """Smallest number of samples."""
+    rate: float | None = None
+    """Rate of the grid, Hz, if no Allan variance can be estimated."""
+
+    def text(self, channel: str) -> str:
+        """Return the finding in sentences."""
+        name = channel_name(channel)
+        if self.rate is None:
+            return (
+                f"{name} has {counted(self.samples, 'sample')}; at least {self.required} are "
+                "required (quality.shortest). Record for longer"
+            )
+        return (
+            f"{name} has too many missing samples for an Allan variance: no two adjacent clusters "
+            f"are full. The grid has {counted(self.samples, 'point')} at "
+            f"{number_text(self.rate, 6)} Hz. Record without losses, or for longer"
+        )
+
+
+@dataclass(frozen=True)
+class Stuck(FindingData, code="stuck", affects=ALL, unfit=True, doubt="{channels} did not change"):
+    """A channel that never changes."""
+
+    value: float
+    samples: int
+
+    def text(self, channel: str) -> str:
+        """Return the finding in sentences."""
+        stays = f"stays at {_value_text(channel, self.value)}" if self.value else "is exactly 0"
+        return (
+            f"{channel_name(channel)} never changes: it {stays} in all {self.samples} samples. The "
+            "axis is dead or was not read, or the column is the wrong one"
+        )
+
+
+@dataclass(frozen=True)
+class EmptyCells(
+    FindingData, code="empty_cells", affects=ALL, doubt="missing samples in {channels}"
+):
+    """Records without a number."""
+
+    cells: int
+    longest: int
+    """Records of the longest run."""
+    duration: float
+    """Its duration, s."""
+    start: float
+    """Its start, s."""
+
+    def text(self, channel: str) -> str:
+        """Return the finding in sentences."""
+        return (
+            f"{channel_name(channel)} has {counted(self.cells, 'record')} without a number, "
+            f"treated as missing samples. {_longest_run(self.longest, self.duration, self.start)}"
+        )
+
+
+@dataclass(frozen=True)
+class NotFinite(
+    FindingData, code="not_finite", affects=ALL, doubt="values of {channels} that are not finite"
+):
+    """Infinities, or values that are too large for a measurement."""
+
+    cells: int
+    limit: float
+    longest: int
+    """Records of the longest run."""
+    duration: float
+    """Its duration, s."""
+    start: float
+    """Its start, s."""
+
+    def text(self, channel: str) -> str:
+        """Return the finding in sentences."""
+        return (
+            f"{channel_name(channel)} has {counted(self.cells, 'value')} that are infinite or "
+            f"above {number_text(self.limit)}, treated as missing samples. "
+            f"{_longest_run(self.longest, self.duration, self.start)}"
+        )
+
+
+def _longest_run(records: int, duration: float, start: float) -> str:
+    """Return a sentence about the longest run of records without a finite number."""
+    return (
+        f"The longest run has {counted(records, 'record')} ({number_text(duration, 3)} s), from "
+        f"{_at(start)}"
+    )
+
+
+@dataclass(frozen=True)
+class StuckForAWhile(
+    FindingData,
+    code="stuck_for_a_while",
+    affects=ALL,
+    doubt="{channels} did not change for some time",
+):
+    """A channel that stays at one value for longer than by chance."""
+
+    duration: float
+    samples: int
+
+    def text(self, channel: str) -> str:
+        """Return the finding in a sentence."""
+        return (
+            f"{channel_name(channel)} stays at one value for {number_text(self.duration)} s "
+            f"({self.samples} samples)"
+        )
+
+
+@dataclass(frozen=True)
+class Saturated(
+    FindingData, code="saturated", affects=ALL, doubt="saturated samples in {channels}"
+):
+    """Samples at an end of the range."""
+
+    samples: int
+    value: float
+    side: str
+    """``lowest`` or ``highest``."""
+
+    def text(self, channel: str) -> str:
+        """Return the finding in sentences."""
+        return (
+            f"{channel_name(channel)} has {self.samples} samples at its {self.side} value, "
+            f"{_value_text(channel, self.value)}: it is saturated. Use a wider range"
+        )
+
+
+@dataclass(frozen=True)
+class PiledUp(
+    FindingData, code="piled_up", affects=ALL, doubt="one value is too frequent in {channels}"
+):
+    """One value is far more frequent than its neighbours."""
+
+    share: float
+    value: float
+
+    def text(self, channel: str) -> str:
+        """Return the finding in sentences."""
+        return (
+            f"{percent_text(self.share, 2)} of the samples of {channel_name(channel)} are exactly "
+            f"{_value_text(channel, self.value)}, many times more than at neighbouring values. "
+            "Lost samples were filled in, or the sensor has a dead band. Leave the cells of lost "
+            "samples empty"
+        )
+
+
+@dataclass(frozen=True)
+class Motion(FindingData, code="motion", affects=ALL, unfit=True, doubt="the sensor was moved"):
+    """The sensor was shaken."""
+
+    start: float
+    end: float
+
+    def text(self, channel: str) -> str:
+        """Return the finding in sentences."""
+        return (
+            f"{channel_name(channel)} was shaken from {_at(self.start)} to {_at(self.end)}. Leave "
+            "this part out: 'use:' in the notes beside the log"
+        )
+
+
+@dataclass(frozen=True)
+class Step(FindingData, code="step", affects=SLOW | {"bias"}, doubt="a step in {channels}"):
+    """A sudden change of the mean."""
+
+    size: float
+    at: float
+    sigmas: float
+    """Size over the standard deviation of all changes of the mean."""
+
+    def text(self, channel: str) -> str:
+        """Return the finding in sentences."""
+        return (
+            f"The mean of {channel_name(channel)} changes by {_value_text(channel, self.size)} at "
+            f"{_at(self.at)}, {number_text(self.sigmas, 3)} times its usual change. The sensor was "
+            "moved, or its range or temperature jumped"
+        )
+
+
+@dataclass(frozen=True)
+class WarmUp(
+    FindingData, code="warm_up", affects=SLOW | {"bias"}, doubt="warm-up drift of {channels}"
+):
+    """The beginning drifts."""
+
+    drift: float
+    end: float
+    ratio: float | None
+    """Drift over the usual one in the rest; None if there is none."""
+
+    def text(self, channel: str) -> str:
+        """Return the finding in sentences."""
+        later = "; later it does not drift"
+        if self.ratio is not None:
+            later = f", {number_text(self.ratio, 2)} times as much as later"
+        return (
+            f"{channel_name(channel)} drifts by {_value_text(channel, self.drift)} in its first "
+            f"{_at(self.end)}{later}. Leave this out with 'use: {{start: {ceil(self.end)}}}' in "
+            "the notes beside the log, or with quality.trim_warm_up"
+        )
+
+
+@dataclass(frozen=True)
+class NotStationary(
+    FindingData, code="not_stationary", affects=ALL, doubt="the noise of {channels} changes"
+):
+    """The noise of one part is larger than elsewhere."""
+
+    ratio: float
+    start: float
+    end: float
+
+    def text(self, channel: str) -> str:
+        """Return the finding in a sentence."""
+        return (
+            f"The noise of {channel_name(channel)} is not stationary: from {_at(self.start)} to "
+            f"{_at(self.end)} it is {number_text(self.ratio, 3)} times as large as in the calmest "
+            "part"
+        )
+
+
+@dataclass(frozen=True)
+class Joined(FindingData, code="joined", affects=ALL, unfit=True, doubt="two logs are joined"):
+    """The data of another sensor, or of another range, begin within the log."""
+
+    changes: tuple[Change, ...]
+    at: float
+    noise_ratio: float
+    """Noise after the change over the noise before."""
+
+    def text(self, channel: str) -> str:
+        """Return the finding in sentences."""
+        changed = join_names([_CHANGES[change] for change in self.changes])
+        return (
+            f"The {changed} of {channel_name(channel)} change at once at {_at(self.at)}. The noise "
+            f"is {number_text(self.noise_ratio, 3)} times as large after that. Two sensors, or two "
+            "ranges of one, are joined in this log. Use one part: 'use:' in the notes beside the "
+            "log"
+        )
+
+
+@dataclass(frozen=True)
+class Interleaved(
+    FindingData,
+    code="interleaved",
+    affects=ALL,
+    unfit=True,
+    doubt="samples of two sensors are interleaved",
+):
+    """Every other sample is of another sensor."""
+
+    changes: tuple[Change, ...]
+    level: float
+    """Difference of the levels over the standard deviation of the noise."""
+    noise_ratio: float
+
+    def text(self, channel: str) -> str:
+        """Return the finding in sentences."""
+        changed = join_names([_CHANGES[change] for change in self.changes])
+        verb = "alternates" if len(self.changes) == 1 else "alternate"
+        return (
+            f"The {changed} of {channel_name(channel)} {verb} from sample to sample. The levels "
+            f"are {number_text(self.level, 3)} standard deviations apart, and the noise differs by "
+            f"a factor of {number_text(self.noise_ratio, 3)}. Every other sample seems to be from "
+            "another sensor. Write each sensor to its own log"
+        )

@@ -1,0 +1,280 @@
+"""Findings about time stamps, sampling rates, and missing samples."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from imubench_pipeline.words.findings.base import (
+    ALL,
+    NONE,
+    POWERS_OF_TIME,
+    SLOW,
+    WHITE,
+    FindingData,
+    channel_name,
+)
+from imubench_pipeline.words.numbers import counted, join_names, number_text, percent_text
+
+_TIMED = frozenset(POWERS_OF_TIME)
+"""Parameters that a wrong sampling rate changes."""
+
+
+def _rate_text(rate: float) -> str:
+    return f"{number_text(rate, 6)} Hz"
+
+
+def _at(seconds: float) -> str:
+    """Return a position in a recording, in s as in ``use:``."""
+    return f"{number_text(seconds, 5)} s"
+
+
+def _change_of_n(correct: float, used: float) -> str:
+    """Return by what share N is too low or too high if another rate is correct: N ∝ rate^(-1/2)."""
+    change = math.sqrt(used / correct) - 1.0
+    return f"{percent_text(abs(change), 2)} {'higher' if change > 0.0 else 'lower'}"
+
+
+@dataclass(frozen=True)
+class RateChanges(
+    FindingData, code="rate_changes", affects=WHITE, doubt="the sampling rate changes"
+):
+    """A part of a log has every n-th sample only."""
+
+    share: float
+    """Share of the samples in that part."""
+    start: float
+    end: float
+    lower_rate: float
+    rate: float
+    """Rate at which all are analysed, Hz."""
+
+    def text(self, channel: str) -> str:
+        """Return the finding in sentences."""
+        of = f" of {channel_name(channel)}" if channel else ""
+        low = 1.0 - math.sqrt(self.lower_rate / self.rate)
+        return (
+            f"The sampling rate{of} changes. {percent_text(self.share, 2)} of the samples, from "
+            f"{_at(self.start)} to {_at(self.end)}, have {_rate_text(self.lower_rate)} instead of "
+            f"{_rate_text(self.rate)}. They are analysed at {_rate_text(self.rate)} with missing "
+            f"samples. If the sensor was set to the lower rate, their N is {percent_text(low, 2)} "
+            "too low. Analyse the parts separately: 'use:' in the notes"
+        )
+
+
+@dataclass(frozen=True)
+class CoarseStamps(
+    FindingData, code="coarse_stamps", affects=_TIMED, doubt="the sampling rate is ambiguous"
+):
+    """Stamps with double or zero steps at regular distances."""
+
+    rate: float
+    other_rate: float
+    """Rate if the stamps are not rounded, Hz."""
+
+    def text(self, channel: str) -> str:
+        """Return the finding in sentences."""
+        what, cause = "repeat", "records are written twice"
+        if self.other_rate > self.rate:
+            what, cause = "have double steps", "samples are lost"
+        return (
+            f"The time stamps {what} at regular distances: taken as rounded, at "
+            f"{_rate_text(self.rate)}. If {cause} so regularly instead, the rate is "
+            f"{_rate_text(self.other_rate)}, and N is {_change_of_n(self.other_rate, self.rate)}. "
+            "State 'rate' in the sensor file"
+        )
+
+
+@dataclass(frozen=True)
+class MissingSamples(FindingData, code="missing_samples", affects=ALL, doubt="samples are missing"):
+    """Points of the grid without a sample."""
+
+    missing: int
+    expected: int
+    gaps: int
+    longest: float
+    """Duration of the longest gap, s."""
+    start: float
+    """Its start, s."""
+    rate_of_bursts: float | None = None
+    """Rate if no sample is missing, Hz; where most samples are missing."""
+    noise_ratio: float | None = None
+    """N at that rate over N."""
+
+    def text(self, channel: str) -> str:
+        """Return the finding in sentences."""
+        longest = f"{number_text(self.longest, 3)} s, from {_at(self.start)} on"
+        gaps = (
+            f"1 gap of {longest}" if self.gaps == 1 else f"{self.gaps} gaps, the longest {longest}"
+        )
+        text = (
+            f"{self.missing} of {counted(self.expected, 'sample')} "
+            f"{'is' if self.missing == 1 else 'are'} missing ({gaps}). The Allan variance uses "
+            "the others"
+        )
+        if self.rate_of_bursts is not None:
+            text += (
+                ". If the samples came in bursts and none is missing, the rate is "
+                f"{number_text(self.rate_of_bursts, 4)} Hz, and N is "
+                f"{number_text(self.noise_ratio, 2)} times as large. State 'rate' in the sensor "
+                "file"
+            )
+        return text
+
+
+@dataclass(frozen=True)
+class Segments(
+    FindingData, code="segments", affects=SLOW | {"bias"}, doubt="the recording was interrupted"
+):
+    """Pauses of the recording, or jumps of its clock."""
+
+    has_grid: bool
+    """The stamps lie on a uniform grid."""
+    pauses: int
+    longest: float
+    """Largest step of the stamps, s; below 0: backwards."""
+    at: float
+    """Duration of the samples before it, s."""
+
+    def text(self, channel: str) -> str:
+        """Return the finding in sentences."""
+        what = "The clock jumps or stops" if self.has_grid else "The stamps stop or run backwards"
+        direction = "backwards" if self.longest < 0.0 else "forward"
+        step = f"{number_text(abs(self.longest), 5)} s {direction}, after {_at(self.at)} of samples"
+        often = "once, by" if self.pauses == 1 else f"{self.pauses} times, by up to"
+        return f"{what} {often} {step}. The recording is analysed as {self.pauses + 1} segments"
+
+
+@dataclass(frozen=True)
+class RepeatedStamps(FindingData, code="repeated_stamps", affects=NONE):
+    """Records with the stamp of an earlier one, which are left out."""
+
+    records: int
+
+    def text(self, channel: str) -> str:
+        """Return the finding in sentences."""
+        one = self.records == 1
+        records = "record repeats a stamp or goes" if one else "records repeat a stamp or go"
+        return (
+            f"{self.records} {records} back to an earlier one; left out. "
+            f"{'It was' if one else 'They were'} written twice, or the clock was set back"
+        )
+
+
+@dataclass(frozen=True)
+class MissingStamps(
+    FindingData, code="missing_stamps", affects=_TIMED, doubt="time stamps are missing"
+):
+    """Records without a stamp, which are taken as consecutive."""
+
+    records: int
+
+    def text(self, channel: str) -> str:
+        """Return the finding in a sentence."""
+        return (
+            f"{counted(self.records, 'record has', 'records have')} no time stamp, or one far from "
+            "its neighbours; taken as consecutive"
+        )
+
+
+@dataclass(frozen=True)
+class RateContradictsStamps(
+    FindingData,
+    code="rate_contradicts_stamps",
+    affects=_TIMED,
+    doubt="the stated rate contradicts the time stamps",
+):
+    """The stated rate is another one than that of the stamps, which is used."""
+
+    stated: float
+    rate: float
+
+    def text(self, channel: str) -> str:
+        """Return the finding in sentences."""
+        return (
+            f"The sensor file or the log states {_rate_text(self.stated)}, but the time stamps "
+            f"have {_rate_text(self.rate)}, which is used. Correct 'rate', or remove it"
+        )
+
+
+@dataclass(frozen=True)
+class RateDrifts(FindingData, code="rate_drifts", affects=_TIMED, doubt="the clock drifts"):
+    """The sampling interval differs between the halves of a log."""
+
+    drift: float
+    """Relative change of the interval."""
+
+    def text(self, channel: str) -> str:
+        """Return the finding in sentences."""
+        return (
+            f"The sampling interval is {number_text(1e6 * abs(self.drift), 3)} ppm "
+            f"{'longer' if self.drift > 0.0 else 'shorter'} in the second half of the recording: "
+            "the clock of the sensor or of the host drifts. One rate is used"
+        )
+
+
+@dataclass(frozen=True)
+class JitteredStamps(
+    FindingData, code="jittered_stamps", affects=_TIMED, doubt="the time stamps are irregular"
+):
+    """Stamps on no uniform grid, so that lost samples are not seen."""
+
+    share: float
+    """Share of the stamps off the grid."""
+    pauses: int
+    longest: float
+    """Longest interval, s."""
+    at: float
+    """Its position, s."""
+    rate: float
+
+    def text(self, channel: str) -> str:
+        """Return the finding in sentences."""
+        return (
+            f"The time stamps lie on no uniform grid: {percent_text(self.share, 2)} are off it, "
+            f"with {counted(self.pauses, 'pause')}, and intervals up to "
+            f"{number_text(1e3 * self.longest, 3)} ms (at {_at(self.at)}). The samples are taken "
+            f"as consecutive at the mean rate, {_rate_text(self.rate)}. Lost samples cannot be "
+            "detected"
+        )
+
+
+@dataclass(frozen=True)
+class IrregularStamps(
+    FindingData,
+    code="irregular_stamps",
+    affects=_TIMED,
+    doubt="some time stamps have more or fewer samples than others",
+):
+    """Stamps that more or fewer samples share than others."""
+
+    stamps: int
+    rate: float
+
+    def text(self, channel: str) -> str:
+        """Return the finding in sentences."""
+        return (
+            f"{counted(self.stamps, 'stamp has', 'stamps have')} more or fewer samples than the "
+            "others: the clock was set, or samples are lost. The rate, "
+            f"{_rate_text(self.rate)}, is that of the others"
+        )
+
+
+@dataclass(frozen=True)
+class OwnRate(FindingData, code="own_rate", affects=NONE):
+    """Channels with fewer numbers than the log has records."""
+
+    channels: tuple[str, ...]
+    rows: int
+    records: int
+    rate: float
+
+    def text(self, channel: str) -> str:
+        """Return the finding in sentences."""
+        one = len(self.channels) == 1
+        return (
+            f"{join_names([channel_name(name) for name in self.channels])} "
+            f"{'has' if one else 'have'} numbers in {self.rows} of {self.records} records, and a "
+            f"clock of {'its' if one else 'their'} own. {'It is' if one else 'They are'} analysed "
+            f"at {_rate_text(self.rate)}"
+        )
