@@ -1,6 +1,20 @@
 """Findings about recordings: their data, affected parameters and sentences."""
 
-from imubench_pipeline.words.findings import estimation
+from imubench_pipeline.words.findings import (
+    backtest,
+    changes,
+    estimation,
+    plausibility,
+    spectrum,
+)
 from imubench_pipeline.words.findings.base import FINDINGS, FindingData
 
-__all__ = ["FINDINGS", "FindingData", "estimation"]
+__all__ = [
+    "FINDINGS",
+    "FindingData",
+    "backtest",
+    "changes",
+    "estimation",
+    "plausibility",
+    "spectrum",
+]
