@@ -25,6 +25,7 @@ from imubench_pipeline.recordings.fitness import (
 )
 from imubench_pipeline.settings.requirements import Requirement
 from imubench_pipeline.tables import build
+from imubench_pipeline.words.findings import FINDINGS
 from tests.ranking import ranking_rows
 from tests.rows import typed
 from tests.test_selection import errors_of
@@ -72,7 +73,9 @@ def test_a_log_of_which_nothing_is_found_is_fit() -> None:
     assert (row.fitness, row.decides, row.doubts) == ("fit", True, "")
 
 
-@pytest.mark.parametrize("name", sorted(UNFIT))
+@pytest.mark.parametrize(
+    "name", sorted(UNFIT | {code for code, kind in FINDINGS.items() if kind.unfit})
+)
 def test_what_need_not_be_a_sensor_at_rest_in_its_unit_does_not_decide(name: str) -> None:
     severity = "fatal" if name == "stuck" else "warning"
     found = list(doubts([finding("noise_grows"), finding(name, severity)], [], []))

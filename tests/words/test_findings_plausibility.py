@@ -2,8 +2,10 @@ import math
 
 import pytest
 
+from imubench_pipeline.recordings.fitness import doubts, fitness
+from imubench_pipeline.tables.findings import find
 from imubench_pipeline.words.findings import plausibility
-from imubench_pipeline.words.findings.base import FindingData
+from imubench_pipeline.words.findings.base import ALL, FindingData
 from imubench_pipeline.words.findings.plausibility import (
     AxisUnlike,
     GravityNorm,
@@ -105,3 +107,42 @@ def test_a_finding_on_the_whole_recording_names_the_channel_that_shows_it() -> N
 def test_a_printed_figure_is_one_of_the_quantity() -> None:
     text = check_sentences(UnusualFigure("accel", "B", 1.0, 1e-3, 9, None), "")
     assert text.startswith("B of accelerometer is 102000 µg, 1000 times the median of 9 sensors")
+
+
+@pytest.mark.parametrize(
+    ("data", "factor", "expected"),
+    [
+        (
+            RateImplausible(1e-4, 1.05, 1e4, 1e-6, statable=False),
+            1e-6,
+            {"N": 1e-3, "Q": 1e-6, "T_B": 1e-6, "tau_min": 1e-6, "K": 1e3, "R": 1e6},
+        ),
+        (
+            SuspiciousUnit("g", "m/s^2", 0.102, gravity=96.17),
+            0.102,
+            dict.fromkeys(("N", "Q", "B", "B_curve", "sigma_min", "K", "R", "bias"), 0.102),
+        ),
+        (
+            Turning(-31.0 * DEG, largest=30.0 * DEG),
+            -31.0 * DEG,
+            dict.fromkeys(sorted(ALL)),
+        ),
+    ],
+)
+def test_a_recording_that_may_not_be_at_rest_in_its_unit_is_not_used(
+    data: FindingData, factor: float, expected: dict[str, float | None]
+) -> None:
+    row = find(data, "warning", factor, "gyro_x").row("s", "r")
+    found = list(doubts([row], [], []))
+    assert fitness(found) == "unfit"
+    by_name = {name: doubt.factor for doubt in found for name in doubt.parameters}
+    assert by_name == {
+        name: value if value is None else pytest.approx(value) for name, value in expected.items()
+    }
+
+
+def test_other_implausible_data_leave_a_recording_in_use() -> None:
+    data = AxisUnlike(("gyro_x", "gyro_y"), 6.0, 0.3 * DEG, "deg/s", None)
+    (doubt,) = doubts([find(data, "warning", 6.0, "gyro_z").row("s", "r")], [], [])
+    assert fitness([doubt]) == "fit with doubts"
+    assert set(doubt.parameters) == ALL

@@ -20,12 +20,13 @@ from imubench_pipeline.model.states import Fitness
 from imubench_pipeline.model.table import ChannelRow, OfRecordingRow, TableRow
 from imubench_pipeline.model.verdicts import DoubtMark
 from imubench_pipeline.tables.findings import LEFT_OUT
+from imubench_pipeline.words.findings import FINDINGS
 
 Key = tuple[str, str]  # sensor, recording
 
 UNFIT = frozenset(
     {
-        *("motion", "turning", "suspicious_unit", "unit_contradicts", "rate_implausible", "stuck"),
+        *("motion", "unit_contradicts", "stuck"),
         *("channel_twice", "log_twice", "recording_twice", "joined", "interleaved"),
     }
 )
@@ -34,12 +35,9 @@ UNFIT = frozenset(
 _SLOW = frozenset({"B", "B_curve", "sigma_min", "tau_min", "T_B", "K", "R"})
 _WHITE = frozenset({"N", "Q"})
 _OF_UNIT = dict.fromkeys(("N", "Q", "B", "B_curve", "sigma_min", "K", "R", "bias"), 1.0)
-_OF_TIME = {"N": 0.5, "Q": 1.0, "T_B": 1.0, "tau_min": 1.0, "K": -0.5, "R": -1.0}
 
 SCALES: Mapping[str, Mapping[str, float]] = {
-    "suspicious_unit": _OF_UNIT,
     "unit_contradicts": _OF_UNIT,
-    "rate_implausible": _OF_TIME,
 }
 """Findings whose value is a factor that mends samples, or times, and the power of it that mends
 each parameter: N² = σ²(τ) τ, so that N goes with the root of time."""
@@ -58,18 +56,7 @@ AFFECTED_PARAMETERS: Mapping[str, frozenset[str]] = {
     "rate_changes": _WHITE,
     "held_samples": _WHITE,
     "step": _SLOW | {"bias"},
-    "bias_step": _SLOW | {"bias"},
     "warm_up": _SLOW | {"bias"},
-    "warm_up_drift": _SLOW | {"bias"},
-    "periodic_drift": _SLOW,
-    "telegraph_noise": _SLOW | {"bias"},
-    "K_differs": frozenset({"K", "R"}),
-    "slow_noise_differs": _SLOW,
-    "slow_noise_missing": _SLOW,
-    "noise_grows": _WHITE,
-    "noise_varies": _WHITE,
-    "backtest_contradicts": _SLOW,
-    "strong_line": frozenset({"S"}),
     **{name: frozenset(powers) for name, powers in SCALES.items()},
 }
 """Parameters that a finding affects; a warning that is not listed affects all."""
@@ -125,14 +112,17 @@ def doubts(
     every: list[Doubt] = []
     for finding in findings:
         code = finding.finding
-        affected = finding.affects if finding.data else AFFECTED_PARAMETERS.get(code, ())
-        harmless = finding.severity != "warning" or (finding.data and not affected)
-        if code in LEFT_OUT or (harmless and code not in UNFIT):
+        kind = FINDINGS.get(code)
+        known = kind.affects if kind else AFFECTED_PARAMETERS.get(code, ())
+        affected = finding.affects if finding.data else known
+        unfit = code in UNFIT or (kind is not None and kind.unfit)
+        harmless = finding.severity != "warning" or ((finding.data or kind) and not affected)
+        if code in LEFT_OUT or (harmless and not unfit):
             continue
         # One doubt for each factor by which parameters may change.
         by_factor: dict[float | None, list[str]] = {}
         if finding.value is not None:
-            for name, power in SCALES.get(code, {}).items():
+            for name, power in (kind.scales if kind else SCALES.get(code, {})).items():
                 by_factor.setdefault(finding.value**power, []).append(name)
         every += [
             Doubt(
@@ -140,7 +130,7 @@ def doubts(
                 code,
                 finding.detail,
                 parameters=tuple(sorted(names)),
-                unfit=code in UNFIT,
+                unfit=unfit,
                 factor=factor,
                 start=finding.start,
                 end=finding.end,

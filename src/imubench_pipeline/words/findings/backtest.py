@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from imubench_pipeline.words.findings.base import SLOW, FindingData
-from imubench_pipeline.words.findings.shown import channel_text
+from imubench_pipeline.words.findings.base import SLOW, FindingData, channel_name
 from imubench_pipeline.words.numbers import counted, join_names, number_text
 
 
@@ -45,7 +44,7 @@ class BacktestContradicts(
             else "its slow noise misses an effect, such as drift with temperature"
         )
         return (
-            f"{channel_text(channel)} drifts {number_text(self.ratio, 3)} times as much as "
+            f"{channel_name(channel)} drifts {number_text(self.ratio, 3)} times as much as "
             f"predicted: {self.error} after {number_text(self.time)} s{rest}. "
             f"Expected are {number_text(self.ratio_lower, 3)} to "
             f"{number_text(self.ratio_upper, 3)} times. "

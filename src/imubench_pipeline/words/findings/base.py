@@ -76,3 +76,8 @@ class FindingData:
     def text(self, channel: str) -> str:
         """Return the finding in sentences, with what to do; ``channel`` may be empty."""
         raise NotImplementedError
+
+
+def channel_name(channel: str) -> str:
+    """Return a channel as it stands in a sentence: ``gyro x``."""
+    return channel.replace("_", " ")

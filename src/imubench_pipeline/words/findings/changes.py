@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from imubench_pipeline.words.findings.base import NONE, SLOW, WHITE, FindingData
-from imubench_pipeline.words.findings.shown import channel_text, estimate_text, unit_of
+from imubench_pipeline.words.findings.base import NONE, SLOW, WHITE, FindingData, channel_name
+from imubench_pipeline.words.findings.shown import estimate_text, unit_of
 from imubench_pipeline.words.numbers import Unit, number_text, percent_text
 
 _SECONDS = Unit("s", 1.0)
@@ -33,7 +33,7 @@ class BiasStep(
         """Return the finding in sentences."""
         size = estimate_text(self.size, self.size_lower, self.size_upper, unit_of(channel, "level"))
         return (
-            f"The bias of {channel_text(channel)} steps by {size} at {number_text(self.time, 6)} s "
+            f"The bias of {channel_name(channel)} steps by {size} at {number_text(self.time, 6)} s "
             f"(± {number_text(self.time_error, 2)} s). The step is removed from the noise. "
             "Look for a motion, a new range or a sudden change of temperature"
         )
@@ -62,7 +62,7 @@ class WarmUpDrift(
         size = estimate_text(self.size, self.size_lower, self.size_upper, unit_of(channel, "level"))
         time = estimate_text(self.time, self.time_lower, self.time_upper, _SECONDS)
         return (
-            f"The bias of {channel_text(channel)} starts {size} from its final value. It settles "
+            f"The bias of {channel_name(channel)} starts {size} from its final value. It settles "
             f"with a time constant of {time}. The drift is removed from the noise. "
             "Let the sensor warm up before recording"
         )
@@ -91,7 +91,7 @@ class PeriodicDrift(
         size = estimate_text(self.size, self.size_lower, self.size_upper, unit_of(channel, "level"))
         time = estimate_text(self.time, self.time_lower, self.time_upper, _SECONDS)
         return (
-            f"The bias of {channel_text(channel)} oscillates with an amplitude of {size}. "
+            f"The bias of {channel_name(channel)} oscillates with an amplitude of {size}. "
             f"Its period is {time}. The oscillation is removed from the noise. "
             "Record at a steady temperature, or with readings of it"
         )
@@ -112,7 +112,7 @@ class TelegraphNoise(
     def text(self, channel: str) -> str:
         """Return the finding in sentences."""
         return (
-            f"The bias of {channel_text(channel)} steps at least {self.steps} times, as telegraph "
+            f"The bias of {channel_name(channel)} steps at least {self.steps} times, as telegraph "
             "noise does. The steps remain in the noise, so B, T_B and K are doubtful. "
             "Look for a loose contact or popcorn noise of the sensor"
         )
@@ -130,7 +130,7 @@ class HeavyTails(FindingData, code="heavy_tails", affects=NONE):
     def text(self, channel: str) -> str:
         """Return the finding in sentences."""
         return (
-            f"The white noise of {channel_text(channel)} has heavier tails than a normal "
+            f"The white noise of {channel_name(channel)} has heavier tails than a normal "
             f"distribution: its excess kurtosis is {number_text(self.kurtosis, 3)}. The interval "
             f"of N is {number_text(self.widening, 3)} times as wide for it. "
             "Look for bursts and small outliers"
@@ -155,7 +155,7 @@ class NoiseTrend(
         """Return the finding in sentences."""
         verb = "grows" if self.trend > 0.0 else "falls"
         return (
-            f"The white noise of {channel_text(channel)} {verb} by "
+            f"The white noise of {channel_name(channel)} {verb} by "
             f"{percent_text(abs(self.trend))} (± {percent_text(self.error, 2)}) over the log. "
             "N is its mean over the log. Look for a change of temperature or supply voltage"
         )
@@ -176,7 +176,7 @@ class NoiseVaries(
     def text(self, channel: str) -> str:
         """Return the finding in sentences."""
         return (
-            f"The white noise of {channel_text(channel)} varies by {percent_text(self.spread)} "
+            f"The white noise of {channel_name(channel)} varies by {percent_text(self.spread)} "
             "(one standard deviation) between sixteenths of the log, more than by chance. "
             "N is its mean over the log. Look for vibration or interference"
         )
@@ -199,7 +199,7 @@ class RandomWalkChanges(
 
     def text(self, channel: str) -> str:
         """Return the finding in sentences."""
-        return _halves_text(f"K of {channel_text(channel)}", self.middle, self.first, self.second)
+        return _halves_text(f"K of {channel_name(channel)}", self.middle, self.first, self.second)
 
 
 @dataclass(frozen=True)
@@ -219,7 +219,7 @@ class SlowNoiseChanges(
 
     def text(self, channel: str) -> str:
         """Return the finding in sentences."""
-        noise = f"The slow noise of {channel_text(channel)}"
+        noise = f"The slow noise of {channel_name(channel)}"
         return _halves_text(noise, self.middle, self.first, self.second)
 
 

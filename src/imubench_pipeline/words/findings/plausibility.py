@@ -13,8 +13,9 @@ from imubench_pipeline.words.findings.base import (
     POWERS_OF_TIME,
     POWERS_OF_UNIT,
     FindingData,
+    channel_name,
 )
-from imubench_pipeline.words.findings.shown import channel_text, unit_of, value_text
+from imubench_pipeline.words.findings.shown import unit_of, value_text
 from imubench_pipeline.words.numbers import join_names, number_text
 
 _OF_UNIT = frozenset(POWERS_OF_UNIT)
@@ -84,7 +85,7 @@ class SuspiciousUnit(
 
     def text(self, channel: str) -> str:
         """Return the finding in sentences."""
-        name = channel_text(channel)
+        name = channel_name(channel)
         if self.gravity is not None:
             seen = f"the mean acceleration is {number_text(self.gravity)} m/s²"
             usual = f"expected {number_text(STANDARD_GRAVITY)}"
@@ -150,7 +151,7 @@ class NoiseUnlikeDatasheet(
 
     def text(self, channel: str) -> str:
         """Return the finding in sentences."""
-        name, unit = channel_text(self.measured_on), unit_of(self.measured_on, "density")
+        name, unit = channel_name(self.measured_on), unit_of(self.measured_on, "density")
         rate = f"the stated rate of {number_text(self.stated_rate)} Hz, " * bool(self.stated_rate)
         return (
             f"The noise of {name} is {unit.text(self.noise, 3)} {unit.sign}, "
@@ -182,8 +183,8 @@ class AxisUnlike(
         """Return the finding in sentences."""
         unit = f"{self.likely} instead of {self.stated} would explain it. " if self.likely else ""
         return (
-            f"The noise of {channel_text(channel)} is {number_text(self.ratio, 3)} times that of "
-            f"{join_names([channel_text(other) for other in self.others])}: "
+            f"The noise of {channel_name(channel)} is {number_text(self.ratio, 3)} times that of "
+            f"{join_names([channel_name(other) for other in self.others])}: "
             f"{value_text(self.noise, channel, 'density')}. Axes of one sensor rarely differ so "
             f"much. {unit}Check unit, scale and column of this axis"
         )
@@ -212,7 +213,7 @@ class Turning(FindingData, code="turning", affects=ALL, unfit=True, doubt="{chan
                 self.offset_of, f"of price class {self.offset_of}"
             )
             return (
-                f"The mean rate of {channel_text(channel)} is {rate} °/s, above the largest offset "
+                f"The mean rate of {channel_name(channel)} is {rate} °/s, above the largest offset "
                 f"{limit} ({number_text(math.degrees(self.largest), 3)} °/s). "
                 "The sensor is turning, or the unit is wrong. "
                 "Record with the sensor at rest, or correct the unit"
@@ -288,7 +289,7 @@ class UnusualFigure(
             (words for factor, words in UNIT_MISTAKES[self.quantity] if factor == self.factor), None
         )
         return (
-            f"{symbol} of {channel_text(channel) if channel else SENSORS[self.quantity]} is "
+            f"{symbol} of {channel_name(channel) if channel else SENSORS[self.quantity]} is "
             f"{unit.text(self.value, digits)} {unit.sign}, {how} of {self.sensors} sensors "
             f"({unit.text(self.usual, 3)} {unit.sign}). "
             + (

@@ -1,4 +1,4 @@
-"""Channels and values in the sentences of findings, in the units that readers expect."""
+"""Values in the sentences of findings, in the units that readers expect."""
 
 from __future__ import annotations
 
@@ -20,11 +20,6 @@ _UNITS: Mapping[tuple[str, Kind], tuple[str, str]] = {
     ("accel", "level"): ("µg", "acceleration"),
     ("accel", "density"): ("µg/√Hz", "accel_density"),
 }
-
-
-def channel_text(channel: str) -> str:
-    """Return the name of a channel in a sentence: ``gyro z``."""
-    return channel.replace("_", " ") or "the sensor"
 
 
 @cache

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from imubench_pipeline.words.findings.base import NONE, SLOW, FindingData
-from imubench_pipeline.words.findings.shown import channel_text, value_text
+from imubench_pipeline.words.findings.base import NONE, SLOW, FindingData, channel_name
+from imubench_pipeline.words.findings.shown import value_text
 from imubench_pipeline.words.numbers import counted, number_text, percent_text
 
 
@@ -19,7 +19,7 @@ class MethodsDiffer(FindingData, code="N_differs", affects=NONE):
     def text(self, channel: str) -> str:
         """Return the finding in sentences."""
         return (
-            f"N of {channel_text(channel)} from the fit of the Allan variance is "
+            f"N of {channel_name(channel)} from the fit of the Allan variance is "
             f"{number_text(self.ratio, 3)} times N of the likelihood, outside both intervals. "
             "A low-pass filter, spectral lines or quantization noise bend the curve at short τ. "
             "The likelihood models them: use its N"
@@ -49,7 +49,7 @@ class Lines(FindingData, code="lines", affects=NONE):
         where = f"at {number_text(self.frequency, 5)} Hz"
         strength = f"{number_text(self.ratio, 3)} times the noise floor"
         return (
-            f"{channel_text(channel)} has {' and '.join(kinds)}"
+            f"{channel_name(channel)} has {' and '.join(kinds)}"
             + (f" {where}, {strength}. It is" if one else f". The strongest is {where}, {strength}")
             + (" " if one else ". They are ")
             + "excluded from the noise fit. If the vibration is strong, record without it"
@@ -73,7 +73,7 @@ class StrongLine(
     def text(self, channel: str) -> str:
         """Return the finding in sentences."""
         return (
-            f"A sinusoid of {channel_text(channel)} at {number_text(self.frequency, 5)} Hz adds "
+            f"A sinusoid of {channel_name(channel)} at {number_text(self.frequency, 5)} Hz adds "
             f"{number_text(self.ratio, 3)} times the white-noise error over 1 s. "
             "The error budgets include it. "
             "If the ground vibrates, and not the sensor, record elsewhere, or on softer ground"
@@ -102,7 +102,7 @@ class TooManyLines(
     def text(self, channel: str) -> str:
         """Return the finding in sentences."""
         return (
-            f"{channel_text(channel)} has {self.lines} sinusoids, too many for a noise model. "
+            f"{channel_name(channel)} has {self.lines} sinusoids, too many for a noise model. "
             f"Error budgets, simulations and filters use the {self.single} strongest individually. "
             f"The other {self.lines - self.single} are merged into {self.groups} of the same "
             f"power, {percent_text(self.share)} of the power of all lines "
@@ -122,7 +122,7 @@ class BandLimit(FindingData, code="band_limit", affects=NONE):
 
     def text(self, channel: str) -> str:
         """Return the finding in sentences."""
-        name, limit = channel_text(channel), f"{number_text(self.highest)} Hz"
+        name, limit = channel_name(channel), f"{number_text(self.highest)} Hz"
         if not self.follows_model:
             return (
                 f"No noise model fits the spectrum of {name} up to any frequency. The fit is "
@@ -153,7 +153,7 @@ class SlowNoiseMissing(
     def text(self, channel: str) -> str:
         """Return the finding in sentences."""
         return (
-            f"Up to {number_text(self.highest, 3)} Hz the spectrum of {channel_text(channel)} has "
+            f"Up to {number_text(self.highest, 3)} Hz the spectrum of {channel_name(channel)} has "
             f"{number_text(self.ratio, 2)} times the density of its white noise. "
             "Slow noise only adds to it, so it was removed before the log was written. "
             "K, B and the errors of dead reckoning are too small. "
