@@ -22,14 +22,25 @@ SIZE = (30.0 * HOUR, 28.0 * HOUR, 32.0 * HOUR)
 TIME = (600.0, 520.0, 690.0)
 
 TEXTS: list[tuple[FindingData, list[str]]] = [
-    (BiasStep(*SIZE, 400.0, 2.0), ["steps by 30 °/h (28 to 32 °/h) at 400 s (± 2 s)", "removed"]),
+    (
+        BiasStep(*SIZE, 400.0, 2.0),
+        ["steps by 30 °/h (95 %: 28 to 32 °/h) at 400 s (± 2 s)", "removed"],
+    ),
     (
         WarmUpDrift(*SIZE, *TIME),
-        ["starts 30 °/h (28 to 32 °/h)", "time constant of 600 s (520 to 690 s)", "removed"],
+        [
+            "starts 30 °/h (95 %: 28 to 32 °/h)",
+            "time constant of 600 s (95 %: 520 to 690 s)",
+            "removed",
+        ],
     ),
     (
         PeriodicDrift(*SIZE, *TIME),
-        ["amplitude of 30 °/h (28 to 32 °/h)", "period is 600 s (520 to 690 s)", "removed"],
+        [
+            "amplitude of 30 °/h (95 %: 28 to 32 °/h)",
+            "period is 600 s (95 %: 520 to 690 s)",
+            "removed",
+        ],
     ),
     (TelegraphNoise(12), ["at least 12 times", "B, T_B and K are doubtful"]),
     (HeavyTails(0.81, 1.19), ["excess kurtosis is 0.81", "1.19 times as wide"]),
@@ -52,6 +63,6 @@ def test_every_finding_on_a_change_has_a_text() -> None:
 
 
 def test_a_step_of_an_accelerometer_is_in_micro_g() -> None:
-    assert "steps by 102 µg (91.8 to 112 µg)" in BiasStep(1e-3, 9e-4, 1.1e-3, 4.0, 1.0).text(
+    assert "steps by 102 µg (95 %: 91.8 to 112 µg)" in BiasStep(1e-3, 9e-4, 1.1e-3, 4.0, 1.0).text(
         "accel_x"
     )

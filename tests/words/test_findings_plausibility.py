@@ -35,11 +35,11 @@ TEXTS: list[tuple[FindingData, list[str]]] = [
         ["is 1×10⁻⁷ Hz", "1×10⁹ times as short, the rate is 100 Hz"],
     ),
     (
-        SuspiciousUnit("rad/s", "deg/s", DEG, noise=0.24, usual=USUAL),
-        ["noise is 13.8 °/s/√Hz; expected 0.0005 to 0.06 for any gyro", "it is 0.24 °/s/√Hz"],
+        SuspiciousUnit("rad/s", "deg/s", DEG, noise=0.0042, usual=USUAL),
+        ["noise is 0.241 °/s/√Hz; expected 0.0005 to 0.06 for any gyro", "it is 0.0042 °/s/√Hz"],
     ),
     (
-        SuspiciousUnit("rad/s", "deg/s", DEG, noise=0.24, usual=USUAL, printed=True),
+        SuspiciousUnit("rad/s", "deg/s", DEG, noise=0.0042, usual=USUAL, printed=True),
         ["expected 0.0005 to 0.06 by its data sheet", "in deg/s, and not rad/s"],
     ),
     (
@@ -64,7 +64,10 @@ TEXTS: list[tuple[FindingData, list[str]]] = [
     (Turning(-31.0 * DEG, largest=30.0 * DEG), ["is −31 °/s, above", "of any gyro (30 °/s)"]),
     (
         Turning(-6.4 * DEG, largest=4.5 * DEG, offset_of="data sheet"),
-        ["is −6.4 °/s, above the largest offset by the data sheet (4.5 °/s)", "unit is wrong"],
+        [
+            "is −6.4 °/s, above the largest plausible offset by its data sheet (4.5 °/s)",
+            "unit is wrong",
+        ],
     ),
     (
         Turning(6.4 * DEG, largest=2.0 * DEG, offset_of="tactical"),

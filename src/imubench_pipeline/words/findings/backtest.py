@@ -46,7 +46,7 @@ class BacktestContradicts(
         return (
             f"{channel_name(channel)} drifts {number_text(self.ratio, 3)} times as much as "
             f"predicted: {self.error} after {number_text(self.time)} s{rest}. "
-            f"Expected are {number_text(self.ratio_lower, 3)} to "
+            f"In 95 % of logs a correct model gives {number_text(self.ratio_lower, 3)} to "
             f"{number_text(self.ratio_upper, 3)} times. "
             f"The log has {counted(self.windows or 0, 'window')}, equivalent to "
             f"{number_text(self.independent, 3)} independent ones. "

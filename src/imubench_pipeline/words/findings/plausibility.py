@@ -181,7 +181,11 @@ class AxisUnlike(
 
     def text(self, channel: str) -> str:
         """Return the finding in sentences."""
-        unit = f"{self.likely} instead of {self.stated} would explain it. " if self.likely else ""
+        unit = (
+            f"A unit of {self.likely} instead of {self.stated} would explain it. "
+            if self.likely
+            else ""
+        )
         return (
             f"The noise of {channel_name(channel)} is {number_text(self.ratio, 3)} times that of "
             f"{join_names([channel_name(other) for other in self.others])}: "
@@ -209,12 +213,12 @@ class Turning(FindingData, code="turning", affects=ALL, unfit=True, doubt="{chan
         """Return the finding in sentences."""
         rate = number_text(math.degrees(self.rate), 3)
         if self.largest is not None:
-            limit = {None: "of any gyro", "data sheet": "by the data sheet"}.get(
+            limit = {None: "of any gyro", "data sheet": "by its data sheet"}.get(
                 self.offset_of, f"of price class {self.offset_of}"
             )
             return (
-                f"The mean rate of {channel_name(channel)} is {rate} °/s, above the largest offset "
-                f"{limit} ({number_text(math.degrees(self.largest), 3)} °/s). "
+                f"The mean rate of {channel_name(channel)} is {rate} °/s, above the largest "
+                f"plausible offset {limit} ({number_text(math.degrees(self.largest), 3)} °/s). "
                 "The sensor is turning, or the unit is wrong. "
                 "Record with the sensor at rest, or correct the unit"
             )

@@ -36,7 +36,7 @@ def value_text(value: float, channel: str, kind: Kind, digits: int = 3) -> str:
 
 
 def estimate_text(value: float, lower: float, upper: float, unit: Unit) -> str:
-    """Return an estimate with its 95 % interval: ``30 °/h (28 to 32 °/h)``."""
+    """Return an estimate with its 95 % interval: ``30 °/h (95 %: 28 to 32 °/h)``."""
     digits = unit.digits(value, lower, upper)
     limits = interval_text(lower, upper, unit, digits)
-    return f"{unit.text(value, digits)} {unit.sign} ({limits} {unit.sign})"
+    return f"{unit.text(value, digits)} {unit.sign} (95 %: {limits} {unit.sign})"
