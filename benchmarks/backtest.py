@@ -37,7 +37,6 @@ import simulators
 from imubench_pipeline.allan import cluster_sizes, of_blocks
 from imubench_pipeline.estimators.rows import recommended_estimates
 from imubench_pipeline.model.estimates import BacktestRow
-from imubench_pipeline.navigation.backtest.comparison import words
 from imubench_pipeline.navigation.backtest.of_recording import backtest_rows
 from imubench_pipeline.recordings.recording import LogWriter, channel_logs
 from imubench_pipeline.settings.config import ErrorBudgetSettings, EstimateSettings
@@ -234,11 +233,22 @@ def show_disturbed(number: int, disturbance: str, folder: Path) -> None:
     )
 
 
+def _describe(row: BacktestRow) -> str:
+    """Return the measured over the predicted error of a row, or why there is none."""
+    if row.ratio is None:
+        return str(row.reason)
+    return (
+        f"{row.ratio:.2f} times the prediction at {row.time:g} s "
+        f"(expected {row.ratio_lower:.2f} to {row.ratio_upper:.2f}), {row.windows} windows, "
+        f"equivalent to {row.independent:.3g} independent ones"
+    )
+
+
 def lines(results: Path) -> Iterator[str]:
     """Yield what the table ``backtest`` of a run says."""
     for row in BacktestRow.rows_of(read("backtest", [results / "tables/backtest.parquet"])):
         yield (
-            f"{row.sensor}/{row.recording} {row.channel} {row.error}: {words(row)}"
+            f"{row.sensor}/{row.recording} {row.channel} {row.error}: {_describe(row)}"
             + (f": {row.verdict}" if row.verdict else "")
             + (", contradicted" if row.contradicted else "")
         )

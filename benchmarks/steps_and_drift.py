@@ -268,7 +268,7 @@ def false(logs: int, first: int) -> None:
                 log = noise.log(_stream(name, hours, i), rate, hours)
                 start = time.perf_counter()
                 courses = searched(log, rate)
-                verdict = assess_signals("gyro_x", "rad/s", courses)
+                verdict = assess_signals("gyro_x", courses)
                 spent += time.perf_counter() - start
                 counts["logs"] += 1
                 counts["with a course"] += bool(courses.signals) or courses.telegraph
@@ -288,7 +288,7 @@ def drift(logs: int, first: int) -> None:
         counts: Counter[str] = Counter()
         for i in range(first, first + logs):
             log, _ = _changed(name, change, i)
-            verdict = assess_signals("gyro_x", "rad/s", searched(log, RATE))
+            verdict = assess_signals("gyro_x", searched(log, RATE))
             counts["logs"] += 1
             names = {finding.finding for finding in verdict.findings}
             counts["named"] += expected in names

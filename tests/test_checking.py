@@ -68,9 +68,9 @@ def test_lines_and_the_band_are_notes(
     drop(logs, "line", log)
     assert check(logs) == 0
     printed = capsys.readouterr().out
-    assert "note     lines: gyro_x has 1 sinusoids and 0 bands of noise" in printed
+    assert "note     lines: gyro x has 1 spectral line at " in printed
     assert "at 17 Hz" in printed or "at 16.99" in printed or "at 17.00" in printed
-    assert "note     band_limit: gyro_x: found: beyond" in printed
+    assert "note     band_limit: The spectrum of gyro x bends above " in printed
 
 
 def test_wrong_settings_are_told_apart(

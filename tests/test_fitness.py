@@ -13,7 +13,6 @@ from imubench_pipeline.model.recordings import FindingRow, RecordingRow
 from imubench_pipeline.model.verdicts import DoubtMark
 from imubench_pipeline.navigation.pooled import pooled_rows
 from imubench_pipeline.recordings.fitness import (
-    UNFIT,
     Doubt,
     doubts,
     fitness,
@@ -78,9 +77,7 @@ def test_a_log_of_which_nothing_is_found_is_fit() -> None:
     assert (row.fitness, row.decides, row.doubts) == ("fit", True, ())
 
 
-@pytest.mark.parametrize(
-    "name", sorted(UNFIT | {code for code, kind in FINDINGS.items() if kind.unfit})
-)
+@pytest.mark.parametrize("name", sorted(code for code, kind in FINDINGS.items() if kind.unfit))
 def test_what_need_not_be_a_sensor_at_rest_in_its_unit_does_not_decide(name: str) -> None:
     severity = "fatal" if name == "stuck" else "warning"
     found = list(doubts([finding("noise_grows"), finding(name, severity)], [], []))

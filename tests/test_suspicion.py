@@ -14,6 +14,7 @@ from imubench_pipeline.datasheets.suspicion import (
 from imubench_pipeline.model.estimates import ParameterRow
 from imubench_pipeline.settings.sensor import Sensor, read_sensors
 from imubench_pipeline.settings.validation import parse
+from imubench_pipeline.words.findings.plausibility import UnusualFigure
 from tests.conftest import PROJECT
 from tests.rows import typed
 from tests.test_configuration import SENSOR
@@ -22,15 +23,19 @@ CATALOGUE = read_sensors(PROJECT / "config/sensors")
 DEG = math.pi / 180
 
 
+def texts(found: list[UnusualFigure]) -> list[str]:
+    return [data.text("") for data in found]
+
+
 def test_the_c102_f9r_as_published_is_probably_in_degrees(shared: Path) -> None:
     papers = yaml.safe_load((shared / "facts/paper_tables.yaml").read_text())["papers"]
     published = papers[0]["table_2"]["rows"][1]
     figures = {"N": published["gyro_N"], "B": published["gyro_B"]}
-    noise, bias = suspicious("gyro", figures, usual_figures(CATALOGUE))
-    assert noise.startswith("gyro N = 0.327 °/s/√Hz is ") and "times the median" in noise
-    assert noise.endswith("is it in degrees, and not rad? It would be 0.0057 °/s/√Hz then")
-    assert bias.startswith("gyro B = 701 °/h is ")
-    assert bias.endswith("is it in degrees, and not rad? It would be 12.2 °/h then")
+    noise, bias = texts(suspicious("gyro", figures, usual_figures(CATALOGUE)))
+    assert noise.startswith("N of gyro is 0.327 °/s/√Hz, ") and "times the median" in noise
+    assert noise.endswith("in degrees, and not rad, the value is 0.0057 °/s/√Hz: check its unit")
+    assert bias.startswith("B of gyro is 701 °/h, ")
+    assert bias.endswith("in degrees, and not rad, the value is 12.2 °/h: check its unit")
     in_degrees = {figure: value * DEG for figure, value in figures.items()}
     assert suspicious("gyro", in_degrees, usual_figures(CATALOGUE)) == []
     accel = {"N": published["acc_N"], "B": published["acc_B"]}
@@ -52,20 +57,24 @@ USUAL = {
 @pytest.mark.parametrize(
     ("quantity", "N", "said"),
     [
-        ("gyro", 0.11 * DEG, "22 times the median of 9 sensors, 0.005 °/s/√Hz: is it in degrees"),
+        (
+            "gyro",
+            0.11 * DEG,
+            "22 times the median of 9 sensors (0.005 °/s/√Hz). If it is in deg",
+        ),
         ("gyro", 0.099 * DEG, None),
         ("gyro", 6e-5 * DEG, None),  # below a twentieth of the median, not of the least
-        ("gyro", 4e-5 * DEG, "25 times below the least of 9 sensors, 0.001 °/s/√Hz: is it in rad"),
-        ("gyro", 20.0 * DEG, "is it in thousandths of its unit? It would be 0.02 °/s/√Hz then"),
-        ("gyro", 100.0 * DEG, "is its unit right?"),
-        ("accel", 0.98, "is it in thousandths of its unit? It would be 99.9 µg/√Hz then"),
-        ("accel", 2.1e-2, "is it in m/s², and not g? It would be 218 µg/√Hz then"),
-        ("accel", 0.1, "is its unit right?"),
+        ("gyro", 4e-5 * DEG, "25 times below the least of 9 sensors (0.001 °/s/√Hz). If it is in"),
+        ("gyro", 20.0 * DEG, "If it is in thousandths of its unit, the value is 0.02 °/s/√Hz"),
+        ("gyro", 100.0 * DEG, "Check whether its unit is right"),
+        ("accel", 0.98, "If it is in thousandths of its unit, the value is 99.9 µg/√Hz"),
+        ("accel", 2.1e-2, "If it is in m/s², and not g, the value is 218 µg/√Hz"),
+        ("accel", 0.1, "Check whether its unit is right"),
         ("accel", 1.9e-2, None),
     ],
 )
 def test_twenty_times_off(quantity: str, N: float, said: str | None) -> None:
-    found = suspicious(quantity, {"N": N, "B": 1.0}, USUAL)
+    found = texts(suspicious(quantity, {"N": N, "B": 1.0}, USUAL))
     assert len(found) == (said is not None)
     assert (said or "") in "".join(found)
 
@@ -73,12 +82,12 @@ def test_twenty_times_off(quantity: str, N: float, said: str | None) -> None:
 def test_a_figure_is_held_against_its_own_datasheet() -> None:
     loud = {"N": 0.2 * DEG}
     assert suspicious("gyro", {"N": 0.3 * DEG}, USUAL, loud) == []
-    (said,) = suspicious("gyro", {"N": 0.3 * DEG}, USUAL, {"N": 0.002 * DEG})
-    assert said.endswith("is it in degrees, and not rad? It would be 0.00524 °/s/√Hz then")
-    (said,) = suspicious("gyro", {"N": 0.3 * DEG}, USUAL, {"N": 0.04 * DEG})
-    assert said.endswith("is its unit right?")
-    (said,) = suspicious("gyro", {"N": 57.3 * 0.2 * DEG}, USUAL, loud)
-    assert said.endswith("It would be 0.2 °/s/√Hz then")
+    (said,) = texts(suspicious("gyro", {"N": 0.3 * DEG}, USUAL, {"N": 0.002 * DEG}))
+    assert said.endswith("in degrees, and not rad, the value is 0.00524 °/s/√Hz: check its unit")
+    (said,) = texts(suspicious("gyro", {"N": 0.3 * DEG}, USUAL, {"N": 0.04 * DEG}))
+    assert said.endswith("Check whether its unit is right")
+    (said,) = texts(suspicious("gyro", {"N": 57.3 * 0.2 * DEG}, USUAL, loud))
+    assert said.endswith("the value is 0.2 °/s/√Hz: check its unit")
 
 
 def with_walk(value: float) -> Sensor:
@@ -109,4 +118,4 @@ def test_an_estimate_is_told_by_the_name_and_digits_that_its_table_prints() -> N
     found = unusual_rows(rows, sensors, usual_figures(sensors))
     (said,) = (finding.detail for finding in found)
     # The papers' B is another figure, and 1.5 times as large.
-    assert said.startswith("gyro σ_min = 400 °/h is 66.3 times the median of 5 sensors, 6 °/h")
+    assert said.startswith("σ_min of gyro x is 400 °/h, 66.3 times the median of 5 sensors (6 °/h)")

@@ -11,7 +11,7 @@ from imubench_pipeline.estimators.likelihood import fit
 from imubench_pipeline.model.estimates import BacktestRow, DeterministicRow
 from imubench_pipeline.model.recordings import RecordingRow
 from imubench_pipeline.model.verdicts import DoubtMark
-from imubench_pipeline.navigation.backtest.comparison import findings, words
+from imubench_pipeline.navigation.backtest.comparison import findings
 from imubench_pipeline.navigation.backtest.of_recording import backtest_rows
 from imubench_pipeline.navigation.expected_errors import error_rows, of_requirement
 from imubench_pipeline.recordings.fitness import doubts, judged
@@ -83,7 +83,6 @@ def test_a_log_of_white_noise_drifts_as_its_budget_says(
         assert 1.0 < row["independent"] < row["windows"]
     # Most of it is the mean over 30 s, of which there are 247 in what is left of 8,000 s.
     assert 150 < heading["independent"] < 1.5 * 247
-    assert f"{heading['ratio']:.2f} times the prediction at 600 s" in words(heading)
     assert not list(findings(rows.values()))
     assert list(rows.values()) == rows_of(logs, estimates)
 

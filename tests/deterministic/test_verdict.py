@@ -16,9 +16,7 @@ from tests.deterministic.logs import RATE, SIGMA, K, N, static_log, times
 
 
 def verdict(log: np.ndarray) -> Verdict:
-    return assess_signals(
-        "gyro_x", "rad/s", find_deterministic_signals(lambda: [log], len(log), RATE)
-    )
+    return assess_signals("gyro_x", find_deterministic_signals(lambda: [log], len(log), RATE))
 
 
 def names(of: Verdict) -> list[str]:
@@ -35,7 +33,7 @@ def test_a_step_is_a_finding_and_a_row() -> None:
     log = static_log(2)
     log += 5.0 * SIGMA * (times(log) >= 3000.0)
     signals = find_deterministic_signals(lambda: [log], len(log), RATE)
-    (finding,) = assess_signals("gyro_x", "rad/s", signals).findings
+    (finding,) = assess_signals("gyro_x", signals).findings
     assert finding.finding == "bias_step"
     assert finding.value == pytest.approx(5.0 * SIGMA, rel=0.3)
     key = {"sensor": "s", "recording": "r", "channel": "gyro_x"}

@@ -16,6 +16,7 @@ from imubench_pipeline.estimators.lines import (
 )
 from imubench_pipeline.estimators.spectral_findings import line_findings
 from imubench_pipeline.noise import NoiseModel
+from imubench_pipeline.words.numbers import number_text, percent_text
 
 
 def comb(number: int, kind: str = "sinusoid") -> list[Line]:
@@ -64,10 +65,10 @@ def test_a_comb_is_a_warning_that_says_how_many_and_how_much_power() -> None:
     assert warning.severity == "warning" and warning.value == 363
     powers = np.sort([0.5 * line.amplitude**2 for line in lines])
     rest = powers[:-MAX_SINGLE_LINES].sum()
-    assert "the other 351" in warning.detail
-    assert f"{100 * rest / powers.sum():.3g} % of that of all lines" in warning.detail
-    assert f"({np.sqrt(rest):.3g} rad/s rms)" in warning.detail
-    assert describe_grouping("gyro_x", "gyro", lines) == warning
+    assert "The other 351" in warning.detail
+    assert f"{percent_text(rest / powers.sum())} of the power of all lines" in warning.detail
+    assert f"({number_text(np.degrees(np.sqrt(rest)), 3)} °/s rms)" in warning.detail
+    assert describe_grouping("gyro_x", lines) == warning
 
 
 def test_a_line_that_integrates_to_as_much_as_the_noise_is_warned_of() -> None:

@@ -41,7 +41,7 @@ def test_a_lack_has_its_part_its_end_and_is_beyond_chance() -> None:
     chance = {n: stats.chi2(n).cdf(power[n]) for n in sums if power[n] < 0.7 * n}
     worst = min(chance, key=chance.__getitem__)
     assert found.value == pytest.approx(power[worst] / worst)
-    assert f"up to {FLAT.upper[worst - 1]:.3g} Hz" in found.detail
+    assert f"Up to {FLAT.upper[worst - 1]:.3g} Hz" in found.detail
 
 
 @pytest.mark.parametrize(
@@ -76,4 +76,7 @@ def test_a_band_that_ends_before_nyquist_is_told() -> None:
     assert found("found: the spectrum follows its model") == []
     (note,) = found("found: beyond 5 Hz the spectrum bends")
     assert (note.finding, note.severity, note.value) == ("band_limit", "note", 5.0)
-    assert len(found("default: a twentieth of the rate")) == 1
+    assert note.detail.startswith("The spectrum of gyro x bends above 5 Hz")
+    (note,) = found("default: a twentieth of the rate")
+    assert note.detail.startswith("No noise model fits the spectrum of gyro x up to any frequency")
+    assert "5 Hz, a twentieth of the sampling rate" in note.detail

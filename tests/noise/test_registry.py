@@ -26,12 +26,12 @@ from imubench_pipeline.noise import (
     terms,
 )
 from imubench_pipeline.noise.terms.registry import register_terms
-from imubench_pipeline.recordings.fitness import SCALES
 from imubench_pipeline.report.practical import page_unit
 from imubench_pipeline.report.static_figures.names import SYMBOLS, TERM_NAMES
 from imubench_pipeline.report.static_figures.terms import TERM_LOOKS
 from imubench_pipeline.settings.simulated_sensor import AxisSettings
 from imubench_pipeline.simulate.model import SensorModel
+from imubench_pipeline.words.findings import FINDINGS
 from tests.conftest import PROJECT
 from tests.noise.examples import example, model_of
 
@@ -149,5 +149,5 @@ def test_the_family_of_the_likelihood_is_registered() -> None:
 def test_what_mends_samples_or_times_mends_parameters_by_their_dimension() -> None:
     for name in FAMILY:
         stated = PARAMETERS[name]
-        assert SCALES["suspicious_unit"].get(name, 0.0) == stated.signal, name
-        assert SCALES["rate_implausible"].get(name, 0.0) == stated.seconds, name
+        assert FINDINGS["suspicious_unit"].scales.get(name, 0.0) == stated.signal, name
+        assert FINDINGS["rate_implausible"].scales.get(name, 0.0) == stated.seconds, name

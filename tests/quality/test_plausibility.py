@@ -99,8 +99,8 @@ def test_units_of_angle_that_are_mixed_up_are_named(
         (finding,) = said
         assert (finding.finding, finding.channel) == ("suspicious_unit", "gyro_z")
         assert finding.value == pytest.approx(1 / factor)
-        assert f"are the figures in {meant}, and not {stated}?" in finding.detail
-        assert "It would be 0.004" in finding.detail  # 0.0048, roughly
+        assert f"If the log is in {meant}, and not {stated}, it is 0.004" in finding.detail
+        # 0.0048 °/s/√Hz, roughly
 
 
 def test_the_datasheet_says_what_noise_is_usual(rng: np.random.Generator) -> None:
@@ -136,11 +136,11 @@ def test_gravity_names_the_unit_of_acceleration(
     for finding in said:
         assert finding.finding == "suspicious_unit"
         assert finding.value == pytest.approx(1 / factor)
-        assert f"are the figures in {meant}, and not {stated}?" in finding.detail
+        assert f"If the log is in {meant}, and not {stated}, it is 10.3 m/s²" in finding.detail
 
 
 @pytest.mark.parametrize(
-    ("factor", "words"), [(0.0, "taken off already"), (1.7, "check unit, scale")]
+    ("factor", "words"), [(0.0, "subtracted already"), (1.7, "Check unit, scale")]
 )
 def test_gravity_that_no_unit_explains(rng: np.random.Generator, factor: float, words: str) -> None:
     (finding,) = found(triad(rng, factor * DOWN))
@@ -154,7 +154,7 @@ def test_one_accelerometer_is_judged_by_its_noise(rng: np.random.Generator) -> N
     log = triad(rng, DOWN)["accel_x"]
     assert found({"accel_x": log}, SI, sensor) == []
     (finding,) = found({"accel_x": 1000 * log}, {"accel": "g"}, sensor)
-    assert "are the figures in mg, and not g?" in finding.detail
+    assert "If the log is in mg, and not g, it is 89.3 µg/√Hz" in finding.detail
     assert found({"accel_x": 1000 * log}, {"accel": "g"}) == []  # nothing is known of it
 
 
@@ -173,7 +173,7 @@ def test_a_unit_of_time_that_is_another_is_named(rate: float, factor: float) -> 
     if 20.0 <= rate <= 1000.0:
         (finding,) = found
         assert (finding.value, finding.channel) == (pytest.approx(factor), None)
-        assert f"the rate is {rate:.4g} Hz: correct" in finding.detail
+        assert f"the rate is {rate:.4g} Hz. If so, correct" in finding.detail
 
 
 @pytest.mark.parametrize("rate", [0.125, 0.5, 1.0])
@@ -207,10 +207,10 @@ def test_rates_of_one_clock_alone_are_those_of_its_channels() -> None:
     ("sensor", "limit", "words"),
     [
         (None, 30.0, "of any gyro"),
-        (printing(offset={"value": 1, "unit": "deg/s"}), 4.0, "that its datasheet prints"),
-        (printing(offset={"value": 2, "unit": "deg/s", "kind": "max"}), 3.0, "datasheet prints"),
-        (printing(offset={"value": 30, "unit": "deg/h"}), 2.0, "that its datasheet prints"),
-        (printing(offset={"value": 20, "unit": "deg/s"}), 30.0, "that its datasheet prints"),
+        (printing(offset={"value": 1, "unit": "deg/s"}), 4.0, "by its data sheet"),
+        (printing(offset={"value": 2, "unit": "deg/s", "kind": "max"}), 3.0, "by its data sheet"),
+        (printing(offset={"value": 30, "unit": "deg/h"}), 2.0, "by its data sheet"),
+        (printing(offset={"value": 20, "unit": "deg/s"}), 30.0, "by its data sheet"),
         (parse(Sensor, SENSOR | {"price_class": "tactical, IMU"}, "s"), 2.0, "class tactical"),
     ],
 )
@@ -250,7 +250,7 @@ def test_gravity_that_turns_tells_the_rate_of_the_sensor(
     logs |= {f"gyro_{axis}": gyro(rng, of) for axis, of in zip("xyz", rate, strict=True)}
     (finding,) = found(logs)
     assert (finding.finding, finding.channel) == ("turning", None)
-    assert "and the gyros" in finding.detail
+    assert "The gyros show" in finding.detail
 
 
 def test_gravity_that_tilts_alone_is_no_sensor_at_rest(rng: np.random.Generator) -> None:
@@ -279,7 +279,7 @@ def test_an_axis_unlike_both_others_is_named(rng: np.random.Generator, scale: fl
     (one,) = found(triad_of_gyros(rng, 5.0, 5.0, 5.0 * scale), {"gyro": "deg/s"})
     assert (one.finding, one.channel, one.severity) == ("axis_unlike", "gyro_z", "warning")
     assert one.value == pytest.approx(scale, rel=0.2)
-    assert ("is it in rad/s, and not deg/s?" in one.detail) is (scale == math.radians(1.0))
+    assert ("rad/s instead of deg/s would explain it" in one.detail) is (scale == math.radians(1.0))
 
 
 def test_an_accelerometer_axis_in_g_is_named(rng: np.random.Generator) -> None:
@@ -287,7 +287,7 @@ def test_an_accelerometer_axis_in_g_is_named(rng: np.random.Generator) -> None:
     logs["accel_y"] /= STANDARD_GRAVITY
     (one,) = found(logs)
     assert (one.finding, one.channel) == ("axis_unlike", "accel_y")
-    assert "is it in g, and not m/s^2?" in one.detail
+    assert "g instead of m/s^2 would explain it" in one.detail
 
 
 @pytest.mark.parametrize("scales", [(1.0, 1.0, 3.0), (1.0, 1.0, 0.4), (1.0, 3.0, 13.0)])

@@ -149,7 +149,8 @@ def test_a_log_that_tilts_steadily(adis16405: np.ndarray, tmp_path: Path) -> Non
     assert set(unfit(found)) == {"turning"}
     (turn,) = (row for row in found if row["finding"] == "turning")
     assert turn["value"] == pytest.approx(speed, rel=0.05)
-    assert "in all, steadily at 0.1 °/s" in turn["detail"]
+    assert turn["detail"].startswith("Gravity turns relative to the sensor by ")
+    assert "°, steadily at 0.1 °/s" in turn["detail"]
 
 
 @pytest.mark.release

@@ -3,13 +3,13 @@
 import pytest
 
 from imubench_pipeline.model.verdicts import DoubtMark
-from imubench_pipeline.recordings.fitness import AFFECTED_PARAMETERS, BESIDE_MEASURED, UNFIT
+from imubench_pipeline.recordings.fitness import BESIDE_MEASURED
 from imubench_pipeline.words.doubts import doubt_text
 from imubench_pipeline.words.findings import FINDINGS
 from imubench_pipeline.words.verdicts import doubts_text
 
 DECLARED = {code for code, kind in FINDINGS.items() if kind.affects or kind.unfit}
-CODES = sorted({*UNFIT, *AFFECTED_PARAMETERS, *DECLARED, BESIDE_MEASURED, "not_sold",
+CODES = sorted({*DECLARED, BESIDE_MEASURED, "not_sold",
                 "not_explained", "doubtful"})  # fmt: skip
 
 
@@ -32,8 +32,6 @@ def test_a_doubt_is_a_sentence(code: str, channels: tuple[str, ...]) -> None:
         ("noise_grows", ("gyro_x",), "the white noise of gyro x changes over the log"),
         ("channel_twice", ("gyro_x",), "gyro x is a copy of another channel"),
         ("channel_twice", ("gyro_x", "gyro_y"), "gyro x and gyro y are a copy of another channel"),
-        ("gap", ("gyro_x", "accel_x"), "gap (gyro x and accel x)"),
-        ("gap", (), "gap"),
     ],
 )
 def test_a_doubt_names_its_channels(code: str, channels: tuple[str, ...], text: str) -> None:

@@ -23,8 +23,16 @@ from imubench_pipeline.model.recordings import FindingRow
 from imubench_pipeline.recordings.kept import Quality
 from imubench_pipeline.recordings.quality.rotation import GravityTurn
 from imubench_pipeline.settings.sensor import QUANTITIES, Sensor, quantity_of
-from imubench_pipeline.tables.findings import Finding
-from imubench_pipeline.units import conversion, from_si, to_si
+from imubench_pipeline.tables.findings import Finding, find
+from imubench_pipeline.units import conversion, to_si
+from imubench_pipeline.words.findings.plausibility import (
+    AxisUnlike,
+    GravityNorm,
+    NoiseUnlikeDatasheet,
+    RateImplausible,
+    SuspiciousUnit,
+    Turning,
+)
 
 _MAX_FACTOR_BELOW_PRINTED = 2.5
 """Maximum usual factor below a printed noise density. `levels.density_of` is not lowered by a
@@ -90,8 +98,6 @@ _LOGGER_UNITS: Mapping[str, Sequence[str]] = {
 }
 """Units that loggers write, the most common first."""
 
-_DENSITY_UNITS = {"gyro": ("°/s/√Hz", "gyro_density"), "accel": ("µg/√Hz", "accel_density")}
-
 _MIN_TURN_OF_GRAVITY = math.radians(10.0)
 """Minimum turn of gravity over a log, rad. No accelerometer drifts so far: 0.17 g."""
 
@@ -99,17 +105,14 @@ _MIN_TURN_WITH_GYROS = math.radians(1.0)
 _MAX_RATE_DISAGREEMENT = 0.25
 """Minimum turn of gravity if the gyros agree with it; maximum relative difference of the rates."""
 
-_UNIT_ADVICE = "state the right 'unit' in the sensor file"
-
 
 @dataclass(frozen=True)
 class Expected:
     """Usual levels of a quantity of a static sensor."""
 
     noise: tuple[float, float] | None  # least and most white noise density, SI/√Hz, two-sided
-    noise_from: str  # source of the range, in words
     offset: float = _MAX_OFFSET  # largest mean of a gyro that an offset explains, rad/s
-    offset_from: str = "of any gyro"
+    offset_of: str | None = None  # "data sheet" or the price class that limits it; None: any gyro
     bandwidth: float | None = None  # the widest that is printed, Hz
     printed: float | None = None  # white noise density that the datasheet prints, SI/√Hz, two-sided
 
@@ -118,20 +121,19 @@ def expected(sensor: Sensor | None, quantity: str) -> Expected:
     """Return the usual levels of a quantity of a sensor, from its file if it prints them."""
     usual = _USUAL_GYRO_DENSITY if quantity == "gyro" else None
     if sensor is None:
-        return Expected(usual, "of a gyro")
+        return Expected(usual)
     printed = printed_figures(sensor, quantity).get("N")
     noise = (
         usual
         if printed is None
         else (printed / _MAX_FACTOR_BELOW_PRINTED, printed * MAX_FACTOR_FROM_PRINTED)
     )
-    noise_from = "of a gyro" if printed is None else "that its datasheet prints"
     return Expected(
-        noise, noise_from, *_find_max_offset(sensor), _find_max_bandwidth(sensor, quantity), printed
+        noise, *_find_max_offset(sensor), _find_max_bandwidth(sensor, quantity), printed
     )
 
 
-def _find_max_offset(sensor: Sensor) -> tuple[float, str]:
+def _find_max_offset(sensor: Sensor) -> tuple[float, str | None]:
     """Return the largest offset of the gyro of a sensor, rad/s, and its source."""
     printed = [
         row.value * _OFFSET_FACTOR_OF_KIND.get(row.figure.kind, _OFFSET_FACTOR_OF_TYPICAL)
@@ -143,12 +145,12 @@ def _find_max_offset(sensor: Sensor) -> tuple[float, str]:
     ]
     if printed:
         largest = min(max(*printed, _MIN_OFFSET_LIMIT), _MAX_OFFSET)
-        return largest, "by the offset that its datasheet prints"
+        return largest, "data sheet"
     words = (sensor.price_class or "").lower().replace(",", " ").split()
     word = next((word for word in words if word in _MAX_OFFSET_OF_CLASS), None)
     if word is None:
-        return _MAX_OFFSET, "of any gyro"
-    return _MAX_OFFSET_OF_CLASS[word], f"of a gyro of price class {word}"
+        return _MAX_OFFSET, None
+    return _MAX_OFFSET_OF_CLASS[word], word
 
 
 def _find_max_bandwidth(sensor: Sensor, quantity: str) -> float | None:
@@ -200,18 +202,10 @@ def implausible_rates(
     findings = []
     for (rate, fastest), names in by_rate.items():
         factor = time_factor(rate, fastest)
-        longer = factor if factor > 1.0 else 1.0 / factor
-        detail = (
-            f"the sampling rate is {rate:.4g} Hz; expected {slowest:.3g} to {fastest:.5g} Hz. If "
-            f"the unit of time is {longer:g} times as {'long' if factor > 1.0 else 'short'}, the "
-            f"rate is {rate / factor:.4g} Hz: correct 'unit' of 'time' in the sensor file"
-        )
-        if MIN_RATE_STATED <= rate < slowest:
-            detail += f"; if {rate:.4g} Hz is right, state it there: 'rate: {rate:.4g} Hz'"
+        statable = MIN_RATE_STATED <= rate < slowest
+        data = RateImplausible(rate, slowest, fastest, factor, statable)
         channels = [None] if len(names) == len(rates) else names
-        findings += [
-            Finding("rate_implausible", "warning", detail, factor, channel) for channel in channels
-        ]
+        findings += [find(data, "warning", factor, channel) for channel in channels]
     return findings
 
 
@@ -304,17 +298,13 @@ def _check_gravity(channels: Mapping[str, Level]) -> Iterator[Finding]:
         return
     units = {channels[name]["unit"] for name in axes}
     unit = units.pop()
-    detail = f"the mean acceleration has a norm of {norm:.4g} m/s², expected {STANDARD_GRAVITY:.4g}"
     for other, factor in mistakes(unit, "accel") if not units else ():
         if abs(norm * factor / STANDARD_GRAVITY - 1.0) <= _GRAVITY_TOLERANCE:
-            question = f"{detail}: are the figures in {other}, and not {unit}? {_UNIT_ADVICE}"
+            data = SuspiciousUnit(unit, other, factor, gravity=norm)
             for name in axes:
-                yield Finding("suspicious_unit", "warning", question, factor, name)
+                yield find(data, "warning", factor, name)
             return
-    advice = "check unit, scale, offset and columns of the accelerometer"
-    if norm < 0.05 * STANDARD_GRAVITY:
-        advice = "gravity seems to be taken off already (linear acceleration); use the raw figures"
-    yield Finding("gravity_norm", "warning", f"{detail}: {advice}", norm)
+    yield find(GravityNorm(norm, removed=norm < 0.05 * STANDARD_GRAVITY), "warning", norm)
 
 
 def _check_noise(channels: Mapping[str, Level], of: Mapping[str, Expected]) -> Iterator[Finding]:
@@ -338,15 +328,15 @@ def _check_noise(channels: Mapping[str, Level], of: Mapping[str, Expected]) -> I
                 low * factor <= _MAX_EXPLAINED_FACTOR * usual[1]
                 and high * factor >= usual[0] / _MAX_EXPLAINED_FACTOR
             ):
-                sign, dimension = _DENSITY_UNITS[quantity]
-                figures = [from_si(x, sign, dimension) for x in (shown, shown * factor, *usual)]
-                detail = (
-                    f"{name} has a noise of {figures[0]:.3g} {sign}; usual "
-                    f"{of[quantity].noise_from} are {figures[2]:.3g} to {figures[3]:.3g}: are the "
-                    f"figures in {unit}, and not {level['unit']}? It would be {figures[1]:.3g} "
-                    f"then; {_UNIT_ADVICE}"
+                data = SuspiciousUnit(
+                    level["unit"],
+                    unit,
+                    factor,
+                    noise=shown,
+                    usual=usual,
+                    printed=of[quantity].printed is not None,
                 )
-                yield Finding("suspicious_unit", "warning", detail, factor, name)
+                yield find(data, "warning", factor, name)
                 break
 
 
@@ -363,7 +353,6 @@ def _compare_noise(
         if name in doubted:
             continue
         quantity = quantity_of(name)
-        sign, dimension = _DENSITY_UNITS[quantity]
         low, high = level["density"]
         high = math.inf if high is None else high
         printed = of[quantity].printed
@@ -371,38 +360,27 @@ def _compare_noise(
         near = MAX_FACTOR_FROM_PRINTED if timed else _MAX_FACTOR_WITHOUT_STAMPS
         if printed is not None and (low > near * printed or near * high < printed):
             shown = low if low > printed else high
-            figures = [from_si(x, sign, dimension) for x in (shown, printed)]
-            rate = "" if timed else f"the stated rate of {level['rate']:g} Hz, "
-            detail = (
-                f"{name} has a noise of {figures[0]:.3g} {sign}, {shown / printed:.3g} times the "
-                f"{figures[1]:.3g} that its datasheet prints: check {rate}scale, range and column "
-                "of the channel, and whether it is this sensor"
-            )
+            stated_rate = None if timed else level["rate"]
             far = (
                 low > MAX_FACTOR_FROM_PRINTED * printed or MAX_FACTOR_FROM_PRINTED * high < printed
             )
             if far or not untimed:  # a wrong rate affects all channels: report it once
                 untimed = untimed or not timed
                 of_channel = name if timed or far else None
-                yield Finding(
-                    "noise_unlike_datasheet", "warning", detail, shown / printed, of_channel
-                )
+                unlike = NoiseUnlikeDatasheet(name, shown, printed, stated_rate)
+                yield find(unlike, "warning", shown / printed, of_channel)
             continue
         others = [f"{quantity}_{axis}" for axis in "xyz" if f"{quantity}_{axis}" != name]
         ratio = _compute_axis_ratio(level, [channels[axis] for axis in others if axis in channels])
         if ratio is not None:
             shown = low if ratio > 1.0 else high
             explained = (
-                f"is it in {unit}, and not {level['unit']}? Check"
+                unit
                 for unit, factor in mistakes(level["unit"], quantity)
                 if 1.0 / _MAX_EXPLAINED_AXIS_RATIO < ratio * factor < _MAX_EXPLAINED_AXIS_RATIO
             )
-            detail = (
-                f"the noise of {name} is {ratio:.3g} times that of {' and '.join(others)}, "
-                f"{from_si(shown, sign, dimension):.3g} {sign}, as axes of one sensor hardly ever "
-                f"have: {next(explained, 'check')} unit, scale and column of this axis"
-            )
-            yield Finding("axis_unlike", "warning", detail, ratio, name)
+            data = AxisUnlike(tuple(others), ratio, shown, level["unit"], next(explained, None))
+            yield find(data, "warning", ratio, name)
 
 
 def _compute_axis_ratio(level: Level, others: Sequence[Level]) -> float | None:
@@ -425,12 +403,8 @@ def _check_mean_rates(means: Mapping[str, float], usual: Expected) -> Iterator[F
     """Yield a finding for each gyro whose mean exceeds the largest offset."""
     for name, mean in means.items():
         if abs(mean) > usual.offset:
-            detail = (
-                f"{name} has a mean of {math.degrees(mean):.4g} °/s, more than the "
-                f"{math.degrees(usual.offset):.3g} °/s that an offset may be {usual.offset_from}: "
-                "the sensor turns, or its unit is another"
-            )
-            yield Finding("turning", "warning", detail, mean, name)
+            data = Turning(mean, largest=usual.offset, offset_of=usual.offset_of)
+            yield find(data, "warning", mean, name)
 
 
 def _check_gravity_turn(
@@ -447,9 +421,5 @@ def _check_gravity_turn(
     together = abs(along / rate - 1.0) < _MAX_RATE_DISAGREEMENT
     if gravity.swept < _MIN_TURN_OF_GRAVITY and not together:
         return
-    beside = f", and the gyros {math.degrees(along):.3g} °/s about that axis" if together else ""
-    detail = (
-        f"gravity turns against the sensor by {math.degrees(gravity.swept):.3g}° in all, steadily "
-        f"at {math.degrees(rate):.3g} °/s{beside}: the sensor turns, or is tilted"
-    )
-    yield Finding("turning", "warning", detail, rate)
+    data = Turning(rate, swept=gravity.swept, gyro_rate=along if together else None)
+    yield find(data, "warning", rate)

@@ -3,56 +3,25 @@
 from __future__ import annotations
 
 import json
-import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import asdict, dataclass, replace
 from statistics import median
 
 from imubench_pipeline.datasheets.comparable import Comparable, comparables
-from imubench_pipeline.earth import STANDARD_GRAVITY
 from imubench_pipeline.model.estimates import ParameterRow
 from imubench_pipeline.model.recordings import FindingRow
 from imubench_pipeline.settings.sensor import QUANTITIES, Sensor, quantity_of
-from imubench_pipeline.tables.findings import Finding
-from imubench_pipeline.units import from_si
-from imubench_pipeline.words.numbers import digits_by
+from imubench_pipeline.tables.findings import find
+from imubench_pipeline.words.findings.plausibility import UNIT_MISTAKES, UnusualFigure
 
 _SUSPICIOUS_FACTOR = 20.0
 _MIN_SENSORS = 5
-_DEGREES_PER_RADIAN = math.degrees(1.0)
-_PREFIX_MISTAKES = (
-    (1e-3, "thousandths of its unit"),
-    (1e3, "thousands of its unit"),
-    (1e-6, "millionths of its unit"),
-    (1e6, "millions of its unit"),
-)
-_UNIT_MISTAKES: Mapping[str, Sequence[tuple[float, str]]] = {
-    "gyro": (
-        (1.0 / _DEGREES_PER_RADIAN, "degrees, and not rad"),
-        (_DEGREES_PER_RADIAN, "rad, and not degrees"),
-        *_PREFIX_MISTAKES,
-    ),
-    "accel": (
-        (STANDARD_GRAVITY, "g, and not m/s²"),
-        (1.0 / STANDARD_GRAVITY, "m/s², and not g"),
-        *_PREFIX_MISTAKES,
-    ),
-}
-"""Common unit mistakes: the factor that corrects a figure, and the mistake in words."""
-
 MAX_FACTOR_FROM_PRINTED = 4.0
 """Maximum usual ratio of a figure to the printed one, either way: low-pass filters, a bad specimen
 or another sidedness explain it."""
 
 _MAX_FACTOR_BEYOND_CATALOGUE = 2.0
 """Maximum usual factor below the least, or above the largest, figure of a catalogue."""
-
-_DISPLAY_UNITS: dict[tuple[str, str], tuple[str, str]] = {
-    ("gyro", "N"): ("°/s/√Hz", "gyro_density"),
-    ("gyro", "B"): ("°/h", "angular_rate"),
-    ("accel", "N"): ("µg/√Hz", "accel_density"),
-    ("accel", "B"): ("µg", "acceleration"),
-}
 
 
 @dataclass(frozen=True)
@@ -123,18 +92,16 @@ def suspicious(
     figures: Mapping[str, float],
     usual: UsualFigures,
     printed: Mapping[str, float] | None = None,
-    written: Mapping[str, str] | None = None,
-) -> list[str]:
-    """Return a sentence for each figure that is 20 times too large or small, with a likely unit.
+) -> list[UnusualFigure]:
+    """Return a finding for each figure that is 20 times too large or small, with a likely unit.
 
     The figures are N and B, printed or estimated, SI. A figure is too large above 20 times the
     median of the catalogue (`usual_figures`). It is too small below a twentieth of the least of the
     catalogue, since there are sensors of every price. A figure near the one in the sensor's own
     datasheet (``printed``, SI) is neither. Another unit is named if its factor gives a usual figure
-    for the sensor, or for the catalogue if the datasheet prints none. ``written``: text of a figure
-    with its name, if it is not N or B to three digits.
+    for the sensor, or for the catalogue if the datasheet prints none.
     """
-    sentences = []
+    found = []
     for figure, value in figures.items():
         typical = usual.get((quantity, figure))
         if typical is None:
@@ -148,40 +115,14 @@ def suspicious(
             if least <= value <= most:
                 continue
         if value > _SUSPICIOUS_FACTOR * typical.median:
-            how = f"{value / typical.median:.3g} times the median of {typical.sensors} sensors, "
             other = typical.median
         elif 0 < value < typical.least / _SUSPICIOUS_FACTOR:
-            how = (
-                f"{typical.least / value:.3g} times below the least of {typical.sensors} sensors, "
-            )
             other = typical.least
         else:
             continue
-        doubt = _ask_about_unit(quantity, figure, value, least, most)
-        shown = (written or {}).get(
-            figure
-        ) or f"{figure} = {_format_figure(quantity, figure, value)}"
-        than = _format_figure(quantity, figure, other)
-        sentences.append(f"{quantity} {shown} is {how}{than}: {doubt}")
-    return sentences
-
-
-def _ask_about_unit(quantity: str, figure: str, value: float, least: float, most: float) -> str:
-    """Return the question about the unit of a figure, with the unit that explains it, if any."""
-    for factor, unit in _UNIT_MISTAKES[quantity]:
-        if least <= value * factor <= most:
-            mended = _format_figure(quantity, figure, value * factor)
-            return f"is it in {unit}? It would be {mended} then"
-    return "is its unit right?"
-
-
-def _format_figure(quantity: str, figure: str, value: float, digits: int = 3) -> str:
-    unit, dimension = _DISPLAY_UNITS[quantity, figure]
-    return f"{float(f'{from_si(value, unit, dimension):.{digits}g}'):g} {unit}"
-
-
-_SYMBOLS = {"N": "N", "B": "σ_min"}
-"""Symbols of the estimates that are compared with printed figures."""
+        factor = next((f for f, _ in UNIT_MISTAKES[quantity] if least <= value * f <= most), None)
+        found.append(UnusualFigure(quantity, figure, value, other, typical.sensors, factor))
+    return found
 
 
 def unusual_rows(
@@ -200,13 +141,6 @@ def unusual_rows(
             continue
         quantity, sensor = quantity_of(row.channel), sensors.get(row.sensor)
         printed = printed_figures(sensor, quantity) if sensor else None
-        unit, dimension = _DISPLAY_UNITS[quantity, figure]
-        figures = [value]
-        if row.lower is not None and row.upper is not None:
-            figures += [row.lower, row.upper]
-        size, *limits = (from_si(number, unit, dimension) for number in figures)
-        digits = digits_by(size, *(limits or (None, None)))
-        text = f"{_SYMBOLS[figure]} = {_format_figure(quantity, figure, value, digits)}"
-        for sentence in suspicious(quantity, {figure: value}, usual, printed, {figure: text}):
-            finding = Finding("unusual_figure", "warning", sentence, value, row.channel)
-            yield finding.row(row.sensor, row.recording)
+        for data in suspicious(quantity, {figure: value}, usual, printed):
+            estimate = replace(data, lower=row.lower, upper=row.upper, estimated=True)
+            yield find(estimate, "warning", value, row.channel).row(row.sensor, row.recording)

@@ -10,7 +10,8 @@ from collections.abc import Iterator, Mapping
 from dataclasses import replace
 
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
-from imubench_pipeline.tables.findings import Finding
+from imubench_pipeline.tables.findings import Finding, find
+from imubench_pipeline.words.findings.spectrum import MethodsDiffer
 
 _MAX_FACTOR_BEYOND_LIMITS = 1.25  # Of a value without limits outside the limits of the likelihood
 _MAX_VALUE_RATIO = 1.8  # Ratio of two values above which they differ, whatever their limits
@@ -70,9 +71,4 @@ def disagreements(channel: str, estimates: Mapping[str, Estimate]) -> Iterator[F
         return
     if weighted.upper < likelihood.lower or weighted.lower > likelihood.upper:
         ratio = weighted.value / likelihood.value
-        detail = (
-            f"{channel}: the fit of the Allan variance gives an N {ratio:.3g} times that of the "
-            "likelihood, beyond the intervals of both; a low-pass, lines or quantization noise "
-            "bend the curve at short tau, and the likelihood takes them out"
-        )
-        yield Finding("N_differs", "note", detail, ratio, channel)
+        yield find(MethodsDiffer(ratio), "note", ratio, channel)

@@ -25,11 +25,12 @@ from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 from scipy.special import betainc, gammainccinv
 
-from imubench_pipeline.estimators.estimate import SI_UNITS, SIGMAS, Parameter
+from imubench_pipeline.estimators.estimate import SIGMAS, Parameter
 from imubench_pipeline.estimators.spectrum import LineSpectrum, Spectrum
 from imubench_pipeline.noise import NoiseModel, Sinusoid
-from imubench_pipeline.tables.findings import Finding
+from imubench_pipeline.tables.findings import Finding, find
 from imubench_pipeline.typing import Array
+from imubench_pipeline.words.findings.spectrum import TooManyLines
 
 FALSE_ALARM_PROBABILITY = 0.005  # Probability that a line is detected in a channel without lines
 _MEDIAN_BINS = 129  # Bins of the median filter that corrects the model around a bin
@@ -304,19 +305,14 @@ def _find_single_lines(lines: Sequence[Line]) -> list[Line]:
     return sorted(lines, key=lambda line: -line.amplitude)[:MAX_SINGLE_LINES]
 
 
-def describe_grouping(channel: str, quantity: str, sinusoids: Sequence[Line]) -> Finding:
-    """Return the warning for a channel of gyro or accel with more than `MAX_LINES` sinusoids."""
+def describe_grouping(channel: str, sinusoids: Sequence[Line]) -> Finding:
+    """Return the warning for a channel with more than `MAX_LINES` sinusoids."""
     single = _find_single_lines(sinusoids)
     rest = math.fsum(0.5 * line.amplitude**2 for line in sinusoids if line not in single)
     share = rest / math.fsum(0.5 * line.amplitude**2 for line in sinusoids)
-    number = len(sinusoids) - len(single)
-    detail = (
-        f"{channel} has {len(sinusoids)} sinusoids: the {len(single)} strongest go into error "
-        f"budgets, simulations and filters as they are, the other {number} as {LINE_GROUPS} of "
-        f"their power, {100 * share:.3g} % of that of all lines ({math.sqrt(rest):.3g} "
-        f"{SI_UNITS[quantity]['amplitude']} rms)"
-    )
-    return Finding("too_many_lines", "warning", detail, float(len(sinusoids)), channel)
+    number = len(sinusoids)
+    data = TooManyLines(number, len(single), LINE_GROUPS, share, math.sqrt(rest))
+    return find(data, "warning", float(number), channel)
 
 
 def _group_lines(lines: Sequence[Line]) -> dict[str, Parameter]:

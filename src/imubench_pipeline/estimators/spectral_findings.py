@@ -11,9 +11,14 @@ from scipy.special import chdtr
 from imubench_pipeline.estimators.frame import FitSelection
 from imubench_pipeline.estimators.lines import MAX_LINES, Line, describe_grouping
 from imubench_pipeline.estimators.spectrum import Spectrum
-from imubench_pipeline.settings.sensor import quantity_of
-from imubench_pipeline.tables.findings import Finding
+from imubench_pipeline.tables.findings import Finding, find
 from imubench_pipeline.typing import Array
+from imubench_pipeline.words.findings.spectrum import (
+    BandLimit,
+    Lines,
+    SlowNoiseMissing,
+    StrongLine,
+)
 
 _MIN_SINUSOID_RATIO = 0.5  # Integral of a sinusoid over that of white noise after 1 s
 _MAX_SLOW_FREQUENCY = 0.05  # Over the rate, of the test for missing slow noise
@@ -29,8 +34,8 @@ def spectral_findings(channel: str, frame: FitSelection, white: float | None) ->
     band = frame.band
     findings = line_findings(channel, frame.lines, white)
     if band.source.startswith(("found: beyond", "default")):
-        detail = f"{channel}: {band.source}"
-        findings.append(Finding("band_limit", "note", detail, band.highest, channel))
+        data = BandLimit(band.highest, follows_model=band.source.startswith("found"))
+        findings.append(find(data, "note", band.highest, channel))
     return findings
 
 
@@ -42,12 +47,8 @@ def line_findings(channel: str, lines: Iterable[Line], white: float | None) -> l
     strongest = max(group, key=lambda line: line.ratio)
     sinusoids = [line for line in group if line.kind == "sinusoid"]
     number = len(sinusoids)
-    detail = (
-        f"{channel} has {number} sinusoids and {len(group) - number} bands of noise, the "
-        f"strongest at {strongest.frequency:.5g} Hz, {strongest.ratio:.3g} times the "
-        "noise there; they are left out of the likelihood"
-    )
-    findings = [Finding("lines", "note", detail, strongest.frequency, channel)]
+    data = Lines(number, len(group) - number, strongest.frequency, strongest.ratio)
+    findings = [find(data, "note", strongest.frequency, channel)]
     if white:
         # After t the integral A / (2 pi f) of a sinusoid differs by A sin(pi f t) / (pi f sqrt(2))
         # rms; the sine is at most 1, or its argument. White noise: N sqrt(t), here t = 1 s.
@@ -57,15 +58,10 @@ def line_findings(channel: str, lines: Iterable[Line], white: float | None) -> l
         }
         most = max(integrals, default=0.0)
         if most >= _MIN_SINUSOID_RATIO:
-            detail = (
-                f"a sinusoid of {channel} at {integrals[most].frequency:.5g} Hz integrates to "
-                f"{most:.3g} times what its white noise does in a second, and is in the error "
-                "budgets: if it is a vibration of the place, and not of the sensor, record "
-                "elsewhere, or on softer ground"
-            )
-            findings.append(Finding("strong_line", "warning", detail, most, channel))
+            strong = StrongLine(integrals[most].frequency, most)
+            findings.append(find(strong, "warning", most, channel))
     if number > MAX_LINES:
-        findings.append(describe_grouping(channel, quantity_of(channel), sinusoids))
+        findings.append(describe_grouping(channel, sinusoids))
     return findings
 
 
@@ -108,10 +104,4 @@ def slow_noise_missing(
         return None
     ratio = float(power[worst] / degrees[worst])
     highest = float(spectrum.upper[order[worst]])
-    detail = (
-        f"up to {highest:.3g} Hz the spectrum of {channel} has {ratio:.2g} of the density of its "
-        "white noise, to which slow noise only adds: it was taken off before the log was written "
-        "(bias zeroed at rest, a high-pass, means or a curve subtracted); switch that off, else K, "
-        "B and the errors of dead reckoning are too small"
-    )
-    return Finding("slow_noise_missing", "warning", detail, ratio, channel)
+    return find(SlowNoiseMissing(highest, ratio), "warning", ratio, channel)

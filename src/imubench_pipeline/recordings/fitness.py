@@ -24,21 +24,6 @@ from imubench_pipeline.words.findings import FINDINGS
 
 Key = tuple[str, str]  # sensor, recording
 
-UNFIT = frozenset({"turning", "suspicious_unit", "rate_implausible"})
-"""Findings after which a log may not be of one sensor at rest in its unit, besides `FINDINGS`."""
-
-_SLOW = frozenset({"B", "B_curve", "sigma_min", "tau_min", "T_B", "K", "R"})
-_WHITE = frozenset({"N", "Q"})
-_OF_UNIT = dict.fromkeys(("N", "Q", "B", "B_curve", "sigma_min", "K", "R", "bias"), 1.0)
-_OF_TIME = {"N": 0.5, "Q": 1.0, "T_B": 1.0, "tau_min": 1.0, "K": -0.5, "R": -1.0}
-
-SCALES: Mapping[str, Mapping[str, float]] = {
-    "suspicious_unit": _OF_UNIT,
-    "rate_implausible": _OF_TIME,
-}
-"""Findings whose value is a factor that mends samples, or times, and the power of it that mends
-each parameter: N² = σ²(τ) τ, so that N goes with the root of time."""
-
 BESIDE_MEASURED = "simulated_beside_measured"
 """Code of the doubt that leaves out simulated recordings, though they be included."""
 
@@ -47,22 +32,6 @@ WITH_DOUBTS: Mapping[str, type[ErrorBudgetRow] | type[DatasheetRow]] = {
     "datasheet": DatasheetRow,
 }
 """Tables of one recording whose rows repeat the doubts about it."""
-
-AFFECTED_PARAMETERS: Mapping[str, frozenset[str]] = {
-    "bias_step": _SLOW | {"bias"},
-    "warm_up_drift": _SLOW | {"bias"},
-    "periodic_drift": _SLOW,
-    "telegraph_noise": _SLOW | {"bias"},
-    "K_differs": frozenset({"K", "R"}),
-    "slow_noise_differs": _SLOW,
-    "slow_noise_missing": _SLOW,
-    "noise_grows": _WHITE,
-    "noise_varies": _WHITE,
-    "backtest_contradicts": _SLOW,
-    "strong_line": frozenset({"S"}),
-    **{name: frozenset(powers) for name, powers in SCALES.items()},
-}
-"""Parameters that a finding affects; a warning that is not listed affects all."""
 
 
 @dataclass(frozen=True)
@@ -115,17 +84,15 @@ def doubts(
     every: list[Doubt] = []
     for finding in findings:
         code = finding.finding
-        declared = FINDINGS.get(code)
-        unfit = code in UNFIT if declared is None else declared.unfit
-        scales = SCALES.get(code, {}) if declared is None else declared.scales
-        affected = finding.affects if finding.data else AFFECTED_PARAMETERS.get(code, ())
-        harmless = finding.severity != "warning" or (finding.data and not affected)
-        if code in LEFT_OUT or (harmless and not unfit):
+        kind = FINDINGS[code]
+        affected = finding.affects if finding.data else kind.affects
+        harmless = finding.severity != "warning" or not affected
+        if code in LEFT_OUT or (harmless and not kind.unfit):
             continue
         # One doubt for each factor by which parameters may change.
         by_factor: dict[float | None, list[str]] = {}
         if finding.value is not None:
-            for name, power in scales.items():
+            for name, power in kind.scales.items():
                 by_factor.setdefault(finding.value**power, []).append(name)
         every += [
             Doubt(
@@ -133,7 +100,7 @@ def doubts(
                 code,
                 finding.detail,
                 parameters=tuple(sorted(names)),
-                unfit=unfit,
+                unfit=kind.unfit,
                 factor=factor,
                 start=finding.start,
                 end=finding.end,

@@ -95,7 +95,7 @@ def estimate_channel(
     sensor's own filter, where it is known, Hz.
     """
     channel = _Channel(key, log, curve, settings, bandwidth)
-    verdict = assess_signals(key.channel, channel.unit, channel.signals)
+    verdict = assess_signals(key.channel, channel.signals)
     into.deterministic += deterministic_rows(asdict(key), channel.unit, channel.signals)
     into.add_findings(key, verdict.findings)
     estimates = channel.by_curve()

@@ -35,8 +35,20 @@ from imubench_pipeline.estimators.estimate import (
 from imubench_pipeline.estimators.spectral_shapes import Shapes
 from imubench_pipeline.estimators.whittle import Maximum
 from imubench_pipeline.model.estimates import DeterministicRow
-from imubench_pipeline.tables.findings import Finding
+from imubench_pipeline.tables.findings import Finding, find
 from imubench_pipeline.typing import Array
+from imubench_pipeline.words.findings.base import FindingData
+from imubench_pipeline.words.findings.changes import (
+    BiasStep,
+    HeavyTails,
+    NoiseTrend,
+    NoiseVaries,
+    PeriodicDrift,
+    RandomWalkChanges,
+    SlowNoiseChanges,
+    TelegraphNoise,
+    WarmUpDrift,
+)
 
 _MIN_EXCESS_KURTOSIS = 0.3  # excess kurtosis above which the interval of N is widened
 _MIN_BLOCKS = 256  # blocks that a part needs to be halved
@@ -51,8 +63,6 @@ _MAX_LOG_LIKELIHOOD_RATIO = 13.0
 
 It is the 99.97 % quantile of chi-squared, as the other terms are fixed although they are uncertain.
 """
-
-_REMOVED = "it is taken out of the noise"
 
 
 @dataclass(frozen=True)
@@ -152,9 +162,9 @@ def _widen_limits(parameter: Parameter, times: float, spread: float) -> Paramete
     )
 
 
-def assess_signals(channel: str, unit: str, signals: DeterministicSignals) -> Verdict:
-    """Return the findings of a channel, with its SI unit, and the caveats on its parameters."""
-    findings = [_describe_signal(channel, unit, signal) for signal in signals.signals]
+def assess_signals(channel: str, signals: DeterministicSignals) -> Verdict:
+    """Return the findings of a channel, and the caveats on its parameters."""
+    findings = [_describe_signal(channel, signal) for signal in signals.signals]
     caveats: dict[str, tuple[Status, str]] = {}
     if signals.means is None or signals.searched is None:
         return Verdict((), {})
@@ -163,11 +173,7 @@ def assess_signals(channel: str, unit: str, signals: DeterministicSignals) -> Ve
     if kurtosis > _MIN_EXCESS_KURTOSIS:
         # The power of L samples has a relative variance of (2 + kurtosis) / L.
         widening = math.sqrt(1.0 + 0.5 * kurtosis)
-        detail = (
-            f"the fast noise of {channel} has heavier tails than a normal distribution (excess "
-            f"kurtosis {kurtosis:.3g}); the interval of N is made {widening:.3g} times as wide"
-        )
-        findings.append(Finding("heavy_tails", "note", detail, kurtosis, channel))
+        findings.append(find(HeavyTails(kurtosis, widening), "note", kurtosis, channel))
     growth = scatter = 0.0
     steady = assess_stationarity(signals.means)
     if steady is not None and (steady.has_trend or steady.is_variable):
@@ -179,13 +185,9 @@ def assess_signals(channel: str, unit: str, signals: DeterministicSignals) -> Ve
         else:
             scatter = steady.spread
     if signals.telegraph:
-        reason = (
-            f"the bias of {channel} steps {MAX_REGRESSORS} times or more, as telegraph noise does: "
-            "the steps are left in the noise, where they pass for B, T_B and K"
-        )
-        finding = Finding("telegraph_noise", "warning", reason, float(MAX_REGRESSORS), channel)
+        finding = find(TelegraphNoise(MAX_REGRESSORS), "warning", float(MAX_REGRESSORS), channel)
         findings.append(finding)
-        caveats |= {name: ("doubtful", reason) for name in ("B", "T_B", "K")}
+        caveats |= {name: ("doubtful", finding.detail) for name in ("B", "T_B", "K")}
         return Verdict(tuple(findings), caveats, widening, growth, scatter)
     for halves in compare_halves(signals.without(), signals.searched.fit.noise):
         if halves.differ:
@@ -223,58 +225,33 @@ def deterministic_rows(
         )
 
 
-def _describe_signal(channel: str, unit: str, signal: DeterministicSignal) -> Finding:
-    size = f"{signal.size:.4g} {unit}"
-    limits = f"95 %: {signal.size_lower:.4g} to {signal.size_upper:.4g} {unit}"
+def _describe_signal(channel: str, signal: DeterministicSignal) -> Finding:
+    size = (signal.size, signal.size_lower, signal.size_upper)
+    data: FindingData
     if signal.kind == "bias_step":
-        name = "bias_step"
-        detail = (
-            f"the bias of {channel} steps by {size} ({limits}) at {signal.start:.6g} s "
-            f"(± {signal.place_error or 0.0:.2g} s); {_REMOVED}"
-        )
-    elif signal.kind == "warm_up_drift":
-        name = "warm_up_drift"
-        detail = (
-            f"{channel} begins {size} ({limits}) away from where it settles, with a time constant "
-            f"of {signal.time:.4g} s ({signal.time_lower:.4g} to {signal.time_upper:.4g} s); "
-            f"{_REMOVED}"
-        )
+        data = BiasStep(*size, signal.start, signal.place_error or 0.0)
     else:
-        name = "periodic_drift"
-        detail = (
-            f"the bias of {channel} swings with an amplitude of {size} ({limits}) and a period of "
-            f"{signal.time:.5g} s ({signal.time_lower:.5g} to {signal.time_upper:.5g} s); "
-            f"{_REMOVED}"
-        )
-    return Finding(name, "warning", detail, signal.size, channel, signal.start, signal.end)
+        assert signal.time is not None
+        assert signal.time_lower is not None
+        assert signal.time_upper is not None
+        time = (signal.time, signal.time_lower, signal.time_upper)
+        kind = WarmUpDrift if signal.kind == "warm_up_drift" else PeriodicDrift
+        data = kind(*size, *time)
+    return find(data, "warning", signal.size, channel, signal.start, signal.end)
 
 
 def _describe_nonstationarity(channel: str, steady: Stationarity) -> Finding:
+    data: FindingData = NoiseVaries(steady.spread)
+    value = steady.spread
     if steady.has_trend:
-        word = "grows" if steady.trend > 0.0 else "falls"
-        detail = (
-            f"the fast noise of {channel} {word} by {100 * abs(steady.trend):.3g} % "
-            f"(± {196 * steady.trend_error:.2g} %) from beginning to end; N is its mean over the "
-            "log"
-        )
-        name, value = "noise_grows", steady.trend
-    else:
-        detail = (
-            f"the fast noise of {channel} differs by {100 * steady.spread:.3g} % (one standard "
-            "deviation) between sixteenths of the log, beyond chance; N is its mean over the log"
-        )
-        name, value = "noise_varies", steady.spread
-    return Finding(name, "warning", detail, value, channel, steady.start, steady.end)
+        data, value = NoiseTrend(steady.trend, SIGMAS * steady.trend_error), steady.trend
+    return find(data, "warning", value, channel, steady.start, steady.end)
 
 
 def _describe_difference(channel: str, halves: Halves) -> Finding:
-    name = "K_differs" if halves.of == "K" else "slow_noise_differs"
-    noise = "K" if halves.of == "K" else "the slow noise"
-    detail = (
-        f"{noise} of {channel} up to {halves.middle:.5g} s is {halves.first:.3g} times, from there "
-        f"on {halves.second:.3g} times that of the whole log, beyond chance: it is not one process"
-    )
-    return Finding(name, "warning", detail, halves.ratio, channel, halves.begin, halves.end)
+    kind = RandomWalkChanges if halves.of == "K" else SlowNoiseChanges
+    data = kind(halves.middle, halves.first, halves.second)
+    return find(data, "warning", halves.ratio, channel, halves.begin, halves.end)
 
 
 @dataclass(frozen=True)

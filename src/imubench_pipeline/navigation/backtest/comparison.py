@@ -1,6 +1,6 @@
 """Compare the errors over windows of a log with the prediction of its noise model.
 
-The results are rows of the table ``backtest``, text, and findings.
+The results are rows of the table ``backtest``, and findings.
 
 The ratio of measured to predicted error comes with its 95 % range if the noise model is right. The
 errors of a log have a random scatter, and the model is uncertain, since it was estimated from the
@@ -35,8 +35,9 @@ from imubench_pipeline.navigation.backtest.windows import Window, errors
 from imubench_pipeline.navigation.error_budget.budget import of_sensor
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.growth import Calibrated
-from imubench_pipeline.tables.findings import Finding
+from imubench_pipeline.tables.findings import find
 from imubench_pipeline.typing import Array
+from imubench_pipeline.words.findings.backtest import BacktestContradicts
 
 _MIN_SCATTER_SHARE = 0.3
 """Minimum remaining variance, as a fraction of the scatter of the log. If the model is hardly
@@ -207,17 +208,6 @@ def _explain_too_few_windows(
     return f"gaps leave {count} overlapping windows: {wanted} without a gap"
 
 
-def words(row: BacktestRow) -> str:
-    """Return a row of the table ``backtest`` in words."""
-    if row.ratio is None:
-        return str(row.reason)
-    return (
-        f"this log drifted {row.ratio:.2f} times the prediction at {row.time:g} s "
-        f"({row.ratio_lower:.2f} to {row.ratio_upper:.2f} are to be expected), "
-        f"{row.windows} windows, as good as {row.independent:.3g} independent ones"
-    )
-
-
 def findings(rows: Iterable[BacktestRow]) -> Iterator[FindingRow]:
     """Yield the rows of the table ``findings`` for logs that contradict their own budgets.
 
@@ -230,16 +220,15 @@ def findings(rows: Iterable[BacktestRow]) -> Iterator[FindingRow]:
             by_channel.setdefault(place, []).append((row.chance, row.ratio, row))
     for (sensor, recording, channel), contradicted in by_channel.items():
         _, ratio, row = min(contradicted, key=lambda one: one[0])
-        taken_out = row.taken_out
-        why = (
-            f"what is taken out of the noise ({taken_out.replace('_', ' ')}) is in the log"
-            if taken_out
-            else "its slow terms miss something, such as drift with temperature"
+        data = BacktestContradicts(
+            row.error,
+            row.time,
+            row.window,
+            ratio,
+            row.ratio_lower,
+            row.ratio_upper,
+            row.windows,
+            row.independent,
+            tuple(row.taken_out.split(", ")) if row.taken_out else (),
         )
-        detail = (
-            f"{channel}: {row.error} after {row.time:g} s with the bias from "
-            f"{row.window:g} s at rest: {words(row)}. Budgets of this channel are too small: "
-            f"{why}"
-        )
-        finding = Finding("backtest_contradicts", "warning", detail, ratio, channel)
-        yield finding.row(sensor, recording)
+        yield find(data, "warning", ratio, channel).row(sensor, recording)

@@ -1,0 +1,233 @@
+"""Findings on changes over a log: steps and drifts of the bias, noise that is not stationary."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from imubench_pipeline.words.findings.base import NONE, SLOW, WHITE, FindingData, channel_name
+from imubench_pipeline.words.findings.shown import estimate_text, unit_of
+from imubench_pipeline.words.numbers import Unit, number_text, percent_text
+
+_SECONDS = Unit("s", 1.0)
+
+
+@dataclass(frozen=True)
+class BiasStep(
+    FindingData,
+    code="bias_step",
+    affects=SLOW | {"bias"},
+    doubt="the bias of {channels} steps",
+):
+    """The bias changes at once, and stays there."""
+
+    size: float
+    size_lower: float
+    size_upper: float
+    """With 95 % limits, SI."""
+    time: float
+    """s from the first sample."""
+    time_error: float
+    """Half width of the 95 % interval of the time, s."""
+
+    def text(self, channel: str) -> str:
+        """Return the finding in sentences."""
+        size = estimate_text(self.size, self.size_lower, self.size_upper, unit_of(channel, "level"))
+        return (
+            f"The bias of {channel_name(channel)} steps by {size} at {number_text(self.time, 6)} s "
+            f"(± {number_text(self.time_error, 2)} s). The step is removed from the noise. "
+            "Look for a motion, a new range or a sudden change of temperature"
+        )
+
+
+@dataclass(frozen=True)
+class WarmUpDrift(
+    FindingData,
+    code="warm_up_drift",
+    affects=SLOW | {"bias"},
+    doubt="{channels} drifts while the sensor warms up",
+):
+    """The bias settles exponentially from the start of the log."""
+
+    size: float
+    size_lower: float
+    size_upper: float
+    """Initial value, with 95 % limits, SI."""
+    time: float
+    time_lower: float
+    time_upper: float
+    """Time constant, with 95 % limits, s."""
+
+    def text(self, channel: str) -> str:
+        """Return the finding in sentences."""
+        size = estimate_text(self.size, self.size_lower, self.size_upper, unit_of(channel, "level"))
+        time = estimate_text(self.time, self.time_lower, self.time_upper, _SECONDS)
+        return (
+            f"The bias of {channel_name(channel)} starts {size} from its final value. It settles "
+            f"with a time constant of {time}. The drift is removed from the noise. "
+            "Let the sensor warm up before recording"
+        )
+
+
+@dataclass(frozen=True)
+class PeriodicDrift(
+    FindingData,
+    code="periodic_drift",
+    affects=SLOW,
+    doubt="the bias of {channels} oscillates slowly",
+):
+    """The bias varies with a slow period."""
+
+    size: float
+    size_lower: float
+    size_upper: float
+    """Amplitude, with 95 % limits, SI."""
+    time: float
+    time_lower: float
+    time_upper: float
+    """Period, with 95 % limits, s."""
+
+    def text(self, channel: str) -> str:
+        """Return the finding in sentences."""
+        size = estimate_text(self.size, self.size_lower, self.size_upper, unit_of(channel, "level"))
+        time = estimate_text(self.time, self.time_lower, self.time_upper, _SECONDS)
+        return (
+            f"The bias of {channel_name(channel)} oscillates with an amplitude of {size}. "
+            f"Its period is {time}. The oscillation is removed from the noise. "
+            "Record at a steady temperature, or with readings of it"
+        )
+
+
+@dataclass(frozen=True)
+class TelegraphNoise(
+    FindingData,
+    code="telegraph_noise",
+    affects=SLOW | {"bias"},
+    doubt="the bias of {channels} steps repeatedly",
+):
+    """The bias steps again and again between levels."""
+
+    steps: int
+    """Minimum number of steps."""
+
+    def text(self, channel: str) -> str:
+        """Return the finding in sentences."""
+        return (
+            f"The bias of {channel_name(channel)} steps at least {self.steps} times, as telegraph "
+            "noise does. The steps remain in the noise, so B, T_B and K are doubtful. "
+            "Look for a loose contact or popcorn noise of the sensor"
+        )
+
+
+@dataclass(frozen=True)
+class HeavyTails(FindingData, code="heavy_tails", affects=NONE):
+    """Large samples are more frequent than in normal noise."""
+
+    kurtosis: float
+    """Excess kurtosis."""
+    widening: float
+    """Factor on the interval of N."""
+
+    def text(self, channel: str) -> str:
+        """Return the finding in sentences."""
+        return (
+            f"The white noise of {channel_name(channel)} has heavier tails than a normal "
+            f"distribution: its excess kurtosis is {number_text(self.kurtosis, 3)}. The interval "
+            f"of N is {number_text(self.widening, 3)} times as wide for it. "
+            "Look for bursts and small outliers"
+        )
+
+
+@dataclass(frozen=True)
+class NoiseTrend(
+    FindingData,
+    code="noise_grows",
+    affects=WHITE,
+    doubt="the white noise of {channels} changes over the log",
+):
+    """The white noise grows or falls steadily."""
+
+    trend: float
+    """N at the end over N at the start, minus 1."""
+    error: float
+    """Half width of the 95 % interval of the trend."""
+
+    def text(self, channel: str) -> str:
+        """Return the finding in sentences."""
+        verb = "grows" if self.trend > 0.0 else "falls"
+        return (
+            f"The white noise of {channel_name(channel)} {verb} by "
+            f"{percent_text(abs(self.trend))} (± {percent_text(self.error, 2)}) over the log. "
+            "N is its mean over the log. Look for a change of temperature or supply voltage"
+        )
+
+
+@dataclass(frozen=True)
+class NoiseVaries(
+    FindingData,
+    code="noise_varies",
+    affects=WHITE,
+    doubt="the white noise of {channels} varies over the log",
+):
+    """The white noise differs between parts of the log, without a trend."""
+
+    spread: float
+    """Relative standard deviation of N between sixteenths of the log."""
+
+    def text(self, channel: str) -> str:
+        """Return the finding in sentences."""
+        return (
+            f"The white noise of {channel_name(channel)} varies by {percent_text(self.spread)} "
+            "(one standard deviation) between sixteenths of the log, more than by chance. "
+            "N is its mean over the log. Look for vibration or interference"
+        )
+
+
+@dataclass(frozen=True)
+class RandomWalkChanges(
+    FindingData,
+    code="K_differs",
+    affects=frozenset({"K", "R"}),
+    doubt="the random walk of {channels} changes over the log",
+):
+    """The random walk differs between the halves of the log."""
+
+    middle: float
+    """End of the first half, s from the first sample."""
+    first: float
+    second: float
+    """K of each half over K of the log."""
+
+    def text(self, channel: str) -> str:
+        """Return the finding in sentences."""
+        return _halves_text(f"K of {channel_name(channel)}", self.middle, self.first, self.second)
+
+
+@dataclass(frozen=True)
+class SlowNoiseChanges(
+    FindingData,
+    code="slow_noise_differs",
+    affects=SLOW,
+    doubt="the slow noise of {channels} changes over the log",
+):
+    """The slow noise differs between the halves of the log."""
+
+    middle: float
+    """End of the first half, s from the first sample."""
+    first: float
+    second: float
+    """Amplitude of the slow noise of each half over that of the log."""
+
+    def text(self, channel: str) -> str:
+        """Return the finding in sentences."""
+        noise = f"The slow noise of {channel_name(channel)}"
+        return _halves_text(noise, self.middle, self.first, self.second)
+
+
+def _halves_text(noise: str, middle: float, first: float, second: float) -> str:
+    """Return the sentences about noise that differs between the halves of a log."""
+    return (
+        f"{noise} is {number_text(first, 3)} times its value over the whole log up to "
+        f"{number_text(middle, 5)} s, and {number_text(second, 3)} times afterwards. "
+        "The difference is significant: one noise process does not describe the log. "
+        "Look for a change of temperature or a motion; use the calmer half, or record again"
+    )

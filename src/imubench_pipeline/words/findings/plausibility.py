@@ -1,0 +1,305 @@
+"""Findings on data that are implausible for a sensor at rest in the stated units."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from imubench_pipeline.earth import STANDARD_GRAVITY
+from imubench_pipeline.settings.printed import SENSORS
+from imubench_pipeline.words.findings.base import (
+    ALL,
+    POWERS_OF_TIME,
+    POWERS_OF_UNIT,
+    FindingData,
+    channel_name,
+)
+from imubench_pipeline.words.findings.shown import unit_of, value_text
+from imubench_pipeline.words.numbers import join_names, number_text
+
+_OF_UNIT = frozenset(POWERS_OF_UNIT)
+_CORRECT_UNIT = "If so, correct 'unit' in the sensor file"
+
+
+@dataclass(frozen=True)
+class RateImplausible(
+    FindingData,
+    code="rate_implausible",
+    affects=frozenset(POWERS_OF_TIME),
+    unfit=True,
+    scales=POWERS_OF_TIME,
+    doubt="the sampling rate looks wrong",
+):
+    """No such sensor samples at this rate."""
+
+    rate: float
+    slowest: float
+    fastest: float
+    """Limits of a plausible rate, Hz."""
+    factor: float
+    """Corrects the times."""
+    statable: bool
+    """Whether the rate is plausible once the sensor file states it."""
+
+    def text(self, channel: str) -> str:
+        """Return the finding in sentences."""
+        times, size = (self.factor, "long") if self.factor > 1.0 else (1.0 / self.factor, "short")
+        text = (
+            f"The sampling rate is {number_text(self.rate)} Hz; expected "
+            f"{number_text(self.slowest, 3)} to {number_text(self.fastest, 5)} Hz. If the unit of "
+            f"time is {number_text(times)} times as {size}, the rate is "
+            f"{number_text(self.rate / self.factor)} Hz. "
+            "If so, correct 'unit' of 'time' in the sensor file"
+        )
+        if self.statable:
+            rate = f"{self.rate:.4g} Hz"
+            text += f". If {rate} is right, state it there: 'rate: {rate}'"
+        return text
+
+
+@dataclass(frozen=True)
+class SuspiciousUnit(
+    FindingData,
+    code="suspicious_unit",
+    affects=_OF_UNIT,
+    unfit=True,
+    scales=POWERS_OF_UNIT,
+    doubt="the unit of {channels} looks wrong",
+):
+    """Gravity, or the noise, is usual in another unit than the stated one."""
+
+    stated: str
+    likely: str
+    """Units as the sensor file writes them."""
+    factor: float
+    """Corrects the samples."""
+    gravity: float | None = None
+    """Norm of the mean acceleration, m/s², if it shows the mistake."""
+    noise: float | None = None
+    """White noise, SI, if it shows the mistake."""
+    usual: tuple[float, float] | None = None
+    """Usual limits of the white noise, SI."""
+    printed: bool = False
+    """Whether they are from the data sheet of the sensor, and not of any."""
+
+    def text(self, channel: str) -> str:
+        """Return the finding in sentences."""
+        name = channel_name(channel)
+        if self.gravity is not None:
+            seen = f"the mean acceleration is {number_text(self.gravity)} m/s²"
+            usual = f"expected {number_text(STANDARD_GRAVITY)}"
+            mended = f"{number_text(self.gravity * self.factor)} m/s²"
+        else:
+            assert self.noise is not None
+            assert self.usual is not None
+            unit = unit_of(channel, "density")
+            seen = f"its noise is {unit.text(self.noise, 3)} {unit.sign}"
+            limits = " to ".join(unit.text(limit, 3) for limit in self.usual)
+            usual = f"expected {limits} {'by its data sheet' if self.printed else 'for any gyro'}"
+            mended = f"{unit.text(self.noise * self.factor, 3)} {unit.sign}"
+        return (
+            f"The unit of {name} is probably wrong: {seen}; {usual}. "
+            f"If the log is in {self.likely}, and not {self.stated}, it is {mended}. "
+            f"{_CORRECT_UNIT}"
+        )
+
+
+@dataclass(frozen=True)
+class GravityNorm(
+    FindingData,
+    code="gravity_norm",
+    affects=ALL,
+    doubt="the mean acceleration is not gravity",
+):
+    """The mean acceleration is not gravity, in no unit."""
+
+    norm: float
+    """m/s²."""
+    removed: bool
+    """Whether gravity seems to be subtracted."""
+
+    def text(self, channel: str) -> str:
+        """Return the finding in sentences."""
+        advice = (
+            "Gravity seems to be subtracted already (linear acceleration): use the raw data"
+            if self.removed
+            else "Check unit, scale, offset and columns of the accelerometer"
+        )
+        return (
+            f"The mean acceleration is {number_text(self.norm)} m/s²; expected "
+            f"{number_text(STANDARD_GRAVITY)}. {advice}"
+        )
+
+
+@dataclass(frozen=True)
+class NoiseUnlikeDatasheet(
+    FindingData,
+    code="noise_unlike_datasheet",
+    affects=ALL,
+    doubt="the noise of {channels} differs from its data sheet",
+):
+    """The white noise is far from the printed one, and no unit explains it."""
+
+    measured_on: str
+    """The channel, also where the finding is about all."""
+    noise: float
+    printed: float
+    """White noise, SI."""
+    stated_rate: float | None
+    """Hz, if the log has no time stamps: it may be the cause."""
+
+    def text(self, channel: str) -> str:
+        """Return the finding in sentences."""
+        name, unit = channel_name(self.measured_on), unit_of(self.measured_on, "density")
+        rate = f"the stated rate of {number_text(self.stated_rate)} Hz, " * bool(self.stated_rate)
+        return (
+            f"The noise of {name} is {unit.text(self.noise, 3)} {unit.sign}, "
+            f"{number_text(self.noise / self.printed, 3)} times the "
+            f"{unit.text(self.printed, 3)} of its data sheet. "
+            f"Check {rate}scale, range and column of the channel, and whether it is this sensor"
+        )
+
+
+@dataclass(frozen=True)
+class AxisUnlike(
+    FindingData,
+    code="axis_unlike",
+    affects=ALL,
+    doubt="the noise of {channels} differs from the other axes",
+):
+    """One axis has much more or much less noise than both others."""
+
+    others: tuple[str, ...]
+    ratio: float
+    """White noise over that of the others."""
+    noise: float
+    """White noise, SI."""
+    stated: str
+    likely: str | None
+    """Units as the sensor file writes them; None: no unit explains it."""
+
+    def text(self, channel: str) -> str:
+        """Return the finding in sentences."""
+        unit = (
+            f"A unit of {self.likely} instead of {self.stated} would explain it. "
+            if self.likely
+            else ""
+        )
+        return (
+            f"The noise of {channel_name(channel)} is {number_text(self.ratio, 3)} times that of "
+            f"{join_names([channel_name(other) for other in self.others])}: "
+            f"{value_text(self.noise, channel, 'density')}. Axes of one sensor rarely differ so "
+            f"much. {unit}Check unit, scale and column of this axis"
+        )
+
+
+@dataclass(frozen=True)
+class Turning(FindingData, code="turning", affects=ALL, unfit=True, doubt="the sensor was turning"):
+    """The mean rate of a gyro, or a steady turn of gravity, shows a rotation."""
+
+    rate: float
+    """Of the gyro, or of gravity relative to the sensor, rad/s."""
+    largest: float | None = None
+    """Largest plausible offset of the gyro, rad/s; None: gravity shows the turn."""
+    offset_of: str | None = None
+    """``data sheet``, or the price class, that limits the offset; None: any gyro."""
+    swept: float | None = None
+    """Angle by which gravity turns, rad."""
+    gyro_rate: float | None = None
+    """Mean rate of the gyros about the axis of gravity's turn, if it agrees, rad/s."""
+
+    def text(self, channel: str) -> str:
+        """Return the finding in sentences."""
+        rate = number_text(math.degrees(self.rate), 3)
+        if self.largest is not None:
+            limit = {None: "of any gyro", "data sheet": "by its data sheet"}.get(
+                self.offset_of, f"of price class {self.offset_of}"
+            )
+            return (
+                f"The mean rate of {channel_name(channel)} is {rate} °/s, above the largest "
+                f"plausible offset {limit} ({number_text(math.degrees(self.largest), 3)} °/s). "
+                "The sensor is turning, or the unit is wrong. "
+                "Record with the sensor at rest, or correct the unit"
+            )
+        gyros = (
+            ""
+            if self.gyro_rate is None
+            else f"The gyros show {number_text(math.degrees(self.gyro_rate), 3)} °/s about the "
+            "same axis. "
+        )
+        return (
+            "Gravity turns relative to the sensor by "
+            f"{number_text(math.degrees(self.swept or 0.0), 3)}°, steadily at {rate} °/s. {gyros}"
+            "The sensor is turning or tilting: record with the sensor at rest"
+        )
+
+
+_PREFIX_MISTAKES: Sequence[tuple[float, str]] = (
+    (1e-3, "thousandths of its unit"),
+    (1e3, "thousands of its unit"),
+    (1e-6, "millionths of its unit"),
+    (1e6, "millions of its unit"),
+)
+UNIT_MISTAKES: Mapping[str, Sequence[tuple[float, str]]] = {
+    "gyro": (
+        (math.radians(1.0), "degrees, and not rad"),
+        (math.degrees(1.0), "rad, and not degrees"),
+        *_PREFIX_MISTAKES,
+    ),
+    "accel": (
+        (STANDARD_GRAVITY, "g, and not m/s²"),
+        (1.0 / STANDARD_GRAVITY, "m/s², and not g"),
+        *_PREFIX_MISTAKES,
+    ),
+}
+"""Common unit mistakes: the factor that corrects a figure, and the mistake in words."""
+
+
+@dataclass(frozen=True)
+class UnusualFigure(
+    FindingData,
+    code="unusual_figure",
+    affects=_OF_UNIT | {"S"},
+    doubt="N or B of {channels} differs from all known sensors",
+):
+    """N or B is twenty times off the figures of other sensors."""
+
+    quantity: str
+    figure: str
+    """``N`` or ``B``."""
+    value: float
+    usual: float
+    """Median of other sensors, or the least if the value is below it, SI."""
+    sensors: int
+    """Number of those sensors."""
+    factor: float | None
+    """Of a unit mistake that explains it (`UNIT_MISTAKES`); None: there is none."""
+    lower: float | None = None
+    upper: float | None = None
+    """Limits of an estimate; its B is the minimum of the Allan deviation, as vendors print it."""
+    estimated: bool = False
+
+    def text(self, channel: str) -> str:
+        """Return the finding in sentences."""
+        symbol = "σ_min" if self.figure == "B" and self.estimated else self.figure
+        unit = unit_of(self.quantity, "density" if self.figure == "N" else "level")
+        digits = unit.digits(self.value, self.lower, self.upper)
+        if self.value > self.usual:
+            how = f"{number_text(self.value / self.usual, 3)} times the median"
+        else:
+            how = f"{number_text(self.usual / self.value, 3)} times below the least"
+        mistake = next(
+            (words for factor, words in UNIT_MISTAKES[self.quantity] if factor == self.factor), None
+        )
+        return (
+            f"{symbol} of {channel_name(channel) if channel else SENSORS[self.quantity]} is "
+            f"{unit.text(self.value, digits)} {unit.sign}, {how} of {self.sensors} sensors "
+            f"({unit.text(self.usual, 3)} {unit.sign}). "
+            + (
+                f"If it is in {mistake}, the value is "
+                f"{unit.text(self.value * (self.factor or 1.0), 3)} {unit.sign}: check its unit"
+                if mistake
+                else "Check whether its unit is right"
+            )
+        )

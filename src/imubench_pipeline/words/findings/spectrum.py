@@ -1,0 +1,162 @@
+"""Findings on the spectrum: lines, the fitted band, missing slow noise, differing methods."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from imubench_pipeline.words.findings.base import NONE, SLOW, FindingData, channel_name
+from imubench_pipeline.words.findings.shown import value_text
+from imubench_pipeline.words.numbers import counted, number_text, percent_text
+
+
+@dataclass(frozen=True)
+class MethodsDiffer(FindingData, code="N_differs", affects=NONE):
+    """N of the curve fit and N of the likelihood exclude each other."""
+
+    ratio: float
+    """N of the curve fit over N of the likelihood."""
+
+    def text(self, channel: str) -> str:
+        """Return the finding in sentences."""
+        return (
+            f"N of {channel_name(channel)} from the fit of the Allan variance is "
+            f"{number_text(self.ratio, 3)} times N of the likelihood, outside both intervals. "
+            "A low-pass filter, spectral lines or quantization noise bend the curve at short τ. "
+            "The likelihood models them: use its N"
+        )
+
+
+@dataclass(frozen=True)
+class Lines(FindingData, code="lines", affects=NONE):
+    """Spectral lines that the noise fit excludes."""
+
+    sinusoids: int
+    bands: int
+    """Number of narrow bands of noise."""
+    frequency: float
+    """Frequency of the strongest, Hz."""
+    ratio: float
+    """Density of the strongest over the noise floor."""
+
+    def text(self, channel: str) -> str:
+        """Return the finding in sentences."""
+        kinds = [
+            counted(number, noun)
+            for number, noun in ((self.sinusoids, "spectral line"), (self.bands, "noise band"))
+            if number
+        ]
+        one = self.sinusoids + self.bands == 1
+        where = f"at {number_text(self.frequency, 5)} Hz"
+        strength = f"{number_text(self.ratio, 3)} times the noise floor"
+        return (
+            f"{channel_name(channel)} has {' and '.join(kinds)}"
+            + (f" {where}, {strength}. It is" if one else f". The strongest is {where}, {strength}")
+            + (" " if one else ". They are ")
+            + "excluded from the noise fit. If the vibration is strong, record without it"
+        )
+
+
+@dataclass(frozen=True)
+class StrongLine(
+    FindingData,
+    code="strong_line",
+    affects=frozenset({"S"}),
+    doubt="a vibration of {channels} adds much to the white-noise error",
+):
+    """A sinusoid whose integral is comparable to that of white noise."""
+
+    frequency: float
+    """Hz."""
+    ratio: float
+    """Its integral over that of white noise after 1 s."""
+
+    def text(self, channel: str) -> str:
+        """Return the finding in sentences."""
+        return (
+            f"A sinusoid of {channel_name(channel)} at {number_text(self.frequency, 5)} Hz adds "
+            f"{number_text(self.ratio, 3)} times the white-noise error over 1 s. "
+            "The error budgets include it. "
+            "If the ground vibrates, and not the sensor, record elsewhere, or on softer ground"
+        )
+
+
+@dataclass(frozen=True)
+class TooManyLines(
+    FindingData,
+    code="too_many_lines",
+    affects=frozenset({"S"}),
+    doubt="{channels} has too many spectral lines",
+):
+    """More sinusoids than a noise model has."""
+
+    lines: int
+    single: int
+    """Number of lines that are used individually."""
+    groups: int
+    """Number of lines into which the others are merged."""
+    share: float
+    """Power of the others over the power of all lines."""
+    rms: float
+    """Of the others, SI."""
+
+    def text(self, channel: str) -> str:
+        """Return the finding in sentences."""
+        return (
+            f"{channel_name(channel)} has {self.lines} sinusoids, too many for a noise model. "
+            f"Error budgets, simulations and filters use the {self.single} strongest individually. "
+            f"The other {self.lines - self.single} are merged into {self.groups} of the same "
+            f"power, {percent_text(self.share)} of the power of all lines "
+            f"({value_text(self.rms, channel, 'signal')} rms). "
+            "Look for motors, fans or converters nearby, or record without them"
+        )
+
+
+@dataclass(frozen=True)
+class BandLimit(FindingData, code="band_limit", affects=NONE):
+    """The fit uses only frequencies below a limit."""
+
+    highest: float
+    """Hz."""
+    follows_model: bool
+    """Whether the spectrum follows a noise model up to there."""
+
+    def text(self, channel: str) -> str:
+        """Return the finding in sentences."""
+        name, limit = channel_name(channel), f"{number_text(self.highest)} Hz"
+        if not self.follows_model:
+            return (
+                f"No noise model fits the spectrum of {name} up to any frequency. The fit is "
+                f"limited to {limit}, a twentieth of the sampling rate. "
+                "Look at the spectrum for vibration"
+            )
+        return (
+            f"The spectrum of {name} bends above {limit}, as by the filter of the sensor. The fit "
+            "is limited to lower frequencies. Look at the spectrum for vibration, and state the "
+            "bandwidth in the sensor file"
+        )
+
+
+@dataclass(frozen=True)
+class SlowNoiseMissing(
+    FindingData,
+    code="slow_noise_missing",
+    affects=SLOW,
+    doubt="slow noise of {channels} was removed before logging",
+):
+    """Less power than white noise at the lowest frequencies."""
+
+    highest: float
+    """Frequency up to which power is missing, Hz."""
+    ratio: float
+    """Density up to there over that of white noise."""
+
+    def text(self, channel: str) -> str:
+        """Return the finding in sentences."""
+        return (
+            f"Up to {number_text(self.highest, 3)} Hz the spectrum of {channel_name(channel)} has "
+            f"{number_text(self.ratio, 2)} times the density of its white noise. "
+            "Slow noise only adds to it, so it was removed before the log was written. "
+            "K, B and the errors of dead reckoning are too small. "
+            "Switch off automatic zeroing, high-pass filters and the subtraction of means or "
+            "curves, and record again"
+        )

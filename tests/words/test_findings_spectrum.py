@@ -1,0 +1,41 @@
+import pytest
+
+from imubench_pipeline.words.findings import spectrum
+from imubench_pipeline.words.findings.base import FindingData
+from imubench_pipeline.words.findings.spectrum import (
+    BandLimit,
+    Lines,
+    MethodsDiffer,
+    SlowNoiseMissing,
+    StrongLine,
+    TooManyLines,
+)
+from tests.words.sentences import check_sentences, declared
+
+TEXTS: list[tuple[FindingData, list[str]]] = [
+    (MethodsDiffer(1.73), ["N of gyro z", "1.73 times", "quantization noise", "use its N"]),
+    (Lines(1, 0, 0.5691, 2.43), ["has 1 spectral line at 0.5691 Hz, 2.43 times the noise floor"]),
+    (Lines(2, 1, 17.0, 1e4), ["2 spectral lines and 1 noise band. The strongest is at 17 Hz"]),
+    (StrongLine(0.567, 0.576), ["at 0.567 Hz adds 0.576 times the white-noise error over 1 s"]),
+    (
+        TooManyLines(363, 12, 4, 0.0123, 1e-3),
+        ["363 sinusoids", "12 strongest", "The other 351", "1.23 %", "0.0573 °/s rms"],
+    ),
+    (BandLimit(5.0, follows_model=True), ["bends above 5 Hz", "state the bandwidth"]),
+    (BandLimit(5.0, follows_model=False), ["5 Hz, a twentieth of the sampling rate"]),
+    (SlowNoiseMissing(0.1, 0.31), ["Up to 0.1 Hz", "0.31 times", "Switch off automatic zeroing"]),
+]
+
+
+@pytest.mark.parametrize(("data", "parts"), TEXTS)
+def test_spectral_finding_states_its_numbers(data: FindingData, parts: list[str]) -> None:
+    text = check_sentences(data, "gyro_z")
+    assert all(part in text for part in parts), text
+
+
+def test_every_spectral_finding_has_a_text() -> None:
+    assert {type(data) for data, _ in TEXTS} == declared(spectrum)
+
+
+def test_units_follow_the_channel() -> None:
+    assert "102 mg rms" in TooManyLines(40, 12, 4, 0.1, 1.0).text("accel_x")
