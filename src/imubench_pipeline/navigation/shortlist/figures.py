@@ -72,7 +72,12 @@ def figures_of(sensor: Sensor, quantity: str, ranges: MeasuredRanges) -> Figures
     def filled(figure: str, statistic: str) -> Span | None:
         own = [row for row in printed if row.statistic == statistic]
         if own:
-            assumed.extend(f"{of} {figure}: {words}" for words in _describe_readings(own))
+            if any("assumed" in (row.reason or "") for row in own):
+                assumed.append(f"{of} {figure}: the side of the density is not stated: both")
+            if all(row.figure is not None and row.figure.kind == "max" for row in own):
+                assumed.append(
+                    f"{of} {figure}: a maximum alone is printed, the typical one may be better"
+                )
             return _find_ends(own)
         span = ranges.span(sensor.price_class, quantity, figure)
         if span is None:
@@ -127,25 +132,8 @@ def _find_ends(rows: Sequence[Comparable]) -> Span:
     return Span(min([*values, *least]), max(values))
 
 
-def _describe_readings(rows: Sequence[Comparable]) -> list[str]:
-    """Return the ambiguities of a printed figure, in words."""
-    readings = []
-    if any("assumed" in (row.reason or "") for row in rows):
-        readings.append("the side of the density is not stated: both")
-    if all(row.figure is not None and row.figure.kind == "max" for row in rows):
-        readings.append("a maximum alone is printed, the typical one may be better")
-    return readings
-
-
 def _read_printed(datasheet: Datasheet, quantity: str) -> tuple[list[Comparable], list[str]]:
     """Return the printed figures of all axes of a quantity, and the options included."""
-    sheet, options = _select_every_option(datasheet, quantity)
-    rows = [row for axis in "xyz" for row in comparables(sheet, f"{quantity}_{axis}")]
-    return [row for row in rows if row.value is not None], options
-
-
-def _select_every_option(datasheet: Datasheet, quantity: str) -> tuple[Datasheet, list[str]]:
-    """Return a datasheet with all options selected if it selects none, and these options."""
     sheet: QuantityDatasheet = getattr(datasheet, quantity)
     named = {
         figure.option
@@ -153,7 +141,9 @@ def _select_every_option(datasheet: Datasheet, quantity: str) -> tuple[Datasheet
         for figure in sheet.printed(name)
         if figure.option is not None
     }
-    if datasheet.options or not named:
-        return datasheet, []
-    options = sorted(named)
-    return datasheet.model_copy(update={"options": tuple(options)}), options
+    options: list[str] = []
+    if named and not datasheet.options:  # select all of them
+        options = sorted(named)
+        datasheet = datasheet.model_copy(update={"options": tuple(options)})
+    rows = [row for axis in "xyz" for row in comparables(datasheet, f"{quantity}_{axis}")]
+    return [row for row in rows if row.value is not None], options

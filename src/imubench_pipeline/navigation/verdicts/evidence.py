@@ -17,21 +17,20 @@ from imubench_pipeline.estimators.estimate import CURVE
 from imubench_pipeline.model.comparisons import ErrorBudgetRow
 from imubench_pipeline.navigation.verdicts.basis import Basis
 from imubench_pipeline.navigation.verdicts.standing import Standing
-from imubench_pipeline.noise import TERMS, Term
+from imubench_pipeline.noise import TERMS
 from imubench_pipeline.noise.terms.traits import Role
 from imubench_pipeline.settings.requirements import Requirement
 from imubench_pipeline.units import quantity_to_si
 
-
-def _list_parameters(kind: type[Term]) -> frozenset[str]:
-    symbols = frozenset(parameter.symbol for parameter in kind.parameters)
-    raises_the_curve = "B" in symbols or kind.role is Role.GAUSS_MARKOV
-    return symbols | frozenset(CURVE) if raises_the_curve else symbols
-
-
-_PARAMETERS_OF_SOURCE = {kind.word: _list_parameters(kind) for kind in TERMS}
+_PARAMETERS_OF_SOURCE: dict[str, frozenset[str]] = {}
 """Noise parameters by the first word of a term's name (`Term.source`). Bias instability determines
 the lowest part of the curve, so its terms include the parameters of the curve."""
+
+for _kind in TERMS:
+    _symbols = frozenset(parameter.symbol for parameter in _kind.parameters)
+    if "B" in _symbols or _kind.role is Role.GAUSS_MARKOV:
+        _symbols |= frozenset(CURVE)
+    _PARAMETERS_OF_SOURCE[_kind.word] = _symbols
 
 
 Reason = Literal["one_specimen", "short_log", "wide_interval", "few_axes"]

@@ -8,7 +8,7 @@ from typing import Any
 
 from imubench_pipeline.model.comparisons import ErrorBudgetRow
 from imubench_pipeline.model.states import Verdict
-from imubench_pipeline.model.verdicts import Condition, DoubtMark, Shortfall
+from imubench_pipeline.model.verdicts import Condition, Shortfall
 from imubench_pipeline.navigation.suitability.abilities import Abilities
 from imubench_pipeline.navigation.suitability.conditions import Conditions, once_calibrated
 from imubench_pipeline.navigation.verdicts.basis import Basis
@@ -61,7 +61,16 @@ class Judgement:
     @property
     def _verdict_on_errors(self) -> Verdict:
         """Verdict on the known errors: by the deciding limit, or by all after calibration."""
-        once = [_judge_once_calibrated(standing) for standing in self.standings]
+        once = [
+            once_calibrated(
+                each.verdict,
+                each.total.limit,
+                each.expected.sigma,
+                each.expected.upper,
+                each.conditions,
+            )
+            for each in self.standings
+        ]
         if self.decides.known and once != [standing.verdict for standing in self.standings]:
             return min(once, key=_WORST_FIRST.index)
         return self.decides.verdict
@@ -99,15 +108,18 @@ def judgements(
         for sensor, rows in of_sensors.items():
             devices, made = _map_specimens(sensor, rows, basis)
             by_limit = standings(_select_deciding_rows(rows, basis), devices, usual[made])
-            decides = deciding(by_limit)
+            price_class, price = sensors[sensor]["price_class"], None
+            if not requirement.admits(price_class):
+                asked = " or ".join(requirement.price_class or ())
+                price = Shortfall("price_class", price_class or "", asked)
             yield Judgement(
                 name,
                 requirement,
                 sensor,
                 by_limit,
-                decides,
+                deciding(by_limit),
                 [weaknesses(each, requirement, basis) if each.known else [] for each in by_limit],
-                _check_price(requirement, sensors[sensor]["price_class"]),
+                price,
                 Conditions.of(
                     requirement.must,
                     Abilities.model_validate(sensors[sensor].get("abilities", {})),
@@ -128,17 +140,15 @@ def _map_specimens(
 
 def _select_deciding_rows(rows: Sequence[ErrorBudgetRow], basis: Basis) -> list[ErrorBudgetRow]:
     """Return rows, with figures removed for recordings that do not decide."""
-    return [
-        row if doubts is None else _remove_figure(row, doubts)
-        for row, doubts in ((row, basis.apart.get((row.sensor, row.recording))) for row in rows)
-    ]
-
-
-def _remove_figure(row: ErrorBudgetRow, doubts: Iterable[DoubtMark]) -> ErrorBudgetRow:
-    reason = f"{row.recording} is not used: {doubts_text(doubts)}"
-    return replace(
-        row, sigma=None, lower=None, upper=None, within=None, reached_after=None, reason=reason
-    )
+    selected = []
+    for row in rows:
+        doubts = basis.apart.get((row.sensor, row.recording))
+        if doubts is not None:
+            reason = f"{row.recording} is not used: {doubts_text(doubts)}"
+            row = replace(row, sigma=None, lower=None, upper=None, within=None)
+            row = replace(row, reached_after=None, reason=reason)
+        selected.append(row)
+    return selected
 
 
 def _pool_spreads(
@@ -155,16 +165,3 @@ def _pool_spreads(
                 by_limit.setdefault(limit_of(standing.total), []).append(standing.expected.spread)
     usual = {key: usual_spread(spreads) for key, spreads in by_limit.items()}
     return {key: spread for key, spread in usual.items() if spread is not None}
-
-
-def _judge_once_calibrated(standing: Standing) -> Verdict:
-    error = standing.expected
-    return once_calibrated(
-        standing.verdict, standing.total.limit, error.sigma, error.upper, standing.conditions
-    )
-
-
-def _check_price(requirement: Requirement, price_class: str | None) -> Shortfall | None:
-    if requirement.admits(price_class):
-        return None
-    return Shortfall("price_class", price_class or "", " or ".join(requirement.price_class or ()))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, TypeVar, get_args
+from typing import TypeVar, get_args
 
 from scipy.special import stdtrit
 
@@ -24,8 +24,6 @@ from imubench_pipeline.navigation.verdicts.standing import Standing
 from imubench_pipeline.words.next_steps import next_step_text
 
 T = TypeVar("T")
-
-_ACTION_ORDER = get_args(Action)
 
 _MAX_DURATION_FACTOR = 100.0
 """Maximum recommended duration over the present one: it makes limits ten times as narrow."""
@@ -55,18 +53,35 @@ class _Step:
 
 def next_step_rows(judged: Sequence[Judgement], basis: Basis) -> list[NextStepRow]:
     """Return the rows of the table ``next_steps``, sorted by the number of changed verdicts."""
-    groups: dict[tuple[Any, ...], list[_Step]] = {}
+    groups: dict[tuple[tuple[str, str | None], Action], list[_Step]] = {}
     for judgement in judged:
         if not judgement.shortfalls:
             for step in _list_steps(judgement, basis):
                 groups.setdefault((step.key, step.action), []).append(step)
-    rows = [_make_row(steps, basis) for steps in groups.values()]
+    rows = []
+    for ((sensor, recording), action), steps in groups.items():
+        turned = {step.requirement for step in steps if step.turns}
+        row = NextStepRow(
+            sensor=sensor,
+            recording=recording,
+            requirements=_unite(step.requirement for step in steps),
+            action=action,
+            quantities=_unite(name for step in steps for name in step.quantities),
+            figures=_unite(figure for step in steps for figure in step.figures),
+            doubts=_unite(code for step in steps for code in step.doubts),
+            verdicts_turned=len(turned),
+            verdicts_strengthened=len({step.requirement for step in steps} - turned),
+            duration=max((step.duration for step in steps if step.duration), default=None),
+            logged=basis.duration((sensor, recording)) if recording else None,
+            specimens=max((step.specimens for step in steps if step.specimens), default=None),
+        )
+        rows.append(replace(row, text=next_step_text(row)))
     return sorted(
         rows,
         key=lambda row: (
             -row.verdicts_turned,
             -row.verdicts_strengthened,
-            _ACTION_ORDER.index(row.action),
+            get_args(Action).index(row.action),
             row.sensor,
             row.recording or "",
         ),
@@ -181,30 +196,6 @@ def _find_longest(sensor: str, standing: Standing, basis: Basis) -> tuple[Key, f
 def _compute_duration_needed(judgement: Judgement) -> float:
     """Return the length of a log that can determine the error of the deciding limit, s."""
     return longest_asked(judgement.decides.total, judgement.requirement) / MAX_TIME_SHARE
-
-
-def _make_row(steps: Sequence[_Step], basis: Basis) -> NextStepRow:
-    first = steps[0]
-    turned = {step.requirement for step in steps if step.turns}
-    strengthened = {step.requirement for step in steps} - turned
-    duration = max((step.duration for step in steps if step.duration), default=None)
-    specimens = max((step.specimens for step in steps if step.specimens), default=None)
-    sensor, recording = first.key
-    row = NextStepRow(
-        sensor=sensor,
-        recording=recording,
-        requirements=_unite(step.requirement for step in steps),
-        action=first.action,
-        quantities=_unite(name for step in steps for name in step.quantities),
-        figures=_unite(figure for step in steps for figure in step.figures),
-        doubts=_unite(code for step in steps for code in step.doubts),
-        verdicts_turned=len(turned),
-        verdicts_strengthened=len(strengthened),
-        duration=duration,
-        logged=basis.duration((sensor, recording)) if recording else None,
-        specimens=specimens,
-    )
-    return replace(row, text=next_step_text(row))
 
 
 def _unite(values: Iterable[T]) -> tuple[T, ...]:

@@ -32,7 +32,7 @@ from scipy.special import stdtr, stdtrit
 
 from imubench_pipeline.model.comparisons import ErrorBudgetRow
 from imubench_pipeline.model.states import SpreadOf
-from imubench_pipeline.navigation.pooled import NORMAL_QUANTILE, Pool, bounded_exp, pool
+from imubench_pipeline.navigation.pooled import NORMAL_QUANTILE, bounded_exp, pool
 
 Limits = tuple[float, float, float]  # value, lower, upper
 
@@ -80,12 +80,19 @@ def expected(
     recording; the specimen of each recording; and the spread of other sensors, which is used with
     one specimen only. Rows without a figure are ignored.
     """
-    figures = [(row, figure) for row in totals if (figure := _read_limits(row)) is not None]
+    figures = [
+        (row, (row.sigma, row.lower, row.upper))
+        for row in totals
+        if row.sigma is not None and row.lower is not None and row.upper is not None
+    ]
     if not figures:
         return Expected(None, None, None, None, 0, 0)
     groups: dict[str, list[Limits]] = {}
-    for row, figure in figures:
-        groups.setdefault(devices[row.recording], []).append(_clip_limits(*figure))
+    for row, (value, lower, upper) in figures:
+        # `pool` needs positive limits on either side of a value.
+        lower = min(max(lower, _MIN_LOWER_RATIO * value), value * (1.0 - _MIN_RELATIVE_WIDTH))
+        upper = max(upper, value * (1.0 + _MIN_RELATIVE_WIDTH))
+        groups.setdefault(devices[row.recording], []).append((value, lower, upper))
     counts = (len(groups), len(figures))
     if any(sigma <= 0.0 for _, (sigma, _, _) in figures) or (len(figures) == 1 and usual is None):
         worst, figure = max(figures, key=lambda pair: pair[1][0])
@@ -103,8 +110,10 @@ def expected(
     else:
         values = [_pool_device(own) for own in groups.values()]
     together = pool(*zip(*values, strict=True))
-    spread = _estimate_spread(values, together)
-    assert together.value is not None and together.error is not None  # several, all usable
+    # There are several, and all are usable.
+    assert together.value is not None and together.error is not None and together.spread is not None
+    least = _MIN_VARIANCE_SHARE * variance([math.log(value) for value, _, _ in values])
+    spread = Spread(max(together.spread**2, least), len(values) - 1)
     scale = math.sqrt(spread.variance + together.error**2)
     prediction = _predict(math.log(together.value), scale, spread.freedom, limit)
     of: SpreadOf = "specimens" if len(groups) > 1 else "recordings"
@@ -125,31 +134,10 @@ def usual_spread(spreads: Iterable[Spread]) -> Spread | None:
     )
 
 
-def _read_limits(row: ErrorBudgetRow) -> Limits | None:
-    if row.sigma is None or row.lower is None or row.upper is None:
-        return None
-    return row.sigma, row.lower, row.upper
-
-
-def _clip_limits(value: float, lower: float, upper: float) -> Limits:
-    """Return value and limits for `pool`: positive limits on either side of the value."""
-    return (
-        value,
-        min(max(lower, _MIN_LOWER_RATIO * value), value * (1.0 - _MIN_RELATIVE_WIDTH)),
-        max(upper, value * (1.0 + _MIN_RELATIVE_WIDTH)),
-    )
-
-
 def _pool_device(recordings: Sequence[Limits]) -> Limits:
     pooled = pool(*zip(*recordings, strict=True))
     assert pooled.value and pooled.lower and pooled.upper  # all are usable
     return pooled.value, pooled.lower, pooled.upper
-
-
-def _estimate_spread(values: Sequence[Limits], together: Pool) -> Spread:
-    least = _MIN_VARIANCE_SHARE * variance([math.log(value) for value, _, _ in values])
-    assert together.spread is not None  # there are several
-    return Spread(max(together.spread**2, least), len(values) - 1)
 
 
 def _predict(

@@ -9,7 +9,7 @@ exact if one quantity dominates the error, as it does if a unit changes a verdic
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -54,7 +54,17 @@ def unless(sensor: str, rows: Sequence[ErrorBudgetRow], basis: Basis) -> Unless 
     devices = {name: basis.device((of, name)) for of, name in keys}
     logged = deciding(standings(own, devices))
     factors = {key: basis.factors(key) for key in doubted}
-    corrected = deciding(standings(list(_correct_rows(own, factors)), devices)) if factors else None
+    corrected = None
+    if factors:
+        by_total: dict[tuple[str, tuple[Any, ...]], list[ErrorBudgetRow]] = {}
+        for row in own:
+            by_total.setdefault((row.recording, limit_of(row)), []).append(row)
+        in_other_unit = [
+            row
+            for (recording, _), parts in by_total.items()
+            for row in scaled(parts, factors.get((sensor, recording), {}))
+        ]
+        corrected = deciding(standings(in_other_unit, devices))
     if corrected is not None and not unjudged and corrected.verdict == logged.verdict:
         corrected = None
     if not logged.known or (corrected is None and not unjudged):
@@ -62,17 +72,6 @@ def unless(sensor: str, rows: Sequence[ErrorBudgetRow], basis: Basis) -> Unless 
     doubts = {key: basis.doubted(key) for key in (doubted or apart)}
     together = {name: f for of_recording in factors.values() for name, f in of_recording.items()}
     return Unless(logged if unjudged else None, corrected, together, doubts)
-
-
-def _correct_rows(
-    rows: Iterable[ErrorBudgetRow], factors: Mapping[tuple[str, str], Factors]
-) -> Iterator[ErrorBudgetRow]:
-    """Yield rows with the figures of the recordings in the other unit."""
-    by_total: dict[tuple[Any, ...], list[ErrorBudgetRow]] = {}
-    for row in rows:
-        by_total.setdefault((row.sensor, row.recording, *limit_of(row)), []).append(row)
-    for (sensor, recording, *_), parts in by_total.items():
-        yield from scaled(parts, factors.get((sensor, recording), {}))
 
 
 def scaled(parts: Sequence[ErrorBudgetRow], factors: Factors) -> list[ErrorBudgetRow]:
@@ -92,25 +91,18 @@ def scaled(parts: Sequence[ErrorBudgetRow], factors: Factors) -> list[ErrorBudge
     sigma = math.hypot(*(size for _, size in sources))
     by = sigma / total.sigma
     lower, upper = by * total.lower, by * total.upper
-    within = _compute_chance_within(total.limit, sigma, lower, upper)
+    within = None
+    if total.limit is not None:
+        # The error is log-normal on either side; without a lower limit, either is possible.
+        away = math.log(total.limit / sigma)
+        if away <= 0.0 and lower <= 0.0:
+            within = 0.5
+        elif (half := math.log(upper / sigma if away > 0.0 else sigma / lower)) > 0.0:
+            within = float(ndtr(NORMAL_QUANTILE * away / half))
+        else:
+            within = 1.0 if away >= 0.0 else 0.0
     return [
         replace(total, sigma=sigma, lower=lower, upper=upper, within=within, reached_after=None),
         *(replace(row, sigma=size) for row, size in sources),
         *missing,
     ]
-
-
-def _compute_chance_within(
-    limit: float | None, sigma: float, lower: float, upper: float
-) -> float | None:
-    """Return the probability that an error is within its limit, log-normal on either side."""
-    if limit is None:
-        return None
-    away = math.log(limit / sigma)
-    if away <= 0.0 and lower <= 0.0:
-        return 0.5  # without limits, either is possible
-    side = upper / sigma if away > 0.0 else sigma / lower
-    half = math.log(side)
-    if half <= 0.0:
-        return 1.0 if away >= 0.0 else 0.0
-    return float(ndtr(NORMAL_QUANTILE * away / half))
