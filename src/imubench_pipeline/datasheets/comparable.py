@@ -110,7 +110,17 @@ class PrintedAxis:
         ]
         logged = [f for f in listed if f.option is None or f.option in self.options]
         rows = [self._make_row(name, figure, like, convert) for figure in logged or listed]
-        return [_add_interval(row, rows) for row in rows]
+        # Add the least and the largest figure of the same option.
+        ends: dict[str | None, list[float]] = {}
+        for row in rows:
+            own = ends.setdefault(row.figure.option if row.figure else None, [])
+            own += [value for value in (row.least, row.value) if value is not None]
+        return [
+            replace(row, lower=min(own), upper=max(own))
+            if row.figure and row.value is not None and (own := ends[row.figure.option])
+            else row
+            for row in rows
+        ]
 
     def _make_row(
         self,
@@ -154,26 +164,30 @@ class PrintedAxis:
         return replace(like, reason=reason, looked_up=looked_up)
 
 
-def _add_interval(row: Comparable, rows: Sequence[Comparable]) -> Comparable:
-    """Return a row with the least and the largest figure among the rows of its option."""
-    option = row.figure.option if row.figure else None
-    values = [
-        value
-        for other in rows
-        if other.figure is not None and other.figure.option == option and row.value is not None
-        for value in (other.least, other.value)
-        if value is not None
-    ]
-    return replace(row, lower=min(values), upper=max(values)) if values else row
-
-
 def comparables(datasheet: Datasheet, channel: str) -> Iterator[Comparable]:
     """Yield the datasheet figures of N, bias instability, K and T_B of a channel, SI.
 
     Rows have no figure if none is published, or if nobody looked it up.
     """
     axis = PrintedAxis.of(datasheet, channel)
-    noise = [*_read_densities(axis), *_read_random_walks(axis), *_read_rms(axis)]
+    walk = Comparable("N", "N", None, reason="random walk as printed is N")
+    rms_to_si = axis.si("rms_noise")
+
+    def convert_rms(value: float, figure: PrintedFigure) -> float:
+        bandwidth = noise_bandwidth(figure.bandwidth_hz or 0.0, figure.filter)
+        return noise_of_rms(rms_to_si(value, figure), bandwidth)
+
+    rms = Comparable("N", "N", None, "one-sided", reason="rms; N is rms / sqrt(2 bandwidth)")
+    noise = [
+        *_read_densities(axis),
+        *axis.read("random_walk", walk, axis.si("random_walk")),
+        *(
+            replace(row, reason=f"{row.reason}, {row.figure.bandwidth} ({row.figure.filter})")
+            if row.figure and row.value is not None
+            else row
+            for row in axis.read("rms_noise", rms, convert_rms)
+        ),
+    ]
     names = ("noise_density", "random_walk", "rms_noise")
     yield from noise or [axis.unpublished(Comparable("N", "N", None), *names)]
     for name, quantity, statistic, reason in (
@@ -237,24 +251,3 @@ def _read_densities(axis: PrintedAxis) -> Iterator[Comparable]:
                 convert,
                 [figure for figure in figures if figure.sidedness == stated],
             )
-
-
-def _read_random_walks(axis: PrintedAxis) -> list[Comparable]:
-    like = Comparable("N", "N", None, reason="random walk as printed is N")
-    return axis.read("random_walk", like, axis.si("random_walk"))
-
-
-def _read_rms(axis: PrintedAxis) -> list[Comparable]:
-    si = axis.si("rms_noise")
-
-    def convert(value: float, figure: PrintedFigure) -> float:
-        bandwidth = noise_bandwidth(figure.bandwidth_hz or 0.0, figure.filter)
-        return noise_of_rms(si(value, figure), bandwidth)
-
-    like = Comparable("N", "N", None, "one-sided", reason="rms; N is rms / sqrt(2 bandwidth)")
-    return [
-        replace(row, reason=f"{row.reason}, {row.figure.bandwidth} ({row.figure.filter})")
-        if row.figure and row.value is not None
-        else row
-        for row in axis.read("rms_noise", like, convert)
-    ]

@@ -154,8 +154,12 @@ def compare(entry: Comparable, parameter: Parameter, tolerance: float) -> Delta:
     if entry.value is None:
         return replace(row, verdict="not comparable (condition)", reason=entry.obstacle)
     if value is None:
-        verdict, reason = _judge_without_value(entry, parameter, tolerance)
-        return replace(row, verdict=verdict, reason=reason)
+        reason = f"{STATUS_WORDS[parameter.status]}: {parameter.reason}"
+        if upper is not None:
+            least = _classify_value(entry, lower or 0.0, tolerance)
+            if least == _classify_value(entry, upper, tolerance) != "as printed":
+                return replace(row, verdict=least, reason=f"{reason}; the limits alone decide")
+        return replace(row, verdict="not measured", reason=reason)
     row = replace(
         row,
         delta=_compute_relative_difference(value, entry.value),
@@ -169,18 +173,6 @@ def compare(entry: Comparable, parameter: Parameter, tolerance: float) -> Delta:
         reasons.append(f"the 95 % interval reaches from {least!r} to {largest!r}")
     words = "; ".join(reason for reason in reasons if reason)
     return replace(row, verdict=least if least == largest else "not sure", reason=words or None)
-
-
-def _judge_without_value(
-    entry: Comparable, parameter: Parameter, tolerance: float
-) -> tuple[str, str]:
-    """Return verdict and reason if the log gives only limits, or nothing."""
-    reason = f"{STATUS_WORDS[parameter.status]}: {parameter.reason}"
-    if parameter.upper is not None:
-        least = _classify_value(entry, parameter.lower or 0.0, tolerance)
-        if least == _classify_value(entry, parameter.upper, tolerance) != "as printed":
-            return least, f"{reason}; the limits alone decide"
-    return "not measured", reason
 
 
 def _classify_value(entry: Comparable, value: float, tolerance: float) -> str:

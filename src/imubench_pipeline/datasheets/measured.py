@@ -40,38 +40,24 @@ def measured(entry: Comparable, estimate: Estimate, tau: NDArray[np.float64]) ->
         # An estimate that was made by hand has only its terms.
         of_curve = estimate.curve or of_model(estimate.model, tau)
         if statistic == "plateau":
-            return _scale(of_curve["B_curve"], FLOOR)
+            top = of_curve["B_curve"]
+            value, lower, upper = (
+                None if each is None else each * FLOOR for each in (top.value, top.lower, top.upper)
+            )
+            return replace(top, value=value, lower=lower, upper=upper)
         return of_curve["sigma_min"]
-    if statistic == "adev":
-        return _evaluate_curve(estimate, tau, entry.tau or math.nan)
-    return estimate.parameters[statistic]
-
-
-def _scale(parameter: Parameter, factor: float) -> Parameter:
-    value, lower, upper = (
-        None if each is None else each * factor
-        for each in (parameter.value, parameter.lower, parameter.upper)
-    )
-    return replace(parameter, value=value, lower=lower, upper=upper)
-
-
-def _evaluate_curve(estimate: Estimate, tau: NDArray[np.float64], at: float) -> Parameter:
+    if statistic != "adev":
+        return estimate.parameters[statistic]
+    at = entry.tau or math.nan
     if not len(tau) or not tau[0] <= at <= tau[-1]:
         return Parameter(None, "not_shown", f"the log does not show the curve at {at:g} s")
-    where = np.array([at])
-    return _add_curve_limits(
-        math.sqrt(float(estimate.model.allan_variance(where)[0])), estimate, where
+    ends = _list_interval_ends(estimate)
+    point, *points = (
+        math.sqrt(float(each.model.allan_variance(np.array([at]))[0])) for each in (estimate, *ends)
     )
-
-
-def _add_curve_limits(value: float, estimate: Estimate, tau: NDArray[np.float64]) -> Parameter:
-    """Return a point of the curve of a model with limits from the limits of its parameters."""
-    points = [
-        float(np.sqrt(end.model.allan_variance(tau)[0])) for end in _list_interval_ends(estimate)
-    ]
     if not points:
-        return Parameter(value)
-    return Parameter(value, lower=min(value, *points), upper=max(value, *points))
+        return Parameter(point)
+    return Parameter(point, lower=min(point, *points), upper=max(point, *points))
 
 
 def _list_interval_ends(estimate: Estimate) -> Iterator[Estimate]:

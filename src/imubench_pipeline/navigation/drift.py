@@ -63,10 +63,8 @@ Estimated = ParameterRow | FixedBiasRow
 
 _MIN_RECORDINGS = 3  # to estimate the spread between recordings
 _MIN_RECORDINGS_FOR_LINE = 8  # a line takes one degree of freedom more
-_RECORDINGS_UPDATED_EACH, _UPDATE_GROWTH = (
-    32,
-    1.05,
-)  # tau is found anew with each of 32 recordings, then with each 5 % more
+# tau is estimated again with each of 32 recordings, then with each 5 % more
+_RECORDINGS_UPDATED_EACH, _UPDATE_GROWTH = 32, 1.05
 _COMPARED_NAMES = (*POOLED_PARAMETERS, "bias")
 _BIAS_TERMS = {kind.symbol for kind in TERMS if PARAMETERS["B"] in kind.parameters}
 _EMPTY_RESULT = (math.nan, math.nan, math.nan, math.nan, 0.0, -1.0, -1.0)
@@ -89,25 +87,21 @@ def order_of(recordings: Iterable[RecordingRow]) -> tuple[list[RecordingRow], Or
     that was never set); equal stamps are ordered by name. Else it is the name, with its numbers as
     numbers: run_2 before run_10. A stamp without a zone is UTC, as the readers write it.
     """
-    by_name = sorted(recordings, key=lambda row: _split_numbers(row.recording))
+
+    def split_numbers(row: RecordingRow) -> tuple[list[tuple[str, int]], str]:
+        parts = re.findall(r"(\D*)(\d*)", row.recording)
+        return [(text.casefold(), int(digits or -1)) for text, digits in parts], row.recording
+
+    by_name = sorted(recordings, key=split_numbers)
     try:
-        stamps = [_parse_stamp(row.started or "") for row in by_name]
+        stamps = [datetime.fromisoformat((row.started or "").strip()) for row in by_name]
     except ValueError:
         return by_name, "name"
+    stamps = [stamp if stamp.tzinfo else stamp.replace(tzinfo=UTC) for stamp in stamps]
     if len(set(stamps)) < 2:
         return by_name, "name"
     pairs = sorted(zip(stamps, range(len(stamps)), strict=True))
     return [by_name[index] for _, index in pairs], "started"
-
-
-def _parse_stamp(started: str) -> datetime:
-    stamp = datetime.fromisoformat(started.strip())
-    return stamp if stamp.tzinfo else stamp.replace(tzinfo=UTC)
-
-
-def _split_numbers(name: str) -> tuple[list[tuple[str, int]], str]:
-    parts = re.findall(r"(\D*)(\d*)", name)
-    return [(text.casefold(), int(digits or -1)) for text, digits in parts], name
 
 
 def series_of(recordings: Iterable[RecordingRow]) -> Iterator[Series]:
@@ -158,7 +152,7 @@ def drift_rows(
 def _make_rows(
     series: Series, cells: Sequence[dict[tuple[str, str], Estimated]]
 ) -> Iterator[DriftRow]:
-    points: dict[tuple[str, ...], dict[int, tuple[float, ...]]] = {}
+    points: dict[tuple[str, str, str], dict[int, tuple[float, ...]]] = {}
     units: dict[tuple[str, str], str] = {}
     for place, cell in enumerate(cells):
         for key, row in cell.items():
@@ -169,7 +163,13 @@ def _make_rows(
     data = np.full((3, len(cells), len(columns)), np.nan)
     for column, index in columns.items():
         data[:, list(points[column]), index] = np.transpose(list(points[column].values()))
-    tested_as = [columns.get(_find_tested_column(key), index) for key, index in columns.items()]
+    # The test of the curve decides for B of one term.
+    tested_as = [
+        columns.get((channel, "B_curve", ""), index)
+        if name == "B" and kind in _BIAS_TERMS
+        else index
+        for (channel, name, kind), index in columns.items()
+    ]
     levels = np.moveaxis(_Levels(data, np.array(tested_as, dtype=int)).results, 0, 2).tolist()
     for key in sorted(
         units, key=lambda key: (key[0][0] != "g", key[0], _COMPARED_NAMES.index(key[1]))
@@ -227,14 +227,7 @@ def _get_bias_terms(row: Estimated | None) -> str:
     """Return the terms of B and T_B, such as ``F`` or ``GM``; empty for other parameters."""
     if not isinstance(row, ParameterRow) or row.parameter not in ("B", "T_B"):
         return ""
-    terms = row.model.split("+")
-    return "+".join(term for term in terms if term in _BIAS_TERMS)
-
-
-def _find_tested_column(column: tuple[str, ...]) -> tuple[str, ...]:
-    """Return the channel, parameter and terms whose test decides for this column."""
-    channel, parameter, kind = column
-    return (channel, "B_curve", "") if parameter == "B" and kind in _BIAS_TERMS else column
+    return "+".join(term for term in row.model.split("+") if term in _BIAS_TERMS)
 
 
 def _make_point(row: Estimated) -> tuple[float, ...]:

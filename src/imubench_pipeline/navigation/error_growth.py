@@ -17,7 +17,7 @@ import numpy as np
 from imubench_pipeline.earth import STANDARD_GRAVITY
 from imubench_pipeline.estimators.estimate import Estimate
 from imubench_pipeline.model.estimates import ErrorGrowthRow
-from imubench_pipeline.navigation.error_budget import Budget, Figures, Uncalibrated, draw_models
+from imubench_pipeline.navigation.error_budget import Figures, Uncalibrated, draw_models
 from imubench_pipeline.navigation.error_budget.budget import ACCEL_ORDER, GYRO_ORDER
 from imubench_pipeline.navigation.expected_errors import (
     NO_FIGURES_OF_CHANNELS,
@@ -92,9 +92,12 @@ def growth_rows(
             total = total + at_rest / (start.window * STANDARD_GRAVITY) ** 2
         return total
 
-    for axis, at_rest in product(
-        answerers := _map_answering_axes(axes), sorted({*_STANDARD_WINDOWS, window})
-    ):
+    # The candidate channels for the worst axes, and for each axis alone.
+    answerers = {"worst": axes}
+    letters = sorted({channel[-1] for channel in axes})
+    for letter in letters if len(letters) > 1 else []:
+        answerers[letter] = {name: errors for name, errors in axes.items() if name[-1] == letter}
+    for axis, at_rest in product(answerers, sorted({*_STANDARD_WINDOWS, window})):
         for question in standard(sorted({*_STANDARD_TIMES, *times}), at_rest, 0.0, ["worst"]):
             if question.error == "north":
                 continue
@@ -117,26 +120,10 @@ def growth_rows(
                 time=question.time,
                 unit=SI_UNITS[DIMENSIONS[question.error]],
             )
-            lower, upper = _compute_limits(budget, drawn)
+            sure = math.fsum(p.sigma**2 for p in budget.contributions if p.cause != "noise")
+            ends = np.quantile(np.sqrt(drawn + sure), [_TAIL_PROBABILITY, 1.0 - _TAIL_PROBABILITY])
+            # Draws of an absent term are above 0: extend the limits to the value.
+            lower, upper = min(float(ends[0]), budget.total), max(float(ends[1]), budget.total)
             yield row(source="total", sigma=budget.total, lower=lower, upper=upper)
             for part in sorted(budget.contributions, key=lambda one: -one.sigma):
                 yield row(source=part.source, sigma=part.sigma)
-
-
-def _map_answering_axes(axes: Mapping[str, AxisErrors]) -> dict[str, dict[str, AxisErrors]]:
-    """Return the candidate channels for the worst axes, and for each axis alone."""
-    letters = sorted({channel[-1] for channel in axes})
-    alone = {
-        letter: {channel: errors for channel, errors in axes.items() if channel[-1] == letter}
-        for letter in letters
-        if len(letters) > 1
-    }
-    return {"worst": dict(axes), **alone}
-
-
-def _compute_limits(budget: Budget, drawn: Array) -> tuple[float, float]:
-    """Return the limits of the total of a budget, from the drawn variances of the noise."""
-    sure = math.fsum(part.sigma**2 for part in budget.contributions if part.cause != "noise")
-    lower, upper = np.quantile(np.sqrt(drawn + sure), [_TAIL_PROBABILITY, 1.0 - _TAIL_PROBABILITY])
-    # Draws of an absent term are above 0: extend the limits to the value.
-    return min(float(lower), budget.total), max(float(upper), budget.total)

@@ -127,11 +127,16 @@ def pool(
     triples = list(zip(values, lower, upper, strict=True))
     used = [triple for triple in triples if usable(triple)]
     others = [triple[1:] for triple in triples if not usable(triple)]
+
+    def count_outside(low: float, high: float) -> int:
+        """Count the left-out intervals that lie wholly outside a range; None is an open end."""
+        return sum((b is not None and b < low) or (a is not None and a > high) for a, b in others)
+
     if not used:
         return Pool(None, None, None, 0, len(others))
     if len(used) == 1:
         value, low, high = used[0]
-        return Pool(value, low, high, 1, len(others), _count_outside(others, low, high))
+        return Pool(value, low, high, 1, len(others), count_outside(low, high))
     middle, points = points_about_median(used)
     freedom = len(used) - 1
     low_q, high_q, t = _compute_quantiles(freedom)
@@ -141,9 +146,6 @@ def pool(
     error = 1.0 / math.sqrt(weight)
     half = max(t * math.sqrt(q / freedom), NORMAL_QUANTILE) * error
     predicted = t * math.hypot(math.sqrt(spread_squared), error)
-    outside = _count_outside(
-        others, bounded_exp(centre - predicted), bounded_exp(centre + predicted)
-    )
     p_value = float(chdtrc(freedom, _minimise_q(points, 0.0)[1]))
     return Pool(
         value=math.exp(centre),
@@ -151,7 +153,9 @@ def pool(
         upper=bounded_exp(centre + half),
         recordings=len(used),
         left_out=len(others),
-        contradicting=outside,
+        contradicting=count_outside(
+            bounded_exp(centre - predicted), bounded_exp(centre + predicted)
+        ),
         error=error,
         spread=math.sqrt(spread_squared),
         spread_lower=math.sqrt(_solve_spread_squared(points, high_q)),
@@ -167,11 +171,6 @@ def usable(triple: tuple[float | None, ...]) -> TypeGuard[tuple[float, float, fl
     if value is None or lower is None or upper is None:
         return False
     return 0.0 < lower < value < upper < math.inf  # False for NaN
-
-
-def _count_outside(limits: Iterable[Sequence[float | None]], low: float, high: float) -> int:
-    """Count the intervals that lie wholly outside a range; a limit of None is open."""
-    return sum((b is not None and b < low) or (a is not None and a > high) for a, b in limits)
 
 
 def bounded_exp(exponent: float) -> float:
@@ -267,26 +266,6 @@ def turn_on_bias(means: Iterable[float | None]) -> TurnOnBias:
     return TurnOnBias(*counts, mean, mean - half, mean + half, deviation, *limits)
 
 
-def _test_devices(pairs: Sequence[tuple[float, str]]) -> float | None:
-    """Return the p-value of equal device means (one-way analysis of variance).
-
-    F = [sum_d n_d (m_d - m)^2 / (D - 1)] / [sum (y - m_d)^2 / (K - D)] for K recordings of D
-    devices (Fisher 1925). All recordings have equal weight: their errors are part of the spread
-    within a device. None with one device, without repeats or without scatter.
-    """
-    groups: dict[str, list[float]] = {}
-    for value, device in pairs:
-        groups.setdefault(device, []).append(value)
-    between, within = len(groups) - 1, len(pairs) - len(groups)
-    if between < 1 or within < 1:
-        return None
-    grand = math.fsum(value for value, _ in pairs) / len(pairs)
-    means = [(math.fsum(group) / len(group), group) for group in groups.values()]
-    apart = math.fsum(len(group) * (mean - grand) ** 2 for mean, group in means)
-    inside = math.fsum((y - mean) ** 2 for mean, group in means for y in group)
-    return float(fdtrc(between, within, apart * within / between / inside)) if inside else None
-
-
 def pooled_rows(
     parameters: Iterable[ParameterRow],
     biases: Iterable[FixedBiasRow],
@@ -375,7 +354,8 @@ def _make_parameter_row(
         (row.value if row.status == "ok" else None, row.lower, row.upper) for _, row in present
     ]
     pooled = pool(*zip(*triples, strict=True))
-    logs, left_out = [], Counter[str]()
+    logs: list[tuple[float | None, str]] = []
+    left_out = Counter[str]()
     for (of, row), triple in zip(present, triples, strict=True):
         if usable(triple):
             logs.append((math.log(triple[0]), of))
@@ -443,10 +423,25 @@ def _make_bias_row(
 
 
 def _describe_device_effects(pairs: Iterable[tuple[float | None, str]], several: bool) -> list[str]:
-    """Return how the spread between devices compares with repeats, if it can be tested."""
-    finite = [(y, device) for y, device in pairs if y is not None and math.isfinite(y)]
-    p_value = _test_devices(finite) if several else None
-    if p_value is None:
+    """Return how the spread between devices compares with repeats, if it can be tested.
+
+    The test of equal device means is a one-way analysis of variance (Fisher 1925). Recordings have
+    equal weights: their errors are part of the spread within a device.
+    """
+    groups: dict[str, list[float]] = {}
+    for value, device in pairs:
+        if value is not None and math.isfinite(value):
+            groups.setdefault(device, []).append(value)
+    values = [value for group in groups.values() for value in group]
+    between, within = len(groups) - 1, len(values) - len(groups)
+    if not several or between < 1 or within < 1:
         return []
+    grand = math.fsum(values) / len(values)
+    means = [(math.fsum(group) / len(group), group) for group in groups.values()]
+    apart = math.fsum(len(group) * (mean - grand) ** 2 for mean, group in means)
+    inside = math.fsum((y - mean) ** 2 for mean, group in means for y in group)
+    if not inside:
+        return []
+    p_value = float(fdtrc(between, within, apart * within / between / inside))
     beyond = "beyond the" if p_value < SIGNIFICANCE_LEVEL else "no more than their"
     return [f"devices differ {beyond} spread from recording to recording (p = {p_value:.2g})"]

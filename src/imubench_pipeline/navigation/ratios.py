@@ -24,7 +24,6 @@ import numpy as np
 from imubench_pipeline.estimators.estimate import Parameter
 from imubench_pipeline.model.estimates import DrawnDeviationRow
 from imubench_pipeline.navigation.compared import ComparedChannel, number_needed
-from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.simulate import channel_rng
 from imubench_pipeline.noise.stacked import summed
 from imubench_pipeline.typing import Array
@@ -68,7 +67,12 @@ def ratio_of_parameters(first: Parameter, second: Parameter) -> Ratio:
     interval goes from the lower limit of the first over the upper limit of the second to the upper
     limit of the first over the lower limit of the second, which is conservative.
     """
-    reason = "; ".join(dict.fromkeys(_list_doubts(first, second))) or None
+    doubts = [
+        f"{which} is {STATUS_WORDS[parameter.status]}"
+        for which, parameter in (("the first", first), ("the second", second))
+        if parameter.status != "ok"
+    ]
+    reason = "; ".join(doubts) or None
     a, b = first.value, second.value
     if not a or not b:
         low = _divide(first.lower or 0.0, second.upper)
@@ -89,15 +93,6 @@ def ratio_of_parameters(first: Parameter, second: Parameter) -> Ratio:
         None if above is None or math.isinf(above) else math.exp(middle + above),
         reason,
     )
-
-
-def _list_doubts(first: Parameter, second: Parameter) -> list[str]:
-    words = ("the first", first), ("the second", second)
-    return [
-        f"{which} is {STATUS_WORDS[parameter.status]}"
-        for which, parameter in words
-        if parameter.status != "ok"
-    ]
 
 
 def _divide(numerator: float | None, denominator: float | None) -> float | None:
@@ -146,10 +141,7 @@ def ratio_of_deviations(
     if not first.model.terms or not second.model.terms:
         return Ratio(None, None, None, "one has no noise model")
     value = math.sqrt(float(number_needed(first.variance(tau), 0.0, second.variance(tau))))
-    own, other = (
-        _compute_variances(_draw_models(channel, draws, seed), [tau])[0]
-        for channel in (first, second)
-    )
+    own, other = (_draw_variances(channel, draws, seed, [tau])[0] for channel in (first, second))
     ratios = np.sqrt(number_needed(own[:, None], 0.0, other[None, :]))
     lower, upper = np.quantile(
         ratios, [_TAIL_PROBABILITY, 1.0 - _TAIL_PROBABILITY], method="inverted_cdf"
@@ -160,15 +152,11 @@ def ratio_of_deviations(
     return Ratio(None if unknown else value, *limits, unknown)
 
 
-def _draw_models(channel: ComparedChannel, draws: int, seed: int) -> list[NoiseModel]:
+def _draw_variances(channel: ComparedChannel, draws: int, seed: int, tau: Sequence[float]) -> Array:
+    """Return the Allan variances of drawn noise models of a channel, shape (tau, draws)."""
     stream = channel_rng(seed, repr(channel.model), channel.channel, "ratio")
-    return channel.drawn(draws, stream)
-
-
-def _compute_variances(models: Sequence[NoiseModel], tau: Sequence[float]) -> Array:
-    """Return the Allan variances of models, shape (tau, models)."""
     times = np.asarray(tau, dtype=np.float64)[:, np.newaxis]
-    return summed(models, lambda term: term.allan_variance(times), len(tau))
+    return summed(channel.drawn(draws, stream), lambda term: term.allan_variance(times), len(tau))
 
 
 def deviation_rows(
@@ -197,7 +185,7 @@ def deviation_rows(
         10.0 ** (step / _TAUS_PER_DECADE)
         for step in range(math.ceil(first - 1e-9), math.floor(last + 1e-9) + 1)
     ]
-    drawn = np.sqrt(_compute_variances(_draw_models(channel, draws, seed), taus))
+    drawn = np.sqrt(_draw_variances(channel, draws, seed, taus))
     row = partial(
         DrawnDeviationRow,
         sensor=channel.sensor,

@@ -80,20 +80,18 @@ def window(rest: float, time: float, rate: float) -> Window | None:
     if most < 1:
         return None
     counts = [number for number in BLOCK_COUNTS if number <= most] or [most]
-    number = min(
-        counts, key=lambda n: (round(_estimate_variance_error(n, shorter, longer, rate), 4), n)
-    )
+
+    def estimate_variance_error(number: int) -> float:
+        """Return the approximate relative error of the variance."""
+        others, samples = number * longer / shorter, shorter * rate / number
+        # Block sizes differ by one sample: the mean of 1 / size is above 1 / mean size.
+        part = samples % 1.0
+        return abs(round(others) / others - 1.0) + part * (1.0 - part) / samples**2
+
+    number = min(counts, key=lambda n: (round(estimate_variance_error(n), 4), n))
     other = round(number * longer / shorter)
     resting, moving = (number, other) if rest <= time else (other, number)
     return Window(shorter / number, resting, moving)
-
-
-def _estimate_variance_error(number: int, shorter: float, longer: float, rate: float) -> float:
-    """Return the approximate relative error of the variance with a number of blocks."""
-    others, samples = number * longer / shorter, shorter * rate / number
-    # Block sizes differ by one sample: the mean of 1 / size is above 1 / mean size.
-    part = samples % 1.0
-    return abs(round(others) / others - 1.0) + part * (1.0 - part) / samples**2
 
 
 @dataclass(frozen=True)
@@ -131,7 +129,11 @@ def errors(means: Sequence[Array], weights: Array, lags: int) -> Errors:
         whole = before[len(weights) :] == before[: -len(weights)]
         total += float(np.sum(window_errors[whole] ** 2))
         count += int(whole.sum())
-        pairs += _count_pairs(whole, lags)
+        # Pairs of windows without a gap, by lag: an autocorrelation.
+        length = 1 << (2 * len(whole) - 1).bit_length()
+        power = np.abs(np.fft.rfft(whole.astype(np.float64), length)) ** 2
+        counted = min(lags, len(whole))
+        pairs[:counted] += np.rint(np.fft.irfft(power, length)[:counted])
     return Errors(total / count if count else math.nan, count, pairs)
 
 
@@ -144,16 +146,6 @@ def correlated(values: Array, weights: Array) -> Array:
     # The circular wrap-around affects only the part that is cut off.
     product = np.fft.rfft(values, length) * np.conj(np.fft.rfft(weights, length))
     return np.fft.irfft(product, length)[: len(values) - len(weights) + 1]
-
-
-def _count_pairs(whole: NDArray[np.bool_], lags: int) -> Array:
-    """Return the number of pairs of windows without a gap, by lag in blocks."""
-    length = 1 << (2 * len(whole) - 1).bit_length()
-    power = np.abs(np.fft.rfft(whole.astype(np.float64), length)) ** 2
-    number = np.zeros(lags)
-    counted = min(lags, len(whole))
-    number[:counted] = np.rint(np.fft.irfft(power, length)[:counted])
-    return number
 
 
 def block_means(
@@ -182,10 +174,13 @@ def block_means(
     dict of float to list of ndarray
         By length, for each segment: rad/s or m/s^2, less a constant of the log.
     """
-    edges = {
-        length: [_find_edges(start, stop, length * rate) for start, stop in segments]
-        for length in lengths
-    }
+    edges: dict[float, list[NDArray[np.int64]]] = {}
+    for length in lengths:
+        samples = length * rate
+        edges[length] = []
+        for start, stop in segments:
+            blocks = math.floor((stop - start) / samples + 1e-9)
+            edges[length].append(start + np.rint(np.arange(blocks + 1) * samples).astype(np.int64))
     if not edges:
         return {}
     every = np.concatenate([of_segment for each in edges.values() for of_segment in each])
@@ -193,12 +188,6 @@ def block_means(
     return {
         length: [sums.means(of_segment) for of_segment in each] for length, each in edges.items()
     }
-
-
-def _find_edges(start: int, stop: int, samples: float) -> NDArray[np.int64]:
-    """Return the first sample of each block of a segment, and the one after the last block."""
-    blocks = math.floor((stop - start) / samples + 1e-9)
-    return start + np.rint(np.arange(blocks + 1) * samples).astype(np.int64)
 
 
 @dataclass(frozen=True)

@@ -222,7 +222,19 @@ def budget(
         raise ValueError(f"quantity is {quantity!r}, expected one of {get_args(Quantity)}")
     if not (math.isfinite(time) and time > 0):
         raise ValueError(f"time is {time}, expected a time above 0")
-    contributions = _list_sources(quantity, time, gyro, accel, start)
+    order = GYRO_ORDER[quantity]
+    gravity = STANDARD_GRAVITY if order > 0 else 1.0
+    contributions = list(of_sensor("gyro", gyro, order, time, start.gyro, gravity))
+    if quantity in ACCEL_ORDER:
+        contributions.extend(of_sensor("accel", accel, ACCEL_ORDER[quantity], time, start.accel))
+    if quantity == "heading":
+        contributions.append(Contribution("initial heading", start.heading, "start", STATED_FIGURE))
+    elif isinstance(start.tilt, Levelled):
+        if quantity == "attitude" and isinstance(start.accel, Calibrated):
+            contributions.extend(_list_levelling_errors(accel, start.accel.window, start.tilt))
+    else:
+        tilt = start.tilt * gravity * of_constant(order - 1, time)
+        contributions.append(Contribution("initial tilt", tilt, "start", STATED_FIGURE))
     missing: list[Missing] = []
     assumptions: list[str] = []
     for measured, cause, source, lever in _list_levers(quantity, time, start, use):
@@ -235,27 +247,6 @@ def budget(
             if cause == "turn_on_bias":
                 assumptions.append(f"turn-on bias of the {SENSORS[measured]}: not known, left out")
     return Budget(time, quantity, contributions, assumptions, missing)
-
-
-def _list_sources(
-    quantity: Quantity, time: float, gyro: NoiseModel, accel: NoiseModel, start: Start
-) -> list[Contribution]:
-    order = GYRO_ORDER[quantity]
-    gravity = STANDARD_GRAVITY if order > 0 else 1.0
-    contributions = list(of_sensor("gyro", gyro, order, time, start.gyro, gravity))
-    if quantity in ACCEL_ORDER:
-        contributions.extend(of_sensor("accel", accel, ACCEL_ORDER[quantity], time, start.accel))
-    if quantity == "heading":
-        contributions.append(Contribution("initial heading", start.heading, "start", STATED_FIGURE))
-    elif isinstance(start.tilt, Levelled):
-        if quantity == "attitude" and isinstance(start.accel, Calibrated):
-            contributions.extend(_list_levelling_errors(accel, start.accel.window, start.tilt))
-    else:
-        lever = gravity * of_constant(order - 1, time)
-        contributions.append(
-            Contribution("initial tilt", start.tilt * lever, "start", STATED_FIGURE)
-        )
-    return contributions
 
 
 def _list_levers(

@@ -26,7 +26,7 @@ from imubench_pipeline.navigation.error_budget.in_use import (
     check_not_negative,
 )
 from imubench_pipeline.navigation.error_budget.parts import Budget, Contribution, Missing, of_figure
-from imubench_pipeline.noise import NoiseModel, Sinusoid, Term
+from imubench_pipeline.noise import NoiseModel, Sinusoid
 
 _BIAS_LEFT_OUT_NOTE = "turn-on bias of the gyro: left out; the heading is no better than this"
 
@@ -174,20 +174,14 @@ class Gyrocompass:
 
     def _list_noise_errors(self, time: float, *, swings: bool) -> Iterator[Contribution]:
         for term in self.gyro.terms:
-            # Only a line oscillates: its mean is 0 after each whole period.
             if isinstance(term, Sinusoid) and not swings:
-                sigma = self._compute_envelope(term, time)
+                # The mean of a line is 0 after each whole period: use its envelope, of
+                # |sin(x) / x| at one position, of sin^2(x/2) / (x/2) at two.
+                x = math.pi * term.frequency * time / self.positions
+                most = min(1.0, 1.0 / x) if self.positions == 1 else min(x, 1.0 / x)
+                sigma = term.amplitude * most / math.sqrt(2.0)
+            elif self.positions == 1:
+                sigma = math.sqrt(term.mean_variance(time, self.on_time))
             else:
-                sigma = math.sqrt(self._compute_variance(term, time))
+                sigma = math.sqrt(float(term.allan_variance(np.array([time / 2.0]))[0]) / 2.0)
             yield Contribution(f"gyro {term.source}", sigma / self._north_rate)
-
-    def _compute_variance(self, term: Term, time: float) -> float:
-        if self.positions == 1:
-            return term.mean_variance(time, self.on_time)
-        return float(term.allan_variance(np.array([time / 2.0]))[0]) / 2.0
-
-    def _compute_envelope(self, line: Sinusoid, time: float) -> float:
-        # |sin(x) / x| at one position, sin^2(x/2) / (x/2) at two.
-        x = math.pi * line.frequency * time / self.positions
-        most = min(1.0, 1.0 / x) if self.positions == 1 else min(x, 1.0 / x)
-        return line.amplitude * most / math.sqrt(2.0)

@@ -60,25 +60,29 @@ def of_datasheet(datasheet: Datasheet, channel: str) -> dict[Cause, Figure]:
     """
     axis = PrintedAxis.of(datasheet, channel)
     names = FIGURE_DIMENSIONS[axis.quantity]
-    return {
-        cause: _read_figure(axis, name)
-        for cause, name in DATASHEET_KEY_OF_CAUSE.items()
-        if name in names
-    }
-
-
-def _read_figure(axis: PrintedAxis, name: str) -> Figure:
-    like = Comparable(name, name, None)
-    rows = axis.read(name, like, axis.si(name))
-    for kind, (sigmas, convention) in _SIGMA_CONVENTIONS.items():
-        values = [row.value for row in rows if row.figure and row.figure.kind == kind]
-        usable = [value for value in values if value is not None]
-        if usable:
-            return Figure(
-                sigma=max(usable) / sigmas, origin="datasheet", kind=kind, convention=convention
+    figures: dict[Cause, Figure] = {}
+    for cause, name in DATASHEET_KEY_OF_CAUSE.items():
+        if name not in names:
+            continue
+        like = Comparable(name, name, None)
+        rows = axis.read(name, like, axis.si(name))
+        by_kind: dict[str, list[float]] = {}
+        for row in rows:
+            if row.figure and row.value is not None:
+                by_kind.setdefault(row.figure.kind, []).append(row.value)
+        kind = next((kind for kind in _SIGMA_CONVENTIONS if kind in by_kind), None)
+        if kind is None:
+            obstacle = next((row.obstacle for row in rows if row.obstacle), None)
+            figures[cause] = Figure(reason=obstacle or axis.unpublished(like, name).reason)
+        else:
+            sigmas, convention = _SIGMA_CONVENTIONS[kind]
+            figures[cause] = Figure(
+                sigma=max(by_kind[kind]) / sigmas,
+                origin="datasheet",
+                kind=kind,
+                convention=convention,
             )
-    obstacle = next((row.obstacle for row in rows if row.obstacle), None)
-    return Figure(reason=obstacle or axis.unpublished(like, name).reason)
+    return figures
 
 
 def of_log(rows: Iterable[TemperatureRow]) -> dict[Cause, Figure]:

@@ -86,7 +86,24 @@ def draw_models(estimate: Estimate, draws: int, rng: np.random.Generator) -> lis
     side. A parameter without limits is not changed.
     """
     if estimate.draws is None:
-        return [_draw_model(estimate, rng) for _ in range(draws)]
+        models = []
+        for _ in range(draws):
+            first = _draw_values(estimate.parameters, rng)
+            further = [_draw_values(group, rng) for group in estimate.further]
+            processes = [
+                GaussMarkov(process["B"], process["T_B"])
+                for process in further
+                if process["B"] and process["T_B"]
+            ]
+            amplitudes = {name: first.get(name, 0.0) for name in ("Q", "N", "B", "K", "R")}
+            model = NoiseModel(
+                **amplitudes,
+                T_B=first.get("T_B") or None,
+                further=processes,
+                sinusoids=_draw_lines(estimate, rng),
+            )
+            models.append(model)
+        return models
     available, places = len(estimate.draws), np.arange(draws)
     rows = places % available if draws > available else places * available // draws
     return [
@@ -104,45 +121,25 @@ def _draw_lines(estimate: Estimate, rng: np.random.Generator) -> list[Sinusoid]:
     return [Sinusoid(line["amplitude"], line["frequency"]) for line in lines]
 
 
-def _draw_model(estimate: Estimate, rng: np.random.Generator) -> NoiseModel:
-    first = _draw_values(estimate.parameters, rng)
-    further = [_draw_values(group, rng) for group in estimate.further]
-    return NoiseModel(
-        Q=first.get("Q", 0.0),
-        N=first.get("N", 0.0),
-        B=first.get("B", 0.0),
-        T_B=first.get("T_B") or None,
-        K=first.get("K", 0.0),
-        R=first.get("R", 0.0),
-        further=[
-            GaussMarkov(process["B"], process["T_B"])
-            for process in further
-            if process["B"] and process["T_B"]
-        ],
-        sinusoids=_draw_lines(estimate, rng),
-    )
-
-
 def _draw_values(parameters: Mapping[str, Parameter], rng: np.random.Generator) -> dict[str, float]:
     """Return a draw of each parameter; 0 for absent ones."""
-    # Draw one number for each parameter, so that an extra one does not change the others.
-    normal = {name: float(rng.standard_normal()) for name in parameters}
-    return {
-        name: _draw_value(name, parameter, normal[name]) for name, parameter in parameters.items()
-    }
-
-
-def _draw_value(name: str, parameter: Parameter, normal: float) -> float:
-    value = parameter.in_model
-    lower, upper = parameter.lower, parameter.upper
-    if value is None or value == 0.0:
-        return 0.0 if name in ("R", "T_B") or upper is None else abs(normal) * upper / SIGMAS
-    limit = lower if normal < 0 else upper
-    if limit is None:
-        return value
-    share = abs(normal) / SIGMAS
-    if name == "R":
-        return value + (limit - value) * share
-    if limit <= 0.0:
-        return max(value * (1.0 - share), 0.0)
-    return value * math.exp(math.log(limit / value) * share)
+    drawn = {}
+    for name, parameter in parameters.items():
+        # Draw one number for each parameter, so that an extra one does not change the others.
+        normal = float(rng.standard_normal())
+        value, upper = parameter.in_model, parameter.upper
+        limit = parameter.lower if normal < 0 else upper
+        share = abs(normal) / SIGMAS
+        if value is None or value == 0.0:
+            drawn[name] = (
+                0.0 if name in ("R", "T_B") or upper is None else abs(normal) * upper / SIGMAS
+            )
+        elif limit is None:
+            drawn[name] = value
+        elif name == "R":
+            drawn[name] = value + (limit - value) * share
+        elif limit <= 0.0:
+            drawn[name] = max(value * (1.0 - share), 0.0)
+        else:
+            drawn[name] = value * math.exp(math.log(limit / value) * share)
+    return drawn

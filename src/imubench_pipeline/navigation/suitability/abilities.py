@@ -138,9 +138,22 @@ def _compare(must: Must, has: Abilities) -> Iterator[_Point]:
     yield from _compare_axes(must, has)
     yield from _compare_full_scales(must, has)
     if must.bandwidth is not None:
-        yield from _compare_bandwidths(must.bandwidth, must, has)
+        # Of the quantities with required axes, or else of all.
+        asked = {axes.split("_")[0] for axes in must.axes} or set(SENSORS)
+        lowest = quantity_to_si(must.bandwidth, "frequency")
+        for measured in get_args(Measured):
+            if measured in asked and measured not in has.without:
+                width = has.bandwidth.get(measured)
+                wide = None if width is None else width >= lowest
+                yield _Point("bandwidth", measured, wide, must.bandwidth, _list_known(width))
     if must.rate is not None:
-        yield _compare_rate(must.rate, has)
+        least = quantity_to_si(must.rate, "frequency")
+        if has.logged_rate is not None and has.logged_rate >= least:
+            yield _Point("rate", "", True, must.rate)
+        else:
+            # The rate of a log may be lower than the highest rate of the sensor.
+            fast = None if has.rate is None else has.rate >= least
+            yield _Point("rate", "", fast, must.rate, _list_known(has.rate))
     if must.temperature is not None:
         low, high = (quantity_to_si(end, "temperature") for end in must.temperature)
         own = has.temperature
@@ -175,25 +188,6 @@ def _compare_full_scales(must: Must, has: Abilities) -> Iterator[_Point]:
         least = quantity_to_si(text, QUANTITIES[measured])
         enough = None if largest is None else largest * _ROUNDING_MARGIN >= least
         yield _Point("full_scale", measured, enough, text, _list_known(largest))
-
-
-def _compare_bandwidths(text: str, must: Must, has: Abilities) -> Iterator[_Point]:
-    """Yield the bandwidth of the quantities with required axes, or else of all."""
-    asked = {axes.split("_")[0] for axes in must.axes} or set(SENSORS)
-    for measured in get_args(Measured):
-        if measured in asked and measured not in has.without:
-            width = has.bandwidth.get(measured)
-            wide = None if width is None else width >= quantity_to_si(text, "frequency")
-            yield _Point("bandwidth", measured, wide, text, _list_known(width))
-
-
-def _compare_rate(text: str, has: Abilities) -> _Point:
-    least = quantity_to_si(text, "frequency")
-    if has.logged_rate is not None and has.logged_rate >= least:
-        return _Point("rate", "", True, text)
-    # The rate of a log may be lower than the highest rate of the sensor.
-    fast = None if has.rate is None else has.rate >= least
-    return _Point("rate", "", fast, text, _list_known(has.rate))
 
 
 def _compare_axes(must: Must, has: Abilities) -> Iterator[_Point]:

@@ -47,7 +47,8 @@ class Conditions:
         lacking, unknown = judge(must, has)
         figures: dict[tuple[str, Figure], float] = {}
         for row in conditions:
-            key = _get_quantity(row), _get_figure(row)
+            quantity = next(word for word in row.source.split() if word in SENSORS)
+            key = quantity, next(figure for figure in FIGURES if figure == row.cause)
             largest = row.largest or 0.0
             figures[key] = min(figures.get(key, largest), largest)
         return cls(tuple(lacking), tuple(unknown), figures)
@@ -66,15 +67,6 @@ class Conditions:
             for (quantity, figure), largest in self.figures.items()
         )
         return (*figures, *self.unknown)
-
-
-def _get_quantity(row: ErrorBudgetRow) -> str:
-    """Return the quantity that a source belongs to: ``gyro`` or ``accel``."""
-    return next(word for word in row.source.split() if word in SENSORS)
-
-
-def _get_figure(row: ErrorBudgetRow) -> Figure:
-    return next(figure for figure in FIGURES if figure == row.cause)
 
 
 def is_condition(row: ErrorBudgetRow) -> bool:
