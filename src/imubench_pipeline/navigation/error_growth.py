@@ -1,8 +1,7 @@
 """Growth of the errors of a recording after static windows of several lengths: rows of a table.
 
-The errors are defined as in `expected_errors`, at more times and windows, with the same models. The
-variances of all drawn models are computed at once: separate budgets would take a thousand times as
-long.
+The errors are those of `expected_errors`, at more times and windows. The variances of all drawn
+models are computed at once: separate budgets would take a thousand times as long.
 """
 
 from __future__ import annotations
@@ -52,22 +51,9 @@ def growth_rows(
 ) -> Iterator[ErrorGrowthRow]:
     """Yield the rows of the table ``error_growth`` of a recording.
 
-    They are for its worst axes, and if it has several, for each axis alone: the gyro and the
-    accelerometer of the same letter.
-
-    Parameters
-    ----------
-    names : mapping of str to str
-        ``sensor`` and ``recording``.
-    estimates : mapping of str to Estimate
-        The recommended one of each channel.
-    times : iterable of float
-        s; in addition to the times that every table has.
-    window : float
-        Static window, s, in addition to the windows that every table has.
-    draws, seed : int
-    figures : mapping of str to mapping
-        All three as `expected_errors.error_rows` takes them.
+    They are for its worst axes, and if it has several, for each letter alone. ``times`` and
+    ``window``, s, are in addition to those that every table has; the others are as in
+    `expected_errors.error_rows`.
     """
     axes = axes_of(estimates, figures)
 

@@ -1,24 +1,17 @@
 """Pooled value, spread and agreement of several recordings of one sensor or device.
 
 The random-effects model of a noise parameter is y_k = ln p_k = mu + u_k + e_k. The variance is
-tau^2 between recordings and v_k from the 95 % limits of each. If the limits are asymmetric, the
-half towards mu counts: v = (ln upper - y)^2 / z^2 for mu > y (the likelihood of a split normal,
-whose sum is convex in mu). The half is at least a quarter of the mean half: a narrower one would
-bound mu on that side.
+tau^2 between recordings and v_k from the half of the 95 % limits of each towards mu:
+v = (ln upper - y)^2 / z^2 for mu > y. It is at least a quarter of the mean half.
 
-A recording without a value inside positive limits is left out and counted. The limits of a
-parameter that is not determined depend as much on the prior as on the log: the mean of twenty such
-intervals would be precise and wrong. They are used only to detect selection bias, since small
-values are less often determined: `Pool.contradicting`.
+A recording without a value inside positive limits is left out and counted: limits of a parameter
+that is not determined depend as much on the prior as on the log. They are used only to detect
+selection bias (`Pool.contradicting`).
 
-The interval of the pool is from Hartung and Knapp, t with K - 1 degrees of freedom, but never
-narrower than the errors of the recordings allow (Jackson et al.). Its coverage was simulated with
-8,000 pools a case (errors equal to errors within a factor 3), for K = 2; 3; 5; 20. Without spread
-it is 99; 99; 98; 96-97 %. With a spread of one error it is 98-96; 97-94; 96-94; 95 %, with a
-spread of three errors 96-93; 96-93; 95; 95 %. If errors differ tenfold about the spread, it falls
-to 79; 86; 89; 93 %. With K = 2 the interval is wide (t = 12.7), since two values hardly determine
-their spread. Shorter intervals fail: the normal interval covers 70-76 % at a large spread, and the
-interval of Hartung and Knapp alone (95 %) has no width if two values happen to be equal.
+The interval is from Hartung and Knapp, t with K - 1 degrees of freedom, but never narrower than the
+errors allow (Jackson et al.). Its coverage was simulated with 8,000 pools a case: 96 to 99 %
+without spread, 93 to 98 % with a spread of one or three errors; if errors differ tenfold about the
+spread, 79; 86; 89; 93 % for K = 2; 3; 5; 20. Shorter intervals fail: the normal one covers 70-76 %.
 
 References
 ----------
@@ -111,18 +104,8 @@ def pool(
     """Pool the estimates of a positive parameter (model and sources: see the module).
 
     tau is the estimate of Paule and Mandel, Q(tau^2) = K - 1; its limits are from the Q-profile
-    method of Viechtbauer.
-
-    Parameters
-    ----------
-    values, lower, upper : iterable of float or None, shape (K,)
-        Estimates in any one unit, and their 95 % limits. One counts if 0 < lower < value < upper <
-        infinity.
-
-    Raises
-    ------
-    ValueError
-        If the lengths differ.
+    method of Viechtbauer. ``values``, ``lower``, ``upper``, shape (K,), are estimates in any one
+    unit with their 95 % limits; one counts if 0 < lower < value < upper < infinity.
     """
     triples = list(zip(values, lower, upper, strict=True))
     used = [triple for triple in triples if usable(triple)]
@@ -245,9 +228,8 @@ def turn_on_bias(means: Iterable[float | None]) -> TurnOnBias:
     """Return the spread of the fixed bias from recording to recording.
 
     Its limits follow from the chi-squared distribution of (K - 1) s^2 / sigma^2. The spread
-    includes the slow noise of a recording and, for an accelerometer, changes of its tilt. The means
-    are in rad/s or m/s^2; None and NaN are left out. With one mean only ``mean`` is set, with none
-    only the counts.
+    includes slow noise and changes of tilt. The means are in rad/s or m/s^2; None and NaN are left
+    out.
     """
     listed = list(means)
     present = [mean for mean in listed if mean is not None and math.isfinite(mean)]
@@ -273,22 +255,12 @@ def pooled_rows(
 ) -> Iterator[PooledRow]:
     """Yield the rows of the table ``pooled``.
 
-    There is one row (device None) for each sensor with two recordings or more. If it has several
-    devices, there is also one for each device with two recordings or more. Parameters are those of
-    `POOLED_PARAMETERS`, and ``bias``; a parameter that no recording has gives no row. All numbers
-    are in ``unit``: the spread of a noise parameter is ``value`` times tau (see `Pool`), and of a
-    bias the standard deviation. A parameter that only some recordings have is never ``agree``;
-    recordings without T_B (no Gauss-Markov term) are not counted for it. A bias has no verdict.
-
-    Parameters
-    ----------
-    parameters : iterable of ParameterRow
-        Recommended rows of component 1 and a parameter of `POOLED_PARAMETERS` are used. Only a
-        value with status ``ok`` is an estimate.
-    biases : iterable of FixedBiasRow
-        The mean of each channel; one that is not finite is left out.
-    devices : mapping of (sensor, recording) to str
-        The device; a recording that is not listed is a device of its own.
+    There is one row (device None) for each sensor with two recordings or more, and if it has
+    several devices, one for each device with two or more. Parameters are `POOLED_PARAMETERS`, from
+    recommended rows of component 1, and ``bias``, which has no verdict. The spread of a noise
+    parameter is ``value`` times tau (see `Pool`). A parameter that only some recordings have is
+    never ``agree``; recordings without T_B do not count for it. A recording that ``devices`` does
+    not list is its own device.
     """
     # By channel, parameter and recording; the key "" lists every recording, with or without it.
     estimates: dict[tuple[str, str], dict[str, dict[str, ParameterRow | None]]] = {}

@@ -61,11 +61,9 @@ class Ratio:
 
 
 def ratio_of_parameters(first: Parameter, second: Parameter) -> Ratio:
-    """Return the ratio of one noise parameter of two logs, both from 0.
+    """Return the ratio of one noise parameter of two logs (Zou and Donner 2008, eq. 2 and 3).
 
-    The limits are from Zou and Donner (2008), eq. 2 and 3. If one has limits but no value, the
-    interval goes from the lower limit of the first over the upper limit of the second to the upper
-    limit of the first over the lower limit of the second, which is conservative.
+    If one has limits but no value, the interval is that of all quotients within the limits.
     """
     doubts = [
         f"{which} is {STATUS_WORDS[parameter.status]}"
@@ -121,19 +119,11 @@ def ratio_of_deviations(
     draws: int,
     seed: int,
 ) -> Ratio:
-    """Return the ratio of the Allan deviations of two models at a tau.
+    """Return the ratio of the Allan deviations of two models at a tau, s.
 
-    Parameters
-    ----------
-    first, second : ComparedChannel
-    tau : float
-        s.
-    longest : float
-        Longest tau, as a fraction of the log.
-    draws : int
-        Number of noise models drawn from the estimate of each log; all pairs are used.
-    seed : int
-        Each channel has its own random stream.
+    ``longest`` is the longest tau as a fraction of the log. ``draws`` noise models are drawn from
+    the estimate of each log, and all pairs are used. Each channel has its own random stream of the
+    seed.
     """
     told = longest * min(first.duration, second.duration)
     if tau > told:
@@ -164,17 +154,9 @@ def deviation_rows(
 ) -> Iterator[DrawnDeviationRow]:
     """Yield the rows of the table ``drawn_deviations`` of a channel.
 
-    They hold the input of `ratio_of_deviations` for the channel, at two tau a decade from the
-    sampling interval on. Any two channels can then be compared without their logs.
-
-    Parameters
-    ----------
-    channel : ComparedChannel
-    rate : float
-        Sampling rate of its log, Hz.
-    longest : float
-    draws, seed : int
-        As in `ratio_of_deviations`, with ``longest``.
+    They are the input of `ratio_of_deviations`, at two tau a decade from the sampling interval on,
+    so that any two channels can be compared without their logs. ``rate`` is in Hz; the others are
+    as in `ratio_of_deviations`.
     """
     if not channel.model.terms:
         return

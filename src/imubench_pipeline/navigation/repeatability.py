@@ -22,9 +22,9 @@ def repeatability_rows(
 ) -> Iterator[RepeatabilityRow]:
     """Yield the rows of the table ``repeatability``: bias spread and printed repeatability.
 
-    A printed repeatability is the spread of the bias from one turn-on to the next. A recording is
-    left out if the power stayed on before it, since it belongs to the turn-on of the previous one,
-    or if it does not decide. The tolerance is the relative difference that still counts as printed.
+    A recording is left out if it does not decide, or if the power stayed on before it, since it
+    belongs to the previous turn-on. The tolerance is the relative difference that still counts as
+    printed.
     """
     about = {(row.sensor, row.recording): row for row in recordings if row.decides}
     by_channel: dict[tuple[str, str, str], list[tuple[RecordingRow, float]]] = {}

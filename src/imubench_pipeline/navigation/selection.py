@@ -14,10 +14,8 @@ from imubench_pipeline.navigation.verdicts.standing import Standing, trajectory_
 def ranked(judged: Sequence[Judgement], basis: Basis) -> Iterator[RankingRow]:
     """Yield the rows of the table ``ranking``, from the judgements and their recordings.
 
-    The limit with the least margin decides for a sensor. Its rank is one more than the number of
-    sensors that are significantly better: the interval of their margin lies wholly above its own.
-    Sensors with overlapping intervals are tied. A sensor with unknown figures is significantly
-    better than another only if the other lacks the same figures.
+    The rank of a sensor is one more than the number of significantly better ones: the interval of
+    their margin lies wholly above its own, and they have no unknown figures that it does not have.
     """
     for name in dict.fromkeys(judgement.name for judgement in judged):
         own = [judgement for judgement in judged if judgement.name == name]

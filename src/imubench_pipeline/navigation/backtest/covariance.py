@@ -1,9 +1,8 @@
 """Correlation of the errors of windows of a log, from the noise model of the log.
 
-A window weights the noise by a kernel h whose integral is 0. Its error is therefore stationary for
-every term, including a random walk and flicker noise. Its covariance at a lag u is the double
-integral of h(s) h(s') C(s - s' + u), with C the generalised covariance of the term; a constant in C
-cancels. The calculation uses means over blocks of length d, k blocks apart.
+A window weights the noise by a kernel h with the integral 0, so its error is stationary for every
+term. The covariance at a lag u is the double integral of h(s) h(s') C(s - s' + u), with C the
+generalised covariance of the term, and is computed from means over blocks.
 """
 
 from __future__ import annotations

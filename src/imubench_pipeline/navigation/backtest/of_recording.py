@@ -48,24 +48,10 @@ def backtest_rows(
 ) -> Iterator[BacktestRow]:
     """Yield the rows of the table ``backtest`` of a recording.
 
-    The logs are used as recorded, with lines, temperature drift and other deterministic signals,
-    since a user of the sensor gets them too.
-
-    Parameters
-    ----------
-    names : mapping of str to str
-        ``sensor`` and ``recording``.
-    logs : mapping of str to ChannelLog
-        Static logs.
-    estimates : mapping of str to Estimate
-        The recommended one of each channel.
-    requirements : mapping of str to Requirement
-    deterministic : iterable of DeterministicRow
-        Signals that are removed from the noise, and not in the models.
-    draws : int
-        Number of noise models drawn from the estimate of each log.
-    seed : int
-        Seed of the run; each channel has its own random stream.
+    The logs are used as recorded, with lines, temperature drift and other ``deterministic``
+    signals, which the models do not include, since a user of the sensor gets them too. ``names``
+    are ``sensor`` and ``recording``; ``estimates`` the recommended one of each channel; ``draws``
+    the number of noise models drawn from each. Each channel has its own random stream of the seed.
     """
     apart: dict[str, dict[str, None]] = {}
     for component in deterministic:

@@ -1,10 +1,7 @@
 """Dead-reckoning errors over windows of a static log.
 
-A window is at rest for a time W, and its mean over W is the bias. It then moves for a time t, and
-the log less the bias is integrated m + 1 times over t. The error is that of `error_budget.growth`,
-with the log instead of the noise. Windows begin one block apart, so that they overlap. Only the
-block means of a log are needed, which are computed for several lengths in one pass and bounded
-memory (`block_means`).
+A window is at rest for a time W, whose mean is the bias. It then moves for a time t, in which the
+log less the bias is integrated m + 1 times (`error_budget.growth`). Windows begin one block apart.
 """
 
 from __future__ import annotations
@@ -107,14 +104,8 @@ class Errors:
 def errors(means: Sequence[Array], weights: Array, lags: int) -> Errors:
     """Return the errors of all windows of a log.
 
-    Parameters
-    ----------
-    means : sequence of ndarray
-        Block means of each segment, NaN where one is missing.
-    weights : ndarray, shape (blocks,)
-        Weights of the blocks of a window.
-    lags : int
-        Number of lags for the pair counts.
+    ``means`` are the block means of each segment, NaN where one is missing; ``weights``, shape
+    (blocks,), those of the blocks of a window; ``lags`` the number of lags for the pair counts.
     """
     total, count = 0.0, 0
     pairs = np.zeros(lags)

@@ -4,20 +4,12 @@ All budgets here assume:
 
 - one horizontal axis: the accelerometer along it and the gyro across it, whose tilt projects
   gravity into that accelerometer. If both axes are alike, the error in the plane is sqrt(2) times
-  the error of one axis. Velocity and position errors need no motion. Errors from scale factors,
-  temperature and vibration are included if a use is stated (`in_use`). Misalignment, and the
-  position error from heading times distance, are neglected;
-- small angles: up to about 0.2 rad;
-- a flat Earth that does not turn, g = 9.80665 m/s^2: no Schuler feedback (a period of 84.4 min),
-  whose absence overstates errors. After 60 s, the excess is 0.3 % at most. After 600 s it is 10 %
-  of the attitude, 5 to 6 % of the velocity and 3 % of the position from a gyro; 10 % of the
-  velocity and 5 to 6 % of the position from an accelerometer or an initial tilt (the first from a
-  bias, the second from white noise); and 36 % of an initial tilt itself. The Earth's rate is
-  removed with the bias of a calibrated gyro, and is a part of the bias of any other;
-- independent sensors with independent noise terms;
-- deterministic terms of random sign: only the size of a ramp matters.
-
-`time_until` returns the time for which dead reckoning remains within a limit.
+  the error of one axis. Misalignment, and the position error from heading times distance, are
+  neglected; errors in use are included if a use is stated (`in_use`);
+- small angles, up to about 0.2 rad;
+- a flat Earth that does not turn, g = 9.80665 m/s^2: no Schuler feedback, whose absence overstates
+  errors by 0.3 % at most after 60 s, and by 3 to 10 % after 600 s (36 % of an initial tilt);
+- independent sensors with independent noise terms, and deterministic terms of random sign.
 """
 
 from __future__ import annotations
@@ -70,17 +62,16 @@ class Levelled:
     """The initial tilt is found by the accelerometers: it is their mean error over g.
 
     The mean is over the static window of the accelerometers, which must be calibrated. This tilt
-    has no effect on velocity and position, since it cancels the mean error that caused it. Only the
-    later departure from that mean has an effect, as for a calibrated accelerometer.
+    cancels the mean error that caused it, so only the later departure from that mean has an effect
+    on velocity and position.
 
     Parameters
     ----------
     bias : float, optional
-        Turn-on bias of the accelerometer, 1 sigma, m/s^2. None: it is taken from the figures of
-        the sensor; if it is not known, it is left out of the attitude, and the budget has a note.
+        Turn-on bias of the accelerometer, 1 sigma, m/s^2. None: from the figures of the sensor,
+        else left out of the attitude with a note.
     on_time : float
-        Time from switch-on to the beginning of the window, s; walks, ramps and flicker noise
-        count from switch-on.
+        Time from switch-on to the beginning of the window, s.
 
     Raises
     ------
@@ -131,13 +122,7 @@ class Start:
     def calibrated(
         cls, window: float, *, tilt: Levelled | float | None = None, heading: float = 0.0
     ) -> Start:
-        """Return a start with both biases from one static window, s; levelled if no tilt is given.
-
-        Raises
-        ------
-        ValueError
-            If the window is not above 0, or an angle is negative.
-        """
+        """Return a start with both biases from one static window, s; levelled by default."""
         sensor = Calibrated(window)
         levelled = Levelled() if tilt is None else tilt
         return cls(gyro=sensor, accel=sensor, tilt=levelled, heading=heading)
@@ -155,11 +140,6 @@ class Start:
         """Return a start with turn-on biases of a given sigma, rad/s and m/s^2, and no window.
 
         None: a bias is taken from the figures of the sensor.
-
-        Raises
-        ------
-        ValueError
-            If a value is negative.
         """
         return cls(
             gyro=Uncalibrated(bias=gyro_bias, on_time=on_time),
@@ -306,33 +286,12 @@ def time_until(
     gyro_figures: Figures = NO_FIGURES,
     accel_figures: Figures = NO_FIGURES,
 ) -> float | None:
-    """Return the time after which an error reaches a limit.
+    """Return the time, s, after which an error reaches a limit, 1 sigma, rad, m/s or m.
 
-    The total of a `budget` increases with time, because the errors at two times never have a
-    negative correlation: the covariance of every random term decreases with the lag. With lines,
-    the error may oscillate; the first crossing is then found among 4096 times up to one at which
-    the limit is certainly exceeded.
-
-    Parameters
-    ----------
-    limit : float
-        1 sigma, rad, m/s or m.
-    quantity : {"attitude", "heading", "velocity", "position"}
-    gyro, accel : NoiseModel
-    start : Start
-    use : Use
-    gyro_figures, accel_figures : mapping of str to Figure
-        All as in `budget`.
-
-    Returns
-    -------
-    float or None
-        s; 0 if the error exceeds the limit from the beginning, None if it does not within 30 years.
-
-    Raises
-    ------
-    ValueError
-        If the limit is not above 0, or the quantity is not known.
+    It is 0 if the error exceeds the limit from the beginning, None if it does not within 30 years.
+    The other arguments are those of `budget`. The total increases with time, because the errors at
+    two times never have a negative correlation. With lines it may oscillate: the first crossing is
+    then found among 4096 times. Raises a ValueError if the limit is not above 0.
     """
     if not (math.isfinite(limit) and limit > 0):
         raise ValueError(f"limit is {limit}, expected a number above 0")

@@ -26,73 +26,34 @@ Quantity = Literal["attitude", "heading", "velocity", "position"]
 
 @dataclass(frozen=True)
 class Contribution:
-    """Contribution of one source to an error.
+    """Contribution of one source to an error."""
 
-    Attributes
-    ----------
-    source : str
-        Such as ``gyro N``, ``accel GM 89.5 s``, ``gyro turn-on bias``.
-    sigma : float
-        1 sigma, rad, m/s or m.
-    cause : str
-        ``noise``, ``start`` (a stated angle), or of `in_use`.
-    figure : Figure or None
-        Figure that it follows from, if it is not noise.
-    """
-
-    source: str
-    sigma: float
-    cause: Cause | Literal["noise", "start"] = "noise"
-    figure: Figure | None = None
+    source: str  # such as ``gyro N``, ``accel GM 89.5 s``, ``gyro turn-on bias``
+    sigma: float  # 1 sigma, rad, m/s or m
+    cause: Cause | Literal["noise", "start"] = "noise"  # ``start``: a stated angle
+    figure: Figure | None = None  # the figure that it follows from, if it is not noise
 
 
 @dataclass(frozen=True)
 class Missing:
-    """A source whose figure is not known.
+    """A source whose figure is not known."""
 
-    Attributes
-    ----------
-    source : str
-        As in `Contribution`.
-    quantity : str
-        ``gyro`` or ``accel``.
-    cause : str
-    lever : float
-        Error from a figure of 1 SI unit.
-    reason : str
-        Why it is not known.
-    """
-
-    source: str
+    source: str  # as in `Contribution`
     quantity: Measured
     cause: Cause
-    lever: float
-    reason: str
+    lever: float  # error from a figure of 1 SI unit
+    reason: str  # why it is not known
 
 
 @dataclass(frozen=True)
 class Budget:
-    """An error and its contributions.
+    """An error and its contributions, which are independent of each other."""
 
-    Attributes
-    ----------
-    time : float
-        s.
-    quantity : str
-        ``attitude`` (a tilt) and ``heading`` in rad, ``velocity`` in m/s, ``position`` in m.
-    contributions : sequence of Contribution
-        Independent of each other.
-    assumptions : sequence of str
-        Assumptions for figures that are not known.
-    missing : sequence of Missing
-        Sources that are left out because no figure is known.
-    """
-
-    time: float
-    quantity: Quantity
+    time: float  # s
+    quantity: Quantity  # attitude (a tilt) and heading in rad, velocity in m/s, position in m
     contributions: Sequence[Contribution]
-    assumptions: Sequence[str] = ()
-    missing: Sequence[Missing] = ()
+    assumptions: Sequence[str] = ()  # for figures that are not known
+    missing: Sequence[Missing] = ()  # sources that are left out because no figure is known
 
     @property
     def total(self) -> float:

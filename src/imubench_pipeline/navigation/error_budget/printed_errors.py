@@ -1,17 +1,8 @@
 """Standard deviations from the figures of a datasheet, and from the thermal fit of a log.
 
-A printed figure is not a standard deviation unless the document says so. The conventions are:
-
-- ``1sigma``: as printed;
-- ``typ`` and ``derived``: a typical ± is taken as 1 sigma;
-- ``range``: a uniform distribution, sigma is the larger end over sqrt(3);
-- ``max``: taken as 3 sigma. In data sheets of the catalogue with both, max is 3 and 3.3 times the
-  typical offset (BNO055 and BMI160 gyros), 1.9 times (BNO055 accelerometer), and 2 and 3.5 times
-  the typical temperature coefficient (BNO055).
-
-With several figures, the first kind of this list is used, and the largest figure of that kind.
-Figures for options that the logged sensors do not have are not used. A temperature coefficient from
-a log is used instead of the printed one, since it belongs to this specimen.
+A typical ± figure is taken as 1 sigma; a range as a uniform distribution, sqrt(3) sigma at its
+larger end; a maximum as 3 sigma. (In data sheets of the catalogue with both, the maximum is 1.9 to
+3.5 times the typical figure.) A temperature coefficient from a log replaces the printed one.
 """
 
 from __future__ import annotations

@@ -15,24 +15,11 @@ from imubench_pipeline.noise import GaussMarkov, NoiseModel, Sinusoid
 
 
 def interval(budgets: Sequence[Budget], level: float = 0.95) -> tuple[float, float]:
-    """Return the limits of the total over budgets of drawn noise models.
+    """Return the limits of the total over budgets of drawn noise models, rad, m/s or m.
 
-    Parameters
-    ----------
-    budgets : sequence of Budget
-        For one quantity and time, one a draw: from the posterior of a fit, or `draw_models`.
-    level : float
-        Fraction of the totals between the limits.
-
-    Returns
-    -------
-    (float, float)
-        Lower and upper limit, rad, m/s or m.
-
-    Raises
-    ------
-    ValueError
-        If there is no budget, they differ in quantity or time, or the level is not within 0..1.
+    ``budgets`` are for one quantity and time, one a draw; ``level`` is the fraction of the totals
+    between the limits. Raises a ValueError without a budget, for budgets that differ in quantity or
+    time, and for a level that is not within 0..1.
     """
     if len({(budget.quantity, budget.time) for budget in budgets}) != 1:
         raise ValueError("expected budgets of one quantity at one time")
@@ -46,19 +33,9 @@ def interval(budgets: Sequence[Budget], level: float = 0.95) -> tuple[float, flo
 def chance_within(limit: float, budgets: Sequence[Budget]) -> float:
     """Return the probability that a total is within a limit, over budgets of drawn noise models.
 
-    It is the integral of a kernel density estimate in log total, with a normal kernel (Silverman
-    1986), so that it is continuous, and not 0 or 1 beyond the outermost draws.
-
-    Parameters
-    ----------
-    limit : float
-        rad, m/s or m; above 0.
-    budgets : sequence of Budget
-        As `interval` takes them.
-
-    References
-    ----------
-    B. W. Silverman, "Density estimation for statistics and data analysis", 1986, eq. 3.31.
+    It is the integral of a kernel density estimate in log total, with a normal kernel (B. W.
+    Silverman, "Density estimation for statistics and data analysis", 1986, eq. 3.31), so that it is
+    not 0 or 1 beyond the outermost draws. The limit, above 0, is in rad, m/s or m.
     """
     totals = np.log(np.maximum([budget.total for budget in budgets], 1e-300))
     quarter = np.subtract(*np.quantile(totals, [0.75, 0.25])) / 1.349
@@ -72,18 +49,13 @@ def chance_within(limit: float, budgets: Sequence[Budget]) -> float:
 def draw_models(estimate: Estimate, draws: int, rng: np.random.Generator) -> list[NoiseModel]:
     """Return ``draws`` noise models, drawn from the uncertainty of an estimate.
 
-    If the estimate has posterior draws, they are used, with all parameters of a model together.
-    They are thinned evenly if fewer are needed, and repeated if more are needed. Their order is
-    random, so that the draws of two channels are combined at random. Lines, which are independent
-    of the noise parameters, are drawn separately.
+    Posterior draws are used with all parameters of a model together, thinned evenly or repeated, in
+    random order. Lines are independent of the noise parameters, and drawn separately.
 
-    If an estimate has no draws (from the curve, or by least squares), its parameters are drawn from
-    their limits **independently**, which they are not. Intervals of functions of several of them
-    are then 1.0 to 3.5 times too wide. Each parameter is log-normal about its value, with a
-    separate spread on either side, so that the limits are the 2.5 % and 97.5 % quantiles. Towards a
-    lower limit of 0, the draws are linear. An absent parameter with an upper limit is half-normal
-    from 0, with that limit as its 95 % quantile. A ramp, which has a sign, is normal on either
-    side. A parameter without limits is not changed.
+    If an estimate has no draws, its parameters are drawn from their limits **independently**, which
+    they are not: intervals of functions of several of them are 1.0 to 3.5 times too wide. Each is
+    log-normal about its value, with a separate spread on either side (towards a lower limit of 0,
+    linear). An absent parameter with an upper limit is half-normal from 0. A ramp is normal.
     """
     if estimate.draws is None:
         models = []

@@ -39,9 +39,8 @@ class MeasuredRanges:
     def span(self, price_class: str | None, quantity: str, figure: str) -> Span | None:
         """Return the range of a figure (N, B, K or T_B) over the measured sensors of a class.
 
-        Of the stated class, only the part before a comma or parenthesis is used. If no sensor of
-        the class is measured, the range is over all measured sensors. If no sensor at all is
-        measured, the range of B is from datasheets. None if nothing is known.
+        If none of the class is measured, the range is over all measured sensors; if none is
+        measured at all, the range of B is from datasheets. None if nothing is known.
         """
         by_sensor = {
             sensor: ends

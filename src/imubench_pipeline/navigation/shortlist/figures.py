@@ -1,10 +1,8 @@
 """Noise models of the best and the worst case that a datasheet allows.
 
-A density of unknown sidedness is N or N times sqrt(2). A printed bias instability is B at best; at
-worst it is the minimum of the curve, so that B is the printed figure over 0.664. All grades and
-ranges of a sensor are included, unless its file selects one. An unpublished figure is taken from
-measured sensors of its class, or, for B without a measured sensor, from the datasheets of its
-class.
+A density of unknown sidedness is N or N sqrt(2). A printed bias instability is B at best, and the
+minimum of the curve, 0.664 B, at worst. All grades are included, unless the sensor file selects
+one. An unpublished figure is from measured sensors of the class, or B from its datasheets.
 """
 
 from __future__ import annotations
@@ -42,13 +40,7 @@ class Figures:
         return self.B is not None and self.K is not None
 
     def models(self, end: End) -> list[NoiseModel]:
-        """Return the models of one case, one for each correlation time.
-
-        Raises
-        ------
-        ValueError
-            If the worst case is not known.
-        """
+        """Return the models of one case, one for each correlation time; the case must be known."""
         if end == "worst" and not self.bounded:
             raise ValueError("the worst is not known: a figure is measured of no sensor")
         N, B, K = (

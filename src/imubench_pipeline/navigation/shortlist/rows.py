@@ -1,8 +1,7 @@
 """Select the catalogue sensors worth logging for a requirement: the table ``shortlist``.
 
-Errors in use are taken from the datasheet (see `error_budget.in_use`). A turn-on bias can be
-calibrated: the best case excludes it, and the worst case includes it. If a figure is not published,
-the worst case is not known.
+Errors in use are from the datasheet. The best case excludes a turn-on bias, which can be
+calibrated. If a figure is not published, the worst case is not known.
 """
 
 from __future__ import annotations
@@ -39,9 +38,8 @@ def shortlist_rows(
 ) -> Iterator[ShortlistRow]:
     """Judge all sensors of a catalogue by their datasheets, with measured verdicts for comparison.
 
-    Yields a row for each requirement and sensor, the best margin first; sensors without a verdict
-    are last. The ranges replace unpublished figures. The ranking and the recordings of a run
-    provide the measured verdicts.
+    Yields a row for each requirement and sensor, the best margin first. The ranges replace
+    unpublished figures; the ranking and the recordings of a run provide the measured verdicts.
     """
     simulated = {(row.sensor, row.recording): row.simulated for row in recordings}
     measured = {(row.requirement, row.sensor): row for row in ranking if row.decides}

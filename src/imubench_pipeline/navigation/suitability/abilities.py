@@ -111,13 +111,7 @@ def _find_largest(datasheet: Datasheet, quantity: Measured, name: str) -> float 
 
 
 def judge(must: Must, has: Abilities) -> tuple[list[Shortfall], list[Condition]]:
-    """Compare the properties of a sensor with the hard requirements.
-
-    Returns
-    -------
-    (list of Shortfall, list of Condition)
-        Demanded properties that it does not have, and those that are not known.
-    """
+    """Return the demanded properties that a sensor does not have, and those that are not known."""
     points: dict[tuple[Property, str], _Point] = {}
     for point in _compare(must, has):
         points.setdefault((point.property, point.subject), point)

@@ -1,10 +1,8 @@
 """Conditions of a verdict other than the known errors: unknown figures and hard requirements.
 
-A sensor that does not meet a hard requirement is excluded. If its known errors meet the limits, but
-a figure that matters in this use is not known, it meets them if that figure is below the largest
-one within the limit. Several unknown figures share the remaining error budget: with all of them at
-their largest, the limit is just reached. If the printed turn-on bias alone exceeds a limit, the
-sensor meets it if it is calibrated to within the remaining error budget.
+Several unknown figures share the remaining error budget: with all of them at their largest, the
+limit is just reached. If the printed turn-on bias alone exceeds a limit, the sensor meets it
+if calibrated to within the remaining error budget.
 """
 
 from __future__ import annotations
@@ -83,9 +81,9 @@ def once_calibrated(
 ) -> Verdict:
     """Return the verdict on an error after calibration of the biases that exceed its limit.
 
-    The square of a bias is a term of every draw of the total, and so of the squared limits of the
-    total. ``verdict`` is without calibration; limit, sigma and upper belong to the error;
-    conditions are the sources that the verdict depends on.
+    The square of a bias is a term of every draw of the total. ``verdict`` is without calibration;
+    limit, sigma and upper belong to the error; conditions are the sources that the verdict depends
+    on.
     """
     squares = [size**2 for _, size in with_sigma(conditions)]
     if not squares or verdict in _PASSING or limit is None:

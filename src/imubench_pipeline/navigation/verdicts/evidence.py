@@ -1,10 +1,7 @@
 """Derive the strength of the evidence for a verdict, and the reasons why it is weak.
 
-A verdict gives the confidence in a figure, assuming that its log is representative. The evidence
-depends on the logs: their length, the number of specimens and axes, and doubts about the parameter
-that contributes most to the error (`imubench_pipeline.recordings.fitness` lists the doubts).
-
-The name of a contribution to an error gives its quantity and noise parameter.
+The evidence depends on the logs: their length, the number of specimens and axes, and doubts about
+the parameter that contributes most to the error.
 """
 
 from __future__ import annotations
@@ -64,11 +61,10 @@ def parameters_behind(source: str) -> frozenset[str]:
 
 
 def weaknesses(standing: Standing, requirement: Requirement, basis: Basis) -> list[str]:
-    """Return the reasons for weak evidence on a limit; empty if it is strong.
+    """Return the reasons for weak evidence on a limit that has a figure; empty if it is strong.
 
     They are `WEAKNESS_REASONS` and codes of the table ``doubts``. Axes and doubts count if at least
-    half of the recordings have them; the longest recording gives the length. The standing must have
-    a figure.
+    half of the recordings have them.
     """
     reasons = []
     if standing.expected.specimens == 1:

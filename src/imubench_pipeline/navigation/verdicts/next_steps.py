@@ -150,10 +150,8 @@ def _find_settling_steps(judgement: Judgement, basis: Basis) -> Iterator[_Step]:
 def specimens_needed(expected: Expected, away: float) -> int | None:
     """Return how many more specimens would bring the limits of an error within a distance.
 
-    The half width of the prediction interval is t sqrt(tau^2 (1 + 1/n)) with n - 1 degrees of
-    freedom. The spread is assumed to remain the same, and the errors of the logs are neglected.
-    ``away`` is the logarithm of the margin, the maximum distance of the limits. None if 20
-    specimens are not enough.
+    ``away`` is the logarithm of the margin, the maximum half width t sqrt(tau^2 (1 + 1/n)) of the
+    prediction interval. The errors of the logs are neglected. None if 20 specimens are not enough.
     """
     assert expected.spread is not None
     for number in range(expected.specimens + 1, _MAX_SPECIMENS + 1):

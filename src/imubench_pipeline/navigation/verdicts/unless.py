@@ -1,9 +1,8 @@
 """Verdicts that a doubtful unit could change: as logged, and with the corrected unit.
 
-All errors are linear in the noise of a quantity, so another unit multiplies each of its noise
-sources by one factor f: sigma'^2 = sum of the other sources^2 + f^2 sum of its own^2. Figures from
-a requirement or a datasheet do not change. The ratios of the limits to sigma are kept. This is
-exact if one quantity dominates the error, as it does if a unit changes a verdict.
+Another unit multiplies each noise source of a quantity by one factor; figures from a requirement or
+a datasheet do not change. The ratios of the limits to sigma are kept, which is exact if one
+quantity dominates the error.
 """
 
 from __future__ import annotations
@@ -40,9 +39,9 @@ class Unless:
 def unless(sensor: str, rows: Sequence[ErrorBudgetRow], basis: Basis) -> Unless | None:
     """Return the verdict on a sensor with doubtful units corrected.
 
-    The rows are those of one requirement, with the figures of all recordings. None without a
-    figure, or if the verdict would not change. If all recordings of a sensor were left out, the
-    verdict from their figures as logged is returned too.
+    The rows are those of one requirement. None without a figure, or if the verdict would not
+    change. If all recordings were left out, the verdict from their figures as logged is returned
+    too.
     """
     keys = list(dict.fromkeys((sensor, row.recording) for row in rows))
     apart = [key for key in keys if key in basis.apart]
