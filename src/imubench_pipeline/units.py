@@ -1,8 +1,7 @@
-"""Every unit that a log, a setting or a datasheet writes, converted to SI and back.
+"""Convert the units of logs, settings and datasheets to SI and back.
 
-The registry is ours: angles have a dimension of their own, so that °/s and Hz, or rad/s and
-1/s, cannot be mixed up, ``g`` is standard gravity, and gram where a mass is asked for alone, and
-``LSB`` is a count.
+The registry is our own: angles have a dimension, so that °/s and Hz cannot be confused; ``g`` is
+standard gravity, or gram if only a mass is expected; ``LSB`` is a count.
 """
 
 from __future__ import annotations
@@ -129,7 +128,7 @@ watt = [power] = W
 
 
 class UnitError(ValueError):
-    """A unit that is not known, or that has another dimension than the one expected."""
+    """An unknown unit, or one of another dimension than expected."""
 
 
 @contextmanager
@@ -207,12 +206,9 @@ def _expected(dimension: str) -> str:
 
 
 def _parsed(unit: str) -> tuple[float, pint.Unit]:
-    """Return a unit of the registry and the power of two that stands with it.
+    """Return a unit of the registry and the power of two beside it.
 
-    Raises
-    ------
-    UnitError
-        If it cannot be read; the text says why, and does not yet say what is expected.
+    Raises a `UnitError` without the expected unit.
     """
     import pint
 
@@ -231,9 +227,12 @@ def _parsed(unit: str) -> tuple[float, pint.Unit]:
     if power and abs(int(power[1])) > _HIGHEST_POWER_OF_TWO:
         raise UnitError(f"cannot read {unit!r} as a unit: the power is too high")
     try:
-        factors = list(_factors(text))
+        tokens = list(_tokens(text))
+        exponents, place = ([], 1) if tokens == ["1"] else _product(tokens, 0)
+        if place < len(tokens):
+            raise UnitError(f"found {tokens[place]!r} too much")
         found = _registry().parse_units("")
-        for name, exponent in factors:
+        for name, exponent in exponents:
             found = found * _registry().parse_units(name) ** exponent
     except pint.UndefinedUnitError:
         raise UnitError(f"unknown unit {unit!r}") from None
@@ -251,25 +250,6 @@ _HIGHEST_POWER = 12.0
 _TOKEN = re.compile(
     r"\s*(?:(?P<name>[A-Za-zµμ_][A-Za-zµμ_0-9]*)|(?P<number>\d+(?:\.\d+)?)|(?P<sign>\*\*|[-*/()]))"
 )
-
-
-def _factors(text: str) -> Iterator[tuple[str, float]]:
-    """Yield each unit of an expression and its exponent: products, quotients, powers, no sums.
-
-    Nothing is computed but exponents: an expression of numbers is no unit.
-
-    Raises
-    ------
-    UnitError
-        If it is none; the text says what was found.
-    """
-    tokens = list(_tokens(text))
-    if tokens == ["1"]:
-        return
-    exponents, place = _product(tokens, 0)
-    if place < len(tokens):
-        raise UnitError(f"found {tokens[place]!r} too much")
-    yield from exponents
 
 
 def _tokens(text: str) -> Iterator[str]:
@@ -359,25 +339,19 @@ def _converter(unit: str, dimension: str) -> tuple[float, float]:
     except UnitError as error:
         raise UnitError(f"{error}; {_expected(dimension)}") from error
     if source.dimensionality != target.dimensionality:
-        raise UnitError(f"{_mismatch(unit, source, dimension)}; {_expected(dimension)}")
+        others = [
+            name
+            for name, other in _targets().items()
+            if other.dimensionality == source.dimensionality
+        ]
+        but = f" but of {_said(others[0])}" if others else f" (it has {source.dimensionality})"
+        fault = f"{unit!r} is no unit of {_said(dimension)}{but}"
+        rooted = _NO_ROOT.sub(r"/sqrt(\1)", unit)
+        if rooted != unit and _parsed(rooted)[1].dimensionality == target.dimensionality:
+            fault += f"; is the sign of a root lost, and {rooted!r} meant?"
+        raise UnitError(f"{fault}; {_expected(dimension)}")
     zero, one = (_registry().Quantity(value, source).to(target).magnitude for value in (0.0, power))
     return float(one - zero), float(zero)
-
-
-def _mismatch(unit: str, source: pint.Unit, dimension: str) -> str:
-    """Return what a unit of another dimension is, and what may be the matter."""
-    others = [
-        name
-        for name, target in _targets().items()
-        if target.dimensionality == source.dimensionality
-    ]
-    but = f" but of {_said(others[0])}" if others else f" (it has {source.dimensionality})"
-    said = f"{unit!r} is no unit of {_said(dimension)}{but}"
-    if _NO_ROOT.search(unit):
-        rooted = _NO_ROOT.sub(r"/sqrt(\1)", unit)
-        if _parsed(rooted)[1].dimensionality == _targets()[dimension].dimensionality:
-            said += f"; is the sign of a root lost, and {rooted!r} meant?"
-    return said
 
 
 def conversion(unit: str, dimension: str) -> tuple[float, float]:
@@ -386,33 +360,23 @@ def conversion(unit: str, dimension: str) -> tuple[float, float]:
     Parameters
     ----------
     unit : str
-        As a vendor writes it, for instance ``°/√h``, ``dps/√Hz`` or ``µg``. What stands behind
-        it (``rms``, ``1σ``, ``over -40..85``) is passed over.
+        As a vendor writes it, for instance ``°/√h``, ``dps/√Hz`` or ``µg``; ``rms``, ``1σ`` or
+        ``over -40..85`` after it is ignored.
     dimension : str
         A key of `SI_UNITS`.
 
     Raises
     ------
     UnitError
-        If the unit is unknown, of another dimension, a level in decibels, or spelled without a
-        sign that was lost; the text names both dimensions and what was expected.
+        If the unit is unknown, of another dimension, a level in decibels, or lacks a lost sign.
     """
     return _converter(unit, dimension)
 
 
 def dimension_of(unit: str, expected: tuple[str, ...]) -> str:
-    """Return which of some dimensions a unit has.
+    """Return the dimension of a unit among some keys of `SI_UNITS`, the usual one first.
 
-    Parameters
-    ----------
-    unit : str
-    expected : tuple of str
-        Keys of `SI_UNITS`, the usual one first.
-
-    Raises
-    ------
-    UnitError
-        If it has none of them; the text is that of the first.
+    Raises a `UnitError` about the first one if it has none of them.
     """
     for dimension in expected[1:]:
         try:
@@ -485,7 +449,7 @@ def in_si(value: float | str, dimension: str, name: str) -> float:
     dimension : str
         A key of `SI_UNITS`.
     name : str
-        What it is called, for the error.
+        Name of the setting, for the error.
 
     Raises
     ------
@@ -517,10 +481,7 @@ _QUANTITY = re.compile(r"^\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*([^\d
 def quantity_to_si(text: str, dimension: str) -> float:
     """Read a number with its unit, such as ``100 Hz``, into SI.
 
-    Raises
-    ------
-    UnitError
-        If there is no number, no unit, a unit of another dimension, or more than a float holds.
+    Raises a `UnitError` without a number or a unit, for another dimension, and beyond a float.
     """
     number, unit = _number_and_unit(text, dimension)
     return _finite(to_si(number, unit, dimension), text)

@@ -1,11 +1,9 @@
 """Convert printed figures to SI, in the convention of the estimate that they are compared with.
 
-Three conventions need care. A printed noise density is mostly one-sided, and N is that density over
-√2; if the datasheet does not say, both readings are returned. A printed bias instability is the
-minimum of the Allan deviation, 0.664 B if the curve has a plateau. A temperature coefficient, a
-total over a temperature range and an rms during a temperature change are three quantities. A static
-log with varying temperature shows the first, the sensitivity that
-`imubench_pipeline.estimators.thermal` fits. It cannot show the other two.
+A printed noise density is mostly one-sided, and N is that density over √2; if the datasheet does
+not say, both readings are returned. A printed bias instability is the minimum of the Allan
+deviation, 0.664 B with a plateau. A temperature coefficient can be compared with the sensitivity of
+a static log; a total or an rms over temperature cannot.
 """
 
 from __future__ import annotations

@@ -1,8 +1,7 @@
 """Compare measured values with printed figures.
 
-A verdict applies to the whole 95 % interval of the measurement: ``worse than typ`` means that all
-of it lies beyond the printed figure and the tolerance. If the interval crosses a boundary, the
-verdict is ``not sure``, and the reason names the possible verdicts.
+A verdict applies to the whole 95 % interval of the measurement. If the interval crosses a boundary,
+the verdict is ``not sure``, and the reason names the possible ones.
 """
 
 from __future__ import annotations
@@ -72,9 +71,8 @@ def deltas(
     tau: NDArray[np.float64],
     tolerance: float,
 ) -> Iterator[Delta]:
-    """Compare an estimate, SI, with the figures of a datasheet.
+    """Compare an estimate, SI, with the figures of a datasheet, one row for each reading of them.
 
-    There is one row for each printed figure and reading of it; K and T_B are mostly not published.
     tau, shape (m,), s, are the averaging times at which the curve is accurate enough to find its
     minimum. The tolerance is the relative difference that still counts as printed.
     """
@@ -103,8 +101,7 @@ def bias_deltas(
     tolerance : float
         Relative difference that still counts as printed.
     sensitivity : Parameter, optional
-        Size of the fitted sensitivity to temperature (`datasheets.measured.sensitivity`); None: the
-        log has no readings of the temperature.
+        From `datasheets.measured.sensitivity`; None without readings of the temperature.
     """
     bias = fixed_bias(channel, means)
     for entry in bias_comparables(datasheet, channel):
@@ -211,8 +208,8 @@ def curve_rms(
     """Compare a measured curve with the lines N/√τ and bias instability of a datasheet.
 
     The two add as variances: σ²(τ) = N²/τ + floor². If a datasheet prints only one of them, that
-    line is used alone. A density of unknown sidedness gives two curves; a datasheet with neither
-    figure gives none. Typical figures are preferred to the others.
+    line is used alone. A density of unknown sidedness gives two curves. Typical figures are
+    preferred.
 
     Parameters
     ----------

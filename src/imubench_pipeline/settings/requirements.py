@@ -1,4 +1,4 @@
-"""What an application needs of a sensor: limits of its errors after a time of dead reckoning."""
+"""Requirements of an application: limits of the errors of dead reckoning after a time."""
 
 from __future__ import annotations
 
@@ -145,7 +145,7 @@ class TurnOn(Strict):
 
 
 class Environment(Strict):
-    """What a sensor meets in use that a static log does not show; what is left out is not there."""
+    """Conditions of use that a static log does not show; none by default."""
 
     temperature_change: Annotated[Text, _change] | None = Field(
         None,
@@ -162,14 +162,14 @@ class Environment(Strict):
 
 
 class FullScale(Strict):
-    """What must not be beyond the range of a sensor."""
+    """Values that must be within the range of a sensor."""
 
     gyro: Rate | None = Field(None, description="±")
     accel: Acceleration | None = Field(None, description="±, gravity included")
 
 
 class Must(Strict):
-    """What a sensor must have, as far as its file tells; what is left out is not asked for."""
+    """Hard requirements, as far as the sensor file has the figures; none by default."""
 
     full_scale: FullScale = FullScale()
     bandwidth: Frequency | None = Field(None, description="-3 dB, of each quantity, at least")
@@ -187,7 +187,7 @@ class Must(Strict):
 
 
 class Requirement(Strict):
-    """What one application needs."""
+    """Requirements of one application."""
 
     title: Text
     example: bool = Field(False, description="made up, to show how a requirement is written")

@@ -111,7 +111,7 @@ class AxisSettings(Strict):
         return self
 
     def si(self, channel: str) -> dict[str, float]:
-        """Return the figures of the noise, the bias, the resolution and the full scale, in SI."""
+        """Return the figures of noise, bias, resolution and full scale in SI."""
         quantity = quantity_of(channel)
         plain = QUANTITIES[quantity]
         dimensions = {
@@ -128,7 +128,7 @@ class AxisSettings(Strict):
         return _in_si({name: (getattr(self, name), of) for name, of in dimensions.items()})
 
     def check(self, channel: str) -> None:
-        """Raise UnitError, with the key, if a unit has another dimension than its figure."""
+        """Raise a UnitError, with the key, if a unit has another dimension than its figure."""
         quantity = quantity_of(channel)
         self.si(channel)
         for number, process in enumerate(self.further):
@@ -183,7 +183,7 @@ class ModelSettings(ImuSettings):
 
 
 def check_axes(axes: Mapping[Channel, AxisSettings], key: str) -> None:
-    """Raise ValueError, with the key of the figure, if a unit has another dimension than it."""
+    """Raise a ValueError, with the key, if a unit has another dimension than its figure."""
     for channel, axis in axes.items():
         try:
             axis.check(channel)
@@ -192,7 +192,7 @@ def check_axes(axes: Mapping[Channel, AxisSettings], key: str) -> None:
 
 
 def _in_si(figures: Mapping[str, tuple[str | None, str]]) -> dict[str, float]:
-    """Return the figures that are there in SI, of text and dimension by their keys."""
+    """Return the stated figures in SI, from text and dimension by key."""
     in_si = {}
     for key, (text, dimension) in figures.items():
         if text is not None:

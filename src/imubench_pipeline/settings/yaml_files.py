@@ -53,26 +53,23 @@ _MERGE_TAG = f"{_TAG_PREFIX}merge"
 _TEXT_TAGS = {f"{_TAG_PREFIX}str", f"{_TAG_PREFIX}binary"}
 
 
-class Integer(int):
+class _Written:
+    """A number that keeps its notation, which errors show."""
+
+    written: str
+
+    def __str__(self) -> str:
+        return self.written
+
+    __repr__ = __str__
+
+
+class Integer(_Written, int):
     """An integer that keeps its notation."""
 
-    written: str
 
-    def __str__(self) -> str:
-        return self.written
-
-    __repr__ = __str__  # errors show what the file has
-
-
-class Decimal(float):
+class Decimal(_Written, float):
     """A number with decimals that keeps its notation."""
-
-    written: str
-
-    def __str__(self) -> str:
-        return self.written
-
-    __repr__ = __str__  # errors show what the file has
 
 
 class _Loader(_SAFE):
@@ -146,14 +143,7 @@ def _make_fault(at: Any, problem: str) -> yaml.MarkedYAMLError:
 
 
 def read_yaml(path: Path) -> object:
-    """Read one YAML file.
-
-    Raises
-    ------
-    ConfigError
-        If the file is missing, no regular file, not YAML, too large, nested too deeply, or has a
-        duplicate key; the message states the line.
-    """
+    """Read one YAML file; raises a `ConfigError` with the line of the fault."""
     try:
         text = _read_text(path)
         if unseen := yaml.reader.Reader.NON_PRINTABLE.search(text):
@@ -187,14 +177,16 @@ def read_folder(
 ) -> dict[str, _Model | ConfigError]:
     """Return all ``.yaml`` files of folders as models by name, with errors for invalid ones.
 
-    A file replaces a file of the same name in an earlier folder.
-
-    Raises
-    ------
-    ConfigError
-        If a folder does not exist.
+    A file replaces a file of the same name in an earlier folder. Raises a `ConfigError` for a
+    missing folder.
     """
-    return {name: _read_or_error(model, path) for name, path in files_in(folders, each).items()}
+    models: dict[str, _Model | ConfigError] = {}
+    for name, path in files_in(folders, each).items():
+        try:
+            models[name] = read_settings(model, path)
+        except ConfigError as error:
+            models[name] = error
+    return models
 
 
 def files_in(folders: Path | Iterable[Path], each: str) -> dict[str, Path]:
@@ -205,13 +197,6 @@ def files_in(folders: Path | Iterable[Path], each: str) -> dict[str, Path]:
             raise ConfigError(f"{folder}: no such folder; expected one YAML file a {each}")
         files |= {path.stem: path for path in folder.glob("*.yaml")}
     return dict(sorted(files.items(), key=lambda file: file[1].name))
-
-
-def _read_or_error(model: type[_Model], path: Path) -> _Model | ConfigError:
-    try:
-        return read_settings(model, path)
-    except ConfigError as error:
-        return error
 
 
 def usable(read: Mapping[str, _Model | ConfigError]) -> dict[str, _Model]:

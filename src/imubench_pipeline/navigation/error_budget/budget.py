@@ -162,14 +162,12 @@ def budget(
 ) -> Budget:
     """Return the error after a time of dead reckoning, by source.
 
-    The noise of the gyro is integrated once to the attitude and the heading, twice and three
-    times with g to velocity and position; that of the accelerometer once and twice; an initial
-    tilt adds g t and g t^2 / 2 times itself (for the formulas see `Term.growth` of each term).
-    White noise alone gives, after t, N sqrt(t), g N sqrt(t^3/3) and g N sqrt(t^5/20) from the gyro,
-    and N sqrt(t) and N sqrt(t^3/3) from the accelerometer.
-
-    White noise in the window is independent of the noise in motion and has a separate contribution.
-    For every other term, window and motion are correlated and have one contribution.
+    The noise of the gyro is integrated once to the attitude and the heading, twice and three times
+    with g to velocity and position; that of the accelerometer once and twice; an initial tilt adds
+    g t and g t^2 / 2 times itself (see `Term.growth`). White noise alone gives, after t, N sqrt(t),
+    g N sqrt(t^3/3) and g N sqrt(t^5/20) from the gyro, N sqrt(t) and N sqrt(t^3/3) from the
+    accelerometer. White noise in the window is independent of the noise in motion and has a
+    separate contribution; every other term has one, since window and motion are correlated.
 
     Parameters
     ----------
@@ -194,9 +192,8 @@ def budget(
     References
     ----------
     P. D. Groves, "Principles of GNSS, Inertial, and Multisensor Integrated Navigation Systems",
-    2nd ed., Artech House 2013 (error growth without Schuler feedback in
-    the short term); D. H. Titterton and J. L. Weston, "Strapdown Inertial Navigation Technology",
-    2nd ed., IEE 2004.
+    2nd ed., Artech House 2013; D. H. Titterton and J. L. Weston, "Strapdown Inertial Navigation
+    Technology", 2nd ed., IEE 2004.
     """
     if quantity not in get_args(Quantity):
         raise ValueError(f"quantity is {quantity!r}, expected one of {get_args(Quantity)}")
@@ -286,12 +283,32 @@ def time_until(
     gyro_figures: Figures = NO_FIGURES,
     accel_figures: Figures = NO_FIGURES,
 ) -> float | None:
-    """Return the time, s, after which an error reaches a limit, 1 sigma, rad, m/s or m.
+    """Return the time after which an error reaches a limit.
 
-    It is 0 if the error exceeds the limit from the beginning, None if it does not within 30 years.
-    The other arguments are those of `budget`. The total increases with time, because the errors at
-    two times never have a negative correlation. With lines it may oscillate: the first crossing is
-    then found among 4096 times. Raises a ValueError if the limit is not above 0.
+    The total of a `budget` increases with time, because the errors at two times never have a
+    negative correlation. With lines it may oscillate: the first crossing is then found among 4096
+    times.
+
+    Parameters
+    ----------
+    limit : float
+        1 sigma, rad, m/s or m.
+    quantity : {"attitude", "heading", "velocity", "position"}
+    gyro, accel : NoiseModel
+    start : Start
+    use : Use
+    gyro_figures, accel_figures : mapping of str to Figure
+        All as in `budget`.
+
+    Returns
+    -------
+    float or None
+        s; 0 if the error exceeds the limit from the beginning, None if it does not within 30 years.
+
+    Raises
+    ------
+    ValueError
+        If the limit is not above 0, or the quantity is not known.
     """
     if not (math.isfinite(limit) and limit > 0):
         raise ValueError(f"limit is {limit}, expected a number above 0")

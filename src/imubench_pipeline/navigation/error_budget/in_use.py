@@ -69,14 +69,29 @@ _REQUIRED_CAUSES: frozenset[Cause] = frozenset(
 
 @dataclass(frozen=True, kw_only=True)
 class Figure:
-    """Size of an error of one axis."""
+    """Size of an error of one axis.
 
-    sigma: float | None = None  # 1 sigma, SI; None if not known
+    Attributes
+    ----------
+    sigma : float or None
+        1 sigma, SI; None if not known.
+    origin : str
+    kind : str or None
+        Kind of a printed figure: typ, max, 1sigma ...
+    convention : str or None
+        How it was converted to a standard deviation.
+    spread : float
+        1 sigma of the figure itself, if it is an estimate.
+    reason : str or None
+        Why it is not known.
+    """
+
+    sigma: float | None = None
     origin: Origin = "not known"
-    kind: str | None = None  # of a printed figure: typ, max, 1sigma ...
-    convention: str | None = None  # how it was converted to a standard deviation
-    spread: float = 0.0  # 1 sigma of the figure itself, if it is an estimate
-    reason: str | None = None  # why it is not known
+    kind: str | None = None
+    convention: str | None = None
+    spread: float = 0.0
+    reason: str | None = None
 
 
 STATED_FIGURE = Figure(origin="requirement", convention="as it is stated, 1 sigma")
