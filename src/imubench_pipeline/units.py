@@ -16,76 +16,44 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     import pint
 
-SI_UNITS: dict[str, str] = {
-    "angular_rate": "rad/s",
-    "acceleration": "m/s^2",
-    "temperature": "degC",
-    "frequency": "Hz",
-    "time": "s",
-    "angle": "rad",
-    "velocity": "m/s",
-    "length": "m",
-    "gyro_density": "rad/s/sqrt(Hz)",
-    "accel_density": "m/s^2/sqrt(Hz)",
-    "gyro_power_density": "(rad/s)^2/Hz",
-    "accel_power_density": "(m/s^2)^2/Hz",
-    "gyro_random_walk": "rad/s/sqrt(s)",
-    "accel_random_walk": "m/s^2/sqrt(s)",
-    "gyro_quantization": "rad",
-    "accel_quantization": "m/s",
-    "gyro_ramp": "rad/s^2",
-    "accel_ramp": "m/s^3",
-    "gyro_temperature_coefficient": "rad/s/K",
-    "accel_temperature_coefficient": "m/s^2/K",
-    "gyro_temperature_curvature": "rad/s/K^2",
-    "accel_temperature_curvature": "m/s^2/K^2",
-    "gyro_acceleration_coefficient": "rad/s/(m/s^2)",
-    "gyro_vibration_coefficient": "rad/s/(m/s^2)^2",
-    "accel_vibration_coefficient": "m/s^2/(m/s^2)^2",
-    "gyro_step": "rad/s/LSB",
-    "accel_step": "m/s^2/LSB",
-    "gyro_sensitivity": "LSB/(rad/s)",
-    "accel_sensitivity": "LSB/(m/s^2)",
-    "ratio": "1",
-    "mass": "kg",
-    "power": "W",
+_DIMENSIONS: dict[str, tuple[str, str]] = {
+    "angular_rate": ("rad/s", "deg/s, deg/h, mrad/s or rad/s"),
+    "acceleration": ("m/s^2", "m/s^2, g, mg or ug"),
+    "temperature": ("degC", "degC or K"),
+    "frequency": ("Hz", "Hz or kHz"),
+    "time": ("s", "s, min, h, ms, us or ns"),
+    "angle": ("rad", "deg, mrad or rad"),
+    "velocity": ("m/s", "m/s or km/h"),
+    "length": ("m", "m, km or cm"),
+    "gyro_density": ("rad/s/sqrt(Hz)", "deg/s/sqrt(Hz), mdps/sqrt(Hz) or deg/sqrt(h)"),
+    "accel_density": ("m/s^2/sqrt(Hz)", "ug/sqrt(Hz) or m/s/sqrt(h)"),
+    "gyro_power_density": ("(rad/s)^2/Hz", "(deg/s)^2/Hz or (deg/h)^2/Hz"),
+    "accel_power_density": ("(m/s^2)^2/Hz", "g^2/Hz or (m/s^2)^2/Hz"),
+    "gyro_random_walk": ("rad/s/sqrt(s)", "deg/h/sqrt(h) or deg/s^(3/2)"),
+    "accel_random_walk": ("m/s^2/sqrt(s)", "ug/sqrt(h) or m/s^(5/2)"),
+    "gyro_quantization": ("rad", "deg or arcsec"),
+    "accel_quantization": ("m/s", "m/s or mm/s"),
+    "gyro_ramp": ("rad/s^2", "deg/h/h or deg/s^2"),
+    "accel_ramp": ("m/s^3", "ug/h or m/s^3"),
+    "gyro_temperature_coefficient": ("rad/s/K", "deg/s/K"),
+    "accel_temperature_coefficient": ("m/s^2/K", "mg/K"),
+    "gyro_temperature_curvature": ("rad/s/K^2", "deg/s/K^2"),
+    "accel_temperature_curvature": ("m/s^2/K^2", "mg/K^2"),
+    "gyro_acceleration_coefficient": ("rad/s/(m/s^2)", "deg/s/g or deg/h/g"),
+    "gyro_vibration_coefficient": ("rad/s/(m/s^2)^2", "deg/s/g^2 or deg/h/g^2"),
+    "accel_vibration_coefficient": ("m/s^2/(m/s^2)^2", "mg/g^2 or ug/g^2"),
+    "gyro_step": ("rad/s/LSB", "mdps/LSB or deg/s/LSB"),
+    "accel_step": ("m/s^2/LSB", "mg/LSB or m/s^2/LSB"),
+    "gyro_sensitivity": ("LSB/(rad/s)", "LSB/(deg/s)"),
+    "accel_sensitivity": ("LSB/(m/s^2)", "LSB/g or LSB/mg"),
+    "ratio": ("1", "% or ppm"),
+    "mass": ("kg", "g or kg"),
+    "power": ("W", "W or mW"),
 }
-"""The dimensions that the project knows, each with the SI unit that it is kept in."""
+"""SI unit of each dimension, and examples of other units for errors."""
 
-_EXAMPLES: dict[str, str] = {
-    "angular_rate": "deg/s, deg/h, mrad/s or rad/s",
-    "acceleration": "m/s^2, g, mg or ug",
-    "temperature": "degC or K",
-    "frequency": "Hz or kHz",
-    "time": "s, min, h, ms, us or ns",
-    "angle": "deg, mrad or rad",
-    "velocity": "m/s or km/h",
-    "length": "m, km or cm",
-    "gyro_density": "deg/s/sqrt(Hz), mdps/sqrt(Hz) or deg/sqrt(h)",
-    "accel_density": "ug/sqrt(Hz) or m/s/sqrt(h)",
-    "gyro_power_density": "(deg/s)^2/Hz or (deg/h)^2/Hz",
-    "accel_power_density": "g^2/Hz or (m/s^2)^2/Hz",
-    "gyro_random_walk": "deg/h/sqrt(h) or deg/s^(3/2)",
-    "accel_random_walk": "ug/sqrt(h) or m/s^(5/2)",
-    "gyro_quantization": "deg or arcsec",
-    "accel_quantization": "m/s or mm/s",
-    "gyro_ramp": "deg/h/h or deg/s^2",
-    "accel_ramp": "ug/h or m/s^3",
-    "gyro_temperature_coefficient": "deg/s/K",
-    "accel_temperature_coefficient": "mg/K",
-    "gyro_temperature_curvature": "deg/s/K^2",
-    "accel_temperature_curvature": "mg/K^2",
-    "gyro_acceleration_coefficient": "deg/s/g or deg/h/g",
-    "gyro_vibration_coefficient": "deg/s/g^2 or deg/h/g^2",
-    "accel_vibration_coefficient": "mg/g^2 or ug/g^2",
-    "gyro_step": "mdps/LSB or deg/s/LSB",
-    "accel_step": "mg/LSB or m/s^2/LSB",
-    "gyro_sensitivity": "LSB/(deg/s)",
-    "accel_sensitivity": "LSB/g or LSB/mg",
-    "ratio": "% or ppm",
-    "mass": "g or kg",
-    "power": "W or mW",
-}
+SI_UNITS: dict[str, str] = {name: si for name, (si, _) in _DIMENSIONS.items()}
+"""SI unit of each dimension."""
 
 _WRITTEN: dict[str, str] = {
     "temperature": "25 degC",
@@ -202,7 +170,7 @@ def _said(dimension: str) -> str:
 
 
 def _expected(dimension: str) -> str:
-    return f"expected a unit of {_said(dimension)} such as {_EXAMPLES[dimension]}"
+    return f"expected a unit of {_said(dimension)} such as {_DIMENSIONS[dimension][1]}"
 
 
 def _parsed(unit: str) -> tuple[float, pint.Unit]:
@@ -503,7 +471,7 @@ def _finite(value: float, text: str) -> float:
 def _number_and_unit(text: str, dimension: str) -> tuple[float, str]:
     match = _QUANTITY.match(str(text))
     if not match:
-        first = re.split(r", | or ", _EXAMPLES[dimension])[0]
+        first = re.split(r", | or ", _DIMENSIONS[dimension][1])[0]
         raise UnitError(
             f"{str(text)[:_LONGEST]!r} is not a number with its unit; {_expected(dimension)}, "
             f"written like {_WRITTEN.get(dimension, f'1 {first}')!r}"

@@ -78,7 +78,7 @@ def describe_error(error: BaseException) -> str:
 
 
 def failure_of(path: Path) -> Failure | None:
-    """Return why an output is empty (Parquet or ``quality.json``); None if it is not, or damaged."""
+    """Return why an output, Parquet or ``quality.json``, is empty; None without a failure."""
     if path.name == QUALITY:
         with contextlib.suppress(ValueError, TypeError, AttributeError):
             failure = read_json(path).get("failure")
