@@ -297,7 +297,22 @@ def _targets() -> dict[str, pint.Unit]:
 
 
 @lru_cache(maxsize=1024)
-def _converter(unit: str, dimension: str) -> tuple[float, float]:
+def conversion(unit: str, dimension: str) -> tuple[float, float]:
+    """Return ``(factor, offset)`` with ``si = factor * value + offset``.
+
+    Parameters
+    ----------
+    unit : str
+        As a vendor writes it, for instance ``°/√h``, ``dps/√Hz`` or ``µg``; ``rms``, ``1σ`` or
+        ``over -40..85`` after it is ignored.
+    dimension : str
+        A key of `SI_UNITS`.
+
+    Raises
+    ------
+    UnitError
+        If the unit is unknown, of another dimension, a level in decibels, or lacks a lost sign.
+    """
     if unit.strip() == "?":
         raise UnitError(f"the unit '?' is left to fill in; {_expected(dimension)}")
     target = _targets()[dimension]
@@ -322,25 +337,6 @@ def _converter(unit: str, dimension: str) -> tuple[float, float]:
     return float(one - zero), float(zero)
 
 
-def conversion(unit: str, dimension: str) -> tuple[float, float]:
-    """Return ``(factor, offset)`` with ``si = factor * value + offset``.
-
-    Parameters
-    ----------
-    unit : str
-        As a vendor writes it, for instance ``°/√h``, ``dps/√Hz`` or ``µg``; ``rms``, ``1σ`` or
-        ``over -40..85`` after it is ignored.
-    dimension : str
-        A key of `SI_UNITS`.
-
-    Raises
-    ------
-    UnitError
-        If the unit is unknown, of another dimension, a level in decibels, or lacks a lost sign.
-    """
-    return _converter(unit, dimension)
-
-
 def dimension_of(unit: str, expected: tuple[str, ...]) -> str:
     """Return the dimension of a unit among some keys of `SI_UNITS`, the usual one first.
 
@@ -348,11 +344,11 @@ def dimension_of(unit: str, expected: tuple[str, ...]) -> str:
     """
     for dimension in expected[1:]:
         try:
-            _converter(unit, dimension)
+            conversion(unit, dimension)
         except UnitError:
             continue
         return dimension
-    _converter(unit, expected[0])
+    conversion(unit, expected[0])
     return expected[0]
 
 

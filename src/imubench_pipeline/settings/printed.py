@@ -209,26 +209,18 @@ class QuantityDatasheet(Strict):
 
 
 def _dimensions(quantity: str, plain: str) -> dict[str, tuple[str, ...]]:
-    return {
+    noise = ("rms_noise", "bias_instability", "allan_deviation", "drift")
+    bias = ("offset", "bias_repeatability", "temperature_total", "temperature_rms")
+    return dict.fromkeys((*noise, *bias, "full_scale", "resolution"), (plain,)) | {
         "noise_density": (f"{quantity}_density", f"{quantity}_power_density"),
         "random_walk": (f"{quantity}_density",),
-        "rms_noise": (plain,),
-        "bias_instability": (plain,),
-        "allan_deviation": (plain,),
-        "drift": (plain,),
         "rate_random_walk": (f"{quantity}_random_walk",),
         "correlation_time": ("time",),
-        "offset": (plain,),
-        "bias_repeatability": (plain,),
         "temperature_coefficient": (f"{quantity}_temperature_coefficient",),
-        "temperature_total": (plain,),
-        "temperature_rms": (plain,),
         "scale_factor_error": ("ratio",),
         "nonlinearity": ("ratio",),
         "vibration_rectification": (f"{quantity}_vibration_coefficient",),
-        "full_scale": (plain,),
         "sensitivity": (f"{quantity}_step", f"{quantity}_sensitivity"),
-        "resolution": (plain,),
         "bandwidth": ("frequency",),
     }
 

@@ -1,21 +1,13 @@
-"""A sensor model as a YAML file has it, with its units; `models` makes it.
+"""A sensor model in a YAML file, with units; `simulate.models` converts it.
 
-sensor: bno055                       # the sensor file that its logs go with, if any
-temperature_step: 1 K
-misalignment: {gyro: [[1, 0.01, 0], [0, 1, 0], [0, 0, 1]]}
 axes:
   gyro_x:
     N: 0.0103 deg/s/sqrt(Hz)
     B: 10 deg/h
     T_B: 200 s
-    K: 2 deg/h/sqrt(h)
-    bias: -5.4 deg/s
     drift: {sensitivity: 0.015 deg/s/K, reference: 25 degC, lag: 5 min}
-    low_pass: {cutoff: 64 Hz}
-    resolution: 0.0625 deg/s
-    full_scale: 2000 deg/s
 
-Here is nothing that computes: the configuration of a run has such axes.
+Nothing is computed here: every configuration loads this module.
 """
 
 from __future__ import annotations

@@ -1,12 +1,8 @@
-"""Read YAML files, which may be untrusted.
+"""Read YAML files, which may be untrusted: size, depth and number of nodes are limited.
 
-Limits are checked before any object is built: size, depth, and number of nodes, where the nodes of
-an alias count at each use. A duplicate key is an error.
-
-Text is not converted. YAML 1.1 reads 0017 as 15, 12:30:45 as 45045, 2026-01-01 as a date and ``no``
-as false. Here a plain word is a text, unless it is null or a decimal or hexadecimal number. A
-number keeps its notation, which a setting of type text receives (`validation.Strict`). For settings
-that are true or false, pydantic converts the word. A key is a text.
+Text is not converted, as YAML 1.1 does (0017 is 15, ``no`` is false): a plain word is a text,
+unless it is null or a number. A number keeps its notation, for settings of type text
+(`validation.Strict`). A key is a text, and a duplicate key an error.
 """
 
 from __future__ import annotations
@@ -21,12 +17,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import yaml
 from pydantic import BaseModel
 
-from imubench_pipeline.settings.validation import (
-    ConfigError,
-    UnavailableSettingsError,
-    cut,
-    parse,
-)
+from imubench_pipeline.settings.validation import ConfigError, UnavailableSettingsError, cut, parse
 
 MAX_BYTES = 4 << 20
 """Largest size of a file, bytes."""

@@ -51,13 +51,7 @@ class Failure:
 
     def row(self) -> FailureRow:
         """Return the row of the table ``failures``."""
-        return FailureRow(
-            sensor=self.sensor,
-            recording=self.recording,
-            step=self.step,
-            cause=self.cause,
-            reason=self.reason,
-        )
+        return FailureRow(**asdict(self))
 
     def finding(self) -> Finding:
         """Return the finding about the recording."""

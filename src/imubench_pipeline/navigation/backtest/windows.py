@@ -174,31 +174,24 @@ def block_means(
             edges[length].append(start + np.rint(np.arange(blocks + 1) * samples).astype(np.int64))
     if not edges:
         return {}
-    every = np.concatenate([of_segment for each in edges.values() for of_segment in each])
-    sums = _sum_parts(parts, np.unique(every))
-    return {
-        length: [sums.means(of_segment) for of_segment in each] for length, each in edges.items()
-    }
+    every = np.unique(np.concatenate([one for each in edges.values() for one in each]))
+    sums, present = _sum_parts(parts, every)
 
-
-@dataclass(frozen=True)
-class _Sums:
-    """Cumulative sums and numbers of the samples before each edge."""
-
-    edges: NDArray[np.int64]
-    sums: Array
-    present: NDArray[np.int64]
-
-    def means(self, edges: NDArray[np.int64]) -> Array:
-        places = np.searchsorted(self.edges, edges)
-        present, size = np.diff(self.present[places]), np.diff(edges)
+    def compute_means(of_segment: NDArray[np.int64]) -> Array:
+        places = np.searchsorted(every, of_segment)
+        counts, size = np.diff(present[places]), np.diff(of_segment)
         means = np.full(len(size), np.nan)
-        enough = (present >= MIN_PRESENT_SHARE * size) & (present > 0)
-        np.divide(np.diff(self.sums[places]), present, out=means, where=enough)
+        enough = (counts >= MIN_PRESENT_SHARE * size) & (counts > 0)
+        np.divide(np.diff(sums[places]), counts, out=means, where=enough)
         return means
 
+    return {length: list(map(compute_means, each)) for length, each in edges.items()}
 
-def _sum_parts(parts: Iterable[NDArray[np.floating[Any]]], edges: NDArray[np.int64]) -> _Sums:
+
+def _sum_parts(
+    parts: Iterable[NDArray[np.floating[Any]]], edges: NDArray[np.int64]
+) -> tuple[Array, NDArray[np.int64]]:
+    """Return the sum, and the number, of the samples before each edge."""
     sums, present = np.zeros(len(edges)), np.zeros(len(edges), dtype=np.int64)
     reached, total, count = 0, 0.0, 0
     level: float | None = None
@@ -221,4 +214,4 @@ def _sum_parts(parts: Iterable[NDArray[np.floating[Any]]], edges: NDArray[np.int
             present[first:last] = count + places + 1
             count += len(part)
         reached, total = reached + len(part), total + float(running[-1])
-    return _Sums(edges, sums, present)
+    return sums, present

@@ -208,7 +208,16 @@ def budget(
         contributions.append(Contribution("initial heading", start.heading, "start", STATED_FIGURE))
     elif isinstance(start.tilt, Levelled):
         if quantity == "attitude" and isinstance(start.accel, Calibrated):
-            contributions.extend(_list_levelling_errors(accel, start.accel.window, start.tilt))
+            for term in accel.terms:
+                variance = term.mean_variance(start.accel.window, start.tilt.on_time)
+                sigma = math.sqrt(variance) / STANDARD_GRAVITY
+                contributions.append(Contribution(f"initial tilt by accel {term.source}", sigma))
+            if start.tilt.bias is not None:
+                sigma, source = (
+                    start.tilt.bias / STANDARD_GRAVITY,
+                    "initial tilt by accel turn-on bias",
+                )
+                contributions.append(Contribution(source, sigma, "turn_on_bias", STATED_FIGURE))
     else:
         tilt = start.tilt * gravity * of_constant(order - 1, time)
         contributions.append(Contribution("initial tilt", tilt, "start", STATED_FIGURE))
@@ -258,18 +267,6 @@ def of_sensor(
     if isinstance(start, Uncalibrated) and start.bias is not None:
         grown = factor * start.bias * of_constant(order, time)
         yield Contribution(f"{sensor} turn-on bias", grown, "turn_on_bias", STATED_FIGURE)
-
-
-def _list_levelling_errors(
-    accel: NoiseModel, window: float, levelled: Levelled
-) -> Iterator[Contribution]:
-    for term in accel.terms:
-        sigma = math.sqrt(term.mean_variance(window, levelled.on_time)) / STANDARD_GRAVITY
-        yield Contribution(f"initial tilt by accel {term.source}", sigma)
-    if levelled.bias is not None:
-        sigma = levelled.bias / STANDARD_GRAVITY
-        source = "initial tilt by accel turn-on bias"
-        yield Contribution(source, sigma, "turn_on_bias", STATED_FIGURE)
 
 
 def time_until(

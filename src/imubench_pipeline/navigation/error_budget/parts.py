@@ -11,12 +11,7 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 from imubench_pipeline.model.comparisons import ErrorBudgetRow
-from imubench_pipeline.navigation.error_budget.in_use import (
-    Cause,
-    Figure,
-    Figures,
-    needed,
-)
+from imubench_pipeline.navigation.error_budget.in_use import Cause, Figure, Figures, needed
 from imubench_pipeline.navigation.error_budget.printed_errors import DATASHEET_KEY_OF_CAUSE
 from imubench_pipeline.settings.printed import FIGURE_DIMENSIONS, Measured
 from imubench_pipeline.units import SI_UNITS

@@ -129,7 +129,15 @@ def judge(must: Must, has: Abilities) -> tuple[list[Shortfall], list[Condition]]
 
 
 def _compare(must: Must, has: Abilities) -> Iterator[_Point]:
-    yield from _compare_axes(must, has)
+    for text in must.axes:
+        quantity, axes = text.split("_")
+        if quantity in has.without:
+            yield _Point("quantity", quantity, False, text)
+            continue
+        for axis in axes:
+            # The sensor may have axes that are not in its logs.
+            logged = f"{quantity}_{axis}" in has.channels or None
+            yield _Point("axis", f"{quantity}_{axis}", logged, text)
     yield from _compare_full_scales(must, has)
     if must.bandwidth is not None:
         # Of the quantities with required axes, or else of all.
@@ -157,10 +165,10 @@ def _compare(must: Must, has: Abilities) -> Iterator[_Point]:
         ("mass", must.mass, has.mass),
         ("power", must.power, has.power),
     )
-    for name, text, size in sizes:
-        if text is not None:
-            small = None if size is None else size <= quantity_to_si(text, name) * _ROUNDING_MARGIN
-            yield _Point(name, "", small, text, _list_known(size))
+    for name, most, size in sizes:
+        if most is not None:
+            small = None if size is None else size <= quantity_to_si(most, name) * _ROUNDING_MARGIN
+            yield _Point(name, "", small, most, _list_known(size))
 
 
 def _list_known(value: float | None) -> tuple[float, ...]:
@@ -182,15 +190,3 @@ def _compare_full_scales(must: Must, has: Abilities) -> Iterator[_Point]:
         least = quantity_to_si(text, QUANTITIES[measured])
         enough = None if largest is None else largest * _ROUNDING_MARGIN >= least
         yield _Point("full_scale", measured, enough, text, _list_known(largest))
-
-
-def _compare_axes(must: Must, has: Abilities) -> Iterator[_Point]:
-    for text in must.axes:
-        quantity, axes = text.split("_")
-        if quantity in has.without:
-            yield _Point("quantity", quantity, False, text)
-            continue
-        for axis in axes:
-            # The sensor may have axes that are not in its logs.
-            logged = f"{quantity}_{axis}" in has.channels or None
-            yield _Point("axis", f"{quantity}_{axis}", logged, text)

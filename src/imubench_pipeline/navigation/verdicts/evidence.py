@@ -7,7 +7,6 @@ the parameter that contributes most to the error.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator
 from typing import Literal, get_args
 
 from imubench_pipeline.estimators.estimate import CURVE
@@ -75,34 +74,27 @@ def weaknesses(standing: Standing, requirement: Requirement, basis: Basis) -> li
         reasons.append("short_log")
     if standing.wide:
         reasons.append("wide_interval")
-    of_logs = Counter(
-        reason
-        for total in standing.totals
-        for reason in dict.fromkeys(_list_log_weaknesses(total, standing, requirement, basis))
-    )
+    of_logs = Counter[str]()
+    for total in standing.totals:
+        key = total.sensor, total.recording
+        own: list[str] = []
+        answering = {"gyro": total.gyro, "accel": total.accel}
+        for quantity, channel in answering.items():
+            axes = basis.axes(key, quantity) if channel else None
+            if requirement.axis == "worst" and axes is not None and axes < _AXIS_COUNT:
+                own.append("few_axes")
+        if standing.source is not None:
+            behind = parameters_behind(standing.source)
+            channel = answering[quantity_behind(standing.source) or "gyro"]
+            for doubt in basis.doubts.get(key, ()):
+                affected = behind.intersection(doubt.parameters) if doubt.parameters else behind
+                if doubt.channel in (None, channel) and affected:
+                    own.append(doubt.code)
+        of_logs.update(dict.fromkeys(own, 1))
     half = len(standing.totals) / 2.0
     order = [*WEAKNESS_REASONS, *of_logs]
     reasons += [reason for reason, count in of_logs.items() if count >= half]
     return sorted(reasons, key=order.index)
-
-
-def _list_log_weaknesses(
-    total: ErrorBudgetRow, standing: Standing, requirement: Requirement, basis: Basis
-) -> Iterator[str]:
-    key = total.sensor, total.recording
-    answering = {"gyro": total.gyro, "accel": total.accel}
-    for quantity, channel in answering.items():
-        axes = basis.axes(key, quantity) if channel else None
-        if requirement.axis == "worst" and axes is not None and axes < _AXIS_COUNT:
-            yield "few_axes"
-    if standing.source is None:
-        return
-    behind = parameters_behind(standing.source)
-    channel = answering[quantity_behind(standing.source) or "gyro"]
-    for doubt in basis.doubts.get(key, ()):
-        affected = behind.intersection(doubt.parameters) if doubt.parameters else behind
-        if doubt.channel in (None, channel) and affected:
-            yield doubt.code
 
 
 def longest_asked(total: ErrorBudgetRow, requirement: Requirement) -> float:

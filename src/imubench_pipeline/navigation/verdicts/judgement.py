@@ -135,7 +135,8 @@ def _map_specimens(
     """Return the specimen of each recording in rows, and whether all are simulated."""
     keys = [(sensor, row.recording) for row in rows]
     devices = {recording: basis.device((sensor, recording)) for _, recording in keys}
-    return devices, all(basis.simulated(key) for key in keys)
+    recordings = [basis.recordings.get(key) for key in keys]
+    return devices, all(row is not None and row.simulated for row in recordings)
 
 
 def _select_deciding_rows(rows: Sequence[ErrorBudgetRow], basis: Basis) -> list[ErrorBudgetRow]:

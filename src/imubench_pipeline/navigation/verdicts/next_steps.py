@@ -100,7 +100,17 @@ def _list_steps(judgement: Judgement, basis: Basis) -> Iterator[_Step]:
             codes = () if quantities else tuple(doubt.code for doubt in doubts)
             yield _Step(action, key, name, not same, quantities=quantities, doubts=codes)
     if not judgement.decides.known:
-        yield from _find_missing_data(judgement, basis)
+        # Channels may be missing, or the recording too short.
+        total = judgement.decides.total
+        key = judgement.sensor, total.recording
+        if key in basis.apart:
+            return
+        needs = ("gyro",) if total.error in ("heading", "north") else ("gyro", "accel")
+        missing = tuple(quantity for quantity in needs if basis.lacks(key, quantity))
+        if missing:
+            yield _Step("add_channels", key, name, turns=True, quantities=missing)
+        elif (needed := _compute_duration_needed(judgement)) > (basis.duration(key) or math.inf):
+            yield _Step("log_longer", key, name, turns=True, duration=needed)
         return
     if judgement.decides.verdict not in ("meets", "fails"):
         yield from _find_settling_steps(judgement, basis)
@@ -110,20 +120,6 @@ def _list_steps(judgement: Judgement, basis: Basis) -> Iterator[_Step]:
         yield _Step("find_figures", (judgement.sensor, None), name, False, figures=figures)
     for reason in judgement.reasons:
         yield from _find_strengthening_steps(judgement, reason, basis)
-
-
-def _find_missing_data(judgement: Judgement, basis: Basis) -> Iterator[_Step]:
-    """Yield the missing channels, or the needed length, of a recording without a figure."""
-    total = judgement.decides.total
-    key = judgement.sensor, total.recording
-    if key in basis.apart:
-        return
-    needs = ("gyro",) if total.error in ("heading", "north") else ("gyro", "accel")
-    missing = tuple(name for name in needs if basis.lacks(key, name))
-    if missing:
-        yield _Step("add_channels", key, judgement.name, turns=True, quantities=missing)
-    elif (needed := _compute_duration_needed(judgement)) > (basis.duration(key) or math.inf):
-        yield _Step("log_longer", key, judgement.name, turns=True, duration=needed)
 
 
 def _find_settling_steps(judgement: Judgement, basis: Basis) -> Iterator[_Step]:
