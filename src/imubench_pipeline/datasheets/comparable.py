@@ -98,8 +98,7 @@ class PrintedAxis:
     ) -> list[Comparable]:
         """Return the printed figures of a name for the axis, as copies of ``like``.
 
-        Figures of options that the logged sensors do not have are returned only if there are no
-        others.
+        Figures of options that are not logged are returned only if there are no others.
         """
         listed = [
             figure
@@ -165,7 +164,7 @@ class PrintedAxis:
 def comparables(datasheet: Datasheet, channel: str) -> Iterator[Comparable]:
     """Yield the datasheet figures of N, bias instability, K and T_B of a channel, SI.
 
-    Rows have no figure if none is published, or if nobody looked it up.
+    Rows have no figure if none is published or looked up.
     """
     axis = PrintedAxis.of(datasheet, channel)
     walk = Comparable("N", "N", None, reason="random walk as printed is N")
@@ -203,8 +202,8 @@ def comparables(datasheet: Datasheet, channel: str) -> Iterator[Comparable]:
 def bias_comparables(datasheet: Datasheet, channel: str) -> Iterator[Comparable]:
     """Yield the datasheet figures of the fixed bias of a channel, and of its changes, SI.
 
-    The offset is always yielded, the others only if they are published. The temperature coefficient
-    is comparable with the sensitivity; the rest have an obstacle.
+    The offset is always yielded, the others if published. Only the temperature coefficient is
+    comparable with a log; the rest have an obstacle.
     """
     axis = PrintedAxis.of(datasheet, channel)
     like = Comparable("offset", "mean", None)
@@ -218,10 +217,7 @@ def bias_comparables(datasheet: Datasheet, channel: str) -> Iterator[Comparable]
 
 
 def repeatability_comparables(datasheet: Datasheet, channel: str) -> Iterator[Comparable]:
-    """Yield the printed turn-on to turn-on repeatability of the bias of a channel, SI.
-
-    It is comparable with a standard deviation. Nothing is yielded if none is published.
-    """
+    """Yield the printed turn-on to turn-on repeatability of the bias of a channel, SI."""
     axis, name = PrintedAxis.of(datasheet, channel), "bias_repeatability"
     yield from axis.read(name, Comparable(name, "spread", None), axis.si(name))
 

@@ -119,10 +119,8 @@ def bias_deltas(
 def compare(entry: Comparable, parameter: Parameter, tolerance: float) -> Delta:
     """Compare a printed figure with its measured value, SI.
 
-    Without limits, the value alone decides. The tolerance is the relative difference from a typical
-    figure that still counts as printed. ``delta`` is measured / comparable - 1; ``delta_lower`` and
-    ``delta_upper`` are its least and largest value within the interval of the measurement and the
-    interval of the printed figures.
+    Without limits, the value alone decides. ``delta`` is measured / comparable - 1, with its least
+    and largest value within both intervals. The tolerance is that of `deltas`.
     """
     figure = entry.figure
     value, lower, upper = parameter.value, parameter.lower, parameter.upper

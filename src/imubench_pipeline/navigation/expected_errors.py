@@ -34,13 +34,7 @@ from imubench_pipeline.navigation.error_budget.parts import Largest
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.simulate import channel_rng
 from imubench_pipeline.settings.printed import SENSORS
-from imubench_pipeline.settings.requirements import (
-    DIMENSIONS,
-    Axis,
-    Environment,
-    Error,
-    Requirement,
-)
+from imubench_pipeline.settings.requirements import DIMENSIONS, Axis, Error, Requirement
 from imubench_pipeline.settings.sensor import quantity_of
 from imubench_pipeline.units import SI_UNITS, difference_to_si, quantity_to_si
 from imubench_pipeline.words.estimates import STATUS_WORDS
@@ -116,8 +110,7 @@ def standard(
 ) -> Iterator[Question]:
     """Yield the standard questions, which are computed for every recording.
 
-    There is one for each time, s, after a static window, s, for these axes; north is at a latitude
-    in rad.
+    ``times`` and the static window are in s, the latitude for north in rad.
     """
     start = Start.calibrated(window)
     quantities: tuple[Quantity, ...] = ("attitude", "heading", "velocity", "position")
@@ -131,45 +124,36 @@ def standard(
 def of_requirement(name: str, requirement: Requirement) -> Iterator[Question]:
     """Yield the questions of a requirement."""
     latitude = requirement.latitude
-    for limit in requirement.by_dead_reckoning:
-        yield Question(
-            name,
-            limit.error,
-            limit.seconds,
-            start_of(requirement),
-            requirement.axis,
-            None if latitude is None else quantity_to_si(latitude, "angle"),
-            limit.size / requirement.sigmas,
-            use_of(requirement.environment, limit.seconds),
-        )
-
-
-def start_of(requirement: Requirement) -> Start:
-    """Return the initial conditions of dead reckoning in an application."""
     if requirement.static_window is not None:
-        return Start.calibrated(quantity_to_si(requirement.static_window, "time"))
-    assert requirement.turn_on is not None  # checked with the requirement
-    gyro, accel = requirement.turn_on.gyro, requirement.turn_on.accel
-    return Start.uncalibrated(
-        gyro_bias=None if gyro is None else quantity_to_si(gyro, "angular_rate"),
-        accel_bias=None if accel is None else quantity_to_si(accel, "acceleration"),
-        on_time=quantity_to_si(requirement.turn_on.on_time, "time"),
-    )
-
-
-def use_of(environment: Environment, time: float) -> Use:
-    """Return the motion and environment of an application within the time of a limit, s."""
+        start = Start.calibrated(quantity_to_si(requirement.static_window, "time"))
+    elif requirement.turn_on is not None:
+        gyro, accel = requirement.turn_on.gyro, requirement.turn_on.accel
+        start = Start.uncalibrated(
+            gyro_bias=None if gyro is None else quantity_to_si(gyro, "angular_rate"),
+            accel_bias=None if accel is None else quantity_to_si(accel, "acceleration"),
+            on_time=quantity_to_si(requirement.turn_on.on_time, "time"),
+        )
+    environment = requirement.environment
     stated = {
         "turns": (environment.turns, "angle"),
         "speed_change": (environment.speed_change, "velocity"),
         "vibration": (environment.vibration, "acceleration"),
     }
-    change = environment.temperature_change
-    return Use(
-        temperature_change=difference_to_si(change, "temperature") if change else 0.0,
-        over=time,
-        **{name: quantity_to_si(text, of) for name, (text, of) in stated.items() if text},
-    )
+    use = {name: quantity_to_si(text, of) for name, (text, of) in stated.items() if text}
+    if environment.temperature_change:
+        change = difference_to_si(environment.temperature_change, "temperature")
+        use["temperature_change"] = change
+    for limit in requirement.by_dead_reckoning:
+        yield Question(
+            name,
+            limit.error,
+            limit.seconds,
+            start,  # a limit of dead reckoning has one
+            requirement.axis,
+            None if latitude is None else quantity_to_si(latitude, "angle"),
+            limit.size / requirement.sigmas,
+            Use(over=limit.seconds, **use),
+        )
 
 
 def error_rows(
@@ -273,10 +257,7 @@ def error_rows(
 def axes_of(
     estimates: Mapping[str, Estimate], figures: Mapping[str, Figures]
 ) -> dict[str, AxisErrors]:
-    """Return the error sources of the axes that have a noise model.
-
-    An axis without one is left out: its log is too short for any estimate, and its noise is not 0.
-    """
+    """Return the error sources of the axes with a noise model: the noise of others is not 0."""
     return {
         channel: AxisErrors(estimate.model, figures.get(channel, NO_FIGURES))
         for channel, estimate in estimates.items()

@@ -45,11 +45,6 @@ class Place:
         return f"{self.holds} ({printable(str(self.path))})"
 
 
-def has_nothing_of_ours(_: Path) -> bool:
-    """Return that no folder is an earlier output."""
-    return False
-
-
 @dataclass
 class Output:
     """An output that the user of a command has named."""
@@ -159,7 +154,7 @@ class OutputFolder(Output):
     """A folder that a command fills."""
 
     # whether a folder is an earlier output, which is replaced without ``--force``
-    is_earlier: Callable[[Path], bool] = has_nothing_of_ours
+    is_earlier: Callable[[Path], bool] = lambda _: False
     shared: bool = False  # it may have other files: only its own are refused where they exist
 
     def check(self) -> Path:

@@ -61,8 +61,8 @@ def of_figure(
 ) -> Contribution | Missing | None:
     """Return the contribution of a figure of a sensor to an error, or that it is missing.
 
-    ``lever`` is the error from a figure of 1 SI unit. None if the figure is not required, or
-    another one replaces it.
+    ``lever`` is the error from a figure of 1 SI unit. None if no figure is required, or another is
+    used.
     """
     figure = figures.get(cause, Figure(reason="the sensor file does not give it"))
     if figure.sigma is not None:
@@ -72,26 +72,12 @@ def of_figure(
     return None
 
 
-def source_row(of: ErrorBudgetRow, contribution: Contribution) -> ErrorBudgetRow:
-    """Return the row of a source, as a copy of the row of its error."""
-    figure = contribution.figure
-    return replace(
-        of,
-        source=contribution.source,
-        sigma=contribution.sigma,
-        cause=contribution.cause,
-        origin=figure.origin if figure else "measured",
-        kind=figure.kind if figure else None,
-        convention=figure.convention if figure else None,
-    )
-
-
 @dataclass(frozen=True)
 class Largest:
     """Remaining error budget under a limit, for unknown figures and biases above the limit.
 
-    A printed turn-on bias is used as printed. If it exceeds the limit, a calibration may reduce it
-    to its share of the remaining budget. All these figures share the budget (``room``) equally.
+    A printed turn-on bias is used as printed, unless it exceeds the limit: a calibration may then
+    reduce it to its share of the remaining budget (``room``), which all share equally.
     """
 
     room: float  # largest error of each of them, 1 sigma; 0 if there is none
@@ -99,11 +85,7 @@ class Largest:
 
     @classmethod
     def of(cls, budget: Budget, limit: float | None, upper: float) -> Largest:
-        """Return the remaining error budget.
-
-        ``limit`` is in SI; None if there is no limit. ``upper`` is the upper limit of the total: a
-        sensor that surely passes still does so with these figures.
-        """
+        """Return the remaining error budget under a limit, SI; ``upper`` is that of the total."""
         if limit is None:
             return cls(0.0)
         biases = tuple(
@@ -124,11 +106,17 @@ class Largest:
         return cls(math.sqrt(max(room, 0.0) / parts) if parts else 0.0, biases)
 
     def of_bias(self, of: ErrorBudgetRow, contribution: Contribution) -> ErrorBudgetRow:
-        """Return the row of a source; a printed bias above the limit has its largest value.
-
-        ``of`` is the row of the error.
-        """
-        row, figure = source_row(of, contribution), contribution.figure
+        """Return the row of a source; a printed bias above the limit has its largest value."""
+        figure = contribution.figure
+        row = replace(
+            of,
+            source=contribution.source,
+            sigma=contribution.sigma,
+            cause=contribution.cause,
+            origin=figure.origin if figure else "measured",
+            kind=figure.kind if figure else None,
+            convention=figure.convention if figure else None,
+        )
         if not self.room or contribution not in self.biases or figure is None or not figure.sigma:
             return row
         quantity = "accel" if "accel" in contribution.source.split() else "gyro"
@@ -137,7 +125,7 @@ class Largest:
         )
 
     def of_missing(self, of: ErrorBudgetRow, missing: Missing) -> ErrorBudgetRow:
-        """Return the row of a source with a missing figure. ``of`` is the row of the error."""
+        """Return the row of a source with a missing figure; ``of`` is the row of the error."""
         row = replace(
             of,
             source=missing.source,

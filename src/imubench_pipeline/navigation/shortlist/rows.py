@@ -17,8 +17,7 @@ from imubench_pipeline.navigation.error_budget.in_use import BIAS_CAUSES, Figure
 from imubench_pipeline.navigation.error_budget.in_use import Figures as InUse
 from imubench_pipeline.navigation.error_budget.printed_errors import of_datasheet
 from imubench_pipeline.navigation.expected_errors import AxisErrors, Question, of_requirement
-from imubench_pipeline.navigation.shortlist.classes import MeasuredRanges
-from imubench_pipeline.navigation.shortlist.figures import End, Figures, figures_of
+from imubench_pipeline.navigation.shortlist.figures import End, Figures, MeasuredRanges, figures_of
 from imubench_pipeline.navigation.suitability.abilities import abilities, judge
 from imubench_pipeline.settings.requirements import Requirement
 from imubench_pipeline.settings.sensor import Sensor
