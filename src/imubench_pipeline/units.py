@@ -209,8 +209,7 @@ def _parsed(unit: str) -> tuple[float, pint.Unit]:
     return 2.0 ** int(power[1]) if power else 1.0, found
 
 
-_LONGEST = 80
-"""Letters of a unit; the longest that a vendor prints has 40."""
+_LONGEST = 80  # letters of a unit; the longest that a vendor prints has 40
 
 _HIGHEST_POWER_OF_TWO = 64
 _HIGHEST_POWER = 12.0

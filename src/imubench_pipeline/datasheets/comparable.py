@@ -41,8 +41,7 @@ _ONE_LOG_OBSTACLES = {
 }
 
 
-SENSITIVITY = "sensitivity"
-"""Name of the statistic of a printed temperature coefficient."""
+SENSITIVITY = "sensitivity"  # name of the statistic of a printed temperature coefficient
 
 
 @dataclass(frozen=True)

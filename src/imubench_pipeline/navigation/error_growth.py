@@ -35,8 +35,7 @@ from imubench_pipeline.units import SI_UNITS
 
 _STANDARD_TIMES = (1.0, 2.0, 5.0, 10.0, 20.0, 30.0, 60.0, 120.0, 300.0, 600.0)
 _STANDARD_WINDOWS = (10.0, 30.0, 60.0, 120.0, 300.0, 600.0)
-_TAIL_PROBABILITY = 0.025
-"""Probability beyond each 95 % limit."""
+_TAIL_PROBABILITY = 0.025  # probability beyond each 95 % limit
 
 
 def growth_rows(

@@ -43,8 +43,7 @@ SIGNIFICANCE_LEVEL = 0.01
 POOLED_PARAMETERS = ("N", "B_curve", "sigma_min", "K", "B", "T_B", "Q", "R")
 """Pooled parameters, in their order in the table."""
 
-NORMAL_QUANTILE = 1.959963984540054
-"""97.5 % quantile of the standard normal distribution."""
+NORMAL_QUANTILE = 1.959963984540054  # 97.5 % quantile of the standard normal distribution
 
 _MIN_HALF_WIDTH_RATIO = 0.25
 
@@ -302,10 +301,7 @@ def _group_rows(
     *,
     several: bool,
 ) -> Iterator[tuple[str | None, list[tuple[str, E]], int]]:
-    """Yield the rows of the sensor (None) and of each device with several recordings.
-
-    Each group has its number of recordings; each row comes with its device.
-    """
+    """Yield device (None: all), rows with their devices, and number of recordings of each group."""
     groups: dict[str | None, list[tuple[str, E | None]]] = {}
     for recording, entry in rows.items():
         device = devices.get((sensor, recording), recording)

@@ -31,19 +31,16 @@ from imubench_pipeline.words.estimates import STATUS_WORDS
 
 Verdict = Literal["lower", "higher", "not told apart", "not known"]
 
-_TAIL_PROBABILITY = 0.025
-"""Probability beyond each 95 % limit."""
+_TAIL_PROBABILITY = 0.025  # probability beyond each 95 % limit
 
-_TAUS_PER_DECADE = 2
-"""Number of tau per decade in the table ``drawn_deviations``."""
+_TAUS_PER_DECADE = 2  # number of tau per decade in the table ``drawn_deviations``
 
 
 @dataclass(frozen=True)
 class Ratio:
     """Ratio of two logs, the first over the second."""
 
-    value: float | None
-    """None: one of them has no value."""
+    value: float | None  # None: one of them has no value
     # 95 % limits; None: unbounded above, or not known
     lower: float | None
     upper: float | None

@@ -63,8 +63,7 @@ def _make_type(
 
 
 MOST_WHOLE = 2**63 - 1
-LONGEST = 1e10
-"""s, three centuries."""
+LONGEST = 1e10  # s, three centuries
 
 
 NO_RESULTS = "what was asked for is not there, or cannot be used"

@@ -232,11 +232,9 @@ FIGURE_DIMENSIONS: dict[str, dict[str, tuple[str, ...]]] = {
 }
 """Dimensions that each datasheet figure may have, the usual one first, by quantity."""
 
-Measured = Literal["gyro", "accel"]
-"""What a sensor measures."""
+Measured = Literal["gyro", "accel"]  # what a sensor measures
 
-SENSORS: Mapping[str, str] = {"gyro": "gyro", "accel": "accelerometer"}
-"""What measures it."""
+SENSORS: Mapping[str, str] = {"gyro": "gyro", "accel": "accelerometer"}  # what measures it
 
 IN_USE = (
     "offset",
@@ -249,8 +247,7 @@ IN_USE = (
 )
 """Figures of errors that come in use and are in no static log."""
 
-_MAX_ACCELERATION_NOISE = 1.0
-"""Largest printed noise density of an accelerometer, SI."""
+_MAX_ACCELERATION_NOISE = 1.0  # largest printed noise density of an accelerometer, SI
 
 
 def _check_unit(key: str, quantity: str, name: str, figure: PrintedFigure) -> None:

@@ -26,8 +26,7 @@ DIMENSIONS: Mapping[str, str] = {
 }
 """The dimension of each error."""
 
-Axis = Literal["worst", "median"]
-"""The axis of a sensor that a requirement is held against."""
+Axis = Literal["worst", "median"]  # the axis of a sensor that a requirement is held against
 
 
 def _latitude(text: str) -> str:
@@ -232,24 +231,21 @@ class Requirement(Strict):
 
     @property
     def sigmas(self) -> float:
-        """How many standard deviations a limit is, at the confidence that is asked for."""
+        """Number of standard deviations of a limit, at its confidence."""
         return NormalDist().inv_cdf((1.0 + self.confidence) / 2.0)
 
     def admits(self, price_class: str | None) -> bool:
-        """Tell whether sensors of a price class may be chosen."""
+        """Return whether sensors of a price class may be chosen."""
         if self.price_class is None:
             return True
         return any(word.lower() in (price_class or "").lower() for word in self.price_class)
 
 
 def read_requirements(folders: Path | Iterable[Path] | None) -> dict[str, Requirement]:
-    """Read every requirement of folders, by the name of its file; none without a folder.
-
-    Raises `ConfigError`.
-    """
+    """Read the requirements of folders by file name, none without a folder."""
     return {} if folders is None else usable(read_folder(Requirement, folders, "requirement"))
 
 
 def requirements_of(sections: Mapping[str, object]) -> dict[str, Requirement]:
-    """Return the requirements as the plan wrote them."""
+    """Return the requirements of a plan."""
     return {name: Requirement.model_validate(section) for name, section in sections.items()}

@@ -26,9 +26,8 @@ def folders(stated: Folders, kind: Literal["sensors", "requirements"]) -> list[P
 
     The folder of a project, ``config/<kind>``, may be missing beside another one.
     """
-    named = [stated] if isinstance(stated, Path) else stated
     found: dict[Path, Path] = {}
-    for folder in named:
+    for folder in [stated] if isinstance(stated, Path) else stated:
         place = project() / "config" / kind if folder == CATALOGUE else folder
         found.pop(place.resolve(), None)
         found[place.resolve()] = place

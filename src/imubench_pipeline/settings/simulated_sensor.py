@@ -41,12 +41,8 @@ class LineSettings(Strict):
 
     def si(self, quantity: str) -> dict[str, float]:
         """Return its figures in SI."""
-        return _in_si(
-            {
-                "amplitude": (self.amplitude, QUANTITIES[quantity]),
-                "frequency": (self.frequency, "frequency"),
-            }
-        )
+        amplitude = (self.amplitude, QUANTITIES[quantity])
+        return _in_si({"amplitude": amplitude, "frequency": (self.frequency, "frequency")})
 
 
 class DriftSettings(Strict):

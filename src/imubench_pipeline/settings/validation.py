@@ -44,8 +44,7 @@ def _parse_fraction(value: object) -> float:
 _MAX_SHOWN_LENGTH, _MAX_ERROR_LENGTH = 100, 1000
 """Largest number of characters of a value, and of an error, that are shown."""
 
-_MAX_SHOWN_FAULTS = 20
-"""Largest number of faults of a file that are shown."""
+_MAX_SHOWN_FAULTS = 20  # largest number of faults of a file that are shown
 
 _SHORT_REPR = reprlib.Repr()
 _SHORT_REPR.maxstring = _SHORT_REPR.maxother = _SHORT_REPR.maxlong = _MAX_SHOWN_LENGTH
@@ -121,8 +120,7 @@ def _check_visible(text: str) -> str:
     return text
 
 
-Text = Annotated[str, AfterValidator(_check_visible)]
-"""A text that is shown in tables and on pages."""
+Text = Annotated[str, AfterValidator(_check_visible)]  # a text that is shown in tables and on pages
 Frequency = Annotated[
     Text, checked("frequency", "a frequency above zero"), Field(examples=["100 Hz"])
 ]

@@ -19,17 +19,14 @@ from pydantic import BaseModel
 
 from imubench_pipeline.settings.validation import ConfigError, UnavailableSettingsError, cut, parse
 
-MAX_BYTES = 4 << 20
-"""Largest size of a file, bytes."""
+MAX_BYTES = 4 << 20  # largest size of a file, bytes
 
-MAX_DEPTH = 40
-"""Largest depth of nested lists and mappings."""
+MAX_DEPTH = 40  # largest depth of nested lists and mappings
 
 MAX_NODES = 200_000
 """Largest number of keys and values of a file; the nodes of an alias count at each use."""
 
-MAX_NUMBER_LENGTH = 100
-"""Largest number of characters of a number."""
+MAX_NUMBER_LENGTH = 100  # largest number of characters of a number
 
 if TYPE_CHECKING:
     _SAFE = yaml.SafeLoader
@@ -168,8 +165,7 @@ def read_folder(
 ) -> dict[str, _Model | ConfigError]:
     """Return all ``.yaml`` files of folders as models by name, with errors for invalid ones.
 
-    A file replaces a file of the same name in an earlier folder. Raises a `ConfigError` for a
-    missing folder.
+    A later folder has precedence; a missing one raises a `ConfigError`.
     """
     models: dict[str, _Model | ConfigError] = {}
     for name, path in files_in(folders, each).items():

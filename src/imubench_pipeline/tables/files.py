@@ -23,8 +23,7 @@ from imubench_pipeline.tables.schemas import PARTS_OF, TABLES
 from imubench_pipeline.tables.texts import printable, with_safe_cells
 
 _SMALL = 1_000_000  # bytes
-_LONGEST_NAME = 240
-"""Bytes of a name to which a temporary one can add; file systems take 255."""
+_LONGEST_NAME = 240  # bytes of a name to which a temporary one can add; file systems take 255
 
 
 class TableError(ValueError):

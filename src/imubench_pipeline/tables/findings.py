@@ -48,17 +48,9 @@ def find(
     end: float | None = None,
 ) -> Finding:
     """Return a finding from its data; the other arguments are as in `Finding`."""
-    return Finding(
-        data.code,
-        severity,
-        data.text(channel or ""),
-        value,
-        channel,
-        start,
-        end,
-        tuple(sorted(data.affects)),
-        json.dumps(asdict(data)),
-    )
+    detail, affects = data.text(channel or ""), tuple(sorted(data.affects))
+    where = channel, start, end
+    return Finding(data.code, severity, detail, value, *where, affects, json.dumps(asdict(data)))
 
 
 def finding_of(row: FindingRow) -> Finding:

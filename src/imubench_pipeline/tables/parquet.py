@@ -13,8 +13,7 @@ from pathlib import Path
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-SEAL = b"imubench.digest"
-"""Key of the metadata."""
+SEAL = b"imubench.digest"  # key of the metadata
 
 _END = struct.Struct("<I4s")
 """How a file ends: the length of its metadata, and the mark of the format."""

@@ -17,8 +17,7 @@ from imubench_pipeline.tables.schemas import PARTS_OF, TABLES
 
 FOLDER = "seals"
 NIGHTS = "nightly"
-_LAYOUT = 1
-"""Is another number when what a run leaves beside its tables is of another form."""
+_LAYOUT = 1  # version of the layout of results other than tables
 
 
 @cache

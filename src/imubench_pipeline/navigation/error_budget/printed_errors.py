@@ -35,8 +35,7 @@ _SIGMA_CONVENTIONS: Mapping[str, tuple[float, str]] = {
 }
 """By kind, in order of preference: number of sigmas of a figure, and description."""
 
-SIGMAS = 1.96
-"""Half the width of a 95 % interval."""
+SIGMAS = 1.96  # half the width of a 95 % interval
 
 _CAUSE_OF_COEFFICIENT: Mapping[str, Cause] = {
     "sensitivity": "temperature",
@@ -45,10 +44,7 @@ _CAUSE_OF_COEFFICIENT: Mapping[str, Cause] = {
 
 
 def of_datasheet(datasheet: Datasheet, channel: str) -> dict[Cause, Figure]:
-    """Return the datasheet figures of the errors in use of a channel, SI.
-
-    There is one for every cause that a datasheet may print; without sigma if it does not print it.
-    """
+    """Return the datasheet figures of the errors in use of a channel, SI."""
     axis = PrintedAxis.of(datasheet, channel)
     names = FIGURE_DIMENSIONS[axis.quantity]
     figures: dict[Cause, Figure] = {}
@@ -77,11 +73,7 @@ def of_datasheet(datasheet: Datasheet, channel: str) -> dict[Cause, Figure]:
 
 
 def of_log(rows: Iterable[TemperatureRow]) -> dict[Cause, Figure]:
-    """Return the figures of the errors in use that the log of a channel determines, SI.
-
-    ``rows`` are its rows of the table ``temperature``. The causes are ``temperature`` and
-    ``temperature_squared``, if determined.
-    """
+    """Return the figures of the errors in use that the thermal fit of a channel determines, SI."""
     figures: dict[Cause, Figure] = {}
     for row in rows:
         if row.parameter not in _CAUSE_OF_COEFFICIENT or row.status != "ok" or row.value is None:
@@ -101,10 +93,7 @@ def of_log(rows: Iterable[TemperatureRow]) -> dict[Cause, Figure]:
 def in_use(
     datasheet: Datasheet, channels: Iterable[str], temperature: Iterable[TemperatureRow]
 ) -> dict[str, dict[Cause, Figure]]:
-    """Return the figures of the errors in use by channel, for `error_rows`.
-
-    They are from the datasheet of the sensor, and the table ``temperature`` of the recording.
-    """
+    """Return the figures of the errors in use by channel, from datasheet and log."""
     rows = list(temperature)
     return {
         channel: of_datasheet(datasheet, channel)

@@ -201,10 +201,7 @@ def figures_of(sensor: Sensor, quantity: str, ranges: MeasuredRanges) -> Figures
 
 
 def printed_ranges(sensors: Mapping[str, Sensor]) -> dict[tuple[str, str], tuple[float, float]]:
-    """Return the range of B, SI, that each datasheet of a catalogue allows, if printed.
-
-    The keys are (sensor, quantity), the values (low, high).
-    """
+    """Return the range of B, SI, by (sensor, quantity), that each datasheet prints."""
     ranges = {}
     for name, sensor in sensors.items():
         for quantity in SENSORS:

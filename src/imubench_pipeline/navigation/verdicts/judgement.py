@@ -78,10 +78,7 @@ def unless(sensor: str, rows: Sequence[ErrorBudgetRow], basis: Basis) -> Unless 
 
 
 def scaled(parts: Sequence[ErrorBudgetRow], factors: Factors) -> list[ErrorBudgetRow]:
-    """Return the rows of one error of one recording, with quantities multiplied by factors.
-
-    The rows are ``total`` and its sources.
-    """
+    """Return the rows of one error of one recording, with quantities multiplied by factors."""
     own = [row for row in parts if row.source != "total"]
     sources = [
         (row, factors.get(quantity_behind(row.source) or "", 1.0) * sigma)

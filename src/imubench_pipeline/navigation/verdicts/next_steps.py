@@ -28,8 +28,7 @@ T = TypeVar("T")
 _MAX_DURATION_FACTOR = 100.0
 """Maximum recommended duration over the present one: it makes limits ten times as narrow."""
 
-_MAX_SPECIMENS = 20
-"""Maximum number of specimens of a sensor that is recommended."""
+_MAX_SPECIMENS = 20  # maximum number of specimens of a sensor that is recommended
 
 _MIN_SPECIMENS = 3
 """Minimum number of specimens to estimate their spread: t is 4.3 with two degrees of freedom, 12.7

@@ -31,8 +31,7 @@ from imubench_pipeline.navigation.pooled import NORMAL_QUANTILE, bounded_exp, po
 
 Limits = tuple[float, float, float]  # value, lower, upper
 
-_MIN_VARIANCE_SHARE = 0.5
-"""Minimum tau^2, as a fraction of the variance of the logarithms."""
+_MIN_VARIANCE_SHARE = 0.5  # minimum tau^2, as a fraction of the variance of the logarithms
 
 _MIN_FREEDOM = 3
 """Minimum degrees of freedom of a spread from other sensors: t = 3.2, and 4.3 with two."""
@@ -116,10 +115,7 @@ def expected(
 
 
 def usual_spread(spreads: Iterable[Spread]) -> Spread | None:
-    """Return the pooled spread of several sensors; None with too few degrees of freedom.
-
-    Each spread is between the specimens of one sensor.
-    """
+    """Return the pooled spread of several sensors; None with too few degrees of freedom."""
     listed = list(spreads)
     freedom = sum(spread.freedom for spread in listed)
     if freedom < _MIN_FREEDOM:
