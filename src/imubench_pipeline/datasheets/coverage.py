@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from itertools import product
 from typing import Literal
 
 from imubench_pipeline.settings.printed import PrintedFigure, QuantityDatasheet
@@ -64,13 +65,36 @@ def coverage(sensors: Mapping[str, Sensor]) -> list[Coverage]:
     There is one row for each sensor, quantity that it measures, and figure, in the order of the
     sensors.
     """
-    return [
-        _make_row(name, sensor, quantity, figure)
-        for name, sensor in sensors.items()
-        for quantity in QUANTITIES
-        if getattr(sensor.datasheet, quantity) is not None
-        for figure in _KEYS_OF_FIGURE
-    ]
+    rows = []
+    for (name, sensor), quantity in product(sensors.items(), QUANTITIES):
+        datasheet = sensor.datasheet
+        sheet: QuantityDatasheet | None = getattr(datasheet, quantity)
+        if sheet is None:
+            continue
+        revision = f", revision {datasheet.revision}" if datasheet.revision else ""
+        for figure, (plain, akin) in _KEYS_OF_FIGURE.items():
+            printed = [each for key in (*plain, *akin) for each in sheet.printed(key)]
+            sources = dict.fromkeys(each.source or datasheet.source or "" for each in printed)
+            published: Published = "not looked up"
+            if any(each.kind != "derived" for key in plain for each in sheet.printed(key)):
+                published = "yes"
+            elif printed:
+                published = "other convention"
+            elif any(sheet.looked_up(key) for key in plain):
+                published = "no"
+            row = Coverage(
+                sensor=name,
+                vendor=sensor.vendor,
+                model=sensor.model,
+                quantity=quantity,
+                figure=figure,
+                published=published,
+                as_printed="; ".join(map(_format_figure, printed)) or None,
+                document=f"{datasheet.document}{revision}" if datasheet.document else None,
+                source=" and ".join(filter(None, sources)) or datasheet.source,
+            )
+            rows.append(row)
+    return rows
 
 
 def by_vendor(rows: Iterable[Coverage]) -> list[VendorCoverage]:
@@ -96,33 +120,6 @@ def by_vendor(rows: Iterable[Coverage]) -> list[VendorCoverage]:
         )
         for key, count in sorted(counts.items(), key=order)
     ]
-
-
-def _make_row(name: str, sensor: Sensor, quantity: str, figure: str) -> Coverage:
-    datasheet = sensor.datasheet
-    sheet: QuantityDatasheet = getattr(datasheet, quantity)
-    plain, akin = _KEYS_OF_FIGURE[figure]
-    printed = [each for key in (*plain, *akin) for each in sheet.printed(key)]
-    revision = f", revision {datasheet.revision}" if datasheet.revision else ""
-    sources = dict.fromkeys(each.source or datasheet.source or "" for each in printed)
-    published: Published = "not looked up"
-    if any(each.kind != "derived" for key in plain for each in sheet.printed(key)):
-        published = "yes"
-    elif printed:
-        published = "other convention"
-    elif any(sheet.looked_up(key) for key in plain):
-        published = "no"
-    return Coverage(
-        sensor=name,
-        vendor=sensor.vendor,
-        model=sensor.model,
-        quantity=quantity,
-        figure=figure,
-        published=published,
-        as_printed="; ".join(map(_format_figure, printed)) or None,
-        document=f"{datasheet.document}{revision}" if datasheet.document else None,
-        source=" and ".join(filter(None, sources)) or datasheet.source,
-    )
 
 
 def _format_figure(figure: PrintedFigure) -> str:

@@ -109,45 +109,39 @@ def standings(
                 reason = row.reason or f"it has no {' and no '.join(missing)}"
                 row = replace(row, sigma=None, reason=reason)
         by_limit.setdefault(limit_of(row), []).append(row)
-    return [
-        _make_standing(parts, devices, (usual or {}).get(key))
-        for key, parts in by_limit.items()
-        if any(row.source == "total" for row in parts)
-    ]
+    listed = []
+    for key, parts in by_limit.items():
+        totals = [row for row in parts if row.source == "total"]
+        if not totals:
+            continue
+        figures = with_sigma(totals)
+        with_figure = [row for row, _ in figures]
+        prediction = expected(with_figure, devices, (usual or {}).get(key))
+        if prediction.sigma is None:
+            listed.append(Standing(totals[0], with_figure, prediction))
+            continue
+        distances = [_compute_distance(sigma, prediction.sigma) for _, sigma in figures]
+        answer, sigma = figures[distances.index(min(distances))]
+        own = [row for row in parts if row.source != "total" and row.recording == answer.recording]
+        conditions = tuple(row for row in own if is_condition(row))
+        standing = Standing(answer, with_figure, prediction, conditions=conditions)
+        sources = with_sigma(own)
+        if sources and sigma > 0.0:
+            largest, size = max(sources, key=lambda source: source[1])
+            share, shares = (size / sigma) ** 2, shares_of(sigma, own)
+            standing = replace(standing, source=largest.source, share=share, parts=shares)
+        listed.append(standing)
+    return listed
+
+
+def _compute_distance(sigma: float, median: float) -> float:
+    """Return the logarithmic distance of an error from the median; the difference if one is 0."""
+    return abs(math.log(sigma / median)) if median and sigma else abs(sigma - median)
 
 
 def limit_of(row: ErrorBudgetRow) -> tuple[Any, ...]:
     """Return the key of the limit of a row."""
     return row.error, row.time, row.limit, trajectory_of(row)
-
-
-def _make_standing(
-    parts: Sequence[ErrorBudgetRow], devices: Mapping[str, str], usual: Spread | None
-) -> Standing:
-    totals = [row for row in parts if row.source == "total"]
-    figures = with_sigma(totals)
-    with_figure = [row for row, _ in figures]
-    prediction = expected(with_figure, devices, usual)
-    if prediction.sigma is None:
-        return Standing(totals[0], with_figure, prediction)
-    median = prediction.sigma
-
-    def compute_distance(figure: tuple[ErrorBudgetRow, float]) -> float:
-        """Return the logarithmic distance from the median; the difference if one is 0."""
-        sigma = figure[1]
-        return abs(math.log(sigma / median)) if median and sigma else abs(sigma - median)
-
-    answer, sigma = min(figures, key=compute_distance)
-    own = [row for row in parts if row.source != "total" and row.recording == answer.recording]
-    conditions = tuple(row for row in own if is_condition(row))
-    sources = with_sigma(own)
-    if not sources or sigma == 0.0:
-        return Standing(answer, with_figure, prediction, conditions=conditions)
-    largest, size = max(sources, key=lambda source: source[1])
-    share = (size / sigma) ** 2
-    return Standing(
-        answer, with_figure, prediction, largest.source, share, shares_of(sigma, own), conditions
-    )
 
 
 def deciding(by_limit: Sequence[Standing]) -> Standing:
