@@ -59,7 +59,10 @@ class WindowCovariance:
         return MAX_CORRELATED_SPANS * self.window.blocks
 
     def of(self, model: NoiseModel) -> Array:
-        """Return the covariance of the random errors by lag, shape (lags,), squared units."""
+        """Return the covariance of the errors by lag in blocks, without deterministic terms.
+
+        Shape (lags,), in rad^2, (m/s)^2 or m^2.
+        """
         total = np.zeros(self.lags)
         reach = self.window.blocks - 1
         lags = np.abs(np.arange(-reach, self.lags + reach, dtype=np.float64))

@@ -102,7 +102,10 @@ def with_sigma(rows: Iterable[ErrorBudgetRow]) -> list[tuple[ErrorBudgetRow, flo
 def shares_of(
     total: float, sources: Iterable[ErrorBudgetRow], least: float = 0.01
 ) -> tuple[Share, ...]:
-    """Return the sources of an error with their shares of the variance, the largest first."""
+    """Return the sources of an error with their shares of the variance, the largest first.
+
+    ``total`` is 1 sigma. Shares below ``least`` are left out.
+    """
     if total <= 0.0:
         return ()
     shares = (
