@@ -1,8 +1,7 @@
-"""Every unit that a log, a setting or a datasheet writes, converted to SI and back.
+"""Convert the units of logs, settings and datasheets to SI and back.
 
-The registry is ours: angles have a dimension of their own, so that °/s and Hz, or rad/s and
-1/s, cannot be mixed up, ``g`` is standard gravity, and gram where a mass is asked for alone, and
-``LSB`` is a count.
+The registry is our own: angles have a dimension, so that °/s and Hz cannot be confused; ``g`` is
+standard gravity, or gram if only a mass is expected; ``LSB`` is a count.
 """
 
 from __future__ import annotations
@@ -17,76 +16,44 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     import pint
 
-SI_UNITS: dict[str, str] = {
-    "angular_rate": "rad/s",
-    "acceleration": "m/s^2",
-    "temperature": "degC",
-    "frequency": "Hz",
-    "time": "s",
-    "angle": "rad",
-    "velocity": "m/s",
-    "length": "m",
-    "gyro_density": "rad/s/sqrt(Hz)",
-    "accel_density": "m/s^2/sqrt(Hz)",
-    "gyro_power_density": "(rad/s)^2/Hz",
-    "accel_power_density": "(m/s^2)^2/Hz",
-    "gyro_random_walk": "rad/s/sqrt(s)",
-    "accel_random_walk": "m/s^2/sqrt(s)",
-    "gyro_quantization": "rad",
-    "accel_quantization": "m/s",
-    "gyro_ramp": "rad/s^2",
-    "accel_ramp": "m/s^3",
-    "gyro_temperature_coefficient": "rad/s/K",
-    "accel_temperature_coefficient": "m/s^2/K",
-    "gyro_temperature_curvature": "rad/s/K^2",
-    "accel_temperature_curvature": "m/s^2/K^2",
-    "gyro_acceleration_coefficient": "rad/s/(m/s^2)",
-    "gyro_vibration_coefficient": "rad/s/(m/s^2)^2",
-    "accel_vibration_coefficient": "m/s^2/(m/s^2)^2",
-    "gyro_step": "rad/s/LSB",
-    "accel_step": "m/s^2/LSB",
-    "gyro_sensitivity": "LSB/(rad/s)",
-    "accel_sensitivity": "LSB/(m/s^2)",
-    "ratio": "1",
-    "mass": "kg",
-    "power": "W",
+_DIMENSIONS: dict[str, tuple[str, str]] = {
+    "angular_rate": ("rad/s", "deg/s, deg/h, mrad/s or rad/s"),
+    "acceleration": ("m/s^2", "m/s^2, g, mg or ug"),
+    "temperature": ("degC", "degC or K"),
+    "frequency": ("Hz", "Hz or kHz"),
+    "time": ("s", "s, min, h, ms, us or ns"),
+    "angle": ("rad", "deg, mrad or rad"),
+    "velocity": ("m/s", "m/s or km/h"),
+    "length": ("m", "m, km or cm"),
+    "gyro_density": ("rad/s/sqrt(Hz)", "deg/s/sqrt(Hz), mdps/sqrt(Hz) or deg/sqrt(h)"),
+    "accel_density": ("m/s^2/sqrt(Hz)", "ug/sqrt(Hz) or m/s/sqrt(h)"),
+    "gyro_power_density": ("(rad/s)^2/Hz", "(deg/s)^2/Hz or (deg/h)^2/Hz"),
+    "accel_power_density": ("(m/s^2)^2/Hz", "g^2/Hz or (m/s^2)^2/Hz"),
+    "gyro_random_walk": ("rad/s/sqrt(s)", "deg/h/sqrt(h) or deg/s^(3/2)"),
+    "accel_random_walk": ("m/s^2/sqrt(s)", "ug/sqrt(h) or m/s^(5/2)"),
+    "gyro_quantization": ("rad", "deg or arcsec"),
+    "accel_quantization": ("m/s", "m/s or mm/s"),
+    "gyro_ramp": ("rad/s^2", "deg/h/h or deg/s^2"),
+    "accel_ramp": ("m/s^3", "ug/h or m/s^3"),
+    "gyro_temperature_coefficient": ("rad/s/K", "deg/s/K"),
+    "accel_temperature_coefficient": ("m/s^2/K", "mg/K"),
+    "gyro_temperature_curvature": ("rad/s/K^2", "deg/s/K^2"),
+    "accel_temperature_curvature": ("m/s^2/K^2", "mg/K^2"),
+    "gyro_acceleration_coefficient": ("rad/s/(m/s^2)", "deg/s/g or deg/h/g"),
+    "gyro_vibration_coefficient": ("rad/s/(m/s^2)^2", "deg/s/g^2 or deg/h/g^2"),
+    "accel_vibration_coefficient": ("m/s^2/(m/s^2)^2", "mg/g^2 or ug/g^2"),
+    "gyro_step": ("rad/s/LSB", "mdps/LSB or deg/s/LSB"),
+    "accel_step": ("m/s^2/LSB", "mg/LSB or m/s^2/LSB"),
+    "gyro_sensitivity": ("LSB/(rad/s)", "LSB/(deg/s)"),
+    "accel_sensitivity": ("LSB/(m/s^2)", "LSB/g or LSB/mg"),
+    "ratio": ("1", "% or ppm"),
+    "mass": ("kg", "g or kg"),
+    "power": ("W", "W or mW"),
 }
-"""The dimensions that the project knows, each with the SI unit that it is kept in."""
+"""SI unit of each dimension, and examples of other units for errors."""
 
-_EXAMPLES: dict[str, str] = {
-    "angular_rate": "deg/s, deg/h, mrad/s or rad/s",
-    "acceleration": "m/s^2, g, mg or ug",
-    "temperature": "degC or K",
-    "frequency": "Hz or kHz",
-    "time": "s, min, h, ms, us or ns",
-    "angle": "deg, mrad or rad",
-    "velocity": "m/s or km/h",
-    "length": "m, km or cm",
-    "gyro_density": "deg/s/sqrt(Hz), mdps/sqrt(Hz) or deg/sqrt(h)",
-    "accel_density": "ug/sqrt(Hz) or m/s/sqrt(h)",
-    "gyro_power_density": "(deg/s)^2/Hz or (deg/h)^2/Hz",
-    "accel_power_density": "g^2/Hz or (m/s^2)^2/Hz",
-    "gyro_random_walk": "deg/h/sqrt(h) or deg/s^(3/2)",
-    "accel_random_walk": "ug/sqrt(h) or m/s^(5/2)",
-    "gyro_quantization": "deg or arcsec",
-    "accel_quantization": "m/s or mm/s",
-    "gyro_ramp": "deg/h/h or deg/s^2",
-    "accel_ramp": "ug/h or m/s^3",
-    "gyro_temperature_coefficient": "deg/s/K",
-    "accel_temperature_coefficient": "mg/K",
-    "gyro_temperature_curvature": "deg/s/K^2",
-    "accel_temperature_curvature": "mg/K^2",
-    "gyro_acceleration_coefficient": "deg/s/g or deg/h/g",
-    "gyro_vibration_coefficient": "deg/s/g^2 or deg/h/g^2",
-    "accel_vibration_coefficient": "mg/g^2 or ug/g^2",
-    "gyro_step": "mdps/LSB or deg/s/LSB",
-    "accel_step": "mg/LSB or m/s^2/LSB",
-    "gyro_sensitivity": "LSB/(deg/s)",
-    "accel_sensitivity": "LSB/g or LSB/mg",
-    "ratio": "% or ppm",
-    "mass": "g or kg",
-    "power": "W or mW",
-}
+SI_UNITS: dict[str, str] = {name: si for name, (si, _) in _DIMENSIONS.items()}
+"""SI unit of each dimension."""
 
 _WRITTEN: dict[str, str] = {
     "temperature": "25 degC",
@@ -129,7 +96,7 @@ watt = [power] = W
 
 
 class UnitError(ValueError):
-    """A unit that is not known, or that has another dimension than the one expected."""
+    """An unknown unit, or one of another dimension than expected."""
 
 
 @contextmanager
@@ -203,16 +170,13 @@ def _said(dimension: str) -> str:
 
 
 def _expected(dimension: str) -> str:
-    return f"expected a unit of {_said(dimension)} such as {_EXAMPLES[dimension]}"
+    return f"expected a unit of {_said(dimension)} such as {_DIMENSIONS[dimension][1]}"
 
 
 def _parsed(unit: str) -> tuple[float, pint.Unit]:
-    """Return a unit of the registry and the power of two that stands with it.
+    """Return a unit of the registry and the power of two beside it.
 
-    Raises
-    ------
-    UnitError
-        If it cannot be read; the text says why, and does not yet say what is expected.
+    Raises a `UnitError` without the expected unit.
     """
     import pint
 
@@ -231,9 +195,12 @@ def _parsed(unit: str) -> tuple[float, pint.Unit]:
     if power and abs(int(power[1])) > _HIGHEST_POWER_OF_TWO:
         raise UnitError(f"cannot read {unit!r} as a unit: the power is too high")
     try:
-        factors = list(_factors(text))
+        tokens = list(_tokens(text))
+        exponents, place = ([], 1) if tokens == ["1"] else _product(tokens, 0)
+        if place < len(tokens):
+            raise UnitError(f"found {tokens[place]!r} too much")
         found = _registry().parse_units("")
-        for name, exponent in factors:
+        for name, exponent in exponents:
             found = found * _registry().parse_units(name) ** exponent
     except pint.UndefinedUnitError:
         raise UnitError(f"unknown unit {unit!r}") from None
@@ -242,8 +209,7 @@ def _parsed(unit: str) -> tuple[float, pint.Unit]:
     return 2.0 ** int(power[1]) if power else 1.0, found
 
 
-_LONGEST = 80
-"""Letters of a unit; the longest that a vendor prints has 40."""
+_LONGEST = 80  # letters of a unit; the longest that a vendor prints has 40
 
 _HIGHEST_POWER_OF_TWO = 64
 _HIGHEST_POWER = 12.0
@@ -251,25 +217,6 @@ _HIGHEST_POWER = 12.0
 _TOKEN = re.compile(
     r"\s*(?:(?P<name>[A-Za-zµμ_][A-Za-zµμ_0-9]*)|(?P<number>\d+(?:\.\d+)?)|(?P<sign>\*\*|[-*/()]))"
 )
-
-
-def _factors(text: str) -> Iterator[tuple[str, float]]:
-    """Yield each unit of an expression and its exponent: products, quotients, powers, no sums.
-
-    Nothing is computed but exponents: an expression of numbers is no unit.
-
-    Raises
-    ------
-    UnitError
-        If it is none; the text says what was found.
-    """
-    tokens = list(_tokens(text))
-    if tokens == ["1"]:
-        return
-    exponents, place = _product(tokens, 0)
-    if place < len(tokens):
-        raise UnitError(f"found {tokens[place]!r} too much")
-    yield from exponents
 
 
 def _tokens(text: str) -> Iterator[str]:
@@ -349,7 +296,22 @@ def _targets() -> dict[str, pint.Unit]:
 
 
 @lru_cache(maxsize=1024)
-def _converter(unit: str, dimension: str) -> tuple[float, float]:
+def conversion(unit: str, dimension: str) -> tuple[float, float]:
+    """Return ``(factor, offset)`` with ``si = factor * value + offset``.
+
+    Parameters
+    ----------
+    unit : str
+        As a vendor writes it, for instance ``°/√h``, ``dps/√Hz`` or ``µg``; ``rms``, ``1σ`` or
+        ``over -40..85`` after it is ignored.
+    dimension : str
+        A key of `SI_UNITS`.
+
+    Raises
+    ------
+    UnitError
+        If the unit is unknown, of another dimension, a level in decibels, or lacks a lost sign.
+    """
     if unit.strip() == "?":
         raise UnitError(f"the unit '?' is left to fill in; {_expected(dimension)}")
     target = _targets()[dimension]
@@ -359,68 +321,33 @@ def _converter(unit: str, dimension: str) -> tuple[float, float]:
     except UnitError as error:
         raise UnitError(f"{error}; {_expected(dimension)}") from error
     if source.dimensionality != target.dimensionality:
-        raise UnitError(f"{_mismatch(unit, source, dimension)}; {_expected(dimension)}")
+        others = [
+            name
+            for name, other in _targets().items()
+            if other.dimensionality == source.dimensionality
+        ]
+        but = f" but of {_said(others[0])}" if others else f" (it has {source.dimensionality})"
+        fault = f"{unit!r} is no unit of {_said(dimension)}{but}"
+        rooted = _NO_ROOT.sub(r"/sqrt(\1)", unit)
+        if rooted != unit and _parsed(rooted)[1].dimensionality == target.dimensionality:
+            fault += f"; is the sign of a root lost, and {rooted!r} meant?"
+        raise UnitError(f"{fault}; {_expected(dimension)}")
     zero, one = (_registry().Quantity(value, source).to(target).magnitude for value in (0.0, power))
     return float(one - zero), float(zero)
 
 
-def _mismatch(unit: str, source: pint.Unit, dimension: str) -> str:
-    """Return what a unit of another dimension is, and what may be the matter."""
-    others = [
-        name
-        for name, target in _targets().items()
-        if target.dimensionality == source.dimensionality
-    ]
-    but = f" but of {_said(others[0])}" if others else f" (it has {source.dimensionality})"
-    said = f"{unit!r} is no unit of {_said(dimension)}{but}"
-    if _NO_ROOT.search(unit):
-        rooted = _NO_ROOT.sub(r"/sqrt(\1)", unit)
-        if _parsed(rooted)[1].dimensionality == _targets()[dimension].dimensionality:
-            said += f"; is the sign of a root lost, and {rooted!r} meant?"
-    return said
-
-
-def conversion(unit: str, dimension: str) -> tuple[float, float]:
-    """Return ``(factor, offset)`` with ``si = factor * value + offset``.
-
-    Parameters
-    ----------
-    unit : str
-        As a vendor writes it, for instance ``°/√h``, ``dps/√Hz`` or ``µg``. What stands behind
-        it (``rms``, ``1σ``, ``over -40..85``) is passed over.
-    dimension : str
-        A key of `SI_UNITS`.
-
-    Raises
-    ------
-    UnitError
-        If the unit is unknown, of another dimension, a level in decibels, or spelled without a
-        sign that was lost; the text names both dimensions and what was expected.
-    """
-    return _converter(unit, dimension)
-
-
 def dimension_of(unit: str, expected: tuple[str, ...]) -> str:
-    """Return which of some dimensions a unit has.
+    """Return the dimension of a unit among some keys of `SI_UNITS`, the usual one first.
 
-    Parameters
-    ----------
-    unit : str
-    expected : tuple of str
-        Keys of `SI_UNITS`, the usual one first.
-
-    Raises
-    ------
-    UnitError
-        If it has none of them; the text is that of the first.
+    Raises a `UnitError` about the first one if it has none of them.
     """
     for dimension in expected[1:]:
         try:
-            _converter(unit, dimension)
+            conversion(unit, dimension)
         except UnitError:
             continue
         return dimension
-    _converter(unit, expected[0])
+    conversion(unit, expected[0])
     return expected[0]
 
 
@@ -485,7 +412,7 @@ def in_si(value: float | str, dimension: str, name: str) -> float:
     dimension : str
         A key of `SI_UNITS`.
     name : str
-        What it is called, for the error.
+        Name of the setting, for the error.
 
     Raises
     ------
@@ -517,10 +444,7 @@ _QUANTITY = re.compile(r"^\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*([^\d
 def quantity_to_si(text: str, dimension: str) -> float:
     """Read a number with its unit, such as ``100 Hz``, into SI.
 
-    Raises
-    ------
-    UnitError
-        If there is no number, no unit, a unit of another dimension, or more than a float holds.
+    Raises a `UnitError` without a number or a unit, for another dimension, and beyond a float.
     """
     number, unit = _number_and_unit(text, dimension)
     return _finite(to_si(number, unit, dimension), text)
@@ -542,7 +466,7 @@ def _finite(value: float, text: str) -> float:
 def _number_and_unit(text: str, dimension: str) -> tuple[float, str]:
     match = _QUANTITY.match(str(text))
     if not match:
-        first = re.split(r", | or ", _EXAMPLES[dimension])[0]
+        first = re.split(r", | or ", _DIMENSIONS[dimension][1])[0]
         raise UnitError(
             f"{str(text)[:_LONGEST]!r} is not a number with its unit; {_expected(dimension)}, "
             f"written like {_WRITTEN.get(dimension, f'1 {first}')!r}"

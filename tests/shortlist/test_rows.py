@@ -11,8 +11,11 @@ from imubench_pipeline.model.comparisons import RankingRow
 from imubench_pipeline.model.estimates import ParameterRow
 from imubench_pipeline.model.recordings import RecordingRow
 from imubench_pipeline.model.states import ShortlistVerdict
-from imubench_pipeline.navigation.shortlist.classes import MeasuredRanges, measured_ranges
-from imubench_pipeline.navigation.shortlist.figures import printed_ranges
+from imubench_pipeline.navigation.shortlist.figures import (
+    MeasuredRanges,
+    measured_ranges,
+    printed_ranges,
+)
 from imubench_pipeline.navigation.shortlist.rows import shortlist_rows
 from imubench_pipeline.noise import FLOOR, Flicker, GaussMarkov
 from imubench_pipeline.noise.growth import Uncalibrated

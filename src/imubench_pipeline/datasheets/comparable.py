@@ -1,11 +1,9 @@
 """Convert printed figures to SI, in the convention of the estimate that they are compared with.
 
-Three conventions need care. A printed noise density is mostly one-sided, and N is that density over
-√2; if the datasheet does not say, both readings are returned. A printed bias instability is the
-minimum of the Allan deviation, 0.664 B if the curve has a plateau. A temperature coefficient, a
-total over a temperature range and an rms during a temperature change are three quantities. A static
-log with varying temperature shows the first, the sensitivity that
-`imubench_pipeline.estimators.thermal` fits. It cannot show the other two.
+A printed noise density is mostly one-sided, and N is that density over √2; if the datasheet does
+not say, both readings are returned. A printed bias instability is the minimum of the Allan
+deviation, 0.664 B with a plateau. A temperature coefficient can be compared with the sensitivity of
+a static log; a total or an rms over temperature cannot.
 """
 
 from __future__ import annotations
@@ -43,8 +41,7 @@ _ONE_LOG_OBSTACLES = {
 }
 
 
-SENSITIVITY = "sensitivity"
-"""Name of the statistic of a printed temperature coefficient."""
+SENSITIVITY = "sensitivity"  # name of the statistic of a printed temperature coefficient
 
 
 @dataclass(frozen=True)
@@ -100,8 +97,7 @@ class PrintedAxis:
     ) -> list[Comparable]:
         """Return the printed figures of a name for the axis, as copies of ``like``.
 
-        Figures of options that the logged sensors do not have are returned only if there are no
-        others.
+        Figures of options that are not logged are returned only if there are no others.
         """
         listed = [
             figure
@@ -110,7 +106,17 @@ class PrintedAxis:
         ]
         logged = [f for f in listed if f.option is None or f.option in self.options]
         rows = [self._make_row(name, figure, like, convert) for figure in logged or listed]
-        return [_add_interval(row, rows) for row in rows]
+        # Add the least and the largest figure of the same option.
+        ends: dict[str | None, list[float]] = {}
+        for row in rows:
+            own = ends.setdefault(row.figure.option if row.figure else None, [])
+            own += [value for value in (row.least, row.value) if value is not None]
+        return [
+            replace(row, lower=min(own), upper=max(own))
+            if row.figure and row.value is not None and (own := ends[row.figure.option])
+            else row
+            for row in rows
+        ]
 
     def _make_row(
         self,
@@ -154,26 +160,30 @@ class PrintedAxis:
         return replace(like, reason=reason, looked_up=looked_up)
 
 
-def _add_interval(row: Comparable, rows: Sequence[Comparable]) -> Comparable:
-    """Return a row with the least and the largest figure among the rows of its option."""
-    option = row.figure.option if row.figure else None
-    values = [
-        value
-        for other in rows
-        if other.figure is not None and other.figure.option == option and row.value is not None
-        for value in (other.least, other.value)
-        if value is not None
-    ]
-    return replace(row, lower=min(values), upper=max(values)) if values else row
-
-
 def comparables(datasheet: Datasheet, channel: str) -> Iterator[Comparable]:
     """Yield the datasheet figures of N, bias instability, K and T_B of a channel, SI.
 
-    Rows have no figure if none is published, or if nobody looked it up.
+    Rows have no figure if none is published or looked up.
     """
     axis = PrintedAxis.of(datasheet, channel)
-    noise = [*_read_densities(axis), *_read_random_walks(axis), *_read_rms(axis)]
+    walk = Comparable("N", "N", None, reason="random walk as printed is N")
+    rms_to_si = axis.si("rms_noise")
+
+    def convert_rms(value: float, figure: PrintedFigure) -> float:
+        bandwidth = noise_bandwidth(figure.bandwidth_hz or 0.0, figure.filter)
+        return noise_of_rms(rms_to_si(value, figure), bandwidth)
+
+    rms = Comparable("N", "N", None, "one-sided", reason="rms; N is rms / sqrt(2 bandwidth)")
+    noise = [
+        *_read_densities(axis),
+        *axis.read("random_walk", walk, axis.si("random_walk")),
+        *(
+            replace(row, reason=f"{row.reason}, {row.figure.bandwidth} ({row.figure.filter})")
+            if row.figure and row.value is not None
+            else row
+            for row in axis.read("rms_noise", rms, convert_rms)
+        ),
+    ]
     names = ("noise_density", "random_walk", "rms_noise")
     yield from noise or [axis.unpublished(Comparable("N", "N", None), *names)]
     for name, quantity, statistic, reason in (
@@ -191,8 +201,8 @@ def comparables(datasheet: Datasheet, channel: str) -> Iterator[Comparable]:
 def bias_comparables(datasheet: Datasheet, channel: str) -> Iterator[Comparable]:
     """Yield the datasheet figures of the fixed bias of a channel, and of its changes, SI.
 
-    The offset is always yielded, the others only if they are published. The temperature coefficient
-    is comparable with the sensitivity; the rest have an obstacle.
+    The offset is always yielded, the others if published. Only the temperature coefficient is
+    comparable with a log; the rest have an obstacle.
     """
     axis = PrintedAxis.of(datasheet, channel)
     like = Comparable("offset", "mean", None)
@@ -206,10 +216,7 @@ def bias_comparables(datasheet: Datasheet, channel: str) -> Iterator[Comparable]
 
 
 def repeatability_comparables(datasheet: Datasheet, channel: str) -> Iterator[Comparable]:
-    """Yield the printed turn-on to turn-on repeatability of the bias of a channel, SI.
-
-    It is comparable with a standard deviation. Nothing is yielded if none is published.
-    """
+    """Yield the printed turn-on to turn-on repeatability of the bias of a channel, SI."""
     axis, name = PrintedAxis.of(datasheet, channel), "bias_repeatability"
     yield from axis.read(name, Comparable(name, "spread", None), axis.si(name))
 
@@ -237,24 +244,3 @@ def _read_densities(axis: PrintedAxis) -> Iterator[Comparable]:
                 convert,
                 [figure for figure in figures if figure.sidedness == stated],
             )
-
-
-def _read_random_walks(axis: PrintedAxis) -> list[Comparable]:
-    like = Comparable("N", "N", None, reason="random walk as printed is N")
-    return axis.read("random_walk", like, axis.si("random_walk"))
-
-
-def _read_rms(axis: PrintedAxis) -> list[Comparable]:
-    si = axis.si("rms_noise")
-
-    def convert(value: float, figure: PrintedFigure) -> float:
-        bandwidth = noise_bandwidth(figure.bandwidth_hz or 0.0, figure.filter)
-        return noise_of_rms(si(value, figure), bandwidth)
-
-    like = Comparable("N", "N", None, "one-sided", reason="rms; N is rms / sqrt(2 bandwidth)")
-    return [
-        replace(row, reason=f"{row.reason}, {row.figure.bandwidth} ({row.figure.filter})")
-        if row.figure and row.value is not None
-        else row
-        for row in axis.read("rms_noise", like, convert)
-    ]

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from itertools import product
 from typing import Literal
 
 from imubench_pipeline.settings.printed import PrintedFigure, QuantityDatasheet
@@ -64,13 +65,36 @@ def coverage(sensors: Mapping[str, Sensor]) -> list[Coverage]:
     There is one row for each sensor, quantity that it measures, and figure, in the order of the
     sensors.
     """
-    return [
-        _make_row(name, sensor, quantity, figure)
-        for name, sensor in sensors.items()
-        for quantity in QUANTITIES
-        if getattr(sensor.datasheet, quantity) is not None
-        for figure in _KEYS_OF_FIGURE
-    ]
+    rows = []
+    for (name, sensor), quantity in product(sensors.items(), QUANTITIES):
+        datasheet = sensor.datasheet
+        sheet: QuantityDatasheet | None = getattr(datasheet, quantity)
+        if sheet is None:
+            continue
+        revision = f", revision {datasheet.revision}" if datasheet.revision else ""
+        for figure, (plain, akin) in _KEYS_OF_FIGURE.items():
+            printed = [each for key in (*plain, *akin) for each in sheet.printed(key)]
+            sources = dict.fromkeys(each.source or datasheet.source or "" for each in printed)
+            published: Published = "not looked up"
+            if any(each.kind != "derived" for key in plain for each in sheet.printed(key)):
+                published = "yes"
+            elif printed:
+                published = "other convention"
+            elif any(sheet.looked_up(key) for key in plain):
+                published = "no"
+            row = Coverage(
+                sensor=name,
+                vendor=sensor.vendor,
+                model=sensor.model,
+                quantity=quantity,
+                figure=figure,
+                published=published,
+                as_printed="; ".join(map(_format_figure, printed)) or None,
+                document=f"{datasheet.document}{revision}" if datasheet.document else None,
+                source=" and ".join(filter(None, sources)) or datasheet.source,
+            )
+            rows.append(row)
+    return rows
 
 
 def by_vendor(rows: Iterable[Coverage]) -> list[VendorCoverage]:
@@ -79,6 +103,12 @@ def by_vendor(rows: Iterable[Coverage]) -> list[VendorCoverage]:
     for row in rows:
         key = (row.vendor, row.quantity, row.figure)
         counts.setdefault(key, Counter())[row.published] += 1
+
+    def order(item: tuple[tuple[str, str, str], Counter[str]]) -> tuple[str, int, int]:
+        vendor, quantity, figure = item[0]
+        place = list(QUANTITIES).index(quantity), list(_KEYS_OF_FIGURE).index(figure)
+        return vendor.lower(), *place
+
     return [
         VendorCoverage(
             *key,
@@ -88,64 +118,25 @@ def by_vendor(rows: Iterable[Coverage]) -> list[VendorCoverage]:
             no=count["no"],
             not_looked_up=count["not looked up"],
         )
-        for key, count in sorted(counts.items(), key=lambda item: _make_sort_key(*item[0]))
+        for key, count in sorted(counts.items(), key=order)
     ]
 
 
-def _make_sort_key(vendor: str, quantity: str, figure: str) -> tuple[str, int, int]:
-    return vendor.lower(), list(QUANTITIES).index(quantity), list(_KEYS_OF_FIGURE).index(figure)
-
-
-def _make_row(name: str, sensor: Sensor, quantity: str, figure: str) -> Coverage:
-    datasheet = sensor.datasheet
-    sheet: QuantityDatasheet = getattr(datasheet, quantity)
-    plain, akin = _KEYS_OF_FIGURE[figure]
-    printed = [each for key in (*plain, *akin) for each in sheet.printed(key)]
-    revision = f", revision {datasheet.revision}" if datasheet.revision else ""
-    sources = dict.fromkeys(each.source or datasheet.source or "" for each in printed)
-    return Coverage(
-        sensor=name,
-        vendor=sensor.vendor,
-        model=sensor.model,
-        quantity=quantity,
-        figure=figure,
-        published=_classify_publication(sheet, plain, akin),
-        as_printed="; ".join(map(_format_figure, printed)) or None,
-        document=f"{datasheet.document}{revision}" if datasheet.document else None,
-        source=" and ".join(filter(None, sources)) or datasheet.source,
-    )
-
-
-def _classify_publication(
-    sheet: QuantityDatasheet, plain: tuple[str, ...], akin: tuple[str, ...]
-) -> Published:
-    if any(each.kind != "derived" for key in plain for each in sheet.printed(key)):
-        return "yes"
-    if any(sheet.printed(key) for key in (*plain, *akin)):
-        return "other convention"
-    return "no" if any(sheet.looked_up(key) for key in plain) else "not looked up"
-
-
 def _format_figure(figure: PrintedFigure) -> str:
-    return " ".join(
-        filter(None, (" ".join(_format_numbers(figure)), figure.unit, *_format_qualifiers(figure)))
+    """Return value, unit, kind and qualifiers of a figure."""
+    value, numbers = figure.value, ""
+    if isinstance(value, dict):
+        numbers = ", ".join(f"{axes} {number:g}" for axes, number in value.items())
+    elif isinstance(value, tuple):
+        numbers = (" to " if figure.kind == "range" else ", ").join(f"{v:g}" for v in value)
+    elif value is not None:
+        numbers = f"{value:g}"
+    parts = (
+        numbers,
+        figure.unit,
+        figure.kind,
+        figure.option and f"({figure.option})",
+        figure.bandwidth and f"over {figure.bandwidth}",
+        figure.tau and f"at {figure.tau}",
     )
-
-
-def _format_numbers(figure: PrintedFigure) -> Iterator[str]:
-    if isinstance(figure.value, dict):
-        yield ", ".join(f"{axes} {value:g}" for axes, value in figure.value.items())
-    elif isinstance(figure.value, tuple):
-        yield (" to " if figure.kind == "range" else ", ").join(f"{v:g}" for v in figure.value)
-    elif figure.value is not None:
-        yield f"{figure.value:g}"
-
-
-def _format_qualifiers(figure: PrintedFigure) -> Iterator[str]:
-    yield figure.kind
-    if figure.option:
-        yield f"({figure.option})"
-    if figure.bandwidth:
-        yield f"over {figure.bandwidth}"
-    if figure.tau:
-        yield f"at {figure.tau}"
+    return " ".join(part for part in parts if part)

@@ -1,8 +1,7 @@
 """Compare measured values with printed figures.
 
-A verdict applies to the whole 95 % interval of the measurement: ``worse than typ`` means that all
-of it lies beyond the printed figure and the tolerance. If the interval crosses a boundary, the
-verdict is ``not sure``, and the reason names the possible verdicts.
+A verdict applies to the whole 95 % interval of the measurement. If the interval crosses a boundary,
+the verdict is ``not sure``, and the reason names the possible ones.
 """
 
 from __future__ import annotations
@@ -72,9 +71,8 @@ def deltas(
     tau: NDArray[np.float64],
     tolerance: float,
 ) -> Iterator[Delta]:
-    """Compare an estimate, SI, with the figures of a datasheet.
+    """Compare an estimate, SI, with the figures of a datasheet, one row for each reading of them.
 
-    There is one row for each printed figure and reading of it; K and T_B are mostly not published.
     tau, shape (m,), s, are the averaging times at which the curve is accurate enough to find its
     minimum. The tolerance is the relative difference that still counts as printed.
     """
@@ -103,8 +101,7 @@ def bias_deltas(
     tolerance : float
         Relative difference that still counts as printed.
     sensitivity : Parameter, optional
-        Size of the fitted sensitivity to temperature (`datasheets.measured.sensitivity`); None: the
-        log has no readings of the temperature.
+        From `datasheets.measured.sensitivity`; None without readings of the temperature.
     """
     bias = fixed_bias(channel, means)
     for entry in bias_comparables(datasheet, channel):
@@ -122,10 +119,8 @@ def bias_deltas(
 def compare(entry: Comparable, parameter: Parameter, tolerance: float) -> Delta:
     """Compare a printed figure with its measured value, SI.
 
-    Without limits, the value alone decides. The tolerance is the relative difference from a typical
-    figure that still counts as printed. ``delta`` is measured / comparable - 1; ``delta_lower`` and
-    ``delta_upper`` are its least and largest value within the interval of the measurement and the
-    interval of the printed figures.
+    Without limits, the value alone decides. ``delta`` is measured / comparable - 1, with its least
+    and largest value within both intervals. The tolerance is that of `deltas`.
     """
     figure = entry.figure
     value, lower, upper = parameter.value, parameter.lower, parameter.upper
@@ -154,8 +149,12 @@ def compare(entry: Comparable, parameter: Parameter, tolerance: float) -> Delta:
     if entry.value is None:
         return replace(row, verdict="not comparable (condition)", reason=entry.obstacle)
     if value is None:
-        verdict, reason = _judge_without_value(entry, parameter, tolerance)
-        return replace(row, verdict=verdict, reason=reason)
+        reason = f"{STATUS_WORDS[parameter.status]}: {parameter.reason}"
+        if upper is not None:
+            least = _classify_value(entry, lower or 0.0, tolerance)
+            if least == _classify_value(entry, upper, tolerance) != "as printed":
+                return replace(row, verdict=least, reason=f"{reason}; the limits alone decide")
+        return replace(row, verdict="not measured", reason=reason)
     row = replace(
         row,
         delta=_compute_relative_difference(value, entry.value),
@@ -169,18 +168,6 @@ def compare(entry: Comparable, parameter: Parameter, tolerance: float) -> Delta:
         reasons.append(f"the 95 % interval reaches from {least!r} to {largest!r}")
     words = "; ".join(reason for reason in reasons if reason)
     return replace(row, verdict=least if least == largest else "not sure", reason=words or None)
-
-
-def _judge_without_value(
-    entry: Comparable, parameter: Parameter, tolerance: float
-) -> tuple[str, str]:
-    """Return verdict and reason if the log gives only limits, or nothing."""
-    reason = f"{STATUS_WORDS[parameter.status]}: {parameter.reason}"
-    if parameter.upper is not None:
-        least = _classify_value(entry, parameter.lower or 0.0, tolerance)
-        if least == _classify_value(entry, parameter.upper, tolerance) != "as printed":
-            return least, f"{reason}; the limits alone decide"
-    return "not measured", reason
 
 
 def _classify_value(entry: Comparable, value: float, tolerance: float) -> str:
@@ -219,8 +206,8 @@ def curve_rms(
     """Compare a measured curve with the lines N/√τ and bias instability of a datasheet.
 
     The two add as variances: σ²(τ) = N²/τ + floor². If a datasheet prints only one of them, that
-    line is used alone. A density of unknown sidedness gives two curves; a datasheet with neither
-    figure gives none. Typical figures are preferred to the others.
+    line is used alone. A density of unknown sidedness gives two curves. Typical figures are
+    preferred.
 
     Parameters
     ----------

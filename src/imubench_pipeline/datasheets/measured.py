@@ -31,47 +31,32 @@ def measured(entry: Comparable, estimate: Estimate, tau: NDArray[np.float64]) ->
     """Return the estimate of the statistic that a printed figure is compared with, SI.
 
     Minimum and plateau are from `imubench_pipeline.estimators.curve_bias`, over the averaging times
-    tau, s, shape (m,), at which the curve is accurate enough. The limits of any other point of the
-    curve are at least as wide as 95 %: all amplitudes are at the same end of their intervals, and
-    each correlation time at either end.
+    tau, s, shape (m,). The limits of any other point of the curve are at least as wide as 95 %: all
+    amplitudes are at the same end of their intervals, and each correlation time at either end.
     """
     statistic = entry.statistic
     if statistic in ("plateau", "adev_minimum"):
         # An estimate that was made by hand has only its terms.
         of_curve = estimate.curve or of_model(estimate.model, tau)
         if statistic == "plateau":
-            return _scale(of_curve["B_curve"], FLOOR)
+            top = of_curve["B_curve"]
+            value, lower, upper = (
+                None if each is None else each * FLOOR for each in (top.value, top.lower, top.upper)
+            )
+            return replace(top, value=value, lower=lower, upper=upper)
         return of_curve["sigma_min"]
-    if statistic == "adev":
-        return _evaluate_curve(estimate, tau, entry.tau or math.nan)
-    return estimate.parameters[statistic]
-
-
-def _scale(parameter: Parameter, factor: float) -> Parameter:
-    value, lower, upper = (
-        None if each is None else each * factor
-        for each in (parameter.value, parameter.lower, parameter.upper)
-    )
-    return replace(parameter, value=value, lower=lower, upper=upper)
-
-
-def _evaluate_curve(estimate: Estimate, tau: NDArray[np.float64], at: float) -> Parameter:
+    if statistic != "adev":
+        return estimate.parameters[statistic]
+    at = entry.tau or math.nan
     if not len(tau) or not tau[0] <= at <= tau[-1]:
         return Parameter(None, "not_shown", f"the log does not show the curve at {at:g} s")
-    where = np.array([at])
-    return _add_curve_limits(
-        math.sqrt(float(estimate.model.allan_variance(where)[0])), estimate, where
+    ends = _list_interval_ends(estimate)
+    point, *points = (
+        math.sqrt(float(each.model.allan_variance(np.array([at]))[0])) for each in (estimate, *ends)
     )
-
-
-def _add_curve_limits(value: float, estimate: Estimate, tau: NDArray[np.float64]) -> Parameter:
-    """Return a point of the curve of a model with limits from the limits of its parameters."""
-    points = [
-        float(np.sqrt(end.model.allan_variance(tau)[0])) for end in _list_interval_ends(estimate)
-    ]
     if not points:
-        return Parameter(value)
-    return Parameter(value, lower=min(value, *points), upper=max(value, *points))
+        return Parameter(point)
+    return Parameter(point, lower=min(point, *points), upper=max(point, *points))
 
 
 def _list_interval_ends(estimate: Estimate) -> Iterator[Estimate]:
@@ -93,13 +78,12 @@ def _list_interval_ends(estimate: Estimate) -> Iterator[Estimate]:
 
 
 def fixed_bias(channel: str, means: Mapping[str, float]) -> Parameter:
-    """Return the magnitude of the fixed bias of a channel from a static recording.
+    """Return the magnitude of the fixed bias of a channel from a static recording, rad/s or m/s².
 
-    For a gyro it is the magnitude of the mean, which includes up to 15.04 °/h of the Earth's
-    rotation. For a vertical accelerometer axis it is the norm of the three axes less standard
-    gravity, and includes the scale factor error. On any other axis, a bias cannot be distinguished
-    from a tilt. The limits are the uncertainty of the Earth's rate or gravity. The bias and the
-    means of all channels are in rad/s or m/s².
+    For a gyro it is the magnitude of the mean, which includes the Earth's rotation. For a vertical
+    accelerometer axis it is the norm of the three axes less standard gravity. On any other axis, a
+    bias cannot be distinguished from a tilt. The limits are the uncertainty of the Earth's rate or
+    gravity.
     """
     if channel.startswith("gyro"):
         reason = "mean of the recording; the Earth's rotation is in it, 15 °/h either way at most"
@@ -129,10 +113,9 @@ def _bound_size(value: float, unknown: float, reason: str) -> Parameter:
 def sensitivity(
     rows: Iterable[TemperatureRow], lowest: float | None, highest: float | None
 ) -> Parameter:
-    """Return the magnitude of the temperature sensitivity of a channel, from its thermal fit.
+    """Return the magnitude of the temperature sensitivity of a channel, rad/s/K or m/s²/K.
 
-    Vendors print ± a figure per kelvin, so the sign is dropped. The unit is rad/s/K or m/s²/K. The
-    reason states the reference temperature and the range, °C. If the temperature effect was not
+    The reason states the reference temperature and the range, °C. If the temperature effect was not
     removed from the log, only the upper limit is useful. If the effect cannot be separated from
     time, there is neither value nor limit.
     """

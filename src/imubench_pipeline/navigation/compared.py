@@ -23,15 +23,9 @@ _MIN_RELEVANT_SHARE = 0.1
 def number_needed(own: ArrayLike, common: ArrayLike, wanted: ArrayLike) -> Array:
     """Return the number of sensors of one kind whose mean has a given Allan variance.
 
-    The mean of n sensors has ``own / n + common``, so n = own / (wanted - common). Without a common
-    part, n is the ratio of the Allan variances. It is not rounded, may be below 1, and is infinite
-    if no number is enough.
-
-    Parameters
-    ----------
-    own, common, wanted : array_like
-        Allan variance of the independent part of one sensor, of the part common to all, and the
-        given one, such as of one better sensor; (rad/s)^2 or (m/s^2)^2, in broadcastable shapes.
+    The mean of n sensors has ``own / n + common``. n is not rounded, may be below 1, and is
+    infinite if no number is enough. The Allan variances of the independent and of the common part,
+    and the wanted one, array_like, are in (rad/s)^2 or (m/s^2)^2.
     """
     own, common, wanted = np.broadcast_arrays(own, common, wanted)
     room = np.asarray(wanted - common, dtype=np.float64)

@@ -1,26 +1,19 @@
 """Change detection over the recordings of one device: expected value and changes.
 
-The model of a noise parameter is y_k = ln p_k = mu + u_k + e_k, as in `pooled`: u_k has the
-standard deviation tau between recordings (from turn-on to turn-on), and e_k follows from the limits
-of recording k. A bias is not transformed: it has no limits, and all its scatter is spread.
+A noise parameter follows y_k = ln p_k = mu + u_k + e_k, as in `pooled`: u_k has the standard
+deviation tau between recordings, and e_k follows from the limits of recording k. A bias is not
+transformed: it has no limits, and all its scatter is spread.
 
 mu and tau are estimated from a level, the recordings since the last change, weighted by
-1 / (v + tau^2). tau^2 is the excess of the squared residuals from mu over the errors v (method of
-moments of DerSimonian and Kacker, in three steps). From 8 recordings on, the residuals are from a
-straight line: otherwise a slow drift would increase tau and never be detected. The distance of the
-next estimate from mu, over the root of v + tau^2 + var mu (v from the half of its interval towards
-mu), follows Student's t (exactly for a bias) with Satterthwaite's degrees of freedom, at most
-n - 1, or n - 2 about a line.
+1 / (v + tau^2), with tau^2 the excess of the squared residuals over the errors v (method of moments
+of DerSimonian and Kacker). From 8 recordings on, residuals are from a straight line: otherwise a
+slow drift would increase tau and never be detected. The distance of the next estimate from mu, over
+the root of v + tau^2 + var mu, follows Student's t with Satterthwaite's degrees of freedom.
 
-A recording is ``changed`` if p is below `SIGNIFICANCE_LEVEL` over its number of tests
-(Bonferroni). B of a single term and ``B_curve`` are one quantity with one test, on ``B_curve``. A
-changed recording begins a new level, so that a step is flagged once. If the next recording is
-nearer to the old level, the flagged one was an outlier, and the old level continues without it.
-
-Fewer than three recordings do not determine tau, so nothing is tested: with tau = 0, each turn-on
-would be a change. With 42 tests, the smallest change that is flagged, in standard deviations of a
-recording, is 75 after 3 recordings; 14 after 5; 6.6 after 10; 4.7 after 20; 4.0 after 50. A smaller
-change joins the level.
+A recording is ``changed`` if p is below `SIGNIFICANCE_LEVEL` over its number of tests (Bonferroni),
+and begins a new level. If the next recording is nearer to the old level, the flagged one was an
+outlier. Fewer than three recordings do not determine tau, and nothing is tested. With 42 tests, the
+smallest flagged change, in standard deviations, is 75 after 3 recordings; 6.6 after 10; 4 after 50.
 
 References
 ----------
@@ -63,10 +56,8 @@ Estimated = ParameterRow | FixedBiasRow
 
 _MIN_RECORDINGS = 3  # to estimate the spread between recordings
 _MIN_RECORDINGS_FOR_LINE = 8  # a line takes one degree of freedom more
-_RECORDINGS_UPDATED_EACH, _UPDATE_GROWTH = (
-    32,
-    1.05,
-)  # tau is found anew with each of 32 recordings, then with each 5 % more
+# tau is estimated again with each of 32 recordings, then with each 5 % more
+_RECORDINGS_UPDATED_EACH, _UPDATE_GROWTH = 32, 1.05
 _COMPARED_NAMES = (*POOLED_PARAMETERS, "bias")
 _BIAS_TERMS = {kind.symbol for kind in TERMS if PARAMETERS["B"] in kind.parameters}
 _EMPTY_RESULT = (math.nan, math.nan, math.nan, math.nan, 0.0, -1.0, -1.0)
@@ -85,29 +76,24 @@ class Series(NamedTuple):
 def order_of(recordings: Iterable[RecordingRow]) -> tuple[list[RecordingRow], Order]:
     """Return the recordings of one device in order of time, and the key of that order.
 
-    The key is ``started`` if each recording has an ISO 8601 stamp and not all are the same (a clock
-    that was never set); equal stamps are ordered by name. Else it is the name, with its numbers as
-    numbers: run_2 before run_10. A stamp without a zone is UTC, as the readers write it.
+    The key is ``started`` if each has an ISO 8601 stamp and not all are the same; without a zone it
+    is UTC. Else it is the name, with its numbers as numbers: run_2 before run_10.
     """
-    by_name = sorted(recordings, key=lambda row: _split_numbers(row.recording))
+
+    def split_numbers(row: RecordingRow) -> tuple[list[tuple[str, int]], str]:
+        parts = re.findall(r"(\D*)(\d*)", row.recording)
+        return [(text.casefold(), int(digits or -1)) for text, digits in parts], row.recording
+
+    by_name = sorted(recordings, key=split_numbers)
     try:
-        stamps = [_parse_stamp(row.started or "") for row in by_name]
+        stamps = [datetime.fromisoformat((row.started or "").strip()) for row in by_name]
     except ValueError:
         return by_name, "name"
+    stamps = [stamp if stamp.tzinfo else stamp.replace(tzinfo=UTC) for stamp in stamps]
     if len(set(stamps)) < 2:
         return by_name, "name"
     pairs = sorted(zip(stamps, range(len(stamps)), strict=True))
     return [by_name[index] for _, index in pairs], "started"
-
-
-def _parse_stamp(started: str) -> datetime:
-    stamp = datetime.fromisoformat(started.strip())
-    return stamp if stamp.tzinfo else stamp.replace(tzinfo=UTC)
-
-
-def _split_numbers(name: str) -> tuple[list[tuple[str, int]], str]:
-    parts = re.findall(r"(\D*)(\d*)", name)
-    return [(text.casefold(), int(digits or -1)) for text, digits in parts], name
 
 
 def series_of(recordings: Iterable[RecordingRow]) -> Iterator[Series]:
@@ -129,20 +115,10 @@ def drift_rows(
     """Yield the rows of the table ``drift``.
 
     There is one row for each recording of a series and each channel and parameter that any of its
-    recordings has. Rows of the gyro come first; rows of one parameter are in order of time. The
-    limits of ``expected`` are the 95 % prediction interval for the estimate of this recording.
-    Without a verdict (``changed`` or ``as before``), ``reason`` explains why.
-
-    Parameters
-    ----------
-    parameters : iterable of ParameterRow
-        Rows of the recommended method. Component 1 of the parameters in
-        `navigation.pooled.POOLED_PARAMETERS` is used; only a value with status ``ok`` is an
-        estimate. B and T_B are compared only between models with the same terms: B of flicker noise
-        and B of a Gauss-Markov process are different quantities. ``B_curve`` does not depend on the
-        model.
-    fixed_bias : iterable of FixedBiasRow
-    recordings : iterable of RecordingRow
+    recordings has, in order of time. The limits of ``expected`` are the 95 % prediction interval
+    for this recording. Without a verdict, ``reason`` explains why. ``parameters`` are the rows of
+    the recommended method: component 1 of `navigation.pooled.POOLED_PARAMETERS` is used, if ``ok``.
+    B and T_B are compared only between models with the same terms.
     """
     cells: dict[tuple[str, str], dict[tuple[str, str], Estimated]] = {}
     for row in parameters:
@@ -158,7 +134,7 @@ def drift_rows(
 def _make_rows(
     series: Series, cells: Sequence[dict[tuple[str, str], Estimated]]
 ) -> Iterator[DriftRow]:
-    points: dict[tuple[str, ...], dict[int, tuple[float, ...]]] = {}
+    points: dict[tuple[str, str, str], dict[int, tuple[float, ...]]] = {}
     units: dict[tuple[str, str], str] = {}
     for place, cell in enumerate(cells):
         for key, row in cell.items():
@@ -169,7 +145,13 @@ def _make_rows(
     data = np.full((3, len(cells), len(columns)), np.nan)
     for column, index in columns.items():
         data[:, list(points[column]), index] = np.transpose(list(points[column].values()))
-    tested_as = [columns.get(_find_tested_column(key), index) for key, index in columns.items()]
+    # The test of the curve decides for B of one term.
+    tested_as = [
+        columns.get((channel, "B_curve", ""), index)
+        if name == "B" and kind in _BIAS_TERMS
+        else index
+        for (channel, name, kind), index in columns.items()
+    ]
     levels = np.moveaxis(_Levels(data, np.array(tested_as, dtype=int)).results, 0, 2).tolist()
     for key in sorted(
         units, key=lambda key: (key[0][0] != "g", key[0], _COMPARED_NAMES.index(key[1]))
@@ -227,14 +209,7 @@ def _get_bias_terms(row: Estimated | None) -> str:
     """Return the terms of B and T_B, such as ``F`` or ``GM``; empty for other parameters."""
     if not isinstance(row, ParameterRow) or row.parameter not in ("B", "T_B"):
         return ""
-    terms = row.model.split("+")
-    return "+".join(term for term in terms if term in _BIAS_TERMS)
-
-
-def _find_tested_column(column: tuple[str, ...]) -> tuple[str, ...]:
-    """Return the channel, parameter and terms whose test decides for this column."""
-    channel, parameter, kind = column
-    return (channel, "B_curve", "") if parameter == "B" and kind in _BIAS_TERMS else column
+    return "+".join(term for term in row.model.split("+") if term in _BIAS_TERMS)
 
 
 def _make_point(row: Estimated) -> tuple[float, ...]:
@@ -269,11 +244,11 @@ def _explain_no_verdict(row: Estimated | None, count: float) -> str:
 class _Levels:
     """The levels of c columns through n recordings.
 
-    ``points`` (3, n, c): y, and the variances of its error for a truth below and above; NaN means
-    no value. ``results`` (7, n, c): the expected y and its two limits; p-value (NaN: not tested);
-    1 or -1 for a change, else 0; number of earlier recordings in the level (-1: no value); index
-    of the flagged recording that this one shows to be an outlier (-1: none). ``tested_as`` (c,):
-    index of the column that gives a column its p-value and verdict, if that one is tested.
+    ``points`` (3, n, c): y, and the variances of its error for a truth below and above, or NaN.
+    ``results`` (7, n, c): expected y and its two limits; p-value or NaN; 1 or -1 for a change, else
+    0; number of earlier recordings in the level, or -1; index of the flagged recording that this
+    one shows to be an outlier, or -1. ``tested_as`` (c,): column that gives a column its p-value
+    and verdict.
     """
 
     def __init__(self, points: NDArray[np.float64], tested_as: NDArray[np.int64]) -> None:

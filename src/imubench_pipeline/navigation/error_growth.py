@@ -1,8 +1,7 @@
 """Growth of the errors of a recording after static windows of several lengths: rows of a table.
 
-The errors are defined as in `expected_errors`, at more times and windows, with the same models. The
-variances of all drawn models are computed at once: separate budgets would take a thousand times as
-long.
+The errors are those of `expected_errors`, at more times and windows. The variances of all drawn
+models are computed at once: separate budgets would take a thousand times as long.
 """
 
 from __future__ import annotations
@@ -17,7 +16,7 @@ import numpy as np
 from imubench_pipeline.earth import STANDARD_GRAVITY
 from imubench_pipeline.estimators.estimate import Estimate
 from imubench_pipeline.model.estimates import ErrorGrowthRow
-from imubench_pipeline.navigation.error_budget import Budget, Figures, Uncalibrated, draw_models
+from imubench_pipeline.navigation.error_budget import Figures, Uncalibrated, draw_models
 from imubench_pipeline.navigation.error_budget.budget import ACCEL_ORDER, GYRO_ORDER
 from imubench_pipeline.navigation.expected_errors import (
     NO_FIGURES_OF_CHANNELS,
@@ -36,8 +35,7 @@ from imubench_pipeline.units import SI_UNITS
 
 _STANDARD_TIMES = (1.0, 2.0, 5.0, 10.0, 20.0, 30.0, 60.0, 120.0, 300.0, 600.0)
 _STANDARD_WINDOWS = (10.0, 30.0, 60.0, 120.0, 300.0, 600.0)
-_TAIL_PROBABILITY = 0.025
-"""Probability beyond each 95 % limit."""
+_TAIL_PROBABILITY = 0.025  # probability beyond each 95 % limit
 
 
 def growth_rows(
@@ -52,22 +50,9 @@ def growth_rows(
 ) -> Iterator[ErrorGrowthRow]:
     """Yield the rows of the table ``error_growth`` of a recording.
 
-    They are for its worst axes, and if it has several, for each axis alone: the gyro and the
-    accelerometer of the same letter.
-
-    Parameters
-    ----------
-    names : mapping of str to str
-        ``sensor`` and ``recording``.
-    estimates : mapping of str to Estimate
-        The recommended one of each channel.
-    times : iterable of float
-        s; in addition to the times that every table has.
-    window : float
-        Static window, s, in addition to the windows that every table has.
-    draws, seed : int
-    figures : mapping of str to mapping
-        All three as `expected_errors.error_rows` takes them.
+    They are for its worst axes, and if it has several, for each letter alone. ``times`` and
+    ``window``, s, are in addition to those that every table has; the others are as in
+    `expected_errors.error_rows`.
     """
     axes = axes_of(estimates, figures)
 
@@ -92,9 +77,12 @@ def growth_rows(
             total = total + at_rest / (start.window * STANDARD_GRAVITY) ** 2
         return total
 
-    for axis, at_rest in product(
-        answerers := _map_answering_axes(axes), sorted({*_STANDARD_WINDOWS, window})
-    ):
+    # The candidate channels for the worst axes, and for each axis alone.
+    answerers = {"worst": axes}
+    letters = sorted({channel[-1] for channel in axes})
+    for letter in letters if len(letters) > 1 else []:
+        answerers[letter] = {name: errors for name, errors in axes.items() if name[-1] == letter}
+    for axis, at_rest in product(answerers, sorted({*_STANDARD_WINDOWS, window})):
         for question in standard(sorted({*_STANDARD_TIMES, *times}), at_rest, 0.0, ["worst"]):
             if question.error == "north":
                 continue
@@ -117,26 +105,10 @@ def growth_rows(
                 time=question.time,
                 unit=SI_UNITS[DIMENSIONS[question.error]],
             )
-            lower, upper = _compute_limits(budget, drawn)
+            sure = math.fsum(p.sigma**2 for p in budget.contributions if p.cause != "noise")
+            ends = np.quantile(np.sqrt(drawn + sure), [_TAIL_PROBABILITY, 1.0 - _TAIL_PROBABILITY])
+            # Draws of an absent term are above 0: extend the limits to the value.
+            lower, upper = min(float(ends[0]), budget.total), max(float(ends[1]), budget.total)
             yield row(source="total", sigma=budget.total, lower=lower, upper=upper)
             for part in sorted(budget.contributions, key=lambda one: -one.sigma):
                 yield row(source=part.source, sigma=part.sigma)
-
-
-def _map_answering_axes(axes: Mapping[str, AxisErrors]) -> dict[str, dict[str, AxisErrors]]:
-    """Return the candidate channels for the worst axes, and for each axis alone."""
-    letters = sorted({channel[-1] for channel in axes})
-    alone = {
-        letter: {channel: errors for channel, errors in axes.items() if channel[-1] == letter}
-        for letter in letters
-        if len(letters) > 1
-    }
-    return {"worst": dict(axes), **alone}
-
-
-def _compute_limits(budget: Budget, drawn: Array) -> tuple[float, float]:
-    """Return the limits of the total of a budget, from the drawn variances of the noise."""
-    sure = math.fsum(part.sigma**2 for part in budget.contributions if part.cause != "noise")
-    lower, upper = np.quantile(np.sqrt(drawn + sure), [_TAIL_PROBABILITY, 1.0 - _TAIL_PROBABILITY])
-    # Draws of an absent term are above 0: extend the limits to the value.
-    return min(float(lower), budget.total), max(float(upper), budget.total)

@@ -34,13 +34,7 @@ from imubench_pipeline.navigation.error_budget.parts import Largest
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.simulate import channel_rng
 from imubench_pipeline.settings.printed import SENSORS
-from imubench_pipeline.settings.requirements import (
-    DIMENSIONS,
-    Axis,
-    Environment,
-    Error,
-    Requirement,
-)
+from imubench_pipeline.settings.requirements import DIMENSIONS, Axis, Error, Requirement
 from imubench_pipeline.settings.sensor import quantity_of
 from imubench_pipeline.units import SI_UNITS, difference_to_si, quantity_to_si
 from imubench_pipeline.words.estimates import STATUS_WORDS
@@ -57,6 +51,7 @@ class AxisErrors:
 
 
 _NO_AXIS_ERRORS = AxisErrors()
+_NO_ERRORS = {"gyro": _NO_AXIS_ERRORS, "accel": _NO_AXIS_ERRORS}
 
 
 @dataclass(frozen=True)
@@ -115,8 +110,7 @@ def standard(
 ) -> Iterator[Question]:
     """Yield the standard questions, which are computed for every recording.
 
-    There is one for each time, s, after a static window, s, for these axes; north is at a latitude
-    in rad.
+    ``times`` and the static window are in s, the latitude for north in rad.
     """
     start = Start.calibrated(window)
     quantities: tuple[Quantity, ...] = ("attitude", "heading", "velocity", "position")
@@ -129,46 +123,37 @@ def standard(
 
 def of_requirement(name: str, requirement: Requirement) -> Iterator[Question]:
     """Yield the questions of a requirement."""
-    latitude = requirement.latitude and quantity_to_si(requirement.latitude, "angle")
-    for limit in requirement.by_dead_reckoning:
-        yield Question(
-            name,
-            limit.error,
-            limit.seconds,
-            start_of(requirement),
-            requirement.axis,
-            latitude if isinstance(latitude, float) else None,
-            limit.size / requirement.sigmas,
-            use_of(requirement.environment, limit.seconds),
-        )
-
-
-def start_of(requirement: Requirement) -> Start:
-    """Return the initial conditions of dead reckoning in an application."""
+    latitude = requirement.latitude
     if requirement.static_window is not None:
-        return Start.calibrated(quantity_to_si(requirement.static_window, "time"))
-    assert requirement.turn_on is not None  # checked with the requirement
-    gyro, accel = requirement.turn_on.gyro, requirement.turn_on.accel
-    return Start.uncalibrated(
-        gyro_bias=None if gyro is None else quantity_to_si(gyro, "angular_rate"),
-        accel_bias=None if accel is None else quantity_to_si(accel, "acceleration"),
-        on_time=quantity_to_si(requirement.turn_on.on_time, "time"),
-    )
-
-
-def use_of(environment: Environment, time: float) -> Use:
-    """Return the motion and environment of an application within the time of a limit, s."""
+        start = Start.calibrated(quantity_to_si(requirement.static_window, "time"))
+    elif requirement.turn_on is not None:
+        gyro, accel = requirement.turn_on.gyro, requirement.turn_on.accel
+        start = Start.uncalibrated(
+            gyro_bias=None if gyro is None else quantity_to_si(gyro, "angular_rate"),
+            accel_bias=None if accel is None else quantity_to_si(accel, "acceleration"),
+            on_time=quantity_to_si(requirement.turn_on.on_time, "time"),
+        )
+    environment = requirement.environment
     stated = {
         "turns": (environment.turns, "angle"),
         "speed_change": (environment.speed_change, "velocity"),
         "vibration": (environment.vibration, "acceleration"),
     }
-    change = environment.temperature_change
-    return Use(
-        temperature_change=difference_to_si(change, "temperature") if change else 0.0,
-        over=time,
-        **{name: quantity_to_si(text, of) for name, (text, of) in stated.items() if text},
-    )
+    use = {name: quantity_to_si(text, of) for name, (text, of) in stated.items() if text}
+    if environment.temperature_change:
+        change = difference_to_si(environment.temperature_change, "temperature")
+        use["temperature_change"] = change
+    for limit in requirement.by_dead_reckoning:
+        yield Question(
+            name,
+            limit.error,
+            limit.seconds,
+            start,  # a limit of dead reckoning has one
+            requirement.axis,
+            None if latitude is None else quantity_to_si(latitude, "angle"),
+            limit.size / requirement.sigmas,
+            Use(over=limit.seconds, **use),
+        )
 
 
 def error_rows(
@@ -182,19 +167,10 @@ def error_rows(
 ) -> Iterator[ErrorBudgetRow]:
     """Yield the rows of the table ``error_budget`` of a recording.
 
-    Parameters
-    ----------
-    names : mapping of str to str
-        ``sensor`` and ``recording``.
-    estimates : mapping of str to Estimate
-        The recommended one of each channel.
-    questions : iterable of Question
-    draws : int
-        Number of noise models drawn from the estimate of each log, for the interval of a total.
-    seed : int
-        Seed of the run; each channel has its own random stream.
-    figures : mapping of str to mapping
-        Figures of the errors in use, by channel (`printed_errors.in_use`).
+    ``names`` are ``sensor`` and ``recording``; ``estimates`` the recommended one of each channel;
+    ``draws`` the number of noise models that are drawn from each, for the interval of a total.
+    Each channel has its own random stream of the seed. ``figures`` are those of the errors in use,
+    by channel (`printed_errors.in_use`).
     """
     axes = axes_of(estimates, figures)
 
@@ -219,11 +195,16 @@ def error_rows(
         )
         chosen = answering(question, axes)
         if chosen is None:
-            missing = [
-                _explain_missing_noise(quantity, estimates)
-                for quantity in question.needs
-                if not _list_channels(quantity, axes)
-            ]
+            missing = []
+            for quantity in question.needs:
+                silent = _list_channels(quantity, estimates)
+                if not silent:
+                    missing.append(f"no {SENSORS[quantity]} in the recording")
+                elif not _list_channels(quantity, axes):
+                    missing.append(
+                        f"nothing is known of the noise of {', '.join(silent)}: "
+                        f"{_find_reason(estimates[silent[0]])}"
+                    )
             yield replace(asked, reason="; ".join(missing))
             continue
         pair = [axes[c] if c else _NO_AXIS_ERRORS for c in chosen.values()]
@@ -234,13 +215,28 @@ def error_rows(
         lower, upper = interval(budgets)
         # Draws of an absent term are above 0: extend the limits to the value.
         lower, upper = min(lower, nominal.total), max(upper, nominal.total)
-        apart = [c for c in chosen.values() if c and not drawn_jointly(estimates[c])]
-        reasons = (
+        used = [channel for channel in chosen.values() if channel]
+        apart = [channel for channel in used if not drawn_jointly(estimates[channel])]
+        reasons = [
             *nominal.assumptions,
-            *_list_doubts(chosen, estimates),
-            *_list_independent_channels(apart, estimates),
-            *_list_unknown_axes(question, estimates),
-        )
+            *(
+                f"{name} of {channel} is {STATUS_WORDS[parameter.status]}"
+                for channel in used
+                for _, name, parameter in estimates[channel].components()
+                if parameter.status in ("not_identified", "at_bound")
+            ),
+            *(
+                f"method {estimates[channel].method} tells the parameters of {channel} one by one: "
+                "the interval is too wide where they trade off"
+                for channel in apart
+            ),
+            *(
+                f"{channel} does not count: nothing is known of its noise "
+                f"({_find_reason(estimate)})"
+                for channel, estimate in estimates.items()
+                if quantity_of(channel) in question.needs and not estimate.model.terms
+            ),
+        ]
         yield replace(
             asked,
             sigma=nominal.total,
@@ -261,10 +257,7 @@ def error_rows(
 def axes_of(
     estimates: Mapping[str, Estimate], figures: Mapping[str, Figures]
 ) -> dict[str, AxisErrors]:
-    """Return the error sources of the axes that have a noise model.
-
-    An axis without one is left out: its log is too short for any estimate, and its noise is not 0.
-    """
+    """Return the error sources of the axes with a noise model: the noise of others is not 0."""
     return {
         channel: AxisErrors(estimate.model, figures.get(channel, NO_FIGURES))
         for channel, estimate in estimates.items()
@@ -276,14 +269,21 @@ def answering(question: Question, axes: Mapping[str, AxisErrors]) -> dict[str, s
     """Return the gyro and accelerometer channels to use; None if one of them is missing."""
     if not all(_list_channels(quantity, axes) for quantity in question.needs):
         return None
-    return {
-        quantity: _select_axis(question, quantity, axes) if quantity in question.needs else None
-        for quantity in ("gyro", "accel")
-    }
+    chosen: dict[str, str | None] = {"gyro": None, "accel": None}
+    for quantity in question.needs:
+        # Rank the axes by their own part of the error.
+        parts = {
+            channel: question.answer(**{**_NO_ERRORS, quantity: axes[channel]}).total
+            for channel in _list_channels(quantity, axes)
+        }
+        ranked = sorted(parts, key=parts.__getitem__)
+        # Of two axes the median is the worse one.
+        chosen[quantity] = ranked[-1] if question.axis == "worst" else ranked[len(ranked) // 2]
+    return chosen
 
 
-def _list_channels(quantity: str, axes: Mapping[str, AxisErrors]) -> list[str]:
-    return [channel for channel in axes if quantity_of(channel) == quantity]
+def _list_channels(quantity: str, channels: Iterable[str]) -> list[str]:
+    return [channel for channel in channels if quantity_of(channel) == quantity]
 
 
 def _draw_figures(figures: Figures, draws: int, rng: np.random.Generator) -> list[Figures]:
@@ -306,61 +306,6 @@ def _draw_figures(figures: Figures, draws: int, rng: np.random.Generator) -> lis
     ]
 
 
-def _explain_missing_noise(quantity: str, estimates: Mapping[str, Estimate]) -> str:
-    """Return why a quantity has no noise model."""
-    silent = [channel for channel in estimates if quantity_of(channel) == quantity]
-    if not silent:
-        return f"no {SENSORS[quantity]} in the recording"
-    return (
-        f"nothing is known of the noise of {', '.join(silent)}: "
-        f"{_find_reason(estimates[silent[0]])}"
-    )
-
-
-def _list_unknown_axes(question: Question, estimates: Mapping[str, Estimate]) -> Iterator[str]:
-    """Yield a note on each axis without a noise model."""
-    for channel, estimate in estimates.items():
-        if quantity_of(channel) in question.needs and not estimate.model.terms:
-            yield (
-                f"{channel} does not count: nothing is known of its noise "
-                f"({_find_reason(estimate)})"
-            )
-
-
 def _find_reason(estimate: Estimate) -> str:
     reasons = (parameter.reason for parameter in estimate.parameters.values())
     return next((reason for reason in reasons if reason), "its log does not show it")
-
-
-def _select_axis(question: Question, quantity: str, axes: Mapping[str, AxisErrors]) -> str:
-    """Return the channel of a quantity whose own share of the error is the worst or the median."""
-
-    def part(channel: str) -> float:
-        own = axes[channel]
-        pair = (own, _NO_AXIS_ERRORS) if quantity == "gyro" else (_NO_AXIS_ERRORS, own)
-        return question.answer(*pair).total
-
-    ranked = sorted(_list_channels(quantity, axes), key=part)
-    # Of two axes the median is the worse one.
-    return ranked[-1] if question.axis == "worst" else ranked[len(ranked) // 2]
-
-
-def _list_independent_channels(
-    channels: Sequence[str], estimates: Mapping[str, Estimate]
-) -> Iterator[str]:
-    """Yield a note on each channel whose parameters have no joint draws."""
-    for channel in channels:
-        yield (
-            f"method {estimates[channel].method} tells the parameters of {channel} one by one: "
-            "the interval is too wide where they trade off"
-        )
-
-
-def _list_doubts(
-    chosen: Mapping[str, str | None], estimates: Mapping[str, Estimate]
-) -> Iterator[str]:
-    """Yield a note on each parameter that the logs do not determine."""
-    for channel in chosen.values():
-        for _, name, parameter in estimates[channel].components() if channel else ():
-            if parameter.status in ("not_identified", "at_bound"):
-                yield f"{name} of {channel} is {STATUS_WORDS[parameter.status]}"

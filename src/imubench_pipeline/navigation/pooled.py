@@ -1,24 +1,17 @@
 """Pooled value, spread and agreement of several recordings of one sensor or device.
 
 The random-effects model of a noise parameter is y_k = ln p_k = mu + u_k + e_k. The variance is
-tau^2 between recordings and v_k from the 95 % limits of each. If the limits are asymmetric, the
-half towards mu counts: v = (ln upper - y)^2 / z^2 for mu > y (the likelihood of a split normal,
-whose sum is convex in mu). The half is at least a quarter of the mean half: a narrower one would
-bound mu on that side.
+tau^2 between recordings and v_k from the half of the 95 % limits of each towards mu:
+v = (ln upper - y)^2 / z^2 for mu > y. It is at least a quarter of the mean half.
 
-A recording without a value inside positive limits is left out and counted. The limits of a
-parameter that is not determined depend as much on the prior as on the log: the mean of twenty such
-intervals would be precise and wrong. They are used only to detect selection bias, since small
-values are less often determined: `Pool.contradicting`.
+A recording without a value inside positive limits is left out and counted: limits of a parameter
+that is not determined depend as much on the prior as on the log. They are used only to detect
+selection bias (`Pool.contradicting`).
 
-The interval of the pool is from Hartung and Knapp, t with K - 1 degrees of freedom, but never
-narrower than the errors of the recordings allow (Jackson et al.). Its coverage was simulated with
-8,000 pools a case (errors equal to errors within a factor 3), for K = 2; 3; 5; 20. Without spread
-it is 99; 99; 98; 96-97 %. With a spread of one error it is 98-96; 97-94; 96-94; 95 %, with a
-spread of three errors 96-93; 96-93; 95; 95 %. If errors differ tenfold about the spread, it falls
-to 79; 86; 89; 93 %. With K = 2 the interval is wide (t = 12.7), since two values hardly determine
-their spread. Shorter intervals fail: the normal interval covers 70-76 % at a large spread, and the
-interval of Hartung and Knapp alone (95 %) has no width if two values happen to be equal.
+The interval is from Hartung and Knapp, t with K - 1 degrees of freedom, but never narrower than the
+errors allow (Jackson et al.). Its coverage was simulated with 8,000 pools a case: 96 to 99 %
+without spread, 93 to 98 % with a spread of one or three errors; if errors differ tenfold about the
+spread, 79; 86; 89; 93 % for K = 2; 3; 5; 20. Shorter intervals fail: the normal one covers 70-76 %.
 
 References
 ----------
@@ -50,8 +43,7 @@ SIGNIFICANCE_LEVEL = 0.01
 POOLED_PARAMETERS = ("N", "B_curve", "sigma_min", "K", "B", "T_B", "Q", "R")
 """Pooled parameters, in their order in the table."""
 
-NORMAL_QUANTILE = 1.959963984540054
-"""97.5 % quantile of the standard normal distribution."""
+NORMAL_QUANTILE = 1.959963984540054  # 97.5 % quantile of the standard normal distribution
 
 _MIN_HALF_WIDTH_RATIO = 0.25
 
@@ -111,27 +103,22 @@ def pool(
     """Pool the estimates of a positive parameter (model and sources: see the module).
 
     tau is the estimate of Paule and Mandel, Q(tau^2) = K - 1; its limits are from the Q-profile
-    method of Viechtbauer.
-
-    Parameters
-    ----------
-    values, lower, upper : iterable of float or None, shape (K,)
-        Estimates in any one unit, and their 95 % limits. One counts if 0 < lower < value < upper <
-        infinity.
-
-    Raises
-    ------
-    ValueError
-        If the lengths differ.
+    method of Viechtbauer. ``values``, ``lower``, ``upper``, shape (K,), are estimates in any one
+    unit with their 95 % limits; one counts if 0 < lower < value < upper < infinity.
     """
     triples = list(zip(values, lower, upper, strict=True))
     used = [triple for triple in triples if usable(triple)]
     others = [triple[1:] for triple in triples if not usable(triple)]
+
+    def count_outside(low: float, high: float) -> int:
+        """Count the left-out intervals that lie wholly outside a range; None is an open end."""
+        return sum((b is not None and b < low) or (a is not None and a > high) for a, b in others)
+
     if not used:
         return Pool(None, None, None, 0, len(others))
     if len(used) == 1:
         value, low, high = used[0]
-        return Pool(value, low, high, 1, len(others), _count_outside(others, low, high))
+        return Pool(value, low, high, 1, len(others), count_outside(low, high))
     middle, points = points_about_median(used)
     freedom = len(used) - 1
     low_q, high_q, t = _compute_quantiles(freedom)
@@ -141,9 +128,6 @@ def pool(
     error = 1.0 / math.sqrt(weight)
     half = max(t * math.sqrt(q / freedom), NORMAL_QUANTILE) * error
     predicted = t * math.hypot(math.sqrt(spread_squared), error)
-    outside = _count_outside(
-        others, bounded_exp(centre - predicted), bounded_exp(centre + predicted)
-    )
     p_value = float(chdtrc(freedom, _minimise_q(points, 0.0)[1]))
     return Pool(
         value=math.exp(centre),
@@ -151,7 +135,9 @@ def pool(
         upper=bounded_exp(centre + half),
         recordings=len(used),
         left_out=len(others),
-        contradicting=outside,
+        contradicting=count_outside(
+            bounded_exp(centre - predicted), bounded_exp(centre + predicted)
+        ),
         error=error,
         spread=math.sqrt(spread_squared),
         spread_lower=math.sqrt(_solve_spread_squared(points, high_q)),
@@ -167,11 +153,6 @@ def usable(triple: tuple[float | None, ...]) -> TypeGuard[tuple[float, float, fl
     if value is None or lower is None or upper is None:
         return False
     return 0.0 < lower < value < upper < math.inf  # False for NaN
-
-
-def _count_outside(limits: Iterable[Sequence[float | None]], low: float, high: float) -> int:
-    """Count the intervals that lie wholly outside a range; a limit of None is open."""
-    return sum((b is not None and b < low) or (a is not None and a > high) for a, b in limits)
 
 
 def bounded_exp(exponent: float) -> float:
@@ -246,9 +227,8 @@ def turn_on_bias(means: Iterable[float | None]) -> TurnOnBias:
     """Return the spread of the fixed bias from recording to recording.
 
     Its limits follow from the chi-squared distribution of (K - 1) s^2 / sigma^2. The spread
-    includes the slow noise of a recording and, for an accelerometer, changes of its tilt. The means
-    are in rad/s or m/s^2; None and NaN are left out. With one mean only ``mean`` is set, with none
-    only the counts.
+    includes slow noise and changes of tilt. The means are in rad/s or m/s^2; None and NaN are left
+    out.
     """
     listed = list(means)
     present = [mean for mean in listed if mean is not None and math.isfinite(mean)]
@@ -267,26 +247,6 @@ def turn_on_bias(means: Iterable[float | None]) -> TurnOnBias:
     return TurnOnBias(*counts, mean, mean - half, mean + half, deviation, *limits)
 
 
-def _test_devices(pairs: Sequence[tuple[float, str]]) -> float | None:
-    """Return the p-value of equal device means (one-way analysis of variance).
-
-    F = [sum_d n_d (m_d - m)^2 / (D - 1)] / [sum (y - m_d)^2 / (K - D)] for K recordings of D
-    devices (Fisher 1925). All recordings have equal weight: their errors are part of the spread
-    within a device. None with one device, without repeats or without scatter.
-    """
-    groups: dict[str, list[float]] = {}
-    for value, device in pairs:
-        groups.setdefault(device, []).append(value)
-    between, within = len(groups) - 1, len(pairs) - len(groups)
-    if between < 1 or within < 1:
-        return None
-    grand = math.fsum(value for value, _ in pairs) / len(pairs)
-    means = [(math.fsum(group) / len(group), group) for group in groups.values()]
-    apart = math.fsum(len(group) * (mean - grand) ** 2 for mean, group in means)
-    inside = math.fsum((y - mean) ** 2 for mean, group in means for y in group)
-    return float(fdtrc(between, within, apart * within / between / inside)) if inside else None
-
-
 def pooled_rows(
     parameters: Iterable[ParameterRow],
     biases: Iterable[FixedBiasRow],
@@ -294,22 +254,12 @@ def pooled_rows(
 ) -> Iterator[PooledRow]:
     """Yield the rows of the table ``pooled``.
 
-    There is one row (device None) for each sensor with two recordings or more. If it has several
-    devices, there is also one for each device with two recordings or more. Parameters are those of
-    `POOLED_PARAMETERS`, and ``bias``; a parameter that no recording has gives no row. All numbers
-    are in ``unit``: the spread of a noise parameter is ``value`` times tau (see `Pool`), and of a
-    bias the standard deviation. A parameter that only some recordings have is never ``agree``;
-    recordings without T_B (no Gauss-Markov term) are not counted for it. A bias has no verdict.
-
-    Parameters
-    ----------
-    parameters : iterable of ParameterRow
-        Recommended rows of component 1 and a parameter of `POOLED_PARAMETERS` are used. Only a
-        value with status ``ok`` is an estimate.
-    biases : iterable of FixedBiasRow
-        The mean of each channel; one that is not finite is left out.
-    devices : mapping of (sensor, recording) to str
-        The device; a recording that is not listed is a device of its own.
+    There is one row (device None) for each sensor with two recordings or more, and if it has
+    several devices, one for each device with two or more. Parameters are `POOLED_PARAMETERS`, from
+    recommended rows of component 1, and ``bias``, which has no verdict. The spread of a noise
+    parameter is ``value`` times tau (see `Pool`). A parameter that only some recordings have is
+    never ``agree``; recordings without T_B do not count for it. A recording that ``devices`` does
+    not list is its own device.
     """
     # By channel, parameter and recording; the key "" lists every recording, with or without it.
     estimates: dict[tuple[str, str], dict[str, dict[str, ParameterRow | None]]] = {}
@@ -351,10 +301,7 @@ def _group_rows(
     *,
     several: bool,
 ) -> Iterator[tuple[str | None, list[tuple[str, E]], int]]:
-    """Yield the rows of the sensor (None) and of each device with several recordings.
-
-    Each group has its number of recordings; each row comes with its device.
-    """
+    """Yield device (None: all), rows with their devices, and number of recordings of each group."""
     groups: dict[str | None, list[tuple[str, E | None]]] = {}
     for recording, entry in rows.items():
         device = devices.get((sensor, recording), recording)
@@ -375,7 +322,8 @@ def _make_parameter_row(
         (row.value if row.status == "ok" else None, row.lower, row.upper) for _, row in present
     ]
     pooled = pool(*zip(*triples, strict=True))
-    logs, left_out = [], Counter[str]()
+    logs: list[tuple[float | None, str]] = []
+    left_out = Counter[str]()
     for (of, row), triple in zip(present, triples, strict=True):
         if usable(triple):
             logs.append((math.log(triple[0]), of))
@@ -443,10 +391,25 @@ def _make_bias_row(
 
 
 def _describe_device_effects(pairs: Iterable[tuple[float | None, str]], several: bool) -> list[str]:
-    """Return how the spread between devices compares with repeats, if it can be tested."""
-    finite = [(y, device) for y, device in pairs if y is not None and math.isfinite(y)]
-    p_value = _test_devices(finite) if several else None
-    if p_value is None:
+    """Return how the spread between devices compares with repeats, if it can be tested.
+
+    The test of equal device means is a one-way analysis of variance (Fisher 1925). Recordings have
+    equal weights: their errors are part of the spread within a device.
+    """
+    groups: dict[str, list[float]] = {}
+    for value, device in pairs:
+        if value is not None and math.isfinite(value):
+            groups.setdefault(device, []).append(value)
+    values = [value for group in groups.values() for value in group]
+    between, within = len(groups) - 1, len(values) - len(groups)
+    if not several or between < 1 or within < 1:
         return []
+    grand = math.fsum(values) / len(values)
+    means = [(math.fsum(group) / len(group), group) for group in groups.values()]
+    apart = math.fsum(len(group) * (mean - grand) ** 2 for mean, group in means)
+    inside = math.fsum((y - mean) ** 2 for mean, group in means for y in group)
+    if not inside:
+        return []
+    p_value = float(fdtrc(between, within, apart * within / between / inside))
     beyond = "beyond the" if p_value < SIGNIFICANCE_LEVEL else "no more than their"
     return [f"devices differ {beyond} spread from recording to recording (p = {p_value:.2g})"]

@@ -24,7 +24,6 @@ import numpy as np
 from imubench_pipeline.estimators.estimate import Parameter
 from imubench_pipeline.model.estimates import DrawnDeviationRow
 from imubench_pipeline.navigation.compared import ComparedChannel, number_needed
-from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.simulate import channel_rng
 from imubench_pipeline.noise.stacked import summed
 from imubench_pipeline.typing import Array
@@ -32,19 +31,16 @@ from imubench_pipeline.words.estimates import STATUS_WORDS
 
 Verdict = Literal["lower", "higher", "not told apart", "not known"]
 
-_TAIL_PROBABILITY = 0.025
-"""Probability beyond each 95 % limit."""
+_TAIL_PROBABILITY = 0.025  # probability beyond each 95 % limit
 
-_TAUS_PER_DECADE = 2
-"""Number of tau per decade in the table ``drawn_deviations``."""
+_TAUS_PER_DECADE = 2  # number of tau per decade in the table ``drawn_deviations``
 
 
 @dataclass(frozen=True)
 class Ratio:
     """Ratio of two logs, the first over the second."""
 
-    value: float | None
-    """None: one of them has no value."""
+    value: float | None  # None: one of them has no value
     # 95 % limits; None: unbounded above, or not known
     lower: float | None
     upper: float | None
@@ -62,13 +58,16 @@ class Ratio:
 
 
 def ratio_of_parameters(first: Parameter, second: Parameter) -> Ratio:
-    """Return the ratio of one noise parameter of two logs, both from 0.
+    """Return the ratio of one noise parameter of two logs (Zou and Donner 2008, eq. 2 and 3).
 
-    The limits are from Zou and Donner (2008), eq. 2 and 3. If one has limits but no value, the
-    interval goes from the lower limit of the first over the upper limit of the second to the upper
-    limit of the first over the lower limit of the second, which is conservative.
+    If one has limits but no value, the interval is that of all quotients within the limits.
     """
-    reason = "; ".join(dict.fromkeys(_list_doubts(first, second))) or None
+    doubts = [
+        f"{which} is {STATUS_WORDS[parameter.status]}"
+        for which, parameter in (("the first", first), ("the second", second))
+        if parameter.status != "ok"
+    ]
+    reason = "; ".join(doubts) or None
     a, b = first.value, second.value
     if not a or not b:
         low = _divide(first.lower or 0.0, second.upper)
@@ -89,15 +88,6 @@ def ratio_of_parameters(first: Parameter, second: Parameter) -> Ratio:
         None if above is None or math.isinf(above) else math.exp(middle + above),
         reason,
     )
-
-
-def _list_doubts(first: Parameter, second: Parameter) -> list[str]:
-    words = ("the first", first), ("the second", second)
-    return [
-        f"{which} is {STATUS_WORDS[parameter.status]}"
-        for which, parameter in words
-        if parameter.status != "ok"
-    ]
 
 
 def _divide(numerator: float | None, denominator: float | None) -> float | None:
@@ -126,19 +116,11 @@ def ratio_of_deviations(
     draws: int,
     seed: int,
 ) -> Ratio:
-    """Return the ratio of the Allan deviations of two models at a tau.
+    """Return the ratio of the Allan deviations of two models at a tau, s.
 
-    Parameters
-    ----------
-    first, second : ComparedChannel
-    tau : float
-        s.
-    longest : float
-        Longest tau, as a fraction of the log.
-    draws : int
-        Number of noise models drawn from the estimate of each log; all pairs are used.
-    seed : int
-        Each channel has its own random stream.
+    ``longest`` is the longest tau as a fraction of the log. ``draws`` noise models are drawn from
+    the estimate of each log, and all pairs are used. Each channel has its own random stream of the
+    seed.
     """
     told = longest * min(first.duration, second.duration)
     if tau > told:
@@ -146,10 +128,7 @@ def ratio_of_deviations(
     if not first.model.terms or not second.model.terms:
         return Ratio(None, None, None, "one has no noise model")
     value = math.sqrt(float(number_needed(first.variance(tau), 0.0, second.variance(tau))))
-    own, other = (
-        _compute_variances(_draw_models(channel, draws, seed), [tau])[0]
-        for channel in (first, second)
-    )
+    own, other = (_draw_variances(channel, draws, seed, [tau])[0] for channel in (first, second))
     ratios = np.sqrt(number_needed(own[:, None], 0.0, other[None, :]))
     lower, upper = np.quantile(
         ratios, [_TAIL_PROBABILITY, 1.0 - _TAIL_PROBABILITY], method="inverted_cdf"
@@ -160,15 +139,11 @@ def ratio_of_deviations(
     return Ratio(None if unknown else value, *limits, unknown)
 
 
-def _draw_models(channel: ComparedChannel, draws: int, seed: int) -> list[NoiseModel]:
+def _draw_variances(channel: ComparedChannel, draws: int, seed: int, tau: Sequence[float]) -> Array:
+    """Return the Allan variances of drawn noise models of a channel, shape (tau, draws)."""
     stream = channel_rng(seed, repr(channel.model), channel.channel, "ratio")
-    return channel.drawn(draws, stream)
-
-
-def _compute_variances(models: Sequence[NoiseModel], tau: Sequence[float]) -> Array:
-    """Return the Allan variances of models, shape (tau, models)."""
     times = np.asarray(tau, dtype=np.float64)[:, np.newaxis]
-    return summed(models, lambda term: term.allan_variance(times), len(tau))
+    return summed(channel.drawn(draws, stream), lambda term: term.allan_variance(times), len(tau))
 
 
 def deviation_rows(
@@ -176,17 +151,9 @@ def deviation_rows(
 ) -> Iterator[DrawnDeviationRow]:
     """Yield the rows of the table ``drawn_deviations`` of a channel.
 
-    They hold the input of `ratio_of_deviations` for the channel, at two tau a decade from the
-    sampling interval on. Any two channels can then be compared without their logs.
-
-    Parameters
-    ----------
-    channel : ComparedChannel
-    rate : float
-        Sampling rate of its log, Hz.
-    longest : float
-    draws, seed : int
-        As in `ratio_of_deviations`, with ``longest``.
+    They are the input of `ratio_of_deviations`, at two tau a decade from the sampling interval on,
+    so that any two channels can be compared without their logs. ``rate`` is in Hz; the others are
+    as in `ratio_of_deviations`.
     """
     if not channel.model.terms:
         return
@@ -197,7 +164,7 @@ def deviation_rows(
         10.0 ** (step / _TAUS_PER_DECADE)
         for step in range(math.ceil(first - 1e-9), math.floor(last + 1e-9) + 1)
     ]
-    drawn = np.sqrt(_compute_variances(_draw_models(channel, draws, seed), taus))
+    drawn = np.sqrt(_draw_variances(channel, draws, seed, taus))
     row = partial(
         DrawnDeviationRow,
         sensor=channel.sensor,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 
 from imubench_pipeline.datasheets.comparable import repeatability_comparables
 from imubench_pipeline.datasheets.deltas import compare
@@ -22,23 +22,37 @@ def repeatability_rows(
 ) -> Iterator[RepeatabilityRow]:
     """Yield the rows of the table ``repeatability``: bias spread and printed repeatability.
 
-    A printed repeatability is the spread of the bias from one turn-on to the next. A recording is
-    left out if the power stayed on before it, since it belongs to the turn-on of the previous one,
-    or if it does not decide. The tolerance is the relative difference that still counts as printed.
+    A recording is left out if it does not decide, or if the power stayed on before it, since it
+    belongs to the previous turn-on. The tolerance is the relative difference that still counts as
+    printed.
     """
     about = {(row.sensor, row.recording): row for row in recordings if row.decides}
     by_channel: dict[tuple[str, str, str], list[tuple[RecordingRow, float]]] = {}
-    for bias in biases:
-        row = about.get((bias.sensor, bias.recording))
+    for mean in biases:
+        row = about.get((mean.sensor, mean.recording))
         if row is not None and row.power_cycled is not False:
-            key = (bias.sensor, row.device, bias.channel)
-            by_channel.setdefault(key, []).append((row, bias.value))
+            key = (mean.sensor, row.device, mean.channel)
+            by_channel.setdefault(key, []).append((row, mean.value))
     for (sensor, device, channel), several in by_channel.items():
         if sensor not in sensors or len(several) < 2:
             continue
         # The first recording of a device has no previous one: its flag does not matter.
         unknown = sum(row.power_cycled is None for row, _ in several) > 1
-        spread = _estimate_spread(channel, [value for _, value in several], unknown)
+        if channel.startswith("accel"):
+            reason = "gravity is in the mean: how the sensor lay each time would be in the spread"
+            spread = Parameter(None, "not_shown", reason)
+        else:
+            conditions = [
+                "the power was off between the recordings, which is not known (power_cycled beside "
+                "the log)"
+            ] * unknown
+            conditions.append(
+                "the sensor pointed the same way each time, and the Earth's rate is no part of it"
+            )
+            reason = f"on condition that {', and that '.join(conditions)}"
+            bias = turn_on_bias(value for _, value in several)
+            limits = bias.deviation_lower, bias.deviation_upper
+            spread = Parameter(bias.deviation, "ok", reason, *limits)
         for entry in repeatability_comparables(sensors[sensor].datasheet, channel):
             found = compare(entry, spread, tolerance)
             unsaid = found.delta is None and spread.reason and entry.value is not None
@@ -60,27 +74,3 @@ def repeatability_rows(
                 verdict=found.verdict,
                 reason=spread.reason if unsaid else found.reason,
             )
-
-
-def _estimate_spread(channel: str, values: Sequence[float], unknown: bool) -> Parameter:
-    """Return the standard deviation between turn-ons, with its conditions."""
-    if channel.startswith("accel"):
-        reason = "gravity is in the mean: how the sensor lay each time would be in the spread"
-        return Parameter(None, "not_shown", reason)
-    conditions = [
-        "the sensor pointed the same way each time, and the Earth's rate is no part of it"
-    ]
-    if unknown:
-        conditions.insert(
-            0,
-            "the power was off between the recordings, which is not known (power_cycled beside "
-            "the log)",
-        )
-    bias = turn_on_bias(values)
-    return Parameter(
-        bias.deviation,
-        "ok",
-        f"on condition that {', and that '.join(conditions)}",
-        bias.deviation_lower,
-        bias.deviation_upper,
-    )

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 
 from imubench_pipeline.model.comparisons import RankingRow
-from imubench_pipeline.model.estimates import BacktestRow
 from imubench_pipeline.model.verdicts import UnitFactor
 from imubench_pipeline.navigation.verdicts.basis import Basis
 from imubench_pipeline.navigation.verdicts.judgement import Judgement
@@ -15,19 +14,32 @@ from imubench_pipeline.navigation.verdicts.standing import Standing, trajectory_
 def ranked(judged: Sequence[Judgement], basis: Basis) -> Iterator[RankingRow]:
     """Yield the rows of the table ``ranking``, from the judgements and their recordings.
 
-    The limit with the least margin decides for a sensor. Its rank is one more than the number of
-    sensors that are significantly better: the interval of their margin lies wholly above its own.
-    Sensors with overlapping intervals are tied. A sensor with unknown figures is significantly
-    better than another only if the other lacks the same figures.
+    The rank of a sensor is one more than the number of significantly better ones: the interval of
+    their margin lies wholly above its own, and they have no unknown figures that it does not have.
     """
     for name in dict.fromkeys(judgement.name for judgement in judged):
         own = [judgement for judgement in judged if judgement.name == name]
         compared = {judgement.sensor: judgement for judgement in own if judgement.compared}
         for judgement in own:
             sensor = judgement.sensor
-            rank, tied = _compute_rank(sensor, compared) if sensor in compared else (None, [])
+            rank: int | None = None
+            tied: list[str] = []
+            if sensor in compared:
+                above = [other for other in compared if _is_better(compared[other], judgement)]
+                rank = 1 + len(above)
+                tied = [
+                    other
+                    for other, theirs in compared.items()
+                    if other not in (sensor, *above) and not _is_better(judgement, theirs)
+                ]
             for standing, weak in zip(judgement.standings, judgement.weak, strict=True):
                 yield _make_row(judgement, standing, weak, rank, tied, basis)
+
+
+def _is_better(first: Judgement, second: Judgement) -> bool:
+    """Return whether a sensor is significantly better, and has no other unknown figures."""
+    no_less_known = first.open.figures.keys() <= second.open.figures.keys()
+    return no_less_known and first.decides.margins[0] > second.decides.margins[1]
 
 
 def _make_row(
@@ -43,7 +55,13 @@ def _make_row(
     unless = None if judgement.price else judgement.unless
     logged, corrected = (unless.logged, unless.corrected) if unless else (None, None)
     factors = unless.factors if unless and corrected else {}
-    tested = _find_backtest(judgement.name, standing, basis)
+    # The back-test of the channel that contributes most to the error.
+    channels = {"gyro": total.gyro, "accel": total.accel}
+    words = (standing.source or "").split()
+    channel = next((channels[word] for word in words if word in channels), None)
+    tested = basis.backtest(total, judgement.name, channel)
+    if tested is not None and tested.ratio is None:
+        tested = None
     return RankingRow(
         requirement=judgement.name,
         sensor=sensor,
@@ -104,30 +122,5 @@ def _make_row(
     )
 
 
-def _find_backtest(requirement: str, standing: Standing, basis: Basis) -> BacktestRow | None:
-    """Return the back-test of the channel that contributes most to an error."""
-    total = standing.total
-    words = (standing.source or "").split()
-    channels = {"gyro": total.gyro, "accel": total.accel}
-    channel = next((channels[word] for word in words if word in channels), None)
-    tested = basis.backtest(total, requirement, channel)
-    return tested if tested is not None and tested.ratio is not None else None
-
-
 def _get_margin(standing: Standing | None) -> float | None:
     return standing.margin if standing is not None and standing.known else None
-
-
-def _compute_rank(sensor: str, compared: Mapping[str, Judgement]) -> tuple[int, list[str]]:
-    """Return the rank of a sensor, and the sensors that are tied with it."""
-
-    def better(first: str, second: str) -> bool:
-        this, that = compared[first], compared[second]
-        no_less_known = this.open.figures.keys() <= that.open.figures.keys()
-        return no_less_known and this.decides.margins[0] > that.decides.margins[1]
-
-    above = [other for other in compared if better(other, sensor)]
-    tied = [
-        other for other in compared if other not in (sensor, *above) and not better(sensor, other)
-    ]
-    return 1 + len(above), tied

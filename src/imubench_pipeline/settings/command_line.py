@@ -1,7 +1,4 @@
-"""Types of options: values that the commands of the terminal take.
-
-Every command imports this: it loads nothing that takes long.
-"""
+"""Types of the options of commands. Every command imports this, so it loads nothing slow."""
 
 from __future__ import annotations
 
@@ -10,18 +7,20 @@ import math
 import reprlib
 from collections.abc import Callable
 from pathlib import Path
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
+
+T = TypeVar("T", int, float)
 
 
 def named_path(text: str) -> Path:
-    """Return a path, which has a name."""
+    """Return a path that is not empty."""
     if not text or "\0" in text:
         raise argparse.ArgumentTypeError(f"found {text!r}; expected a path")
     return Path(text)
 
 
 def seconds(text: str) -> float:
-    """Return a time in s, which is given with its unit or without."""
+    """Return a time in s, with its unit or without."""
     from imubench_pipeline.units import UnitError, quantity_to_si
 
     try:
@@ -36,39 +35,27 @@ def seconds(text: str) -> float:
 def number(
     least: float, most: float, words: str, read: Callable[[str], float] = float
 ) -> Callable[[str], float]:
-    """Return the type of a number that is finite, and in a range.
+    """Return the type of a finite number in a range, its ends included.
 
-    Parameters
-    ----------
-    least, most : float
-        The range, its ends included.
-    words : str
-        What is expected, as the error says it.
-    read : callable
-        Returns the number of a text.
+    ``words`` are the expected value in the error; ``read`` converts a text to a number.
     """
-
-    def value(text: str) -> float:
-        try:
-            found = read(text)
-        except ValueError:
-            found = math.nan
-        if not (math.isfinite(found) and least <= found <= most):
-            raise argparse.ArgumentTypeError(f"found {reprlib.repr(text)}; expected {words}")
-        return found
-
-    return value
+    return _make_type(least, most, words, read)
 
 
 def whole_number(least: int, most: int, words: str) -> Callable[[str], int]:
     """Return the type of a whole number in a range, its ends included; see `number`."""
+    return _make_type(least, most, words, int)
 
-    def value(text: str) -> int:
+
+def _make_type(
+    least: float, most: float, words: str, read: Callable[[str], T]
+) -> Callable[[str], T]:
+    def value(text: str) -> T:
         try:
-            found = int(text)
+            found: T | None = read(text)
         except ValueError:
-            found = least - 1
-        if not least <= found <= most:
+            found = None
+        if found is None or abs(found) == math.inf or not least <= found <= most:
             raise argparse.ArgumentTypeError(f"found {reprlib.repr(text)}; expected {words}")
         return found
 
@@ -76,8 +63,7 @@ def whole_number(least: int, most: int, words: str) -> Callable[[str], int]:
 
 
 MOST_WHOLE = 2**63 - 1
-LONGEST = 1e10
-"""s, three centuries."""
+LONGEST = 1e10  # s, three centuries
 
 
 NO_RESULTS = "what was asked for is not there, or cannot be used"

@@ -1,4 +1,4 @@
-"""The extras of the package: what some uses of it need, and not everybody has to install."""
+"""The extras of the package: optional dependencies of some of its uses."""
 
 from __future__ import annotations
 
@@ -11,19 +11,14 @@ Extra = Literal["workflow", "ros", "hdf5"]
 
 
 class ExtraError(ImportError):
-    """What is asked for needs a package that is not installed; the text says how to install it."""
+    """A missing package; the text says how to install it."""
 
 
 @contextmanager
 def extra(name: Extra, purpose: str) -> Iterator[None]:
-    """Say which extra has the package that is imported within, where it is not installed.
+    """Raise an `ExtraError` if a package that is imported within is not installed.
 
     ``purpose`` completes "to ...".
-
-    Raises
-    ------
-    ExtraError
-        If the package is not installed.
     """
     try:
         yield

@@ -1,9 +1,9 @@
-"""What vendors print of a sensor, as it stands in the file of that sensor."""
+"""Figures of a datasheet, as a sensor file has them."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Mapping
 from typing import Annotated, Any, Literal
 
 from pydantic import (
@@ -133,7 +133,7 @@ class PrintedFigure(Strict):
 
 
 def _listed(value: Any) -> Any:
-    """Return a figure that stands alone as a list of one."""
+    """Return a single figure as a list of one."""
     if isinstance(value, Mapping):
         return (PrintedFigure.model_validate(value),)
     listed = value if isinstance(value, (list, tuple)) else [value]
@@ -153,7 +153,7 @@ Figures = Annotated[
 
 
 class QuantityDatasheet(Strict):
-    """What a datasheet says of one quantity; what is null is not published."""
+    """Figures of one quantity; null: not published."""
 
     noise_density: Figures = Field(None, description="density, .../sqrt(Hz), or squared, .../Hz")
     random_walk: Figures = Field(
@@ -195,7 +195,7 @@ class QuantityDatasheet(Strict):
 
     @model_serializer(mode="wrap")
     def _as_written(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """Leave out what the file leaves out: it is not looked up, and null is not published."""
+        """Omit missing figures: they were not looked up, and null is not published."""
         return {name: v for name, v in handler(self).items() if name in self.model_fields_set}
 
     def printed(self, name: str) -> tuple[PrintedFigure, ...]:
@@ -204,31 +204,23 @@ class QuantityDatasheet(Strict):
         return tuple(figure for figure in figures if figure.value is not None)
 
     def looked_up(self, name: str) -> bool:
-        """Return whether the file says anything of a name, if only that it is not published."""
+        """Return whether the file has a name, even if it is not published."""
         return name in self.model_fields_set
 
 
 def _dimensions(quantity: str, plain: str) -> dict[str, tuple[str, ...]]:
-    return {
+    noise = ("rms_noise", "bias_instability", "allan_deviation", "drift")
+    bias = ("offset", "bias_repeatability", "temperature_total", "temperature_rms")
+    return dict.fromkeys((*noise, *bias, "full_scale", "resolution"), (plain,)) | {
         "noise_density": (f"{quantity}_density", f"{quantity}_power_density"),
         "random_walk": (f"{quantity}_density",),
-        "rms_noise": (plain,),
-        "bias_instability": (plain,),
-        "allan_deviation": (plain,),
-        "drift": (plain,),
         "rate_random_walk": (f"{quantity}_random_walk",),
         "correlation_time": ("time",),
-        "offset": (plain,),
-        "bias_repeatability": (plain,),
         "temperature_coefficient": (f"{quantity}_temperature_coefficient",),
-        "temperature_total": (plain,),
-        "temperature_rms": (plain,),
         "scale_factor_error": ("ratio",),
         "nonlinearity": ("ratio",),
         "vibration_rectification": (f"{quantity}_vibration_coefficient",),
-        "full_scale": (plain,),
         "sensitivity": (f"{quantity}_step", f"{quantity}_sensitivity"),
-        "resolution": (plain,),
         "bandwidth": ("frequency",),
     }
 
@@ -240,11 +232,9 @@ FIGURE_DIMENSIONS: dict[str, dict[str, tuple[str, ...]]] = {
 }
 """Dimensions that each datasheet figure may have, the usual one first, by quantity."""
 
-Measured = Literal["gyro", "accel"]
-"""What a sensor measures."""
+Measured = Literal["gyro", "accel"]  # what a sensor measures
 
-SENSORS: Mapping[str, str] = {"gyro": "gyro", "accel": "accelerometer"}
-"""What measures it."""
+SENSORS: Mapping[str, str] = {"gyro": "gyro", "accel": "accelerometer"}  # what measures it
 
 IN_USE = (
     "offset",
@@ -257,12 +247,33 @@ IN_USE = (
 )
 """Figures of errors that come in use and are in no static log."""
 
-_MAX_ACCELERATION_NOISE = 1.0
-"""Largest printed noise density of an accelerometer, SI."""
+_MAX_ACCELERATION_NOISE = 1.0  # largest printed noise density of an accelerometer, SI
+
+
+def _check_unit(key: str, quantity: str, name: str, figure: PrintedFigure) -> None:
+    """Raise for another unit, and for 400 g/√Hz, where a document lost the sign of micro."""
+    dimensions = FIGURE_DIMENSIONS[quantity].get(name)
+    if dimensions is None:
+        raise ValueError(f"{key}: found under {quantity}; expected under gyro alone")
+    if figure.value is None or figure.unit is None:
+        return
+    unit = figure.unit
+    try:
+        dimension = dimension_of(unit, dimensions)
+    except UnitError as error:
+        mend = "; a figure by LSB is the 'sensitivity'" * ("LSB" in unit)
+        raise ValueError(f"{key}.unit: {error}{mend}") from error
+    if name in ("noise_density", "bias_instability") and quantity == "accel":
+        for value in map(figure.on_axis, "xyz"):
+            if isinstance(value, float) and to_si(value, unit, dimension) > _MAX_ACCELERATION_NOISE:
+                raise ValueError(
+                    f"{key}: found {value:g} {unit}, which no accelerometer has; was the sign of "
+                    f"micro or milli lost? expected such as {value:g} u{unit.removeprefix('m')}"
+                )
 
 
 class Datasheet(Strict):
-    """What a vendor prints of a sensor."""
+    """A datasheet of a sensor."""
 
     document: Text | None = None
     revision: Text | None = Field(None, description="of the document, with its date")
@@ -282,47 +293,19 @@ class Datasheet(Strict):
 
     @model_validator(mode="after")
     def _units(self) -> Datasheet:
-        for key, quantity, name, figure in self._figures():
-            dimensions = FIGURE_DIMENSIONS[quantity].get(name)
-            if dimensions is None:
-                raise ValueError(f"{key}: found under {quantity}; expected under gyro alone")
-            if figure.value is None or figure.unit is None:
-                continue
-            try:
-                dimension = dimension_of(figure.unit, dimensions)
-            except UnitError as error:
-                mend = "; a figure by LSB is the 'sensitivity'" * ("LSB" in figure.unit)
-                raise ValueError(f"{key}.unit: {error}{mend}") from error
-            if name in ("noise_density", "bias_instability") and quantity == "accel":
-                for axis in "xyz":
-                    printed = figure.on_axis(axis)
-                    if isinstance(printed, float):
-                        _check_micro(printed, figure.unit, dimension, key)
-        return self
-
-    def only(self, names: Collection[str]) -> dict[str, Any]:
-        """Return what the file says of some figures, such as `IN_USE`, and of the options."""
-        written = self.model_dump(mode="json", include={"options", *FIGURE_DIMENSIONS})
-        for quantity in FIGURE_DIMENSIONS:
-            if (sheet := written[quantity]) is not None:
-                written[quantity] = {name: sheet[name] for name in sheet if name in names}
-        return written
-
-    def _figures(self) -> Iterator[tuple[str, str, str, PrintedFigure]]:
-        """Yield key, quantity, name and figure of everything that is printed."""
         for quantity in FIGURE_DIMENSIONS:
             sheet: QuantityDatasheet | None = getattr(self, quantity)
             for name in QuantityDatasheet.model_fields if sheet else ():
                 figures: tuple[PrintedFigure, ...] = getattr(sheet, name) or ()
                 for number, figure in enumerate(figures):
                     place = f".{number}" * (len(figures) > 1)
-                    yield f"{quantity}.{name}{place}", quantity, name, figure
+                    _check_unit(f"{quantity}.{name}{place}", quantity, name, figure)
+        return self
 
-
-def _check_micro(value: float, unit: str, dimension: str, key: str) -> None:
-    """Raise for values such as 400 g/√Hz, where a document lost the sign of micro."""
-    if to_si(value, unit, dimension) > _MAX_ACCELERATION_NOISE:
-        raise ValueError(
-            f"{key}: found {value:g} {unit}, which no accelerometer has; was the sign of micro or "
-            f"milli lost? expected such as {value:g} u{unit.removeprefix('m')}"
-        )
+    def only(self, names: Collection[str]) -> dict[str, Any]:
+        """Return some figures as the file has them, such as `IN_USE`, and the options."""
+        written = self.model_dump(mode="json", include={"options", *FIGURE_DIMENSIONS})
+        for quantity in FIGURE_DIMENSIONS:
+            if (sheet := written[quantity]) is not None:
+                written[quantity] = {name: sheet[name] for name in sheet if name in names}
+        return written

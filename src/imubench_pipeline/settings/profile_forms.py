@@ -1,12 +1,11 @@
-"""Motion and temperature over time as a YAML file has them: a formula, or columns of a file.
+"""Motion and temperature over time in a YAML file: a formula, or columns of a file.
 
     temperature: {form: warm_up, start: 22 degC, end: 35 degC, time_constant: 10 min}
     motion:
       gyro_z: {form: steps, times: [0 s, 60 s, 90 s], values: [0 deg/s, 20 deg/s, 0 deg/s]}
       accel_z: 1 g
 
-A figure has its unit with it, and is converted to SI when `profiles` makes a profile of it. Here is
-nothing that computes: the configuration of a run, which has such forms, is read at once.
+`profiles` converts figures to SI. Nothing is computed here: every configuration loads this module.
 """
 
 from __future__ import annotations
@@ -21,16 +20,10 @@ from imubench_pipeline.settings.validation import Strict, Text
 from imubench_pipeline.units import UnitError, difference_to_si, quantity_to_si
 
 
-def _time(text: str) -> str:
-    quantity_to_si(text, "time")
-    return text
-
-
-def _positive(text: str, what: str) -> float:
-    seconds = quantity_to_si(text, "time")
-    if seconds <= 0:
-        raise ValueError(f"{what} is {text}, expected a time above 0")
-    return seconds
+def _check_time(text: str, above_zero: str | None = None) -> None:
+    """Raise for a text that is no time, or one that is not above 0 under the name of its key."""
+    if quantity_to_si(text, "time") <= 0 and above_zero:
+        raise ValueError(f"{above_zero} is {text}, expected a time above 0")
 
 
 class ConstantForm(Strict):
@@ -70,8 +63,8 @@ class DayCycleForm(Strict):
 
     @model_validator(mode="after")
     def _times(self) -> DayCycleForm:
-        _positive(self.period, "period")
-        _time(self.highest)
+        _check_time(self.period, "period")
+        _check_time(self.highest)
         return self
 
 
@@ -86,8 +79,8 @@ class WarmUpForm(Strict):
 
     @model_validator(mode="after")
     def _times(self) -> WarmUpForm:
-        _positive(self.time_constant, "time_constant")
-        _time(self.begin)
+        _check_time(self.time_constant, "time_constant")
+        _check_time(self.begin)
         return self
 
 
@@ -103,10 +96,7 @@ Part = Annotated[ConstantForm | StepsForm | DayCycleForm | WarmUpForm, Field(dis
 
 
 class SumForm(Strict):
-    """Several formulas together, such as a warm-up and the cycle of a day.
-
-    The first is a value, what the others add to it are differences: 0 K is no difference.
-    """
+    """Several formulas together: a value, and differences that the others add to it."""
 
     form: Literal["sum"]
     parts: tuple[Part, ...] = Field(min_length=2)
@@ -117,7 +107,7 @@ Form = Annotated[Formula | FileForm, Field(discriminator="form")]
 
 
 def _form(value: Any) -> Any:
-    """Return a quantity that stands alone as a constant."""
+    """Return a single quantity as a constant."""
     return {"form": "constant", "value": value} if isinstance(value, (str, int, float)) else value
 
 
@@ -126,7 +116,7 @@ ProfileForm = Annotated[Form, BeforeValidator(_form)]
 
 
 class Surroundings(Strict):
-    """What the sensors of a board have in common, as a YAML file has it."""
+    """Common conditions of the sensors of a board."""
 
     temperature: ProfileForm | None = None
     motion: dict[Channel, ProfileForm] = Field(default_factory=dict)

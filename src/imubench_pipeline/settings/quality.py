@@ -1,4 +1,4 @@
-"""The thresholds of what is found wrong with a recording."""
+"""Thresholds of the findings about recordings."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What an application needs of a sensor: limits of its errors after a time of dead reckoning."""
+"""Requirements of an application: limits of the errors of dead reckoning after a time."""
 
 from __future__ import annotations
 
@@ -26,8 +26,7 @@ DIMENSIONS: Mapping[str, str] = {
 }
 """The dimension of each error."""
 
-Axis = Literal["worst", "median"]
-"""The axis of a sensor that a requirement is held against."""
+Axis = Literal["worst", "median"]  # the axis of a sensor that a requirement is held against
 
 
 def _latitude(text: str) -> str:
@@ -145,7 +144,7 @@ class TurnOn(Strict):
 
 
 class Environment(Strict):
-    """What a sensor meets in use that a static log does not show; what is left out is not there."""
+    """Conditions of use that a static log does not show; none by default."""
 
     temperature_change: Annotated[Text, _change] | None = Field(
         None,
@@ -162,14 +161,14 @@ class Environment(Strict):
 
 
 class FullScale(Strict):
-    """What must not be beyond the range of a sensor."""
+    """Values that must be within the range of a sensor."""
 
     gyro: Rate | None = Field(None, description="±")
     accel: Acceleration | None = Field(None, description="±, gravity included")
 
 
 class Must(Strict):
-    """What a sensor must have, as far as its file tells; what is left out is not asked for."""
+    """Hard requirements, as far as the sensor file has the figures; none by default."""
 
     full_scale: FullScale = FullScale()
     bandwidth: Frequency | None = Field(None, description="-3 dB, of each quantity, at least")
@@ -187,7 +186,7 @@ class Must(Strict):
 
 
 class Requirement(Strict):
-    """What one application needs."""
+    """Requirements of one application."""
 
     title: Text
     example: bool = Field(False, description="made up, to show how a requirement is written")
@@ -232,24 +231,21 @@ class Requirement(Strict):
 
     @property
     def sigmas(self) -> float:
-        """How many standard deviations a limit is, at the confidence that is asked for."""
+        """Number of standard deviations of a limit, at its confidence."""
         return NormalDist().inv_cdf((1.0 + self.confidence) / 2.0)
 
     def admits(self, price_class: str | None) -> bool:
-        """Tell whether sensors of a price class may be chosen."""
+        """Return whether sensors of a price class may be chosen."""
         if self.price_class is None:
             return True
         return any(word.lower() in (price_class or "").lower() for word in self.price_class)
 
 
 def read_requirements(folders: Path | Iterable[Path] | None) -> dict[str, Requirement]:
-    """Read every requirement of folders, by the name of its file; none without a folder.
-
-    Raises `ConfigError`.
-    """
+    """Read the requirements of folders by file name, none without a folder."""
     return {} if folders is None else usable(read_folder(Requirement, folders, "requirement"))
 
 
 def requirements_of(sections: Mapping[str, object]) -> dict[str, Requirement]:
-    """Return the requirements as the plan wrote them."""
+    """Return the requirements of a plan."""
     return {name: Requirement.model_validate(section) for name, section in sections.items()}

@@ -1,6 +1,6 @@
-"""What comes with the package beside its code: the workflow, and a catalogue of its configuration.
+"""Files that come with the package: the workflow, and a catalogue of its configuration.
 
-In a checkout that is the checkout itself; a wheel holds the same files in the package.
+A checkout has them at its root, a wheel in the package.
 """
 
 from __future__ import annotations
@@ -22,13 +22,12 @@ def project() -> Path:
 
 
 def folders(stated: Folders, kind: Literal["sensors", "requirements"]) -> list[Path]:
-    """Return the folders that a configuration names, each once; what is in a later one counts.
+    """Return the folders that a configuration names, each once; a later one has precedence.
 
-    That of a project, ``config/<kind>``, need not be there beside another one.
+    The folder of a project, ``config/<kind>``, may be missing beside another one.
     """
-    named = [stated] if isinstance(stated, Path) else stated
     found: dict[Path, Path] = {}
-    for folder in named:
+    for folder in [stated] if isinstance(stated, Path) else stated:
         place = project() / "config" / kind if folder == CATALOGUE else folder
         found.pop(place.resolve(), None)
         found[place.resolve()] = place
@@ -38,6 +37,6 @@ def folders(stated: Folders, kind: Literal["sensors", "requirements"]) -> list[P
 
 
 def own_folder(stated: Folders) -> Path:
-    """Return the folder to put a file into that is missing: the last that is not the package's."""
+    """Return the folder for a missing file: the last that is not the package's."""
     named = [stated] if isinstance(stated, Path) else stated
     return next((folder for folder in reversed(named) if folder != CATALOGUE), named[-1])

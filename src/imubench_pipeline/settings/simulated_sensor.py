@@ -1,21 +1,13 @@
-"""A sensor model as a YAML file has it, with its units; `models` makes it.
+"""A sensor model in a YAML file, with units; `simulate.models` converts it.
 
-sensor: bno055                       # the sensor file that its logs go with, if any
-temperature_step: 1 K
-misalignment: {gyro: [[1, 0.01, 0], [0, 1, 0], [0, 0, 1]]}
 axes:
   gyro_x:
     N: 0.0103 deg/s/sqrt(Hz)
     B: 10 deg/h
     T_B: 200 s
-    K: 2 deg/h/sqrt(h)
-    bias: -5.4 deg/s
     drift: {sensitivity: 0.015 deg/s/K, reference: 25 degC, lag: 5 min}
-    low_pass: {cutoff: 64 Hz}
-    resolution: 0.0625 deg/s
-    full_scale: 2000 deg/s
 
-Here is nothing that computes: the configuration of a run has such axes.
+Nothing is computed here: every configuration loads this module.
 """
 
 from __future__ import annotations
@@ -49,12 +41,8 @@ class LineSettings(Strict):
 
     def si(self, quantity: str) -> dict[str, float]:
         """Return its figures in SI."""
-        return _in_si(
-            {
-                "amplitude": (self.amplitude, QUANTITIES[quantity]),
-                "frequency": (self.frequency, "frequency"),
-            }
-        )
+        amplitude = (self.amplitude, QUANTITIES[quantity])
+        return _in_si({"amplitude": amplitude, "frequency": (self.frequency, "frequency")})
 
 
 class DriftSettings(Strict):
@@ -111,7 +99,7 @@ class AxisSettings(Strict):
         return self
 
     def si(self, channel: str) -> dict[str, float]:
-        """Return the figures of the noise, the bias, the resolution and the full scale, in SI."""
+        """Return the figures of noise, bias, resolution and full scale in SI."""
         quantity = quantity_of(channel)
         plain = QUANTITIES[quantity]
         dimensions = {
@@ -128,7 +116,7 @@ class AxisSettings(Strict):
         return _in_si({name: (getattr(self, name), of) for name, of in dimensions.items()})
 
     def check(self, channel: str) -> None:
-        """Raise UnitError, with the key, if a unit has another dimension than its figure."""
+        """Raise a UnitError, with the key, if a unit has another dimension than its figure."""
         quantity = quantity_of(channel)
         self.si(channel)
         for number, process in enumerate(self.further):
@@ -183,7 +171,7 @@ class ModelSettings(ImuSettings):
 
 
 def check_axes(axes: Mapping[Channel, AxisSettings], key: str) -> None:
-    """Raise ValueError, with the key of the figure, if a unit has another dimension than it."""
+    """Raise a ValueError, with the key, if a unit has another dimension than its figure."""
     for channel, axis in axes.items():
         try:
             axis.check(channel)
@@ -192,7 +180,7 @@ def check_axes(axes: Mapping[Channel, AxisSettings], key: str) -> None:
 
 
 def _in_si(figures: Mapping[str, tuple[str | None, str]]) -> dict[str, float]:
-    """Return the figures that are there in SI, of text and dimension by their keys."""
+    """Return the stated figures in SI, from text and dimension by key."""
     in_si = {}
     for key, (text, dimension) in figures.items():
         if text is not None:

@@ -24,10 +24,7 @@ class UnavailableSettingsError(ConfigError):
 
 
 class Strict(BaseModel):
-    """A group of settings in which an unknown key is an error, and a number may be a text.
-
-    As text it is what ``str`` makes of it: of a number from a file, as it is written there.
-    """
+    """A group of settings: an unknown key is an error, and a number may be a text, as written."""
 
     model_config = ConfigDict(
         extra="forbid", frozen=True, allow_inf_nan=False, coerce_numbers_to_str=True
@@ -47,8 +44,7 @@ def _parse_fraction(value: object) -> float:
 _MAX_SHOWN_LENGTH, _MAX_ERROR_LENGTH = 100, 1000
 """Largest number of characters of a value, and of an error, that are shown."""
 
-_MAX_SHOWN_FAULTS = 20
-"""Largest number of faults of a file that are shown."""
+_MAX_SHOWN_FAULTS = 20  # largest number of faults of a file that are shown
 
 _SHORT_REPR = reprlib.Repr()
 _SHORT_REPR.maxstring = _SHORT_REPR.maxother = _SHORT_REPR.maxlong = _MAX_SHOWN_LENGTH
@@ -57,10 +53,9 @@ _SHORT_REPR.maxstring = _SHORT_REPR.maxother = _SHORT_REPR.maxlong = _MAX_SHOWN_
 def cut(
     value: object, words: Callable[[object], str] = _SHORT_REPR.repr, most: int = _MAX_SHOWN_LENGTH
 ) -> str:
-    """Return a value of a file as text for messages, shortened to one line.
+    """Return a value of a file as text for messages, shortened to ``most`` characters.
 
-    ``words``: converts the value to text; by default a shortened `repr`. ``most``: largest number
-    of characters.
+    ``words`` converts the value to text; by default a shortened `repr`.
     """
     text = words(value)
     return text if len(text) <= most else f"{text[: most - 3]}..."
@@ -75,16 +70,8 @@ def checked(
 ) -> AfterValidator:
     """Return a validator for a number with a unit of a dimension, and its range.
 
-    Parameters
-    ----------
-    dimension : str
-        A key of `imubench_pipeline.units.SI_UNITS`.
-    expected : str, optional
-        Expected value in the error for a number that is not above 0; by default all are valid.
-    from_zero : bool
-        0 is valid, too.
-    to_si : callable
-        Converts a text to SI.
+    ``expected`` is the expected value in the error for a number that is not above 0 (``from_zero``:
+    not negative); by default all are valid. ``to_si`` converts a text to SI.
     """
 
     def check(text: str) -> str:
@@ -133,8 +120,7 @@ def _check_visible(text: str) -> str:
     return text
 
 
-Text = Annotated[str, AfterValidator(_check_visible)]
-"""A text that is shown in tables and on pages."""
+Text = Annotated[str, AfterValidator(_check_visible)]  # a text that is shown in tables and on pages
 Frequency = Annotated[
     Text, checked("frequency", "a frequency above zero"), Field(examples=["100 Hz"])
 ]
@@ -159,29 +145,20 @@ _Model = TypeVar("_Model", bound=BaseModel)
 
 
 def parse(model: type[_Model], data: object, file: str) -> _Model:
-    """Validate ``data`` as ``model``.
-
-    Raises
-    ------
-    ConfigError
-        One line for each fault: file, key, value found, what was expected.
-    """
+    """Validate ``data`` as ``model``; raises a `ConfigError` with one line for each fault."""
     if not isinstance(data, Mapping):
         raise ConfigError(f"{file}: found {cut(data)}, expected keys and values")
     try:
         return model.model_validate(data)
     except ValidationError as error:
-        faults = _select_faults(error.errors())
+        listed = error.errors()
+        # A list is not too short if faults of its elements are reported.
+        inside = {fault["loc"][:n] for fault in listed for n in range(len(fault["loc"]))}
+        faults = [f for f in listed if f["type"] != "too_short" or f["loc"] not in inside]
         lines = [_describe_fault(file, fault, model) for fault in faults[:_MAX_SHOWN_FAULTS]]
         if len(faults) > _MAX_SHOWN_FAULTS:
             lines.append(f"{file}: and {len(faults) - _MAX_SHOWN_FAULTS} more")
         raise ConfigError("\n".join(lines)) from None
-
-
-def _select_faults(faults: list[Any]) -> list[Any]:
-    """Return the faults, without a too short list whose elements are reported as well."""
-    inside = {fault["loc"][:n] for fault in faults for n in range(len(fault["loc"]))}
-    return [f for f in faults if f["type"] != "too_short" or f["loc"] not in inside]
 
 
 def _describe_fault(file: str, fault: Any, model: type[BaseModel]) -> str:

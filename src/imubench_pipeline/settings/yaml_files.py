@@ -1,12 +1,8 @@
-"""Read YAML files, which may be untrusted.
+"""Read YAML files, which may be untrusted: size, depth and number of nodes are limited.
 
-Limits are checked before any object is built: size, depth, and number of nodes, where the nodes of
-an alias count at each use. A duplicate key is an error.
-
-Text is not converted. YAML 1.1 reads 0017 as 15, 12:30:45 as 45045, 2026-01-01 as a date and ``no``
-as false. Here a plain word is a text, unless it is null or a decimal or hexadecimal number. A
-number keeps its notation, which a setting of type text receives (`validation.Strict`). For settings
-that are true or false, pydantic converts the word. A key is a text.
+Text is not converted, as YAML 1.1 does (0017 is 15, ``no`` is false): a plain word is a text,
+unless it is null or a number. A number keeps its notation, for settings of type text
+(`validation.Strict`). A key is a text, and a duplicate key an error.
 """
 
 from __future__ import annotations
@@ -21,24 +17,16 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import yaml
 from pydantic import BaseModel
 
-from imubench_pipeline.settings.validation import (
-    ConfigError,
-    UnavailableSettingsError,
-    cut,
-    parse,
-)
+from imubench_pipeline.settings.validation import ConfigError, UnavailableSettingsError, cut, parse
 
-MAX_BYTES = 4 << 20
-"""Largest size of a file, bytes."""
+MAX_BYTES = 4 << 20  # largest size of a file, bytes
 
-MAX_DEPTH = 40
-"""Largest depth of nested lists and mappings."""
+MAX_DEPTH = 40  # largest depth of nested lists and mappings
 
 MAX_NODES = 200_000
 """Largest number of keys and values of a file; the nodes of an alias count at each use."""
 
-MAX_NUMBER_LENGTH = 100
-"""Largest number of characters of a number."""
+MAX_NUMBER_LENGTH = 100  # largest number of characters of a number
 
 if TYPE_CHECKING:
     _SAFE = yaml.SafeLoader
@@ -53,26 +41,23 @@ _MERGE_TAG = f"{_TAG_PREFIX}merge"
 _TEXT_TAGS = {f"{_TAG_PREFIX}str", f"{_TAG_PREFIX}binary"}
 
 
-class Integer(int):
+class _Written:
+    """A number that keeps its notation, which errors show."""
+
+    written: str
+
+    def __str__(self) -> str:
+        return self.written
+
+    __repr__ = __str__
+
+
+class Integer(_Written, int):
     """An integer that keeps its notation."""
 
-    written: str
 
-    def __str__(self) -> str:
-        return self.written
-
-    __repr__ = __str__  # errors show what the file has
-
-
-class Decimal(float):
+class Decimal(_Written, float):
     """A number with decimals that keeps its notation."""
-
-    written: str
-
-    def __str__(self) -> str:
-        return self.written
-
-    __repr__ = __str__  # errors show what the file has
 
 
 class _Loader(_SAFE):
@@ -146,14 +131,7 @@ def _make_fault(at: Any, problem: str) -> yaml.MarkedYAMLError:
 
 
 def read_yaml(path: Path) -> object:
-    """Read one YAML file.
-
-    Raises
-    ------
-    ConfigError
-        If the file is missing, no regular file, not YAML, too large, nested too deeply, or has a
-        duplicate key; the message states the line.
-    """
+    """Read one YAML file; raises a `ConfigError` with the line of the fault."""
     try:
         text = _read_text(path)
         if unseen := yaml.reader.Reader.NON_PRINTABLE.search(text):
@@ -187,14 +165,15 @@ def read_folder(
 ) -> dict[str, _Model | ConfigError]:
     """Return all ``.yaml`` files of folders as models by name, with errors for invalid ones.
 
-    A file replaces a file of the same name in an earlier folder.
-
-    Raises
-    ------
-    ConfigError
-        If a folder does not exist.
+    A later folder has precedence; a missing one raises a `ConfigError`.
     """
-    return {name: _read_or_error(model, path) for name, path in files_in(folders, each).items()}
+    models: dict[str, _Model | ConfigError] = {}
+    for name, path in files_in(folders, each).items():
+        try:
+            models[name] = read_settings(model, path)
+        except ConfigError as error:
+            models[name] = error
+    return models
 
 
 def files_in(folders: Path | Iterable[Path], each: str) -> dict[str, Path]:
@@ -205,13 +184,6 @@ def files_in(folders: Path | Iterable[Path], each: str) -> dict[str, Path]:
             raise ConfigError(f"{folder}: no such folder; expected one YAML file a {each}")
         files |= {path.stem: path for path in folder.glob("*.yaml")}
     return dict(sorted(files.items(), key=lambda file: file[1].name))
-
-
-def _read_or_error(model: type[_Model], path: Path) -> _Model | ConfigError:
-    try:
-        return read_settings(model, path)
-    except ConfigError as error:
-        return error
 
 
 def usable(read: Mapping[str, _Model | ConfigError]) -> dict[str, _Model]:

@@ -11,8 +11,7 @@ from imubench_pipeline.model.comparisons import RankingRow, ShortlistRow
 from imubench_pipeline.model.estimates import ParameterRow
 from imubench_pipeline.model.recordings import RecordingRow
 from imubench_pipeline.model.table import R
-from imubench_pipeline.navigation.shortlist.classes import measured_ranges
-from imubench_pipeline.navigation.shortlist.figures import printed_ranges
+from imubench_pipeline.navigation.shortlist.figures import measured_ranges, printed_ranges
 from imubench_pipeline.navigation.shortlist.rows import shortlist_rows
 from imubench_pipeline.settings.requirements import Requirement, requirements_of
 from imubench_pipeline.settings.sensor import Sensor, sensors_of

@@ -1,7 +1,4 @@
-"""What is kept: the columns of every table, and tables read, checked and written.
-
-Beside it findings and failures, which every step may leave, and the digest of the code.
-"""
+"""Read, check and write tables; findings, failures, and the digest of the code."""
 
 from imubench_pipeline.tables.files import (
     TableError,

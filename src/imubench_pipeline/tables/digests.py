@@ -1,4 +1,4 @@
-"""Digests of files, and JSON of which no bit changes unseen: a digest of it stands at its end."""
+"""Digests of files, and JSON files that end with a digest of themselves."""
 
 from __future__ import annotations
 
@@ -17,26 +17,15 @@ _LAST_LINE = re.compile(r',\n "digest": "[0-9a-f]{64}"\n\}\n\Z')
 
 
 def write_sealed_json(data: Mapping[str, Any], path: Path) -> None:
-    """Write a mapping with a digest of it, atomically.
-
-    Parameters
-    ----------
-    data : mapping
-        What JSON can hold, no NaN among it.
-    """
+    """Write a mapping of JSON values without NaN, with its digest, atomically."""
     text = json.dumps(dict(data), indent=1, allow_nan=False)
     write_content(text.removesuffix(_END) + _last_line(text), path)
 
 
 def read_sealed_json(path: Path) -> dict[str, Any]:
-    """Return what `write_sealed_json` wrote.
+    """Return the data that `write_sealed_json` wrote.
 
-    Raises
-    ------
-    OSError
-        If the file cannot be read.
-    ValueError
-        If it is not, letter for letter, as it was written.
+    Raises an OSError if the file cannot be read, and a ValueError if any byte has changed.
     """
     # All letters count, and not only what they mean.
     with open(path, "rb", opener=open_without_waiting) as file:
@@ -64,5 +53,5 @@ def digest_of(path: Path) -> str:
 
 
 def _last_line(text: str) -> str:
-    """Return how a file ends that has the digest of a text, which is that of an object of JSON."""
+    """Return the last line of a file: the digest of the text of a JSON object."""
     return f',\n "digest": "{hashlib.sha256(text.encode()).hexdigest()}"{_END}\n'

@@ -1,8 +1,7 @@
-"""What failed, as the tables tell it: a step that did for one recording or sensor leaves no row.
+"""Failed steps, as the tables show them.
 
-A step that raises, is killed twice or runs past its time leaves its outputs valid and empty. Each
-says why in its metadata (the ingest in ``quality.json``), so that the steps that follow pass it on,
-and the tables and pages tell it.
+A step that raises, is killed twice or exceeds its time leaves empty outputs with the reason in
+their metadata (the ingest in ``quality.json``), which the following steps pass on.
 """
 
 from __future__ import annotations
@@ -40,27 +39,19 @@ class Failure:
     """A step that failed."""
 
     sensor: str
-    recording: str | None
-    """None: a step of the whole sensor."""
+    recording: str | None  # None: a step of the whole sensor
     step: str
     cause: Cause
-    reason: str
-    """In one line."""
+    reason: str  # one line
 
     @property
     def name(self) -> str:
-        """What is left out."""
+        """Name of the recording or sensor that is left out."""
         return f"{self.sensor}/{self.recording}" if self.recording else self.sensor
 
     def row(self) -> FailureRow:
         """Return the row of the table ``failures``."""
-        return FailureRow(
-            sensor=self.sensor,
-            recording=self.recording,
-            step=self.step,
-            cause=self.cause,
-            reason=self.reason,
-        )
+        return FailureRow(**asdict(self))
 
     def finding(self) -> Finding:
         """Return the finding about the recording."""
@@ -70,7 +61,7 @@ class Failure:
 def describe_error(error: BaseException) -> str:
     """Return an error in words: with its type, unless it is a log that cannot be read now.
 
-    It is the same in each run: without addresses of objects, and of files with their names alone.
+    Addresses of objects and folders of files are removed, so that it is the same in each run.
     """
     if isinstance(error, UnavailableError):
         return str(error)
@@ -81,15 +72,7 @@ def describe_error(error: BaseException) -> str:
 
 
 def failure_of(path: Path) -> Failure | None:
-    """Return why an output is empty; None where it is the work of its step, or damaged.
-
-    The step that reads a damaged one says so.
-
-    Parameters
-    ----------
-    path : Path
-        A table as Parquet, or ``quality.json``.
-    """
+    """Return why an output, Parquet or ``quality.json``, is empty; None without a failure."""
     if path.name == QUALITY:
         with contextlib.suppress(ValueError, TypeError, AttributeError):
             failure = read_json(path).get("failure")
@@ -101,26 +84,20 @@ def failure_of(path: Path) -> Failure | None:
 
 
 def told_by(read: pa.Schema) -> Failure | None:
-    """Return the failure that the metadata of a table tells."""
+    """Return the failure in the metadata of a table."""
     text = (read.metadata or {}).get(_METADATA)
     return Failure(**json.loads(text)) if text else None
 
 
 def read_with_failures(table: str, paths: Sequence[Path]) -> tuple[pa.Table, list[Failure]]:
-    """Read and join files of one table, and what failed of those that are empty for it."""
+    """Read and join files of one table, and return the failures of the empty ones."""
     parts = [read_part(table, path) for path in paths]
     failures = [failure for part in parts if len(part) == 0 and (failure := told_by(part.schema))]
     return joined(table, parts), failures
 
 
 def write_empty(tables: Iterable[Path], failure: Failure) -> None:
-    """Write the tables that a step declares, without a row and with what failed.
-
-    Parameters
-    ----------
-    tables : iterable of Path
-        Each has the name of its file.
-    """
+    """Write the tables that a step declares, without a row and with its failure."""
     metadata = {_METADATA: json.dumps(asdict(failure), sort_keys=True).encode()}
     for path in tables:
         write_arrow(schema(path.stem).empty_table().replace_schema_metadata(metadata), path)
@@ -129,15 +106,11 @@ def write_empty(tables: Iterable[Path], failure: Failure) -> None:
 def with_failures(
     tables: Mapping[str, pa.Table], failures: Sequence[Failure]
 ) -> dict[str, pa.Table]:
-    """Return tables with what failed: told in ``failures`` and ``findings``, and left out.
+    """Return tables with the failures, and without failed recordings.
 
-    A recording of which a step failed has the status ``failed``, and no rows in other tables. What
-    is found of a static log by a step that needs more than the log leaves that alone out.
-
-    Parameters
-    ----------
-    tables : mapping of str to Table
-        Those of recordings, among them ``recordings`` and ``findings``.
+    A recording with a failed step has the status ``failed``, a finding, and no rows in other
+    tables, unless the step needs more than a static log. ``tables`` include ``recordings`` and
+    ``findings``.
     """
     if not failures:
         return {"failures": schema("failures").empty_table()} | dict(tables)
@@ -172,7 +145,7 @@ def with_failures(
 
 
 def with_new(listed: Sequence[R], rows: Iterable[R]) -> list[R]:
-    """Return rows of a table, and after them those of others that are not among them."""
+    """Return rows, and after them those others that are not among them."""
     known = {tuple(row.columns().values()) for row in listed}
     return [*listed, *(row for row in rows if tuple(row.columns().values()) not in known)]
 
@@ -180,13 +153,7 @@ def with_new(listed: Sequence[R], rows: Iterable[R]) -> list[R]:
 def without(
     tables: Mapping[str, pa.Table], left_out: Container[tuple[str, str | None]]
 ) -> dict[str, pa.Table]:
-    """Return tables without the rows of some recordings, but for those that say why.
-
-    Parameters
-    ----------
-    left_out : container of (str, str)
-        Sensor and recording.
-    """
+    """Return tables without the rows of some (sensor, recording); those with the reason remain."""
     filtered = dict(tables)
     for name, table in tables.items():
         if "recording" in table.schema.names and name not in _NAMED:

@@ -23,8 +23,7 @@ from imubench_pipeline.tables.schemas import PARTS_OF, TABLES
 from imubench_pipeline.tables.texts import printable, with_safe_cells
 
 _SMALL = 1_000_000  # bytes
-_LONGEST_NAME = 240
-"""Bytes of a name to which a temporary one can add; file systems take 255."""
+_LONGEST_NAME = 240  # bytes of a name to which a temporary one can add; file systems take 255
 
 
 class TableError(ValueError):
@@ -52,20 +51,11 @@ def schema(table: str) -> pa.Schema:
 
 
 def build(table: str, rows: Iterable[AnyRow]) -> pa.Table:
-    """Make an Arrow table of rows and check it against the schema.
+    """Make an Arrow table of rows and check it against the schema of ``table``.
 
-    Parameters
-    ----------
-    table : str
-        A key of `imubench_pipeline.tables.schemas.TABLES`, or of ``PARTS_OF`` there.
-    rows : iterable of mapping
-        One mapping a row; a column that a row leaves out is null. NaN and infinities become
-        null, and of texts what does not show is escaped.
-
-    Raises
-    ------
-    TableError
-        If a row has a column that the table does not, or lacks a required value.
+    A column that a row leaves out is null. NaN and infinities become null, and invisible characters
+    are escaped. Raises a `TableError` if a row has a column that the table does not, or lacks a
+    required value.
     """
     listed = [row.columns() if isinstance(row, TableRow) else row for row in rows]
     columns = columns_of(table)
@@ -82,7 +72,9 @@ def build(table: str, rows: Iterable[AnyRow]) -> pa.Table:
                 f"table {table}: column {column.name} is {min(map(str, other))!r}; expected one of "
                 f"{', '.join(column.values)}"
             )
-        array = _finite(pa.array(values, type=column.type, from_pandas=True))
+        array = pa.array(values, type=column.type, from_pandas=True)
+        if pa.types.is_floating(column.type):
+            array = pc.if_else(pc.is_finite(array), array, pa.scalar(None, column.type))
         if column.required and array.null_count:
             raise TableError(f"table {table}: column {column.name} has {array.null_count} nulls")
         arrays.append(array)
@@ -90,9 +82,9 @@ def build(table: str, rows: Iterable[AnyRow]) -> pa.Table:
 
 
 def _plain(value: Any) -> Any:
-    """Return a value as Arrow takes it: each character of a text shows, structs are mappings."""
-    if isinstance(value, str):
-        return _shown(value)
+    """Return a value as Arrow takes it: texts are printable, structs are mappings."""
+    if isinstance(value, str):  # a reason may have several lines
+        return "\n".join(map(printable, value.split("\n")))
     if isinstance(value, (tuple, list)):
         return [_plain_part(part) for part in value]
     return value
@@ -109,13 +101,6 @@ def _plain_part(value: Any) -> Any:
     return _plain(value)
 
 
-def _finite(column: pa.Array) -> pa.Array:
-    """Return a column with null in place of NaN and infinities, which no table holds."""
-    if not pa.types.is_floating(column.type):
-        return column
-    return pc.if_else(pc.is_finite(column), column, pa.scalar(None, column.type))
-
-
 def _not_finite(table: pa.Table) -> str:
     """Return the first cell of a table that is NaN or infinite, in words; empty if none is."""
     for name, column in zip(table.column_names, table.columns, strict=True):
@@ -125,11 +110,6 @@ def _not_finite(table: pa.Table) -> str:
                 row = pc.index(finite, pa.scalar(False)).as_py()
                 return f"{name} of row {row + 1} is {column[row].as_py()}"
     return ""
-
-
-def _shown(text: str) -> str:
-    """Return a text of which each character shows; a reason may have several lines."""
-    return text if text.isprintable() else "\n".join(map(printable, text.split("\n")))
 
 
 @contextlib.contextmanager
@@ -156,10 +136,7 @@ def replacing(path: Path) -> Iterator[Path]:
 def making(folder: Path) -> Iterator[Path]:
     """Give the name of a folder to fill, renamed to ``folder`` when the block ends without error.
 
-    Parameters
-    ----------
-    folder : Path
-        It may not be there yet, or be empty.
+    ``folder`` must be missing or empty.
     """
     folder.parent.mkdir(parents=True, exist_ok=True)
     scratch = Path(tempfile.mkdtemp(prefix=f".{folder.name}.", suffix=".part", dir=folder.parent))
@@ -181,12 +158,7 @@ def write_arrow(table: pa.Table, path: Path) -> None:
     """Write an Arrow table as Parquet or, where the name ends so, CSV, atomically.
 
     Texts in CSV are such as no spreadsheet takes for formulas (`imubench_pipeline.tables.texts`);
-    Parquet has them without that. Lists in CSV are joined by semicolons, structs are JSON.
-
-    Raises
-    ------
-    TableError
-        If a number is NaN or infinite: `build` makes null of it.
+    lists are joined by semicolons, structs are JSON. Raises a `TableError` for NaN or infinities.
     """
     if fault := _not_finite(table):
         raise TableError(f"{path}: {fault}; expected a finite number or null")
@@ -208,12 +180,9 @@ def tables_folder(results: Path) -> Path:
 
 
 def tables_of_run(results: Path, names: Iterable[str]) -> dict[str, Path]:
-    """Return where tables of a run lie, by name; ``results`` as `tables_folder` takes it.
+    """Return the paths of tables of a run, by name; ``results`` as `tables_folder` takes it.
 
-    Raises
-    ------
-    TableError
-        If one is not there.
+    Raises a `TableError` if one is missing.
     """
     folder = tables_folder(results)
     paths = {name: folder / f"{name}.parquet" for name in names}
@@ -238,12 +207,9 @@ def joined(table: str, parts: Sequence[pa.Table]) -> pa.Table:
 
 
 def read_part(table: str, path: Path) -> pa.Table:
-    """Read one file of a table, with the metadata that it has.
+    """Read one file of a table, with its metadata.
 
-    Raises
-    ------
-    TableError
-        If it is damaged, has other columns, or a number that is NaN or infinite.
+    Raises a `TableError` if it is damaged, has other columns, or a number that is NaN or infinite.
     """
     expected = schema(table)
     try:
@@ -277,7 +243,7 @@ def read_part(table: str, path: Path) -> pa.Table:
 
 
 def _other_columns(actual: pa.Schema, expected: pa.Schema) -> str:
-    """Return in which columns a table is another than expected; nothing where it is not."""
+    """Return how the columns of a table differ from the expected ones; empty if they do not."""
     if actual.names != expected.names:
         missing = [name for name in expected.names if name not in actual.names]
         unknown = [name for name in actual.names if name not in expected.names]
@@ -302,13 +268,7 @@ def write_content(content: str | bytes, path: Path) -> None:
 
 
 def read_json(path: Path) -> Any:
-    """Read JSON.
-
-    Raises
-    ------
-    ValueError
-        If it is none, or deeper than Python reads.
-    """
+    """Read JSON; raises a ValueError if it is invalid, or nested deeper than Python reads."""
     try:
         return json.loads(path.read_text(encoding="utf-8"))
     except RecursionError:

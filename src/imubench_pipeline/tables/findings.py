@@ -1,4 +1,4 @@
-"""A finding: what is wrong with a recording, or worth knowing of it, or why it cannot be used."""
+"""Findings about recordings, and the errors that reject them."""
 
 from __future__ import annotations
 
@@ -22,39 +22,21 @@ _ADDRESS = re.compile(r" at 0x[0-9a-f]{6,}")
 class Finding:
     """One finding about a recording or one of its channels."""
 
-    finding: str
-    """Its name, such as ``missing_samples``."""
-    severity: Severity
-    """``fatal``: the channel, or the whole recording, is left out of the analysis."""
-    detail: str
-    """In words, with the unit of ``value`` and what to do."""
-    value: float
-    """Its size."""
-    channel: str | None = None
-    """None: the whole recording."""
+    finding: str  # code, such as ``missing_samples``
+    severity: Severity  # ``fatal``: the channel or recording is left out of the analysis
+    detail: str  # in words, with the unit of ``value`` and what to do
+    value: float  # size
+    channel: str | None = None  # None: the whole recording
+    # start, end: its part of the recording, s from the first sample; None: all of it
     start: float | None = None
     end: float | None = None
-    """The part of the recording that it concerns, s from the first sample; None: all of it."""
-    affects: tuple[str, ...] = ()
-    """Parameters whose estimates it puts in doubt."""
-    data: str | None = None
-    """Its data (`imubench_pipeline.words.findings`) as JSON."""
+    affects: tuple[str, ...] = ()  # doubtful parameters
+    data: str | None = None  # data of the finding (`imubench_pipeline.words.findings`) as JSON
 
     def row(self, sensor: str, recording: str) -> FindingRow:
         """Return the row of the table ``findings``."""
-        return FindingRow(
-            sensor=sensor,
-            recording=recording,
-            channel=self.channel,
-            finding=self.finding,
-            severity=self.severity,
-            detail=self.detail,
-            value=self.value,
-            start=self.start,
-            end=self.end,
-            affects=self.affects,
-            data=self.data,
-        )
+        own = {field.name: getattr(self, field.name) for field in fields(self)}
+        return FindingRow(sensor=sensor, recording=recording, **own)
 
 
 def find(
@@ -66,21 +48,13 @@ def find(
     end: float | None = None,
 ) -> Finding:
     """Return a finding from its data; the other arguments are as in `Finding`."""
-    return Finding(
-        data.code,
-        severity,
-        data.text(channel or ""),
-        value,
-        channel,
-        start,
-        end,
-        tuple(sorted(data.affects)),
-        json.dumps(asdict(data)),
-    )
+    detail, affects = data.text(channel or ""), tuple(sorted(data.affects))
+    where = channel, start, end
+    return Finding(data.code, severity, detail, value, *where, affects, json.dumps(asdict(data)))
 
 
 def finding_of(row: FindingRow) -> Finding:
-    """Return the finding that a row of the table ``findings`` stands for."""
+    """Return the finding of a row of the table ``findings``."""
     return Finding(**{field.name: getattr(row, field.name) for field in fields(Finding)})
 
 
@@ -90,11 +64,9 @@ def without_addresses(reason: str) -> str:
 
 
 class RecordingError(ValueError):
-    """A recording that cannot be used; the text is the reason, with what to mend.
+    """A recording that cannot be used; the text is the reason, and how to mend it.
 
-    What a damaged file puts into it, such as a name of a million letters, is left out of the
-    middle; of what is no sign to print, such as a line break in a name, a question mark is left.
-    The address of an object, which a library may print, is another one in each run: it is left out.
+    Long reasons are cut in the middle, invisible characters replaced, addresses of objects removed.
     """
 
     def __init__(self, reason: str) -> None:
@@ -107,7 +79,4 @@ class RecordingError(ValueError):
 
 
 class UnavailableError(OSError):
-    """A log that cannot be read now, for a reason outside of it, such as a mount that is away.
-
-    It says nothing about the log: the ingest fails, and the next run tries again.
-    """
+    """A log that cannot be read now, for an external reason, such as a missing mount."""

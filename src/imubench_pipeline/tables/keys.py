@@ -1,4 +1,4 @@
-"""What names a channel in every table, and tables divided by such names."""
+"""The names of a channel in every table, and division of tables by them."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import pyarrow as pa
 
 @dataclass(frozen=True)
 class Key:
-    """What names a channel in every table."""
+    """Sensor, recording and channel."""
 
     sensor: str
     recording: str

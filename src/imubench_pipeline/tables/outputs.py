@@ -2,15 +2,14 @@
 
 One rule for every option that names an output (`add_output`):
 
-- What is there is refused without ``--force``: another name, or ``--force``, mends it. A folder may
-  be there if it is empty, or if it is an earlier output of the same kind. Of a folder that is
-  replaced only files of the same name change; all else in it stays.
-- Only regular files are replaced, each by a rename of a complete file: on any error the old one is
-  whole. Devices, pipes, sockets, and folders in the place of a file are refused.
-- Symbolic links are followed: the link stays, and its target is judged by this rule. A link to
-  nothing has its target made; a loop is refused. Missing parent folders are made.
-- Nothing is written over what the command reads, nor into the places of a project (`Place`), not
-  even with ``--force``. Only commands whose output belongs there add new files to such a place.
+- An existing file is refused without ``--force``. A folder may exist if it is empty or an earlier
+  output of the same kind; only its files of the same name change.
+- Only regular files are replaced, each by a rename of a complete file. Devices, pipes, sockets, and
+  folders in place of a file are refused.
+- Symbolic links are followed, and their targets judged by this rule. A loop is refused. Missing
+  parent folders are made.
+- Inputs of the command and the places of a project (`Place`) are never overwritten. Only commands
+  whose output belongs there add new files to such a place.
 """
 
 from __future__ import annotations
@@ -39,55 +38,28 @@ class Place:
     """A folder or file of a project in which other commands must not write."""
 
     path: Path
-    kind: str
-    """Such as ``logs``; an output that belongs there names it (`add_output`)."""
-    holds: str
-    """In words, such as "the logs"."""
+    kind: str  # such as ``logs``; an output that belongs there names it (`add_output`)
+    holds: str  # in words, such as "the logs"
 
     def __str__(self) -> str:
         return f"{self.holds} ({printable(str(self.path))})"
 
 
-def has_nothing_of_ours(_: Path) -> bool:
-    """Return that no folder is an earlier output."""
-    return False
-
-
 @dataclass
 class Output:
-    """Where a command writes what its user asks for.
+    """An output that the user of a command has named."""
 
-    Parameters
-    ----------
-    path : Path
-        As it was named.
-    adds_to : collection of str
-        Kinds of places to which it may add new files.
-    force : bool
-        Replace regular files that are there.
-    places : callable
-        Returns the places of the projects about a path.
-    inputs : sequence of Path
-        What the command reads.
-    """
-
-    path: Path
-    adds_to: Collection[str] = ()
-    force: bool = False
-    places: Callable[[Path], Iterable[Place]] = lambda _: ()
-    inputs: Sequence[Path] = ()
+    path: Path  # as it was named
+    adds_to: Collection[str] = ()  # kinds of places to which it may add new files
+    force: bool = False  # replace regular files
+    places: Callable[[Path], Iterable[Place]] = lambda _: ()  # of the projects about a path
+    inputs: Sequence[Path] = ()  # files that the command reads
 
     def __str__(self) -> str:
         return printable(str(self.path))
 
     def check(self) -> Path:
-        """Return the path that is written, links followed.
-
-        Raises
-        ------
-        OutputError
-            If it must not be written.
-        """
+        """Return the path that is written, links followed; raises an `OutputError`."""
         raise NotImplementedError
 
     def _resolve(self) -> tuple[Path, os.stat_result | None]:
@@ -179,18 +151,11 @@ class OutputFile(Output):
 
 @dataclass
 class OutputFolder(Output):
-    """A folder that a command fills.
+    """A folder that a command fills."""
 
-    Parameters
-    ----------
-    is_earlier : callable
-        Returns whether a folder is an earlier output, which is replaced without ``--force``.
-    shared : bool
-        Other things may be in it: only its files are refused where they are there.
-    """
-
-    is_earlier: Callable[[Path], bool] = has_nothing_of_ours
-    shared: bool = False
+    # whether a folder is an earlier output, which is replaced without ``--force``
+    is_earlier: Callable[[Path], bool] = lambda _: False
+    shared: bool = False  # it may have other files: only its own are refused where they exist
 
     def check(self) -> Path:
         """Return the folder that is filled, links followed."""
@@ -233,18 +198,19 @@ class OutputFolder(Output):
             yield Path(scratch)
             files = [path for path in sorted(Path(scratch).rglob("*")) if path.is_file()]
             # All are judged before the first is moved.
-            moves = [(path, self._target(real, path.relative_to(scratch))) for path in files]
+            moves = []
+            for path in files:
+                name = path.relative_to(scratch)
+                target = replace(self.file(str(name)), force=True).check()
+                if not target.is_relative_to(real):
+                    raise OutputError(
+                        f"{self}: {name} in it is a link that leads out; remove the link"
+                    )
+                moves.append((path, target))
             for source, target in moves:
                 if not target.is_file() or target.read_bytes() != source.read_bytes():
                     target.parent.mkdir(parents=True, exist_ok=True)
                     source.replace(target)
-
-    def _target(self, real: Path, name: Path) -> Path:
-        """Return where a file of a folder is moved, which may be there."""
-        target = replace(self.file(str(name)), force=True).check()
-        if not target.is_relative_to(real):
-            raise OutputError(f"{self}: {name} in it is a link that leads out; remove the link")
-        return target
 
 
 class StoreOutput(argparse.Action):
@@ -274,12 +240,8 @@ def add_output(
 ) -> None:
     """Declare an option, or an argument, that names an output, and beside it ``--force``.
 
-    Parameters
-    ----------
-    make : callable
-        Makes the output of its path.
-    keys
-        As `argparse.ArgumentParser.add_argument` takes them.
+    ``make`` makes the output of its path; ``keys`` are those of
+    `argparse.ArgumentParser.add_argument`.
     """
     parser.add_argument(name, type=Path, action=StoreOutput, make=make, **keys)
     if name.startswith("-"):
@@ -302,19 +264,13 @@ _MENDED = {
 
 
 def explain(error: OSError) -> str:
-    """Return what went wrong with a file, and how to mend it, as one line."""
+    """Return the fault of a file, and how to mend it, as one line."""
     mended = _MENDED.get(error.errno or 0, "name another place")
     return f"{printable(error.strerror or str(error))}; {mended}"
 
 
 def check_outputs(options: argparse.Namespace, places: Callable[[Path], Iterable[Place]]) -> None:
-    """Judge all outputs that the options of a command name, before it does anything.
-
-    Raises
-    ------
-    OutputError
-        If one must not be written.
-    """
+    """Check all outputs that the options of a command name; raises an `OutputError`."""
     values = list(vars(options).values())
     listed = [one for value in values for one in (value if isinstance(value, list) else [value])]
     # A text counts as a file only with a suffix: a sensor may have the name of an output.

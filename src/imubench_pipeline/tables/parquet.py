@@ -1,7 +1,6 @@
-"""Parquet files of which no bit changes unseen: checksums of their pages, a digest of the rest.
+"""Parquet files with checksums of their pages, and a digest of the metadata in the footer.
 
-Parquet has checksums for pages alone. What says where they lie, which columns there are and how
-many rows, stands at the end of a file without one; a digest of it is kept there among the metadata.
+Parquet has checksums of pages only, and none of the footer.
 """
 
 from __future__ import annotations
@@ -14,8 +13,7 @@ from pathlib import Path
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-SEAL = b"imubench.digest"
-"""Key of the metadata."""
+SEAL = b"imubench.digest"  # key of the metadata
 
 _END = struct.Struct("<I4s")
 """How a file ends: the length of its metadata, and the mark of the format."""
@@ -35,13 +33,8 @@ def checked_row_group(
 ) -> pa.Table:
     """Read a row group of a file that `checked_parquet` has opened, whole.
 
-    Checksums are of what a page holds, and not of its header: where that is damaged, PyArrow before
-    version 22 leaves out rows and says nothing.
-
-    Raises
-    ------
-    pyarrow.ArrowInvalid
-        If it has other rows than it says.
+    Raises a `pyarrow.ArrowInvalid` if rows are missing: checksums do not cover the header of a
+    page, and PyArrow before version 22 silently omits rows where it is damaged.
     """
     table = file.read_row_group(number, columns=columns, use_threads=False)
     expected = file.metadata.row_group(number).num_rows
@@ -51,13 +44,7 @@ def checked_row_group(
 
 
 def write_sealed(table: pa.Table, path: Path, compression: str) -> None:
-    """Write a table with checksums of its pages and a digest of its metadata.
-
-    Parameters
-    ----------
-    compression : str
-        As `pyarrow.parquet.ParquetWriter` takes it.
-    """
+    """Write a table with checksums of its pages and a digest of its metadata."""
     with pq.ParquetWriter(
         path, table.schema, compression=compression, write_page_checksum=True
     ) as writer:
@@ -73,10 +60,7 @@ def write_sealed(table: pa.Table, path: Path, compression: str) -> None:
 
 
 def seal_broken(path: Path) -> bool:
-    """Return whether the metadata of a file are not those that `write_sealed` wrote.
-
-    Of a file without a digest that is not known: False.
-    """
+    """Return whether the metadata are not as `write_sealed` wrote them; False without a digest."""
     footer = end_of(path)
     place = _PLACE.search(footer)
     if place is None:
@@ -86,7 +70,7 @@ def seal_broken(path: Path) -> bool:
 
 
 def end_of(path: Path) -> bytes:
-    """Return the metadata at the end of a Parquet file, as bytes; none where it has another end."""
+    """Return the metadata at the end of a Parquet file; empty if its end is another."""
     with path.open("rb") as file:
         size = file.seek(0, 2)
         file.seek(max(size - _END.size, 0))

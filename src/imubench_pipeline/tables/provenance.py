@@ -1,10 +1,9 @@
-"""Which code a result comes from."""
+"""Digest of the code that computes a result."""
 
 from __future__ import annotations
 
 import hashlib
 import re
-from collections.abc import Iterator
 from contextlib import suppress
 from functools import cache
 from pathlib import Path
@@ -22,22 +21,12 @@ _TEXT = re.compile(r"""["'](\w[\w.]*\*?)["']""", re.ASCII)
 
 
 def source_digest(*modules: str) -> str:
-    """Return a digest of modules of this package and of all that they use of it.
+    """Return a digest of modules of this package and of all other code and files that they use.
 
-    That is what they import, what extensions add to it (`imubench_pipeline.registry`), and what
-    their texts name: another module in full, since some are imported by name when they are needed;
-    every module of a package, by a name that ends in ``.*``; or a file or folder beside the module,
-    such as templates.
-
-    Parameters
-    ----------
-    *modules : str
-        Names below the package, such as ``allan`` or ``estimators.curve``.
-
-    Raises
-    ------
-    ValueError
-        If there is no such module.
+    These are their imports, extensions of it (`imubench_pipeline.registry`), and modules and files
+    that their texts name: a module in full, every module of a package by a name that ends in
+    ``.*``, or a file or folder beside the module. ``modules`` are names below the package, such as
+    ``estimators.curve``. Raises a ValueError for an unknown one.
     """
     todo, seen = [_path(module) for module in modules], set()
     while todo:
@@ -61,7 +50,7 @@ def _path(module: str) -> Path:
 
 @cache
 def _used(path: Path) -> tuple[Path, ...]:
-    """Return the files of the package that a module uses by itself."""
+    """Return the files of the package that a module uses directly."""
     text = path.read_text("utf-8")
     files: list[Path] = []
     for package, base, names in _IMPORT.findall(text):
@@ -75,22 +64,15 @@ def _used(path: Path) -> tuple[Path, ...]:
     for call in _EXTENSIONS.findall(text):
         files += sources(*call)
     for name in dict.fromkeys(_TEXT.findall(text)):
-        files += _named(name, path.parent)
-    return tuple(files)
-
-
-def _named(text: str, folder: Path) -> Iterator[Path]:
-    """Yield the modules, or the files in the folder of a module, that a text is the name of."""
-    if text.startswith(_NAME + ".") and text.endswith(".*"):
-        package = _path(text.removeprefix(_NAME + ".").removesuffix(".*")).parent
-        yield from package.glob("*.py")
-        yield from package.glob("*/__init__.py")
-    elif text.startswith(_NAME + "."):
-        with suppress(ValueError):
-            yield _path(text.removeprefix(_NAME + "."))
-    else:
-        beside = folder / text
-        if beside.is_file():
-            yield beside
+        beside = path.parent / name
+        if name.startswith(_NAME + ".") and name.endswith(".*"):
+            package = _path(name.removeprefix(_NAME + ".").removesuffix(".*")).parent
+            files += [*package.glob("*.py"), *package.glob("*/__init__.py")]
+        elif name.startswith(_NAME + "."):
+            with suppress(ValueError):
+                files.append(_path(name.removeprefix(_NAME + ".")))
+        elif beside.is_file():
+            files.append(beside)
         elif beside.is_dir() and not (beside / "__init__.py").exists():
-            yield from (path for path in beside.rglob("*") if path.is_file())
+            files += [file for file in beside.rglob("*") if file.is_file()]
+    return tuple(files)

@@ -1,4 +1,4 @@
-"""What every table holds: its columns with type, unit and meaning."""
+"""The columns of every table, with type, unit and meaning, and groups of tables."""
 
 from __future__ import annotations
 

@@ -1,7 +1,6 @@
-"""Seals: what a step left and what of, kept apart from it, so that no other file passes for it.
+"""Seals: digests of the inputs and outputs of each step, kept apart from its outputs.
 
-A file that is whole may still be the wrong one: that of another recording, of a backup, of another
-version of this package. Each step seals its outputs with their digests, and those of what it read.
+An intact file may still be the wrong one, such as that of another recording or a backup.
 """
 
 from __future__ import annotations
@@ -18,13 +17,12 @@ from imubench_pipeline.tables.schemas import PARTS_OF, TABLES
 
 FOLDER = "seals"
 NIGHTS = "nightly"
-_LAYOUT = 1
-"""Is another number when what a run leaves beside its tables is of another form."""
+_LAYOUT = 1  # version of the layout of results other than tables
 
 
 @cache
 def form() -> str:
-    """Return what is another text whenever a table, or what else is kept, has another form."""
+    """Return a digest of the columns of all tables and of the layout of other results."""
     columns = {
         name: [(column.name, str(column.type), column.unit) for column in table]
         for name, table in TABLES.items()
@@ -48,12 +46,9 @@ class SealedFile:
         return cls(about.st_size, digest_of(path), about.st_mtime_ns)
 
     def fault(self, path: Path, *, whole: bool) -> str | None:
-        """Return what is wrong with a file; None where nothing is seen.
+        """Return the fault of a file; None without one.
 
-        Parameters
-        ----------
-        whole : bool
-            All of it is read, and not only where it was changed since.
+        Unless ``whole``, its content is read only if it was changed since.
         """
         try:
             about = path.stat()
@@ -72,18 +67,13 @@ class SealedFile:
 
 @dataclass(frozen=True)
 class Seal:
-    """What a step left."""
+    """The inputs and outputs of a step."""
 
-    place: str
-    """Of the seal: the step, after the recording or sensor that it is of."""
-    form: str
-    """As `form` gave it."""
-    inputs: dict[str, str]
-    """Digests of what it read, by their places below the results."""
+    place: str  # as of `place_of`
+    form: str  # as `form` gave it
+    inputs: dict[str, str]  # digests by place below the results
     outputs: dict[str, SealedFile]
-    """Likewise, what it wrote."""
-    settings: str = ""
-    """Digest of the settings and the code that it ran with."""
+    settings: str = ""  # digest of the settings and the code
 
     def write(self, results: Path) -> None:
         """Keep it, atomically."""
@@ -102,7 +92,7 @@ def place_of(step: str, sensor: str | None = None, recording: str | None = None)
 
 
 def night_place(name: str) -> str:
-    """Return the place of the seal of what a nightly run said."""
+    """Return the place of the seal of the results of a nightly run."""
     return f"{NIGHTS}/{name}"
 
 
@@ -113,31 +103,17 @@ def seal_files(
     inputs: Mapping[str, str],
     settings: str = "",
 ) -> None:
-    """Seal what a step left.
+    """Seal the outputs of a step: files, or folders with all their files.
 
-    Parameters
-    ----------
-    place : str
-        As of `place_of`.
-    outputs : iterable of Path
-        Files, and folders of which all files are meant.
-    inputs : mapping of str to str
-        As `digests` gave them.
-    settings : str
-        Digest of the settings and the code of the step.
+    ``place`` is as of `place_of`, ``inputs`` as of `digests`; ``settings`` is a digest of the
+    settings and the code of the step.
     """
     left = {name: SealedFile.of(path) for name, path in sorted(_below(results, outputs))}
     Seal(place, form(), dict(inputs), left, settings).write(results)
 
 
 def seal_again(results: Path, place: str, outputs: Iterable[Path]) -> None:
-    """Seal what a command has written in the place of a step, of the files that the step read.
-
-    Parameters
-    ----------
-    place : str
-        Where there is no seal, none is made.
-    """
+    """Seal files that a command has written in place of a step; without a seal none is made."""
     try:
         before = read_seal(results, place)
     except (FileNotFoundError, SealError):
@@ -147,7 +123,7 @@ def seal_again(results: Path, place: str, outputs: Iterable[Path]) -> None:
 
 
 def lost_inputs(results: Path, place: str) -> list[str]:
-    """Return what a step read and is no longer there; nothing where there is no seal of it."""
+    """Return the missing inputs of a step; empty without a seal."""
     try:
         inputs = read_seal(results, place).inputs
     except (FileNotFoundError, SealError):
@@ -156,32 +132,30 @@ def lost_inputs(results: Path, place: str) -> list[str]:
 
 
 def digests(results: Path, paths: Iterable[Path]) -> dict[str, str]:
-    """Return the digests of files below the results, by their places there.
-
-    Parameters
-    ----------
-    paths : iterable of Path
-        Files, and folders of which all files are meant; others than of results are left out.
-    """
+    """Return the digests of files below the results, and in folders there, by their places."""
     return {name: digest_of(path) for name, path in sorted(_below(results, paths))}
 
 
 def read_seal(results: Path, place: str) -> Seal:
     """Return the seal of a place.
 
-    Raises
-    ------
-    FileNotFoundError
-        If there is none.
-    SealError
-        If it is damaged, or that of another place.
+    Raises a FileNotFoundError without one, and a `SealError` if it is damaged or of another place.
     """
     path = _path(results, place)
     try:
         data = read_sealed_json(path)
         outputs = {name: SealedFile(**file) for name, file in data["outputs"].items()}
         seal = Seal(**{**data, "outputs": outputs})
-        _check(seal)
+        texts = [seal.place, seal.form, seal.settings, *seal.inputs.values()]
+        texts += [file.sha256 for file in outputs.values()]
+        numbers = [n for file in outputs.values() for n in (file.size, file.changed)]
+        names = [PurePosixPath(name) for name in (*seal.inputs, *outputs)]
+        if (
+            not all(isinstance(text, str) for text in texts)
+            or not all(type(number) is int for number in numbers)
+            or any(name.is_absolute() or ".." in name.parts for name in names)
+        ):
+            raise ValueError("no seal")
     except FileNotFoundError:
         raise
     except OSError as error:
@@ -191,20 +165,6 @@ def read_seal(results: Path, place: str) -> Seal:
     if seal.place != place:
         raise SealError(f"is that of {seal.place}")
     return seal
-
-
-def _check(seal: Seal) -> None:
-    """Raise `ValueError` unless all in a seal is of its type, and names what is in the results."""
-    texts = [seal.place, seal.form, seal.settings, *seal.inputs.values()]
-    texts += [file.sha256 for file in seal.outputs.values()]
-    numbers = [n for file in seal.outputs.values() for n in (file.size, file.changed)]
-    names = [PurePosixPath(name) for name in (*seal.inputs, *seal.outputs)]
-    if (
-        not all(isinstance(text, str) for text in texts)
-        or not all(type(number) is int for number in numbers)
-        or any(name.is_absolute() or ".." in name.parts for name in names)
-    ):
-        raise ValueError("no seal")
 
 
 def places(results: Path) -> list[str]:
@@ -217,7 +177,7 @@ def places(results: Path) -> list[str]:
 
 
 def visible(path: Path) -> bool:
-    """Return whether no part of a place is hidden: what begins with a dot is no result."""
+    """Return whether no part of a path begins with a dot."""
     return not any(part.startswith(".") for part in path.parts)
 
 

@@ -1,10 +1,8 @@
-"""Texts from logs, notes and names of folders, made safe for what opens them.
+"""Make texts from logs, notes and names of folders safe for the programs that open them.
 
 A spreadsheet takes a cell of a CSV file that begins with ``=``, ``+``, ``-`` or ``@`` for a
-formula, quoted or not, and a formula can start programs and fetch pages. An apostrophe before it is
-what spreadsheets themselves take for "this is text". One that expects semicolons between cells
-breaks a text at them, whatever the quotes, so what follows a semicolon is treated as what begins a
-cell.
+formula, quoted or not. An apostrophe before it marks it as text. Where semicolons separate cells,
+a text is divided at them, so that the same applies after a semicolon.
 """
 
 from __future__ import annotations
@@ -19,13 +17,7 @@ _FORMULA = re.compile(r"((?:^|;)[\s\"]*)('*[=+\-@\uff1d\uff0b\uff0d\uff20])")
 
 
 def printable(text: str) -> str:
-    r"""Return a text in which each character shows: others are escaped, as ``\x1b`` and ``\u2028``.
-
-    Parameters
-    ----------
-    text : str
-        May hold control characters, line ends, marks of direction and halves of surrogate pairs.
-    """
+    r"""Return a text with all invisible characters escaped, as ``\x1b`` and ``\u2028``."""
     if text.isprintable():
         return text
     return "".join(
@@ -37,8 +29,7 @@ def printable(text: str) -> str:
 def as_cell(text: str) -> str:
     """Return a text as a cell of a CSV file that no spreadsheet takes for a formula.
 
-    It is `printable`, and each sign that would begin a formula has one apostrophe more before it
-    than in the text.
+    It is `printable`, and each sign that would begin a formula has one more apostrophe before it.
     """
     return _FORMULA.sub(r"\1'\2", printable(text))
 
@@ -47,7 +38,13 @@ def with_safe_cells(table: pa.Table) -> pa.Table:
     """Return a table with its texts as `as_cell` gives them, and lists as texts."""
     for place, field in enumerate(table.schema):
         if pa.types.is_list(field.type):
-            texts = ["; ".join(map(_text_of, value or ())) for value in table[place].to_pylist()]
+            texts = [
+                "; ".join(
+                    part if isinstance(part, str) else json.dumps(part, ensure_ascii=False)
+                    for part in value or ()
+                )
+                for value in table[place].to_pylist()
+            ]
             table = table.set_column(place, field.name, pa.array(texts, pa.string()))
         elif pa.types.is_dictionary(field.type):
             table = table.set_column(place, field.name, table[place].cast(pa.string()))
@@ -61,7 +58,3 @@ def with_safe_cells(table: pa.Table) -> pa.Table:
             column = pa.DictionaryArray.from_arrays(column.indices, pa.array(safe, pa.string()))
             table = table.set_column(place, field, column.cast(pa.string()))
     return table
-
-
-def _text_of(part: object) -> str:
-    return part if isinstance(part, str) else json.dumps(part, ensure_ascii=False)

@@ -1,15 +1,13 @@
 """Correlation of the errors of windows of a log, from the noise model of the log.
 
-A window weights the noise by a kernel h whose integral is 0. Its error is therefore stationary for
-every term, including a random walk and flicker noise. Its covariance at a lag u is the double
-integral of h(s) h(s') C(s - s' + u), with C the generalised covariance of the term; a constant in C
-cancels. The calculation uses means over blocks of length d, k blocks apart.
+A window weights the noise by a kernel h with the integral 0, so its error is stationary for every
+term. The covariance at a lag u is the double integral of h(s) h(s') C(s - s' + u), with C the
+generalised covariance of the term, and is computed from means over blocks.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -66,14 +64,20 @@ class WindowCovariance:
         Shape (lags,), in rad^2, (m/s)^2 or m^2.
         """
         total = np.zeros(self.lags)
+        reach = self.window.blocks - 1
+        lags = np.abs(np.arange(-reach, self.lags + reach, dtype=np.float64))
         for term in model.terms:
             if not isinstance(term, Deterministic):
                 power, unit = term.as_unit()
-                total += power * (
-                    self._compute_covariance(term)
-                    if unit is term
-                    else self._get_unit_covariance(unit)
-                )
+                if unit not in self._unit_covariances:
+                    covariance = correlated(
+                        unit.block_covariance(lags, self.window.block), self._autocorrelation
+                    )
+                else:
+                    covariance = self._unit_covariances[unit]
+                if unit is not term:  # all models share it
+                    self._unit_covariances[unit] = covariance
+                total += power * covariance
         return total
 
     def spread(self, model: NoiseModel, errors: Errors) -> Spread:
@@ -84,54 +88,34 @@ class WindowCovariance:
         line, at a random phase, adds half the square of its amplitude. Both add their products with
         the noise to the variance.
         """
-        covariance, share = self.of(model), _count_both_signs(errors.pairs) / errors.count**2
+        covariance = self.of(model)
+        both_signs = np.concatenate((errors.pairs[:1], 2.0 * errors.pairs[1:]))
+        share = both_signs / errors.count**2
         mean, variance = float(covariance[0]), 2.0 * float(share @ covariance**2)
         distance = self.window.block * np.arange(self.lags)
-        for power, frequency in self._list_deterministic(model):
+        for term in model.terms:
+            if not isinstance(term, Deterministic):
+                continue
+            power, frequency = term.swing(self.weights, self.window.block)  # 0 Hz for a ramp
             mean += power
             wave = np.cos(2.0 * math.pi * frequency * distance)
             variance += 4.0 * power * max(float(share @ (covariance * wave)), 0.0)
             if frequency > 0.0:
                 # Its mean square depends on the phase, unless the windows cover all phases.
                 turn = 2.0 * math.pi * frequency * self.window.block
-                variance += 0.5 * power**2 * _compute_coherence(2.0 * turn, errors.count)
+                half = math.remainder(turn, math.pi)
+                coherence = 1.0  # squared mean of phasors that are two turns apart
+                if abs(half) >= 1e-9:
+                    mean_phasor = math.sin(errors.count * half) / (errors.count * math.sin(half))
+                    coherence = mean_phasor**2
+                variance += 0.5 * power**2 * coherence
         return Spread(mean, max(variance, _MIN_RELATIVE_VARIANCE * mean**2))
-
-    def _list_deterministic(self, model: NoiseModel) -> Iterator[tuple[float, float]]:
-        """Yield mean square and frequency, Hz, of deterministic terms; 0 Hz for the ramp."""
-        for term in model.terms:
-            if isinstance(term, Deterministic):
-                yield term.swing(self.weights, self.window.block)
 
     @cached_property
     def _unit_covariances(self) -> dict[Term, Array]:
         return {}
 
-    def _get_unit_covariance(self, unit: Term) -> Array:
-        """Return the covariance of a term that all models share."""
-        if unit not in self._unit_covariances:
-            self._unit_covariances[unit] = self._compute_covariance(unit)
-        return self._unit_covariances[unit]
-
-    def _compute_covariance(self, term: Term) -> Array:
-        reach = self.window.blocks - 1
-        lags = np.abs(np.arange(-reach, self.lags + reach, dtype=np.float64))
-        return correlated(term.block_covariance(lags, self.window.block), self._autocorrelation)
-
     @cached_property
     def _autocorrelation(self) -> Array:
         """The autocorrelation of the weights, from -(blocks - 1) to blocks - 1."""
         return np.correlate(self.weights, self.weights, "full")
-
-
-def _count_both_signs(pairs: Array) -> Array:
-    """Return the number of pairs by lag, counting both signs of the lag."""
-    return np.concatenate((pairs[:1], 2.0 * pairs[1:]))
-
-
-def _compute_coherence(angle: float, count: int) -> float:
-    """Return the squared mean of ``count`` phasors, an angle apart: 1 for whole turns."""
-    half = math.remainder(0.5 * angle, math.pi)
-    if abs(half) < 1e-9:
-        return 1.0
-    return (math.sin(count * half) / (count * math.sin(half))) ** 2

@@ -8,12 +8,12 @@ from dataclasses import replace
 from imubench_pipeline.earth import STANDARD_GRAVITY
 from imubench_pipeline.estimators.estimate import Estimate
 from imubench_pipeline.model.estimates import BacktestRow, DeterministicRow
-from imubench_pipeline.navigation.backtest.comparison import Comparison, DeadReckoning, compare
+from imubench_pipeline.navigation.backtest.comparison import DeadReckoning, compare
 from imubench_pipeline.navigation.backtest.windows import block_means, window
 from imubench_pipeline.navigation.error_budget import draw_models, drawn_jointly
 from imubench_pipeline.noise.simulate import channel_rng
 from imubench_pipeline.recordings.recording import ChannelLog
-from imubench_pipeline.settings.requirements import DIMENSIONS, Error, Limit, Requirement
+from imubench_pipeline.settings.requirements import DIMENSIONS, Error, Requirement
 from imubench_pipeline.settings.sensor import quantity_of
 from imubench_pipeline.units import SI_UNITS, quantity_to_si
 
@@ -48,24 +48,10 @@ def backtest_rows(
 ) -> Iterator[BacktestRow]:
     """Yield the rows of the table ``backtest`` of a recording.
 
-    The logs are used as recorded, with lines, temperature drift and other deterministic signals,
-    since a user of the sensor gets them too.
-
-    Parameters
-    ----------
-    names : mapping of str to str
-        ``sensor`` and ``recording``.
-    logs : mapping of str to ChannelLog
-        Static logs.
-    estimates : mapping of str to Estimate
-        The recommended one of each channel.
-    requirements : mapping of str to Requirement
-    deterministic : iterable of DeterministicRow
-        Signals that are removed from the noise, and not in the models.
-    draws : int
-        Number of noise models drawn from the estimate of each log.
-    seed : int
-        Seed of the run; each channel has its own random stream.
+    The logs are used as recorded, with lines, temperature drift and other ``deterministic``
+    signals, which the models do not include, since a user of the sensor gets them too. ``names``
+    are ``sensor`` and ``recording``; ``estimates`` the recommended one of each channel; ``draws``
+    the number of noise models drawn from each. Each channel has its own random stream of the seed.
     """
     apart: dict[str, dict[str, None]] = {}
     for component in deterministic:
@@ -96,15 +82,37 @@ def _test_channel(
     draws: int,
     seed: int,
 ) -> Iterator[BacktestRow]:
-    listed = [
-        (
-            _make_row(names, channel, name, limit),
-            _select_dead_reckoning(channel, requirement, limit, estimate),
-        )
-        for name, requirement in requirements.items()
-        for limit in requirement.by_dead_reckoning
-        if (quantity_of(channel), limit.error) in (*_INTEGRATIONS, ("gyro", "north"))
-    ]
+    """Yield the rows of one channel."""
+    listed: list[tuple[BacktestRow, DeadReckoning | str]] = []
+    for name, requirement in requirements.items():
+        for limit in requirement.by_dead_reckoning:
+            key = quantity_of(channel), limit.error
+            # The error that the limit needs, or why the log cannot show it.
+            asked: DeadReckoning | str
+            if key == ("gyro", "north"):
+                asked = (
+                    "a log at one position does not tell the bias of a gyro from the Earth's rate"
+                )
+            elif key not in _INTEGRATIONS:
+                continue
+            elif requirement.static_window is None:
+                asked = "turn_on: a log shows one turn-on bias, not how these scatter"
+            elif not estimate.model.terms:
+                asked = "nothing is known of the noise of this channel"
+            else:
+                order, factor = _INTEGRATIONS[key]
+                rest = quantity_to_si(requirement.static_window, "time")
+                asked = DeadReckoning(order, rest, limit.seconds, factor)
+            about = BacktestRow(
+                sensor=names["sensor"],
+                recording=names["recording"],
+                channel=channel,
+                requirement=name,
+                error=limit.error,
+                time=limit.seconds,
+                unit=SI_UNITS[DIMENSIONS[limit.error]],
+            )
+            listed.append((about, asked))
     cuts = {
         asked: window(asked.rest, asked.time, log.rate)
         for _, asked in listed
@@ -123,57 +131,21 @@ def _test_channel(
             reason = f"two samples are further apart than the times: {log.rate:g} Hz"
             yield replace(about, reason=reason)
         else:
-            comparison = compare(
-                asked, cut, means[cut.block], estimate.model, drawn, efficient=jointly
+            found = compare(asked, cut, means[cut.block], estimate.model, drawn, efficient=jointly)
+            yield replace(
+                about,
+                window=asked.rest,
+                windows=found.windows,
+                independent=found.independent,
+                measured=found.measured,
+                predicted=found.predicted,
+                predicted_lower=found.lower,
+                predicted_upper=found.upper,
+                ratio=found.ratio,
+                ratio_lower=None if found.least is None else found.least / found.predicted,
+                ratio_upper=None if found.most is None else found.most / found.predicted,
+                chance=found.chance,
+                verdict=found.verdict,
+                duration_needed=asked.duration_needed,
+                reason=found.reason,
             )
-            yield _fill_row(about, asked, comparison)
-
-
-def _make_row(
-    names: Mapping[str, str], channel: str, requirement: str, limit: Limit
-) -> BacktestRow:
-    return BacktestRow(
-        sensor=names["sensor"],
-        recording=names["recording"],
-        channel=channel,
-        requirement=requirement,
-        error=limit.error,
-        time=limit.seconds,
-        unit=SI_UNITS[DIMENSIONS[limit.error]],
-    )
-
-
-def _select_dead_reckoning(
-    channel: str, requirement: Requirement, limit: Limit, estimate: Estimate
-) -> DeadReckoning | str:
-    """Return the error that a limit needs from a channel, or why its log cannot show it."""
-    if limit.error == "north":
-        return "a log at one position does not tell the bias of a gyro from the Earth's rate"
-    if requirement.static_window is None:
-        return "turn_on: a log shows one turn-on bias, not how these scatter"
-    if not estimate.model.terms:
-        return "nothing is known of the noise of this channel"
-    order, factor = _INTEGRATIONS[quantity_of(channel), limit.error]
-    rest = quantity_to_si(requirement.static_window, "time")
-    return DeadReckoning(order, rest, limit.seconds, factor)
-
-
-def _fill_row(row: BacktestRow, asked: DeadReckoning, comparison: Comparison) -> BacktestRow:
-    predicted = comparison.predicted
-    return replace(
-        row,
-        window=asked.rest,
-        windows=comparison.windows,
-        independent=comparison.independent,
-        measured=comparison.measured,
-        predicted=predicted,
-        predicted_lower=comparison.lower,
-        predicted_upper=comparison.upper,
-        ratio=comparison.ratio,
-        ratio_lower=None if comparison.least is None else comparison.least / predicted,
-        ratio_upper=None if comparison.most is None else comparison.most / predicted,
-        chance=comparison.chance,
-        verdict=comparison.verdict,
-        duration_needed=asked.duration_needed,
-        reason=comparison.reason,
-    )

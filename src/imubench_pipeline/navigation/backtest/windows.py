@@ -1,10 +1,7 @@
 """Dead-reckoning errors over windows of a static log.
 
-A window is at rest for a time W, and its mean over W is the bias. It then moves for a time t, and
-the log less the bias is integrated m + 1 times over t. The error is that of `error_budget.growth`,
-with the log instead of the noise. Windows begin one block apart, so that they overlap. Only the
-block means of a log are needed, which are computed for several lengths in one pass and bounded
-memory (`block_means`).
+A window is at rest for a time W, whose mean is the bias. It then moves for a time t, in which the
+log less the bias is integrated m + 1 times (`error_budget.growth`). Windows begin one block apart.
 """
 
 from __future__ import annotations
@@ -80,20 +77,18 @@ def window(rest: float, time: float, rate: float) -> Window | None:
     if most < 1:
         return None
     counts = [number for number in BLOCK_COUNTS if number <= most] or [most]
-    number = min(
-        counts, key=lambda n: (round(_estimate_variance_error(n, shorter, longer, rate), 4), n)
-    )
+
+    def estimate_variance_error(number: int) -> float:
+        """Return the approximate relative error of the variance."""
+        others, samples = number * longer / shorter, shorter * rate / number
+        # Block sizes differ by one sample: the mean of 1 / size is above 1 / mean size.
+        part = samples % 1.0
+        return abs(round(others) / others - 1.0) + part * (1.0 - part) / samples**2
+
+    number = min(counts, key=lambda n: (round(estimate_variance_error(n), 4), n))
     other = round(number * longer / shorter)
     resting, moving = (number, other) if rest <= time else (other, number)
     return Window(shorter / number, resting, moving)
-
-
-def _estimate_variance_error(number: int, shorter: float, longer: float, rate: float) -> float:
-    """Return the approximate relative error of the variance with a number of blocks."""
-    others, samples = number * longer / shorter, shorter * rate / number
-    # Block sizes differ by one sample: the mean of 1 / size is above 1 / mean size.
-    part = samples % 1.0
-    return abs(round(others) / others - 1.0) + part * (1.0 - part) / samples**2
 
 
 @dataclass(frozen=True)
@@ -109,14 +104,8 @@ class Errors:
 def errors(means: Sequence[Array], weights: Array, lags: int) -> Errors:
     """Return the errors of all windows of a log.
 
-    Parameters
-    ----------
-    means : sequence of ndarray
-        Block means of each segment, NaN where one is missing.
-    weights : ndarray, shape (blocks,)
-        Weights of the blocks of a window.
-    lags : int
-        Number of lags for the pair counts.
+    ``means`` are the block means of each segment, NaN where one is missing; ``weights``, shape
+    (blocks,), those of the blocks of a window; ``lags`` the number of lags for the pair counts.
     """
     total, count = 0.0, 0
     pairs = np.zeros(lags)
@@ -131,7 +120,11 @@ def errors(means: Sequence[Array], weights: Array, lags: int) -> Errors:
         whole = before[len(weights) :] == before[: -len(weights)]
         total += float(np.sum(window_errors[whole] ** 2))
         count += int(whole.sum())
-        pairs += _count_pairs(whole, lags)
+        # Pairs of windows without a gap, by lag: an autocorrelation.
+        length = 1 << (2 * len(whole) - 1).bit_length()
+        power = np.abs(np.fft.rfft(whole.astype(np.float64), length)) ** 2
+        counted = min(lags, len(whole))
+        pairs[:counted] += np.rint(np.fft.irfft(power, length)[:counted])
     return Errors(total / count if count else math.nan, count, pairs)
 
 
@@ -144,16 +137,6 @@ def correlated(values: Array, weights: Array) -> Array:
     # The circular wrap-around affects only the part that is cut off.
     product = np.fft.rfft(values, length) * np.conj(np.fft.rfft(weights, length))
     return np.fft.irfft(product, length)[: len(values) - len(weights) + 1]
-
-
-def _count_pairs(whole: NDArray[np.bool_], lags: int) -> Array:
-    """Return the number of pairs of windows without a gap, by lag in blocks."""
-    length = 1 << (2 * len(whole) - 1).bit_length()
-    power = np.abs(np.fft.rfft(whole.astype(np.float64), length)) ** 2
-    number = np.zeros(lags)
-    counted = min(lags, len(whole))
-    number[:counted] = np.rint(np.fft.irfft(power, length)[:counted])
-    return number
 
 
 def block_means(
@@ -182,43 +165,33 @@ def block_means(
     dict of float to list of ndarray
         By length, for each segment: rad/s or m/s^2, less a constant of the log.
     """
-    edges = {
-        length: [_find_edges(start, stop, length * rate) for start, stop in segments]
-        for length in lengths
-    }
+    edges: dict[float, list[NDArray[np.int64]]] = {}
+    for length in lengths:
+        samples = length * rate
+        edges[length] = []
+        for start, stop in segments:
+            blocks = math.floor((stop - start) / samples + 1e-9)
+            edges[length].append(start + np.rint(np.arange(blocks + 1) * samples).astype(np.int64))
     if not edges:
         return {}
-    every = np.concatenate([of_segment for each in edges.values() for of_segment in each])
-    sums = _sum_parts(parts, np.unique(every))
-    return {
-        length: [sums.means(of_segment) for of_segment in each] for length, each in edges.items()
-    }
+    every = np.unique(np.concatenate([one for each in edges.values() for one in each]))
+    sums, present = _sum_parts(parts, every)
 
-
-def _find_edges(start: int, stop: int, samples: float) -> NDArray[np.int64]:
-    """Return the first sample of each block of a segment, and the one after the last block."""
-    blocks = math.floor((stop - start) / samples + 1e-9)
-    return start + np.rint(np.arange(blocks + 1) * samples).astype(np.int64)
-
-
-@dataclass(frozen=True)
-class _Sums:
-    """Cumulative sums and numbers of the samples before each edge."""
-
-    edges: NDArray[np.int64]
-    sums: Array
-    present: NDArray[np.int64]
-
-    def means(self, edges: NDArray[np.int64]) -> Array:
-        places = np.searchsorted(self.edges, edges)
-        present, size = np.diff(self.present[places]), np.diff(edges)
+    def compute_means(of_segment: NDArray[np.int64]) -> Array:
+        places = np.searchsorted(every, of_segment)
+        counts, size = np.diff(present[places]), np.diff(of_segment)
         means = np.full(len(size), np.nan)
-        enough = (present >= MIN_PRESENT_SHARE * size) & (present > 0)
-        np.divide(np.diff(self.sums[places]), present, out=means, where=enough)
+        enough = (counts >= MIN_PRESENT_SHARE * size) & (counts > 0)
+        np.divide(np.diff(sums[places]), counts, out=means, where=enough)
         return means
 
+    return {length: list(map(compute_means, each)) for length, each in edges.items()}
 
-def _sum_parts(parts: Iterable[NDArray[np.floating[Any]]], edges: NDArray[np.int64]) -> _Sums:
+
+def _sum_parts(
+    parts: Iterable[NDArray[np.floating[Any]]], edges: NDArray[np.int64]
+) -> tuple[Array, NDArray[np.int64]]:
+    """Return the sum, and the number, of the samples before each edge."""
     sums, present = np.zeros(len(edges)), np.zeros(len(edges), dtype=np.int64)
     reached, total, count = 0, 0.0, 0
     level: float | None = None
@@ -241,4 +214,4 @@ def _sum_parts(parts: Iterable[NDArray[np.floating[Any]]], edges: NDArray[np.int
             present[first:last] = count + places + 1
             count += len(part)
         reached, total = reached + len(part), total + float(running[-1])
-    return _Sums(edges, sums, present)
+    return sums, present

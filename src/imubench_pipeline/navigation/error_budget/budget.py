@@ -4,20 +4,12 @@ All budgets here assume:
 
 - one horizontal axis: the accelerometer along it and the gyro across it, whose tilt projects
   gravity into that accelerometer. If both axes are alike, the error in the plane is sqrt(2) times
-  the error of one axis. Velocity and position errors need no motion. Errors from scale factors,
-  temperature and vibration are included if a use is stated (`in_use`). Misalignment, and the
-  position error from heading times distance, are neglected;
-- small angles: up to about 0.2 rad;
-- a flat Earth that does not turn, g = 9.80665 m/s^2: no Schuler feedback (a period of 84.4 min),
-  whose absence overstates errors. After 60 s, the excess is 0.3 % at most. After 600 s it is 10 %
-  of the attitude, 5 to 6 % of the velocity and 3 % of the position from a gyro; 10 % of the
-  velocity and 5 to 6 % of the position from an accelerometer or an initial tilt (the first from a
-  bias, the second from white noise); and 36 % of an initial tilt itself. The Earth's rate is
-  removed with the bias of a calibrated gyro, and is a part of the bias of any other;
-- independent sensors with independent noise terms;
-- deterministic terms of random sign: only the size of a ramp matters.
-
-`time_until` returns the time for which dead reckoning remains within a limit.
+  the error of one axis. Misalignment, and the position error from heading times distance, are
+  neglected; errors in use are included if a use is stated (`in_use`);
+- small angles, up to about 0.2 rad;
+- a flat Earth that does not turn, g = 9.80665 m/s^2: no Schuler feedback, whose absence overstates
+  errors by 0.3 % at most after 60 s, and by 3 to 10 % after 600 s (36 % of an initial tilt);
+- independent sensors with independent noise terms, and deterministic terms of random sign.
 """
 
 from __future__ import annotations
@@ -70,17 +62,16 @@ class Levelled:
     """The initial tilt is found by the accelerometers: it is their mean error over g.
 
     The mean is over the static window of the accelerometers, which must be calibrated. This tilt
-    has no effect on velocity and position, since it cancels the mean error that caused it. Only the
-    later departure from that mean has an effect, as for a calibrated accelerometer.
+    cancels the mean error that caused it, so only the later departure from that mean has an effect
+    on velocity and position.
 
     Parameters
     ----------
     bias : float, optional
-        Turn-on bias of the accelerometer, 1 sigma, m/s^2. None: it is taken from the figures of
-        the sensor; if it is not known, it is left out of the attitude, and the budget has a note.
+        Turn-on bias of the accelerometer, 1 sigma, m/s^2. None: from the figures of the sensor,
+        else left out of the attitude with a note.
     on_time : float
-        Time from switch-on to the beginning of the window, s; walks, ramps and flicker noise
-        count from switch-on.
+        Time from switch-on to the beginning of the window, s.
 
     Raises
     ------
@@ -131,13 +122,7 @@ class Start:
     def calibrated(
         cls, window: float, *, tilt: Levelled | float | None = None, heading: float = 0.0
     ) -> Start:
-        """Return a start with both biases from one static window, s; levelled if no tilt is given.
-
-        Raises
-        ------
-        ValueError
-            If the window is not above 0, or an angle is negative.
-        """
+        """Return a start with both biases from one static window, s; levelled by default."""
         sensor = Calibrated(window)
         levelled = Levelled() if tilt is None else tilt
         return cls(gyro=sensor, accel=sensor, tilt=levelled, heading=heading)
@@ -155,11 +140,6 @@ class Start:
         """Return a start with turn-on biases of a given sigma, rad/s and m/s^2, and no window.
 
         None: a bias is taken from the figures of the sensor.
-
-        Raises
-        ------
-        ValueError
-            If a value is negative.
         """
         return cls(
             gyro=Uncalibrated(bias=gyro_bias, on_time=on_time),
@@ -182,14 +162,12 @@ def budget(
 ) -> Budget:
     """Return the error after a time of dead reckoning, by source.
 
-    The noise of the gyro is integrated once to the attitude and the heading, twice and three
-    times with g to velocity and position; that of the accelerometer once and twice; an initial
-    tilt adds g t and g t^2 / 2 times itself (for the formulas see `Term.growth` of each term).
-    White noise alone gives, after t, N sqrt(t), g N sqrt(t^3/3) and g N sqrt(t^5/20) from the gyro,
-    and N sqrt(t) and N sqrt(t^3/3) from the accelerometer.
-
-    White noise in the window is independent of the noise in motion and has a separate contribution.
-    For every other term, window and motion are correlated and have one contribution.
+    The noise of the gyro is integrated once to the attitude and the heading, twice and three times
+    with g to velocity and position; that of the accelerometer once and twice; an initial tilt adds
+    g t and g t^2 / 2 times itself (see `Term.growth`). White noise alone gives, after t, N sqrt(t),
+    g N sqrt(t^3/3) and g N sqrt(t^5/20) from the gyro, N sqrt(t) and N sqrt(t^3/3) from the
+    accelerometer. White noise in the window is independent of the noise in motion and has a
+    separate contribution; every other term has one, since window and motion are correlated.
 
     Parameters
     ----------
@@ -214,15 +192,35 @@ def budget(
     References
     ----------
     P. D. Groves, "Principles of GNSS, Inertial, and Multisensor Integrated Navigation Systems",
-    2nd ed., Artech House 2013 (error growth without Schuler feedback in
-    the short term); D. H. Titterton and J. L. Weston, "Strapdown Inertial Navigation Technology",
-    2nd ed., IEE 2004.
+    2nd ed., Artech House 2013; D. H. Titterton and J. L. Weston, "Strapdown Inertial Navigation
+    Technology", 2nd ed., IEE 2004.
     """
     if quantity not in get_args(Quantity):
         raise ValueError(f"quantity is {quantity!r}, expected one of {get_args(Quantity)}")
     if not (math.isfinite(time) and time > 0):
         raise ValueError(f"time is {time}, expected a time above 0")
-    contributions = _list_sources(quantity, time, gyro, accel, start)
+    order = GYRO_ORDER[quantity]
+    gravity = STANDARD_GRAVITY if order > 0 else 1.0
+    contributions = list(of_sensor("gyro", gyro, order, time, start.gyro, gravity))
+    if quantity in ACCEL_ORDER:
+        contributions.extend(of_sensor("accel", accel, ACCEL_ORDER[quantity], time, start.accel))
+    if quantity == "heading":
+        contributions.append(Contribution("initial heading", start.heading, "start", STATED_FIGURE))
+    elif isinstance(start.tilt, Levelled):
+        if quantity == "attitude" and isinstance(start.accel, Calibrated):
+            for term in accel.terms:
+                variance = term.mean_variance(start.accel.window, start.tilt.on_time)
+                sigma = math.sqrt(variance) / STANDARD_GRAVITY
+                contributions.append(Contribution(f"initial tilt by accel {term.source}", sigma))
+            if start.tilt.bias is not None:
+                sigma, source = (
+                    start.tilt.bias / STANDARD_GRAVITY,
+                    "initial tilt by accel turn-on bias",
+                )
+                contributions.append(Contribution(source, sigma, "turn_on_bias", STATED_FIGURE))
+    else:
+        tilt = start.tilt * gravity * of_constant(order - 1, time)
+        contributions.append(Contribution("initial tilt", tilt, "start", STATED_FIGURE))
     missing: list[Missing] = []
     assumptions: list[str] = []
     for measured, cause, source, lever in _list_levers(quantity, time, start, use):
@@ -235,27 +233,6 @@ def budget(
             if cause == "turn_on_bias":
                 assumptions.append(f"turn-on bias of the {SENSORS[measured]}: not known, left out")
     return Budget(time, quantity, contributions, assumptions, missing)
-
-
-def _list_sources(
-    quantity: Quantity, time: float, gyro: NoiseModel, accel: NoiseModel, start: Start
-) -> list[Contribution]:
-    order = GYRO_ORDER[quantity]
-    gravity = STANDARD_GRAVITY if order > 0 else 1.0
-    contributions = list(of_sensor("gyro", gyro, order, time, start.gyro, gravity))
-    if quantity in ACCEL_ORDER:
-        contributions.extend(of_sensor("accel", accel, ACCEL_ORDER[quantity], time, start.accel))
-    if quantity == "heading":
-        contributions.append(Contribution("initial heading", start.heading, "start", STATED_FIGURE))
-    elif isinstance(start.tilt, Levelled):
-        if quantity == "attitude" and isinstance(start.accel, Calibrated):
-            contributions.extend(_list_levelling_errors(accel, start.accel.window, start.tilt))
-    else:
-        lever = gravity * of_constant(order - 1, time)
-        contributions.append(
-            Contribution("initial tilt", start.tilt * lever, "start", STATED_FIGURE)
-        )
-    return contributions
 
 
 def _list_levers(
@@ -292,18 +269,6 @@ def of_sensor(
         yield Contribution(f"{sensor} turn-on bias", grown, "turn_on_bias", STATED_FIGURE)
 
 
-def _list_levelling_errors(
-    accel: NoiseModel, window: float, levelled: Levelled
-) -> Iterator[Contribution]:
-    for term in accel.terms:
-        sigma = math.sqrt(term.mean_variance(window, levelled.on_time)) / STANDARD_GRAVITY
-        yield Contribution(f"initial tilt by accel {term.source}", sigma)
-    if levelled.bias is not None:
-        sigma = levelled.bias / STANDARD_GRAVITY
-        source = "initial tilt by accel turn-on bias"
-        yield Contribution(source, sigma, "turn_on_bias", STATED_FIGURE)
-
-
 def time_until(
     limit: float,
     quantity: Quantity,
@@ -318,9 +283,8 @@ def time_until(
     """Return the time after which an error reaches a limit.
 
     The total of a `budget` increases with time, because the errors at two times never have a
-    negative correlation: the covariance of every random term decreases with the lag. With lines,
-    the error may oscillate; the first crossing is then found among 4096 times up to one at which
-    the limit is certainly exceeded.
+    negative correlation. With lines it may oscillate: the first crossing is then found among 4096
+    times.
 
     Parameters
     ----------

@@ -1,9 +1,8 @@
 """Heading error of gyrocompassing: north from the Earth's rate, at rest.
 
-The horizontal part of the Earth's rate, w_ie cos(latitude), points north. A horizontal gyro
-across it, towards east, should read 0. An error dw of its mean gives a heading error of
-dw / (w_ie cos(latitude)). Neglected are the levelling error (a tilt about north projects the
-vertical rate into the gyro: a heading error of tan(latitude) times the tilt) and large angles.
+An error dw of the mean of a horizontal gyro across north gives a heading error of
+dw / (w_ie cos(latitude)). Neglected are the levelling error (tan(latitude) times the tilt about
+north) and large angles.
 """
 
 from __future__ import annotations
@@ -26,7 +25,7 @@ from imubench_pipeline.navigation.error_budget.in_use import (
     check_not_negative,
 )
 from imubench_pipeline.navigation.error_budget.parts import Budget, Contribution, Missing, of_figure
-from imubench_pipeline.noise import NoiseModel, Sinusoid, Term
+from imubench_pipeline.noise import NoiseModel, Sinusoid
 
 _BIAS_LEFT_OUT_NOTE = "turn-on bias of the gyro: left out; the heading is no better than this"
 
@@ -42,24 +41,21 @@ class Gyrocompass:
     gyro : NoiseModel
         The horizontal gyro.
     latitude : float
-        rad.
+        rad, between the poles.
     bias : float, optional
-        Turn-on bias of the gyro, 1 sigma, rad/s: at one position it cannot be separated from the
-        Earth's rate. None: it is taken from ``figures``; if it is not known, it is left out, and
-        the budget has a note.
+        Turn-on bias of the gyro, 1 sigma, rad/s; None: from ``figures``, else left out with a note.
     on_time : float
-        Time from switch-on to the beginning, s; a walk, a ramp and flicker noise count from
-        switch-on (see `growth.Uncalibrated`). At two positions it does not matter.
+        Time from switch-on to the beginning, s (see `growth.Uncalibrated`).
     positions : {1, 2}
-        2: the gyro is turned by 180 degrees after half the time, instantaneously, and half the
-        difference of the two means is used, which removes the turn-on bias.
+        2: the gyro is turned by 180 degrees after half the time, and half the difference of the two
+        means is used, which removes the turn-on bias.
     figures : mapping of str to Figure
         Figures of the gyro other than its noise.
 
     Raises
     ------
     ValueError
-        If the latitude is not between the poles, a value is negative, or positions is not 1 or 2.
+        If a value is out of its range.
     """
 
     gyro: NoiseModel
@@ -80,17 +76,8 @@ class Gyrocompass:
         """Return the heading error after a static window, s, by source, rad.
 
         At one position the error of the mean has, by term, the variance `Term.mean_variance`; at
-        two positions sigma^2(t/2) / 2, with sigma^2 the Allan variance.
-
-        Raises
-        ------
-        ValueError
-            If the time is not above 0.
-
-        References
-        ----------
-        K. R. Britting, "Inertial Navigation Systems Analysis", Wiley 1971 (the limit of
-        gyrocompassing, drift over w_ie cos(latitude)).
+        two positions sigma^2(t/2) / 2, with sigma^2 the Allan variance (Britting, "Inertial
+        Navigation Systems Analysis", Wiley 1971). Raises a ValueError if the time is not above 0.
         """
         if not (math.isfinite(time) and time > 0):
             raise ValueError(f"time is {time}, expected a time above 0")
@@ -110,15 +97,9 @@ class Gyrocompass:
     def time_needed(self, accuracy: float) -> float | None:
         """Return the shortest static window, s, that gives a heading accuracy, 1 sigma, rad.
 
-        Longer is not always better, since a walk and a ramp grow. For lines, the envelope of their
-        mean is used, so that the result does not depend on whole periods. The window is from 1 ms
-        to 30 years; None if no window is sufficient, because of turn-on bias, flicker noise, walk
-        or ramp.
-
-        Raises
-        ------
-        ValueError
-            If the accuracy is not above 0.
+        The window is from 1 ms to 30 years; None if none is sufficient, because of turn-on bias,
+        flicker noise, walk or ramp. For lines, the envelope of their mean is used. Raises a
+        ValueError if the accuracy is not above 0.
         """
         if not (math.isfinite(accuracy) and accuracy > 0):
             raise ValueError(f"accuracy is {accuracy}, expected an angle above 0")
@@ -174,20 +155,14 @@ class Gyrocompass:
 
     def _list_noise_errors(self, time: float, *, swings: bool) -> Iterator[Contribution]:
         for term in self.gyro.terms:
-            # Only a line oscillates: its mean is 0 after each whole period.
             if isinstance(term, Sinusoid) and not swings:
-                sigma = self._compute_envelope(term, time)
+                # The mean of a line is 0 after each whole period: use its envelope, of
+                # |sin(x) / x| at one position, of sin^2(x/2) / (x/2) at two.
+                x = math.pi * term.frequency * time / self.positions
+                most = min(1.0, 1.0 / x) if self.positions == 1 else min(x, 1.0 / x)
+                sigma = term.amplitude * most / math.sqrt(2.0)
+            elif self.positions == 1:
+                sigma = math.sqrt(term.mean_variance(time, self.on_time))
             else:
-                sigma = math.sqrt(self._compute_variance(term, time))
+                sigma = math.sqrt(float(term.allan_variance(np.array([time / 2.0]))[0]) / 2.0)
             yield Contribution(f"gyro {term.source}", sigma / self._north_rate)
-
-    def _compute_variance(self, term: Term, time: float) -> float:
-        if self.positions == 1:
-            return term.mean_variance(time, self.on_time)
-        return float(term.allan_variance(np.array([time / 2.0]))[0]) / 2.0
-
-    def _compute_envelope(self, line: Sinusoid, time: float) -> float:
-        # |sin(x) / x| at one position, sin^2(x/2) / (x/2) at two.
-        x = math.pi * line.frequency * time / self.positions
-        most = min(1.0, 1.0 / x) if self.positions == 1 else min(x, 1.0 / x)
-        return line.amplitude * most / math.sqrt(2.0)

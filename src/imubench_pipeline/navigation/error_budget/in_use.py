@@ -2,20 +2,15 @@
 
 Each error is a figure of the sensor, a standard deviation, times a factor that depends on the use:
 
-- ``turn_on_bias``, ``repeatability``: a bias that is not removed by a static window. Levelling at
-  rest turns an accelerometer bias into a tilt, bias / g. Gyrocompassing turns a gyro bias into an
-  error of north;
+- ``turn_on_bias``, ``repeatability``: a bias that no static window removes. Levelling turns an
+  accelerometer bias into a tilt, bias / g;
 - ``temperature``: coefficient times change. With a static window, the temperature changes linearly
-  from the window to the end. Without one, the bias was determined elsewhere, and the whole change
-  acts from the beginning. ``temperature_squared``: the same for a measured curvature;
-- ``scale_factor``, ``nonlinearity``: for a gyro, times the angle turned about its axis, in attitude
-  and heading. The effect of such a tilt on velocity and position is neglected, since vehicles
-  mostly turn about the vertical. For an accelerometer, times the change of speed along its axis, in
-  velocity and position. Both act evenly over the time. A nonlinearity is applied to the motion, not
-  to the full scale that it is printed for: rates are far below it;
-- ``g_sensitivity``: for a gyro, times the vibration, as if it were a constant acceleration.
-  Vibration about zero averages out, so this is a bound. ``vibration_rectification``: times the
-  square of the rms of the vibration.
+  from the window to the end; without one, the whole change acts from the beginning.
+  ``temperature_squared``: the same for a measured curvature;
+- ``scale_factor``, ``nonlinearity``: for a gyro, times the angle turned, in attitude and heading;
+  for an accelerometer, times the change of speed, in velocity and position. Both act evenly;
+- ``g_sensitivity``: for a gyro, times the vibration, as if it were constant: a bound.
+  ``vibration_rectification``: times the square of the rms of the vibration.
 
 Causes are independent of each other and of the noise; a figure has no sign.
 """
@@ -121,17 +116,10 @@ class Use:
 
     Parameters
     ----------
-    temperature_change : float
-        K.
-    turns : float
-        About the axis of the gyro, rad.
-    speed_change : float
-        Along the axis of the accelerometer, m/s.
-    vibration : float
-        rms, m/s^2.
+    temperature_change, turns, speed_change, vibration : float
+        K; rad about the axis of the gyro; m/s along the axis of the accelerometer; rms, m/s^2.
     over : float
-        Time during which temperature, heading and speed change, s. They change evenly, and not
-        afterwards.
+        Time during which temperature, heading and speed change evenly, s.
 
     Raises
     ------
@@ -186,9 +174,8 @@ def levers(
 ) -> Iterator[tuple[Cause, float]]:
     """Yield each cause that occurs in a use, and its lever: the error from a figure of 1.
 
-    ``order`` is m, 0 to 2, and the time is in s. ``seen``: the sensor measures the quantity of the
-    error or its rate, so that its scale factor matters. A lever is in s^(m+1) times the unit of the
-    use.
+    ``order`` is m, 0 to 2, the time in s. ``seen``: the sensor measures the quantity of the error
+    or its rate, so that its scale factor matters. A lever is in s^(m+1) times the unit of the use.
     """
     constant = of_constant(order, time)
     calibrated = isinstance(start, Calibrated)

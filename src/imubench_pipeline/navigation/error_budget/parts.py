@@ -11,12 +11,7 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 from imubench_pipeline.model.comparisons import ErrorBudgetRow
-from imubench_pipeline.navigation.error_budget.in_use import (
-    Cause,
-    Figure,
-    Figures,
-    needed,
-)
+from imubench_pipeline.navigation.error_budget.in_use import Cause, Figure, Figures, needed
 from imubench_pipeline.navigation.error_budget.printed_errors import DATASHEET_KEY_OF_CAUSE
 from imubench_pipeline.settings.printed import FIGURE_DIMENSIONS, Measured
 from imubench_pipeline.units import SI_UNITS
@@ -26,73 +21,34 @@ Quantity = Literal["attitude", "heading", "velocity", "position"]
 
 @dataclass(frozen=True)
 class Contribution:
-    """Contribution of one source to an error.
+    """Contribution of one source to an error."""
 
-    Attributes
-    ----------
-    source : str
-        Such as ``gyro N``, ``accel GM 89.5 s``, ``gyro turn-on bias``.
-    sigma : float
-        1 sigma, rad, m/s or m.
-    cause : str
-        ``noise``, ``start`` (a stated angle), or of `in_use`.
-    figure : Figure or None
-        Figure that it follows from, if it is not noise.
-    """
-
-    source: str
-    sigma: float
-    cause: Cause | Literal["noise", "start"] = "noise"
-    figure: Figure | None = None
+    source: str  # such as ``gyro N``, ``accel GM 89.5 s``, ``gyro turn-on bias``
+    sigma: float  # 1 sigma, rad, m/s or m
+    cause: Cause | Literal["noise", "start"] = "noise"  # ``start``: a stated angle
+    figure: Figure | None = None  # the figure that it follows from, if it is not noise
 
 
 @dataclass(frozen=True)
 class Missing:
-    """A source whose figure is not known.
+    """A source whose figure is not known."""
 
-    Attributes
-    ----------
-    source : str
-        As in `Contribution`.
-    quantity : str
-        ``gyro`` or ``accel``.
-    cause : str
-    lever : float
-        Error from a figure of 1 SI unit.
-    reason : str
-        Why it is not known.
-    """
-
-    source: str
+    source: str  # as in `Contribution`
     quantity: Measured
     cause: Cause
-    lever: float
-    reason: str
+    lever: float  # error from a figure of 1 SI unit
+    reason: str  # why it is not known
 
 
 @dataclass(frozen=True)
 class Budget:
-    """An error and its contributions.
+    """An error and its contributions, which are independent of each other."""
 
-    Attributes
-    ----------
-    time : float
-        s.
-    quantity : str
-        ``attitude`` (a tilt) and ``heading`` in rad, ``velocity`` in m/s, ``position`` in m.
-    contributions : sequence of Contribution
-        Independent of each other.
-    assumptions : sequence of str
-        Assumptions for figures that are not known.
-    missing : sequence of Missing
-        Sources that are left out because no figure is known.
-    """
-
-    time: float
-    quantity: Quantity
+    time: float  # s
+    quantity: Quantity  # attitude (a tilt) and heading in rad, velocity in m/s, position in m
     contributions: Sequence[Contribution]
-    assumptions: Sequence[str] = ()
-    missing: Sequence[Missing] = ()
+    assumptions: Sequence[str] = ()  # for figures that are not known
+    missing: Sequence[Missing] = ()  # sources that are left out because no figure is known
 
     @property
     def total(self) -> float:
@@ -105,8 +61,8 @@ def of_figure(
 ) -> Contribution | Missing | None:
     """Return the contribution of a figure of a sensor to an error, or that it is missing.
 
-    ``lever`` is the error from a figure of 1 SI unit. None if the figure is not required, or
-    another one replaces it.
+    ``lever`` is the error from a figure of 1 SI unit. None if no figure is required, or another is
+    used.
     """
     figure = figures.get(cause, Figure(reason="the sensor file does not give it"))
     if figure.sigma is not None:
@@ -116,26 +72,12 @@ def of_figure(
     return None
 
 
-def source_row(of: ErrorBudgetRow, contribution: Contribution) -> ErrorBudgetRow:
-    """Return the row of a source, as a copy of the row of its error."""
-    figure = contribution.figure
-    return replace(
-        of,
-        source=contribution.source,
-        sigma=contribution.sigma,
-        cause=contribution.cause,
-        origin=figure.origin if figure else "measured",
-        kind=figure.kind if figure else None,
-        convention=figure.convention if figure else None,
-    )
-
-
 @dataclass(frozen=True)
 class Largest:
     """Remaining error budget under a limit, for unknown figures and biases above the limit.
 
-    A printed turn-on bias is used as printed. If it exceeds the limit, a calibration may reduce it
-    to its share of the remaining budget. All these figures share the budget (``room``) equally.
+    A printed turn-on bias is used as printed, unless it exceeds the limit: a calibration may then
+    reduce it to its share of the remaining budget (``room``), which all share equally.
     """
 
     room: float  # largest error of each of them, 1 sigma; 0 if there is none
@@ -143,11 +85,7 @@ class Largest:
 
     @classmethod
     def of(cls, budget: Budget, limit: float | None, upper: float) -> Largest:
-        """Return the remaining error budget.
-
-        ``limit`` is in SI; None if there is no limit. ``upper`` is the upper limit of the total: a
-        sensor that surely passes still does so with these figures.
-        """
+        """Return the remaining error budget under a limit, SI; ``upper`` is that of the total."""
         if limit is None:
             return cls(0.0)
         biases = tuple(
@@ -168,11 +106,17 @@ class Largest:
         return cls(math.sqrt(max(room, 0.0) / parts) if parts else 0.0, biases)
 
     def of_bias(self, of: ErrorBudgetRow, contribution: Contribution) -> ErrorBudgetRow:
-        """Return the row of a source; a printed bias above the limit has its largest value.
-
-        ``of`` is the row of the error.
-        """
-        row, figure = source_row(of, contribution), contribution.figure
+        """Return the row of a source; a printed bias above the limit has its largest value."""
+        figure = contribution.figure
+        row = replace(
+            of,
+            source=contribution.source,
+            sigma=contribution.sigma,
+            cause=contribution.cause,
+            origin=figure.origin if figure else "measured",
+            kind=figure.kind if figure else None,
+            convention=figure.convention if figure else None,
+        )
         if not self.room or contribution not in self.biases or figure is None or not figure.sigma:
             return row
         quantity = "accel" if "accel" in contribution.source.split() else "gyro"
@@ -181,7 +125,7 @@ class Largest:
         )
 
     def of_missing(self, of: ErrorBudgetRow, missing: Missing) -> ErrorBudgetRow:
-        """Return the row of a source with a missing figure. ``of`` is the row of the error."""
+        """Return the row of a source with a missing figure; ``of`` is the row of the error."""
         row = replace(
             of,
             source=missing.source,

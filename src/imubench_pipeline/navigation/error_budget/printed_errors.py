@@ -1,17 +1,8 @@
 """Standard deviations from the figures of a datasheet, and from the thermal fit of a log.
 
-A printed figure is not a standard deviation unless the document says so. The conventions are:
-
-- ``1sigma``: as printed;
-- ``typ`` and ``derived``: a typical ± is taken as 1 sigma;
-- ``range``: a uniform distribution, sigma is the larger end over sqrt(3);
-- ``max``: taken as 3 sigma. In data sheets of the catalogue with both, max is 3 and 3.3 times the
-  typical offset (BNO055 and BMI160 gyros), 1.9 times (BNO055 accelerometer), and 2 and 3.5 times
-  the typical temperature coefficient (BNO055).
-
-With several figures, the first kind of this list is used, and the largest figure of that kind.
-Figures for options that the logged sensors do not have are not used. A temperature coefficient from
-a log is used instead of the printed one, since it belongs to this specimen.
+A typical ± figure is taken as 1 sigma; a range as a uniform distribution, sqrt(3) sigma at its
+larger end; a maximum as 3 sigma. (In data sheets of the catalogue with both, the maximum is 1.9 to
+3.5 times the typical figure.) A temperature coefficient from a log replaces the printed one.
 """
 
 from __future__ import annotations
@@ -44,8 +35,7 @@ _SIGMA_CONVENTIONS: Mapping[str, tuple[float, str]] = {
 }
 """By kind, in order of preference: number of sigmas of a figure, and description."""
 
-SIGMAS = 1.96
-"""Half the width of a 95 % interval."""
+SIGMAS = 1.96  # half the width of a 95 % interval
 
 _CAUSE_OF_COEFFICIENT: Mapping[str, Cause] = {
     "sensitivity": "temperature",
@@ -54,39 +44,36 @@ _CAUSE_OF_COEFFICIENT: Mapping[str, Cause] = {
 
 
 def of_datasheet(datasheet: Datasheet, channel: str) -> dict[Cause, Figure]:
-    """Return the datasheet figures of the errors in use of a channel, SI.
-
-    There is one for every cause that a datasheet may print; without sigma if it does not print it.
-    """
+    """Return the datasheet figures of the errors in use of a channel, SI."""
     axis = PrintedAxis.of(datasheet, channel)
     names = FIGURE_DIMENSIONS[axis.quantity]
-    return {
-        cause: _read_figure(axis, name)
-        for cause, name in DATASHEET_KEY_OF_CAUSE.items()
-        if name in names
-    }
-
-
-def _read_figure(axis: PrintedAxis, name: str) -> Figure:
-    like = Comparable(name, name, None)
-    rows = axis.read(name, like, axis.si(name))
-    for kind, (sigmas, convention) in _SIGMA_CONVENTIONS.items():
-        values = [row.value for row in rows if row.figure and row.figure.kind == kind]
-        usable = [value for value in values if value is not None]
-        if usable:
-            return Figure(
-                sigma=max(usable) / sigmas, origin="datasheet", kind=kind, convention=convention
+    figures: dict[Cause, Figure] = {}
+    for cause, name in DATASHEET_KEY_OF_CAUSE.items():
+        if name not in names:
+            continue
+        like = Comparable(name, name, None)
+        rows = axis.read(name, like, axis.si(name))
+        by_kind: dict[str, list[float]] = {}
+        for row in rows:
+            if row.figure and row.value is not None:
+                by_kind.setdefault(row.figure.kind, []).append(row.value)
+        kind = next((kind for kind in _SIGMA_CONVENTIONS if kind in by_kind), None)
+        if kind is None:
+            obstacle = next((row.obstacle for row in rows if row.obstacle), None)
+            figures[cause] = Figure(reason=obstacle or axis.unpublished(like, name).reason)
+        else:
+            sigmas, convention = _SIGMA_CONVENTIONS[kind]
+            figures[cause] = Figure(
+                sigma=max(by_kind[kind]) / sigmas,
+                origin="datasheet",
+                kind=kind,
+                convention=convention,
             )
-    obstacle = next((row.obstacle for row in rows if row.obstacle), None)
-    return Figure(reason=obstacle or axis.unpublished(like, name).reason)
+    return figures
 
 
 def of_log(rows: Iterable[TemperatureRow]) -> dict[Cause, Figure]:
-    """Return the figures of the errors in use that the log of a channel determines, SI.
-
-    ``rows`` are its rows of the table ``temperature``. The causes are ``temperature`` and
-    ``temperature_squared``, if determined.
-    """
+    """Return the figures of the errors in use that the thermal fit of a channel determines, SI."""
     figures: dict[Cause, Figure] = {}
     for row in rows:
         if row.parameter not in _CAUSE_OF_COEFFICIENT or row.status != "ok" or row.value is None:
@@ -106,10 +93,7 @@ def of_log(rows: Iterable[TemperatureRow]) -> dict[Cause, Figure]:
 def in_use(
     datasheet: Datasheet, channels: Iterable[str], temperature: Iterable[TemperatureRow]
 ) -> dict[str, dict[Cause, Figure]]:
-    """Return the figures of the errors in use by channel, for `error_rows`.
-
-    They are from the datasheet of the sensor, and the table ``temperature`` of the recording.
-    """
+    """Return the figures of the errors in use by channel, from datasheet and log."""
     rows = list(temperature)
     return {
         channel: of_datasheet(datasheet, channel)

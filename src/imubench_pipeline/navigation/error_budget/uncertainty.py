@@ -15,24 +15,11 @@ from imubench_pipeline.noise import GaussMarkov, NoiseModel, Sinusoid
 
 
 def interval(budgets: Sequence[Budget], level: float = 0.95) -> tuple[float, float]:
-    """Return the limits of the total over budgets of drawn noise models.
+    """Return the limits of the total over budgets of drawn noise models, rad, m/s or m.
 
-    Parameters
-    ----------
-    budgets : sequence of Budget
-        For one quantity and time, one a draw: from the posterior of a fit, or `draw_models`.
-    level : float
-        Fraction of the totals between the limits.
-
-    Returns
-    -------
-    (float, float)
-        Lower and upper limit, rad, m/s or m.
-
-    Raises
-    ------
-    ValueError
-        If there is no budget, they differ in quantity or time, or the level is not within 0..1.
+    ``budgets`` are for one quantity and time, one a draw; ``level`` is the fraction of the totals
+    between the limits. Raises a ValueError without a budget, for budgets that differ in quantity or
+    time, and for a level that is not within 0..1.
     """
     if len({(budget.quantity, budget.time) for budget in budgets}) != 1:
         raise ValueError("expected budgets of one quantity at one time")
@@ -46,19 +33,9 @@ def interval(budgets: Sequence[Budget], level: float = 0.95) -> tuple[float, flo
 def chance_within(limit: float, budgets: Sequence[Budget]) -> float:
     """Return the probability that a total is within a limit, over budgets of drawn noise models.
 
-    It is the integral of a kernel density estimate in log total, with a normal kernel (Silverman
-    1986), so that it is continuous, and not 0 or 1 beyond the outermost draws.
-
-    Parameters
-    ----------
-    limit : float
-        rad, m/s or m; above 0.
-    budgets : sequence of Budget
-        As `interval` takes them.
-
-    References
-    ----------
-    B. W. Silverman, "Density estimation for statistics and data analysis", 1986, eq. 3.31.
+    It is the integral of a kernel density estimate in log total, with a normal kernel (B. W.
+    Silverman, "Density estimation for statistics and data analysis", 1986, eq. 3.31), so that it is
+    not 0 or 1 beyond the outermost draws. The limit, above 0, is in rad, m/s or m.
     """
     totals = np.log(np.maximum([budget.total for budget in budgets], 1e-300))
     quarter = np.subtract(*np.quantile(totals, [0.75, 0.25])) / 1.349
@@ -72,21 +49,33 @@ def chance_within(limit: float, budgets: Sequence[Budget]) -> float:
 def draw_models(estimate: Estimate, draws: int, rng: np.random.Generator) -> list[NoiseModel]:
     """Return ``draws`` noise models, drawn from the uncertainty of an estimate.
 
-    If the estimate has posterior draws, they are used, with all parameters of a model together.
-    They are thinned evenly if fewer are needed, and repeated if more are needed. Their order is
-    random, so that the draws of two channels are combined at random. Lines, which are independent
-    of the noise parameters, are drawn separately.
+    Posterior draws are used with all parameters of a model together, thinned evenly or repeated, in
+    random order. Lines are independent of the noise parameters, and drawn separately.
 
-    If an estimate has no draws (from the curve, or by least squares), its parameters are drawn from
-    their limits **independently**, which they are not. Intervals of functions of several of them
-    are then 1.0 to 3.5 times too wide. Each parameter is log-normal about its value, with a
-    separate spread on either side, so that the limits are the 2.5 % and 97.5 % quantiles. Towards a
-    lower limit of 0, the draws are linear. An absent parameter with an upper limit is half-normal
-    from 0, with that limit as its 95 % quantile. A ramp, which has a sign, is normal on either
-    side. A parameter without limits is not changed.
+    If an estimate has no draws, its parameters are drawn from their limits **independently**, which
+    they are not: intervals of functions of several of them are 1.0 to 3.5 times too wide. Each is
+    log-normal about its value, with a separate spread on either side (towards a lower limit of 0,
+    linear). An absent parameter with an upper limit is half-normal from 0. A ramp is normal.
     """
     if estimate.draws is None:
-        return [_draw_model(estimate, rng) for _ in range(draws)]
+        models = []
+        for _ in range(draws):
+            first = _draw_values(estimate.parameters, rng)
+            further = [_draw_values(group, rng) for group in estimate.further]
+            processes = [
+                GaussMarkov(process["B"], process["T_B"])
+                for process in further
+                if process["B"] and process["T_B"]
+            ]
+            amplitudes = {name: first.get(name, 0.0) for name in ("Q", "N", "B", "K", "R")}
+            model = NoiseModel(
+                **amplitudes,
+                T_B=first.get("T_B") or None,
+                further=processes,
+                sinusoids=_draw_lines(estimate, rng),
+            )
+            models.append(model)
+        return models
     available, places = len(estimate.draws), np.arange(draws)
     rows = places % available if draws > available else places * available // draws
     return [
@@ -104,45 +93,25 @@ def _draw_lines(estimate: Estimate, rng: np.random.Generator) -> list[Sinusoid]:
     return [Sinusoid(line["amplitude"], line["frequency"]) for line in lines]
 
 
-def _draw_model(estimate: Estimate, rng: np.random.Generator) -> NoiseModel:
-    first = _draw_values(estimate.parameters, rng)
-    further = [_draw_values(group, rng) for group in estimate.further]
-    return NoiseModel(
-        Q=first.get("Q", 0.0),
-        N=first.get("N", 0.0),
-        B=first.get("B", 0.0),
-        T_B=first.get("T_B") or None,
-        K=first.get("K", 0.0),
-        R=first.get("R", 0.0),
-        further=[
-            GaussMarkov(process["B"], process["T_B"])
-            for process in further
-            if process["B"] and process["T_B"]
-        ],
-        sinusoids=_draw_lines(estimate, rng),
-    )
-
-
 def _draw_values(parameters: Mapping[str, Parameter], rng: np.random.Generator) -> dict[str, float]:
     """Return a draw of each parameter; 0 for absent ones."""
-    # Draw one number for each parameter, so that an extra one does not change the others.
-    normal = {name: float(rng.standard_normal()) for name in parameters}
-    return {
-        name: _draw_value(name, parameter, normal[name]) for name, parameter in parameters.items()
-    }
-
-
-def _draw_value(name: str, parameter: Parameter, normal: float) -> float:
-    value = parameter.in_model
-    lower, upper = parameter.lower, parameter.upper
-    if value is None or value == 0.0:
-        return 0.0 if name in ("R", "T_B") or upper is None else abs(normal) * upper / SIGMAS
-    limit = lower if normal < 0 else upper
-    if limit is None:
-        return value
-    share = abs(normal) / SIGMAS
-    if name == "R":
-        return value + (limit - value) * share
-    if limit <= 0.0:
-        return max(value * (1.0 - share), 0.0)
-    return value * math.exp(math.log(limit / value) * share)
+    drawn = {}
+    for name, parameter in parameters.items():
+        # Draw one number for each parameter, so that an extra one does not change the others.
+        normal = float(rng.standard_normal())
+        value, upper = parameter.in_model, parameter.upper
+        limit = parameter.lower if normal < 0 else upper
+        share = abs(normal) / SIGMAS
+        if value is None or value == 0.0:
+            drawn[name] = (
+                0.0 if name in ("R", "T_B") or upper is None else abs(normal) * upper / SIGMAS
+            )
+        elif limit is None:
+            drawn[name] = value
+        elif name == "R":
+            drawn[name] = value + (limit - value) * share
+        elif limit <= 0.0:
+            drawn[name] = max(value * (1.0 - share), 0.0)
+        else:
+            drawn[name] = value * math.exp(math.log(limit / value) * share)
+    return drawn

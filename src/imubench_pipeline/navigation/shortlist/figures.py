@@ -1,24 +1,122 @@
 """Noise models of the best and the worst case that a datasheet allows.
 
-A density of unknown sidedness is N or N times sqrt(2). A printed bias instability is B at best; at
-worst it is the minimum of the curve, so that B is the printed figure over 0.664. All grades and
-ranges of a sensor are included, unless its file selects one. An unpublished figure is taken from
-measured sensors of its class, or, for B without a measured sensor, from the datasheets of its
-class.
+A density of unknown sidedness is N or N sqrt(2). A printed bias instability is B at best, and the
+minimum of the curve, 0.664 B, at worst. All grades are included, unless the sensor file selects
+one. An unpublished figure is from measured sensors of the class, or B from its datasheets.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Literal
 
 from imubench_pipeline.datasheets.comparable import Comparable, comparables
-from imubench_pipeline.navigation.shortlist.classes import MeasuredRanges, Span
+from imubench_pipeline.model.estimates import ParameterRow
+from imubench_pipeline.model.recordings import RecordingRow
 from imubench_pipeline.noise import FLOOR, NoiseModel
+from imubench_pipeline.recordings.fitness import left_out
 from imubench_pipeline.settings.printed import SENSORS, Datasheet, QuantityDatasheet
-from imubench_pipeline.settings.sensor import Sensor
+from imubench_pipeline.settings.sensor import Sensor, quantity_of
+
+_FIGURE_OF_PARAMETER = {"N": "N", "B_curve": "B", "K": "K", "T_B": "T_B"}
+"""Figure for each parameter of the estimates: B is taken from the curve."""
+
+
+@dataclass(frozen=True)
+class Span:
+    """Range of possible values of a figure."""
+
+    # low, high: SI
+    low: float
+    high: float
+    words: str = ""  # source of an assumed range; empty if printed
+
+
+@dataclass(frozen=True)
+class MeasuredRanges:
+    """Ranges of measured parameters, by sensor, quantity and figure."""
+
+    # (sensor, quantity, figure) -> (low, high), SI
+    of_sensor: Mapping[tuple[str, str, str], tuple[float, float]]
+    classes: Mapping[str, str]  # class of each sensor that states one
+    # (sensor, quantity) -> (low, high) of B, SI, from datasheets: used if none is measured
+    printed: Mapping[tuple[str, str], tuple[float, float]] = field(default_factory=dict)
+
+    def span(self, price_class: str | None, quantity: str, figure: str) -> Span | None:
+        """Return the range of a figure (N, B, K or T_B) over the measured sensors of a class.
+
+        If none of the class is measured, the range is over all measured sensors; if none is
+        measured at all, the range of B is from datasheets. None if nothing is known.
+        """
+        by_sensor = {
+            sensor: ends
+            for (sensor, of, name), ends in self.of_sensor.items()
+            if (of, name) == (quantity, figure)
+        }
+        source = "measured sensors"
+        if not by_sensor and figure == "B":
+            by_sensor = {name: ends for (name, of), ends in self.printed.items() if of == quantity}
+            source = "datasheets"
+        if not by_sensor:
+            return None
+        wanted = class_of(price_class)
+        own = {s: ends for s, ends in by_sensor.items() if wanted and self.classes.get(s) == wanted}
+        which = f"of class {wanted}" if own else "of any class, for there is none of its own"
+        used = own or by_sensor
+        named = ", ".join(sorted(used))
+        low, high = min(ends[0] for ends in used.values()), max(ends[1] for ends in used.values())
+        return Span(low, high, f"that of {source} {which} ({named})")
+
+
+def class_of(price_class: str | None) -> str:
+    """Return the name in a price class, such as ``consumer`` in ``consumer, about US$8``."""
+    return re.split(r"[,(]", price_class or "")[0].strip().lower()
+
+
+def measured_ranges(
+    parameters: Iterable[ParameterRow],
+    recordings: Iterable[RecordingRow],
+    price_classes: Mapping[str, str | None],
+) -> MeasuredRanges:
+    """Return the measured ranges of a run, from real sensors and recordings that decide.
+
+    They are the 95 % limits of parameters with a value. A random walk that is not significant in a
+    log may be 0; its upper limit is used only if no log of the sensor determines one.
+    """
+    about = list(recordings)
+    apart = left_out(about)
+    real = {
+        place
+        for row in about
+        if not row.simulated and (place := (row.sensor, row.recording)) not in apart
+    }
+    shown: dict[tuple[str, str, str], list[tuple[float, float]]] = {}
+    absent: dict[tuple[str, str, str], list[float]] = {}
+    for one in parameters:
+        figure = _FIGURE_OF_PARAMETER.get(one.parameter)
+        if figure is None or not one.recommended or one.component != 1:
+            continue
+        if (one.sensor, one.recording) not in real:
+            continue
+        key = (one.sensor, quantity_of(one.channel), figure)
+        if one.status == "ok" and one.value is not None:
+            low, high = (one.value if end is None else end for end in (one.lower, one.upper))
+            shown.setdefault(key, []).append((low, high))
+        elif one.status == "absent" and figure == "K":
+            absent.setdefault(key, []).append(one.upper or 0.0)
+    ranges = {}
+    for key in {*shown, *absent}:
+        several = shown.get(key, [(0.0, max(absent.get(key, [0.0])))])
+        low = 0.0 if key in absent else min(ends[0] for ends in several)
+        high = max(ends[1] for ends in several)
+        if math.isfinite(high):
+            ranges[key] = (low, high)
+    classes = {sensor: class_of(text) for sensor, text in price_classes.items() if text}
+    return MeasuredRanges(ranges, classes)
+
 
 End = Literal["best", "worst"]
 
@@ -42,13 +140,7 @@ class Figures:
         return self.B is not None and self.K is not None
 
     def models(self, end: End) -> list[NoiseModel]:
-        """Return the models of one case, one for each correlation time.
-
-        Raises
-        ------
-        ValueError
-            If the worst case is not known.
-        """
+        """Return the models of one case, one for each correlation time; the case must be known."""
         if end == "worst" and not self.bounded:
             raise ValueError("the worst is not known: a figure is measured of no sensor")
         N, B, K = (
@@ -72,7 +164,12 @@ def figures_of(sensor: Sensor, quantity: str, ranges: MeasuredRanges) -> Figures
     def filled(figure: str, statistic: str) -> Span | None:
         own = [row for row in printed if row.statistic == statistic]
         if own:
-            assumed.extend(f"{of} {figure}: {words}" for words in _describe_readings(own))
+            if any("assumed" in (row.reason or "") for row in own):
+                assumed.append(f"{of} {figure}: the side of the density is not stated: both")
+            if all(row.figure is not None and row.figure.kind == "max" for row in own):
+                assumed.append(
+                    f"{of} {figure}: a maximum alone is printed, the typical one may be better"
+                )
             return _find_ends(own)
         span = ranges.span(sensor.price_class, quantity, figure)
         if span is None:
@@ -104,10 +201,7 @@ def figures_of(sensor: Sensor, quantity: str, ranges: MeasuredRanges) -> Figures
 
 
 def printed_ranges(sensors: Mapping[str, Sensor]) -> dict[tuple[str, str], tuple[float, float]]:
-    """Return the range of B, SI, that each datasheet of a catalogue allows, if printed.
-
-    The keys are (sensor, quantity), the values (low, high).
-    """
+    """Return the range of B, SI, by (sensor, quantity), that each datasheet prints."""
     ranges = {}
     for name, sensor in sensors.items():
         for quantity in SENSORS:
@@ -127,25 +221,8 @@ def _find_ends(rows: Sequence[Comparable]) -> Span:
     return Span(min([*values, *least]), max(values))
 
 
-def _describe_readings(rows: Sequence[Comparable]) -> list[str]:
-    """Return the ambiguities of a printed figure, in words."""
-    readings = []
-    if any("assumed" in (row.reason or "") for row in rows):
-        readings.append("the side of the density is not stated: both")
-    if all(row.figure is not None and row.figure.kind == "max" for row in rows):
-        readings.append("a maximum alone is printed, the typical one may be better")
-    return readings
-
-
 def _read_printed(datasheet: Datasheet, quantity: str) -> tuple[list[Comparable], list[str]]:
     """Return the printed figures of all axes of a quantity, and the options included."""
-    sheet, options = _select_every_option(datasheet, quantity)
-    rows = [row for axis in "xyz" for row in comparables(sheet, f"{quantity}_{axis}")]
-    return [row for row in rows if row.value is not None], options
-
-
-def _select_every_option(datasheet: Datasheet, quantity: str) -> tuple[Datasheet, list[str]]:
-    """Return a datasheet with all options selected if it selects none, and these options."""
     sheet: QuantityDatasheet = getattr(datasheet, quantity)
     named = {
         figure.option
@@ -153,7 +230,9 @@ def _select_every_option(datasheet: Datasheet, quantity: str) -> tuple[Datasheet
         for figure in sheet.printed(name)
         if figure.option is not None
     }
-    if datasheet.options or not named:
-        return datasheet, []
-    options = sorted(named)
-    return datasheet.model_copy(update={"options": tuple(options)}), options
+    options: list[str] = []
+    if named and not datasheet.options:  # select all of them
+        options = sorted(named)
+        datasheet = datasheet.model_copy(update={"options": tuple(options)})
+    rows = [row for axis in "xyz" for row in comparables(datasheet, f"{quantity}_{axis}")]
+    return [row for row in rows if row.value is not None], options

@@ -1,8 +1,7 @@
 """Select the catalogue sensors worth logging for a requirement: the table ``shortlist``.
 
-Errors in use are taken from the datasheet (see `error_budget.in_use`). A turn-on bias can be
-calibrated: the best case excludes it, and the worst case includes it. If a figure is not published,
-the worst case is not known.
+Errors in use are from the datasheet. The best case excludes a turn-on bias, which can be
+calibrated. If a figure is not published, the worst case is not known.
 """
 
 from __future__ import annotations
@@ -13,23 +12,19 @@ from dataclasses import replace
 
 from imubench_pipeline.model.comparisons import RankingRow, ShortlistRow
 from imubench_pipeline.model.recordings import RecordingRow
-from imubench_pipeline.model.states import ShortlistVerdict
 from imubench_pipeline.model.verdicts import Shortfall
 from imubench_pipeline.navigation.error_budget.in_use import BIAS_CAUSES, Figure
 from imubench_pipeline.navigation.error_budget.in_use import Figures as InUse
-from imubench_pipeline.navigation.error_budget.parts import Budget
 from imubench_pipeline.navigation.error_budget.printed_errors import of_datasheet
 from imubench_pipeline.navigation.expected_errors import AxisErrors, Question, of_requirement
-from imubench_pipeline.navigation.shortlist.classes import MeasuredRanges
-from imubench_pipeline.navigation.shortlist.figures import End, Figures, figures_of
-from imubench_pipeline.navigation.suitability.abilities import Abilities, abilities, judge
+from imubench_pipeline.navigation.shortlist.figures import End, Figures, MeasuredRanges, figures_of
+from imubench_pipeline.navigation.suitability.abilities import abilities, judge
 from imubench_pipeline.settings.requirements import Requirement
 from imubench_pipeline.settings.sensor import Sensor
 from imubench_pipeline.words.verdicts import subject_text
 
-_NO_AXIS_ERRORS = AxisErrors()
 _QUANTITIES = ("gyro", "accel")
-_NO_ERRORS = dict.fromkeys(_QUANTITIES, _NO_AXIS_ERRORS)
+_NO_ERRORS = dict.fromkeys(_QUANTITIES, AxisErrors())
 _CALIBRATED_BIASES: InUse = dict.fromkeys(BIAS_CAUSES, Figure(sigma=0.0))
 
 
@@ -42,9 +37,8 @@ def shortlist_rows(
 ) -> Iterator[ShortlistRow]:
     """Judge all sensors of a catalogue by their datasheets, with measured verdicts for comparison.
 
-    Yields a row for each requirement and sensor, the best margin first; sensors without a verdict
-    are last. The ranges replace unpublished figures. The ranking and the recordings of a run
-    provide the measured verdicts.
+    Yields a row for each requirement and sensor, the best margin first. The ranges replace
+    unpublished figures; the ranking and the recordings of a run provide the measured verdicts.
     """
     simulated = {(row.sensor, row.recording): row.simulated for row in recordings}
     measured = {(row.requirement, row.sensor): row for row in ranking if row.decides}
@@ -84,7 +78,11 @@ def _judge(
     row = ShortlistRow(
         requirement=names[0], sensor=names[1], price_class=price_class, verdict="not_judged"
     )
-    lacking, unknown = judge(requirement.must, _assume_all_axes(sensor))
+    # The sensor has all axes of its quantities, logged or not.
+    has = abilities(sensor)
+    channels = tuple(f"{q}_{axis}" for q in _QUANTITIES if q not in has.without for axis in "xyz")
+    has = has.model_copy(update={"channels": channels, "logged_rate": None})
+    lacking, unknown = judge(requirement.must, has)
     if lacking:
         return replace(row, verdict="cannot_meet", shortfalls=tuple(lacking))
     needed = dict.fromkeys(quantity for question in questions for quantity in question.needs)
@@ -110,21 +108,10 @@ def _judge(
     if not requirement.admits(price_class):
         asked = " or ".join(requirement.price_class or ())
         return replace(row, shortfalls=(Shortfall("price_class", price_class or "", asked),))
-    return replace(row, verdict=_choose_verdict(best[least], worst))
-
-
-def _assume_all_axes(sensor: Sensor) -> Abilities:
-    """Return the properties of a sensor with all axes of its quantities, logged or not."""
-    has = abilities(sensor)
-    quantities = [name for name in _QUANTITIES if name not in has.without]
-    channels = tuple(f"{name}_{axis}" for name in quantities for axis in "xyz")
-    return has.model_copy(update={"channels": channels, "logged_rate": None})
-
-
-def _choose_verdict(best: float, worst: float | None) -> ShortlistVerdict:
-    if best < 1.0:
-        return "cannot_meet"
-    return "meets_at_worst" if worst is not None and worst >= 1.0 else "worth_logging"
+    if best[least] < 1.0:
+        return replace(row, verdict="cannot_meet")
+    at_worst = worst is not None and worst >= 1.0
+    return replace(row, verdict="meets_at_worst" if at_worst else "worth_logging")
 
 
 def _compute_margins(
@@ -134,7 +121,18 @@ def _compute_margins(
     end: End,
 ) -> tuple[list[float], list[str]]:
     """Return the limit over the error of each question, and all omissions in words."""
-    budgets = [_compute_budget(question, figures, in_use, end) for question in questions]
+    pick = min if end == "best" else max
+    beside = _CALIBRATED_BIASES if end == "best" else {}
+    budgets = []
+    for question in questions:
+        chosen = dict(_NO_ERRORS)
+        for quantity in question.needs:
+            models = figures[quantity].models(end)
+            axes = [AxisErrors(model, {**in_use[quantity], **beside}) for model in models]
+            # The quantities are independent: take the extreme of each.
+            totals = [question.answer(**{**_NO_ERRORS, quantity: axis}).total for axis in axes]
+            chosen[quantity] = axes[totals.index(pick(totals))]
+        budgets.append(question.answer(**chosen))
     margins = [
         question.limit / budget.total if budget.total > 0.0 else math.inf
         for question, budget in zip(questions, budgets, strict=True)
@@ -146,18 +144,3 @@ def _compute_margins(
         for missed in budget.missing
     )
     return margins, list(dict.fromkeys(missing))
-
-
-def _compute_budget(
-    question: Question, figures: Mapping[str, Figures], in_use: Mapping[str, InUse], end: End
-) -> Budget:
-    pick = min if end == "best" else max
-    beside = _CALIBRATED_BIASES if end == "best" else {}
-    chosen = dict.fromkeys(_QUANTITIES, _NO_AXIS_ERRORS)
-    for quantity in question.needs:
-        models = figures[quantity].models(end)
-        axes = [AxisErrors(model, {**in_use[quantity], **beside}) for model in models]
-        # The quantities are independent: take the extreme of each.
-        totals = [question.answer(**{**_NO_ERRORS, quantity: axis}).total for axis in axes]
-        chosen[quantity] = axes[totals.index(pick(totals))]
-    return question.answer(**chosen)

@@ -111,13 +111,7 @@ def _find_largest(datasheet: Datasheet, quantity: Measured, name: str) -> float 
 
 
 def judge(must: Must, has: Abilities) -> tuple[list[Shortfall], list[Condition]]:
-    """Compare the properties of a sensor with the hard requirements.
-
-    Returns
-    -------
-    (list of Shortfall, list of Condition)
-        Demanded properties that it does not have, and those that are not known.
-    """
+    """Return the demanded properties that a sensor does not have, and those that are not known."""
     points: dict[tuple[Property, str], _Point] = {}
     for point in _compare(must, has):
         points.setdefault((point.property, point.subject), point)
@@ -135,12 +129,33 @@ def judge(must: Must, has: Abilities) -> tuple[list[Shortfall], list[Condition]]
 
 
 def _compare(must: Must, has: Abilities) -> Iterator[_Point]:
-    yield from _compare_axes(must, has)
+    for text in must.axes:
+        quantity, axes = text.split("_")
+        if quantity in has.without:
+            yield _Point("quantity", quantity, False, text)
+            continue
+        for axis in axes:
+            # The sensor may have axes that are not in its logs.
+            logged = f"{quantity}_{axis}" in has.channels or None
+            yield _Point("axis", f"{quantity}_{axis}", logged, text)
     yield from _compare_full_scales(must, has)
     if must.bandwidth is not None:
-        yield from _compare_bandwidths(must.bandwidth, must, has)
+        # Of the quantities with required axes, or else of all.
+        asked = {axes.split("_")[0] for axes in must.axes} or set(SENSORS)
+        lowest = quantity_to_si(must.bandwidth, "frequency")
+        for measured in get_args(Measured):
+            if measured in asked and measured not in has.without:
+                width = has.bandwidth.get(measured)
+                wide = None if width is None else width >= lowest
+                yield _Point("bandwidth", measured, wide, must.bandwidth, _list_known(width))
     if must.rate is not None:
-        yield _compare_rate(must.rate, has)
+        least = quantity_to_si(must.rate, "frequency")
+        if has.logged_rate is not None and has.logged_rate >= least:
+            yield _Point("rate", "", True, must.rate)
+        else:
+            # The rate of a log may be lower than the highest rate of the sensor.
+            fast = None if has.rate is None else has.rate >= least
+            yield _Point("rate", "", fast, must.rate, _list_known(has.rate))
     if must.temperature is not None:
         low, high = (quantity_to_si(end, "temperature") for end in must.temperature)
         own = has.temperature
@@ -150,10 +165,10 @@ def _compare(must: Must, has: Abilities) -> Iterator[_Point]:
         ("mass", must.mass, has.mass),
         ("power", must.power, has.power),
     )
-    for name, text, size in sizes:
-        if text is not None:
-            small = None if size is None else size <= quantity_to_si(text, name) * _ROUNDING_MARGIN
-            yield _Point(name, "", small, text, _list_known(size))
+    for name, most, size in sizes:
+        if most is not None:
+            small = None if size is None else size <= quantity_to_si(most, name) * _ROUNDING_MARGIN
+            yield _Point(name, "", small, most, _list_known(size))
 
 
 def _list_known(value: float | None) -> tuple[float, ...]:
@@ -175,34 +190,3 @@ def _compare_full_scales(must: Must, has: Abilities) -> Iterator[_Point]:
         least = quantity_to_si(text, QUANTITIES[measured])
         enough = None if largest is None else largest * _ROUNDING_MARGIN >= least
         yield _Point("full_scale", measured, enough, text, _list_known(largest))
-
-
-def _compare_bandwidths(text: str, must: Must, has: Abilities) -> Iterator[_Point]:
-    """Yield the bandwidth of the quantities with required axes, or else of all."""
-    asked = {axes.split("_")[0] for axes in must.axes} or set(SENSORS)
-    for measured in get_args(Measured):
-        if measured in asked and measured not in has.without:
-            width = has.bandwidth.get(measured)
-            wide = None if width is None else width >= quantity_to_si(text, "frequency")
-            yield _Point("bandwidth", measured, wide, text, _list_known(width))
-
-
-def _compare_rate(text: str, has: Abilities) -> _Point:
-    least = quantity_to_si(text, "frequency")
-    if has.logged_rate is not None and has.logged_rate >= least:
-        return _Point("rate", "", True, text)
-    # The rate of a log may be lower than the highest rate of the sensor.
-    fast = None if has.rate is None else has.rate >= least
-    return _Point("rate", "", fast, text, _list_known(has.rate))
-
-
-def _compare_axes(must: Must, has: Abilities) -> Iterator[_Point]:
-    for text in must.axes:
-        quantity, axes = text.split("_")
-        if quantity in has.without:
-            yield _Point("quantity", quantity, False, text)
-            continue
-        for axis in axes:
-            # The sensor may have axes that are not in its logs.
-            logged = f"{quantity}_{axis}" in has.channels or None
-            yield _Point("axis", f"{quantity}_{axis}", logged, text)

@@ -1,10 +1,8 @@
 """Conditions of a verdict other than the known errors: unknown figures and hard requirements.
 
-A sensor that does not meet a hard requirement is excluded. If its known errors meet the limits, but
-a figure that matters in this use is not known, it meets them if that figure is below the largest
-one within the limit. Several unknown figures share the remaining error budget: with all of them at
-their largest, the limit is just reached. If the printed turn-on bias alone exceeds a limit, the
-sensor meets it if it is calibrated to within the remaining error budget.
+Several unknown figures share the remaining error budget: with all of them at their largest, the
+limit is just reached. If the printed turn-on bias alone exceeds a limit, the sensor meets it
+if calibrated to within the remaining error budget.
 """
 
 from __future__ import annotations
@@ -47,7 +45,8 @@ class Conditions:
         lacking, unknown = judge(must, has)
         figures: dict[tuple[str, Figure], float] = {}
         for row in conditions:
-            key = _get_quantity(row), _get_figure(row)
+            quantity = next(word for word in row.source.split() if word in SENSORS)
+            key = quantity, next(figure for figure in FIGURES if figure == row.cause)
             largest = row.largest or 0.0
             figures[key] = min(figures.get(key, largest), largest)
         return cls(tuple(lacking), tuple(unknown), figures)
@@ -68,15 +67,6 @@ class Conditions:
         return (*figures, *self.unknown)
 
 
-def _get_quantity(row: ErrorBudgetRow) -> str:
-    """Return the quantity that a source belongs to: ``gyro`` or ``accel``."""
-    return next(word for word in row.source.split() if word in SENSORS)
-
-
-def _get_figure(row: ErrorBudgetRow) -> Figure:
-    return next(figure for figure in FIGURES if figure == row.cause)
-
-
 def is_condition(row: ErrorBudgetRow) -> bool:
     """Return whether meeting a limit depends on the figure of a source."""
     return row.largest_unit is not None and row.cause in FIGURES
@@ -91,9 +81,9 @@ def once_calibrated(
 ) -> Verdict:
     """Return the verdict on an error after calibration of the biases that exceed its limit.
 
-    The square of a bias is a term of every draw of the total, and so of the squared limits of the
-    total. ``verdict`` is without calibration; limit, sigma and upper belong to the error;
-    conditions are the sources that the verdict depends on.
+    The square of a bias is a term of every draw of the total. ``verdict`` is without calibration;
+    limit, sigma and upper belong to the error; conditions are the sources that the verdict depends
+    on.
     """
     squares = [size**2 for _, size in with_sigma(conditions)]
     if not squares or verdict in _PASSING or limit is None:

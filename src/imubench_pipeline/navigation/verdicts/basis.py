@@ -74,11 +74,6 @@ class Basis:
         durations = (self.duration(_make_key(row)) for row in rows)
         return max((duration for duration in durations if duration is not None), default=None)
 
-    def simulated(self, key: Key) -> bool:
-        """Return whether a recording is simulated."""
-        row = self.recordings.get(key)
-        return bool(row and row.simulated)
-
     def doubted(self, key: Key) -> tuple[DoubtMark, ...]:
         """Return the doubts about a recording."""
         row = self.recordings.get(key)

@@ -1,37 +1,32 @@
 """Derive the strength of the evidence for a verdict, and the reasons why it is weak.
 
-A verdict gives the confidence in a figure, assuming that its log is representative. The evidence
-depends on the logs: their length, the number of specimens and axes, and doubts about the parameter
-that contributes most to the error (`imubench_pipeline.recordings.fitness` lists the doubts).
-
-The name of a contribution to an error gives its quantity and noise parameter.
+The evidence depends on the logs: their length, the number of specimens and axes, and doubts about
+the parameter that contributes most to the error.
 """
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator
 from typing import Literal, get_args
 
 from imubench_pipeline.estimators.estimate import CURVE
 from imubench_pipeline.model.comparisons import ErrorBudgetRow
 from imubench_pipeline.navigation.verdicts.basis import Basis
 from imubench_pipeline.navigation.verdicts.standing import Standing
-from imubench_pipeline.noise import TERMS, Term
+from imubench_pipeline.noise import TERMS
 from imubench_pipeline.noise.terms.traits import Role
 from imubench_pipeline.settings.requirements import Requirement
 from imubench_pipeline.units import quantity_to_si
 
-
-def _list_parameters(kind: type[Term]) -> frozenset[str]:
-    symbols = frozenset(parameter.symbol for parameter in kind.parameters)
-    raises_the_curve = "B" in symbols or kind.role is Role.GAUSS_MARKOV
-    return symbols | frozenset(CURVE) if raises_the_curve else symbols
-
-
-_PARAMETERS_OF_SOURCE = {kind.word: _list_parameters(kind) for kind in TERMS}
+_PARAMETERS_OF_SOURCE: dict[str, frozenset[str]] = {}
 """Noise parameters by the first word of a term's name (`Term.source`). Bias instability determines
 the lowest part of the curve, so its terms include the parameters of the curve."""
+
+for _kind in TERMS:
+    _symbols = frozenset(parameter.symbol for parameter in _kind.parameters)
+    if "B" in _symbols or _kind.role is Role.GAUSS_MARKOV:
+        _symbols |= frozenset(CURVE)
+    _PARAMETERS_OF_SOURCE[_kind.word] = _symbols
 
 
 Reason = Literal["one_specimen", "short_log", "wide_interval", "few_axes"]
@@ -65,11 +60,10 @@ def parameters_behind(source: str) -> frozenset[str]:
 
 
 def weaknesses(standing: Standing, requirement: Requirement, basis: Basis) -> list[str]:
-    """Return the reasons for weak evidence on a limit; empty if it is strong.
+    """Return the reasons for weak evidence on a limit that has a figure; empty if it is strong.
 
     They are `WEAKNESS_REASONS` and codes of the table ``doubts``. Axes and doubts count if at least
-    half of the recordings have them; the longest recording gives the length. The standing must have
-    a figure.
+    half of the recordings have them.
     """
     reasons = []
     if standing.expected.specimens == 1:
@@ -80,34 +74,27 @@ def weaknesses(standing: Standing, requirement: Requirement, basis: Basis) -> li
         reasons.append("short_log")
     if standing.wide:
         reasons.append("wide_interval")
-    of_logs = Counter(
-        reason
-        for total in standing.totals
-        for reason in dict.fromkeys(_list_log_weaknesses(total, standing, requirement, basis))
-    )
+    of_logs = Counter[str]()
+    for total in standing.totals:
+        key = total.sensor, total.recording
+        own: list[str] = []
+        answering = {"gyro": total.gyro, "accel": total.accel}
+        for quantity, channel in answering.items():
+            axes = basis.axes(key, quantity) if channel else None
+            if requirement.axis == "worst" and axes is not None and axes < _AXIS_COUNT:
+                own.append("few_axes")
+        if standing.source is not None:
+            behind = parameters_behind(standing.source)
+            channel = answering[quantity_behind(standing.source) or "gyro"]
+            for doubt in basis.doubts.get(key, ()):
+                affected = behind.intersection(doubt.parameters) if doubt.parameters else behind
+                if doubt.channel in (None, channel) and affected:
+                    own.append(doubt.code)
+        of_logs.update(dict.fromkeys(own, 1))
     half = len(standing.totals) / 2.0
     order = [*WEAKNESS_REASONS, *of_logs]
     reasons += [reason for reason, count in of_logs.items() if count >= half]
     return sorted(reasons, key=order.index)
-
-
-def _list_log_weaknesses(
-    total: ErrorBudgetRow, standing: Standing, requirement: Requirement, basis: Basis
-) -> Iterator[str]:
-    key = total.sensor, total.recording
-    answering = {"gyro": total.gyro, "accel": total.accel}
-    for quantity, channel in answering.items():
-        axes = basis.axes(key, quantity) if channel else None
-        if requirement.axis == "worst" and axes is not None and axes < _AXIS_COUNT:
-            yield "few_axes"
-    if standing.source is None:
-        return
-    behind = parameters_behind(standing.source)
-    channel = answering[quantity_behind(standing.source) or "gyro"]
-    for doubt in basis.doubts.get(key, ()):
-        affected = behind.intersection(doubt.parameters) if doubt.parameters else behind
-        if doubt.channel in (None, channel) and affected:
-            yield doubt.code
 
 
 def longest_asked(total: ErrorBudgetRow, requirement: Requirement) -> float:

@@ -2,22 +2,111 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
+from scipy.special import ndtr
+
 from imubench_pipeline.model.comparisons import ErrorBudgetRow
 from imubench_pipeline.model.states import Verdict
 from imubench_pipeline.model.verdicts import Condition, DoubtMark, Shortfall
+from imubench_pipeline.navigation.pooled import NORMAL_QUANTILE
 from imubench_pipeline.navigation.suitability.abilities import Abilities
-from imubench_pipeline.navigation.suitability.conditions import Conditions, once_calibrated
-from imubench_pipeline.navigation.verdicts.basis import Basis
-from imubench_pipeline.navigation.verdicts.evidence import weaknesses
+from imubench_pipeline.navigation.suitability.conditions import (
+    Conditions,
+    once_calibrated,
+    with_sigma,
+)
+from imubench_pipeline.navigation.verdicts.basis import Basis, Key
+from imubench_pipeline.navigation.verdicts.evidence import quantity_behind, weaknesses
 from imubench_pipeline.navigation.verdicts.specimens import Spread, usual_spread
 from imubench_pipeline.navigation.verdicts.standing import Standing, deciding, limit_of, standings
-from imubench_pipeline.navigation.verdicts.unless import Unless, unless
 from imubench_pipeline.settings.requirements import Requirement
 from imubench_pipeline.words.verdicts import doubts_text
+
+Factors = Mapping[str, float]  # by quantity
+
+
+@dataclass(frozen=True)
+class Unless:
+    """Alternative verdict on a sensor."""
+
+    # the deciding limit with the figures as logged; None if it is the present one
+    logged: Standing | None
+    corrected: Standing | None  # with corrected units; None if there is no correction
+    factors: Factors  # by quantity
+    doubts: Mapping[Key, tuple[DoubtMark, ...]]  # by sensor and recording
+
+
+def unless(sensor: str, rows: Sequence[ErrorBudgetRow], basis: Basis) -> Unless | None:
+    """Return the verdict on a sensor with doubtful units corrected.
+
+    The rows are those of one requirement. None without a figure, or if the verdict would not
+    change. If all recordings were left out, the verdict from their figures as logged is returned
+    too.
+    """
+    keys = list(dict.fromkeys((sensor, row.recording) for row in rows))
+    apart = [key for key in keys if key in basis.apart]
+    unjudged = len(apart) == len(keys) and bool(keys)
+    doubted = [key for key in keys if basis.factors(key) and (unjudged or key not in apart)]
+    if not unjudged and not doubted:
+        return None
+    own = [row for row in rows if unjudged or (sensor, row.recording) not in apart]
+    devices = {name: basis.device((of, name)) for of, name in keys}
+    logged = deciding(standings(own, devices))
+    factors = {key: basis.factors(key) for key in doubted}
+    corrected = None
+    if factors:
+        by_total: dict[tuple[str, tuple[Any, ...]], list[ErrorBudgetRow]] = {}
+        for row in own:
+            by_total.setdefault((row.recording, limit_of(row)), []).append(row)
+        in_other_unit = [
+            row
+            for (recording, _), parts in by_total.items()
+            for row in scaled(parts, factors.get((sensor, recording), {}))
+        ]
+        corrected = deciding(standings(in_other_unit, devices))
+    if corrected is not None and not unjudged and corrected.verdict == logged.verdict:
+        corrected = None
+    if not logged.known or (corrected is None and not unjudged):
+        return None
+    doubts = {key: basis.doubted(key) for key in (doubted or apart)}
+    together = {name: f for of_recording in factors.values() for name, f in of_recording.items()}
+    return Unless(logged if unjudged else None, corrected, together, doubts)
+
+
+def scaled(parts: Sequence[ErrorBudgetRow], factors: Factors) -> list[ErrorBudgetRow]:
+    """Return the rows of one error of one recording, with quantities multiplied by factors."""
+    own = [row for row in parts if row.source != "total"]
+    sources = [
+        (row, factors.get(quantity_behind(row.source) or "", 1.0) * sigma)
+        for row, sigma in with_sigma(own)
+    ]
+    missing = [row for row in own if row.sigma is None]
+    (total,) = (row for row in parts if row.source == "total")
+    if not total.sigma or not sources or total.lower is None or total.upper is None:
+        return list(parts)
+    sigma = math.hypot(*(size for _, size in sources))
+    by = sigma / total.sigma
+    lower, upper = by * total.lower, by * total.upper
+    within = None
+    if total.limit is not None:
+        # The error is log-normal on either side; without a lower limit, either is possible.
+        away = math.log(total.limit / sigma)
+        if away <= 0.0 and lower <= 0.0:
+            within = 0.5
+        elif (half := math.log(upper / sigma if away > 0.0 else sigma / lower)) > 0.0:
+            within = float(ndtr(NORMAL_QUANTILE * away / half))
+        else:
+            within = 1.0 if away >= 0.0 else 0.0
+    return [
+        replace(total, sigma=sigma, lower=lower, upper=upper, within=within, reached_after=None),
+        *(replace(row, sigma=size) for row, size in sources),
+        *missing,
+    ]
+
 
 _WORST_FIRST: tuple[Verdict, ...] = (
     "fails",
@@ -61,7 +150,16 @@ class Judgement:
     @property
     def _verdict_on_errors(self) -> Verdict:
         """Verdict on the known errors: by the deciding limit, or by all after calibration."""
-        once = [_judge_once_calibrated(standing) for standing in self.standings]
+        once = [
+            once_calibrated(
+                each.verdict,
+                each.total.limit,
+                each.expected.sigma,
+                each.expected.upper,
+                each.conditions,
+            )
+            for each in self.standings
+        ]
         if self.decides.known and once != [standing.verdict for standing in self.standings]:
             return min(once, key=_WORST_FIRST.index)
         return self.decides.verdict
@@ -99,15 +197,18 @@ def judgements(
         for sensor, rows in of_sensors.items():
             devices, made = _map_specimens(sensor, rows, basis)
             by_limit = standings(_select_deciding_rows(rows, basis), devices, usual[made])
-            decides = deciding(by_limit)
+            price_class, price = sensors[sensor]["price_class"], None
+            if not requirement.admits(price_class):
+                asked = " or ".join(requirement.price_class or ())
+                price = Shortfall("price_class", price_class or "", asked)
             yield Judgement(
                 name,
                 requirement,
                 sensor,
                 by_limit,
-                decides,
+                deciding(by_limit),
                 [weaknesses(each, requirement, basis) if each.known else [] for each in by_limit],
-                _check_price(requirement, sensors[sensor]["price_class"]),
+                price,
                 Conditions.of(
                     requirement.must,
                     Abilities.model_validate(sensors[sensor].get("abilities", {})),
@@ -123,22 +224,21 @@ def _map_specimens(
     """Return the specimen of each recording in rows, and whether all are simulated."""
     keys = [(sensor, row.recording) for row in rows]
     devices = {recording: basis.device((sensor, recording)) for _, recording in keys}
-    return devices, all(basis.simulated(key) for key in keys)
+    recordings = [basis.recordings.get(key) for key in keys]
+    return devices, all(row is not None and row.simulated for row in recordings)
 
 
 def _select_deciding_rows(rows: Sequence[ErrorBudgetRow], basis: Basis) -> list[ErrorBudgetRow]:
     """Return rows, with figures removed for recordings that do not decide."""
-    return [
-        row if doubts is None else _remove_figure(row, doubts)
-        for row, doubts in ((row, basis.apart.get((row.sensor, row.recording))) for row in rows)
-    ]
-
-
-def _remove_figure(row: ErrorBudgetRow, doubts: Iterable[DoubtMark]) -> ErrorBudgetRow:
-    reason = f"{row.recording} is not used: {doubts_text(doubts)}"
-    return replace(
-        row, sigma=None, lower=None, upper=None, within=None, reached_after=None, reason=reason
-    )
+    selected = []
+    for row in rows:
+        doubts = basis.apart.get((row.sensor, row.recording))
+        if doubts is not None:
+            reason = f"{row.recording} is not used: {doubts_text(doubts)}"
+            row = replace(row, sigma=None, lower=None, upper=None, within=None)
+            row = replace(row, reached_after=None, reason=reason)
+        selected.append(row)
+    return selected
 
 
 def _pool_spreads(
@@ -155,16 +255,3 @@ def _pool_spreads(
                 by_limit.setdefault(limit_of(standing.total), []).append(standing.expected.spread)
     usual = {key: usual_spread(spreads) for key, spreads in by_limit.items()}
     return {key: spread for key, spread in usual.items() if spread is not None}
-
-
-def _judge_once_calibrated(standing: Standing) -> Verdict:
-    error = standing.expected
-    return once_calibrated(
-        standing.verdict, standing.total.limit, error.sigma, error.upper, standing.conditions
-    )
-
-
-def _check_price(requirement: Requirement, price_class: str | None) -> Shortfall | None:
-    if requirement.admits(price_class):
-        return None
-    return Shortfall("price_class", price_class or "", " or ".join(requirement.price_class or ()))

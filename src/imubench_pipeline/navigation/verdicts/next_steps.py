@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, TypeVar, get_args
+from typing import TypeVar, get_args
 
 from scipy.special import stdtrit
 
@@ -25,13 +25,10 @@ from imubench_pipeline.words.next_steps import next_step_text
 
 T = TypeVar("T")
 
-_ACTION_ORDER = get_args(Action)
-
 _MAX_DURATION_FACTOR = 100.0
 """Maximum recommended duration over the present one: it makes limits ten times as narrow."""
 
-_MAX_SPECIMENS = 20
-"""Maximum number of specimens of a sensor that is recommended."""
+_MAX_SPECIMENS = 20  # maximum number of specimens of a sensor that is recommended
 
 _MIN_SPECIMENS = 3
 """Minimum number of specimens to estimate their spread: t is 4.3 with two degrees of freedom, 12.7
@@ -55,18 +52,35 @@ class _Step:
 
 def next_step_rows(judged: Sequence[Judgement], basis: Basis) -> list[NextStepRow]:
     """Return the rows of the table ``next_steps``, sorted by the number of changed verdicts."""
-    groups: dict[tuple[Any, ...], list[_Step]] = {}
+    groups: dict[tuple[tuple[str, str | None], Action], list[_Step]] = {}
     for judgement in judged:
         if not judgement.shortfalls:
             for step in _list_steps(judgement, basis):
                 groups.setdefault((step.key, step.action), []).append(step)
-    rows = [_make_row(steps, basis) for steps in groups.values()]
+    rows = []
+    for ((sensor, recording), action), steps in groups.items():
+        turned = {step.requirement for step in steps if step.turns}
+        row = NextStepRow(
+            sensor=sensor,
+            recording=recording,
+            requirements=_unite(step.requirement for step in steps),
+            action=action,
+            quantities=_unite(name for step in steps for name in step.quantities),
+            figures=_unite(figure for step in steps for figure in step.figures),
+            doubts=_unite(code for step in steps for code in step.doubts),
+            verdicts_turned=len(turned),
+            verdicts_strengthened=len({step.requirement for step in steps} - turned),
+            duration=max((step.duration for step in steps if step.duration), default=None),
+            logged=basis.duration((sensor, recording)) if recording else None,
+            specimens=max((step.specimens for step in steps if step.specimens), default=None),
+        )
+        rows.append(replace(row, text=next_step_text(row)))
     return sorted(
         rows,
         key=lambda row: (
             -row.verdicts_turned,
             -row.verdicts_strengthened,
-            _ACTION_ORDER.index(row.action),
+            get_args(Action).index(row.action),
             row.sensor,
             row.recording or "",
         ),
@@ -85,7 +99,17 @@ def _list_steps(judgement: Judgement, basis: Basis) -> Iterator[_Step]:
             codes = () if quantities else tuple(doubt.code for doubt in doubts)
             yield _Step(action, key, name, not same, quantities=quantities, doubts=codes)
     if not judgement.decides.known:
-        yield from _find_missing_data(judgement, basis)
+        # Channels may be missing, or the recording too short.
+        total = judgement.decides.total
+        key = judgement.sensor, total.recording
+        if key in basis.apart:
+            return
+        needs = ("gyro",) if total.error in ("heading", "north") else ("gyro", "accel")
+        missing = tuple(quantity for quantity in needs if basis.lacks(key, quantity))
+        if missing:
+            yield _Step("add_channels", key, name, turns=True, quantities=missing)
+        elif (needed := _compute_duration_needed(judgement)) > (basis.duration(key) or math.inf):
+            yield _Step("log_longer", key, name, turns=True, duration=needed)
         return
     if judgement.decides.verdict not in ("meets", "fails"):
         yield from _find_settling_steps(judgement, basis)
@@ -95,20 +119,6 @@ def _list_steps(judgement: Judgement, basis: Basis) -> Iterator[_Step]:
         yield _Step("find_figures", (judgement.sensor, None), name, False, figures=figures)
     for reason in judgement.reasons:
         yield from _find_strengthening_steps(judgement, reason, basis)
-
-
-def _find_missing_data(judgement: Judgement, basis: Basis) -> Iterator[_Step]:
-    """Yield the missing channels, or the needed length, of a recording without a figure."""
-    total = judgement.decides.total
-    key = judgement.sensor, total.recording
-    if key in basis.apart:
-        return
-    needs = ("gyro",) if total.error in ("heading", "north") else ("gyro", "accel")
-    missing = tuple(name for name in needs if basis.lacks(key, name))
-    if missing:
-        yield _Step("add_channels", key, judgement.name, turns=True, quantities=missing)
-    elif (needed := _compute_duration_needed(judgement)) > (basis.duration(key) or math.inf):
-        yield _Step("log_longer", key, judgement.name, turns=True, duration=needed)
 
 
 def _find_settling_steps(judgement: Judgement, basis: Basis) -> Iterator[_Step]:
@@ -135,10 +145,8 @@ def _find_settling_steps(judgement: Judgement, basis: Basis) -> Iterator[_Step]:
 def specimens_needed(expected: Expected, away: float) -> int | None:
     """Return how many more specimens would bring the limits of an error within a distance.
 
-    The half width of the prediction interval is t sqrt(tau^2 (1 + 1/n)) with n - 1 degrees of
-    freedom. The spread is assumed to remain the same, and the errors of the logs are neglected.
-    ``away`` is the logarithm of the margin, the maximum distance of the limits. None if 20
-    specimens are not enough.
+    ``away`` is the logarithm of the margin, the maximum half width t sqrt(tau^2 (1 + 1/n)) of the
+    prediction interval. The errors of the logs are neglected. None if 20 specimens are not enough.
     """
     assert expected.spread is not None
     for number in range(expected.specimens + 1, _MAX_SPECIMENS + 1):
@@ -181,30 +189,6 @@ def _find_longest(sensor: str, standing: Standing, basis: Basis) -> tuple[Key, f
 def _compute_duration_needed(judgement: Judgement) -> float:
     """Return the length of a log that can determine the error of the deciding limit, s."""
     return longest_asked(judgement.decides.total, judgement.requirement) / MAX_TIME_SHARE
-
-
-def _make_row(steps: Sequence[_Step], basis: Basis) -> NextStepRow:
-    first = steps[0]
-    turned = {step.requirement for step in steps if step.turns}
-    strengthened = {step.requirement for step in steps} - turned
-    duration = max((step.duration for step in steps if step.duration), default=None)
-    specimens = max((step.specimens for step in steps if step.specimens), default=None)
-    sensor, recording = first.key
-    row = NextStepRow(
-        sensor=sensor,
-        recording=recording,
-        requirements=_unite(step.requirement for step in steps),
-        action=first.action,
-        quantities=_unite(name for step in steps for name in step.quantities),
-        figures=_unite(figure for step in steps for figure in step.figures),
-        doubts=_unite(code for step in steps for code in step.doubts),
-        verdicts_turned=len(turned),
-        verdicts_strengthened=len(strengthened),
-        duration=duration,
-        logged=basis.duration((sensor, recording)) if recording else None,
-        specimens=specimens,
-    )
-    return replace(row, text=next_step_text(row))
 
 
 def _unite(values: Iterable[T]) -> tuple[T, ...]:

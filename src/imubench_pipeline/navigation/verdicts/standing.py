@@ -11,11 +11,7 @@ from imubench_pipeline.model import table
 from imubench_pipeline.model.comparisons import ErrorBudgetRow
 from imubench_pipeline.model.states import SURE_PROBABILITY, Verdict
 from imubench_pipeline.model.verdicts import Share
-from imubench_pipeline.navigation.suitability.conditions import (
-    is_condition,
-    shares_of,
-    with_sigma,
-)
+from imubench_pipeline.navigation.suitability.conditions import is_condition, shares_of, with_sigma
 from imubench_pipeline.navigation.verdicts.specimens import Expected, Spread, expected
 
 MAX_LIMIT_RATIO = 4.0
@@ -78,12 +74,6 @@ class Standing:
         return low <= 0.0 or high / low > MAX_LIMIT_RATIO
 
     @property
-    def _is_vague(self) -> bool:
-        """Whether the interval of the representative log is too wide for a verdict."""
-        lower, upper = self.total.lower, self.total.upper
-        return lower is None or upper is None or lower <= 0.0 or upper / lower > MAX_LIMIT_RATIO
-
-    @property
     def verdict(self) -> Verdict:
         """Verdict by the probability to be within the limit."""
         if not self.known:
@@ -92,7 +82,9 @@ class Standing:
             return "meets"
         if self.chance <= 1.0 - SURE_PROBABILITY:
             return "fails"
-        if self._is_vague:
+        # The interval of the representative log may be too wide for a verdict.
+        lower, upper = self.total.lower, self.total.upper
+        if lower is None or upper is None or lower <= 0.0 or upper / lower > MAX_LIMIT_RATIO:
             return "not_enough_data"
         return "likely_meets" if self.chance >= 0.5 else "likely_fails"
 
@@ -108,56 +100,48 @@ def standings(
     spread of other sensors by `limit_of`.
     """
     by_limit: dict[tuple[Any, ...], list[ErrorBudgetRow]] = {}
-    for row in map(_drop_unjudgeable_figure, rows):
+    for row in rows:
+        if row.source == "total":
+            # A total without the numbers for its verdict has no figure.
+            needed = ("sigma", "lower", "upper", "within", "limit")
+            missing = [name for name in needed if getattr(row, name) is None]
+            if missing:
+                reason = row.reason or f"it has no {' and no '.join(missing)}"
+                row = replace(row, sigma=None, reason=reason)
         by_limit.setdefault(limit_of(row), []).append(row)
-    return [
-        _make_standing(parts, devices, (usual or {}).get(key))
-        for key, parts in by_limit.items()
-        if any(row.source == "total" for row in parts)
-    ]
+    listed = []
+    for key, parts in by_limit.items():
+        totals = [row for row in parts if row.source == "total"]
+        if not totals:
+            continue
+        figures = with_sigma(totals)
+        with_figure = [row for row, _ in figures]
+        prediction = expected(with_figure, devices, (usual or {}).get(key))
+        if prediction.sigma is None:
+            listed.append(Standing(totals[0], with_figure, prediction))
+            continue
+        distances = [_compute_distance(sigma, prediction.sigma) for _, sigma in figures]
+        answer, sigma = figures[distances.index(min(distances))]
+        own = [row for row in parts if row.source != "total" and row.recording == answer.recording]
+        conditions = tuple(row for row in own if is_condition(row))
+        standing = Standing(answer, with_figure, prediction, conditions=conditions)
+        sources = with_sigma(own)
+        if sources and sigma > 0.0:
+            largest, size = max(sources, key=lambda source: source[1])
+            share, shares = (size / sigma) ** 2, shares_of(sigma, own)
+            standing = replace(standing, source=largest.source, share=share, parts=shares)
+        listed.append(standing)
+    return listed
 
 
-def _drop_unjudgeable_figure(row: ErrorBudgetRow) -> ErrorBudgetRow:
-    """Return a row; a total without the numbers for its verdict has no figure."""
-    judged_by = {
-        "sigma": row.sigma,
-        "lower": row.lower,
-        "upper": row.upper,
-        "within": row.within,
-        "limit": row.limit,
-    }
-    missing = [name for name, number in judged_by.items() if number is None]
-    if row.source != "total" or not missing:
-        return row
-    reason = row.reason or f"it has no {' and no '.join(missing)}"
-    return replace(row, sigma=None, reason=reason)
+def _compute_distance(sigma: float, median: float) -> float:
+    """Return the logarithmic distance of an error from the median; the difference if one is 0."""
+    return abs(math.log(sigma / median)) if median and sigma else abs(sigma - median)
 
 
 def limit_of(row: ErrorBudgetRow) -> tuple[Any, ...]:
     """Return the key of the limit of a row."""
     return row.error, row.time, row.limit, trajectory_of(row)
-
-
-def _make_standing(
-    parts: Sequence[ErrorBudgetRow], devices: Mapping[str, str], usual: Spread | None
-) -> Standing:
-    totals = [row for row in parts if row.source == "total"]
-    figures = with_sigma(totals)
-    with_figure = [row for row, _ in figures]
-    prediction = expected(with_figure, devices, usual)
-    if prediction.sigma is None:
-        return Standing(totals[0], with_figure, prediction)
-    answer, sigma = min(figures, key=lambda figure: _compute_distance(figure[1], prediction.sigma))
-    own = [row for row in parts if row.source != "total" and row.recording == answer.recording]
-    conditions = tuple(row for row in own if is_condition(row))
-    sources = with_sigma(own)
-    if not sources or sigma == 0.0:
-        return Standing(answer, with_figure, prediction, conditions=conditions)
-    largest, size = max(sources, key=lambda source: source[1])
-    share = (size / sigma) ** 2
-    return Standing(
-        answer, with_figure, prediction, largest.source, share, shares_of(sigma, own), conditions
-    )
 
 
 def deciding(by_limit: Sequence[Standing]) -> Standing:
@@ -166,13 +150,6 @@ def deciding(by_limit: Sequence[Standing]) -> Standing:
     worst = min(known, key=lambda standing: standing.margin, default=by_limit[0])
     unknown = [standing for standing in by_limit if not standing.known]
     return worst if not unknown or worst.verdict == "fails" else unknown[0]
-
-
-def _compute_distance(sigma: float, other: float | None) -> float:
-    """Return the logarithmic distance of two errors; their difference if one is 0."""
-    if not other or not sigma:
-        return abs(sigma - (other or 0.0))
-    return abs(math.log(sigma / other))
 
 
 def _divide(limit: float | None, error: float | None) -> float:
