@@ -190,7 +190,7 @@ def test_evidence_is_weak_for_reasons() -> None:
         "one unit; one log of 11 min; fewer than three axes"
     )
     assert weak("one_specimen", "periodic_drift", "not_explained", spread_of="other sensors") == (
-        "one unit, spread taken from other sensors; periodic drift of the data; "
+        "one unit, spread taken from other sensors; the bias of the data oscillates slowly; "
         "no model explains the spectrum of the data"
     )
     assert weak("short_log", "wide_interval", specimens=2, recordings=2, spread_of="specimens") == (
