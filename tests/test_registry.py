@@ -87,7 +87,7 @@ def test_an_extension_without_one_that_it_needs_is_left_out(
         ("settings.config", "aided/settings.py"),
         ("settings.simulated_recordings", "fusion/settings.py"),
         ("steps.report", "papers/templates/papers.html.jinja"),
-        ("steps.report", "calibration/page_positions.py"),
+        ("steps.report", "calibration/pages.py"),
     ],
 )
 def test_code_that_an_extension_adds_is_of_the_step(
@@ -98,5 +98,5 @@ def test_code_that_an_extension_adds_is_of_the_step(
     changed = FOLDER / file
     monkeypatch.setattr(Path, "read_bytes", lambda one: whole(one) + b" " * (one == changed))
     assert source_digest(step) != before
-    if file.endswith(("limits.py", "jinja", "page_positions.py")):
+    if file.endswith(("limits.py", "jinja", "pages.py")):
         assert source_digest("steps.allan") == of_allan
