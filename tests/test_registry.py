@@ -39,7 +39,7 @@ def test_each_package_is_an_extension_of_its_name() -> None:
 
 
 def test_each_field_is_tested_here() -> None:
-    others = {"name", "needs", "blocks", "rules", "templates"}
+    others = {"name", "needs", "blocks", "rules", "templates", "static"}
     assert {field.name for field in fields(Extension)} == HOOKS.keys() | others
 
 
@@ -56,7 +56,7 @@ def test_each_block_of_settings_is_strict_and_each_file_there() -> None:
         for block in one.blocks:
             assert issubclass(registry.load(block.model), Strict), block
         assert set(one.needs) <= {other.name for other in EXTENSIONS}
-        for file in filter(None, (one.rules, one.templates)):
+        for file in filter(None, (one.rules, one.templates, one.static)):
             assert (FOLDER / one.name / file).exists()
 
 
@@ -87,6 +87,7 @@ def test_an_extension_without_one_that_it_needs_is_left_out(
         ("settings.config", "aided/settings.py"),
         ("settings.simulated_recordings", "fusion/settings.py"),
         ("steps.report", "papers/templates/papers.html.jinja"),
+        ("steps.report", "earth_rate/static/earth_rate.js"),
         ("steps.report", "calibration/pages.py"),
     ],
 )
@@ -98,5 +99,5 @@ def test_code_that_an_extension_adds_is_of_the_step(
     changed = FOLDER / file
     monkeypatch.setattr(Path, "read_bytes", lambda one: whole(one) + b" " * (one == changed))
     assert source_digest(step) != before
-    if file.endswith(("limits.py", "jinja", "pages.py")):
+    if file.endswith(("limits.py", "jinja", "js", "pages.py")):
         assert source_digest("steps.allan") == of_allan

@@ -56,6 +56,7 @@ class Extension:
     recording_sections: tuple[str, ...] = ()  # of the page of a static recording
     search: tuple[str, ...] = ()  # names that the search of the report finds
     templates: str | None = None  # folder
+    static: str | None = None  # folder with scripts of the pages
 
 
 @cache
@@ -68,7 +69,7 @@ def installed_extensions() -> tuple[Extension, ...]:
     return tuple(one for one in found if set(one.needs) <= set(names))
 
 
-File = Literal["rules", "templates"]
+File = Literal["rules", "templates", "static"]
 """Files and folders that an extension may have."""
 
 

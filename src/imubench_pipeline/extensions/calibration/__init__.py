@@ -54,4 +54,5 @@ EXTENSION = Extension(
     sections=("calibration.figures:NOT_CALIBRATED",),
     recording_sections=("calibration.figures:at_rest",),
     templates="templates",
+    static="static",
 )
