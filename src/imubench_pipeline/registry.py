@@ -12,6 +12,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cache
 from importlib import import_module
+from itertools import chain
 from pathlib import Path
 from typing import Any, Generic, Literal, TypeVar
 
@@ -27,11 +28,7 @@ recording."""
 
 @dataclass(frozen=True)
 class Block:
-    """A block of settings.
-
-    ``model``: reference to its class; without a description it has its defaults where it is left
-    out, and else it is null.
-    """
+    """A block of settings: where it stands, and a reference to the class of its model."""
 
     place: Place
     key: str
@@ -59,7 +56,7 @@ class Extension:
     recording_sections: tuple[str, ...] = ()  # of the page of a static recording
     search: tuple[str, ...] = ()  # names that the search of the report finds
     templates: str | None = None  # folder
-    glossary: str | None = None  # file of the terms of its pages
+    static: str | None = None  # folder with scripts of the pages
 
 
 @cache
@@ -72,7 +69,7 @@ def installed_extensions() -> tuple[Extension, ...]:
     return tuple(one for one in found if set(one.needs) <= set(names))
 
 
-File = Literal["rules", "templates", "glossary"]
+File = Literal["rules", "templates", "static"]
 """Files and folders that an extension may have."""
 
 
@@ -130,17 +127,22 @@ def load(reference: str) -> Any:
 
 
 def sources(of: str, name: str) -> list[Path]:
-    """Return the files that a module uses where it calls this module for extensions.
+    """Return the files that a module uses where it asks for what extensions add.
 
     Parameters
     ----------
     of : str
-        What is called: ``Hook``, ``blocks`` or ``files_of``.
+        How it asks: ``Hook``, ``blocks``, ``with_blocks`` or ``files_of``.
     name : str
         With which name.
     """
+    used = installed_extensions()
     if of == "files_of":
-        folders = files_of(name)  # type: ignore[arg-type]  # as the module has it
-        return [file for path in folders for file in (path.rglob("*") if path.is_dir() else [path])]
-    stated = references(name).values() if of == "Hook" else [b.model for b in blocks(name).values()]  # type: ignore[arg-type]  # likewise
-    return [FOLDER / f"{reference.partition(':')[0].replace('.', '/')}.py" for reference in stated]
+        files = (getattr(one, name) and FOLDER / one.name / getattr(one, name) for one in used)
+        inside = ([path, *path.rglob("*")] for path in files if path)
+        return [path for path in chain.from_iterable(inside) if path.is_file()]
+    if of == "Hook":
+        stated = list(references(name).values())
+    else:
+        stated = [block.model for one in used for block in one.blocks if block.place == name]
+    return [FOLDER / f"{one.partition(':')[0].replace('.', '/')}.py" for one in stated]

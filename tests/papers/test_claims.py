@@ -7,7 +7,7 @@ import pytest
 
 from imubench_pipeline.extensions.papers.claims import Claim, Result, no_result, verdict_of
 from imubench_pipeline.extensions.papers.evidence import Evidence
-from imubench_pipeline.extensions.papers.lines import PAPERS, published_rows
+from imubench_pipeline.extensions.papers.papers import PAPERS, published_rows
 from imubench_pipeline.tables import build
 from tests.conftest import PROJECT
 

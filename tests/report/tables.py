@@ -13,7 +13,7 @@ import pyarrow as pa
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
 from imubench_pipeline.estimators.rows import parameter_rows
 from imubench_pipeline.extensions.fusion.fusion import fusion_rows
-from imubench_pipeline.extensions.papers.lines import rows_without_a_run
+from imubench_pipeline.extensions.papers.papers import rows_without_a_run
 from imubench_pipeline.model.comparisons import ErrorBudgetRow
 from imubench_pipeline.model.estimates import BacktestRow, FixedBiasRow, ParameterRow
 from imubench_pipeline.model.recordings import DoubtRow, RecordingRow

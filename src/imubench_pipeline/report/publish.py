@@ -12,6 +12,7 @@ from pathlib import Path
 import jinja2
 import pyarrow as pa
 
+from imubench_pipeline.registry import files_of
 from imubench_pipeline.report.folder import KEYS, write_failed_pages
 from imubench_pipeline.report.glossary import glossary
 from imubench_pipeline.report.html import environment
@@ -47,8 +48,6 @@ _SCRIPT_NAMES = (
     "tabs",
     "search",
     "channel",
-    "earth_rate",
-    "calibration",
     "trend",
     "start",
 )
@@ -193,7 +192,9 @@ def _make_script() -> str:
         }
         for quantity, choices in units_of_pages().items()
     }
-    parts = [(_STATIC_FOLDER / f"{name}.js").read_text(encoding="utf-8") for name in _SCRIPT_NAMES]
+    *own, last = (_STATIC_FOLDER / f"{name}.js" for name in _SCRIPT_NAMES)
+    added = (path for folder in files_of("static") for path in sorted(folder.glob("*.js")))
+    parts = [path.read_text(encoding="utf-8") for path in (*own, *added, last)]
     terms = {key: entry.short for key, entry in glossary().items()}
     head = "".join(
         f"const {name} = {json.dumps(value, ensure_ascii=False)};\n"

@@ -16,7 +16,7 @@ _NAME = _PACKAGE.name
 # A whole tree of each module's syntax would take as long to read as all logs of a run.
 _IMPORT = re.compile(r"^ *from (\w+)((?:\.\w+)*) import (\([^)]*\)|.*)$", re.MULTILINE)
 _IMPORTED = re.compile(r"(\w+)(?: as \w+)?")
-_EXTENSIONS = re.compile(r"""\b(Hook|blocks|files_of)\(["'](\w+)["']\)""")
+_EXTENSIONS = re.compile(r"""\b(Hook|with_blocks|blocks|files_of)\(["'](\w+)["']\)""")
 _TEXT = re.compile(r"""["'](\w[\w.]*\*?)["']""", re.ASCII)
 
 

@@ -48,10 +48,11 @@ EXTENSION = Extension(
     },
     rules="rules.smk",
     recording_pages={
-        "rate_table": "calibration.page_rate_table:RATE_TABLE",
-        "positions": "calibration.page_positions:POSITIONS",
+        "rate_table": "calibration.pages:RATE_TABLE",
+        "positions": "calibration.pages:POSITIONS",
     },
     sections=("calibration.figures:NOT_CALIBRATED",),
     recording_sections=("calibration.figures:at_rest",),
     templates="templates",
+    static="static",
 )

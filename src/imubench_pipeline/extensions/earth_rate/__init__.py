@@ -31,4 +31,5 @@ EXTENSION = Extension(
     recording_pages={"two_position": "earth_rate.page_turned:TURNED_PAGE"},
     sections=("earth_rate.page:NOT_FOUND",),
     templates="templates",
+    static="static",
 )

@@ -42,7 +42,7 @@ def run(arguments: argparse.Namespace) -> int:
     from imubench_pipeline.report.show import show
 
     if arguments.results is None:
-        from imubench_pipeline.extensions.papers.lines import rows_without_a_run
+        from imubench_pipeline.extensions.papers.papers import rows_without_a_run
 
         rows = list(rows_without_a_run())
         expected = "without the results of a run: what needs no log"

@@ -1,15 +1,19 @@
-"""What the papers print, beside what the run found."""
+"""What the papers print, in the order in which they are shown, beside what the run found."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
+from imubench_pipeline.extensions.papers import engers, maia, silva
 from imubench_pipeline.extensions.papers.about import MAIA
+from imubench_pipeline.extensions.papers.claims import Paper, rows_of
 from imubench_pipeline.extensions.papers.evidence import Evidence
-from imubench_pipeline.extensions.papers.lines import published_rows
 from imubench_pipeline.extensions.papers.panel import panel_rows
+from imubench_pipeline.extensions.papers.tables import PublishedRow
 from imubench_pipeline.tables import build, read, write_arrow
+
+PAPERS: Sequence[Paper] = (maia.PAPER, silva.PAPER, engers.PAPER)
 
 
 def write_published(tables: Iterable[Path], outputs: Iterable[Path]) -> None:
@@ -29,3 +33,18 @@ def write_published(tables: Iterable[Path], outputs: Iterable[Path]) -> None:
     }
     for output in outputs:
         write_arrow(made[output.stem], output)
+
+
+def published_rows(evidence: Evidence) -> Iterator[PublishedRow]:
+    """Yield the rows of the table ``published`` for the papers with logs in the run."""
+    for paper in PAPERS:
+        if any(evidence.has(*log) for log in paper.about.logs):
+            yield from rows_of(paper, evidence)
+
+
+def rows_without_a_run() -> Iterator[PublishedRow]:
+    """Yield the rows that need printed figures and closed forms only, and no log."""
+    for paper in PAPERS:
+        for row in rows_of(paper, Evidence()):
+            if row.basis in ("computed", "checked"):
+                yield row

@@ -1,4 +1,4 @@
-"""The page of a recording of a gyro on a rate table."""
+"""The pages of recordings on a rate table, and in several positions."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from typing import Any
 
 from imubench_pipeline.extensions.calibration.figures import (
     answer,
+    attitude_lines,
     earth_words,
     lines,
     noise_words,
@@ -23,7 +24,7 @@ from imubench_pipeline.report.view import RecordingView
 from imubench_pipeline.words.numbers import counted, number_text
 
 
-def context(site: Site, view: RecordingView, folder: Path) -> dict[str, Any]:
+def _rate_table(site: Site, view: RecordingView, folder: Path) -> dict[str, Any]:
     """Return what the template needs; ``folder`` is the recording's."""
     rows = view.rows(CalibrationRow)
     points = view.rows(CalibrationPointRow)
@@ -43,7 +44,7 @@ def context(site: Site, view: RecordingView, folder: Path) -> dict[str, Any]:
     }
 
 
-RATE_TABLE = RecordingPage("rate_table.html.jinja", context, "rate table")
+RATE_TABLE = RecordingPage("rate_table.html.jinja", _rate_table, "rate table")
 """The page of a gyro on a rate table."""
 
 
@@ -68,3 +69,22 @@ def _summarise(view: RecordingView, points: Sequence[CalibrationPointRow]) -> st
     most = math.degrees(max(abs(point.table_rate) for point in points))
     rates = f"{counted(len(points), 'constant rate')} up to {number_text(most)} °/s"
     return summary_words(view, [rates])
+
+
+def _positions(site: Site, view: RecordingView, folder: Path) -> dict[str, Any]:
+    """Return what the template needs; ``folder`` is the recording's."""
+    rows = view.rows(CalibrationRow)
+    number = rows[0].rates if rows else None
+    return {
+        **about_of(site, view, [], folder),
+        "summary": summary_words(view, [] if number is None else [f"{number} positions"]),
+        "lines": list(attitude_lines(rows)),
+        "noise": noise_words(rows),
+        "findings": view.findings,
+        "command": site.again(view, "calibration"),
+        "page": {"looks": {}, "channels": [], "findings": []},
+    }
+
+
+POSITIONS = RecordingPage("positions.html.jinja", _positions, "several positions")
+"""The page of a triad that stood in several positions."""
