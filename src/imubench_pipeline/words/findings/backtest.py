@@ -13,7 +13,7 @@ class BacktestContradicts(
     FindingData,
     code="backtest_contradicts",
     affects=SLOW,
-    doubt="{channels} drifts more than its noise model predicts",
+    doubt="more drift of {channels} than its noise model predicts",
 ):
     """The errors over windows of the log are larger than predicted."""
 

@@ -44,7 +44,7 @@ class WarmUpDrift(
     FindingData,
     code="warm_up_drift",
     affects=SLOW | {"bias"},
-    doubt="{channels} drifts while the sensor warms up",
+    doubt="the bias of {channels} drifts during warm-up",
 ):
     """The bias settles exponentially from the start of the log."""
 

@@ -85,7 +85,7 @@ class TooManyLines(
     FindingData,
     code="too_many_lines",
     affects=frozenset({"S"}),
-    doubt="{channels} has too many spectral lines",
+    doubt="too many spectral lines in {channels}",
 ):
     """More sinusoids than a noise model has."""
 
