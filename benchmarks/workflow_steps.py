@@ -15,12 +15,13 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
+from imubench_pipeline import registry
 from imubench_pipeline.run.plan import Plan
 from imubench_pipeline.tables import schemas
 
 PROJECT = Path(__file__).parents[1]
 
-_FILES = ("common", "recordings", "experiments", "sensors")
+_FILES = ("common", "recordings", "sensors")
 _RULE = re.compile(r"^rule (\w+):\n((?:[ ].*\n|\n)*)", re.MULTILINE)
 _SECTION = re.compile(r"^    (input|output|params):\n((?:        .*\n|\n)*)", re.MULTILINE)
 _UNUSED = re.compile(r"^\w+:\n(?:    .*\n)*|\A[\s\S]*?(?=^RESULTS)", re.MULTILINE)
@@ -63,10 +64,14 @@ class OneRecording:
         self.folder = plan.run.results / "recordings" / self.sensor / self.recording
         self.folder.mkdir(parents=True, exist_ok=True)
         self._of = {"sensor": self.sensor, "recording": self.recording}
-        self._names: dict[str, Any] = vars(schemas) | {
-            "plan": _Uncoded(plan),
-            "rules": _Rules(self),
-        }
+        self._names: dict[str, Any] = (
+            vars(registry)
+            | vars(schemas)
+            | {
+                "plan": _Uncoded(plan),
+                "rules": _Rules(self),
+            }
+        )
         for code in _between_rules():
             exec(code, self._names)
 
