@@ -22,8 +22,11 @@ def decisive(margins: dict[str, float], recordings: Rows) -> RankingRow:
     [
         ({}, ""),
         ({"c": "motion"}, "c: the sensor was moved"),
-        ({"a": "x", "b": "y"}, "a: x; b: y"),
-        (dict.fromkeys(FIVE, "x"), "a: x; b: x; c: x; and 2 more"),
+        ({"a": "motion", "b": "stuck"}, "a: the sensor was moved; b: the data did not change"),
+        (
+            dict.fromkeys(FIVE, "motion"),
+            "a: the sensor was moved; b: the sensor was moved; c: the sensor was moved; and 2 more",
+        ),
     ],
 )
 def test_doubts_are_those_of_all_recordings(doubts: dict[str, str], text: str) -> None:
