@@ -5,7 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from imubench_pipeline.extensions.aided.axis_states import axis_states, split_into_steps, stack
+from imubench_pipeline.extensions.aided.axis_states import axis_states, stack
+from imubench_pipeline.extensions.aided.runs import Drive
+from imubench_pipeline.extensions.aided.trajectories import trajectory
 from imubench_pipeline.noise import NoiseModel
 
 RATE, WIDTH, STEPS = 50.0, 5, 10
@@ -82,8 +84,9 @@ def test_the_bias_at_switch_on_is_the_start_of_a_walk_or_a_state() -> None:
     assert walk.process_noise[0, 0] == pytest.approx(1e-8 / RATE)
 
 
-def test_steps_divide_the_time_between_fixes() -> None:
-    assert split_into_steps(100, 10) == (10, 10)
-    assert split_into_steps(32, 4) == (4, 8)
-    assert split_into_steps(7, 1) == (1, 7)
-    assert split_into_steps(51, 6) == (3, 17)
+@pytest.mark.parametrize(
+    ("rate", "width", "steps"), [(100.0, 10, 10), (32.0, 4, 8), (7.0, 1, 7), (51.0, 3, 17)]
+)
+def test_steps_divide_the_time_between_fixes(rate: float, width: int, steps: int) -> None:
+    drive = Drive(trajectory("rest", 2.0, rate), [])
+    assert (drive.width, drive.steps) == (width, steps)

@@ -11,13 +11,7 @@ from imubench_pipeline.registry import Block, Extension
 EXTENSION = Extension(
     name="aided",
     tables="aided.tables",
-    blocks=(
-        Block(
-            "run",
-            "navigate",
-            "aided.settings:NavigateSettings",
-        ),
-    ),
+    blocks=(Block("run", "navigate", "aided.settings:NavigateSettings"),),
     limits={"navigation": "aided.limits:outage_rows"},
     rules="rules.smk",
     pages=("aided.page:NAVIGATION",),

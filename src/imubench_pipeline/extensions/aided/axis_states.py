@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -81,8 +82,7 @@ def with_turn_on(space: StateSpace, turn_on: float) -> StateSpace:
     return StateSpace.together([space, StateSpace.scalar(1.0, 0.0, turn_on**2)])
 
 
-@dataclass(frozen=True)
-class StackedStates:
+class StackedStates(NamedTuple):
     """The states of all six axes over steps of several samples, for the compiled filter.
 
     There are m states, gyros x, y, z before accelerometers, and n steps between two GNSS fixes.
@@ -154,11 +154,8 @@ def stack(axes: Sequence[AxisStates], sampling: float, width: int, steps: int) -
         step[own, own], first_observation[own] = over[1:, 1:], over[0, 1:]
         noise_of_step[own, own] = noise[1:, 1:]
         step_state_covariance[own], step_variance[a] = noise[0, 1:], noise[0, 0]
-    sum_observation, sum_state_covariance, sum_variance = (
-        np.empty((steps, m)),
-        np.empty((steps, m)),
-        np.empty((steps, 6)),
-    )
+    sum_observation, sum_state_covariance = np.empty((2, steps, m))
+    sum_variance = np.empty((steps, 6))
     transition, noise = np.eye(m), np.zeros((m, m))
     for k in range(steps):
         sum_observation[k] = first_observation @ transition
@@ -182,12 +179,3 @@ def stack(axes: Sequence[AxisStates], sampling: float, width: int, steps: int) -
         scale=np.array([axis.scale for axis in axes]),
         output=whole.output,
     )
-
-
-def split_into_steps(samples: int, widest: int) -> tuple[int, int]:
-    """Return samples per step, and steps between two fixes, from the samples between the fixes.
-
-    A step has 1 to ``widest`` samples.
-    """
-    width = next(width for width in range(min(widest, samples), 0, -1) if samples % width == 0)
-    return width, samples // width

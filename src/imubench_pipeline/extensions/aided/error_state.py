@@ -15,6 +15,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from imubench_pipeline.extensions.aided.axis_states import StackedStates
 from imubench_pipeline.extensions.aided.strapdown import (
     GRAVITY_GRADIENT,
     copy,
@@ -26,7 +27,7 @@ from imubench_pipeline.extensions.aided.strapdown import (
 from imubench_pipeline.typing import Array
 
 NAVIGATION_STATES = 9
-"""Number of states of position, velocity and attitude."""
+"""Number of states of position, velocity (north, east, down) and attitude."""
 
 GROUPS = ("position", "velocity", "attitude", "gyro", "accel", "navigation")
 """Groups of states with a normalised squared error (NEES). The bias of an axis is the sum of its
@@ -34,9 +35,6 @@ states; ``navigation`` is the first three groups together."""
 
 DEGREES_OF_FREEDOM = (3, 3, 3, 3, 3, 9)
 """Degrees of freedom of each group."""
-
-ERROR_COLUMNS = 9
-"""Number of columns of the errors: position, velocity (north, east, down) and attitude."""
 
 
 @njit(cache=True, nogil=True)
@@ -81,18 +79,7 @@ def run(
     v: Array,
     C: Array,
     start: Array,
-    first: Array,
-    D: Array,
-    D_epoch: Array,
-    noise: Array,
-    sum_observation: Array,
-    sum_state_covariance: Array,
-    sum_variance: Array,
-    first_observation: Array,
-    start_of_states: Array,
-    mean: Array,
-    scale: Array,
-    output: Array,
+    axes: StackedStates,
     width: int,
 ) -> tuple[Array, Array, Array, Array]:
     """Filter one run; p, v and C are changed in place.
@@ -118,8 +105,7 @@ def run(
         Initial estimate.
     start : ndarray, shape (9, 9)
         Covariance of its error.
-    first ... output
-        As in `axis_states.StackedStates`.
+    axes : StackedStates
     width : int
         Samples of a step.
 
@@ -132,7 +118,8 @@ def run(
     covariance : ndarray, shape (9 + m + s, 9 + m + s)
         Covariance of all states after the last epoch.
     """
-    E, steps = len(fixes), len(sum_observation)
+    E, steps = len(fixes), len(axes.sum_observation)
+    first, scale = axes.first, axes.scale
     m = first[6]
     of_scale = np.full(6, -1)
     total = NAVIGATION_STATES + m
@@ -143,54 +130,40 @@ def run(
     n_states = total - NAVIGATION_STATES
     P = np.zeros((total, total))
     copy(start, P)
-    for i in range(m):
-        for j in range(m):
-            P[NAVIGATION_STATES + i, NAVIGATION_STATES + j] = start_of_states[i, j]
+    copy(axes.start, P[NAVIGATION_STATES:, NAVIGATION_STATES:])
     for a in range(6):
         if of_scale[a] >= 0:
             P[of_scale[a], of_scale[a]] = scale[a] ** 2
     x = np.zeros(n_states)
     for j in range(m):
-        x[j] = mean[j]
+        x[j] = axes.mean[j]
     axis_of = np.empty(m, np.int64)
     for a in range(6):
         axis_of[first[a] : first[a + 1]] = a
 
-    errors, variances = np.empty((E, ERROR_COLUMNS)), np.empty((E, ERROR_COLUMNS))
+    errors, variances = np.empty((2, E, NAVIGATION_STATES))
     normalised = np.full((E, 6), math.nan)
     room = np.empty((4, 3, 3))
-    C_mid, turn, turned = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
-    A_step, A, A_new = (
-        np.empty((NAVIGATION_STATES, NAVIGATION_STATES)),
-        np.empty((NAVIGATION_STATES, NAVIGATION_STATES)),
-        np.empty((NAVIGATION_STATES, NAVIGATION_STATES)),
-    )
-    M = np.empty((NAVIGATION_STATES, 6))
-    B, Qnx = np.empty((NAVIGATION_STATES, n_states)), np.empty((NAVIGATION_STATES, n_states))
-    B_new, Q_new = np.empty((NAVIGATION_STATES, n_states)), np.empty((NAVIGATION_STATES, n_states))
-    MSQ = np.empty((NAVIGATION_STATES, 6))
-    Qnn, through = (
-        np.empty((NAVIGATION_STATES, NAVIGATION_STATES)),
-        np.empty((NAVIGATION_STATES, NAVIGATION_STATES)),
-    )
+    C_mid, turn, turned = np.empty((3, 3, 3))
+    A_step, A, A_new, Qnn, through = np.empty((5, NAVIGATION_STATES, NAVIGATION_STATES))
+    M, MSQ = np.empty((2, NAVIGATION_STATES, 6))
+    B, B_new, Qnx, Q_new = np.empty((4, NAVIGATION_STATES, n_states))
+    identity = np.eye(NAVIGATION_STATES)
     estimated, moved = np.zeros(6), np.zeros(6)
-    w, f, mean_force, error = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
-    whole = np.empty(NAVIGATION_STATES)
+    w, f, mean_force, error = np.empty((4, 3))
     dt = width * T
     k = 0
     for epoch in range(E):
-        A[:] = 0.0
-        for i in range(NAVIGATION_STATES):
-            A[i, i] = 1.0
+        copy(identity, A)
         B[:] = 0.0
         Qnx[:] = 0.0
         Qnn[:] = 0.0
         for part in range(steps):
-            # What the filter takes off each sample of this step.
+            # Estimated errors, subtracted from each sample of this step.
             for a in range(6):
                 s = 0.0
                 for j in range(first[a], first[a + 1]):
-                    s += first_observation[j] * x[j]
+                    s += axes.first_observation[j] * x[j]
                 estimated[a] = s / dt
                 moved[a] = 0.0
             mean_force[:] = 0.0
@@ -214,21 +187,18 @@ def run(
                 for i in range(3):
                     mean_force[i] += room[3, 0, i] / width
                 k += 1
-            # The states of the sensors go on.
+            # Prediction of the sensor states.
             for a in range(6):
                 for i in range(first[a], first[a + 1]):
                     s = 0.0
                     for j in range(first[a], first[a + 1]):
-                        s += D[i, j] * x[j]
-                    whole_sum = s
-                    B_new[0, i] = whole_sum
+                        s += axes.step[i, j] * x[j]
+                    B_new[0, i] = s
                 for i in range(first[a], first[a + 1]):
                     x[i] = B_new[0, i]
-            # Transition of the errors over the step, and what errors of the sums add.
+            # Transition of the errors over the step, and their sensitivity to errors of the sums.
             fx, fy, fz = mean_force
-            A_step[:] = 0.0
-            for i in range(NAVIGATION_STATES):
-                A_step[i, i] = 1.0
+            copy(identity, A_step)
             for i in range(3):
                 A_step[i, 3 + i] = dt
             A_step[3, 0] = A_step[4, 1] = -GRAVITY_GRADIENT * dt
@@ -258,14 +228,14 @@ def run(
                 M[5, j] = 0.5 * dt * (fy * gx - fx * gy)
                 for i in range(3):
                     M[i, j] = dt / 3.0 * M[3 + i, j]
-            # Covariances: first what the sums have in common with the errors so far.
+            # Covariances, first of the sums with the errors so far.
             MSQ[:] = 0.0
             for i in range(NAVIGATION_STATES):
                 for j in range(m):
-                    MSQ[i, axis_of[j]] += Qnx[i, j] * first_observation[j]
+                    MSQ[i, axis_of[j]] += Qnx[i, j] * axes.first_observation[j]
             for i in range(NAVIGATION_STATES):
                 for j in range(6):
-                    s = 0.5 * M[i, j] * sum_variance[part, j]
+                    s = 0.5 * M[i, j] * axes.sum_variance[part, j]
                     for r in range(NAVIGATION_STATES):
                         if A_step[i, r] != 0.0:
                             s += A_step[i, r] * MSQ[r, j]
@@ -289,7 +259,7 @@ def run(
                         for j in range(m):
                             Q_new[i, j] += c * Qnx[r, j]
                 for j in range(m):
-                    B_new[i, j] += M[i, axis_of[j]] * sum_observation[part, j]
+                    B_new[i, j] += M[i, axis_of[j]] * axes.sum_observation[part, j]
                 for a in range(6):
                     if of_scale[a] >= 0:
                         B_new[i, of_scale[a] - NAVIGATION_STATES] += M[i, a] * moved[a]
@@ -297,9 +267,9 @@ def run(
             for i in range(NAVIGATION_STATES):
                 for a in range(6):
                     for j in range(first[a], first[a + 1]):
-                        s = M[i, a] * sum_state_covariance[part, j]
+                        s = M[i, a] * axes.sum_state_covariance[part, j]
                         for r in range(first[a], first[a + 1]):
-                            s += D[j, r] * Q_new[i, r]
+                            s += axes.step[j, r] * Q_new[i, r]
                         Qnx[i, j] = s
             for i in range(NAVIGATION_STATES):
                 for j in range(NAVIGATION_STATES):
@@ -309,7 +279,7 @@ def run(
                             s += A_step[i, r] * A[r, j]
                     A_new[i, j] = s
             copy(A_new, A)
-        _predict(P, A, B, Qnn, Qnx, D_epoch, noise, first)
+        _predict(P, A, B, Qnn, Qnx, axes.epoch, axes.noise, first)
         if available[epoch]:
             x_error = _update(P, fixes[epoch], p, v, C, spread)
             for i in range(3):
@@ -322,6 +292,7 @@ def run(
                 x[j] += x_error[NAVIGATION_STATES + j]
         _orthonormal(C)
         # Errors: a turn in the frame that leads from the estimate to the truth.
+        whole = errors[epoch]
         for i in range(3):
             whole[i] = position[epoch, i] - p[i]
             whole[3 + i] = velocity[epoch, i] - v[i]
@@ -332,14 +303,13 @@ def run(
         for i in range(3):
             whole[6 + i] = -error[i]
         for i in range(NAVIGATION_STATES):
-            errors[epoch, i] = whole[i]
             variances[epoch, i] = P[i, i]
         for g in range(3):
             normalised[epoch, g] = _normalise_square(P, whole, 3 * g, 3)
         normalised[epoch, 5] = _normalise_square(P, whole, 0, NAVIGATION_STATES)
         for g in range(2):
             if not math.isnan(bias[epoch, 3 * g]):
-                normalised[epoch, 3 + g] = _of_biases(P, x, output, first, bias[epoch], 3 * g)
+                normalised[epoch, 3 + g] = _of_biases(P, x, axes, bias[epoch], 3 * g)
     return errors, variances, normalised, P
 
 
@@ -447,8 +417,7 @@ def _predict(
     for i in range(s_all):
         for j in range(i):
             both = 0.5 * (P[n + i, n + j] + P[n + j, n + i])
-            P[n + i, n + j] = both
-            P[n + j, n + i] = both
+            P[n + i, n + j] = P[n + j, n + i] = both
 
 
 @njit(cache=True, nogil=True)
@@ -493,8 +462,9 @@ def _orthonormal(C: Array) -> None:
 
 
 @njit(cache=True, nogil=True)
-def _of_biases(P: Array, x: Array, output: Array, first: Array, true: Array, offset: int) -> float:
+def _of_biases(P: Array, x: Array, axes: StackedStates, true: Array, offset: int) -> float:
     """Return the normalised error squared of the slow errors of three axes, from ``offset`` on."""
+    first, output = axes.first, axes.output
     covariance, error = np.zeros((3, 3)), np.empty(3)
     for a in range(3):
         own = range(first[offset + a], first[offset + a + 1])

@@ -32,15 +32,11 @@ def outage_rows(
     recordings: Iterable[RecordingRow],
     requirements: Mapping[str, Requirement],
 ) -> Iterator[OutageErrorRow]:
-    """Yield the rows of the outage limits, for every sensor with static recordings.
-
-    ``recordings`` are the rows of this table. A sensor without a filter run has no
-    figure.
-    """
+    """Yield the rows of the outage limits, for every sensor with static recordings."""
     runs: dict[tuple[Any, ...], NavigationRow] = {}
-    for run in NavigationRow.rows_of(navigation):
-        if run.recommended and run.signals != "log" and run.position is not None:
-            runs[run.sensor, run.trajectory, run.outage] = run
+    for row in NavigationRow.rows_of(navigation):
+        if row.recommended and row.signals != "log" and row.position is not None:
+            runs[row.sensor, row.trajectory, row.outage] = row
     of_sensors: dict[str, RecordingRow] = {}
     for recording in recordings:
         if recording.status == "ok" and recording.kind == "static":
@@ -48,21 +44,17 @@ def outage_rows(
     for name, requirement in requirements.items():
         for limit in requirement.in_outages:
             for sensor, about in of_sensors.items():
-                found = runs.get((sensor, limit.trajectory, limit.seconds))
-                yield _make_row(name, requirement, limit, found or about, found)
+                run = runs.get((sensor, limit.trajectory, limit.seconds), about)
+                yield _make_row(name, requirement, limit, run)
 
 
 def _make_row(
-    name: str,
-    requirement: Requirement,
-    limit: Limit,
-    about: NavigationRow | RecordingRow,
-    run: NavigationRow | None,
+    name: str, requirement: Requirement, limit: Limit, run: NavigationRow | RecordingRow
 ) -> OutageErrorRow:
     allowed = limit.size / requirement.sigmas
     unknown = OutageErrorRow(
-        sensor=about.sensor,
-        recording=about.recording,
+        sensor=run.sensor,
+        recording=run.recording,
         requirement=name,
         axis=requirement.axis,
         error=limit.error,
@@ -73,7 +65,7 @@ def _make_row(
         unit=SI_UNITS[DIMENSIONS[limit.error]],
         reason="no filter was run for this sensor (setting navigate: of)",
     )
-    if run is None:
+    if isinstance(run, RecordingRow):
         return unknown
     if run.consistent is False:
         inside = 100.0 * (run.nees_inside or 0.0)
@@ -81,10 +73,15 @@ def _make_row(
             f"the filter of this sensor goes astray: NEES is inside in {inside:.0f} % instead of 95"
         )
         return replace(unknown, reason=reason)
-    found = _get_error(run, limit.error)
-    if found is None:
+    found = {
+        "position": (run.position, run.position_lower, run.position_upper),
+        "velocity": (run.velocity, run.velocity_lower, run.velocity_upper),
+        "heading": (run.heading, run.heading_lower, run.heading_upper),
+    }[limit.error]
+    sizes = [size / _AXIS_FACTORS[limit.error] for size in found if size is not None]
+    if len(sizes) < len(found):
         return replace(unknown, reason=f"the runs do not tell the error of the {limit.error}")
-    sigma, lower, upper = (size / _AXIS_FACTORS[limit.error] for size in found)
+    sigma, lower, upper = sizes
     spread = math.log(upper / lower) / (2.0 * NORMAL_QUANTILE)
     assumed = f"; assumed: {run.assumed}" if run.assumed else ""
     return replace(
@@ -95,15 +92,3 @@ def _make_row(
         within=float(ndtr(math.log(allowed / sigma) / spread)),
         reason=_LIMITS_NOTE + assumed,
     )
-
-
-def _get_error(run: NavigationRow, error: str) -> tuple[float, float, float] | None:
-    """Return the root mean square of an error with its limits."""
-    value, lower, upper = {
-        "position": (run.position, run.position_lower, run.position_upper),
-        "velocity": (run.velocity, run.velocity_lower, run.velocity_upper),
-        "heading": (run.heading, run.heading_lower, run.heading_upper),
-    }[error]
-    if value is None or lower is None or upper is None:
-        return None
-    return value, lower, upper

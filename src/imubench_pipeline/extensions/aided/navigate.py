@@ -1,8 +1,7 @@
 """Run filters with different tunings for a sensor on simulated drives with GNSS outages.
 
-Their signals are simulated with the true model of a simulated recording, low-pass and register
-included, or, of a measured one, with the model that was found of it; or they are pieces of the log
-itself, where it is long enough.
+The signals are simulated with the true model of a simulated recording (low-pass and register
+included) or with the estimated model of a measured one, or they are pieces of a long log.
 """
 
 from __future__ import annotations
@@ -18,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from imubench_pipeline.estimators.rows import recommended_estimates
-from imubench_pipeline.extensions.aided.axis_states import AxisStates, axis_states
+from imubench_pipeline.extensions.aided.axis_states import axis_states
 from imubench_pipeline.extensions.aided.error_state import GROUPS
 from imubench_pipeline.extensions.aided.measures import (
     ERRORS,
@@ -41,7 +40,14 @@ from imubench_pipeline.extensions.aided.settings import NavigateSettings
 from imubench_pipeline.extensions.aided.signals import Signals, Spreads, signals
 from imubench_pipeline.extensions.aided.tables import NavigationRow
 from imubench_pipeline.extensions.aided.trajectories import trajectory
-from imubench_pipeline.extensions.aided.tunings import TRUE, Models, all_axes, scaled, tunings
+from imubench_pipeline.extensions.aided.tunings import (
+    TRUE,
+    Models,
+    all_axes,
+    complete_axes,
+    scaled,
+    tunings,
+)
 from imubench_pipeline.model.estimates import LowPassRow
 from imubench_pipeline.model.recordings import RecordingRow
 from imubench_pipeline.noise import NoiseModel
@@ -84,15 +90,13 @@ class _Source:
 
 
 def navigate(folders: Sequence[Path], sensor: str, settings: str) -> Iterator[NavigationRow]:
-    """Yield the rows of the table ``navigation`` of a sensor.
+    """Yield the rows of the table ``navigation`` of a sensor, of its longest usable recording.
 
-    Of the longest of its static recordings that can be used, in ``folders``; `settings`: of
-    `imubench_pipeline.extensions.aided.plan.navigate_settings`.
+    ``folders`` are its static recordings, ``settings`` are from `plan.navigate_settings`.
     """
     sections = json.loads(settings)
-    how = _add_requirements(
-        NavigateSettings.model_validate(sections["navigate"]), sections["asked"]
-    )
+    how = NavigateSettings.model_validate(sections["navigate"])
+    how = _add_requirements(how, sections["asked"])
     declared = Sensor.model_validate(sections["sensor"]) if sections["sensor"] else None
     truths = {
         entry.recording: entry
@@ -104,26 +108,34 @@ def navigate(folders: Sequence[Path], sensor: str, settings: str) -> Iterator[Na
         fitted = {name: scaled(each.model, 1.0) for name, each in best.items()}
         if not fitted:
             continue
-        names = {"sensor": sensor, "recording": about.recording}
-        untold = NavigationRow(sensor=sensor, recording=about.recording, tuning=TRUE)
         rate = about.rate or 0.0
-        if rate < _MIN_RATE:
-            slow = f"samples of {rate:.3g} Hz; expected {_MIN_RATE:g} Hz or more"
-            for course in how.trajectories:
-                yield replace(untold, trajectory=course, reason=slow)
-            return
-        stand_in = _substitute_accelerometers(fitted, how)
+        stand_in: Models = {}
+        if not any(
+            quantity_of(name) == "accel" and model.N > 0.0 for name, model in fitted.items()
+        ):
+            stand_in = {"accel_x": NoiseModel(N=quantity_to_si(how.accel_noise, "accel_density"))}
         fitted |= stand_in
-        if all_axes(fitted) is None:
+        lacking = None
+        if rate < _MIN_RATE:
+            lacking = f"samples of {rate:.3g} Hz; expected {_MIN_RATE:g} Hz or more"
+        elif all_axes(fitted) is None:
             lacking = "the recording tells no white noise of a gyro"
+        if lacking is not None:
             for course in how.trajectories:
-                yield replace(untold, trajectory=course, reason=lacking)
+                yield NavigationRow(
+                    sensor=sensor,
+                    recording=about.recording,
+                    tuning=TRUE,
+                    trajectory=course,
+                    reason=lacking,
+                )
             return
         longest = max(quantity_to_si(length, "time") for length in how.outages)
         tuned, lacking_of = tunings(folder, sensor, declared, longest, stand_in)
         truth = truths.get(about.recording)
         methods = [each.method for each in best.values()]
         chosen = max(sorted(set(methods)), key=methods.count)
+        names = {"sensor": sensor, "recording": about.recording}
         for source in _list_sources(folder, about, rate, fitted, stand_in, truth, how):
             for row in _make_rows(names, how, source, tuned, lacking_of):
                 yield replace(
@@ -153,13 +165,6 @@ def _add_requirements(
     )
 
 
-def _substitute_accelerometers(fitted: Models, how: NavigateSettings) -> Models:
-    """Return substitute accelerometer models for a log without accelerometer noise."""
-    if any(quantity_of(name) == "accel" and model.N > 0.0 for name, model in fitted.items()):
-        return {}
-    return {"accel_x": NoiseModel(N=quantity_to_si(how.accel_noise, "accel_density"))}
-
-
 def _list_sources(
     folder: Path,
     about: RecordingRow,
@@ -170,62 +175,60 @@ def _list_sources(
     how: NavigateSettings,
 ) -> Iterator[_Source]:
     """Yield the sources of signals: the simulator, and a measured log."""
-    block = _choose_block(logged, how)
-    spreads = _make_spreads(how)
+    axes: dict[str, SensorModel] = {}
     known = truth is not None and not truth.simulated_sensors
     if known and truth is not None:
         axes = {str(name): model for name, model in imu_model(truth.channels, truth).axes.items()}
     else:
-        axes = {
-            channel: _model_before_filter(folder, channel, noise, logged)
-            for channel, noise in fitted.items()
+        low_pass = {
+            row.channel: LowPass(row.value, row.order)
+            for row in LowPassRow.rows_of(read("low_pass", [folder / "low_pass.parquet"]))
+            if row.parameter == "cutoff" and row.value is not None and row.order is not None
         }
+        for channel, noise in fitted.items():
+            plain = SensorModel(low_pass=low_pass.get(channel))
+            axes[channel] = replace(plain, noise=before_the_filter(plain, noise, logged))
     axes |= {channel: SensorModel(noise=noise) for channel, noise in stand_in.items()}
-    axes = {channel: replace(model, bias=0.0, scale_error=0.0) for channel, model in axes.items()}
-    whole = _complete_models(axes)
+    axes = complete_axes(
+        {channel: replace(model, bias=0.0, scale_error=0.0) for channel, model in axes.items()}
+    )
     true = {
         channel: replace(model.noise, N=in_the_log(model, logged))
-        for channel, model in whole.items()
+        for channel, model in axes.items()
     }
     change = (
         difference_to_si(how.temperature_change, "temperature") if how.temperature_change else 0.0
     )
+    reference = next((m.drift.reference for m in axes.values() if m.drift is not None), 25.0)
+    block = max(math.ceil(logged / quantity_to_si(how.rate, "frequency") - 1e-6), 1)
+    sampling = logged / block
 
-    def simulated(drive: Drive, course: str, number: int) -> Signals:
-        samples, reference = len(drive.trajectory.rate) * block, _find_reference(whole)
+    def of_run(
+        drive: Drive, course: str, number: int, pieces: Sequence[Mapping[str, Array]] = ()
+    ) -> Signals:
+        samples = len(drive.trajectory.rate) * block
         return signals(
             drive.trajectory,
-            whole,
-            spreads,
+            axes,
+            _make_spreads(how),
             drive.every,
             how.seed,
-            (about.sensor, about.recording, course, str(number)),
-            block=block,
+            (about.sensor, about.recording, course, f"log {number}" if pieces else str(number)),
+            block=1 if pieces else block,
             temperature=(
                 (lambda start, stop: reference + change * np.arange(start, stop) / samples)
-                if change
+                if change and not pieces
                 else None
             ),
+            added=pieces[number] if pieces else None,
         )
 
-    sampling = logged / block
-    yield _Source("truth" if known else "estimate", sampling, how.runs, simulated, true)
+    yield _Source("truth" if known else "estimate", sampling, how.runs, of_run, true)
     if not about.simulated:
         pieces = _cut_pieces(folder, block, round(quantity_to_si(how.duration, "time") * sampling))
         if len(pieces) >= _MIN_PIECES:
-
-            def of_log(drive: Drive, course: str, number: int) -> Signals:
-                return signals(
-                    drive.trajectory,
-                    whole,
-                    spreads,
-                    drive.every,
-                    how.seed,
-                    (about.sensor, about.recording, course, f"log {number}"),
-                    added=pieces[number],
-                )
-
-            yield _Source("log", sampling, min(len(pieces), how.runs), of_log, None)
+            runs = min(len(pieces), how.runs)
+            yield _Source("log", sampling, runs, partial(of_run, pieces=pieces), None)
 
 
 def _make_spreads(how: NavigateSettings) -> Spreads:
@@ -237,43 +240,10 @@ def _make_spreads(how: NavigateSettings) -> Spreads:
     )
 
 
-def _complete_models(axes: Mapping[str, SensorModel]) -> dict[str, SensorModel]:
-    """Return models of all six channels, as `all_axes`."""
-    whole = {}
-    for channel in CHANNELS:
-        own = [name for name in axes if quantity_of(name) == quantity_of(channel)]
-        whole[channel] = axes[
-            channel if channel in own else own["xyz".index(channel[-1]) % len(own)]
-        ]
-    return whole
-
-
-def _find_reference(axes: Mapping[str, SensorModel]) -> float:
-    return next((m.drift.reference for m in axes.values() if m.drift is not None), 25.0)
-
-
-def _model_before_filter(folder: Path, channel: str, noise: NoiseModel, rate: float) -> SensorModel:
-    """Return the model of an axis from the estimates of a log, with its low-pass; rate in Hz."""
-    rows = LowPassRow.rows_of(read("low_pass", [folder / "low_pass.parquet"]))
-    filters = [
-        LowPass(row.value, row.order)
-        for row in rows
-        if row.channel == channel and row.parameter == "cutoff"
-        if row.value is not None and row.order is not None
-    ]
-    plain = SensorModel(low_pass=filters[-1] if filters else None)
-    return replace(plain, noise=before_the_filter(plain, noise, rate))
-
-
-def _choose_block(logged: float, how: NavigateSettings) -> int:
-    """Return the number of samples of a log, at a rate in Hz, per sample of the filter."""
-    return max(math.ceil(logged / quantity_to_si(how.rate, "frequency") - 1e-6), 1)
-
-
 def _cut_pieces(folder: Path, block: int, size: int) -> list[dict[str, Array]]:
-    """Return pieces of a log of ``size`` means over ``block`` samples, less the mean of the log.
+    """Return pieces of ``size`` means over ``block`` samples, less the mean of the log.
 
-    Those with a hole in a channel lack it.
+    A channel with a hole is absent from the piece.
     """
     pieces: list[dict[str, Array]] = []
     for channel, log in kept_static_logs(folder).items():
@@ -300,72 +270,61 @@ def _make_rows(
     duration = quantity_to_si(how.duration, "time")
     spreads = _make_spreads(how)
     models = dict(tuned) | ({TRUE: source.true} if source.true is not None else {})
+    states = {
+        name: [
+            axis_states(
+                model[channel],
+                source.sampling,
+                turn_on=spreads.bias(channel),
+                shortest=FIX_INTERVAL,
+                longest=duration,
+                scale=spreads.scale(channel),
+            )
+            for channel in CHANNELS
+        ]
+        for name, model in models.items()
+    }
     for course in how.trajectories:
         drive = Drive(trajectory(course, duration, source.sampling), schedule(duration, lengths))
-        outcomes = drive.repeat(
-            {
-                name: _make_states(model, source.sampling, spreads, duration)
-                for name, model in models.items()
-            },
-            partial(source.of_run, drive, course),
-            source.runs,
-        )
+        outcomes = drive.repeat(states, partial(source.of_run, drive, course), source.runs)
         about: dict[str, Any] = dict(names) | {
             "trajectory": course,
             "signals": source.words,
             "runs": source.runs,
         }
-        told = [
-            NavigationRow(
-                **(
-                    about
-                    | _describe_tuning(drive, outcomes, name, length)
-                    | _list_bank_shares(models[name])
-                ),
-                model=_describe_terms(models[name]),
-            )
-            for name in models
-            for length in (None, *lengths)
-        ]
-        smallest = _choose_smallest(told)
-        for row in told:
-            yield replace(row, smallest=row.tuning == smallest)
+        told = {
+            name: [
+                NavigationRow(**about | _describe_tuning(drive, outcomes, name, model, length))
+                for length in (None, *lengths)
+            ]
+            for name, model in models.items()
+        }
+        # The consistent tuning with the fewest states; of several, the one with the best position
+        # after the longest outage. The true model is none.
+        consistent = {
+            name: (own[0].states or 0, own[-1].position or 0.0)
+            for name, own in told.items()
+            if name != TRUE and all(row.consistent for row in own)
+        }
+        smallest = min(consistent, key=lambda name: consistent[name], default=None)
+        for name, own in told.items():
+            for row in own:
+                yield replace(row, smallest=name == smallest)
         for name, reason in lacking.items():
             yield NavigationRow(**about, tuning=name, reason=reason)
 
 
-def _make_states(
-    models: Models, sampling: float, spreads: Spreads, duration: float
-) -> list[AxisStates]:
-    return [
-        axis_states(
-            models[channel],
-            sampling,
-            turn_on=spreads.bias(channel),
-            shortest=FIX_INTERVAL,
-            longest=duration,
-            scale=spreads.scale(channel),
-        )
-        for channel in CHANNELS
-    ]
-
-
-def _describe_terms(models: Models) -> str:
-    """Describe the terms of the models of gyros and accelerometers."""
-    return "; ".join(
-        f"{quantity} {', '.join(dict.fromkeys(models[c].name for c in own))}"
-        for quantity in ("gyro", "accel")
-        if (own := [c for c in CHANNELS if quantity_of(c) == quantity])
-    )
-
-
 def _describe_tuning(
-    drive: Drive, outcomes: Mapping[str, Outcome], name: str, length: float | None
+    drive: Drive, outcomes: Mapping[str, Outcome], name: str, models: Models, length: float | None
 ) -> dict[str, Any]:
     """Return the fields of a row about a tuning, at the end of outages, s, or with fixes."""
     outcome = outcomes[name]
+    terms: dict[str, dict[str, None]] = {"gyro": {}, "accel": {}}
+    for channel in CHANNELS:
+        terms[quantity_of(channel)][models[channel].name] = None
     row: dict[str, Any] = {
         "tuning": name,
+        "model": "; ".join(f"{quantity} {', '.join(own)}" for quantity, own in terms.items()),
         "outage": length,
         "outages": sum(o.length == length for o in drive.outages) * len(outcome.errors),
         "states": outcome.states,
@@ -382,26 +341,16 @@ def _describe_tuning(
                 f"{error}_ratio_lower": against.lower,
                 f"{error}_ratio_upper": against.upper,
             }
+    # A bank of processes has none shorter than an epoch: its states are no true bias.
+    of_bank = {quantity_of(c) for c, model in models.items() if "F" in model.name.split("+")}
     for group in GROUPS:
         share = inside(drive, outcome, group, length)
         if group != "navigation":
-            row[f"nees_{group}"] = share and share.value
+            row[f"nees_{group}"] = share.value if share and group not in of_bank else None
         elif share is not None:
-            row |= {
-                "nees_inside": share.value,
-                "nees_error": share.error,
-                "consistent": _is_consistent(share),
-            }
+            row["nees_inside"], row["nees_error"] = share.value, share.error
+            row["consistent"] = _is_consistent(share)
     return row
-
-
-def _list_bank_shares(models: Models) -> dict[str, None]:
-    """Return the shares that are null: those of biases that a bank of processes only stands for.
-
-    It has no process shorter than an epoch, so that its states are no truth to hold a filter to.
-    """
-    flickering = [name for name, model in models.items() if "F" in model.name.split("+")]
-    return {f"nees_{quantity_of(name)}": None for name in flickering}
 
 
 def _is_consistent(share: Share) -> bool | None:
@@ -410,19 +359,3 @@ def _is_consistent(share: Share) -> bool | None:
     if off > _SHARE_TOLERANCE + 3.0 * share.error:
         return False
     return True if off + 2.0 * share.error <= _MAX_SHARE_ERROR + 1e-9 else None
-
-
-def _choose_smallest(rows: Sequence[NavigationRow]) -> str | None:
-    """Return the consistent tuning (in all its rows) with the fewest states.
-
-    Of several that one whose position is best after the longest outage. The true model is none.
-    """
-    by_tuning: dict[str, list[NavigationRow]] = {}
-    for row in rows:
-        by_tuning.setdefault(row.tuning, []).append(row)
-    consistent = {
-        name: (own[0].states or 0, own[-1].position or 0.0)
-        for name, own in by_tuning.items()
-        if name != TRUE and all(row.consistent for row in own)
-    }
-    return min(consistent, key=lambda name: consistent[name], default=None)

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from typing import Any, TypeVar
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
 
 from imubench_pipeline.extensions.aided.tables import NavigationRow
 from imubench_pipeline.recordings.fitness import left_out
@@ -87,19 +87,15 @@ def answers(rows: Sequence[NavigationRow]) -> Iterator[dict[str, Any]]:
     The criterion is the position error after the longest outage, relative to the true model on the
     same signals.
     """
-    for (sensor, trajectory, signals), own in _group_rows(
-        rows, lambda row: (row.sensor, row.trajectory, row.signals)
-    ):
+    groups: dict[tuple[str, str | None, str | None], list[NavigationRow]] = {}
+    for row in rows:
+        groups.setdefault((row.sensor, row.trajectory, row.signals), []).append(row)
+    for (sensor, trajectory, signals), own in groups.items():
         longest = max(row.outage or 0.0 for row in own)
         last = [row for row in own if row.outage == longest and row.tuning != "true"]
         known = [row for row in last if row.position_ratio is not None]
         if not known:
             continue
-        worse = [row for row in known if _find_ratio_limits(row)[0] > _MIN_RELEVANT_RATIO]
-        no_worse = [row for row in known if _find_ratio_limits(row)[1] < _MIN_RELEVANT_RATIO]
-        equal = [row for row in no_worse if _find_ratio_limits(row)[0] > 1.0 / _MIN_RELEVANT_RATIO]
-        no_worse = [row for row in no_worse if row not in equal]
-        inconclusive = [row for row in known if row not in worse + equal + no_worse]
         smallest = next((row for row in own if row.smallest), None)
         yield {
             "sensor": sensor,
@@ -109,10 +105,8 @@ def answers(rows: Sequence[NavigationRow]) -> Iterator[dict[str, Any]]:
             "runs": own[0].runs,
             "words": _SIGNAL_TEXTS[signals],
             "outage": f"{number_text(longest)} s",
-            "matters": _describe_effect(worse, equal, no_worse, inconclusive),
-            "smallest": None
-            if smallest is None
-            else f"{TUNINGS[smallest.tuning]}, {smallest.states} states",
+            "matters": _describe_effect(known),
+            "smallest": smallest and f"{TUNINGS[smallest.tuning]}, {smallest.states} states",
             "dishonest": ", ".join(
                 dict.fromkeys(TUNINGS[row.tuning] for row in own if row.consistent is False)
             )
@@ -120,62 +114,53 @@ def answers(rows: Sequence[NavigationRow]) -> Iterator[dict[str, Any]]:
         }
 
 
-def _find_ratio_limits(row: NavigationRow) -> tuple[float, float]:
-    """Return the limits of the ratio of positions; unknown limits are the widest possible."""
-    return _fill_limits(row.position_ratio_lower, row.position_ratio_upper)
-
-
 def _fill_limits(lower: float | None, upper: float | None) -> tuple[float, float]:
+    """Replace unknown limits by the widest possible ones."""
     return 0.0 if lower is None else lower, math.inf if upper is None else upper
 
 
-def _describe_effect(
-    worse: Sequence[NavigationRow],
-    equal: Sequence[NavigationRow],
-    no_worse: Sequence[NavigationRow],
-    inconclusive: Sequence[NavigationRow],
-) -> str:
+def _describe_effect(rows: Sequence[NavigationRow]) -> str:
     """Return which tunings are worse than the true model, equal to it, or undecided."""
-    parts = []
+    worse: list[str] = []
+    groups: dict[str, list[str]] = {"within 10 %": [], "at most 10 % worse": [], "inconclusive": []}
+    for row in rows:
+        name = TUNINGS[row.tuning]
+        lower, upper = _fill_limits(row.position_ratio_lower, row.position_ratio_upper)
+        if lower > _MIN_RELEVANT_RATIO:
+            worse.append(f"{name} {number_text(row.position_ratio, 3)} times")
+        elif upper >= _MIN_RELEVANT_RATIO:
+            groups["inconclusive"].append(name)
+        elif lower > 1.0 / _MIN_RELEVANT_RATIO:
+            groups["within 10 %"].append(name)
+        else:
+            groups["at most 10 % worse"].append(name)
+    parts = [f"{text}: {', '.join(names)}" for text, names in groups.items() if names]
     if worse:
-        by = ", ".join(
-            f"{TUNINGS[row.tuning]} {number_text(row.position_ratio, 3)} times" for row in worse
-        )
-        parts.append(f"The tuning matters: {by} the error of the true model")
-    for text, rows in (
-        ("within 10 %", equal),
-        ("at most 10 % worse", no_worse),
-        ("inconclusive", inconclusive),
-    ):
-        if rows:
-            parts.append(f"{text}: {', '.join(TUNINGS[row.tuning] for row in rows)}")
+        parts.insert(0, f"The tuning matters: {', '.join(worse)} the error of the true model")
     text = "; ".join(parts)
     return f"{text[0].upper()}{text[1:]}."
 
 
 def ranking(rows: Sequence[NavigationRow]) -> Iterator[dict[str, Any]]:
     """Yield the sensors by the position error after the longest outage, recommended tuning."""
-    for trajectory, own in _group_rows(rows, lambda row: row.trajectory):
-        chosen = [row for row in own if row.recommended and row.signals != "log"]
+    for trajectory in dict.fromkeys(row.trajectory for row in rows):
+        chosen = [
+            row
+            for row in rows
+            if row.trajectory == trajectory and row.recommended and row.signals != "log"
+        ]
         longest = max((row.outage or 0.0 for row in chosen), default=0.0)
-        last = sorted((row for row in chosen if row.outage == longest), key=_get_position)
+        last = [row for row in chosen if row.outage == longest]
+        last.sort(key=lambda row: math.inf if row.position is None else row.position)
+        limits = [_fill_limits(row.position_lower, row.position_upper) for row in last]
         for place, row in enumerate(last, start=1):
+            lower, upper = limits[place - 1]
             ties = [
-                other.sensor for other in last if other is not row and _is_overlapping(row, other)
+                other.sensor
+                for other, (low, high) in zip(last, limits, strict=True)
+                if other is not row and low <= upper and lower <= high
             ]
             yield line_of(row) | {"place": place, "ties": ties, "trajectory": trajectory}
-
-
-def _get_position(row: NavigationRow) -> float:
-    """Return the error of the position; infinity if unknown."""
-    return math.inf if row.position is None else row.position
-
-
-def _is_overlapping(one: NavigationRow, other: NavigationRow) -> bool:
-    """Tell whether the limits of two positions overlap."""
-    lower, upper = _fill_limits(one.position_lower, one.position_upper)
-    other_lower, other_upper = _fill_limits(other.position_lower, other.position_upper)
-    return other_lower <= upper and lower <= other_upper
 
 
 def line_of(row: NavigationRow) -> dict[str, Any]:
@@ -226,15 +211,3 @@ def _format_figure(
         number_text(None if size is None else factor * size, 3) for size in (value, lower, upper)
     )
     return text if low == high else f"{text} ({low} to {high})"
-
-
-_Key = TypeVar("_Key")
-
-
-def _group_rows(
-    rows: Sequence[NavigationRow], key: Callable[[NavigationRow], _Key]
-) -> Iterator[tuple[_Key, list[NavigationRow]]]:
-    groups: dict[_Key, list[NavigationRow]] = {}
-    for row in rows:
-        groups.setdefault(key(row), []).append(row)
-    yield from groups.items()

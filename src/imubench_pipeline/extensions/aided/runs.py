@@ -10,12 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from imubench_pipeline.extensions.aided.axis_states import (
-    AxisStates,
-    StackedStates,
-    split_into_steps,
-    stack,
-)
+from imubench_pipeline.extensions.aided.axis_states import AxisStates, StackedStates, stack
 from imubench_pipeline.extensions.aided.error_state import run
 from imubench_pipeline.extensions.aided.signals import Signals
 from imubench_pipeline.extensions.aided.strapdown import rotation
@@ -33,7 +28,6 @@ INITIAL_TILT_SIGMA, INITIAL_HEADING_SIGMA = math.radians(0.5), math.radians(2.0)
 
 WARM_UP = 120.0
 """Time with GNSS before the evaluation begins, s."""
-
 
 RECOVERY_TIME = 40.0
 """Time with GNSS between two outages, s."""
@@ -85,33 +79,28 @@ class Drive:
         self.trajectory = trajectory
         rate = trajectory.sampling
         self.every = max(round(rate * FIX_INTERVAL), 1)
-        self.width, self.steps = split_into_steps(self.every, math.ceil(rate * MAX_STEP))
+        widest = min(math.ceil(rate * MAX_STEP), self.every)
+        # The longest step that divides the time between two fixes.
+        self.width = next(width for width in range(widest, 0, -1) if self.every % width == 0)
+        self.steps = self.every // self.width
         self.at: NDArray[np.int64] = np.arange(self.every, len(trajectory.rate) + 1, self.every)
         self.times = self.at / rate
         self.available = np.ones(len(self.at), dtype=np.bool_)
         # An outage lasts from a fix to the first one after its end. If its length is not a multiple
         # of the period, the error at its exact end is interpolated between two epochs.
         self.period = self.every / rate
-        begun = [(o, int(np.searchsorted(self.times, o.begin + 1e-9)) - 1) for o in outages]
-        fitting = [
-            (o, last) for o, last in begun if last + self._epochs(o.length) < len(self.times)
-        ]
-        self.outages = [outage for outage, _ in fitting]
-        self.last_fixes = [last for _, last in fitting]
-        for outage, last in fitting:
-            self.available[last + 1 : last + 1 + self._epochs(outage.length)] = False
-        gnss = trajectory.gnss
-        self._spread = gnss.spread
-        sigmas = np.array(
-            [
-                *self._spread[:6],
-                INITIAL_TILT_SIGMA,
-                INITIAL_TILT_SIGMA,
-                min(INITIAL_HEADING_SIGMA, gnss.heading),
-            ]
-        )
-        self._start = np.diag(sigmas**2)
-        self._sigmas = sigmas
+        self.outages: list[Outage] = []
+        self.last_fixes: list[int] = []
+        for outage in outages:
+            last = int(np.searchsorted(self.times, outage.begin + 1e-9)) - 1
+            end = last + self._epochs(outage.length)
+            if end < len(self.times):
+                self.outages.append(outage)
+                self.last_fixes.append(last)
+                self.available[last + 1 : end + 1] = False
+        heading = min(INITIAL_HEADING_SIGMA, trajectory.gnss.heading)
+        attitude = [INITIAL_TILT_SIGMA, INITIAL_TILT_SIGMA, heading]
+        self._sigmas = np.array([*trajectory.gnss.spread[:6], *attitude])
 
     def _epochs(self, length: float) -> int:
         """Return the number of epochs of an outage of this length, s."""
@@ -134,7 +123,7 @@ class Drive:
         """Run the filter once; the result is as in `error_state.run`."""
         way = self.trajectory
         off = self._sigmas * signals.start
-        turn, C = np.empty((3, 3)), way.attitude[0]
+        turn = np.empty((3, 3))
         rotation(-off[6], -off[7], -off[8], turn)
         return run(
             signals.rate,
@@ -143,27 +132,16 @@ class Drive:
             way.earth,
             signals.fixes,
             self.available,
-            self._spread,
+            way.gnss.spread,
             way.position[self.at],
             way.velocity[self.at],
             way.attitude[self.at],
             signals.bias,
             way.position[0] - off[:3],
             way.velocity[0] - off[3:6],
-            turn @ C,
-            self._start,
-            stacked.first,
-            stacked.step,
-            stacked.epoch,
-            stacked.noise,
-            stacked.sum_observation,
-            stacked.sum_state_covariance,
-            stacked.sum_variance,
-            stacked.first_observation,
-            stacked.start,
-            stacked.mean,
-            stacked.scale,
-            stacked.output,
+            turn @ way.attitude[0],
+            np.diag(self._sigmas**2),
+            stacked,
             self.width,
         )
 
@@ -184,9 +162,9 @@ class Drive:
         with ThreadPoolExecutor(max(1, threads)) as pool:
             done = list(pool.map(once, range(runs)))
         outcomes = {}
-        for name in tunings:
+        for name, states in stacked.items():
             errors, variances, normalised = (
                 np.stack([each[name][part] for each in done]) for part in range(3)
             )
-            outcomes[name] = Outcome(errors, variances, normalised, stacked[name].states)
+            outcomes[name] = Outcome(errors, variances, normalised, states.states)
         return outcomes

@@ -9,7 +9,6 @@ from functools import partial
 import numpy as np
 
 from imubench_pipeline.extensions.aided.trajectories import Trajectory, headings
-from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.simulate import channel_rng
 from imubench_pipeline.settings.sensor import CHANNELS
 from imubench_pipeline.simulate.model import SensorModel
@@ -74,10 +73,8 @@ def signals(
 
     Parameters
     ----------
-    trajectory : Trajectory
     axes : mapping of str to SensorModel
-        Of all six channels.
-    spreads : Spreads
+        All six channels.
     every : int
         Samples between two fixes.
     seed : int
@@ -86,7 +83,7 @@ def signals(
     block : int
         Number of sensor samples per sample of the trajectory, which is their mean.
     temperature : callable, optional
-        °C, as `simulate.simulation.simulate_blocks` takes it, at the samples of the sensor.
+        °C at the samples of the sensor, as in `simulate.simulation.simulate_blocks`.
     added : mapping of str to ndarray, shape (L,)
         Errors of channels that replace simulated noise: pieces of a log at rest.
     """
@@ -99,23 +96,20 @@ def signals(
         turned_on = spreads.bias(channel) * rng.standard_normal()
         scale = spreads.scale(channel) * rng.standard_normal()
         model = replace(axes[channel], bias=axes[channel].bias + turned_on, scale_error=scale)
+        behind = (model.low_pass, model.drift, model.full_scale)
         if added is not None and channel in added:
             measured[i] = (1.0 + scale) * true[i] + turned_on + added[channel]
-        elif _is_plain(model):
-            slow = _simulate_slow_errors(model, rate, L * block, rng)
+        elif model.resolution == 0.0 and behind == (None, None, None):
+            # The log is the sum of motion and noise: the slow errors are known.
+            slow_model = replace(model, noise=replace(model.noise, N=0.0), scale_error=0.0)
+            slow = simulate(slow_model, rate, L * block, rng)
             white = model.noise.N * np.sqrt(trajectory.sampling) * rng.standard_normal(L)
             measured[i] = (1.0 + scale) * true[i] + _average_blocks(slow, block) + white
             bias[i] = slow[at * block - 1]
         else:
             course = np.repeat(true[i], block)
-            log = simulate(
-                model,
-                rate,
-                L * block,
-                rng,
-                true=partial(_slice_course, course),
-                temperature=temperature,
-            )
+            motion = partial(_slice_course, course)
+            log = simulate(model, rate, L * block, rng, true=motion, temperature=temperature)
             measured[i] = _average_blocks(log, block)
     rng = channel_rng(seed, *names, "gnss")
     heading = headings(trajectory.attitude[at])[:, None]
@@ -132,17 +126,3 @@ def _slice_course(course: Array, start: int, stop: int) -> Array:
 
 def _average_blocks(log: Array, block: int) -> Array:
     return log if block == 1 else np.asarray(log.reshape(-1, block).mean(axis=1))
-
-
-def _is_plain(model: SensorModel) -> bool:
-    """Return whether the log is just the sum of motion and noise."""
-    behind = (model.low_pass, model.drift, model.full_scale)
-    return behind == (None, None, None) and model.resolution == 0.0
-
-
-def _simulate_slow_errors(
-    model: SensorModel, rate: float, samples: int, rng: np.random.Generator
-) -> Array:
-    """Simulate the errors of an axis without its white noise."""
-    noise: NoiseModel = replace(model.noise, N=0.0)
-    return simulate(replace(model, noise=noise, scale_error=0.0), rate, samples, rng)

@@ -25,7 +25,7 @@ import math
 import numpy as np
 from numba import njit
 
-from imubench_pipeline.earth import EARTH_RATE, STANDARD_GRAVITY
+from imubench_pipeline.earth import STANDARD_GRAVITY
 from imubench_pipeline.typing import Array
 
 EARTH_RADIUS = 6371000.0
@@ -33,11 +33,6 @@ EARTH_RADIUS = 6371000.0
 
 GRAVITY_GRADIENT = STANDARD_GRAVITY / EARTH_RADIUS
 """Horizontal gradient of gravity, 1/s^2; the vertical one is twice as large."""
-
-
-def earth_rate_at(latitude: float) -> Array:
-    """Return the Earth's rate in the frame, rad/s, shape (3,), at a latitude in rad."""
-    return EARTH_RATE * np.array([math.cos(latitude), 0.0, -math.sin(latitude)])
 
 
 @njit(cache=True, nogil=True)

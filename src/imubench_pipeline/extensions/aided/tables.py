@@ -14,35 +14,31 @@ class NavigationRow(SensorRow):
     recording: Annotated[str, Column("whose estimates tune the filter")]
     trajectory: Annotated[str | None, Column("field, car, drone or rest")] = None
     outage: Annotated[
-        float | None,
-        Column("length of the outages of GNSS; null: epochs with GNSS", "s"),
+        float | None, Column("length of the outages of GNSS; null: epochs with GNSS", "s")
     ] = None
     tuning: Annotated[
         str,
         Column(
             "method of the estimate, datasheet, datasheet_misread, times_ten, table_1, overbound,"
-            " or true: the model of the simulated sensor",
+            " or true: the model of the simulated sensor"
         ),
     ]
     recommended: Annotated[bool | None, Column("the recommended estimate")] = None
-    model: Annotated[
-        str | None,
-        Column("terms of gyros and of accelerometers in the filter"),
-    ] = None
+    model: Annotated[str | None, Column("terms of gyros and of accelerometers in the filter")] = (
+        None
+    )
     states: Annotated[
-        int | None,
-        Column("of the filter, position, velocity and attitude included"),
+        int | None, Column("of the filter, position, velocity and attitude included")
     ] = None
     signals: Annotated[
         str | None,
         Column(
             "errors of the sensor: simulated by the truth of its recording, by its estimate, or "
-            "pieces of its log",
+            "pieces of its log"
         ),
     ] = None
     assumed: Annotated[
-        str | None,
-        Column("of another sensor, as the recording does not have it"),
+        str | None, Column("of another sensor, as the recording does not have it")
     ] = None
     runs: Annotated[int | None, Column("that a row is of")] = None
     outages: Annotated[int | None, Column("of this length in all runs")] = None
@@ -51,14 +47,12 @@ class NavigationRow(SensorRow):
         Column("rms of the error in the plane, at the end of outages or at all fixes", "m"),
     ] = None
     position_lower: Annotated[
-        float | None,
-        Column("lower 95 % limit, by the scatter of the runs", "m"),
+        float | None, Column("lower 95 % limit, by the scatter of the runs", "m")
     ] = None
     position_upper: Annotated[float | None, Column("upper 95 % limit", "m")] = None
     position_predicted: Annotated[float | None, Column("rms that the filter expects", "m")] = None
     position_ratio: Annotated[
-        float | None,
-        Column("rms relative to the true model on the same signals"),
+        float | None, Column("rms relative to the true model on the same signals")
     ] = None
     position_ratio_lower: Annotated[float | None, Column("lower 95 % limit")] = None
     position_ratio_upper: Annotated[float | None, Column("upper 95 % limit")] = None
@@ -67,14 +61,12 @@ class NavigationRow(SensorRow):
         Column("rms of the error in the plane, at the end of outages or at all fixes", "m/s"),
     ] = None
     velocity_lower: Annotated[
-        float | None,
-        Column("lower 95 % limit, by the scatter of the runs", "m/s"),
+        float | None, Column("lower 95 % limit, by the scatter of the runs", "m/s")
     ] = None
     velocity_upper: Annotated[float | None, Column("upper 95 % limit", "m/s")] = None
     velocity_predicted: Annotated[float | None, Column("rms that the filter expects", "m/s")] = None
     velocity_ratio: Annotated[
-        float | None,
-        Column("rms relative to the true model on the same signals"),
+        float | None, Column("rms relative to the true model on the same signals")
     ] = None
     velocity_ratio_lower: Annotated[float | None, Column("lower 95 % limit")] = None
     velocity_ratio_upper: Annotated[float | None, Column("upper 95 % limit")] = None
@@ -83,28 +75,24 @@ class NavigationRow(SensorRow):
         Column("rms of the error about the vertical, at the end of outages or at all fixes", "rad"),
     ] = None
     heading_lower: Annotated[
-        float | None,
-        Column("lower 95 % limit, by the scatter of the runs", "rad"),
+        float | None, Column("lower 95 % limit, by the scatter of the runs", "rad")
     ] = None
     heading_upper: Annotated[float | None, Column("upper 95 % limit", "rad")] = None
     heading_predicted: Annotated[float | None, Column("rms that the filter expects", "rad")] = None
     heading_ratio: Annotated[
-        float | None,
-        Column("rms relative to the true model on the same signals"),
+        float | None, Column("rms relative to the true model on the same signals")
     ] = None
     heading_ratio_lower: Annotated[float | None, Column("lower 95 % limit")] = None
     heading_ratio_upper: Annotated[float | None, Column("upper 95 % limit")] = None
     nees_inside: Annotated[
-        float | None,
-        Column("share of epochs with NEES within its 95 % bounds"),
+        float | None, Column("share of epochs with NEES within its 95 % bounds")
     ] = None
     nees_error: Annotated[float | None, Column("standard error of that share")] = None
     nees_position: Annotated[float | None, Column("likewise of the position alone")] = None
     nees_velocity: Annotated[float | None, Column("of the velocity")] = None
     nees_attitude: Annotated[float | None, Column("of the attitude")] = None
     nees_gyro: Annotated[
-        float | None,
-        Column("of the biases of the gyros; null: not known, or flicker"),
+        float | None, Column("of the biases of the gyros; null: not known, or flicker")
     ] = None
     nees_accel: Annotated[float | None, Column("of the biases of the accelerometers")] = None
     consistent: Annotated[
@@ -112,7 +100,6 @@ class NavigationRow(SensorRow):
         Column("that share, with twice its error, is 0.9 to 1; null: the runs do not tell"),
     ] = None
     smallest: Annotated[
-        bool | None,
-        Column("of the consistent tunings that with the fewest states"),
+        bool | None, Column("of the consistent tunings that with the fewest states")
     ] = None
     reason: Annotated[str | None, Column("why there is no such tuning")] = None

@@ -14,8 +14,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from imubench_pipeline.earth import STANDARD_GRAVITY
-from imubench_pipeline.extensions.aided.strapdown import earth_rate_at, inverse
+from imubench_pipeline.earth import EARTH_RATE, STANDARD_GRAVITY
+from imubench_pipeline.extensions.aided.strapdown import inverse
 from imubench_pipeline.typing import Array
 
 DEFAULT_LATITUDE = math.radians(45.0)
@@ -148,35 +148,19 @@ def _simulate_drone(time: Array, sampling: float) -> _Motion:
     return _Motion(speed, np.cumsum(rate) / sampling, climb, roll, pitch)
 
 
-def _simulate_rest(time: Array, sampling: float) -> _Motion:
-    """Return no motion."""
-    none = np.zeros_like(time)
-    return _Motion(none, none, none, none, none)
-
-
 _MOTIONS: Mapping[str, tuple[Callable[[Array, float], _Motion], Gnss]] = {
     "field": (_simulate_field, _RTK_RECEIVER),
     "car": (_simulate_car, _STANDALONE_RECEIVER),
     "drone": (_simulate_drone, _STANDALONE_RECEIVER),
-    "rest": (_simulate_rest, _TWO_ANTENNA_RECEIVER),
+    "rest": (lambda time, _: _Motion(*np.zeros((5, len(time)))), _TWO_ANTENNA_RECEIVER),
 }
 
 TRAJECTORY_NAMES = tuple(_MOTIONS)
 """Names of the trajectories."""
 
 
-def trajectory(
-    name: str, duration: float, sampling: float, latitude: float = DEFAULT_LATITUDE
-) -> Trajectory:
-    """Return a trajectory of a length in s at a rate in Hz, at a latitude in rad.
-
-    Raises
-    ------
-    ValueError
-        If there is none of that name.
-    """
-    if name not in _MOTIONS:
-        raise ValueError(f"trajectory {name!r}, expected one of {', '.join(TRAJECTORY_NAMES)}")
+def trajectory(name: str, duration: float, sampling: float) -> Trajectory:
+    """Return a trajectory of `TRAJECTORY_NAMES`, with a length in s, at a rate in Hz."""
     moves, gnss = _MOTIONS[name]
     time = np.arange(round(duration * sampling) + 1) / sampling
     motion = moves(time, sampling)
@@ -184,7 +168,7 @@ def trajectory(
         [motion.speed * np.cos(motion.course), motion.speed * np.sin(motion.course), -motion.climb]
     )
     attitude = attitudes(motion.roll, motion.pitch, motion.course)
-    earth = earth_rate_at(latitude)
+    earth = EARTH_RATE * np.array([math.cos(DEFAULT_LATITUDE), 0.0, -math.sin(DEFAULT_LATITUDE)])
     position, rate, force = inverse(np.zeros(3), velocity, attitude, 1.0 / sampling, earth)
     return Trajectory(position, velocity, attitude, rate, force, sampling, earth, gnss)
 

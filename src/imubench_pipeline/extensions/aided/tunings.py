@@ -6,12 +6,13 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import TypeVar
 
 import pyarrow.compute as pc
 
 from imubench_pipeline.datasheets.comparable import comparables
 from imubench_pipeline.estimators.estimate import Estimate
-from imubench_pipeline.estimators.rows import estimates
+from imubench_pipeline.estimators.rows import estimates, recommended_estimates
 from imubench_pipeline.export.overbound import overbound
 from imubench_pipeline.export.request import curve_of
 from imubench_pipeline.model.estimates import AllanRow
@@ -21,71 +22,61 @@ from imubench_pipeline.settings.validation import ConfigError
 from imubench_pipeline.simulate.from_datasheet import from_datasheet
 from imubench_pipeline.tables import read
 
+T = TypeVar("T")
+
 Models = dict[str, NoiseModel]
 """By channel."""
 
-DATASHEET, MISREAD, TENFOLD, TABLE_1, OVERBOUND, TRUE = (
-    "datasheet",
-    "datasheet_misread",
-    "times_ten",
-    "table_1",
-    "overbound",
-    "true",
-)
+DATASHEET, MISREAD, TENFOLD = "datasheet", "datasheet_misread", "times_ten"
+TABLE_1, OVERBOUND, TRUE = "table_1", "overbound", "true"
 """Tunings other than those named after a method."""
 
 _ESTIMATION_METHODS = ("curve", "paper", "weighted", "likelihood", "likelihood_gm", "compensated")
 _TENFOLD_FACTOR = 10.0
 
 
-def all_axes(models: Mapping[str, NoiseModel]) -> Models | None:
-    """Return models of all six channels; an axis that is not there has that of the next one.
-
-    None where there are no gyros, no accelerometers, or one of them has no white noise.
-    """
-    usable = {name: model for name, model in models.items() if model.N > 0.0}
+def complete_axes(models: Mapping[str, T]) -> dict[str, T]:
+    """Return models of all six channels; a missing axis takes one of the same quantity."""
     whole = {}
     for channel in CHANNELS:
-        own = [name for name in usable if quantity_of(name) == quantity_of(channel)]
-        if not own:
-            return None
+        own = [name for name in models if quantity_of(name) == quantity_of(channel)]
         here = channel if channel in own else own["xyz".index(channel[-1]) % len(own)]
-        whole[channel] = usable[here]
+        whole[channel] = models[here]
     return whole
 
 
-def stands_in(channel: str, stand_in: Models) -> bool:
-    """Tell whether a model of another sensor stands for the quantity of a channel."""
-    return any(quantity_of(channel) == quantity_of(other) for other in stand_in)
+def all_axes(models: Mapping[str, NoiseModel]) -> Models | None:
+    """Return models of all six channels; None if gyros or accelerometers have no white noise."""
+    usable = {name: model for name, model in models.items() if model.N > 0.0}
+    quantities = {quantity_of(name) for name in usable}
+    return complete_axes(usable) if quantities >= {"gyro", "accel"} else None
 
 
 def tunings(
     folder: Path, sensor: str, declared: Sensor | None, horizon: float, stand_in: Models
 ) -> tuple[dict[str, Models], dict[str, str]]:
-    """Return the tunings that a recording and the datasheet of its sensor give, by name.
+    """Return the tunings from a recording and the datasheet of its sensor, by name.
 
-    And, for those that there are not, the reason. ``horizon``, s, is that of the overbound;
-    ``stand_in`` are models of channels of a quantity that the recording does not have.
+    The second mapping has the reasons of missing tunings. ``horizon``, s, is for the overbound;
+    ``stand_in`` replaces the channels of a quantity that the recording does not have.
     """
     every = estimates(folder / "parameters.parquet", folder / "draws.parquet")
-    named: dict[str, Models] = {}
+    best = recommended_estimates(folder / "parameters.parquet", folder / "draws.parquet")
+    named = _make_printed_models(sensor, declared)
     lacking: dict[str, str] = {}
-    for name, models in _make_printed_models(sensor, declared).items():
-        named[name] = models
-    best = _select_recommended(folder, every)
     ten = {channel: scaled(estimate.model, _TENFOLD_FACTOR) for channel, estimate in best.items()}
-    candidates = {TENFOLD: ten, TABLE_1: _select_method(every, "authors")}
-    candidates |= {method: _select_method(every, method) for method in _ESTIMATION_METHODS}
+    named |= {TENFOLD: ten, TABLE_1: _select_method(every, "authors")}
+    named |= {method: _select_method(every, method) for method in _ESTIMATION_METHODS}
     try:
-        candidates[OVERBOUND] = _make_overbounds(folder, best, horizon)
+        named[OVERBOUND] = _make_overbounds(folder, best, horizon)
     except ValueError as error:
         lacking[OVERBOUND] = str(error)
-    for name, models in candidates.items():
-        if models:
-            named[name] = models
+    replaced = {quantity_of(channel) for channel in stand_in}
     found = {}
     for name, models in named.items():
-        own = {c: m for c, m in models.items() if not stands_in(c, stand_in)}
+        if not models:
+            continue
+        own = {c: m for c, m in models.items() if quantity_of(c) not in replaced}
         whole = all_axes(own | stand_in)
         if whole is None:
             lacking[name] = "it tells no white noise of a gyro or of an accelerometer"
@@ -106,19 +97,6 @@ def scaled(model: NoiseModel, factor: float) -> NoiseModel:
     )
 
 
-def _select_recommended(
-    folder: Path, every: Mapping[str, Sequence[Estimate]]
-) -> dict[str, Estimate]:
-    table = read("parameters", [folder / "parameters.parquet"])
-    rows = table.filter(pc.field("recommended")).select(["channel", "method"]).to_pylist()
-    method = {row["channel"]: row["method"] for row in rows}
-    return {
-        channel: next(each for each in own if each.method == method[channel])
-        for channel, own in every.items()
-        if channel in method
-    }
-
-
 def _select_method(every: Mapping[str, Sequence[Estimate]], method: str) -> Models:
     """Return the models of a method without a ramp and lines: no filter expects them to go on."""
     return {
@@ -130,13 +108,7 @@ def _select_method(every: Mapping[str, Sequence[Estimate]], method: str) -> Mode
 
 
 def _make_overbounds(folder: Path, best: Mapping[str, Estimate], horizon: float) -> Models:
-    """Return the smallest models of white noise and a walk above the curves.
-
-    Raises
-    ------
-    ValueError
-        If there is none for a channel.
-    """
+    """Return the smallest models of white noise and a walk above the curves (or ValueError)."""
     table = read("allan", [folder / "allan.parquet"])
     models = {}
     for channel, estimate in best.items():
@@ -144,10 +116,9 @@ def _make_overbounds(folder: Path, best: Mapping[str, Estimate], horizon: float)
         rate = float(curve.cluster_size[0] / curve.tau[0])
         drawn = estimate.draws
         many = [drawn.model(number) for number in range(len(drawn))] if drawn is not None else []
-        bound = overbound(
+        models[channel] = overbound(
             curve, estimate.model, rate, horizon=horizon, drawn=many, most_excess=_TENFOLD_FACTOR
-        )
-        models[channel] = bound.model
+        ).model
     return models
 
 
