@@ -17,11 +17,12 @@ from imubench_pipeline.extensions.aided.runs import (
     schedule,
 )
 from imubench_pipeline.extensions.aided.signals import Signals, Spreads, signals
-from imubench_pipeline.extensions.aided.strapdown import mechanise, rotation, turn_between
+from imubench_pipeline.extensions.aided.strapdown import rotation, turn_between
 from imubench_pipeline.extensions.aided.trajectories import Trajectory, headings, trajectory
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.settings.sensor import CHANNELS
 from imubench_pipeline.simulate.model import SensorModel
+from tests.aided.mechanisation import mechanise
 from tests.conftest import few
 
 # The filter takes longest of all to compile; every day, the demonstration has it.

@@ -8,7 +8,7 @@ import pytest
 import r3f
 
 from imubench_pipeline.earth import EARTH_RATE, STANDARD_GRAVITY
-from imubench_pipeline.extensions.aided.strapdown import EARTH_RADIUS, inverse, mechanise
+from imubench_pipeline.extensions.aided.strapdown import EARTH_RADIUS, inverse
 from imubench_pipeline.extensions.aided.trajectories import (
     DEFAULT_LATITUDE,
     TRAJECTORY_NAMES,
@@ -16,6 +16,7 @@ from imubench_pipeline.extensions.aided.trajectories import (
     headings,
     trajectory,
 )
+from tests.aided.mechanisation import mechanise
 
 
 @pytest.mark.parametrize("name", TRAJECTORY_NAMES)

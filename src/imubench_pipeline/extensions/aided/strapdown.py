@@ -10,9 +10,8 @@ Gravity points to the centre of the Earth and decreases with height, to first or
 from the start. This includes Schuler feedback, and holds for a drive of some 10 km.
 
 A sample is the mean of w and f over the interval that it ends, as of an integrating sensor. In an
-interval the mechanisation is of second order, and `inverse` is its exact inverse: `mechanise`
-reproduces the motion up to rounding. Therefore navigation errors come from sensors, GNSS or the
-start alone.
+interval the mechanisation (`step`) is of second order, and `inverse` is its exact inverse up to
+rounding. Therefore navigation errors come from sensors, GNSS or the start alone.
 
 Kernels loop over scalars, since numba compiles assignments to slices and sums of arrays into code
 that takes longer than the kernel itself.
@@ -109,42 +108,6 @@ def step(
     v[0] += T * ax
     v[1] += T * ay
     v[2] += T * az
-
-
-@njit(cache=True, nogil=True)
-def mechanise(
-    p: Array, v: Array, C: Array, rate: Array, force: Array, T: float, earth: Array
-) -> tuple[Array, Array, Array]:
-    """Return position, velocity and attitude from samples; the first is the start.
-
-    Parameters
-    ----------
-    p, v : ndarray, shape (3,)
-    C : ndarray, shape (3, 3)
-        The start.
-    rate, force : ndarray, shape (L, 3)
-        rad/s and m/s^2.
-    T : float
-        s.
-    earth : ndarray, shape (3,)
-
-    Returns
-    -------
-    tuple of ndarray, shapes (L + 1, 3), (L + 1, 3), (L + 1, 3, 3)
-    """
-    L = len(rate)
-    ps, vs, Cs = np.empty((L + 1, 3)), np.empty((L + 1, 3)), np.empty((L + 1, 3, 3))
-    for i in range(3):
-        ps[0, i], vs[0, i] = p[i], v[i]
-    copy(C, Cs[0])
-    here, speed, attitude = p.copy(), v.copy(), C.copy()
-    room = np.empty((4, 3, 3))
-    for k in range(L):
-        step(here, speed, attitude, rate[k], force[k], T, earth, room)
-        for i in range(3):
-            ps[k + 1, i], vs[k + 1, i] = here[i], speed[i]
-        copy(attitude, Cs[k + 1])
-    return ps, vs, Cs
 
 
 @njit(cache=True, nogil=True)

@@ -28,7 +28,7 @@ from imubench_pipeline.report.drop_zone import drop_zone_lines
 from imubench_pipeline.run import recovery
 from imubench_pipeline.run.lock import Lock, TakenError, lock_of
 from imubench_pipeline.run.project import snakefile_of
-from imubench_pipeline.settings.config import Run, read_config, read_run
+from imubench_pipeline.settings.config import read_config, read_run
 from imubench_pipeline.settings.validation import ConfigError
 from imubench_pipeline.tables import write_content, write_json
 from imubench_pipeline.tables.seals import night_place, seal_files
@@ -44,21 +44,10 @@ _CHANGED_WHILE_READ = "it was written to while it was read: what the results say
 
 
 class Night:
-    """A run of the workflow of a project.
+    """A run of the workflow of a project: a folder of logs, or a checkout.
 
-    Parameters
-    ----------
-    project : Path
-        Folder of logs, or a checkout.
-    config : sequence of str
-        Settings ``key=value`` beyond its file, as Snakemake takes them.
-    flags : sequence of str
-        Further flags of Snakemake.
-
-    Raises
-    ------
-    ConfigError
-        If the folder is neither of the two, or the settings cannot be read.
+    ``config`` has settings ``key=value`` beyond its file, ``flags`` further flags of Snakemake. A
+    ConfigError is raised for another folder, or settings that cannot be read.
     """
 
     def __init__(self, project: Path, config: Sequence[str], flags: Sequence[str] = ()) -> None:
@@ -66,10 +55,19 @@ class Night:
         self._snakefile = snakefile_of(self.project)
         if own := set(flags) & _OWN_FLAGS:
             raise ConfigError(f"{', '.join(own)}: expected --config of imubench nightly instead")
-        run = _read_run_settings(self.project / "config/config.yaml", config)
+        file = self.project / "config/config.yaml"
+        settings = read_config(file)
+        for entry in config:
+            key, equals, value = entry.partition("=")
+            if not equals:
+                raise ConfigError(f"--config: found {entry!r}; expected KEY=VALUE")
+            settings |= {key: yaml.load(value, Loader=yaml.BaseLoader)}
+        paths = {key: settings[key] for key in _PATH_SETTINGS if key in settings}
+        run = read_run(paths, f"{file} or --config")
         self.logs = self.project / run.logs
         self.results = self.project / run.results
         self.folder = self.results / "nightly"
+        self._state = self.folder / "state.json"
         self._always_held_back = run.held_back
         self._config = [entry for entry in config if not entry.startswith("held_back=")]
         self._flags = flags
@@ -92,7 +90,11 @@ class Night:
             lock.acquire(wait)
             self._began = datetime.now(UTC)
             self._wait_for_others(until)
-            before = self._read_previous_state()
+            try:
+                before = read_state(self._state)
+            except StateError as error:
+                before = None
+                self._put_right.append(str(error))
             self._recover(lock)
             seen, skips = settled(self.logs, settle, before.logs if before else {})
             try:
@@ -105,28 +107,15 @@ class Night:
             try:
                 self._keep(summary, after)
             except OSError as error:
-                why = [
-                    *summary.failure,
-                    f"the summary cannot be kept: {error}",
-                    *self._describe_disk_space(),
-                ]
-                return summary.model_copy(update={"outcome": "failed", "failure": why})
+                why = [f"the summary cannot be kept: {error}", *self._describe_disk_space()]
+                return summary.model_copy(
+                    update={"outcome": "failed", "failure": [*summary.failure, *why]}
+                )
         return summary
-
-    @property
-    def _state(self) -> Path:
-        return self.folder / "state.json"
 
     @property
     def _log(self) -> Path:
         return self.folder / f"{self._began:%Y%m%dT%H%M%SZ}.log"
-
-    def _read_previous_state(self) -> State | None:
-        try:
-            return read_state(self._state)
-        except StateError as error:
-            self._put_right.append(str(error))
-            return None
 
     def _wait_for_others(self, until: float) -> None:
         """Wait for a Snakemake that a user runs on these results."""
@@ -161,21 +150,19 @@ class Night:
 
     def _run_snakemake(self, cores: str, skips: Sequence[Skip], lock: Lock) -> list[str]:
         """Run Snakemake; return why it failed, if it did."""
+        names = {*self._always_held_back, *(skip.recording for skip in skips if skip.held_back)}
+        held_back = self.folder / "held_back.yaml"
+        write_json({"held_back": sorted(names)}, held_back)
         arguments = ["--snakefile", str(self._snakefile), f"-c{cores}", "--rerun-incomplete"]
-        arguments += [*self._flags, *self._held_back(skips)]
+        arguments += [*self._flags, "--configfile", str(held_back)]
+        if self._config:
+            arguments += ["--config", *self._config]
         status = run_snakemake(arguments, self.project, self._log, lock)
         if status == 0:
             return []
         messages = [f"a step said: {error}" for error in errors(self._log)[:_MAX_ERRORS]]
         why = f"Snakemake ended with exit status {status}; the last lines of its log:"
         return [*messages, why, *last_lines(self._log)]
-
-    def _held_back(self, skips: Sequence[Skip]) -> list[str]:
-        """Return the flags that hold logs back."""
-        names = {*self._always_held_back, *(skip.recording for skip in skips if skip.held_back)}
-        file = self.folder / "held_back.yaml"
-        write_json({"held_back": sorted(names)}, file)
-        return ["--configfile", str(file), *(["--config", *self._config] if self._config else [])]
 
     def _summarise(
         self,
@@ -188,11 +175,11 @@ class Night:
         fields: dict[str, Any] = {"outcome": "failed"}
         after, analysed = None, before.recordings if before else {}
         tables = None
-        try:
-            if not failure:
+        if not failure:
+            try:
                 tables = load_tables(self.results)
-        except (OSError, ValueError) as error:
-            failure = [f"the tables cannot be read: {error}"]
+            except (OSError, ValueError) as error:
+                failure = [f"the tables cannot be read: {error}"]
         held_back = {skip.recording for skip in skips if skip.held_back}
         late = sorted(moved(seen, look(self.logs)) - held_back)
         skips = [*skips, *(Skip(name, _CHANGED_WHILE_READ, held_back=False) for name in late)]
@@ -228,9 +215,9 @@ class Night:
 
     def _describe_disk_space(self) -> list[str]:
         free = disk_usage(self.results).free
-        return [f"the disk of the results has only {free / 1e6:.0f} MB left"] * (
-            free < _LOW_DISK_SPACE
-        )
+        if free >= _LOW_DISK_SPACE:
+            return []
+        return [f"the disk of the results has only {free / 1e6:.0f} MB left"]
 
     def _keep(self, summary: Summary, after: State | None) -> None:
         for name in (self._log.stem, "latest"):
@@ -245,19 +232,6 @@ class Night:
             seal_files(self.results, night_place("state"), [self._state], {})
 
 
-def _read_run_settings(file: Path, config: Sequence[str]) -> Run:
-    """Return where the logs and the results are; the rest is Snakemake's to read."""
-    settings = read_config(file)
-    for entry in config:
-        key, equals, value = entry.partition("=")
-        if not equals:
-            raise ConfigError(f"--config: found {entry!r}; expected KEY=VALUE")
-        settings |= {key: yaml.load(value, Loader=yaml.BaseLoader)}
-    return read_run(
-        {key: settings[key] for key in _PATH_SETTINGS if key in settings}, f"{file} or --config"
-    )
-
-
 @contextmanager
 def _interrupt_on_signals() -> Iterator[None]:
     """Handle the signals that end a service like Ctrl-C, for an orderly end."""
@@ -265,10 +239,9 @@ def _interrupt_on_signals() -> Iterator[None]:
     def stop(number: int, frame: FrameType | None) -> None:
         raise KeyboardInterrupt
 
-    numbers = [signal.SIGTERM, signal.SIGHUP]
     replaced = {
         number: signal.signal(number, stop)
-        for number in numbers
+        for number in (signal.SIGTERM, signal.SIGHUP)
         if signal.getsignal(number) is not signal.SIG_IGN  # as nohup wants it
     }
     try:

@@ -19,7 +19,7 @@ from imubench_pipeline.run.lock import INHERITED, Lock
 from imubench_pipeline.run.recovery import end_group
 
 _MAX_STOP_TIME = 60.0  # s; for Snakemake to stop its steps
-_MAX_LAST_LINES = 20  # last lines
+_MAX_LAST_LINES = 20
 _TRACEBACK = re.compile(
     r"^Traceback \(most recent call last\):\n(?:[ \t].*\n)*(\S.*)", re.MULTILINE
 )
@@ -34,11 +34,10 @@ def run_snakemake(arguments: Sequence[str], project: Path, output: Path, lock: L
     All output goes to the file `output`. Snakemake also holds the lock, since it may outlive this
     process.
     """
-    command = [sys.executable, "-m", "snakemake", *arguments]
     with output.open("ab", buffering=0) as file:
         terminal = _Terminal(file) if sys.stderr.isatty() else None
         process = subprocess.Popen(
-            command,
+            [sys.executable, "-m", "snakemake", *arguments],
             cwd=project,
             stdin=subprocess.DEVNULL,
             stdout=file,
@@ -85,7 +84,12 @@ class _Terminal:
         while True:
             ended = process.poll() is not None
             while select.select([self._begin], [], [], 0.0 if ended else 0.2)[0]:
-                self._pass_on(os.read(self._begin, 65536))
+                written = os.read(self._begin, 65536)
+                sys.stderr.buffer.write(written)
+                sys.stderr.buffer.flush()
+                *lines, self._pending = (self._pending + written).split(b"\n")
+                for line in lines:
+                    self._keep(line)
             if ended:
                 self._keep(self._pending)
                 self._keep(b"")
@@ -95,13 +99,6 @@ class _Terminal:
         """Close both ends."""
         os.close(self._begin)
         os.close(self.end)
-
-    def _pass_on(self, written: bytes) -> None:
-        sys.stderr.buffer.write(written)
-        sys.stderr.buffer.flush()
-        *lines, self._pending = (self._pending + written).split(b"\n")
-        for line in lines:
-            self._keep(line)
 
     def _keep(self, line: bytes) -> None:
         """Write a line to the file once the next line does not erase it."""
@@ -119,9 +116,8 @@ def errors(path: Path) -> list[str]:
 
 def last_lines(path: Path) -> list[str]:
     """Return the last lines of the output of a run, without empty ones."""
-    return [line.rstrip() for line in _read_output(path).splitlines() if line.strip()][
-        -_MAX_LAST_LINES:
-    ]
+    lines = [line.rstrip() for line in _read_output(path).splitlines() if line.strip()]
+    return lines[-_MAX_LAST_LINES:]
 
 
 def _read_output(path: Path) -> str:

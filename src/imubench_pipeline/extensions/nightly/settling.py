@@ -18,13 +18,7 @@ from pathlib import Path
 
 import psutil
 
-from imubench_pipeline.recordings.drop_zone import (
-    PARTIAL,
-    Recording,
-    found_logs,
-    name_of,
-    sensor_of,
-)
+from imubench_pipeline.recordings.drop_zone import PARTIAL, found_logs, name_of, sensor_of
 from imubench_pipeline.report.run_summary import one_line
 
 Signature = tuple[tuple[str, int, int], ...]
@@ -38,39 +32,20 @@ _MISSING = -1
 
 @dataclass(frozen=True)
 class Found:
-    """Files of one recording in the drop zone.
+    """Files of one recording in the drop zone."""
 
-    Attributes
-    ----------
-    files : Signature
-        Its files and notes, without files that are still being transferred.
-    partial : tuple or None
-        Relative path, size and last change of a file that is still being transferred.
-    incomplete : bool
-        Whether the partial file is a part of the recording, and not a later version of it.
-    """
-
-    files: Signature = ()
-    partial: tuple[str, int, int] | None = None
-    incomplete: bool = False
+    files: Signature = ()  # and notes, without files that are still being transferred
+    partial: tuple[str, int, int] | None = None  # signature of a file that is being transferred
+    incomplete: bool = False  # the partial file is a part of the recording, not a later version
 
 
 @dataclass(frozen=True)
 class Skip:
-    """A log, or a part of one, that is not read in this run.
+    """A log, or a part of one, that is not read in this run."""
 
-    Attributes
-    ----------
-    recording : str
-        Sensor and name, such as ``mti_7/night``.
-    held_back : bool
-        False: the recording is not held back. Either there is a complete log besides the partial
-        one, or the transfer of the partial one was given up long ago.
-    """
-
-    recording: str
+    recording: str  # sensor and name, such as mti_7/night
     reason: str
-    held_back: bool = True
+    held_back: bool = True  # False: there is a complete log, too, or the transfer was given up
 
 
 def look(logs: Path) -> dict[str, Found]:
@@ -82,7 +57,8 @@ def look(logs: Path) -> dict[str, Found]:
         key = f"{log.sensor}/{log.name}"
         before = recordings.get(key, Found())
         partial = next(_find_partial_files(log.path), before.partial)
-        recordings[key] = Found(before.files + _stat_files(log), partial, partial is not None)
+        files = tuple(_stat_file(path) for path in log.files or [log.path])
+        recordings[key] = Found(before.files + files, partial, partial is not None)
     for path in sorted(logs.glob("*/*")):
         whole = complete_name(path.name)
         if whole is not None and path.is_file():
@@ -112,26 +88,14 @@ def complete_name(name: str) -> str | None:
 def settled(
     logs: Path, settle: float, earlier: Mapping[str, Signature]
 ) -> tuple[dict[str, Found], list[Skip]]:
-    """Scan a drop zone for logs that are still being written, twice if logs are new.
+    """Return the last scan of a drop zone, and the logs that are still being written.
 
-    Parameters
-    ----------
-    logs : Path
-    settle : float
-        How long nothing of a complete log has changed, s.
-    earlier : mapping of str to Signature
-        The logs at an earlier run; unchanged logs need no second scan.
-
-    Returns
-    -------
-    dict of str to Found, and list of Skip
-        The last scan, and the logs that are still being written.
+    A complete log has not changed for ``settle``, s. Logs that are as they were at an ``earlier``
+    run need no second scan.
     """
-    first = look(logs)
-    second = first
+    first = second = look(logs)
     if settle and any(earlier.get(key) != recording.files for key, recording in first.items()):
-        pause = min(settle, _MAX_PAUSE)
-        time.sleep(pause)
+        time.sleep(min(settle, _MAX_PAUSE))
         second = look(logs)
     return second, list(unsettled(first, second, settle, time.time(), writers(second)))
 
@@ -143,18 +107,10 @@ def unsettled(
     now: float,
     writing: Mapping[Path, str],
 ) -> Iterator[Skip]:
-    """Yield the logs that are still being written.
+    """Yield the logs that are still being written, from two scans.
 
-    Parameters
-    ----------
-    first, second : mapping of str to Found
-        Two scans.
-    settle : float
-        How long nothing of a complete log has changed, s.
-    now : float
-        Time of the second scan, s since 1970.
-    writing : mapping of Path to str
-        Files that are open for writing, with their process.
+    ``settle`` is as in `settled`, ``now`` the time of the second scan, s since 1970, and
+    ``writing`` has the files that are open for writing, with their process.
     """
     for key in sorted(first.keys() | second.keys()):
         was, latest = first.get(key, Found()), second.get(key, Found())
@@ -193,8 +149,7 @@ def writers(recordings: Mapping[str, Found]) -> dict[Path, str]:
         with contextlib.suppress(psutil.Error, OSError):
             for file in process.open_files():
                 if getattr(file, "mode", "r") != "r" and Path(file.path) in looked_for:
-                    writer = f"process {process.pid} ({process.name()})"
-                    writing[Path(file.path)] = one_line(writer)
+                    writing[Path(file.path)] = one_line(f"process {process.pid} ({process.name()})")
     return writing
 
 
@@ -205,10 +160,6 @@ def moved(before: Mapping[str, Found], after: Mapping[str, Found]) -> set[str]:
 
 def _resolve_paths(recording: Found) -> Iterable[Path]:
     return (Path(os.path.realpath(path)) for path, _, _ in recording.files)
-
-
-def _stat_files(log: Recording) -> Signature:
-    return tuple(_stat_file(path) for path in log.files or [log.path])
 
 
 def _stat_file(path: Path, below: Path | None = None) -> tuple[str, int, int]:

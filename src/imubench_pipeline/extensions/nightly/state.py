@@ -7,7 +7,6 @@ import json
 from collections.abc import Collection, Iterable, Mapping
 from dataclasses import asdict, dataclass
 from datetime import datetime
-from itertools import chain
 from pathlib import Path
 from typing import NamedTuple
 
@@ -65,29 +64,17 @@ class Known(NamedTuple):
 
 
 class State(BaseModel):
-    """State after a successful run.
-
-    Attributes
-    ----------
-    logs : dict
-        Size and stamps of each log that was read.
-    warned, drifted : list
-        Findings that put results in doubt, and changes of devices.
-    leaders : dict
-        By requirement.
-    skipped : dict
-        Since when a log has been skipped, run by run.
-    """
+    """State after a successful run."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
     finished: datetime
-    logs: dict[str, Signature] = {}
+    logs: dict[str, Signature] = {}  # that were read
     recordings: dict[str, Known] = {}
     warned: list[Warned] = []
     drifted: list[Drifted] = []
-    leaders: dict[str, Leader | None] = {}
-    skipped: dict[str, datetime] = {}
+    leaders: dict[str, Leader | None] = {}  # by requirement
+    skipped: dict[str, datetime] = {}  # since when, without a break
 
     def write(self, path: Path) -> None:
         """Write the state atomically."""
@@ -111,18 +98,12 @@ class State(BaseModel):
 
 
 def read_state(path: Path) -> State | None:
-    """Return the state that a run has written; None if there is none.
-
-    Raises
-    ------
-    StateError
-        If it is damaged, or of another version.
-    """
+    """Return the state that a run has written; None without one; StateError if unreadable."""
     try:
         return State.model_validate(read_sealed_json(path))
     except FileNotFoundError:
         return None
-    except (OSError, ValueError) as error:  # that of the model, too
+    except (OSError, ValueError) as error:
         raise StateError(
             f"{path.name} is damaged, or of another version: what is new is not known, and "
             "everything is told"
@@ -131,11 +112,10 @@ def read_state(path: Path) -> State | None:
 
 @dataclass(frozen=True)
 class RunRows:
-    """The rows of the tables of a run that a state is made of."""
+    """Rows of the tables of a run, for a state."""
 
     recordings: list[RecordingRow]
-    parameters: list[ParameterRow]
-    """Of the recommended methods."""
+    parameters: list[ParameterRow]  # of the recommended methods
     fixed_bias: list[FixedBiasRow]
     failures: list[FailureRow]
     findings: list[FindingRow]
@@ -144,13 +124,7 @@ class RunRows:
 
 
 def load_tables(results: Path) -> RunRows:
-    """Return the rows of the tables that a state is made of.
-
-    Raises
-    ------
-    OSError, ValueError
-        If one is not there, or is of another form.
-    """
+    """Return the rows of the tables for a state; OSError or ValueError if one is unreadable."""
 
     def rows(of: type[R]) -> list[R]:
         return of.rows_of(read(of.table, [results / f"tables/{of.table}.parquet"]))
@@ -178,12 +152,19 @@ def state_of(
         for row in tables.recordings
         if row.status == "rejected"
     }
+    # The digest of the rows of a recording changes with its outcome.
+    digests = {name_in(row): hashlib.sha256() for row in tables.recordings}
+    rows: list[RecordingRow | ParameterRow | FixedBiasRow]
+    rows = [*tables.recordings, *tables.parameters, *tables.fixed_bias]
+    for row in rows:
+        columns = json.dumps(row.columns(), sort_keys=True, default=asdict)
+        digests[name_in(row)].update(columns.encode())
     return State(
         finished=finished,
         logs=dict(logs),
         recordings={
-            name: Known(digest, rejected.get(name))
-            for name, digest in _digest_recordings(tables).items()
+            name: Known(digest.hexdigest()[:16], rejected.get(name))
+            for name, digest in digests.items()
         },
         warned=sorted({warned(row) for row in serious(tables.findings)}, key=str),
         drifted=sorted({drifted(row) for row in changes(tables.drift)}),
@@ -225,16 +206,3 @@ def leading(ranking: Iterable[RankingRow]) -> dict[str, Leader | None]:
                 first[name] = Leader(row.sensor, row.verdict not in ("likely_fails", "fails"))
                 margins[name] = margin
     return first
-
-
-def _digest_recordings(tables: RunRows) -> dict[str, str]:
-    """Return a digest of the rows of each recording; it changes with the outcome."""
-    digests = {name_in(row): hashlib.sha256() for row in tables.recordings}
-    rows = chain[RecordingRow | ParameterRow | FixedBiasRow](
-        tables.recordings, tables.parameters, tables.fixed_bias
-    )
-    for row in rows:
-        digests[name_in(row)].update(
-            json.dumps(row.columns(), sort_keys=True, default=asdict).encode()
-        )
-    return {name: digest.hexdigest()[:16] for name, digest in digests.items()}

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from datetime import datetime
 from typing import Any, Literal
 
@@ -10,7 +10,6 @@ from pydantic import BaseModel
 
 from imubench_pipeline.extensions.nightly.state import (
     Known,
-    Leader,
     RunRows,
     State,
     changes,
@@ -96,42 +95,26 @@ class First(BaseModel):
 
 
 class Summary(BaseModel):
-    """Changes since the last successful nightly run.
-
-    Attributes
-    ----------
-    seconds : float
-        Duration of the run.
-    since : datetime or None
-        The end of the run that this one is compared with; None: there is none.
-    recordings : int
-        Number of recordings in the tables.
-    files : list of str
-        Status of the files in the drop zone, as lines.
-    put_right : list of str
-        Repairs after an earlier run.
-    failure : list of str
-        Reason of a failure: the last lines of the log.
-    """
+    """Changes since the last successful nightly run."""
 
     outcome: Outcome
     began: datetime
     finished: datetime
     seconds: float
-    since: datetime | None = None
-    recordings: int = 0
+    since: datetime | None = None  # end of the run that this one is compared with
+    recordings: int = 0  # number in the tables
     new: list[str] = []
     changed: list[Changed] = []
     removed: list[str] = []
-    files: list[str] = []
+    files: list[str] = []  # lines about the drop zone
     skipped: list[Skipped] = []
     failed: list[Failed] = []
     rejected: list[Rejected] = []
     warnings: list[NewWarning] = []
     drift: list[Drift] = []
     first: list[First] = []
-    put_right: list[str] = []
-    failure: list[str] = []
+    put_right: list[str] = []  # repairs after an earlier run
+    failure: list[str] = []  # reason, and the last lines of the log
     report: str = ""
     log: str = ""
 
@@ -141,22 +124,38 @@ def compared(
 ) -> dict[str, Any]:
     """Return the changes of a state since the last successful run, as fields of the summary.
 
-    `tables` are the rows of the state `after`. The recordings `without` are left out: their logs
-    changed while they were read.
+    The recordings `without` are left out: their logs changed while they were read.
     """
     was = before or State(finished=after.finished)
     written_to = set(without)
     now = {name: outcome for name, outcome in after.recordings.items() if name not in written_to}
-    both = [name for name in now if name in was.recordings]
     known_warnings, known_drift = set(was.warned), set(was.drifted)
+    first = []
+    for name, leader in after.leaders.items():
+        old = was.leaders.get(name)
+        if name not in was.leaders or leader != old:
+            of_it = [row for row in tables.ranking if row.requirement == name]
+            first.append(
+                First(
+                    requirement=name,
+                    sensor=leader and leader.sensor,
+                    before=old and f"{old.sensor}{', which failed it' * (not old.fulfils)}",
+                    said=next(leaders(of_it, tables.recordings)),
+                )
+            )
     fields: dict[str, Any] = {
         "since": before and before.finished,
         "recordings": len(after.recordings),
         "new": [name for name in now if name not in was.recordings],
         "changed": [
-            Changed(recording=name, because=_explain_change(name, was, after))
-            for name in both
-            if now[name].digest != was.recordings[name].digest
+            Changed(
+                recording=name,
+                because="its log changed"
+                if was.logs.get(name) != after.logs.get(name)
+                else "settings, or the code of the analysis, changed",
+            )
+            for name in now
+            if name in was.recordings and now[name].digest != was.recordings[name].digest
         ],
         "removed": [name for name in was.recordings if name not in after.recordings],
         "failed": [
@@ -183,35 +182,12 @@ def compared(
             for row in changes(tables.drift)
             if name_in(row) not in written_to and drifted(row) not in known_drift
         ],
-        "first": list(_list_new_leaders(was, after, tables)),
+        "first": first,
     }
     rejected = any(rejection.new for rejection in fields["rejected"])
     flagged = rejected or fields["warnings"] or fields["drift"]
     outcome = "failed" if fields["failed"] else "flagged" if flagged else "fine"
     return fields | {"outcome": outcome}
-
-
-def _explain_change(name: str, was: State, now: State) -> str:
-    if was.logs.get(name) != now.logs.get(name):
-        return "its log changed"
-    return "settings, or the code of the analysis, changed"
-
-
-def _list_new_leaders(was: State, now: State, tables: RunRows) -> Iterator[First]:
-    for name, leader in now.leaders.items():
-        if name in was.leaders and leader == was.leaders[name]:
-            continue
-        of_it = [row for row in tables.ranking if row.requirement == name]
-        yield First(
-            requirement=name,
-            sensor=leader and leader.sensor,
-            before=_describe_leader(was.leaders.get(name)),
-            said=next(leaders(of_it, tables.recordings)),
-        )
-
-
-def _describe_leader(leader: Leader | None) -> str | None:
-    return leader and (leader.sensor if leader.fulfils else f"{leader.sensor}, which failed it")
 
 
 def in_words(summary: Summary) -> str:
@@ -221,15 +197,16 @@ def in_words(summary: Summary) -> str:
         f"{len(summary.new)} new, {len(summary.changed)} analysed again, "
         f"{len(summary.removed)} removed, {len(summary.skipped)} skipped; "
         f"{summary.recordings} in all, {len(summary.rejected)} of them rejected"
-        + f"; {len(summary.failed)} failed"
-        * bool(summary.failed)
     )
+    if summary.failed:
+        counts += f"; {len(summary.failed)} failed"
     counts += "".join(f"\n{line}" for line in summary.files)
     since = f"since {_format_time(summary.since)}" if summary.since else "the first run"
-    lines = [
-        f"imubench nightly: {summary.outcome}, {_format_time(summary.finished)}, "
-        f"took {_format_duration(summary.seconds)}"
-    ]
+    minutes, seconds = divmod(round(summary.seconds), 60)
+    hours, minutes = divmod(minutes, 60)
+    took = f"{hours} h {minutes} min" if hours else f"{minutes} min {seconds} s"
+    finished = _format_time(summary.finished)
+    lines = [f"imubench nightly: {summary.outcome}, {finished}, took {took}"]
     if summary.failure:
         lines += ["", "why it failed:", *(f"  {one_line(line, 500)}" for line in summary.failure)]
     else:
@@ -242,13 +219,19 @@ def in_words(summary: Summary) -> str:
         "analysed again": [f"{change.recording}: {change.because}" for change in summary.changed],
         "removed": summary.removed,
         "skipped, and looked at again next time": [
-            _describe_skip(skip) for skip in summary.skipped
+            f"{skip.recording}: {skip.reason}{'; its results stay' * skip.keeps_results} "
+            f"(since {_format_time(skip.since)})"
+            for skip in summary.skipped
         ],
         f"rejected ({new or 'none'} of them new)": [
             f"{rejection.recording}{' (new)' * rejection.new}: {rejection.reason}"
             for rejection in rejected
         ],
-        "new warnings": [_describe_warning(warning) for warning in summary.warnings],
+        "new warnings": [
+            f"{warning.recording}: {f'{warning.channel}: ' if warning.channel else ''}"
+            f"{warning.finding.replace('_', ' ')}: {warning.detail}"
+            for warning in summary.warnings
+        ],
         "devices that have changed": [_describe_drift(drift) for drift in summary.drift],
         "first for a requirement": [
             lead.said + f" (before: {lead.before})" * bool(lead.before) for lead in summary.first
@@ -257,19 +240,11 @@ def in_words(summary: Summary) -> str:
     }
     for title, entries in sections.items():
         if entries:
-            lines += ["", f"{title}:", *_limit_lines(entries)]
+            more = len(entries) - _MAX_LINES
+            shown = entries if more <= 1 else [*entries[:_MAX_LINES], f"and {more} more"]
+            lines += ["", f"{title}:", *(f"  {one_line(line, 300)}" for line in shown)]
     lines += ["", f"report: {summary.report}", f"log: {summary.log}"]
     return "\n".join(lines) + "\n"
-
-
-def _describe_skip(skip: Skipped) -> str:
-    stays = "; its results stay" * skip.keeps_results
-    return f"{skip.recording}: {skip.reason}{stays} (since {_format_time(skip.since)})"
-
-
-def _describe_warning(warning: NewWarning) -> str:
-    channel = f"{warning.channel}: " if warning.channel else ""
-    return f"{warning.recording}: {channel}{warning.finding.replace('_', ' ')}: {warning.detail}"
 
 
 def _describe_drift(drift: Drift) -> str:
@@ -283,17 +258,5 @@ def _describe_drift(drift: Drift) -> str:
     )
 
 
-def _limit_lines(lines: list[str]) -> list[str]:
-    more = len(lines) - _MAX_LINES
-    shown = lines if more <= 1 else [*lines[:_MAX_LINES], f"and {more} more"]
-    return [f"  {one_line(line, 300)}" for line in shown]
-
-
 def _format_time(stamp: datetime) -> str:
     return stamp.astimezone().strftime("%Y-%m-%d %H:%M %Z")
-
-
-def _format_duration(seconds: float) -> str:
-    minutes, rest = divmod(round(seconds), 60)
-    hours, minutes = divmod(minutes, 60)
-    return f"{hours} h {minutes} min" if hours else f"{minutes} min {rest} s"
