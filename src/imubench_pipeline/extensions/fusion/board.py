@@ -47,10 +47,7 @@ class Parts:
     sensitivities: Array  # shape (s, n); g: SI per these units
 
     def of_sum(self, weights: NDArray[Any]) -> Array:
-        """Return the independent and shared variances of weighted sums, SI^2, shape (m, 2).
-
-        The weights have the shape (m, n), real or complex.
-        """
+        """Return the independent and shared variances of sums, weighted (m, n): SI^2, (m, 2)."""
         alone = np.sum(self.own * np.abs(weights) ** 2, axis=1)
         common = np.sum(self.shared * np.abs(weights @ self.sensitivities.T) ** 2, axis=1)
         return np.column_stack((alone, common))
@@ -113,23 +110,10 @@ class Board:
         rate: float,
         correlation: Mapping[str, float] | None = None,
     ) -> Board:
-        """Return a board of several specimens of one sensor.
+        """Return a board of one or more specimens of one sensor, at a rate in Hz.
 
-        Parameters
-        ----------
-        model : NoiseModel
-            The whole noise of each.
-        number : int
-            From 1.
-        rate : float
-            Hz.
-        correlation : mapping of str to float, optional
-            Fraction of the variance of N, B, K and R that is shared, 0 to 1; by default 0.
-
-        Raises
-        ------
-        ValueError
-            If there is no sensor, or a correlation is of another parameter or not from 0 to 1.
+        The model is the whole noise of each; the correlation, and a ValueError, are as for
+        `divided`.
         """
         own, common = divided(model, correlation or {})
         shared = [Shared(common, [1.0] * number)] if common.terms else []
@@ -158,10 +142,9 @@ class Board:
         )
 
     def allan_parts(self, tau: ArrayLike) -> Parts:
-        """Return the independent and shared Allan variances of the sensors.
+        """Return the Allan variances of the sensors at tau, s, array_like of shape (m,).
 
-        They are at tau, s, array_like of shape (m,), rounded to the nearest whole number of fused
-        samples, at least one.
+        Each tau is rounded to the nearest whole number of fused samples, at least one.
         """
         t = np.atleast_1d(np.asarray(tau, dtype=np.float64))
         t = np.maximum(np.rint(t * self.rate), 1.0) / self.rate
@@ -172,7 +155,7 @@ class Board:
     def spectral_parts(self, omega: ArrayLike) -> Parts:
         """Return the spectra of the fused samples, without ramps and lines.
 
-        They are at omega, rad per fused sample, above 0, array_like of shape (m,).
+        The frequencies omega are in rad per fused sample, above 0, array_like of shape (m,).
         """
         w = np.atleast_1d(np.asarray(omega, dtype=np.float64))
         spectra: dict[tuple[int, int], Array] = {}  # specimens of one sensor have the same spectrum
@@ -191,17 +174,9 @@ class Board:
 def divided(model: NoiseModel, correlation: Mapping[str, float]) -> tuple[NoiseModel, NoiseModel]:
     """Split the noise of a sensor into an independent part and one shared by all specimens.
 
-    Parameters
-    ----------
-    model : NoiseModel
-    correlation : mapping of str to float
-        Fraction of the variance of N, B, K and R that is shared, 0 to 1. The fraction of B
-        applies to further Gauss-Markov processes, too. Quantization and lines are independent.
-
-    Returns
-    -------
-    (NoiseModel, NoiseModel)
-        Independent and shared part; the sum of their spectra is the spectrum of the model.
+    The spectrum of the model is the sum of the two. ``correlation`` has the shared fraction of the
+    variance of N, B, K and R, 0 to 1. The fraction of B applies to further Gauss-Markov processes,
+    too. Quantization and lines are independent.
 
     Raises
     ------

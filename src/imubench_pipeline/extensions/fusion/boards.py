@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator
 from typing import Any
 
 from imubench_pipeline.extensions.fusion.tables import PublishedFigureRow
 from imubench_pipeline.report import thermal
 from imubench_pipeline.report.payload import Arrays, channel_payload, looks
 from imubench_pipeline.report.site import Entry, Site
-from imubench_pipeline.report.view import ChannelView, RecordingView
+from imubench_pipeline.report.view import RecordingView
 from imubench_pipeline.words.numbers import limit_digits, number_text
 
 _MAX_AGREEING_DIFFERENCE = 0.05
@@ -25,29 +25,32 @@ def _make_context(site: Site) -> dict[str, Any]:
     payloads: list[dict[str, Any]] = []
     for name, board in site.settings["boards"].items():
         views = _select_recordings(site, name)
-        channels = {view.sensor: view.channels() for view in views}
-        payloads += (
-            channel_payload(channel, channel.rate, arrays)
-            for view in views
-            for channel in channels[view.sensor]
-        )
+        sensors = []
+        for view in views:
+            rows = view.rows(PublishedFigureRow)
+            channels = []
+            for channel in view.channels():
+                payloads.append(channel_payload(channel, channel.rate, arrays))
+                own = (row for row in rows if row.channel == channel.channel)
+                channels.append(
+                    {
+                        "view": channel,
+                        "figures": board["sensors"][view.sensor].get(channel.channel),
+                        "answer": thermal.answer(channel, site.system),
+                        "lines": list(published_lines(own)),
+                    }
+                )
+            sensors.append({"view": view, "name": site.names[view.sensor], "channels": channels})
+        shared = ["one temperature"] * board["temperature"] + ["one motion"] * bool(board["motion"])
         boards.append(
             {
                 "name": name,
                 "title": board["title"],
                 "note": board["note"],
-                "shared": _describe_shared(board),
-                "sensors": [
-                    {
-                        "view": view,
-                        "name": site.names[view.sensor],
-                        "channels": [
-                            _describe_channel(site, view, channel, board["sensors"][view.sensor])
-                            for channel in channels[view.sensor]
-                        ],
-                    }
-                    for view in views
-                ],
+                "shared": f"All sensors of the board share {' and '.join(shared)}."
+                if shared
+                else "The sensors share only their place.",
+                "sensors": sensors,
                 "lost": sorted(set(board["sensors"]) - {view.sensor for view in views}),
             }
         )
@@ -80,25 +83,6 @@ BOARDS = Entry(
     place=3,
 )
 """The page that shows every board."""
-
-
-def _describe_shared(board: Mapping[str, Any]) -> str:
-    shared = ["one temperature"] * board["temperature"] + ["one motion"] * bool(board["motion"])
-    if not shared:
-        return "The sensors share only their place."
-    return f"All sensors of the board share {' and '.join(shared)}."
-
-
-def _describe_channel(
-    site: Site, view: RecordingView, channel: ChannelView, figures: Mapping[str, str | None]
-) -> dict[str, Any]:
-    rows = view.rows(PublishedFigureRow)
-    return {
-        "view": channel,
-        "figures": figures.get(channel.channel),
-        "answer": thermal.answer(channel, site.system),
-        "lines": list(published_lines(row for row in rows if row.channel == channel.channel)),
-    }
 
 
 def published_lines(rows: Iterable[PublishedFigureRow]) -> Iterator[dict[str, Any]]:

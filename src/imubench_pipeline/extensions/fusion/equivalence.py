@@ -25,11 +25,9 @@ class Answer:
     """Allan variance of a sensor at one tau."""
 
     candidate: ComparedChannel  # the representative channel
-    # own, common: Allan variance of the independent and common part of one specimen, SI
-    own: float
-    common: float
-    # drawn_own, drawn_common: shape (draws,); the same for the drawn models
-    drawn_own: Array
+    own: float  # Allan variance of the independent part of one specimen, SI
+    common: float  # of its common part
+    drawn_own: Array  # shape (draws,); the same for the drawn models
     drawn_common: Array
     unknown: str | None  # unknown parameters that matter; the number is then not given
 
@@ -58,10 +56,8 @@ def answer(
         Fraction of the variance of each parameter that specimens share.
     longest : float
         Longest tau, as a fraction of the log.
-    draws : int
-        Number of models drawn from the estimate.
-    seed : int
-        Each channel has its own random stream.
+    draws, seed : int
+        Number of models drawn from the estimate; each channel has its own random stream.
     """
     measured = [channel for channel in candidates if not channel.simulated] or list(candidates)
     long = [channel for channel in measured if tau <= longest * channel.duration]

@@ -35,33 +35,23 @@ def candidates(
     joint: Mapping[tuple[str, str], Path] | None,
     besides: Container[str] = (),
 ) -> Iterator[ComparedChannel]:
-    """Yield the channels of recordings that decide, each with the estimate of the method to use.
+    """Yield the channels of recordings that decide, and of the sensors in ``besides``.
 
-    Where temperature is taken out of a channel, its estimate is that of what temperature leaves.
-
-    Parameters
-    ----------
-    tables : mapping of str to pyarrow.Table
-        Those of `NEEDED`, of a run.
-    joint : mapping of (str, str) to Path, optional
-        The table ``draws`` of recordings, by sensor and recording.
-    besides : container of str
-        Sensors whose recordings are taken although they do not decide.
+    The estimate is the recommended one, or the one after removal of the temperature effect.
+    ``tables`` are the tables `NEEDED` of a run, ``joint`` the files of the table ``draws``, by
+    sensor and recording.
     """
-    recordings, parameters = tables["recordings"], tables["parameters"]
+    parameters = tables["parameters"]
     warm = _temperature_parts(tables)
-    compensated = ParameterRow.rows_of(
-        parameters.filter(pc.equal(parameters["method"], "compensated"))
-    )
-    recommended = ParameterRow.rows_of(parameters.filter(parameters["recommended"]))
-    about = {(row.sensor, row.recording): row for row in RecordingRow.rows_of(recordings)}
-    apart = left_out(about.values())
+    compensated = parameters.filter(pc.equal(parameters["method"], "compensated"))
+    recommended = parameters.filter(parameters["recommended"])
+    used = [row for row in ParameterRow.rows_of(compensated) if _channel(row) in warm]
+    used += [row for row in ParameterRow.rows_of(recommended) if _channel(row) not in warm]
     groups: dict[tuple[str, str, str, str], list[ParameterRow]] = {}
-    used = [row for row in compensated if _channel(row) in warm]
-    used += [row for row in recommended if _channel(row) not in warm]
     for row in used:
-        key = (row.sensor, row.recording, row.channel, row.method)
-        groups.setdefault(key, []).append(row)
+        groups.setdefault((*_channel(row), row.method), []).append(row)
+    about = {(row.sensor, row.recording): row for row in RecordingRow.rows_of(tables["recordings"])}
+    apart = left_out(about.values())
     read = cache(draws)
 
     def drawn(path: Path, channel: str, method: str) -> JointDraws | None:
@@ -87,10 +77,10 @@ def candidates(
 def _temperature_parts(
     tables: Mapping[str, pa.Table],
 ) -> dict[tuple[str, str, str], TemperaturePart]:
-    """Return what temperature adds to the channels of which it is taken out."""
+    """Return the removed temperature effect of channels."""
     curves: dict[tuple[str, str, str], list[tuple[float, float]]] = {}
-    for left in CompensatedAllanRow.rows_of(tables["allan_compensated"]):
-        curves.setdefault(_channel(left), []).append((left.tau, left.temperature))
+    for point in CompensatedAllanRow.rows_of(tables["allan_compensated"]):
+        curves.setdefault(_channel(point), []).append((point.tau, point.temperature))
     temperature = tables["temperature"]
     chosen = pc.and_(temperature["compensated"], pc.equal(temperature["parameter"], "sensitivity"))
     parts = {}
@@ -113,7 +103,7 @@ def fusion_rows(
     how: FusionSettings,
     joint: Mapping[tuple[str, str], Path] | None = None,
 ) -> Iterator[FusionRow]:
-    """Return the rows of the table ``fusion``; `tables` and `joint` are as of `candidates`."""
+    """Return the rows of the table ``fusion``; `tables` and `joint` as in `candidates`."""
     rows = equivalence_rows(
         candidates(tables, joint),
         [quantity_to_si(tau, "time") for tau in how.tau],
@@ -132,10 +122,7 @@ TACTICAL_CLASS = "tactical"
 def grades_of_run(
     tables: Mapping[str, pa.Table], sensors: Mapping[str, Sensor]
 ) -> Iterator[GradeRow]:
-    """Return the rows of the table ``grades``; `tables` as of `candidates`.
-
-    Of sensors that are not sold, too: a board of several is made to reach such a grade.
-    """
+    """Return the rows of the table ``grades``, with sensors that are not sold, such as boards."""
     grades = [
         Grade(name, f"{sensor.vendor} {sensor.model}", sensor.datasheet)
         for name, sensor in sensors.items()

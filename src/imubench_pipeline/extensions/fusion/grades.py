@@ -8,7 +8,7 @@ do not average out. A fused log is treated as a separate sensor, and its rows in
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 from imubench_pipeline.datasheets.comparable import Comparable, comparables
@@ -57,12 +57,16 @@ def grade_rows(
         quantity = channel.channel.split("_")[0]
         by_sensor.setdefault((quantity, channel.sensor), []).append(channel)
     for (quantity, sensor), channels in sorted(by_sensor.items()):
-        chosen = _select_middle(channels)
+        measured = [channel for channel in channels if not channel.simulated] or channels
+        chosen = sorted(measured, key=lambda channel: channel.model.N)[len(measured) // 2]
         for grade in grades:
             if grade.sensor == sensor:
                 continue
             for option, printed in grade.printed(chosen.channel):
-                own = _get_estimate(chosen, printed.statistic)
+                name = PARAMETER_OF_STATISTIC[printed.statistic]
+                estimate = chosen.estimate
+                of = estimate.parameters if name == "N" else estimate.curve or {}
+                own = of.get(name, Parameter(None, "not_shown", "not estimated"))
                 row = GradeRow(
                     quantity=quantity,
                     sensor=sensor,
@@ -72,26 +76,13 @@ def grade_rows(
                     grade=grade.sensor,
                     grade_name=grade.name,
                     option=option,
-                    statistic=PARAMETER_OF_STATISTIC[printed.statistic],
+                    statistic=name,
                     value=own.value,
                     lower=own.lower,
                     upper=own.upper,
                     printed=printed.value,
                 )
                 yield _compare(row, own, printed)
-
-
-def _select_middle(channels: Sequence[ComparedChannel]) -> ComparedChannel:
-    measured = [channel for channel in channels if not channel.simulated] or list(channels)
-    return sorted(measured, key=lambda channel: channel.model.N)[len(measured) // 2]
-
-
-def _get_estimate(channel: ComparedChannel, statistic: str) -> Parameter:
-    estimate = channel.estimate
-    of: Mapping[str, Parameter] = estimate.parameters
-    if statistic == "adev_minimum":
-        of = estimate.curve or {}
-    return of.get(PARAMETER_OF_STATISTIC[statistic], Parameter(None, "not_shown", "not estimated"))
 
 
 def _compare(row: GradeRow, own: Parameter, printed: Comparable) -> GradeRow:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numba import njit
@@ -16,14 +16,13 @@ from scipy.linalg import block_diag, schur
 from scipy.sparse import csr_array
 
 from imubench_pipeline.extensions.fusion.board import Board, stochastic
-from imubench_pipeline.noise import GaussMarkov, NoiseModel, bias_instability
+from imubench_pipeline.noise import GaussMarkov, bias_instability
 from imubench_pipeline.noise.block_means import of_block_means
 from imubench_pipeline.typing import Array
 
 _MAX_DOUBLINGS = 80
 _CONVERGENCE_TOLERANCE = 1e-13
 """Maximum number of doublings, and relative change of the covariance at convergence."""
-
 
 _MAX_FLICKER_TAU = 1e5
 """Maximum tau, s, up to which the filter models flicker noise."""
@@ -37,7 +36,7 @@ Its estimate does not matter: it is fused as a part of the signal.
 
 
 def steady_covariance(transition: Array, process_noise: Array, information: Array) -> Array:
-    """Return the steady covariance of the prediction of a Kalman filter.
+    """Return the steady covariance P of a Kalman filter before a measurement, shape (m, m).
 
     The solution of the discrete algebraic Riccati equation
 
@@ -52,11 +51,6 @@ def steady_covariance(transition: Array, process_noise: Array, information: Arra
     ----------
     transition, process_noise, information : ndarray, shape (m, m)
         Phi, Q_d and G. Unobservable processes must be stable.
-
-    Returns
-    -------
-    ndarray, shape (m, m)
-        P, before the measurement of a sample.
 
     Raises
     ------
@@ -109,11 +103,6 @@ class KalmanFusion:
     (`imubench_pipeline.extensions.fusion.weights.ByFrequency`) has the same or less noise. Ramps
     and lines are not estimated: they pass with the weights at their frequency.
 
-    Parameters
-    ----------
-    board : Board
-        Every sensor needs white noise.
-
     Raises
     ------
     ValueError
@@ -122,24 +111,21 @@ class KalmanFusion:
 
     def __init__(self, board: Board) -> None:
         self.sensors = board.sensors
-        space = _build_state_space(board)
-        if not np.all(np.diag(space.white) > 0.0):
+        transition, process_noise, output, white = _build_state_space(board)
+        if not np.all(np.diag(white) > 0.0):
             raise ValueError("a filter needs white noise, N, of every sensor")
-        inverse = _project_out_common(space.white)
-        information = space.output.T @ inverse @ space.output
-        covariance = steady_covariance(space.transition, space.process_noise, information)
-        of_output = space.output @ covariance @ space.output.T + space.white
-        self.weights = _compute_common_weights(of_output)
-        gain = covariance @ space.output.T @ _project_out_common(of_output)
-        self._output = space.output
-        self._transition = space.transition
+        information = output.T @ _project_out_common(white) @ output
+        covariance = steady_covariance(transition, process_noise, information)
+        of_output = output @ covariance @ output.T + white
+        solved = np.linalg.solve(of_output, np.ones(len(of_output)))
+        self.weights = np.asarray(solved / solved.sum())
+        gain = covariance @ output.T @ _project_out_common(of_output)
         # The rows must be orthogonal to the signal to machine precision.
         gain -= np.outer(gain.sum(axis=1), self.weights)
-        self._gain = space.transition @ gain
-        self._seen = self.weights @ space.output
-        closed = space.transition - self._gain @ space.output
+        self._output, self._transition, self._gain = output, transition, transition @ gain
+        closed = transition - self._gain @ output
         self._triangle, basis = schur(closed, output="complex")
-        self._row = self._seen @ basis
+        self._row = self.weights @ output @ basis
         self._columns = basis.conj().T @ self._gain
 
     @property
@@ -167,15 +153,8 @@ class KalmanFusion:
         The filter begins with states of 0: subtract the fixed bias of each sensor before. If a
         sensor has no sample (NaN), there is no fused sample, and the states are only predicted.
 
-        Parameters
-        ----------
-        blocks : iterable of ndarray, shape (k, n)
-            Samples of all sensors at the fused rate (`at_fused_rate`), rad/s or m/s^2.
-
-        Yields
-        ------
-        ndarray, shape (k,)
-            rad/s or m/s^2.
+        The blocks are samples of all sensors at the fused rate (`at_fused_rate`), shape (k, n),
+        in rad/s or m/s^2 like the fused ones, shape (k,).
 
         Raises
         ------
@@ -202,53 +181,30 @@ class KalmanFusion:
             yield fused
 
 
-@dataclass(frozen=True)
-class _Space:
-    """State space of all sensors of a board, and of their shared processes."""
-
-    transition: Array
-    process_noise: Array
-    output: Array
-    white: Array
-
-
-def _build_state_space(board: Board) -> _Space:
+def _build_state_space(board: Board) -> tuple[Array, Array, Array, Array]:
+    """Return the transition, process noise, output and white noise of sensors and processes."""
     spaces, outputs = [], []
     white = np.zeros((board.sensors, board.sensors))
     members = [
         *zip(board.models, board.rates, board.blocks, np.eye(board.sensors), strict=True),
-        *(
-            (process.model, board.rate, 1, np.asarray(process.sensitivity))
-            for process in board.shared
-        ),
+        *((shared.model, board.rate, 1, np.asarray(shared.sensitivity)) for shared in board.shared),
     ]
     for model, rate, size, gains in members:
-        space = of_block_means(_stabilise(model).state_space(rate, _MAX_FLICKER_TAU), size)
+        noise = stochastic(model)
+        if noise.K:  # the walk is replaced by a slow stable process
+            time = _WALK_SURROGATE_TIME_RATIO * _MAX_FLICKER_TAU
+            walk = GaussMarkov(bias_instability(noise.K**2, time), time)
+            noise = replace(noise, K=0.0, further=[*noise.further, walk])
+        space = of_block_means(noise.state_space(rate, _MAX_FLICKER_TAU), size)
         spaces.append(space)
         outputs.append(np.outer(gains, space.output))
         white += space.measurement_noise * np.outer(gains, gains)
-    return _Space(
+    return (
         np.asarray(block_diag(*(space.transition for space in spaces))),
         np.asarray(block_diag(*(space.process_noise for space in spaces))),
         np.concatenate(outputs, axis=1),
         white,
     )
-
-
-def _stabilise(model: NoiseModel) -> NoiseModel:
-    """Return a model without deterministic terms, its walk replaced by a slow stable process."""
-    noise = stochastic(model)
-    if not noise.K:
-        return noise
-    time = _WALK_SURROGATE_TIME_RATIO * _MAX_FLICKER_TAU
-    walk = GaussMarkov(bias_instability(noise.K**2, time), time)
-    return replace(noise, K=0.0, further=[*noise.further, walk])
-
-
-def _compute_common_weights(covariance: Array) -> Array:
-    """Return S^-1 1 / (1^T S^-1 1)."""
-    solved = np.linalg.solve(covariance, np.ones(len(covariance)))
-    return np.asarray(solved / solved.sum())
 
 
 def _project_out_common(covariance: Array) -> Array:

@@ -16,23 +16,20 @@ _PARAMETER_TEXTS = {"N": "white noise", "B": "bias instability", "K": "random wa
 
 def _make_context(site: Site) -> dict[str, Any]:
     lines = list(equal_numbers(site.rows(FusionRow)))
-    price_classes = {
-        name: site.settings["sensors"].get(name, {}).get("price_class") for name in site.sensors
-    }
-    filters = {
-        "tau": list(dict.fromkeys(line["tau"] for line in lines)),
-        "quantity": list(dict.fromkeys(line["quantity"] for line in lines)),
-        "wanted": list(dict.fromkeys(site.names[line["other"]] for line in lines)),
-        "sensor": list(dict.fromkeys(site.names[line["sensor"]] for line in lines)),
-    }
+    sensors = site.settings["sensors"]
     return {
         "lines": lines,
         "matrices": list(matrices(lines)),
         "grades": list(grade_lines(site.rows(GradeRow))),
         "unprinted": unprinted_grades(site.rows(GradeRow)),
-        "filters": filters,
+        "filters": {
+            "tau": list(dict.fromkeys(line["tau"] for line in lines)),
+            "quantity": list(dict.fromkeys(line["quantity"] for line in lines)),
+            "wanted": list(dict.fromkeys(site.names[line["other"]] for line in lines)),
+            "sensor": list(dict.fromkeys(site.names[line["sensor"]] for line in lines)),
+        },
         "shared": shared_words(site.settings["settings"]["fusion"]["common"]),
-        "price_classes": price_classes,
+        "price_classes": {name: sensors.get(name, {}).get("price_class") for name in site.sensors},
     }
 
 
@@ -43,18 +40,14 @@ FUSION = Entry(
 
 
 def shared_words(common: Mapping[str, float]) -> str:
-    """Return the assumptions on common errors, as sentences.
-
-    ``common`` has the common share of the variance of N, B, K and R.
-    """
+    """Return the assumptions on common errors: the common shares of the variance of N, B, K, R."""
     named = [
         f"{percent_text(share)} of the variance of the {_PARAMETER_TEXTS[name]} ({name})"
         for name, share in common.items()
         if share > 0.0
     ]
-    if not named:
-        shared = "The noise of each unit is assumed to be independent."
-    else:
+    shared = "The noise of each unit is assumed to be independent."
+    if named:
         shared = f"The units of one sensor are assumed to share {', '.join(named)}."
     return (
         f"{shared} The effect of a logged temperature counts as common to all units. Other common "
@@ -70,6 +63,10 @@ def equal_numbers(rows: Sequence[FusionRow]) -> Iterator[dict[str, Any]]:
                 continue
         elif row.sensor > row.other:
             continue  # an unknown pair is listed once
+        number = "–" if row.n is None else _round_up(row.n)
+        common = percent_text(row.common_share) if row.common_share is not None else "–"
+        if row.common_share is not None and row.temperature_share:
+            common += f" (temperature {percent_text(row.temperature_share)})"
         yield {
             "sensor": row.sensor,
             "other": row.other,
@@ -83,9 +80,9 @@ def equal_numbers(rows: Sequence[FusionRow]) -> Iterator[dict[str, Any]]:
             "seconds": row.tau,
             "adev": row.adev,
             "other_adev": row.other_adev,
-            "number": _format_number(row),
+            "number": "not possible" if row.reachable is False else number,
             "limits": _format_limits(row),
-            "common": _format_common(row),
+            "common": common,
         }
 
 
@@ -171,23 +168,6 @@ def _format_grade_limits(row: GradeRow) -> str:
         return f"at most {upper}"
     lower = _round_up(row.n_lower)
     return "" if lower == upper else f"{lower} to {upper}"
-
-
-def _format_common(row: FusionRow) -> str:
-    if row.common_share is None:
-        return "–"
-    text = percent_text(row.common_share)
-    of_temperature = row.temperature_share
-    if of_temperature:
-        text += f" (temperature {percent_text(of_temperature)})"
-    return text
-
-
-def _format_number(row: FusionRow) -> str:
-    """Return the smallest sufficient number of sensors."""
-    if row.reachable is False:
-        return "not possible"
-    return "–" if row.n is None else _round_up(row.n)
 
 
 def _format_limits(row: FusionRow) -> str:

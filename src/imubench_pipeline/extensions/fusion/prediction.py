@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -20,8 +19,8 @@ from imubench_pipeline.navigation.error_budget.uncertainty import draw_models
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.typing import Array
 
-_QUADRATURE_POINTS = 16
-"""Number of Gauss-Legendre points in a panel."""
+_RULE = np.polynomial.legendre.leggauss(16)
+"""Gauss-Legendre points and weights in a panel."""
 
 _OCTAVE_PANELS = 40
 """Number of panels below the first zero of sin^4(n w/2): remainder 1e-12 for a random walk."""
@@ -30,7 +29,6 @@ _RESOLVED_PERIODS = 64
 """Number of resolved periods of sin^4(n w/2). Beyond, its mean of 3/8 is used, with an error of
 4e-8 for white noise (first term of the asymptotic series of the remainder, 0.23/X^3 against
 pi/4)."""
-
 
 _RAMP_FREQUENCY = 1e-9
 """rad per sample; frequency at which the response of a filter to a ramp is evaluated."""
@@ -84,15 +82,9 @@ def allan_of_spectrum(spectrum: Callable[[Array], NDArray[Any]], sizes: ArrayLik
     return np.array(variances)
 
 
-@lru_cache(maxsize=1)
-def _compute_rule() -> tuple[Array, Array]:
-    points, weights = np.polynomial.legendre.leggauss(_QUADRATURE_POINTS)
-    return np.asarray(points), np.asarray(weights)
-
-
 def _make_linear_panels(edges: Array) -> tuple[Array, Array]:
     """Return points and weights in panels between edges."""
-    points, weights = _compute_rule()
+    points, weights = _RULE
     middle, half = (edges[1:] + edges[:-1]) / 2.0, np.diff(edges) / 2.0
     return (middle[:, None] + half[:, None] * points).ravel(), np.outer(half, weights).ravel()
 
@@ -142,18 +134,16 @@ def fused_allan(board: Board, weights: Weights, tau: ArrayLike) -> FusedCurve:
     """Return the Allan variance of a virtual sensor.
 
     With constant weights it is the sum of w_i^2 AV_i and, of each shared process, of
-    (w^T g)^2 AV. With weights that change with the frequency it is the integral of the
-    fused spectrum (`nodes`; relative error below 1e-7). A ramp passes with the weights
-    at frequency 0, a line with the weights at its frequency. Ramps of several sensors are
-    assumed to be independent, with random signs.
+    (w^T g)^2 AV. With weights that change with the frequency it is the integral of the fused
+    spectrum (`nodes`; relative error below 1e-7). A ramp passes with the weights at frequency 0, a
+    line with the weights at its frequency. Ramps of several sensors have independent random signs.
 
     Parameters
     ----------
     board : Board
         The actual sensors.
     weights : Weights
-        From `weights`, or a filter of `kalman`. They may be from another board, to predict the
-        effect of wrong sensor models.
+        They may be from another board, to predict the effect of wrong sensor models.
     tau : array_like, shape (m,)
         s; rounded to the nearest whole number of fused samples, at least one.
     """
@@ -176,24 +166,18 @@ def _compute_deterministic_variance(board: Board, weights: Weights, tau: Array) 
     """Return the Allan variances of independent and common ramps and lines, shape (m, 2)."""
     # Each at its own rate: block means of a faster sensor attenuate its lines.
     alone = list(zip(board.models, board.rates, np.eye(board.sensors), strict=True))
-    common = [
-        (process.model, board.rate, np.asarray(process.sensitivity)) for process in board.shared
-    ]
+    common = [(shared.model, board.rate, np.asarray(shared.sensitivity)) for shared in board.shared]
     parts = np.zeros((len(tau), 2))
     for column, members in enumerate((alone, common)):
         for model, rate, gains in members:
-            if model.R:
-                ramp = NoiseModel(R=model.R).allan_variance(tau, rate)
-                parts[:, column] += ramp * _compute_power(weights, _RAMP_FREQUENCY, gains)
+            terms = [(NoiseModel(R=model.R), _RAMP_FREQUENCY)] if model.R else []
             for line in model.sinusoids:
                 omega = 2.0 * np.pi * line.frequency / board.rate
-                alone_line = NoiseModel(sinusoids=[line]).allan_variance(tau, rate)
-                parts[:, column] += alone_line * _compute_power(weights, omega, gains)
+                terms.append((NoiseModel(sinusoids=[line]), omega))
+            for term, omega in terms:
+                power = float(np.abs(weights.response(np.array([omega]))[0] @ gains) ** 2)
+                parts[:, column] += term.allan_variance(tau, rate) * power
     return parts
-
-
-def _compute_power(weights: Weights, omega: float, gains: Array) -> float:
-    return float(np.abs(weights.response(np.array([omega]))[0] @ gains) ** 2)
 
 
 def prediction_limits(
@@ -206,7 +190,7 @@ def prediction_limits(
     rng: np.random.Generator,
     level: float = 0.95,
 ) -> tuple[Array, Array]:
-    """Return limits of the predicted Allan deviation from the uncertainty of the parameters.
+    """Return limits, shapes (m,), of the predicted Allan deviation, by uncertain parameters.
 
     The weights are fixed, computed from the estimates. The sensors are drawn by `draw_models`: all
     parameters together if the estimates have joint draws, else independently, which gives limits
@@ -228,22 +212,15 @@ def prediction_limits(
     level : float
         Fraction of the draws between the limits.
 
-    Returns
-    -------
-    (ndarray, ndarray), shapes (m,)
-        rad/s or m/s^2.
     """
-    streams = rng.spawn(len(estimates))
     drawn: dict[int, list[NoiseModel]] = {}
-    for estimate, stream in zip(estimates, streams, strict=True):
+    for estimate, stream in zip(estimates, rng.spawn(len(estimates)), strict=True):
         if id(estimate) not in drawn:
             drawn[id(estimate)] = draw_models(estimate, draws, stream)
-    deviations = [
-        fused_allan(
-            replace(board, models=[drawn[id(estimate)][i] for estimate in estimates]), weights, tau
-        ).deviation
-        for i in range(draws)
-    ]
+    deviations = []
+    for i in range(draws):
+        models = [drawn[id(estimate)][i] for estimate in estimates]
+        deviations.append(fused_allan(replace(board, models=models), weights, tau).deviation)
     tail = (1.0 - level) / 2.0
     lower, upper = np.quantile(deviations, [tail, 1.0 - tail], axis=0)
     return lower, upper

@@ -36,22 +36,23 @@ _DATASHEET_PARAMETERS = {
 }
 """Parameter and factor of datasheet figures, by statistic or quantity."""
 
+_MAX_TAU_OVER_LENGTH = 1.0 / 9.0
+"""Longest tau at which a curve is read, over the length of the log."""
+
 
 def published_rows(
     truths: str, truth: Iterable[SimulatedTruthRow], tables: Mapping[str, pa.Table]
 ) -> Iterator[PublishedFigureRow]:
-    """Yield the rows of the table ``published_figures``.
+    """Yield the rows of the table ``published_figures`` of a sensor.
 
-    `truths`: the simulated recordings, as the plan wrote them; `truth`: of them; `tables`:
-    ``recordings``, ``allan``, ``parameters``, ``fixed_bias``, ``temperature`` and ``datasheet`` of
-    the same sensor.
+    `truths`: the simulated recordings, as JSON; `truth`: their true parameters; `tables`:
+    ``recordings``, ``allan``, ``parameters``, ``fixed_bias``, ``temperature``, ``datasheet``.
     """
     entries = [SimulatedRecording.model_validate(entry) for entry in json.loads(truths)]
     if not any(settings.published for entry in entries for settings in entry.channels.values()):
         return
     true = _slowest(truth)
     curve, best = _estimates(tables)
-    curve = _lowest_points(tables) | curve
     printed = _printed(DatasheetRow.rows_of(tables["datasheet"]))
     for entry in entries:
         for channel, settings in entry.channels.items():
@@ -64,6 +65,7 @@ def published_rows(
                     value for kind, value in printed.get(key, []) if figure.kind in (None, kind)
                 ]
                 shown = true.get(key)
+                unit = units["B"] + "/K" * (figure.parameter == "sensitivity")
                 yield PublishedFigureRow(
                     sensor=entry.sensor,
                     recording=entry.recording,
@@ -74,10 +76,7 @@ def published_rows(
                     of=figure.of,
                     parameter=figure.parameter,
                     means=figure.si(quantity),
-                    unit=units.get(
-                        figure.parameter,
-                        units["B"] + "/K" * (figure.parameter == "sensitivity"),
-                    ),
+                    unit=units.get(figure.parameter, unit),
                     truth=shown.value if shown else None,
                     curve=curve.get(key),
                     value=estimate.value if estimate else None,
@@ -97,7 +96,17 @@ def _estimates(
     tables: Mapping[str, pa.Table],
 ) -> tuple[dict[_Place, float], dict[_Place, ParameterRow | TemperatureRow]]:
     """Return the values from the curve, and the rows of the recommended method."""
+    durations = {
+        (row.sensor, row.recording): row.duration
+        for row in RecordingRow.rows_of(tables["recordings"])
+    }
+    # B from the lowest point of each curve, for sources without a visible minimum.
     curve: dict[_Place, float] = {}
+    for point in AllanRow.rows_of(tables["allan"]):
+        duration = durations.get((point.sensor, point.recording))
+        if duration is not None and point.tau <= _MAX_TAU_OVER_LENGTH * duration:
+            place = _place(point, "B")
+            curve[place] = min(curve.get(place, math.inf), point.adev / FLOOR)
     parameters = ParameterRow.rows_of(tables["parameters"])
     for row in parameters:
         if row.method == "curve" and row.component == 1 and row.value is not None:
@@ -110,25 +119,6 @@ def _estimates(
         if thermal.parameter in ("bias", "sensitivity"):
             best[_place(thermal, thermal.parameter)] = thermal
     return curve, best
-
-
-_MAX_TAU_OVER_LENGTH = 1.0 / 9.0
-"""Longest tau at which a curve is read, over the length of the log."""
-
-
-def _lowest_points(tables: Mapping[str, pa.Table]) -> dict[_Place, float]:
-    """Return B from the lowest point of each curve, for sources without a visible minimum."""
-    durations = {
-        (row.sensor, row.recording): row.duration
-        for row in RecordingRow.rows_of(tables["recordings"])
-    }
-    lowest: dict[_Place, float] = {}
-    for row in AllanRow.rows_of(tables["allan"]):
-        duration = durations.get((row.sensor, row.recording))
-        if duration is not None and row.tau <= _MAX_TAU_OVER_LENGTH * duration:
-            place = _place(row, "B")
-            lowest[place] = min(lowest.get(place, math.inf), row.adev / FLOOR)
-    return lowest
 
 
 S = TypeVar("S", bound=ParameterRow | SimulatedTruthRow)
@@ -155,12 +145,10 @@ def _printed(rows: Iterable[DatasheetRow]) -> dict[_Place, list[tuple[str | None
     """Return kind and value of the figures of the datasheet, in the parameters' conventions."""
     figures: dict[_Place, list[tuple[str | None, float]]] = {}
     for row in rows:
-        convention = _DATASHEET_PARAMETERS.get(row.statistic) or _DATASHEET_PARAMETERS.get(
-            row.quantity
-        )
+        conventions = _DATASHEET_PARAMETERS
+        convention = conventions.get(row.statistic) or conventions.get(row.quantity)
         if convention is not None and row.comparable is not None:
             parameter, factor = convention
-            figures.setdefault(_place(row, parameter), []).append(
-                (row.kind, row.comparable * factor)
-            )
+            figure = (row.kind, row.comparable * factor)
+            figures.setdefault(_place(row, parameter), []).append(figure)
     return figures

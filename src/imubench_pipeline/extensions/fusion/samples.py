@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -16,7 +16,7 @@ _BLOCK_LENGTH = 1 << 16
 
 
 def at_fused_rate(board: Board, samples: Sequence[Array]) -> Array:
-    """Return the samples of all sensors at the fused rate: means of blocks.
+    """Return the samples of all sensors at the fused rate, shape (k, n): means of blocks.
 
     Parameters
     ----------
@@ -24,11 +24,6 @@ def at_fused_rate(board: Board, samples: Sequence[Array]) -> Array:
     samples : sequence of ndarray
         Samples of each sensor at its own rate, rad/s or m/s^2, with a common start. A remainder
         that does not fill a block of every sensor is left out. A block with NaN (missing) is NaN.
-
-    Returns
-    -------
-    ndarray, shape (k, n)
-        rad/s or m/s^2.
 
     Raises
     ------
@@ -45,28 +40,21 @@ def at_fused_rate(board: Board, samples: Sequence[Array]) -> Array:
 def fuse(board: Board, how: Constant | KalmanFusion, samples: Sequence[Array]) -> Array:
     """Return the samples of the virtual sensor, rad/s or m/s^2, shape (k,), at the fused rate.
 
-    The samples are those of each sensor, shape (n,), as for `at_fused_rate`.
-
-    Raises
-    ------
-    ValueError
-        If the number of sensors differs.
+    The samples, and a ValueError, are as for `at_fused_rate`.
     """
     number = _count_fused_samples(board, samples)
-    blocks = (
-        at_fused_rate(
-            board,
-            [
-                log[start * size : min(start + _BLOCK_LENGTH, number) * size]
-                for log, size in zip(samples, board.blocks, strict=True)
-            ],
-        )
-        for start in range(0, number, _BLOCK_LENGTH)
-    )
+    sizes = board.blocks
+
+    def blocks() -> Iterator[Array]:
+        for start in range(0, number, _BLOCK_LENGTH):
+            stop = min(start + _BLOCK_LENGTH, number)
+            parts = [log[start * n : stop * n] for log, n in zip(samples, sizes, strict=True)]
+            yield at_fused_rate(board, parts)
+
     if isinstance(how, Constant):
-        parts = [block @ how.values for block in blocks]
+        parts = [block @ how.values for block in blocks()]
     else:
-        parts = list(how.fuse(blocks))
+        parts = list(how.fuse(blocks()))
     return np.concatenate(parts) if parts else np.empty(0)
 
 

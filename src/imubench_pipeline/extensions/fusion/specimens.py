@@ -1,9 +1,8 @@
 """Specimens of one sensor on a board, fused to one log: the aim of Engers (2021, section 1).
 
-Each specimen has noise of its own, and parameters of its own about those of its kind; their
-weights are those of least white noise, N^-2 (`extensions.fusion.weights.best_constant`). What all
-of a kind have at the same time, such as T_B and the low-pass, is that of the fused log too, so that
-its noise is of the same terms, smaller by what `fused_model` says.
+The noise of each specimen is independent, and its N, B and K scatter. The weights minimise the
+white noise (N^-2, `weights.best_constant`). T_B and the low-pass are the same for all specimens,
+and for the fused log.
 """
 
 from __future__ import annotations
@@ -56,10 +55,7 @@ def weights_of(models: Sequence[NoiseModel], rate: float) -> tuple[Board, Consta
 
 
 def fused_model(models: Sequence[NoiseModel], weights: Constant) -> NoiseModel:
-    """Return the noise of specimens of one kind fused: of each term the root of sum w^2 p^2.
-
-    Their correlation times are the same.
-    """
+    """Return the noise of fused specimens with equal correlation times: roots of sum w^2 p^2."""
     ratios = [
         np.linalg.norm(weights.values * [getattr(model, name) for model in models])
         / (getattr(models[0], name) or 1.0)
@@ -79,10 +75,7 @@ def fused_blocks(
     motion: Mapping[str, Profile],
     temperature: Profile | None,
 ) -> Iterator[dict[str, Array]]:
-    """Yield the blocks of a log of fused specimens, and of the temperature that they share.
-
-    They are in SI; the temperature in °C, where there is one.
-    """
+    """Yield the blocks of a log of fused specimens, SI, and of their temperature, if any, °C."""
     rate = quantity_to_si(recording.rate, "frequency")
     models = specimens_of(recording)
     fusing = {
@@ -112,14 +105,14 @@ def fused_blocks(
 
 
 def factors_of_fused(recording: SimulatedRecording, channel: str) -> dict[str, float]:
-    """Return the factors on the noise of one specimen that several have when they are fused."""
+    """Return the noise of fused specimens, over the noise of one, by parameter."""
     models = [model.axes[channel].noise for model in specimens_of(recording)]
     of_kind = imu_model(recording.channels, recording).axes[channel].noise
     _, weights = weights_of(models, quantity_to_si(recording.rate, "frequency"))
     fused = fused_model(models, weights)
     return {
         name: getattr(fused, name) / getattr(of_kind, name)
-        for name in ("N", "B", "K")
+        for name in _SPREAD_PARAMETERS
         if getattr(of_kind, name)
     }
 

@@ -19,10 +19,7 @@ class Weights(Protocol):
     """Weights of the sensors of a board."""
 
     def response(self, omega: Array) -> NDArray[Any]:
-        """Return the weight of each sensor, shape (m, n), complex where a filter delays.
-
-        The angular frequencies are in rad per fused sample, shape (m,).
-        """
+        """Return the weights, (m, n), complex for a delay, at omega, rad per fused sample, (m,)."""
 
 
 @dataclass(frozen=True)
@@ -54,14 +51,9 @@ class ByFrequency:
     processes. They are the weights of an optimal, non-causal smoother. No causal filter has less
     noise at any frequency; the Kalman filter (`imubench_pipeline.extensions.fusion.kalman`) has
     slightly more where the weights change.
-
-    Attributes
-    ----------
-    board : Board
-        Board with the models for the weights.
     """
 
-    board: Board
+    board: Board  # with the models for the weights
 
     def response(self, omega: Array) -> Array:
         """Return the weights, shape (m, n), real: no delay (see `Weights`)."""
@@ -82,12 +74,8 @@ def best_constant(board: Board, tau: float | None = None) -> Constant:
     weight may be negative: a poor sensor with a large temperature sensitivity compensates the
     others.
 
-    Parameters
-    ----------
-    board : Board
-    tau : float, optional
-        s, rounded to the nearest whole number of fused samples, at least one; without it, the
-        weights are optimal for white noise, N^-2.
+    The tau, s, is rounded to the nearest whole number of fused samples, at least one. Without it,
+    the weights are optimal for white noise, N^-2.
 
     Raises
     ------
