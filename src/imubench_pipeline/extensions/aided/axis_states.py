@@ -23,18 +23,10 @@ from imubench_pipeline.typing import Array
 
 @dataclass(frozen=True)
 class AxisStates:
-    """Error model of one axis in a filter, at the sampling rate.
+    """Error model of one axis in a filter, at the sampling rate."""
 
-    Attributes
-    ----------
-    space : StateSpace
-        Noise and turn-on bias.
-    scale : float
-        Standard deviation of the relative scale-factor error; 0 if it is not a state.
-    """
-
-    space: StateSpace
-    scale: float = 0.0
+    space: StateSpace  # noise and turn-on bias
+    scale: float = 0.0  # SD of the relative scale-factor error; 0 if it is not a state
 
 
 def axis_states(
@@ -46,19 +38,11 @@ def axis_states(
     longest: float,
     scale: float = 0.0,
 ) -> AxisStates:
-    """Return the states of a noise model.
+    """Return the states of a noise model at a sampling rate, Hz.
 
-    Parameters
-    ----------
-    model : NoiseModel
-    sampling : float
-        Hz.
-    turn_on : float
-        Standard deviation of the turn-on bias, rad/s or m/s^2.
-    shortest, longest : float
-        Range of tau over which a bank of processes represents flicker noise, s; below, it is white.
-    scale : float
-        See `AxisStates`.
+    ``turn_on`` is the standard deviation of the turn-on bias, rad/s or m/s^2, ``scale`` as in
+    `AxisStates`. From the tau ``shortest`` to ``longest``, s, a bank of processes represents
+    flicker noise; below, it is white.
     """
     terms = model.realised(shortest, longest)
     spaces = [term.state_space(1.0 / sampling) for term in terms]
@@ -86,45 +70,21 @@ class StackedStates(NamedTuple):
     """The states of all six axes over steps of several samples, for the compiled filter.
 
     There are m states, gyros x, y, z before accelerometers, and n steps between two GNSS fixes.
-
-    Attributes
-    ----------
-    first : ndarray, shape (7,)
-        Index of the first state of each axis, and m.
-    step, epoch : ndarray, shape (m, m)
-        Transition matrices over one step and over n.
-    noise : ndarray, shape (m, m)
-        Process noise covariance over n steps.
-    sum_observation : ndarray, shape (n, m)
-        Sensitivity of the sum over step k, on the axis of each state, to that state at the last
-        fix.
-    sum_state_covariance : ndarray, shape (n, m)
-        Covariance of this sum with the state after step k, from the noise since the last fix.
-    sum_variance : ndarray, shape (n, 6)
-        Variance of the sum over step k, from the noise since the last fix.
-    first_observation : ndarray, shape (m,)
-        ``sum_observation`` of the first step.
-    start : ndarray, shape (m, m)
-    mean : ndarray, shape (m,)
-        Covariance and mean at switch-on.
-    scale : ndarray, shape (6,)
-        As in `AxisStates`; the states of scale factors come after the m.
-    output : ndarray, shape (m,)
-        Output matrix H: sensitivity of z to each state.
+    A sum adds the samples of step k on the axis of a state.
     """
 
-    first: Array
-    step: Array
-    epoch: Array
-    noise: Array
-    sum_observation: Array
-    sum_state_covariance: Array
-    sum_variance: Array
-    first_observation: Array
-    start: Array
-    mean: Array
-    scale: Array
-    output: Array
+    first: Array  # (7,); index of the first state of each axis, and m
+    step: Array  # (m, m); transition matrix over one step
+    epoch: Array  # (m, m); transition matrix over n steps
+    noise: Array  # (m, m); process noise covariance over n steps
+    sum_observation: Array  # (n, m); sensitivity of the sum to the state at the last fix
+    sum_state_covariance: Array  # (n, m); of the sum with the state after step k, since the fix
+    sum_variance: Array  # (n, 6); of the sum, from the noise since the last fix
+    first_observation: Array  # (m,); `sum_observation` of the first step
+    start: Array  # (m, m); covariance at switch-on
+    mean: Array  # (m,); at switch-on
+    scale: Array  # (6,); as in `AxisStates`; the states of scale factors come after the m
+    output: Array  # (m,); output matrix H: sensitivity of z to each state
 
     @property
     def states(self) -> int:

@@ -86,28 +86,18 @@ def run(
 
     Parameters
     ----------
-    rate, force : ndarray, shape (L, 3)
-        Sensor readings, rad/s and m/s^2.
-    T : float
-        s.
-    earth : ndarray, shape (3,)
-    fixes : ndarray, shape (E, 7)
-        Position, velocity and heading of GNSS at the end of each epoch.
-    available : ndarray of bool, shape (E,)
-        Whether the filter uses them.
-    spread : ndarray, shape (7,)
-        Their standard deviations; a fix with an infinite one is not used.
-    position, velocity, attitude : ndarray, shapes (E, 3), (E, 3), (E, 3, 3)
-        The truth at these times.
-    bias : ndarray, shape (E, 6)
-        True slow error of each axis there; NaN if unknown.
-    p, v, C : ndarray, shapes (3,), (3,), (3, 3)
-        Initial estimate.
-    start : ndarray, shape (9, 9)
-        Covariance of its error.
-    axes : StackedStates
-    width : int
-        Samples of a step.
+    rate, force, T, earth
+        Sensor readings, shape (L, 3), rad/s and m/s^2, every T s; the Earth's rate, shape (3,).
+    fixes, available, spread
+        Position, velocity and heading of GNSS at the end of each epoch, shape (E, 7), whether the
+        filter uses them (E,), and their standard deviations (7,); infinite: not used.
+    position, velocity, attitude, bias
+        The truth at these times, shapes (E, 3), (E, 3), (E, 3, 3), and the true slow error of each
+        axis (E, 6); NaN if unknown.
+    p, v, C, start
+        Initial estimate, shapes (3,), (3,), (3, 3), and the covariance of its error, (9, 9).
+    axes, width
+        States of the axes, and samples of a step.
 
     Returns
     -------

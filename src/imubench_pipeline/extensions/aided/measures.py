@@ -52,9 +52,9 @@ def within(drive: Drive, length: float | None) -> NDArray[np.bool_]:
 
 
 def squares(drive: Drive, outcome: Outcome, error: str, length: float | None) -> Array:
-    """Return the mean square of an error of each run, shape (R,).
+    """Return the mean square of an error of each run, shape (R,), at the end of outages.
 
-    At the end of outages of this length, s; None: at all fixes.
+    They have this length, s; None: at all fixes.
     """
     return _average_epochs(drive, outcome.errors[:, :, _ERROR_COLUMNS[error]] ** 2, length)
 
@@ -100,10 +100,7 @@ def _compute_interval(value: float, relative: Array) -> Interval:
 
 
 def inside(drive: Drive, outcome: Outcome, group: str, length: float | None) -> Share | None:
-    """Return the share of epochs whose NEES of a group of `GROUPS` is within its 95 % bounds.
-
-    None if the truth of the group is unknown.
-    """
+    """Return the share of epochs whose NEES of a group is within 95 % bounds; None if unknown."""
     place = GROUPS.index(group)
     nees = outcome.normalised[:, within(drive, length), place]
     if np.isnan(nees).any():

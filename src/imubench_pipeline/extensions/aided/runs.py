@@ -55,21 +55,12 @@ def schedule(duration: float, lengths: Sequence[float]) -> list[Outage]:
 
 @dataclass(frozen=True)
 class Outcome:
-    """Results of a tuning, from R runs of E fixes.
+    """Results of a tuning, from R runs of E fixes; see `error_state.run`."""
 
-    Attributes
-    ----------
-    errors, variances : ndarray, shape (R, E, 9)
-    normalised : ndarray, shape (R, E, 6)
-        See `error_state.run`.
-    states : int
-        Number of states of the filter.
-    """
-
-    errors: Array
-    variances: Array
-    normalised: Array
-    states: int
+    errors: Array  # (R, E, 9)
+    variances: Array  # (R, E, 9)
+    normalised: Array  # (R, E, 6)
+    states: int  # number of states of the filter
 
 
 class Drive:

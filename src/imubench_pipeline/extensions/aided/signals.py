@@ -36,25 +36,13 @@ class Spreads:
 
 @dataclass(frozen=True)
 class Signals:
-    """Input of a filter in a run, and the known truth.
+    """Input of a filter in a run, and the known truth."""
 
-    Attributes
-    ----------
-    rate, force : ndarray, shape (L, 3)
-        rad/s and m/s^2.
-    fixes : ndarray, shape (E, 7)
-        Position, velocity and heading of GNSS, m, m/s and rad.
-    bias : ndarray, shape (E, 6)
-        Slow error of each axis at the fixes, without white noise; NaN if unknown.
-    start : ndarray, shape (9,)
-        Initial errors in standard deviations.
-    """
-
-    rate: Array
-    force: Array
-    fixes: Array
-    bias: Array
-    start: Array
+    rate: Array  # (L, 3); rad/s
+    force: Array  # (L, 3); m/s^2
+    fixes: Array  # (E, 7); position, velocity and heading of GNSS, m, m/s and rad
+    bias: Array  # (E, 6); error of each axis at the fixes, without white noise; NaN if unknown
+    start: Array  # (9,); initial errors in standard deviations
 
 
 def signals(

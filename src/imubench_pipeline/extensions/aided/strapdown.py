@@ -73,19 +73,10 @@ def copy(a: Array, into: Array) -> None:
 def step(
     p: Array, v: Array, C: Array, w: Array, f: Array, T: float, earth: Array, room: Array
 ) -> None:
-    """Propagate by one sampling interval; p, v, C are changed in place.
+    """Propagate by one sampling interval T, s; p, v, C are changed in place.
 
-    Parameters
-    ----------
-    p, v, w, f : ndarray, shape (3,)
-        m, m/s, rad/s, m/s^2.
-    C : ndarray, shape (3, 3)
-    T : float
-        s.
-    earth : ndarray, shape (3,)
-        w_ie, rad/s.
-    room : ndarray, shape (4, 3, 3)
-        Work space; on return [3, 0] has the specific force in the frame.
+    p, v, w, f and ``earth`` (w_ie) have the shape (3,), in SI, C (3, 3). ``room`` (4, 3, 3) is work
+    space; on return, [3, 0] has the specific force in the frame.
     """
     middle, half, other = room[0], room[1], room[2]
     force, back = room[3, 0], -0.5 * T
@@ -129,21 +120,9 @@ def turn_between(C: Array, after: Array, into: Array) -> None:
 def inverse(
     start: Array, velocity: Array, attitude: Array, T: float, earth: Array
 ) -> tuple[Array, Array, Array]:
-    """Return the positions, and the samples of ideal sensors along them.
+    """Return the positions, shape (L + 1, 3), and ideal rates and forces, shapes (L, 3).
 
-    Parameters
-    ----------
-    start : ndarray, shape (3,)
-        m.
-    velocity : ndarray, shape (L + 1, 3)
-    attitude : ndarray, shape (L + 1, 3, 3)
-    T : float
-        s.
-    earth : ndarray, shape (3,)
-
-    Returns
-    -------
-    position, rate, force : ndarray, shapes (L + 1, 3), (L, 3), (L, 3)
+    The start has the shape (3,), m, the velocity (L + 1, 3), the attitude (L + 1, 3, 3).
     """
     L = len(velocity) - 1
     position, rate, force = np.empty((L + 1, 3)), np.empty((L, 3)), np.empty((L, 3))

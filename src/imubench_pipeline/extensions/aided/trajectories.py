@@ -23,19 +23,11 @@ DEFAULT_LATITUDE = math.radians(45.0)
 
 @dataclass(frozen=True)
 class Gnss:
-    """Standard deviations of the white errors of a GNSS receiver.
+    """Standard deviations of the white errors of a GNSS receiver."""
 
-    Attributes
-    ----------
-    position, velocity : float
-        Of one axis, m and m/s.
-    heading : float
-        rad; infinite for a receiver with one antenna, without heading.
-    """
-
-    position: float
-    velocity: float
-    heading: float = math.inf
+    position: float  # of one axis, m
+    velocity: float  # of one axis, m/s
+    heading: float = math.inf  # rad; infinite for one antenna
 
     @property
     def spread(self) -> Array:
@@ -45,30 +37,15 @@ class Gnss:
 
 @dataclass(frozen=True)
 class Trajectory:
-    """True motion at a rate in Hz, and the samples of ideal sensors.
+    """True motion, and the samples of ideal sensors."""
 
-    Attributes
-    ----------
-    position, velocity : ndarray, shape (L + 1, 3)
-        North, east, down; m and m/s.
-    attitude : ndarray, shape (L + 1, 3, 3)
-        From the axes of the sensor (ahead, right, down) to north, east, down.
-    rate, force : ndarray, shape (L, 3)
-        rad/s and m/s^2: means over the intervals between.
-    sampling : float
-        Hz.
-    earth : ndarray, shape (3,)
-        The Earth's rate, rad/s.
-    gnss : Gnss
-    """
-
-    position: Array
-    velocity: Array
-    attitude: Array
-    rate: Array
-    force: Array
-    sampling: float
-    earth: Array
+    position: Array  # (L + 1, 3); north, east, down; m
+    velocity: Array  # (L + 1, 3); m/s
+    attitude: Array  # (L + 1, 3, 3); from sensor axes (ahead, right, down) to north, east, down
+    rate: Array  # (L, 3); rad/s: means over the intervals between
+    force: Array  # (L, 3); m/s^2, likewise
+    sampling: float  # Hz
+    earth: Array  # (3,); the Earth's rate, rad/s
     gnss: Gnss
 
 
@@ -113,9 +90,8 @@ def _simulate_ground(time: Array, size: float, moving: Array) -> tuple[Array, Ar
 def _simulate_field(time: Array, sampling: float) -> _Motion:
     """Return a field: 1.5 m/s along rows of 45 m, half turns of 2 m radius, left and right."""
     turn = math.pi / 6.0
-    rate = _build_sequence(
-        time, [(30.0, 0.0), (6.0, turn), (30.0, 0.0), (6.0, -turn)], 2.0, sampling
-    )
+    turns = [(30.0, 0.0), (6.0, turn), (30.0, 0.0), (6.0, -turn)]
+    rate = _build_sequence(time, turns, 2.0, sampling)
     speed = _build_sequence(time, [(29.0, 1.5), (8.0, 1.0), (28.0, 1.5), (7.0, 1.0)], 2.0, sampling)
     rolled, pitched = _simulate_ground(time, math.radians(1.5), speed / 1.5)
     return _Motion(speed, np.cumsum(rate) / sampling, np.zeros_like(time), rolled, pitched)
@@ -124,12 +100,8 @@ def _simulate_field(time: Array, sampling: float) -> _Motion:
 def _simulate_car(time: Array, sampling: float) -> _Motion:
     """Return a drive in streets: up to 14 m/s, turns by 90 degrees, stops at lights."""
     quarter = math.pi / 2.0 / 5.0
-    speed = _build_sequence(
-        time,
-        [(18.0, 12.0), (7.0, 5.0), (22.0, 14.0), (8.0, 0.0), (20.0, 13.0), (7.0, 5.0), (10.0, 9.0)],
-        4.0,
-        sampling,
-    )
+    speeds = [(18.0, 12.0), (7.0, 5.0), (22.0, 14.0), (8.0, 0.0), (20.0, 13.0), (7.0, 5.0)]
+    speed = _build_sequence(time, [*speeds, (10.0, 9.0)], 4.0, sampling)
     turns = [(19.0, 0.0), (5.0, quarter), (45.0, 0.0), (6.5, 0.0), (5.0, -quarter), (11.5, 0.0)]
     rate = _build_sequence(time, turns, 2.0, sampling) * np.minimum(speed / 4.0, 1.0)
     rolled, pitched = _simulate_ground(time, math.radians(0.4), np.minimum(speed / 5.0, 1.0))
@@ -140,9 +112,8 @@ def _simulate_drone(time: Array, sampling: float) -> _Motion:
     """Return figures of eight at 8 m/s with climbs and descents, banked in turns."""
     speed = _build_sequence(time, [(40.0, 8.0), (10.0, 4.0)], 4.0, sampling)
     rate = _build_sequence(time, [(12.0, 0.5), (5.0, 0.0), (12.0, -0.5), (5.0, 0.0)], 3.0, sampling)
-    climb = _build_sequence(
-        time, [(20.0, 0.0), (8.0, 1.5), (20.0, 0.0), (8.0, -1.5)], 3.0, sampling
-    )
+    climbs = [(20.0, 0.0), (8.0, 1.5), (20.0, 0.0), (8.0, -1.5)]
+    climb = _build_sequence(time, climbs, 3.0, sampling)
     roll = np.arctan(speed * rate / STANDARD_GRAVITY)
     pitch = -np.arctan(np.gradient(speed, 1.0 / sampling) / STANDARD_GRAVITY)
     return _Motion(speed, np.cumsum(rate) / sampling, climb, roll, pitch)

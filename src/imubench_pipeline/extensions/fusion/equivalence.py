@@ -44,22 +44,13 @@ def answer(
 ) -> Answer | str:
     """Return the Allan variance of the median channel of a sensor at a tau; or why not.
 
-    Parameters
-    ----------
-    sensor : str
-    candidates : sequence of ComparedChannel
-        All channels of one quantity of the sensor, at least one. Simulated ones are left out if
-        there are measured ones. The median of two is the worse one.
-    tau : float
-        s.
-    correlation : mapping of str to float
-        Fraction of the variance of each parameter that specimens share.
-    longest : float
-        Longest tau, as a fraction of the log.
-    draws, seed : int
-        Number of models drawn from the estimate; each channel has its own random stream.
+    The candidates are all channels of one quantity of the sensor, at least one. Simulated ones are
+    left out if there are measured ones. The median of two is the worse one. The tau is in s;
+    ``correlation`` has the fraction of the variance of each parameter that specimens share,
+    ``longest`` is the longest tau as a fraction of the log, and ``draws`` the number of models
+    drawn from the estimate, with a random stream for each channel.
     """
-    measured = [channel for channel in candidates if not channel.simulated] or list(candidates)
+    measured = [channel for channel in candidates if not channel.simulated] or candidates
     long = [channel for channel in measured if tau <= longest * channel.duration]
     if not long:
         most = longest * max(channel.duration for channel in measured)
@@ -106,12 +97,11 @@ def equivalence_rows(
             if channel.channel.startswith(quantity):
                 by_sensor.setdefault(channel.sensor, []).append(channel)
         for tau in taus:
-            answers = {
-                sensor: answer(
-                    sensor, own, tau, correlation, longest=longest, draws=draws, seed=seed
+            answers = {}
+            for name, own in by_sensor.items():
+                answers[name] = answer(
+                    name, own, tau, correlation, longest=longest, draws=draws, seed=seed
                 )
-                for sensor, own in by_sensor.items()
-            }
             for a, b in permutations(answers, 2):
                 row = FusionRow(quantity=quantity, tau=tau, sensor=a, other=b)
                 yield _compare_pair(row, answers[a], answers[b])
@@ -147,9 +137,8 @@ def _compare_pair(row: FusionRow, a: Answer | str, b: Answer | str) -> FusionRow
     number = float(number_needed(a.own, a.common, b.own + b.common))
     drawn = number_needed(a.drawn_own, a.drawn_common, b.drawn_own + b.drawn_common)
     # Infinite numbers cannot be interpolated.
-    low, high = np.quantile(
-        drawn, [_TAIL_PROBABILITY, 1.0 - _TAIL_PROBABILITY], method="inverted_cdf"
-    )
+    tails = [_TAIL_PROBABILITY, 1.0 - _TAIL_PROBABILITY]
+    low, high = np.quantile(drawn, tails, method="inverted_cdf")
     # Draws of an absent term are above 0: extend the limits to the value.
     low, high = min(float(low), number), max(float(high), number)
     if math.isinf(number):

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from imubench_pipeline.datasheets.comparable import Comparable, comparables
 from imubench_pipeline.estimators.estimate import Parameter
@@ -67,7 +67,10 @@ def grade_rows(
                 estimate = chosen.estimate
                 of = estimate.parameters if name == "N" else estimate.curve or {}
                 own = of.get(name, Parameter(None, "not_shown", "not estimated"))
-                row = GradeRow(
+                reason = printed.obstacle or printed.reason
+                if printed.value is not None:
+                    reason = None if own.value is not None else own.reason or own.status
+                yield GradeRow(
                     quantity=quantity,
                     sensor=sensor,
                     recording=chosen.recording,
@@ -81,23 +84,15 @@ def grade_rows(
                     lower=own.lower,
                     upper=own.upper,
                     printed=printed.value,
+                    n=_divide(own.value, printed.value),
+                    n_lower=_divide(own.lower, printed.value),
+                    n_upper=_divide(own.upper, printed.value),
+                    reason=reason,
                 )
-                yield _compare(row, own, printed)
 
 
-def _compare(row: GradeRow, own: Parameter, printed: Comparable) -> GradeRow:
-    if printed.value is None:
-        return replace(row, reason=printed.obstacle or printed.reason)
-
-    def needed(value: float | None) -> float | None:
-        return (
-            None if value is None else (value / printed.value) ** 2 if printed.value else math.inf
-        )
-
-    return replace(
-        row,
-        n=needed(own.value),
-        n_lower=needed(own.lower),
-        n_upper=needed(own.upper),
-        reason=None if own.value is not None else own.reason or own.status,
-    )
+def _divide(own: float | None, printed: float | None) -> float | None:
+    """Return the number of sensors that reach a printed figure."""
+    if own is None or printed is None:
+        return None
+    return (own / printed) ** 2 if printed else math.inf

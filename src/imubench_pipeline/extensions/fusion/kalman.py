@@ -47,10 +47,7 @@ def steady_covariance(transition: Array, process_noise: Array, information: Arra
     combination without information) needs no choice of differences. It is accurate for
     eigenvalues near 1, which slow Gauss-Markov processes have.
 
-    Parameters
-    ----------
-    transition, process_noise, information : ndarray, shape (m, m)
-        Phi, Q_d and G. Unobservable processes must be stable.
+    Phi, Q and G have the shape (m, m). Unobservable processes must be stable.
 
     Raises
     ------
@@ -168,17 +165,14 @@ class KalmanFusion:
                 raise ValueError(
                     f"a block has the shape {block.shape}, expected {self.sensors} columns"
                 )
-            fused = np.empty(len(block))
-            _run_filter(
+            yield _run_filter(
                 np.ascontiguousarray(block, dtype=np.float64),
-                fused,
                 state,
                 (output.indptr, output.indices, output.data),
                 (transition.indptr, transition.indices, transition.data),
                 np.ascontiguousarray(self._gain),
                 self.weights,
             )
-            yield fused
 
 
 def _build_state_space(board: Board) -> tuple[Array, Array, Array, Array]:
@@ -218,16 +212,15 @@ def _project_out_common(covariance: Array) -> Array:
 @njit(cache=True, nogil=True)
 def _run_filter(
     samples: Array,
-    fused: Array,
     state: Array,
     output: tuple[NDArray[np.int32], NDArray[np.int32], Array],
     transition: tuple[NDArray[np.int32], NDArray[np.int32], Array],
     gain: Array,
     weights: Array,
-) -> None:
-    """Run the filter over samples, and update the state in place."""
+) -> Array:
+    """Return the fused samples, and update the state in place."""
     sensors, states = weights.size, state.size
-    left, moved = np.empty(sensors), np.empty(states)
+    fused, left, moved = np.empty(len(samples)), np.empty(sensors), np.empty(states)
     for k in range(len(samples)):
         signal = 0.0
         for i in range(sensors):
@@ -251,3 +244,4 @@ def _run_filter(
             moved[j] = total
         for j in range(states):
             state[j] = moved[j]
+    return fused

@@ -89,8 +89,7 @@ def equal_numbers(rows: Sequence[FusionRow]) -> Iterator[dict[str, Any]]:
 def matrices(lines: Sequence[Mapping[str, Any]]) -> Iterator[dict[str, Any]]:
     """Yield a matrix for each quantity and averaging time, from the lines of `equal_numbers`.
 
-    Rows and columns are the sensors, the quietest first; a cell has the number of row sensors that
-    match one column sensor. A sensor that is at least as good needs one, and has no line.
+    A cell has the number of row sensors that match one column sensor; the quietest come first.
     """
     groups: dict[tuple[str, str], list[Mapping[str, Any]]] = {}
     for line in lines:

@@ -138,14 +138,9 @@ def fused_allan(board: Board, weights: Weights, tau: ArrayLike) -> FusedCurve:
     spectrum (`nodes`; relative error below 1e-7). A ramp passes with the weights at frequency 0, a
     line with the weights at its frequency. Ramps of several sensors have independent random signs.
 
-    Parameters
-    ----------
-    board : Board
-        The actual sensors.
-    weights : Weights
-        They may be from another board, to predict the effect of wrong sensor models.
-    tau : array_like, shape (m,)
-        s; rounded to the nearest whole number of fused samples, at least one.
+    The weights may be from another board than the actual sensors, to predict the effect of wrong
+    sensor models. The tau are array_like of shape (m,), s, rounded to the nearest whole number of
+    fused samples, at least one.
     """
     sizes = np.maximum(np.rint(np.atleast_1d(np.asarray(tau)) * board.rate).astype(np.int64), 1)
     tau = sizes / board.rate
@@ -197,21 +192,9 @@ def prediction_limits(
     that are too wide for correlated parameters. Sensors with the same estimate are specimens of one
     sensor and are drawn together, since the error of a parameter is common to them.
 
-    Parameters
-    ----------
-    board : Board
-        Board from the estimates; its shared parts are assumed to be known.
-    estimates : sequence of Estimate
-        One a sensor, of its independent noise.
-    weights : Weights
-    tau : array_like, shape (m,)
-        s.
-    draws : int
-        Number of drawn boards.
-    rng : numpy.random.Generator
-    level : float
-        Fraction of the draws between the limits.
-
+    The board is from the estimates; its shared parts are assumed to be known. There is an estimate
+    of the independent noise of each sensor. The tau are array_like of shape (m,), s; ``draws`` is
+    the number of boards, and ``level`` the fraction of them between the limits.
     """
     drawn: dict[int, list[NoiseModel]] = {}
     for estimate, stream in zip(estimates, rng.spawn(len(estimates)), strict=True):

@@ -1,4 +1,4 @@
-"""What is declared of several simulated sensors on a board."""
+"""Settings of several simulated sensors on a board."""
 
 from __future__ import annotations
 

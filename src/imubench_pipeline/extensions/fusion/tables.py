@@ -1,4 +1,4 @@
-"""Several sensors together, and what a source prints of those on a board."""
+"""Rows about several sensors together, and about the printed figures of a board."""
 
 from __future__ import annotations
 
