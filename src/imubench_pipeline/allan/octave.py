@@ -116,9 +116,8 @@ class OctaveSums:
         if ready:
             # Only sections that begin in the remainder are copied, with the samples they need.
             heads = min(ready, -(-len(rest) // SECTION_SAMPLES))
-            head = np.concatenate(
-                (rest, block[: heads * SECTION_SAMPLES + _OVERLAP_SAMPLES - len(rest)])
-            )
+            end = heads * SECTION_SAMPLES + _OVERLAP_SAMPLES - len(rest)
+            head = np.concatenate((rest, block[:end]))
             body = block[heads * SECTION_SAMPLES - len(rest) :] if ready > heads else block[:0]
             self._sum(head, heads, body, ready)
         self._rest = block[used:].copy() if used >= 0 else np.concatenate((rest[used:], block))
@@ -212,9 +211,8 @@ class OctaveSums:
         for section in range(number):
             in_head = low + section < heads
             begin = (low + section - (0 if in_head else heads)) * SECTION_SAMPLES
-            samples = (head if in_head else body)[
-                begin : begin + SECTION_SAMPLES + _OVERLAP_SAMPLES
-            ]
+            end = begin + SECTION_SAMPLES + _OVERLAP_SAMPLES
+            samples = (head if in_head else body)[begin:end]
             of_section = (*common, sums[section], edges[section])
             if len(samples) < SECTION_SAMPLES + _OVERLAP_SAMPLES:
                 totals[section], whole[section] = _sum_end(samples, *of_section)

@@ -262,13 +262,9 @@ def sum_sizes(theta: Array, start: int, stop: int, sizes: NDArray[np.int64], sum
         last = theta[start + 2 * n : end + 2 * n]
         next_n = sizes[min(j + 1, sizes.size - 1)]
         if j + 1 < sizes.size and end == min(stop, theta.size - 2 * next_n):
-            both = _sum_squares_twice(
-                first,
-                middle,
-                last,
-                theta[start + next_n : end + next_n],
-                theta[start + 2 * next_n : end + 2 * next_n],
-            )
+            next_middle = theta[start + next_n : end + next_n]
+            next_last = theta[start + 2 * next_n : end + 2 * next_n]
+            both = _sum_squares_twice(first, middle, last, next_middle, next_last)
             sums[j] += both[0]
             sums[j + 1] += both[1]
             j += 2
@@ -300,9 +296,8 @@ def sum_present(
         good = (first >= enough) & (second >= enough)
         inverse_first = 1.0 / max(first, 1)
         inverse_second = 1.0 / max(second, 1)
-        difference = (theta_2[i] - theta_1[i]) * inverse_second - (
-            theta_1[i] - theta_0[i]
-        ) * inverse_first
+        mean = (theta_1[i] - theta_0[i]) * inverse_first
+        difference = (theta_2[i] - theta_1[i]) * inverse_second - mean
         weight = 1.0 if good else 0.0
         total += weight * difference * difference
         thinned += weight * 0.5 * (inverse_first + inverse_second)

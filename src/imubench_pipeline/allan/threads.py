@@ -14,19 +14,11 @@ _SHARES_PER_THREAD = 4  # so that no thread waits long for the last share
 
 
 def available(threads: int | None) -> int:
-    """Return the number of threads; None: one for each core available to this process.
-
-    Raises
-    ------
-    ValueError
-        If the number is below 1.
-    """
+    """Return the number of threads, by default of all cores available; ValueError below 1."""
     if threads is None:
-        return (
-            len(os.sched_getaffinity(0))
-            if hasattr(os, "sched_getaffinity")
-            else os.cpu_count() or 1
-        )
+        if hasattr(os, "sched_getaffinity"):
+            return len(os.sched_getaffinity(0))
+        return os.cpu_count() or 1
     if threads < 1:
         raise ValueError(f"threads is {threads}, expected 1 or more, or None for all cores")
     return threads

@@ -344,9 +344,7 @@ def _make_curve(
         before = exponent
         exponents.append(exponent)
         counts = [stop - start - 2 * size + 1 for start, stop in segments]
-        degrees.append(
-            sum(equivalent_degrees(exponent, size, count) for count in counts if count > 0)
-        )
+        degrees.append(sum(equivalent_degrees(exponent, size, m) for m in counts if m > 0))
     return AllanCurve(
         tau=n / rate,
         cluster_size=n,

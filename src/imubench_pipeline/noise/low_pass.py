@@ -47,7 +47,7 @@ class LowPass:
     @property
     def transition(self) -> Array:
         """F, shape (order, order), 1/s."""
-        sections, _ = self._sections()
+        sections = self._sections()
         matrix = np.asarray(block_diag(*sections), dtype=np.float64)
         begin = 0
         for section, following in pairwise(sections):
@@ -59,24 +59,21 @@ class LowPass:
     @property
     def input(self) -> Array:
         """Column b, shape (order,), 1/s."""
-        sections, _ = self._sections()
         column = np.zeros(self.order)
-        column[len(sections[0]) - 1] = self.angular_cutoff
+        column[len(self._sections()[0]) - 1] = self.angular_cutoff
         return column
 
     @property
     def output(self) -> Array:
         """Row c, shape (order,)."""
-        sections, _ = self._sections()
         row = np.zeros(self.order)
-        row[self.order - len(sections[-1])] = 1.0
+        row[self.order - len(self._sections()[-1])] = 1.0
         return row
 
     @property
     def steady_state(self) -> Array:
         """States at rest under a unit input, -F^-1 b, shape (order,)."""
-        _, states = self._sections()
-        return states
+        return np.concatenate([np.eye(len(section))[0] for section in self._sections()])
 
     def power(self, frequency: ArrayLike) -> Array:
         """Return |H|^2 = 1 / (1 + (f / cutoff)^(2 order)), in the shape of the frequency, Hz."""
@@ -87,19 +84,16 @@ class LowPass:
     def response(self, frequency: float) -> complex:
         """Return H: gain and phase of a sinusoid of a frequency in Hz."""
         s = 1j * frequency / self.cutoff
-        poles = np.exp(
-            1j * math.pi * (2 * np.arange(1, self.order + 1) + self.order - 1) / (2 * self.order)
-        )
+        n = self.order
+        poles = np.exp(1j * math.pi * (2 * np.arange(1, n + 1) + n - 1) / (2 * n))
         return complex(1.0 / np.prod((s - poles) / -poles))
 
-    def _sections(self) -> tuple[list[Array], Array]:
-        """Return the matrices of the sections at a cut-off of 1 rad/s, and the states at rest."""
-        damping = [
-            math.sin(math.pi * (2 * j - 1) / (2 * self.order))
-            for j in range(1, self.order // 2 + 1)
-        ]
-        sections = [np.array([[0.0, 1.0], [-1.0, -2.0 * zeta]]) for zeta in damping]
+    def _sections(self) -> list[Array]:
+        """Return the matrices of the sections at a cut-off of 1 rad/s."""
+        sections = []
+        for j in range(1, self.order // 2 + 1):
+            damping = math.sin(math.pi * (2 * j - 1) / (2 * self.order))
+            sections.append(np.array([[0.0, 1.0], [-1.0, -2.0 * damping]]))
         if self.order % 2:
             sections.append(np.array([[-1.0]]))
-        steady_state = np.concatenate([np.eye(len(section))[0] for section in sections])
-        return sections, steady_state
+        return sections

@@ -158,10 +158,7 @@ class NoiseModel:
 
     def realised(self, interval: float, longest: float) -> Sequence[Term]:
         """Return terms with finite state spaces: flicker noise is a bank up to ``longest``, s."""
-        terms: list[Term] = []
-        for term in self.terms:
-            terms.extend(term.realised(interval, longest))
-        return terms
+        return [part for term in self.terms for part in term.realised(interval, longest)]
 
     def state_space(self, rate: float, longest: float = _MAX_FLICKER_TAU) -> StateSpace:
         """Return the discrete state space with exact noise covariances, at a rate in Hz.
@@ -171,7 +168,7 @@ class NoiseModel:
         approximated by several states up to a tau of ``longest``, s.
         """
         spaces = [term.state_space(1.0 / rate) for term in self.realised(1.0 / rate, longest)]
-        return StateSpace.together([*spaces, StateSpace.without_states(0.0)])
+        return StateSpace.together(spaces)
 
 
 def _sum(parts: Sequence[Array], like: Array) -> Array:

@@ -136,13 +136,10 @@ class _Covariance:
     def _smooth(self, lags: Array) -> Array:
         n = self._n
         total = np.zeros(len(lags))
-        if not self._noise:
-            return total
         shifted = np.abs(lags[None, :] + n * np.arange(-2.0, 3.0)[:, None])
+        second_difference = np.array([1.0, -4.0, 6.0, -4.0, 1.0])
         for term in self._noise:
-            total += np.array([1.0, -4.0, 6.0, -4.0, 1.0]) @ term.sum_covariance(
-                shifted, n, self._interval
-            )
+            total += second_difference @ term.sum_covariance(shifted, n, self._interval)
         return total
 
     def _at(self, lags: NDArray[np.int64]) -> tuple[Array, Array]:
@@ -168,10 +165,7 @@ class _Covariance:
         # Trapezoidal sums between the lags; each end counts as a whole lag.
         weight = (width[1:] + width[:-1]) / 2.0
         weight[-1] += 0.5
-        if len(lags) > 1:
-            weight[0] += 0.5
-        else:
-            weight[0] = 1.0
+        weight[0] = weight[0] + 0.5 if len(lags) > 1 else 1.0
         both = np.where(lags == 0, 2.0 * weight - 1.0, 2.0 * weight) * pairs
         sharp = np.where(lags == 0, 1.0, 2.0) * pairs * rounding
         square = both @ smooth**2 + sharp @ (2.0 * smooth + rounding)
@@ -208,14 +202,11 @@ class _Covariance:
                 places = np.flatnonzero(present)[:1]
             layouts = [(places, float(thinning * stride))]
         else:
-            thinned = [
-                min(
-                    int(M),
-                    max(2 * _TAIL_LAGS_PER_CLUSTER, round(M * _TAIL_LAGS_PER_CLUSTER / self._n)),
-                )
-                for M in terms
-            ]
-            layouts = [(np.arange(m), float(M) / m) for m, M in zip(thinned, terms, strict=True)]
+            layouts = []
+            for M in terms.tolist():
+                least = 2 * _TAIL_LAGS_PER_CLUSTER
+                m = min(M, max(least, round(M * _TAIL_LAGS_PER_CLUSTER / self._n)))
+                layouts.append((np.arange(m), M / m))
         if sum(len(places) for places, _ in layouts) > _MAX_EIGENVALUES:
             return None
         for places, step in layouts:

@@ -45,6 +45,7 @@ class StateSpace:
     @classmethod
     def together(cls, spaces: Sequence[StateSpace]) -> StateSpace:
         """Return the model of the sum of independent models, with their states in order."""
+        spaces = [*spaces, cls.without_states(0.0)]  # there may be none
         return cls(
             _build_block_diagonal([space.transition for space in spaces]),
             _build_block_diagonal([space.process_noise for space in spaces]),

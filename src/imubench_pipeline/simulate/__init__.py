@@ -13,11 +13,11 @@ from imubench_pipeline.simulate.samples import simulate
 __all__ = ["simulate"]
 
 
-class _Room(ModuleType):
+class _CallablePackage(ModuleType):
     """A package that is callable like its function of the same name."""
 
     __call__ = staticmethod(simulate)
     __signature__: Signature = signature(simulate)
 
 
-sys.modules[__name__].__class__ = _Room
+sys.modules[__name__].__class__ = _CallablePackage

@@ -74,13 +74,10 @@ def slow_sources(times: Array, interval: float, low_pass: LowPass | None) -> Slo
     system[:, 1:, 0] = low_pass.steady_state / times[:, None]
     system[:, 1:, 1:] = low_pass.transition
     impulse = np.concatenate(([1.0], -low_pass.steady_state))
-    transition, factor = _integrate_covariance(
-        system, np.broadcast_to(impulse, (n, 1 + m)), interval
-    )
-    sign = np.sign(factor[:, 0, 0])
-    return SlowSources(
-        decay, lost, own, transition[:, 1:, 0], factor[:, 0, 1:] * sign[:, None], factor[:, 1:, 1:]
-    )
+    impulses = np.broadcast_to(impulse, (n, 1 + m))
+    transition, factor = _integrate_covariance(system, impulses, interval)
+    shared = factor[:, 0, 1:] * np.sign(factor[:, 0, 0])[:, None]
+    return SlowSources(decay, lost, own, transition[:, 1:, 0], shared, factor[:, 1:, 1:])
 
 
 def white_factor(low_pass: LowPass, interval: float) -> Array:
@@ -127,14 +124,10 @@ class HeldInput:
     """Response of the filter deviation e to an input that is linear between samples."""
 
     step: Array  # shape (m,); e changes by ``step`` times the change of the input
-    # lag_decay, lag_step: the lag ε = lagged - input of a first-order lag becomes ``lag_decay * ε +
-    # lag_step * change``
-    lag_decay: float
-    lag_step: float
-    # lag_coupling, lagged_step: shape (m,); for a lagged input e changes by ``lag_coupling * ε +
-    # lagged_step * change``
-    lag_coupling: Array
-    lagged_step: Array
+    lag_decay: float  # the lag ε = lagged - input of a first-order lag becomes
+    lag_step: float  # ``lag_decay * ε + lag_step * change``
+    lag_coupling: Array  # shape (m,); for a lagged input e changes by
+    lagged_step: Array  # ``lag_coupling * ε + lagged_step * change``
 
 
 def held_input(low_pass: LowPass | None, lag: float, interval: float) -> HeldInput:
@@ -171,22 +164,9 @@ def stationary(
 ) -> tuple[Array, Array]:
     """Return the stationary distribution of the filter deviation e, given x.
 
-    Parameters
-    ----------
-    times : ndarray, shape (n,)
-        Correlation times, s; infinite for a random walk, whose x starts at 0.
-    densities : ndarray, shape (n,)
-        Densities of the driving noises.
-    white : float
-        Density of white noise at the input, N^2.
-    low_pass : LowPass
-
-    Returns
-    -------
-    mean_given_x : ndarray, shape (n, m)
-        Mean of e is ``x @ mean_given_x``.
-    covariance_given_x : ndarray, shape (m, m)
-        Covariance of e for a given x.
+    Its mean is x times the first result, shape (n, m); its covariance is the second, shape (m, m).
+    The correlation times, s, and the densities of the driving noises have the shape (n,). A time is
+    infinite for a random walk, whose x starts at 0. ``white`` is N^2 at the input.
     """
     # In units of the time constant of the filter, for well-conditioned equations.
     unit = low_pass.angular_cutoff

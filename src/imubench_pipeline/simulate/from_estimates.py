@@ -51,9 +51,8 @@ def with_estimates(
     figures: dict[str, list[Remark]] = {}
     topics: list[set[Topic]] = []
     for channel in CHANNELS:
-        of_channel = {
-            table: rows.filter(pc.field("channel") == channel) for table, rows in of_log.items()
-        }
+        own = pc.field("channel") == channel
+        of_channel = {table: rows.filter(own) for table, rows in of_log.items()}
         if len(of_channel["parameters"]):
             if recorded.rate is None:
                 raise ConfigError(f"{name}/{chosen}: its rate is not known")
@@ -113,15 +112,12 @@ def _estimate_axis(
     compensated = any(row.compensated for row in effect.values())
     reference = effect["T_0"].value if compensated else None
     if reference is not None:
-        values = {
-            name: (row.value if row.value is not None else row.fitted) or 0.0
-            for name, row in effect.items()
-        }
+        sensitivity, quadratic, lag = (
+            (row.value if row.value is not None else row.fitted) or 0.0
+            for row in (effect[name] for name in ("sensitivity", "quadratic", "lag"))
+        )
         drift = TemperatureDrift(
-            sensitivity=values["sensitivity"],
-            reference=reference,
-            quadratic=values["quadratic"],
-            lag=values["lag"],
+            sensitivity=sensitivity, reference=reference, quadratic=quadratic, lag=lag
         )
         figure = f"{drift.sensitivity:.4g} {effect['sensitivity'].unit}"
         remarks.append(Remark("drift", f"temperature sensitivity {figure}: estimated from {log}"))
@@ -131,11 +127,8 @@ def _estimate_axis(
         if (row.method == "compensated" if compensated else row.recommended)
     ]
     estimate = estimate_of(rows[0].method, rows)
-    text = (
-        f"noise {estimate.model.name}: estimated by {estimate.method} from {log}, N taken back to "
-        "before low-pass and rounding"
-    )
-    remarks.append(Remark("noise", text))
+    text = f"noise {estimate.model.name}: estimated by {estimate.method} from {log}"
+    remarks.append(Remark("noise", f"{text}, N taken back to before low-pass and rounding"))
     # The mean of an accelerometer is mostly gravity.
     if quantity_of(channel) != "accel":
         fixed = FixedBiasRow.rows_of(tables["fixed_bias"])

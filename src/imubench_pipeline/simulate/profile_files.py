@@ -148,9 +148,8 @@ class FileSeries:
                     "one a row: leave out the row, or fill it in"
                 )
             columns[name] = raw * factor + offset
-        times = np.concatenate(
-            ([before if np.isfinite(before) else -np.inf], columns[_TIME_COLUMN])
-        )
+        earlier = before if np.isfinite(before) else -np.inf
+        times = np.concatenate(([earlier], columns[_TIME_COLUMN]))
         rises = np.diff(times) > 0
         if not rises.all():
             at = int(np.argmin(rises))
@@ -208,15 +207,12 @@ class FileSeries:
                 batches: Iterable[pa.RecordBatch]
                 if self.path.suffix == ".parquet":
                     file = opened.enter_context(pq.ParquetFile(self.path))
-                    batches = file.iter_batches(
-                        _ROWS_PER_BATCH, columns=headings, use_threads=False
-                    )
+                    batches = file.iter_batches(_ROWS_PER_BATCH, None, headings, use_threads=False)
                 else:
                     types = dict.fromkeys(headings, pa.float64())
                     chosen = pacsv.ConvertOptions(include_columns=headings, column_types=types)
-                    batches = opened.enter_context(
-                        pacsv.open_csv(self.path, convert_options=chosen)
-                    )
+                    reader = pacsv.open_csv(self.path, convert_options=chosen)
+                    batches = opened.enter_context(reader)
                 for batch in batches:
                     yield row, batch
                     row += len(batch)

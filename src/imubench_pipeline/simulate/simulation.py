@@ -65,16 +65,14 @@ def run(
     lagged_step: Array,
     drift: Array,
 ) -> None:
-    """Write samples to ``log``, and update the states to the last sample.
+    """Write samples to a log, and update the states to the last sample.
 
     Parameters
     ----------
     log : ndarray, shape (L,)
         Written: output of the filter.
-    entering : ndarray, shape (L,)
-        Input at the samples without noise and drift; linear in between.
-    temperature : ndarray, shape (L,)
-        °C; empty: no drift.
+    entering, temperature : ndarray, shape (L,)
+        Input at the samples without noise and drift, and °C (empty: no drift); linear in between.
     normal : ndarray, shape (L, n + max(m, 1))
         Normal deviates. The states do not use the row of the first sample of the log.
     memory, x, e : ndarray, shapes (4,), (n,), (m,)
@@ -85,12 +83,8 @@ def run(
         Matrices of the filter; its own noise is normal @ factor.
     white : float
         Standard deviation of white noise per sample, if there is no filter.
-    step : ndarray, shape (m,)
-        Change of the filter deviation e for a unit change of the input (`HeldInput`).
-    lag : ndarray, shape (2,)
-        Decay of the temperature lag over a sample, and its change for a change of 1 K.
-    lag_coupling, lagged_step : ndarray, shape (m,)
-        Change of e for a lag of 1 K and for a change of 1 K, with a drift of 1 SI unit per K.
+    step, lag, lag_coupling, lagged_step : ndarray, shapes (m,), (2,), (m,), (m,)
+        `HeldInput`: for a unit change of the input; for 1 K and a drift of 1 SI unit per K.
     drift : ndarray, shape (3,)
         Sensitivity, SI/K, quadratic, SI/K², and reference, °C.
     """
@@ -240,9 +234,8 @@ class _Axis:
         self._input = (hold.step, lag, hold.lag_coupling, hold.lagged_step, np.array(figures))
         self._x, self._e = self._draw_initial_states(begin)
         self._memory = np.zeros(4)
-        self._sinusoids = [
-            (line, lines.uniform(0.0, 2.0 * math.pi)) for line in model.noise.sinusoids
-        ]
+        phases = (lines.uniform(0.0, 2.0 * math.pi) for _ in model.noise.sinusoids)
+        self._sinusoids = list(zip(model.noise.sinusoids, phases, strict=True))
         self._counted = self._counts.standard_normal() if model.noise.Q else 0.0
 
     def _discretise(
@@ -252,13 +245,10 @@ class _Axis:
         low_pass = self._model.low_pass
         slow = slow_sources(self._times, interval, low_pass)
         scale = np.sqrt(self._densities)
-        shared = slow.shared * scale[:, None]
-        states = (
-            slow.decay,
-            slow.own * scale,
-            np.ascontiguousarray(slow.coupling.T),
-            np.ascontiguousarray(shared.T),
+        coupling, shared = (
+            np.ascontiguousarray(part.T) for part in (slow.coupling, slow.shared * scale[:, None])
         )
+        states = (slow.decay, slow.own * scale, coupling, shared)
         if low_pass is None:
             none = np.zeros((0, 0))
             return states, (none, none, np.zeros(0), math.sqrt(self._white / interval))
@@ -276,14 +266,12 @@ class _Axis:
         low_pass = self._model.low_pass
         if low_pass is None:
             return x, np.zeros(0)
-        mean_given_x, covariance_given_x = stationary(
-            self._times, self._densities, self._white, low_pass
-        )
-        values, vectors = np.linalg.eigh(covariance_given_x)
+        mean, covariance = stationary(self._times, self._densities, self._white, low_pass)
+        values, vectors = np.linalg.eigh(covariance)
         root = vectors * np.sqrt(np.maximum(values, 0.0))
         # For a ramp that has always been rising, e is constant: F^-1 p R.
         ramp = np.linalg.solve(low_pass.transition, low_pass.steady_state) * self._model.noise.R
-        return x, x @ mean_given_x + root @ rng.standard_normal(low_pass.order) + ramp
+        return x, x @ mean + root @ rng.standard_normal(low_pass.order) + ramp
 
     def samples(
         self, start: int, stop: int, true: Signal | None, temperature: Signal | None

@@ -56,21 +56,18 @@ def write_log(
     known_sources |= {} if log.temperature is None else {TEMPERATURE: log.temperature}
     sources = {name: known_sources[name] for name in names}
     samples = 0
-    if log.reader == "arrow":
-        with LogWriter(path, dict.fromkeys(names, pa.float64())) as writer:
-            for block in blocks:
-                writer.write(block)
-                samples += len(next(iter(block.values())))
-                progress(samples)
-            writer.finish(
-                {**metadata, "rows": samples, "grid": samples, "segments": [[0, samples]]}
-            )
-        return
-    with TextLog(path, log, sources, log.rate_hz or 1.0, remarks) as text:
+    with (
+        LogWriter(path, dict.fromkeys(names, pa.float64()))
+        if log.reader == "arrow"
+        else TextLog(path, log, sources, log.rate_hz or 1.0, remarks)
+    ) as writer:
         for block in blocks:
-            text.write(block)
+            writer.write(block)
             samples += len(next(iter(block.values())))
             progress(samples)
+        if isinstance(writer, LogWriter):
+            shape = {"rows": samples, "grid": samples, "segments": [[0, samples]]}
+            writer.finish({**metadata, **shape})
 
 
 def notes_text(name: str, log: LogFormat, sensor: LogFormat | None, words: str) -> str:

@@ -46,8 +46,7 @@ def axis_states(
     """
     terms = model.realised(shortest, longest)
     spaces = [term.state_space(1.0 / sampling) for term in terms]
-    whole = StateSpace.together([*spaces, StateSpace.without_states(0.0)])
-    return AxisStates(with_turn_on(whole, turn_on), scale)
+    return AxisStates(with_turn_on(StateSpace.together(spaces), turn_on), scale)
 
 
 def with_turn_on(space: StateSpace, turn_on: float) -> StateSpace:
@@ -99,7 +98,7 @@ def stack(axes: Sequence[AxisStates], sampling: float, width: int, steps: int) -
     """
     T = 1.0 / sampling
     spaces = [axis.space for axis in axes]
-    whole = StateSpace.together([*spaces, StateSpace.without_states(0.0)])
+    whole = StateSpace.together(spaces)
     first = np.cumsum([0, *(len(space.output) for space in spaces)])
     m = int(first[-1])
     step, noise_of_step, first_observation = np.zeros((m, m)), np.zeros((m, m)), np.zeros(m)

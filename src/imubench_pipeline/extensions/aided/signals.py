@@ -61,8 +61,10 @@ def signals(
 
     Parameters
     ----------
+    trajectory : Trajectory
     axes : mapping of str to SensorModel
         All six channels.
+    spreads : Spreads
     every : int
         Samples between two fixes.
     seed : int

@@ -81,9 +81,9 @@ class Term(ABC):
     def state_space(self, interval: float) -> StateSpace:
         """Discrete state space at a sampling interval, exact."""
 
-    @abstractmethod
     def continuous_space(self) -> ContinuousSpace | None:
         """State space in continuous time; None: it has none."""
+        return None
 
     @property
     @abstractmethod
@@ -127,9 +127,9 @@ class Term(ABC):
     def block_sums(self, blocks: int, width: int, rate: float, rng: np.random.Generator) -> Array:
         """Draw the sums over adjacent blocks of ``width`` samples of a simulated log, exactly."""
 
-    @abstractmethod
     def reading(self, lowest_tau: float) -> Reading | None:
         """Return where a curve, lowest at a tau in s, shows its parameter; None: nowhere."""
+        return None
 
     @property
     def values(self) -> dict[str, float]:
@@ -220,10 +220,6 @@ class Deterministic(Term):
     def growth_from_known(self, time: Array) -> tuple[Array, Array]:
         """0: a filter with the term predicts it exactly."""
         return np.zeros_like(time), np.zeros_like(time)
-
-    def reading(self, lowest_tau: float) -> Reading | None:
-        """None."""
-        return None
 
     def block_covariance(self, lags: Array, block: float) -> Array:
         """Raise TypeError: it is deterministic (see `swing`)."""

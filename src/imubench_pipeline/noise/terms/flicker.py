@@ -27,14 +27,13 @@ import numpy as np
 from scipy.optimize import nnls
 
 from imubench_pipeline.noise.growth import Calibrated, SensorStart
-from imubench_pipeline.noise.state_space import ContinuousSpace, StateSpace
+from imubench_pipeline.noise.state_space import StateSpace
 from imubench_pipeline.noise.terms.base import Term
 from imubench_pipeline.noise.terms.gauss_markov import (
     BIAS_INSTABILITY,
     FLOOR,
     PEAK_TAU,
     GaussMarkov,
-    sampled_gauss_markov_shape,
 )
 from imubench_pipeline.noise.terms.traits import Drive, Reading, Role, SampleBlocks
 from imubench_pipeline.noise.terms.white_noise import WhiteNoise
@@ -111,10 +110,6 @@ class Flicker(Term):
         """Raise ValueError: there is no finite state space."""
         raise ValueError("flicker noise has no finite state space; take its Gauss-Markov bank")
 
-    def continuous_space(self) -> ContinuousSpace | None:
-        """None, see `state_space`."""
-        return None
-
     @property
     def drive(self) -> Drive:
         """B of flicker noise."""
@@ -189,12 +184,7 @@ def bank(B: float, interval: float, longest: float) -> list[Term]:
     Their correlation times are spaced evenly on a log scale from half a sampling interval, five in
     two decades; white noise replaces shorter ones. The variances are fitted to the Allan variance
     of sampled flicker noise by non-negative least squares. The band of tau is from the sampling
-    ``interval`` to ``longest``, s.
-
-    Raises
-    ------
-    ValueError
-        If the band is empty.
+    ``interval`` to ``longest``, s; ValueError if it is empty.
     """
     if not 0 < interval < longest:
         raise ValueError(f"the band from {interval} to {longest} s is empty")
@@ -234,9 +224,7 @@ def _fit_unit_bank(decades: float) -> tuple[Array, Array, float]:
     times = np.geomspace(first, last, members)
     n = np.unique(np.rint(np.geomspace(1.0, 10.0**decades, 2 + int(decades * _POINTS_PER_DECADE))))
     wanted = Flicker(1.0).sampled_allan_variance(n, 1.0)
-    shapes = [
-        GaussMarkov(1.0, time).density * sampled_gauss_markov_shape(n, 1.0, time) for time in times
-    ]
+    shapes = [GaussMarkov(1.0, time).sampled_allan_variance(n, 1.0) for time in times]
     powers, _ = nnls(np.column_stack([*shapes, 1.0 / n]) / wanted[:, None], np.ones_like(n))
     return times, np.sqrt(powers[:-1]), math.sqrt(powers[-1])
 

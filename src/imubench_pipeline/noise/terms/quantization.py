@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from imubench_pipeline.noise.growth import Calibrated, SensorStart, of_constant
-from imubench_pipeline.noise.state_space import ContinuousSpace, StateSpace
+from imubench_pipeline.noise.state_space import StateSpace
 from imubench_pipeline.noise.terms.base import Term
-from imubench_pipeline.noise.terms.traits import Drive, Reading, Role, SampleBlocks, TermParameter
+from imubench_pipeline.noise.terms.traits import Drive, Role, SampleBlocks, TermParameter
 from imubench_pipeline.typing import Array
 
 
@@ -60,10 +60,6 @@ class Quantization(Term):
             np.eye(2) * self.Q**2,
         )
 
-    def continuous_space(self) -> ContinuousSpace | None:
-        """None: it is caused by the sampling."""
-        return None
-
     @property
     def drive(self) -> Drive | None:
         """None: a converter that counts increments follows every filter."""
@@ -103,7 +99,3 @@ class Quantization(Term):
     def block_sums(self, blocks: int, width: int, rate: float, rng: np.random.Generator) -> Array:
         """Drawn from the rounding errors at the ends of the blocks."""
         return np.diff(rng.standard_normal(blocks + 1)) * self.Q * rate
-
-    def reading(self, lowest_tau: float) -> Reading | None:
-        """None."""
-        return None
