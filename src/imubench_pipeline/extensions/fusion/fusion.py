@@ -137,11 +137,11 @@ def write_fusion(
     joint: list[Path],
     settings: str,
     catalogue: str,
-    outputs: Mapping[str, list[Path]],
+    outputs: list[Path],
 ) -> None:
     """Write the tables ``fusion`` and ``grades``, as Parquet and CSV.
 
-    ``joint``: tables ``draws`` of recordings; ``outputs``: the files of each table.
+    ``joint``: tables ``draws`` of recordings; ``outputs``: files of both tables, by their stems.
     """
     how = FusionSettings.model_validate_json(settings)
     tables = {name: read(name, [Path(inputs[name])]) for name in NEEDED}
@@ -152,5 +152,6 @@ def write_fusion(
     }
     for name, own in rows.items():
         table = build(name, own)
-        for output in outputs[name]:
-            write_arrow(table, output)
+        for output in outputs:
+            if output.stem == name:
+                write_arrow(table, output)

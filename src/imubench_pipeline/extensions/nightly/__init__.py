@@ -1,4 +1,4 @@
-"""`imubench nightly`: what a timer calls, while loggers write."""
+"""`imubench nightly`: run the workflow on complete logs, from a timer."""
 
 from imubench_pipeline.registry import Extension
 

@@ -1,4 +1,4 @@
-"""`imubench nightly`: what a timer calls, while loggers write."""
+"""The command `imubench nightly`, for timers."""
 
 from __future__ import annotations
 

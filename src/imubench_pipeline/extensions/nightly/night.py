@@ -71,24 +71,19 @@ class Night:
         self._always_held_back = run.held_back
         self._config = [entry for entry in config if not entry.startswith("held_back=")]
         self._flags = flags
-        self._began = datetime.now(UTC)
         self._put_right: list[str] = []
 
     def run(self, cores: str, settle: float, wait: float) -> Summary:
         """Run the workflow once; also write the summary to the folder ``nightly`` of the results.
 
         `settle`: min. time without change of a complete log, s; `wait`: max. time to wait for
-        another run, s.
-
-        Raises
-        ------
-        TakenError
-            If another run is still active.
+        another run, s (then a TakenError).
         """
         until = time.monotonic() + wait
         with Lock(lock_of(self.results)) as lock, _interrupt_on_signals():
             lock.acquire(wait)
             self._began = datetime.now(UTC)
+            self._log = self.folder / f"{self._began:%Y%m%dT%H%M%SZ}.log"
             self._wait_for_others(until)
             try:
                 before = read_state(self._state)
@@ -108,14 +103,9 @@ class Night:
                 self._keep(summary, after)
             except OSError as error:
                 why = [f"the summary cannot be kept: {error}", *self._describe_disk_space()]
-                return summary.model_copy(
-                    update={"outcome": "failed", "failure": [*summary.failure, *why]}
-                )
+                failure = [*summary.failure, *why]
+                return summary.model_copy(update={"outcome": "failed", "failure": failure})
         return summary
-
-    @property
-    def _log(self) -> Path:
-        return self.folder / f"{self._began:%Y%m%dT%H%M%SZ}.log"
 
     def _wait_for_others(self, until: float) -> None:
         """Wait for a Snakemake that a user runs on these results."""

@@ -62,7 +62,8 @@ def run_snakemake(arguments: Sequence[str], project: Path, output: Path, lock: L
             end_group(process.pid)
             process.wait()
             if terminal:
-                terminal.close()
+                os.close(terminal.begin)
+                os.close(terminal.end)
 
 
 class _Terminal:
@@ -75,7 +76,7 @@ class _Terminal:
         self._file = file
         self._pending = b""
         self._last: bytes | None = None
-        self._begin, self.end = os.openpty()
+        self.begin, self.end = os.openpty()
         with contextlib.suppress(termios.error):
             termios.tcsetwinsize(self.end, termios.tcgetwinsize(sys.stderr.fileno()))
 
@@ -83,8 +84,8 @@ class _Terminal:
         """Pass on the output of a process until it ends."""
         while True:
             ended = process.poll() is not None
-            while select.select([self._begin], [], [], 0.0 if ended else 0.2)[0]:
-                written = os.read(self._begin, 65536)
+            while select.select([self.begin], [], [], 0.0 if ended else 0.2)[0]:
+                written = os.read(self.begin, 65536)
                 sys.stderr.buffer.write(written)
                 sys.stderr.buffer.flush()
                 *lines, self._pending = (self._pending + written).split(b"\n")
@@ -94,11 +95,6 @@ class _Terminal:
                 self._keep(self._pending)
                 self._keep(b"")
                 return
-
-    def close(self) -> None:
-        """Close both ends."""
-        os.close(self._begin)
-        os.close(self.end)
 
     def _keep(self, line: bytes) -> None:
         """Write a line to the file once the next line does not erase it."""

@@ -211,10 +211,11 @@ def in_words(summary: Summary) -> str:
         lines += ["", "why it failed:", *(f"  {one_line(line, 500)}" for line in summary.failure)]
     else:
         lines.append(f"recordings, {since}: {counts}")
-    failed = "failed, left out of a report that is there, and tried again next time"
     rejected = sorted(summary.rejected, key=lambda rejection: not rejection.new)
     sections = {
-        failed: [*left_out(summary.failed)],
+        "failed, left out of a report that is there, and tried again next time": [
+            *left_out(summary.failed)
+        ],
         "new": summary.new,
         "analysed again": [f"{change.recording}: {change.because}" for change in summary.changed],
         "removed": summary.removed,

@@ -10,8 +10,5 @@ if __name__ == "__main__":
         [Path(path) for path in snakemake.input.draws],
         snakemake.params.settings,
         snakemake.params.catalogue,
-        {
-            name: [path for path in map(Path, snakemake.output) if path.stem == name]
-            for name in ("fusion", "grades")
-        },
+        [Path(path) for path in snakemake.output],
     )
