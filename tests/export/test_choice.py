@@ -81,8 +81,8 @@ def test_what_has_no_plain_value_is_said() -> None:
         N=1e-4,
         B=Parameter(None, "not_identified", "a short log", 1e-6, 9e-6, None, 5e-6),
         T_B=Parameter(7200.0, "at_bound", "the longest", 100.0, 7200.0),
-        K=Parameter(None, "absent", "the data do not ask for it", 0.0, 2e-6),
-        R=Parameter(None, "absent", "the data do not ask for it"),
+        K=Parameter(None, "absent", "the data do not support it", 0.0, 2e-6),
+        R=Parameter(None, "absent", "the data do not support it"),
     )
     notes = parameter_notes(found)
     assert notes == [
@@ -90,7 +90,7 @@ def test_what_has_no_plain_value_is_said() -> None:
         "to 9.000e-06",
         "T_B is at the end of its search (the longest): 7.2000e+03 is used, 95 % limits 1.000e+02 "
         "to 7.200e+03",
-        "K is absent (the data do not ask for it): 0 in the model; its upper limit is 2.000e-06",
+        "K is absent (the data do not support it): 0 in the model; its upper limit is 2.000e-06",
     ]
     chosen = choose(rows("gyro_x", found), "gyro").axis
     assert chosen.least_walk == 2e-6
