@@ -54,6 +54,7 @@ from imubench_pipeline.tables.keys import Key
 from imubench_pipeline.typing import Array
 from imubench_pipeline.units import quantity_to_si
 from imubench_pipeline.words.numbers import sentence
+from imubench_pipeline.words.reasons import simulations as texts
 
 
 @dataclass
@@ -421,6 +422,6 @@ def estimation(
 
 def _of_authors(read: Mapping[str, float]) -> Estimate:
     """Return what the authors of a simulated recording read from the curve of their own log."""
-    unread = Parameter(None, "not_shown", "the source does not print it")
+    unread = Parameter(None, "not_shown", texts.not_printed_by_source())
     parameters = {name: Parameter(read[name]) if name in read else unread for name in PARAMETERS}
     return Estimate("authors", parameters)
