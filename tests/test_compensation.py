@@ -104,7 +104,7 @@ def test_the_sensitivity_is_that_of_the_simulation(found: Estimation) -> None:
     assert sensitivity["status"] == "ok"
     assert sensitivity["value"] == pytest.approx(SENSITIVITY, rel=0.02)
     assert sensitivity["lower"] < SENSITIVITY < sensitivity["upper"]
-    assert "BIC favours" in sensitivity["reason"]
+    assert "BIC prefers" in sensitivity["reason"]
     assert rows["quadratic"]["status"] == "absent" and rows["quadratic"]["value"] is None
 
 

@@ -9,7 +9,7 @@ import yaml
 
 from imubench_pipeline.allan import AllanCurve
 from imubench_pipeline.datasheets.comparable import comparables
-from imubench_pipeline.datasheets.deltas import VERDICTS, Delta, bias_deltas, curve_rms, deltas
+from imubench_pipeline.datasheets.deltas import Delta, bias_deltas, curve_rms, deltas
 from imubench_pipeline.datasheets.measured import fixed_bias, sensitivity
 from imubench_pipeline.estimators import curve as reading
 from imubench_pipeline.estimators.curve_bias import of_model
@@ -18,6 +18,7 @@ from imubench_pipeline.model.estimates import TemperatureRow
 from imubench_pipeline.noise import FLOOR, NoiseModel
 from imubench_pipeline.settings.printed import Datasheet
 from imubench_pipeline.settings.sensor import read_sensors
+from imubench_pipeline.words.reasons.datasheets import DELTA_MEANINGS
 from tests.conftest import PROJECT
 from tests.rows import typed
 
@@ -55,7 +56,7 @@ def test_table_4_of_the_first_paper_both_ways() -> None:
     assert one.comparable == pytest.approx(8.64e-5, rel=1e-3)
     assert one.delta == pytest.approx(-0.03, abs=0.005)
     assert one.verdict == "as printed"
-    assert "does not say" in (one.reason or "")
+    assert "assumed, as the data sheet does not state it" in (one.reason or "")
 
 
 def test_the_accelerometer_of_the_same_table() -> None:
@@ -133,7 +134,7 @@ def test_what_is_not_measured_has_its_reason() -> None:
         "plateau", None
     ]
     assert row.verdict == "not measured"
-    assert row.reason == "absent: no such term"
+    assert row.reason == "not in the model: no such term"
     assert row.delta is None
 
 
@@ -219,7 +220,7 @@ def test_offsets_of_the_second_paper(
 
 
 def test_every_verdict_is_explained() -> None:
-    assert all(VERDICTS.values())
+    assert all(DELTA_MEANINGS.values())
 
 
 @pytest.mark.parametrize(
@@ -244,11 +245,11 @@ def test_a_verdict_takes_the_whole_interval(
     found = replace(known, parameters=known.parameters | {"N": white})
     walk = {"value": 60, "unit": "deg/sqrt(h)", "kind": kind}
     row = rows(sheet(random_walk=walk), found)["N", None]
-    assert row.verdict == verdict and row.verdict in VERDICTS
+    assert row.verdict == verdict and row.verdict in DELTA_MEANINGS
     assert row.delta_lower == pytest.approx(lower - 1) and row.delta_upper == pytest.approx(
         upper - 1
     )
-    assert ("the 95 % interval reaches from" in (row.reason or "")) == (verdict == "not sure")
+    assert ("the 95 % interval extends from" in (row.reason or "")) == (verdict == "not sure")
 
 
 def test_limits_decide_where_there_is_no_value() -> None:
@@ -259,7 +260,7 @@ def test_limits_decide_where_there_is_no_value() -> None:
         found = replace(known, parameters=known.parameters | {"N": absent})
         row = rows(sheet(random_walk=printed), found)["N", None]
         assert row.verdict == verdict
-        assert (row.reason or "").startswith("absent: too small to see")
+        assert (row.reason or "").startswith("not in the model: too small to see")
 
 
 def all_rows(datasheet: Datasheet, found: Estimate, channel: str = "gyro_x") -> list[Delta]:
@@ -308,18 +309,21 @@ def test_figures_of_an_option_are_compared_where_the_logs_have_it() -> None:
 
     (of_grade,) = noise("A")
     assert (of_grade.printed, of_grade.verdict) == (60.0, "as printed")
-    for options, said in (((), "file does not say what it has"), (("C",), "that is logged has: C")):
+    for options, said in (
+        ((), ". State the options of the logged sensor"),
+        (("C",), ", but the sensor file states C"),
+    ):
         for row, grade in zip(noise(*options), "AB", strict=True):
             assert row.verdict == "not comparable (condition)"
             assert row.comparable is None and row.delta is None
-            assert f"printed for the option {grade}; the sensor {said}" in (row.reason or "")
+            assert f"printed for the option {grade}{said}" in (row.reason or "")
             assert row.measured == pytest.approx(DEG)
 
 
 @pytest.mark.parametrize(
     ("name", "figure", "reason"),
     [
-        ("random_walk", {"value": 60, "unit": "deg/sqrt(h)", "kind": "min"}, "a least value"),
+        ("random_walk", {"value": 60, "unit": "deg/sqrt(h)", "kind": "min"}, "only a minimum"),
         ("rms_noise", {"value": 0.1, "unit": "deg/s rms"}, "without its bandwidth"),
         ("allan_deviation", {"value": 1, "unit": "deg/h"}, "without its averaging time"),
     ],
@@ -456,9 +460,9 @@ def test_a_fitted_sensitivity_is_compared_with_the_coefficient_by_its_size() -> 
     limits = [row.delta, row.delta_lower, row.delta_upper]
     assert limits == pytest.approx([0.2, 0.12, 0.4])
     assert row.verdict == "worse than typ"
-    assert "slope at 27 °C, of readings from 21 to 34 °C" in (row.reason or "")
+    assert "slope at 27 °C, from readings of 21 to 34 °C" in (row.reason or "")
     bent = coefficient(thermal((0.05, 0.049, 0.051), True, q=1e-6))
-    assert bent.verdict == "as printed" and "bends" in (bent.reason or "")
+    assert bent.verdict == "as printed" and "slope changes with temperature" in (bent.reason or "")
 
 
 @pytest.mark.parametrize(
@@ -479,7 +483,7 @@ def test_a_sensitivity_that_is_not_told_has_limits_at_most(
 
 def test_without_readings_of_the_temperature_there_is_no_sensitivity() -> None:
     row = coefficient([])
-    assert row.verdict == "not measured" and "no readings" in (row.reason or "")
+    assert row.verdict == "not measured" and "no temperature readings" in (row.reason or "")
 
 
 ACCEL = Datasheet.model_validate({"accel": {"offset": {"value": 20, "unit": "mg"}}})
@@ -495,7 +499,7 @@ def test_gravity_tells_the_offset_of_a_vertical_axis_alone() -> None:
     for channel in ("accel_x", "accel_y"):
         row = bias_rows(ACCEL, channel, means)["offset"]
         assert row.verdict == "not comparable (condition)"
-        assert "cannot be told from a tilt" in (row.reason or "")
+        assert "cannot be separated from tilt" in (row.reason or "")
         assert row.measured is None and row.printed == 20.0
 
 
@@ -503,7 +507,7 @@ def test_gravity_tells_the_offset_of_a_vertical_axis_alone() -> None:
     ("means", "reason"),
     [
         ({"accel_z": G}, "three axes are needed"),
-        ({"accel_x": 0.1, "accel_y": 0.1, "accel_z": 0.1}, "and not gravity"),
+        ({"accel_x": 0.1, "accel_y": 0.1, "accel_z": 0.1}, "which is not gravity"),
         ({"accel_x": 6.0, "accel_y": 5.0, "accel_z": 5.9}, "not vertical"),
     ],
 )
@@ -561,7 +565,7 @@ def test_every_shipped_datasheet_gives_rows() -> None:
         for channel in means:
             listed = [*all_rows(sensor.datasheet, found, channel)]
             listed += bias_deltas(sensor.datasheet, channel, means, 0.1)
-            assert {row.verdict for row in listed} <= set(VERDICTS)
+            assert {row.verdict for row in listed} <= set(DELTA_MEANINGS)
             assert {row.quantity for row in listed} >= {
                 "N",
                 "bias_instability",

@@ -241,9 +241,9 @@ def test_what_is_not_printed_is_not_known_and_it_is_said_why() -> None:
     found = of_datasheet(sheet(offset=least, nonlinearity=None, g_sensitivity=option), "gyro_x")
     assert {one.sigma for one in found.values()} == {None}
     reasons = {cause: one.reason or "" for cause, one in found.items()}
-    assert "a least value" in reasons["turn_on_bias"]
+    assert "only a minimum" in reasons["turn_on_bias"]
     assert "does not publish" in reasons["nonlinearity"]
-    assert "does not say" in reasons["scale_factor"]
+    assert "does not state" in reasons["scale_factor"]
     assert "grade A" in reasons["g_sensitivity"]
     assert set(DATASHEET_KEY_OF_CAUSE.values()) == set(IN_USE)
 

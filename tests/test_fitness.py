@@ -144,7 +144,7 @@ def test_pools_are_those_without_the_unfit_recording_and_count_it() -> None:
     (without,) = pooled_rows(rows[:2], [], {})
     assert pooled["value"] == without["value"]
     assert (pooled["recordings"], pooled["left_out"]) == (2, 1)
-    assert "1 left out: not used" in pooled["reason"]
+    assert "1 recording not used (the recording is in doubt)" in pooled["reason"]
 
 
 def test_rows_carry_the_doubts_of_what_they_stand_on() -> None:

@@ -14,6 +14,7 @@ from imubench_pipeline.export.smallest_model import FAMILIES, Family, find_small
 from imubench_pipeline.noise import GaussMarkov, NoiseModel
 from imubench_pipeline.noise.simulate import simulate
 from imubench_pipeline.typing import Array
+from imubench_pipeline.words.numbers import number_text
 from tests.conftest import few
 
 GYRO = NoiseModel(N=8.4e-5, B=6.7e-5, T_B=89.5, K=8.2e-7)
@@ -161,7 +162,7 @@ def test_a_random_walk_beyond_two_correlation_times_is_warned_of() -> None:
 @pytest.mark.release
 def test_a_random_walk_far_too_large_is_refused_with_what_to_take() -> None:
     curve = measured(PROCESS, 1e9)
-    with pytest.raises(ValueError, match=r"N\+GM is 1 times.*at most 3 times is allowed") as error:
+    with pytest.raises(ValueError, match=r"N\+GM 1 times.*At most 3 times is allowed") as error:
         overbound(curve, PROCESS, RATE, horizon=150.0)
     assert "beyond 2 T_B = 40 s" in str(error.value)
 
@@ -176,7 +177,7 @@ def test_a_random_walk_far_too_large_is_given_where_it_is_allowed() -> None:
 
 @pytest.mark.release
 def test_a_log_too_short_for_a_horizon_is_told_from_a_family_that_does_not_suit() -> None:
-    with pytest.raises(ValueError, match="no family comes closer than"):
+    with pytest.raises(ValueError, match="No family is closer than"):
         overbound(measured(GYRO), GYRO, RATE, horizon=2000.0)
 
 
@@ -192,8 +193,8 @@ def test_the_density_is_bounded_above_the_band_s_lowest_frequency_only() -> None
         lambda f: float(found.model.psd(f) - walk.psd(f)), 1e-3 * low, low, xtol=1e-12
     )
     assert found.passed_below == pytest.approx(crossing, rel=0.03)
-    assert f"holds above {low:.3g} Hz only" in found.density_words
-    assert f"above it below {found.passed_below:.3g} Hz" in found.density_words
+    assert f"bounded above {low:.3g} Hz only" in found.density_words
+    assert f"exceeds the bound below {found.passed_below:.3g} Hz" in found.density_words
     same = overbound(measured(walk, 1e9), walk, RATE)
     assert same.passed_below is None
 
@@ -280,7 +281,7 @@ def test_a_filter_that_loads_it_is_not_overconfident() -> None:
 
 def test_its_words_tell_how_large_it_is() -> None:
     found = of_gyro()
-    assert f"{math.sqrt(found.at_minimum):.2f} times the measured one" in found.words
+    assert f"{number_text(math.sqrt(found.at_minimum), 3)} times the measured one" in found.words
     assert "from 0.00167 to 2.5 Hz" in found.words
 
 

@@ -9,6 +9,7 @@ from scipy.stats import f_oneway
 from imubench_pipeline.model.comparisons import PooledRow
 from imubench_pipeline.model.estimates import FixedBiasRow, ParameterRow
 from imubench_pipeline.navigation.pooled import Pool, pool, pooled_rows, turn_on_bias
+from imubench_pipeline.words.numbers import number_text
 from tests.conftest import few
 
 Z = 1.959963984540054
@@ -262,7 +263,7 @@ def test_rows_of_one_device() -> None:
     assert row["spread"] == pytest.approx(alone.spread * alone.value)
     assert (row["recordings"], row["left_out"], row["verdict"]) == (3, 0, "differ")
     assert row["unit"] == "rad/s/sqrt(Hz)"
-    assert row["reason"] == "differ: the sensor is not stationary"
+    assert row["reason"] == "the recordings differ: the sensor is not stationary"
 
 
 def test_devices_that_differ_are_told_from_recordings_that_do(rng: np.random.Generator) -> None:
@@ -284,7 +285,7 @@ def test_devices_that_differ_are_told_from_recordings_that_do(rng: np.random.Gen
     )
     for name in ("N", "bias"):
         assert set(key[0] for key in apart) == {None, "x", "y", "z"}
-        assert "beyond the spread" in apart[None, "gyro_x", name]["reason"]
+        assert "differ more than repeated" in apart[None, "gyro_x", name]["reason"]
         assert "no more than" in alike[None, "gyro_x", name]["reason"]
     assert apart[None, "gyro_x", "N"]["verdict"] == "differ"
     assert apart["y", "gyro_x", "N"]["verdict"] == "agree"
@@ -297,7 +298,7 @@ def test_devices_are_compared_by_analysis_of_variance(rng: np.random.Generator) 
     rows = [parameter(name, value=float(np.exp(y))) for name, _, y in names]
     found = by_key(pooled_rows(rows, [], {("S", name): device for name, device, _ in names}))
     expected = f_oneway(*groups).pvalue
-    assert f"(p = {expected:.2g})" in found[None, "gyro_x", "N"]["reason"]
+    assert f"(p = {number_text(expected, 2)})" in found[None, "gyro_x", "N"]["reason"]
 
 
 def test_one_recording_a_device_cannot_tell_which() -> None:
@@ -305,7 +306,7 @@ def test_one_recording_a_device_cannot_tell_which() -> None:
     found = by_key(pooled_rows(rows, [], {}))
     assert list(found) == [(None, "gyro_x", "N")]
     reason = found[None, "gyro_x", "N"]["reason"]
-    assert reason == "differ: the devices, or the sensor is not stationary"
+    assert reason == "the recordings differ: the devices differ, or the sensor is not stationary"
 
 
 def test_a_term_absent_in_some_is_no_agreement() -> None:
@@ -319,7 +320,7 @@ def test_a_term_absent_in_some_is_no_agreement() -> None:
     assert set(key[2] for key in found) == {"N", "K", "T_B"}
     walk = found[None, "gyro_x", "K"]
     assert (walk["recordings"], walk["left_out"], walk["verdict"]) == (2, 2, None)
-    assert "absent in 2 of 4" in walk["reason"]
+    assert "not in the model of 2 of 4 recordings" in walk["reason"]
     times = found[None, "gyro_x", "T_B"]
     assert (times["recordings"], times["left_out"], times["verdict"]) == (2, 0, "agree")
 
@@ -330,16 +331,16 @@ def test_reasons_say_what_is_left_out() -> None:
     rows += [parameter("d", value=7.0, status="at_bound"), parameter("e", lower=None)]
     row = by_key(pooled_rows(rows, [], {}))[None, "gyro_x", "N"]
     assert (row["recordings"], row["left_out"]) == (2, 3)
-    for part in ("1 left out: not identified", "1 left out: at bound", "1 left out: no limits"):
-        assert part in row["reason"]
-    assert "limits of 2 left out lie outside" in row["reason"]
+    for why in ("not determined", "bounded", "no 95 % limits"):
+        assert f"1 recording not used ({why})" in row["reason"]
+    assert "2 recordings not used have limits outside the predicted range" in row["reason"]
 
 
 def test_none_identified_gives_a_row_without_a_value() -> None:
     rows = [parameter(r, "B", None, "not_identified") for r in "ab"]
     row = by_key(pooled_rows(rows, [], {}))[None, "gyro_x", "B"]
     assert (row["recordings"], row["left_out"], row["value"], row["spread"]) == (0, 2, None, None)
-    assert row["reason"] == "2 left out: not identified"
+    assert row["reason"] == "2 recordings not used (not determined)"
 
 
 def test_biases() -> None:

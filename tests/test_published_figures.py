@@ -24,7 +24,7 @@ DEGREE = math.pi / 180
 KEY = Key("imu", "sim_board", "gyro_x")
 NAMES = asdict(KEY)
 
-ABSENT = Parameter(None, "absent", "the data do not ask for it")
+ABSENT = Parameter(None, "absent", "the data do not support it")
 
 Row = Mapping[str, Any]
 

@@ -66,7 +66,7 @@ def test_what_is_not_known_of_the_power_is_a_condition() -> None:
     assert row["power_cycled"] == "yes"  # the first recording may be the one not known
     (row,) = rows([0.0, HOUR, 2 * HOUR], [None, True, None])
     assert row["power_cycled"] == "unknown"
-    assert "on condition that the power was off between" in row["reason"]
+    assert "assumes that the power was off between" in row["reason"]
 
 
 def test_recordings_of_one_turn_on_do_not_count_twice() -> None:

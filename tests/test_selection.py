@@ -125,7 +125,7 @@ def test_what_the_log_does_not_tell_is_not_enough_data() -> None:
     )
     found = ranking({"s": {"gyro_x": vague}}, requirement(("heading", "100 s", "0.3 deg")))
     assert found["s"]["verdict"] == "not_enough_data"
-    assert "K of gyro_x is not determined" in found["s"]["reason"]
+    assert "K of gyro x is not determined" in found["s"]["reason"]
 
 
 def test_a_log_of_which_nothing_is_known_is_no_sensor_without_noise() -> None:
@@ -134,12 +134,12 @@ def test_a_log_of_which_nothing_is_known_is_no_sensor_without_noise() -> None:
     found = ranking({"mute": {"gyro_x": silent}, "s": {"gyro_x": white(1e-5)}}, asked)
     assert found["mute"]["verdict"] == "not_enough_data"
     assert found["mute"]["sigma"] is None
-    assert "nothing is known of the noise of gyro_x: too short a log" in found["mute"]["reason"]
+    assert "the noise of gyro x is not known: too short a log" in found["mute"]["reason"]
     assert (found["s"]["rank"], found["mute"]["rank"]) == (1, None)
     # One axis of several: the others answer, and it is said.
     found = ranking({"s": {"gyro_x": white(1e-5), "gyro_y": silent}}, asked)
     assert found["s"]["sigma"] is not None
-    assert "gyro_y does not count" in found["s"]["reason"]
+    assert "gyro y is not used" in found["s"]["reason"]
 
 
 def test_the_limit_with_the_least_margin_decides_and_the_source_is_named() -> None:

@@ -164,6 +164,6 @@ def test_what_a_log_cannot_show_has_its_reason(
         }
     )
     turned_on, north = rows_of(short, {"gyro_x": estimate}, other)
-    assert turned_on["reason"].startswith("turn_on") and "Earth" in north["reason"]
+    assert "one turn-on bias" in turned_on["reason"] and "Earth" in north["reason"]
     unknown = Estimate("likelihood", {"N": Parameter(None, "not_shown", "too short")})
-    assert "nothing is known" in rows_of(short, {"gyro_x": unknown})[0]["reason"]
+    assert "noise of this channel is not known" in rows_of(short, {"gyro_x": unknown})[0]["reason"]

@@ -50,7 +50,7 @@ def test_a_log_too_short_for_the_minimum_gives_no_b(rng) -> None:
 def test_a_random_walk_from_the_start_gives_no_n(rng) -> None:
     estimate = read(allan_variance(simulate(NoiseModel(K=1.0), 1.0, 50_000, rng), 1.0))
     assert estimate.parameters["N"].status == "not_shown"
-    assert "slope -1/2" in (estimate.parameters["N"].reason or "")
+    assert "slope −1/2" in (estimate.parameters["N"].reason or "")
     assert value(estimate, "K") == pytest.approx(1.0, rel=0.1)
 
 

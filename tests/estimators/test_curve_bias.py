@@ -109,7 +109,7 @@ def test_a_curve_that_only_falls_or_rises_has_no_lowest_point() -> None:
     assert falls["sigma_min"].status == "not_shown"
     assert "still falls at 4000 s" in (falls["sigma_min"].reason or "")
     rises = of_model(NoiseModel(K=1e-4), TAU)
-    assert "rises from its beginning" in (rises["sigma_min"].reason or "")
+    assert "rises from its shortest τ" in (rises["sigma_min"].reason or "")
     assert {one.status for one in of_model(NoiseModel(), TAU).values()} == {"not_shown"}
 
 

@@ -120,5 +120,5 @@ def test_a_curve_of_three_points_shows_nothing() -> None:
     for samples, shown in ((72, True), (71, False)):
         curve = AllanCurve(n / 1.0, n, 1.0 / n, np.full(5, 1e6), samples)
         statuses = {one.status for one in read(curve).parameters.values()}
-        few = "points up to" in (read(curve).parameters["N"].reason or "")
+        few = "of the 4 points that are needed" in (read(curve).parameters["N"].reason or "")
         assert few is not shown and statuses

@@ -35,7 +35,7 @@ def estimate() -> Estimate:
 
 
 def frame(highest: float = RATE / 2.0, *, cut: bool = False) -> FitSelection:
-    return FitSelection([], EVERY, EVERY, Band(highest, "found"), cut=cut)
+    return FitSelection([], EVERY, EVERY, Band(highest, "whole"), cut=cut)
 
 
 def doubted(
@@ -142,4 +142,4 @@ def test_a_walk_is_one_by_its_slope_and_by_what_it_adds_beyond_the_lowest_cosine
     assert reason is None
     assert pytest.approx(2.0 * np.pi * 12.0 / (2.0 * DURATION) * N, rel=0.01) == K
     assert "smooth drift" in (of_slope(4.0, 12.0)[0] or "")
-    assert "beyond the 5 lowest" in (of_slope(2.0, 1.5)[0] or "")
+    assert "without the 5 lowest" in (of_slope(2.0, 1.5)[0] or "")

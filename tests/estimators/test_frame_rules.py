@@ -34,7 +34,7 @@ def behind(*cutoffs: float, white: float = 1.0, **more: object) -> Cutoff:
 
 
 def frame(low_pass: Cutoff | None = None, highest: float = 50.0) -> FitSelection:
-    return FitSelection([], EVERY, EVERY, Band(highest, "found"), low_pass)
+    return FitSelection([], EVERY, EVERY, Band(highest, "whole"), low_pass)
 
 
 @pytest.mark.parametrize(
@@ -122,8 +122,8 @@ def test_where_nothing_explains_all_the_bend_is_left_out() -> None:
     gain = 1.0 / (1.0 + (wide.frequency / 20.0) ** 8)
     spectrum = replace(wide, density=gain * rng.chisquare(wide.ordinates) / wide.ordinates)
     every = np.ones(len(gain), dtype=np.bool_)
-    of = FitSelection([], every, every, Band(50.0, "found"), None, stated=90.0).limited(spectrum)
+    of = FitSelection([], every, every, Band(50.0, "whole"), None, stated=90.0).limited(spectrum)
     assert of.cut and 2.0 < of.band.highest <= 9.0
     assert (of.used == (spectrum.upper <= of.band.highest * (1.0 + 1e-9))).all()
     flat = replace(wide, density=rng.chisquare(wide.ordinates) / wide.ordinates)
-    assert not FitSelection([], every, every, Band(50.0, "found"), None).limited(flat).cut
+    assert not FitSelection([], every, every, Band(50.0, "whole"), None).limited(flat).cut

@@ -45,10 +45,10 @@ def of_fit(spectrum: Spectrum, terms: Terms) -> tuple[Goodness, np.ndarray]:
 
 def place(text: str) -> tuple[float, float, int, float]:
     """Frequencies between which a spectrum is furthest from its model, side and distance."""
-    match = re.search(r"from (\S+) to (\S+) Hz: (above|below) it by (\S+) standard errors", text)
+    match = re.search(r"at (\S+) to (\S+) Hz, (\S+) standard errors (above|below) it", text)
     assert match, text
-    side = 1 if match[3] == "above" else -1
-    return float(match[1]), float(match[2]), side, float(match[4])
+    side = 1 if match[4] == "above" else -1
+    return float(match[1]), float(match[2]), side, float(match[3])
 
 
 @pytest.mark.release

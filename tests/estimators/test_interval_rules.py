@@ -69,7 +69,7 @@ def test_limits_are_quantiles_of_the_draws(whittle: Whittle) -> None:
         assert (found[name].lower, found[name].upper) == pytest.approx((low, high), rel=1e-3)
     assert {found[name].status for name in ("N", "K", "B", "T_B", "R")} == {"ok"}
     assert [found[name].value for name in ("N", "K", "B", "T_B", "R")] == [N, K, B, T_B, R]
-    assert found["Q"] == Parameter(None, "absent", "the data do not ask for it")
+    assert found["Q"] == Parameter(None, "absent", "the data do not support it")
 
 
 @pytest.mark.parametrize(
@@ -196,11 +196,11 @@ def test_what_is_absent_has_the_limit_of_all_models_that_have_it() -> None:
     assert (found["B"].status, found["T_B"].status) == ("absent", "absent")
     found = with_upper_limits(estimate, [plain, near], wider, drawn).parameters
     assert (found["B"].status, found["B"].lower) == ("not_identified", 0.0)
-    assert "N+GM, which has it, is about as good as N;" in (found["B"].reason or "")
+    assert "N+GM, which includes it, fits about as well as N:" in (found["B"].reason or "")
     assert (found["T_B"].lower, found["T_B"].upper) == pytest.approx((250.0, 360.0), rel=1e-3)
     both = candidate(Terms("NK", 1), 1.0, 9.0)
     found = with_upper_limits(estimate, [plain, near, both], wider, drawn).parameters
-    assert "N+GM and N+GM+K, which have it, are" in (found["B"].reason or "")
+    assert "N+GM and N+GM+K, which include it, fit" in (found["B"].reason or "")
     assert (found["T_B"].lower, found["T_B"].upper) == pytest.approx((10.0, 360.0), rel=1e-2)
     # A model that has it at 0 says nothing for it.
     none = candidate(Terms("N", 1), 1.0, 9.0, B=0.0)

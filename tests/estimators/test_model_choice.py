@@ -394,7 +394,7 @@ def scored(terms: Terms, bic: float, aic: float) -> Candidate:
 
 def test_a_disagreement_of_aic_and_bic_is_said_with_its_size() -> None:
     simple, rich = scored(Terms("N"), 100.0, 97.5), scored(Terms("NK"), 101.3, 95.1)
-    assert describe_disagreement([simple, rich]) == "AIC favours N+K by 2.4, BIC N by 1.3"
+    assert describe_disagreement([simple, rich]) == "AIC prefers N+K by 2.4, BIC prefers N by 1.3"
     assert describe_disagreement([simple, scored(Terms("NK"), 104.0, 98.0)]) is None
     assert describe_disagreement([simple]) is None
 

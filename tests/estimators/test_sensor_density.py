@@ -100,7 +100,7 @@ def of_rules(
 ) -> Parameter | None:
     """N_sensor of a fit with N = 1 from 0.9 to 1.1, and processes of B = 1."""
     every, powers = ONES > 0.0, np.ones(1 + len(times))
-    frame = FitSelection([], every, every, Band(5.0, "found"), low_pass, shortest=0.3)
+    frame = FitSelection([], every, every, Band(5.0, "whole"), low_pass, shortest=0.3)
     terms = terms or Terms("N", len(times))
     drawn = np.column_stack([np.linspace(0.9, 1.1, 4001), *np.ones((len(times), 4001))])
     posterior = Posterior(drawn, np.tile(times, (4001, 1)), np.zeros(4001), 4001.0)

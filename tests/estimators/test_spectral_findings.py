@@ -10,6 +10,7 @@ from imubench_pipeline.estimators.band import Band
 from imubench_pipeline.estimators.frame import FitSelection
 from imubench_pipeline.estimators.identifiability import ideal_spectrum
 from imubench_pipeline.estimators.spectral_findings import slow_noise_missing, spectral_findings
+from imubench_pipeline.model.states import BandSource
 from imubench_pipeline.tables.findings import Finding
 
 FLAT = ideal_spectrum(10.0, 1000.0, 5.0)
@@ -69,14 +70,14 @@ def test_nothing_is_said_below_a_low_pass_or_without_n() -> None:
 
 
 def test_a_band_that_ends_before_nyquist_is_told() -> None:
-    def found(source: str) -> list[Finding]:
+    def found(source: BandSource) -> list[Finding]:
         every = np.ones(BINS, dtype=np.bool_)
         return spectral_findings("gyro_x", FitSelection([], every, every, Band(5.0, source)), None)
 
-    assert found("found: the spectrum follows its model") == []
-    (note,) = found("found: beyond 5 Hz the spectrum bends")
+    assert found("whole") == []
+    (note,) = found("bend")
     assert (note.finding, note.severity, note.value) == ("band_limit", "note", 5.0)
     assert note.detail.startswith("The spectrum of gyro x bends above 5 Hz")
-    (note,) = found("default: a twentieth of the rate")
+    (note,) = found("no_model")
     assert note.detail.startswith("No noise model fits the spectrum of gyro x up to any frequency")
     assert "5 Hz, a twentieth of the sampling rate" in note.detail

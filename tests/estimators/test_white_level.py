@@ -212,7 +212,7 @@ def test_where_the_curve_has_no_stretch_n_says_that_it_is_of_the_model() -> None
     curve = allan_variance(log, 10.0)
     assert find_white_stretch(curve) is None
     white = fit(log, 10.0).estimates[0].parameters["N"]
-    assert "no -1/2 stretch" in (white.reason or "")
+    assert "no slope of −1/2" in (white.reason or "")
 
 
 numbers = st.one_of(st.none(), st.floats(-1e6, 1e6))

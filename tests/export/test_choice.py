@@ -39,7 +39,7 @@ def test_the_worst_axis_is_that_of_the_largest_error_at_the_horizon_and_no_mix()
     assert found.channel == "gyro_y"
     assert (found.axis.model.N, found.axis.model.K) == (1e-4, 5e-5)
     assert found.of == 3
-    assert "gyro_y of recording a by method likelihood, the worst of 3 axes" in found.axis.origin
+    assert "gyro y of recording a by method likelihood, the worst of 3 axes" in found.axis.origin
     assert choose(AXES, "gyro", horizon=1.0).channel == "gyro_x"
 
 
@@ -72,7 +72,7 @@ def test_the_recommended_method_is_taken_unless_another_is_asked_for() -> None:
 def test_the_error_in_words_is_that_of_coasting_over_the_horizon() -> None:
     found = choose(AXES, "accel", horizon=60.0)
     variance = NoiseModel(N=1e-3, K=1e-5).allan_variance(np.array([60.0]))[0]
-    assert f"({np.sqrt(2.0 * 60.0**2 * variance):.3g} m/s there" in found.axis.origin
+    assert f"after 60 s is {np.sqrt(2.0 * 60.0**2 * variance):.3g} m/s, with" in found.axis.origin
     assert found.deviation == pytest.approx(np.sqrt(variance))
 
 
@@ -81,21 +81,22 @@ def test_what_has_no_plain_value_is_said() -> None:
         N=1e-4,
         B=Parameter(None, "not_identified", "a short log", 1e-6, 9e-6, None, 5e-6),
         T_B=Parameter(7200.0, "at_bound", "the longest", 100.0, 7200.0),
-        K=Parameter(None, "absent", "the data do not ask for it", 0.0, 2e-6),
-        R=Parameter(None, "absent", "the data do not ask for it"),
+        K=Parameter(None, "absent", "the data do not support it", 0.0, 2e-6),
+        R=Parameter(None, "absent", "the data do not support it"),
     )
     notes = parameter_notes(found)
     assert notes == [
-        "B is not identified (a short log): the fitted 5.000e-06 is used, 95 % limits 1.000e-06 "
-        "to 9.000e-06",
-        "T_B is at the end of its search (the longest): 7.2000e+03 is used, 95 % limits 1.000e+02 "
-        "to 7.200e+03",
-        "K is absent (the data do not ask for it): 0 in the model; its upper limit is 2.000e-06",
+        "B is not determined (a short log). The fitted 5.000e-06 is used, with 95 % limits of "
+        "1.000e-06 to 9.000e-06",
+        "T_B is at the end of its search (the longest). Its value of 7.2000e+03 is used, with 95 % "
+        "limits of 1.000e+02 to 7.200e+03",
+        "K is not in the model (the data do not support it). It is 0 in this file, and its upper "
+        "limit is 2.000e-06",
     ]
     chosen = choose(rows("gyro_x", found), "gyro").axis
     assert chosen.least_walk == 2e-6
     assert chosen.model.B == 5e-6
-    without = "axes left out, no recording has an estimate: gyro_y and gyro_z"
+    without = "axes without an estimate: gyro y and gyro z"
     assert list(chosen.notes) == [without, *notes]
 
 

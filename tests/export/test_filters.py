@@ -176,7 +176,7 @@ def test_white_noise_alone_takes_the_upper_limit_or_is_refused() -> None:
         with pytest.raises(ExportError, match="gyro: K is 0"):
             writer.write(imu(gyro=white))
     assert ekf2(px4.write(imu(gyro=white)))["EKF2_GYR_B_NOISE"] == 0.0
-    assert "no upper limit of one is known" in px4.write(imu(gyro=white)).replace("\n#  ", "")
+    assert "no upper limit of it is known" in px4.write(imu(gyro=white)).replace("\n#  ", "")
 
 
 def test_px4_keeps_its_ranges_and_says_so() -> None:

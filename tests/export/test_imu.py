@@ -22,7 +22,7 @@ def test_an_inflation_needs_a_reason_and_the_file_gives_it() -> None:
         imu(inflation=1.5)
     with pytest.raises(ExportError, match="needs its reason"):
         imu(inflation=1.5, because=" ")
-    text = write(imu(inflation=1.5, because="vibration in flight"))
+    text = write(imu(inflation=1.5, because="vibration in flight")).replace("\n#  ", "")
     assert "1.5 times" in text
     assert "vibration in flight" in text
     assert f"gyroscope_noise_density: {1.5 * GYRO.N:.6e}" in text

@@ -80,14 +80,14 @@ def test_without_anything_slow_the_upper_limit_of_the_walk_stands_in() -> None:
     assert "upper 95 % limit" in found.words[0]
     without = as_walk(NoiseModel(N=1.0), 60.0, 100.0)
     assert without.model.K == 0.0
-    assert "it is 0" in without.words[0]
+    assert "so it is 0" in without.words[0]
 
 
 def test_what_is_left_out_is_said() -> None:
     model = NoiseModel(Q=1e-6, N=1.0, K=0.1, sinusoids=[Sinusoid(0.2, 3.0)])
     words = " ".join(as_walk(model, 60.0, 100.0).words)
     assert "quantization noise Q" in words
-    assert "at 3 Hz: left out" in words
+    assert "at 3 Hz: not included" in words
 
 
 def test_a_ramp_is_covered_by_the_walk() -> None:

@@ -110,5 +110,5 @@ def test_the_snippet_runs_alone_and_predicts_the_growth(tmp_path: Path) -> None:
 
 def test_the_snippet_says_what_it_does_not_hold() -> None:
     text = snippet.write(imu(gyro=EVERYTHING))
-    assert "gyro: not held: R = 1.000e-05, line of amplitude" in text.replace("\n#  ", "")
-    assert "not held" not in snippet.write(imu())
+    assert "gyro: not included: R = 1.000e-05, line of amplitude" in text.replace("\n#  ", "")
+    assert "gyro: not included" not in snippet.write(imu())

@@ -70,7 +70,7 @@ def test_the_file_of_the_worst_axes(tables: dict[str, pa.Table]) -> None:
     assert found["accelerometer_noise_density"] == 1.1e-3
     assert found["update_rate"] == RATE
     assert "SIMULATED" in text
-    assert "gyro_y of recording sim_a by method likelihood, the worst of 2 axes" in text
+    assert "gyro y of recording sim_a by method likelihood, the worst of 2 axes" in text
 
 
 def judged(tables: dict[str, pa.Table], **changes: object) -> dict[str, pa.Table]:
@@ -108,12 +108,12 @@ def test_axes_and_recordings_that_are_left_out_are_named(tables: dict[str, pa.Ta
     bad = about | {"recording": "bad", "status": "rejected", "reason": "line 3: found 'x'"}
     several = tables | {"recordings": build("recordings", [about, bad])}
     said = " ".join(str(make_content(several, REQUEST)).replace("#", "").split())
-    assert "gyro: axes left out, less noise at 60 s: gyro_x of sim_a." in said
-    assert "axes left out, no recording has an estimate: gyro_z." in said
-    assert "CAUTION: left out: bad is rejected: line 3: found 'x'." in said
+    assert "gyro: axes not used (less noise at 60 s): gyro x of sim_a." in said
+    assert "axes without an estimate: gyro z." in said
+    assert "CAUTION: bad is not used, as it was rejected: line 3: found 'x'." in said
     gyros = several | {"parameters": tables["parameters"].slice(0, 8)}
     alone = make_content(gyros, replace(REQUEST, target="json"))
-    assert "accel left out: there is no estimate of it." in json.loads(alone)["about"]
+    assert "accel: not included, as there is no estimate." in json.loads(alone)["about"]
 
 
 def test_the_temperature_of_the_recording_that_is_exported_is_in_the_file(
@@ -199,7 +199,7 @@ def test_an_overbound_is_larger_and_says_what_it_is(
     for key in ("gyroscope_noise_density", "gyroscope_random_walk", "accelerometer_random_walk"):
         assert plain[key] < found[key] < 2.0 * plain[key]
     joined = text.replace("\n#  ", "")
-    assert "the smallest N+K that lies above the measured Allan variance" in joined
+    assert "the smallest N+K above the measured Allan variance" in joined
     assert "at every tau up to 60 s (95 % for all together)" in joined
 
 

@@ -73,8 +73,8 @@ def test_px4_takes_off_what_temperature_adds_within_the_range_of_the_log() -> No
     assert px4_offset(found, 0, 60.0) == px4_offset(found, 0, 41.0)
     assert px4_offset(found, 2, 41.0) == 0.0
     joined = text.replace("\n#  ", "")
-    assert "axis z left out: the log does not show it: why" in joined
-    assert "device serial 7: it holds for that device, from 18.00 to 41.00 degC" in joined
+    assert "axis z is not included: the log does not show an effect (why)" in joined
+    assert "device serial 7. It is valid for that device from 18 to 41 degC" in joined
     assert "TC_A0_" not in text and "TC_G_ENABLE\t" not in text
 
 
@@ -91,7 +91,7 @@ def test_matlab_adds_nothing_at_the_reference_and_a_line_elsewhere() -> None:
         )
         assert added == pytest.approx([2e-4 * (temperature - 30.0), 0.0, 0.0], abs=1e-12)
     assert "IMU.Temperature = 30;" in text and "between 18 and 41" in text
-    assert "axis y left out: its bias bends" in text.replace("\n%  ", "")
+    assert "axis y is not included: its bias is not linear" in text.replace("\n%  ", "")
     # the parentheses of the call stay balanced, and one line ends it
     assert text.count("(") == text.count(")")
 
@@ -99,10 +99,10 @@ def test_matlab_adds_nothing_at_the_reference_and_a_line_elsewhere() -> None:
 @pytest.mark.parametrize(
     ("changes", "reason"),
     [
-        ({"sensitivity": (None, 1e-4, 3e-4, "not_identified")}, "not identified: why"),
-        ({"sensitivity": (2e-4, 0.9e-4, 3.1e-4, "ok")}, "known to 55 % only, by the noise and"),
+        ({"sensitivity": (None, 1e-4, 3e-4, "not_identified")}, "not determined (why)"),
+        ({"sensitivity": (2e-4, 0.9e-4, 3.1e-4, "ok")}, "known to 55 %, from noise and"),
         ({"lag": (90.0, 80.0, 100.0, "ok")}, "lag the temperature by 100 s"),
-        ({"lag": (None, None, None, "not_identified")}, "its lag is not identified: why"),
+        ({"lag": (None, None, None, "not_identified")}, "its lag is not determined (why)"),
     ],
 )
 def test_what_is_not_safe_is_left_out_with_the_reason(changes: dict[str, Any], reason: str) -> None:
@@ -120,9 +120,9 @@ def test_a_longer_horizon_allows_a_longer_lag_and_a_narrow_range_nothing() -> No
     assert not effect(lagging).slope
     assert effect(lagging, horizon=100.0).slope == {"x": 2e-4}
     narrow = effect(rows("gyro_x"), temperature_max=19.5)
-    assert not narrow.slope and "varies by 1.5 K only" in narrow.notes[1]
+    assert not narrow.slope and "varies by only 1.5 K" in narrow.notes[1]
     none = effect([], temperature_min=None, temperature_max=None)
-    assert none.notes == ["left out: warm has no readings of the temperature"]
+    assert none.notes == ["not included, as warm has no temperature readings"]
 
 
 def test_a_file_of_noise_alone_says_so() -> None:
@@ -131,4 +131,4 @@ def test_a_file_of_noise_alone_says_so() -> None:
         content = target.write(replace(imu(), temperature=told))
         text = content if isinstance(content, str) else content.decode("utf-32-le", "ignore")
         if isinstance(content, str) and name not in ("px4", "matlab"):
-            assert "the file holds noise alone" in re.sub(r"\n#  ", "", text)
+            assert "The file contains noise only" in re.sub(r"\n#  ", "", text)

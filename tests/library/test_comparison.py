@@ -96,7 +96,7 @@ def test_what_has_no_value_is_compared_by_its_limits(
     assert (ratio.lower, ratio.upper) == pytest.approx(limits)
     assert ratio.verdict == verdict
     if first.status != "ok":
-        assert ratio.value is None and "the first is" in ratio.reason
+        assert ratio.value is None and "the first value is" in ratio.reason
 
 
 def test_an_interval_alone_says_which_is_lower() -> None:

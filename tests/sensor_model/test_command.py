@@ -56,7 +56,7 @@ def test_a_log_is_read_with_its_sensor_file(sensor: str, tmp_path: Path, capsys)
         assert simulate(sensor, *given, "--out", path) == 0
         said = capsys.readouterr().out
         assert said.startswith("SIMULATED by imubench, not measured: 4,000 samples")
-        assert "assumed: " in said and "datasheet" in said
+        assert "assumed: " in said and "data sheet" in said
         found[suffix] = ingested(path, sensor, tmp_path / suffix)
         path.with_suffix(".yaml").unlink()
     assert set(found["csv"]) == set(found["parquet"]) >= {"gyro_x"}
@@ -74,7 +74,7 @@ def test_a_text_log_of_a_sensor_with_names_needs_no_notes(tmp_path: Path) -> Non
     steps = np.degrees(block) * 16  # 16 LSB/(deg/s)
     np.testing.assert_allclose(steps, np.rint(steps), atol=1e-6)
     assert path.read_text().startswith(
-        "# SIMULATED by imubench, not measured\n# from the datasheet of bno055"
+        "# SIMULATED by imubench, not measured\n# from the data sheet of bno055"
     )
 
 
@@ -163,7 +163,7 @@ def test_estimates_of_a_run_are_simulated_as_the_log_showed_them(tmp_path: Path,
     given = ["--duration", "2000 s", "--results", tmp_path / "results", "--out", path]
     assert simulate("bno055", *given) == 0
     said = capsys.readouterr().out
-    assert "gyro_y: noise N+GM: estimated by likelihood from bno055/night" in said
+    assert "gyro_y: noise N+GM: estimated by method likelihood from bno055/night" in said
     assert "cut-off 64 Hz" in said
     log = channel_logs(tmp_path)["gyro_y"]
     assert log.mean() == pytest.approx(0.02, abs=3e-4)
@@ -182,7 +182,7 @@ def test_drift_and_cut_off_are_those_of_the_run(tmp_path: Path, capsys) -> None:
     warm = ["--temperature", "42.5 degC"]
     assert simulate("bno055", *given, *warm) == 0
     said = capsys.readouterr().out
-    assert "noise N+GM+K: estimated by compensated from bno055/night" in said
+    assert "noise N+GM+K: estimated by method compensated from bno055/night" in said
     assert "cut-off 64 Hz: estimated from bno055/night" in said
     assert "temperature sensitivity 0.0004363 rad/s/K: estimated" in said
     assert "no drift" not in said and "first order" not in said

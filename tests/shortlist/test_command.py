@@ -40,7 +40,7 @@ def test_the_command_prints_the_verdicts(folder: Path, capsys: pytest.CaptureFix
     assert ask(folder) == 0
     printed = capsys.readouterr().out
     assert "A robot" in printed and "worth logging" in printed
-    assert "one: gyro B, K, T_B: not published, and not measured of any sensor" in printed
+    assert "one: gyro B, K and T_B: not published, and not measured of any sensor" in printed
     assert ask(folder, requirement=str(folder / "requirements/robot.yaml")) == 0
     assert capsys.readouterr().out == printed
 
@@ -65,7 +65,7 @@ def test_what_a_run_measured_fills_what_is_not_published(
     assert ask(folder, "--results", str(folder / "results")) == 0
     printed = capsys.readouterr().out
     assert "meets the limits" in printed
-    assert "K: 1e-07 to 1e-07 SI, that of measured sensors of any class" in printed
+    assert "K: 1.2 °/h/√h, as in measured sensors of any class" in printed
 
 
 @pytest.mark.parametrize(

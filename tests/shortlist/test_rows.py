@@ -77,7 +77,7 @@ def test_white_noise_alone_grows_with_the_root_of_the_time() -> None:
     assert row["best_margin"] == pytest.approx(margin(N**2 * TIME), rel=1e-8)
     # neither B nor K is published, and no sensor is measured
     assert row["worst_margin"] is None and row["verdict"] == "worth_logging"
-    assert "gyro B, K, T_B: not published, and not measured of any sensor" in "; ".join(
+    assert "gyro B, K and T_B: not published, and not measured of any sensor" in "; ".join(
         row["assumed"]
     )
     assert row["decides"] == "heading within 2 deg after 100 s"
@@ -88,7 +88,7 @@ def test_a_side_that_is_not_stated_is_both() -> None:
     (row,) = judged(sensor(noise_density=DENSITY | {"sidedness": "unknown"}), of_class(**figures))
     assert row["best_margin"] == pytest.approx(margin(N**2 * TIME), rel=1e-8)
     assert row["worst_margin"] == pytest.approx(row["best_margin"] / math.sqrt(2), rel=1e-8)
-    assert "the side of the density is not stated: both" in "; ".join(row["assumed"])
+    assert "one- or two-sided, so both are considered" in "; ".join(row["assumed"])
 
 
 def test_a_printed_bias_instability_is_b_or_the_minimum() -> None:
@@ -117,7 +117,7 @@ def test_the_worst_correlation_time_of_the_class_counts() -> None:
     B = 0.01 * DEG
     assert row["best_margin"] == pytest.approx(margin(N**2 * TIME + min(of_process(B))))
     assert row["worst_margin"] == pytest.approx(margin(N**2 * TIME + max(of_process(B / FLOOR))))
-    assert "that of measured sensors of class consumer (m)" in "; ".join(row["assumed"])
+    assert "as in measured sensors of class consumer (m)" in "; ".join(row["assumed"])
 
 
 def test_what_fails_at_its_best_cannot_meet_the_limits() -> None:
@@ -141,7 +141,7 @@ def test_b_of_the_datasheets_of_its_class_stands_for_one_that_is_not_published()
     start = Uncalibrated(bias=0.0, on_time=1.0)
     floor = Flicker(0.01 * DEG).growth(0, TIME, start)
     assert row["best_margin"] == pytest.approx(margin(N**2 * TIME + floor), rel=1e-8)
-    assert "that of datasheets of class consumer (o)" in "; ".join(row["assumed"])
+    assert "as in data sheets of class consumer (o)" in "; ".join(row["assumed"])
 
 
 def test_options_are_all_there_to_buy_unless_one_is_stated() -> None:
@@ -149,7 +149,7 @@ def test_options_are_all_there_to_buy_unless_one_is_stated() -> None:
     none = of_class(B=(0.0, 0.0), K=(0.0, 0.0))
     (row,) = judged(sensor(noise_density=graded), none)
     assert row["best_margin"] / row["worst_margin"] == pytest.approx(3.0)
-    assert "gyro: any of A, B" in "; ".join(row["assumed"])
+    assert "gyro: any of the options A, B" in "; ".join(row["assumed"])
 
 
 def test_what_is_not_judged_says_why() -> None:

@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
+from imubench_pipeline.noise import FLOOR
 from imubench_pipeline.settings.conversions import (
     Sidedness,
     noise_bandwidth,
@@ -25,19 +26,12 @@ from imubench_pipeline.settings.printed import (
     QuantityDatasheet,
 )
 from imubench_pipeline.units import dimension_of, to_si
+from imubench_pipeline.words.reasons import datasheets as texts
 
 _SIDEDNESS_READINGS: dict[str, tuple[Sidedness, ...]] = {
     "one-sided": ("one-sided",),
     "two-sided": ("two-sided",),
     "unknown": ("one-sided", "two-sided"),
-}
-
-_NO_BANDWIDTH_REASON = "an rms without its bandwidth says nothing of the density"
-_ONE_LOG_OBSTACLES = {
-    "bias_repeatability": "a spread between runs: the table repeatability",
-    "drift": "the document does not say what drift is meant",
-    "temperature_total": "a total over the range of the datasheet; a log has its own",
-    "temperature_rms": "an rms over the temperature's course of the datasheet; a log has its own",
 }
 
 
@@ -63,6 +57,8 @@ class Comparable:
     upper: float | None = None
     obstacle: str | None = None  # why it cannot be compared with a static log
     tau: float | None = None  # averaging time of a printed Allan deviation, s
+    is_side_assumed: bool = False  # the document does not say whether it is one- or two-sided
+    is_rms: bool = False  # printed as an rms, and converted with the bandwidth
     looked_up: bool = True  # False: the sensor file does not say whether the vendor publishes it
 
 
@@ -142,22 +138,19 @@ class PrintedAxis:
 
     def _find_obstacle(self, name: str, figure: PrintedFigure) -> str | None:
         if figure.option is not None and figure.option not in self.options:
-            logged = ", ".join(self.options)
-            which = f"that is logged has: {logged}" if logged else "file does not say what it has"
-            return f"printed for the option {figure.option}; the sensor {which} ('options')"
+            return texts.other_option(figure.option, self.options)
         if figure.kind == "min":
-            return "a least value is printed"
+            return texts.only_minimum()
         if name == "rms_noise" and figure.bandwidth is None:
-            return _NO_BANDWIDTH_REASON
+            return texts.rms_without_bandwidth()
         if name == "allan_deviation" and figure.tau is None:
-            return "an Allan deviation without its averaging time"
+            return texts.deviation_without_time()
         return None
 
     def unpublished(self, like: Comparable, *names: str) -> Comparable:
         """Return the row of a quantity without a printed figure."""
         looked_up = any(self.sheet.looked_up(name) for name in names)
-        reason = "the vendor does not publish it" if looked_up else "the sensor file does not say"
-        return replace(like, reason=reason, looked_up=looked_up)
+        return replace(like, reason=texts.unpublished(looked_up=looked_up), looked_up=looked_up)
 
 
 def comparables(datasheet: Datasheet, channel: str) -> Iterator[Comparable]:
@@ -166,19 +159,19 @@ def comparables(datasheet: Datasheet, channel: str) -> Iterator[Comparable]:
     Rows have no figure if none is published or looked up.
     """
     axis = PrintedAxis.of(datasheet, channel)
-    walk = Comparable("N", "N", None, reason="random walk as printed is N")
+    walk = Comparable("N", "N", None, reason=texts.walk_is_density())
     rms_to_si = axis.si("rms_noise")
 
     def convert_rms(value: float, figure: PrintedFigure) -> float:
         bandwidth = noise_bandwidth(figure.bandwidth_hz or 0.0, figure.filter)
         return noise_of_rms(rms_to_si(value, figure), bandwidth)
 
-    rms = Comparable("N", "N", None, "one-sided", reason="rms; N is rms / sqrt(2 bandwidth)")
+    rms = Comparable("N", "N", None, "one-sided", reason=texts.density_of_rms(), is_rms=True)
     noise = [
         *_read_densities(axis),
         *axis.read("random_walk", walk, axis.si("random_walk")),
         *(
-            replace(row, reason=f"{row.reason}, {row.figure.bandwidth} ({row.figure.filter})")
+            replace(row, reason=texts.density_of_rms(row.figure.bandwidth, row.figure.filter))
             if row.figure and row.value is not None
             else row
             for row in axis.read("rms_noise", rms, convert_rms)
@@ -187,14 +180,14 @@ def comparables(datasheet: Datasheet, channel: str) -> Iterator[Comparable]:
     names = ("noise_density", "random_walk", "rms_noise")
     yield from noise or [axis.unpublished(Comparable("N", "N", None), *names)]
     for name, quantity, statistic, reason in (
-        ("bias_instability", "bias_instability", "adev_minimum", "minimum of the curve"),
-        ("bias_instability", "bias_instability", "plateau", "the plateau alone: 0.664 B"),
+        ("bias_instability", "bias_instability", "adev_minimum", texts.curve_minimum()),
+        ("bias_instability", "bias_instability", "plateau", texts.curve_plateau(FLOOR)),
         ("rate_random_walk", "K", "K", None),
         ("correlation_time", "T_B", "T_B", None),
     ):
         like = Comparable(quantity, statistic, None, reason=reason)
         yield from axis.read(name, like, axis.si(name)) or [axis.unpublished(like, name)]
-    like = Comparable("allan_deviation", "adev", None, reason="the curve at that averaging time")
+    like = Comparable("allan_deviation", "adev", None, reason=texts.curve_at_time())
     yield from axis.read("allan_deviation", like, axis.si("allan_deviation"))
 
 
@@ -210,7 +203,7 @@ def bias_comparables(datasheet: Datasheet, channel: str) -> Iterator[Comparable]
     yield from offsets or [axis.unpublished(like, "offset")]
     name = "temperature_coefficient"
     yield from axis.read(name, Comparable(name, SENSITIVITY, None), axis.si(name))
-    for name, obstacle in _ONE_LOG_OBSTACLES.items():
+    for name, obstacle in texts.ONE_LOG_OBSTACLES.items():
         like = Comparable(name, "mean", None, obstacle=obstacle)
         yield from axis.read(name, like, axis.si(name))
 
@@ -235,12 +228,12 @@ def _read_densities(axis: PrintedAxis) -> Iterator[Comparable]:
                     return noise_of_density(density, side)
                 return noise_of_power_density(density, side)
 
-            assumed = ", assumed: the datasheet does not say" * (stated == "unknown")
-            halved = " / sqrt(2)" * (sidedness == "one-sided")
-            reason = f"{sidedness} density{assumed}; N is the density{halved}"
+            assumed = stated == "unknown"
+            reason = texts.density_side(sidedness, assumed=assumed)
+            like = Comparable("N", "N", None, sidedness, reason=reason, is_side_assumed=assumed)
             yield from axis.read(
                 "noise_density",
-                Comparable("N", "N", None, sidedness, reason=reason),
+                like,
                 convert,
                 [figure for figure in figures if figure.sidedness == stated],
             )

@@ -22,20 +22,8 @@ from imubench_pipeline.datasheets.comparable import (
 from imubench_pipeline.datasheets.measured import NO_TEMPERATURE_READINGS, fixed_bias, measured
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
 from imubench_pipeline.settings.printed import Datasheet
-from imubench_pipeline.words.estimates import STATUS_WORDS
-
-VERDICTS: dict[str, str] = {
-    "better than typ": "below a typical figure and the tolerance, or below a printed range",
-    "as printed": "at a typical figure, within the tolerance; within a maximum or a range",
-    "worse than typ": "above a typical figure and the tolerance",
-    "worse than max": "above a maximum, or above a range",
-    "not sure": "the 95 % interval reaches over a border between these",
-    "not published": "the datasheet was looked up, and prints no figure",
-    "not looked up": "nobody looked up whether a figure is printed",
-    "not measured": "the log does not tell the value",
-    "not comparable (condition)": "the figure holds for what this log does not have",
-}
-"""Meaning of each verdict."""
+from imubench_pipeline.words.reasons import datasheets as texts
+from imubench_pipeline.words.reasons.pools import status_reason
 
 _TYPICAL_KINDS = ("typ", "1sigma", "derived")
 
@@ -149,11 +137,11 @@ def compare(entry: Comparable, parameter: Parameter, tolerance: float) -> Delta:
     if entry.value is None:
         return replace(row, verdict="not comparable (condition)", reason=entry.obstacle)
     if value is None:
-        reason = f"{STATUS_WORDS[parameter.status]}: {parameter.reason}"
+        reason = status_reason(parameter.status, parameter.reason)
         if upper is not None:
             least = _classify_value(entry, lower or 0.0, tolerance)
             if least == _classify_value(entry, upper, tolerance) != "as printed":
-                return replace(row, verdict=least, reason=f"{reason}; the limits alone decide")
+                return replace(row, verdict=least, reason=texts.limits_decide(reason))
         return replace(row, verdict="not measured", reason=reason)
     row = replace(
         row,
@@ -165,7 +153,7 @@ def compare(entry: Comparable, parameter: Parameter, tolerance: float) -> Delta:
     least, largest = (_classify_value(entry, end, tolerance) for end in (low, high))
     reasons = [entry.reason, parameter.reason]
     if least != largest:
-        reasons.append(f"the 95 % interval reaches from {least!r} to {largest!r}")
+        reasons.append(texts.interval_spans(least, largest))
     words = "; ".join(reason for reason in reasons if reason)
     return replace(row, verdict=least if least == largest else "not sure", reason=words or None)
 

@@ -16,11 +16,12 @@ from imubench_pipeline.estimators.curve_bias import of_model
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
 from imubench_pipeline.model.estimates import TemperatureRow
 from imubench_pipeline.noise import FLOOR
+from imubench_pipeline.words.reasons import datasheets as texts
 
 _MAX_GRAVITY_DEVIATION = 0.027
 """m/s²; maximum deviation of gravity on the ground from its standard value."""
 
-NO_TEMPERATURE_READINGS = Parameter(None, "not_shown", "the log has no readings of the temperature")
+NO_TEMPERATURE_READINGS = Parameter(None, "not_shown", texts.no_temperature())
 """Sensitivity of a log without temperature readings."""
 
 _MIN_VERTICAL_COSINE = math.cos(math.radians(15.0))
@@ -49,7 +50,7 @@ def measured(entry: Comparable, estimate: Estimate, tau: NDArray[np.float64]) ->
         return estimate.parameters[statistic]
     at = entry.tau or math.nan
     if not len(tau) or not tau[0] <= at <= tau[-1]:
-        return Parameter(None, "not_shown", f"the log does not show the curve at {at:g} s")
+        return Parameter(None, "not_shown", texts.curve_not_shown(at))
     ends = _list_interval_ends(estimate)
     point, *points = (
         math.sqrt(float(each.model.allan_variance(np.array([at]))[0])) for each in (estimate, *ends)
@@ -86,23 +87,17 @@ def fixed_bias(channel: str, means: Mapping[str, float]) -> Parameter:
     gravity.
     """
     if channel.startswith("gyro"):
-        reason = "mean of the recording; the Earth's rotation is in it, 15 °/h either way at most"
-        return _bound_size(means[channel], EARTH_RATE, reason)
+        return _bound_size(means[channel], EARTH_RATE, texts.earth_rate_in_mean())
     axes = [means.get(f"accel_{axis}") for axis in "xyz"]
     if any(value is None for value in axes):
-        return Parameter(None, "not_shown", "gravity cannot be taken off: three axes are needed")
+        return Parameter(None, "not_shown", texts.gravity_needs_three_axes())
     norm = math.hypot(*(value or 0.0 for value in axes))
     if abs(norm / STANDARD_GRAVITY - 1.0) > _MAX_NORM_ERROR_AT_REST:
-        reason = f"the mean acceleration is {norm:.4g} m/s², and not gravity"
-        return Parameter(None, "not_shown", reason)
+        return Parameter(None, "not_shown", texts.mean_is_not_gravity(norm))
     if abs(means[channel]) < _MIN_VERTICAL_COSINE * norm:
-        reason = "the axis is not vertical: its offset cannot be told from a tilt"
-        return Parameter(None, "not_shown", reason)
-    reason = (
-        "norm of the three axes less standard gravity, with the scale factor error; local gravity "
-        "differs by 0.027 m/s² at most"
-    )
-    return _bound_size(norm - STANDARD_GRAVITY, _MAX_GRAVITY_DEVIATION, reason)
+        return Parameter(None, "not_shown", texts.axis_not_vertical())
+    deviation = norm - STANDARD_GRAVITY
+    return _bound_size(deviation, _MAX_GRAVITY_DEVIATION, texts.norm_less_gravity())
 
 
 def _bound_size(value: float, unknown: float, reason: str) -> Parameter:
@@ -123,14 +118,13 @@ def sensitivity(
     row = by_parameter.get("sensitivity")
     if row is None:
         return NO_TEMPERATURE_READINGS
-    at = f"slope at {by_parameter['T_0'].value:.3g} °C"
-    if lowest is not None and highest is not None:
-        at += f", of readings from {lowest:.3g} to {highest:.3g} °C; the vendor has another range"
-    if by_parameter["quadratic"].value is not None:
-        at += "; the bias bends with temperature, the slope is another elsewhere"
+    bends = by_parameter["quadratic"].value is not None
+    reference = by_parameter["T_0"].value
+    assert reference is not None  # of every fit
+    at = texts.slope_at(reference, lowest, highest, bends=bends)
     lower, upper = row.lower, row.upper
     if row.value is None or lower is None or upper is None:
-        return Parameter(None, "not_identified", row.reason or "no interval")
+        return Parameter(None, "not_identified", row.reason or texts.no_interval())
     largest = max(abs(lower), abs(upper))
     if not row.compensated:
         return Parameter(None, "not_identified", f"{row.reason}; {at}", 0.0, largest)

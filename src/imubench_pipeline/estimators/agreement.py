@@ -12,6 +12,7 @@ from dataclasses import replace
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
 from imubench_pipeline.tables.findings import Finding, find
 from imubench_pipeline.words.findings.spectrum import MethodsDiffer
+from imubench_pipeline.words.reasons import estimates as texts
 
 _MAX_FACTOR_BEYOND_LIMITS = 1.25  # Of a value without limits outside the limits of the likelihood
 _MAX_VALUE_RATIO = 1.8  # Ratio of two values above which they differ, whatever their limits
@@ -40,7 +41,7 @@ def _doubt_group(
         if value is None or parameter.status not in ("ok", "at_bound") or not reference:
             continue
         if reference.value is None:
-            reason = f"the likelihood gives no {name}: {reference.reason or reference.status}"
+            reason = texts.no_reference(name, reference.status, reference.reason)
             judged[name] = replace(parameter, status="doubtful", reason=reason)
             continue
         lower, upper = reference.lower, reference.upper
@@ -53,7 +54,7 @@ def _doubt_group(
         else:
             apart |= parameter.upper < lower or parameter.lower > upper
         if apart or value < lower / ratio or value > upper * ratio:
-            reason = f"the likelihood has {name} between {lower:.3g} and {upper:.3g} (SI)"
+            reason = texts.excluded_by_likelihood(name, lower / value, upper / value)
             judged[name] = replace(parameter, status="doubtful", reason=reason)
     return judged
 

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from imubench_pipeline.estimators.spectrum import Spectrum
 from imubench_pipeline.estimators.whittle import COARSE, Maximum, Terms, Whittle, whittle_of
+from imubench_pipeline.model.states import BandSource
 
 _DEFAULT_BAND = 1 / 20  # Frequency over sampling rate below which filters are assumed to be flat
 _MIN_BAND = 1 / 1000
@@ -29,7 +30,7 @@ class Band:
     """The highest frequency that enters the likelihood."""
 
     highest: float  # Hz
-    source: str  # description of its origin
+    source: BandSource
 
 
 def find_band(
@@ -58,21 +59,18 @@ def find_band(
     nyquist = 0.5 * spectrum.rate
     if asked is not None:
         highest = min(asked, nyquist)
-        return Band(highest, f"set: {highest:.4g} Hz")
+        return Band(highest, "set")
     cap = nyquist
     if bandwidth is not None and bandwidth / _MIN_BANDWIDTH_RATIO < nyquist:
         cap = bandwidth / _MIN_BANDWIDTH_RATIO
     limit = _find_unbent_limit(spectrum, clear, cap)
     if limit is not None and limit < cap:
-        source = f"found: beyond {limit:.4g} Hz the spectrum bends, as by the sensor's filter"
-        return Band(limit, source)
+        return Band(limit, "bend")
     if cap < nyquist:
-        return Band(cap, f"a tenth of the stated bandwidth: {cap:.4g} Hz")
+        return Band(cap, "bandwidth")
     if limit is None:
-        limit = _DEFAULT_BAND * spectrum.rate
-        source = f"default: a twentieth of the rate, {limit:.4g} Hz; the spectrum follows no model"
-        return Band(limit, f"{source} beyond any frequency")
-    return Band(nyquist, "found: the spectrum follows its model up to Nyquist")
+        return Band(_DEFAULT_BAND * spectrum.rate, "no_model")
+    return Band(nyquist, "whole")
 
 
 def _find_unbent_limit(spectrum: Spectrum, clear: NDArray[np.bool_], cap: float) -> float | None:

@@ -15,6 +15,7 @@ from imubench_pipeline.allan import AllanCurve
 from imubench_pipeline.estimators.estimate import Estimate, Parameter, not_shown
 from imubench_pipeline.noise import FLOOR, PEAK_TAU
 from imubench_pipeline.typing import Array
+from imubench_pipeline.words.reasons import curves as texts
 
 _SLOPE_WINDOW = 0.5  # Width of the window for a local slope, decades of tau
 _OCTAVE = math.log10(2.0)  # Distance of tau, in decades, below which estimates are correlated
@@ -24,6 +25,7 @@ _WALK_MAX_TOLERANCE = 0.2
 _WALK_SPANS = np.arange(0.4, 2.01, 0.1)
 _WALK_MIN_SLOPE = 0.2
 _RISE_SIGMAS = 3.0
+_MIN_POINTS = 4
 
 
 @dataclass(frozen=True)
@@ -71,8 +73,7 @@ def read(curve: AllanCurve, *, longest: float = 1 / 9) -> Estimate:
     """
     used = curve.cluster_size <= longest * curve.samples
     if not (curve.variance[used] > 0).all():
-        reason = "the Allan variance is 0 at some tau: the samples repeat exactly"
-        return not_shown("curve", reason)
+        return not_shown("curve", texts.repeated_samples())
     # Where samples are missing, white noise is averaged over fewer than n: as at a shorter tau.
     thinned = np.sqrt(curve.cluster_size / curve.averaged)[used]
     points = _Curve(
@@ -80,9 +81,9 @@ def read(curve: AllanCurve, *, longest: float = 1 / 9) -> Estimate:
         np.log10(curve.deviation[used]),
         1.0 / (math.log(10.0) * np.sqrt(2.0 * curve.edf[used])),
     )
-    if used.sum() < 4:
-        reason = f"the curve has {used.sum()} points up to {longest:.3g} of the log"
-        return not_shown("curve", reason)
+    points_used = int(used.sum())
+    if points_used < _MIN_POINTS:
+        return not_shown("curve", texts.few_points(points_used, longest, _MIN_POINTS))
     bias, time = _read_minimum(points)
     N, K = _read_white(points, thinned), _read_walk(points)
     lowest = {"sigma_min": bias, "tau_min": time}
@@ -104,18 +105,14 @@ def _read_white(points: _Curve, thinned: Array) -> Parameter:
             if error < 0.25:
                 slopes[i] = slope
     if not np.isfinite(slopes).any():
-        return Parameter(None, "not_shown", "the curve is too short to show a slope")
+        return Parameter(None, "not_shown", texts.short_curve())
     # The ends have one-sided windows; the first run of the right slope is the white noise.
     close = np.abs(slopes + 0.5) <= _WHITE_TOLERANCE
     edges = np.flatnonzero(np.diff(np.concatenate(([0], close.astype(np.int8), [0]))))
     runs = [slice(*ends) for ends in edges.reshape(-1, 2) if ends[1] - ends[0] >= 3]
     if not runs:
         low, high = np.nanmin(slopes), np.nanmax(slopes)
-        return Parameter(
-            None,
-            "not_shown",
-            f"no stretch of the curve has the slope -1/2: slopes run from {low:.2f} to {high:.2f}",
-        )
+        return Parameter(None, "not_shown", texts.no_white_slope(float(low), float(high)))
     excess = float(np.average(thinned[runs[0]], weights=points.error[runs[0]] ** -2))
     return Parameter(points.level(runs[0], -0.5, 1.0) / excess)
 
@@ -128,20 +125,16 @@ def _read_minimum(points: _Curve) -> tuple[Parameter, Parameter]:
     fall = points.deviation[0] - points.deviation[lowest]
     reason = None
     if lowest == 0 or fall < _RISE_SIGMAS * math.hypot(points.error[0], points.error[lowest]):
-        reason = "the curve does not fall to a minimum: its lowest point is at its beginning"
+        reason = texts.no_fall()
     elif not (rise > _RISE_SIGMAS * error).any():
-        tau = 10.0 ** points.tau[lowest]
-        reason = (
-            f"the curve does not rise again after its lowest point at {tau:.3g} s by "
-            f"{_RISE_SIGMAS:.0f} standard errors: no minimum is shown; a longer log may"
-        )
+        reason = texts.no_rise(float(10.0 ** points.tau[lowest]), _RISE_SIGMAS)
     if reason:
         nothing = Parameter(None, "not_shown", reason)
         return nothing, nothing
     return (
         Parameter(
             float(10.0 ** points.deviation[lowest]) / FLOOR,
-            reason="read at the minimum of the whole curve, where N and K add to B",
+            reason=texts.read_at_minimum(),
         ),
         Parameter(float(10.0 ** points.tau[lowest]) / PEAK_TAU),
     )
@@ -163,6 +156,6 @@ def _read_walk(points: _Curve) -> Parameter:
         if abs(slope - 0.5) <= allowed and slope - 2 * error > _WALK_MIN_SLOPE:
             best = inside
     if best is None:
-        shown = f"the steepest end has {steepest:+.2f}" if np.isfinite(steepest) else "it ends low"
-        return Parameter(None, "not_shown", f"the curve does not end with the slope +1/2: {shown}")
+        shown = float(steepest) if np.isfinite(steepest) else None
+        return Parameter(None, "not_shown", texts.no_walk_slope(shown))
     return Parameter(points.level(best, 0.5, 3.0))

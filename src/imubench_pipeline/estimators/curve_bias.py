@@ -25,6 +25,7 @@ from imubench_pipeline.estimators.whittle import Terms
 from imubench_pipeline.noise import FLOOR, PEAK_TAU, GaussMarkov, NoiseModel
 from imubench_pipeline.noise.terms import gauss_markov_shape
 from imubench_pipeline.typing import Array
+from imubench_pipeline.words.reasons import curves, estimates
 
 MAX_TAU_FRACTION = 1 / 9  # Maximum tau over the duration of the log
 _POINTS_PER_DECADE = 16  # Averaging times for the search of the lowest point
@@ -191,46 +192,39 @@ def _estimate_bias(
     value, at = (float(of_one[0]) for of_one in bias_of_curve(model, longest))
     lower, upper = _compute_limits(parts, value)
     if value == 0.0:
-        return Parameter(None, "absent", "the data do not ask for it", 0.0, upper)
+        return Parameter(None, "absent", estimates.absent_below(), 0.0, upper)
     reason = None
     if model.terms.gauss_markov and at >= longest * (1.0 - 1e-9):
-        reason = f"its processes still rise at {longest:.4g} s, a ninth of the log"
+        reason = curves.rises_to_end(longest)
     elif model.terms.gauss_markov and at < PEAK_TAU * BROADBAND_TIME:
-        reason = (
-            f"its highest point, at {at:.2g} s, is a process with a correlation time below "
-            f"{BROADBAND_TIME:g} s: broadband noise, and no bias instability"
-        )
-    if reason:
-        reason += "; only its interval is given"
+        reason = curves.broadband_peak(at, BROADBAND_TIME)
     else:
         # The end of the search decides the amplitude of a process whose T_B ran into it.
         times = [group.get("T_B") for group in (estimate.parameters, *estimate.further)]
-        bounds = [time.reason for time in times if time and time.status == "at_bound"]
+        bounds = [time.reason or "" for time in times if time and time.status == "at_bound"]
         if not bounds:
             return Parameter(value, "ok", None, lower, upper)
-        reason = f"a correlation time is at the bound of its search: {bounds[0]}"
+        reason = curves.time_at_bound(bounds[0])
     return Parameter(None, "not_identified", reason, lower, upper, fitted=value)
 
 
 def _describe_weak_bias(drawn: Sequence[Models], as_good: bool, longest: float) -> Parameter:
     """Return the bias instability of a curve whose chosen model has none."""
     if not drawn:
-        return Parameter(None, "absent", "the data do not ask for it")
+        return Parameter(None, "absent", estimates.absent())
     upper = max(float(np.quantile(bias_of_curve(models, longest)[0], 0.975)) for models in drawn)
     if as_good:
-        reason = "models with a bias instability are about as good; only its interval is given"
-        return Parameter(None, "not_identified", reason, 0.0, upper)
-    reason = "the data do not ask for it; with 95 % it is below the upper limit"
-    return Parameter(None, "absent", reason, 0.0, upper)
+        return Parameter(None, "not_identified", estimates.bias_models_alike(), 0.0, upper)
+    return Parameter(None, "absent", estimates.absent_below(), 0.0, upper)
 
 
 def of_model(model: NoiseModel, tau: Array) -> dict[str, Parameter]:
     """Return the figures of the curve of a model as it is, at `averaging_times`, without limits."""
     models = models_of(model)
     if not models.terms.parameters:
-        nothing = Parameter(None, "not_shown", "there is no noise")
+        nothing = Parameter(None, "not_shown", curves.no_noise())
         return dict.fromkeys(CURVE, nothing)
-    bias = Parameter(None, "absent", "no flicker noise and no Gauss-Markov process")
+    bias = Parameter(None, "absent", curves.no_bias_terms())
     if any(models.terms.biases):
         bias = Parameter(float(bias_of_curve(models, float(tau[-1]))[0][0]))
     return {"B_curve": bias} | lowest_parameters(models, [], tau)
@@ -253,10 +247,7 @@ def lowest_parameters(model: Models, drawn: Sequence[Models], tau: Array) -> dic
         ]
     if not inside:
         falls = time > tau[0]
-        reason = (
-            f"no minimum is shown: the curve of the noise {'still falls' if falls else 'rises'} "
-            f"{f'at {tau[-1]:.4g} s, a ninth of the log' if falls else 'from its beginning'}"
-        )
+        reason = curves.no_model_minimum(float(tau[-1]) if falls else None)
         upper = limits[0][1] if falls else None
         return {
             "sigma_min": Parameter(None, "not_shown", reason, 0.0 if upper else None, upper),
@@ -268,7 +259,7 @@ def lowest_parameters(model: Models, drawn: Sequence[Models], tau: Array) -> dic
         for weight, (_, _, minimum) in zip(weights, points, strict=True)
     )
     if outside > 0.025 * sum(weights):
-        reason = "models that the log does not rule out have no minimum within a ninth of it"
+        reason = curves.minimum_beyond()
         lowest_time = Parameter(None, "not_identified", reason, limits[1][0], None, fitted=time)
     return {"sigma_min": Parameter(sigma, "ok", None, *limits[0]), "tau_min": lowest_time}
 

@@ -33,10 +33,11 @@ from imubench_pipeline.estimators.filter_fits import (
     get_highest_cutoff,
     read_as_digital,
 )
-from imubench_pipeline.estimators.low_pass import Filter, Kind
+from imubench_pipeline.estimators.low_pass import Kind
 from imubench_pipeline.estimators.spectrum import Spectrum
 from imubench_pipeline.estimators.whittle import Behind, Terms
 from imubench_pipeline.typing import Array
+from imubench_pipeline.words.reasons import spectra as texts
 
 _MIN_WHITE_GAIN = 2.0  # Minimum gain of log likelihood by white noise in addition to a process
 _MAX_LEAKAGE_FRACTION = 0.01  # Maximum spectral leakage over density in a fitted bin
@@ -55,11 +56,6 @@ _NO_FILTER_WEIGHT = 0.1
 _MIN_N_RATIO = 1e-6  # Minimum N at an end of the interval over N at the best cut-off
 MAX_LIMIT_RATIO = 1.2  # Ratio of the limits of a cut-off above which it is not identified
 _MIN_HALF_WIDTH = 1e-5  # Minimum half width of the interval of a log cut-off
-
-ALLOWED_CUTOFFS_REASON = "the log allows cut-offs from {:.4g} to {:.4g} Hz"
-UNKNOWN_BEND_REASON = (
-    f"the spectrum bends, but not as behind any of {len(FAMILY)} filters that were tried"
-)
 
 _MAX_STATED_RATIO = 1.6  # Ratio of found to configured cut-off of the same filter
 
@@ -91,7 +87,7 @@ class Cutoff:
         cutoff = self.frequency.value or self.frequency.fitted
         if self.kind is None or self.order is None or cutoff is None:
             return ""
-        return f"{Filter(self.kind, self.order, cutoff).name} at {cutoff:.4g} Hz"
+        return texts.filter_text(self.kind, self.order, cutoff)
 
     @property
     def beside(self) -> float:
@@ -146,7 +142,8 @@ def find_cutoff(
     """
     usable = np.ones(len(spectrum.frequency), dtype=np.bool_) if clear is None else clear
     if usable.sum() < MIN_BINS:
-        unknown = Parameter(None, "not_shown", f"the spectrum has {usable.sum()} bins only")
+        reason = texts.few_bins(int(usable.sum()), MIN_BINS)
+        unknown = Parameter(None, "not_shown", reason)
         return Cutoff(unknown, None, unknown, 0.0, 0.0)
     fits = FilterFits(spectrum.select(usable))
     if not fits.may_bend():
@@ -220,14 +217,11 @@ def _describe_filter(
     frequency = Parameter(shown, lower=lower, upper=upper)
     reason = None
     if or_quantization:
-        reason = (
-            "the spectrum rises towards Nyquist, by quantization noise as well as by a low-pass "
-            f"with a cut-off from {lower:.4g} to {upper:.4g} Hz"
-        )
+        reason = texts.filter_or_quantization(lower, upper)
     elif upper > MAX_LIMIT_RATIO * lower or highest:
-        reason = ALLOWED_CUTOFFS_REASON.format(lower, upper)
+        reason = texts.cutoff_range(lower, upper)
     elif not fits.explains(best):
-        reason = UNKNOWN_BEND_REASON
+        reason = texts.unknown_filter(len(FAMILY))
     if reason is not None:
         frequency, density = (
             replace(each, value=None, status="not_identified", reason=reason, fitted=each.value)
@@ -254,7 +248,7 @@ def _describe_filter(
 
 def _describe_no_filter(N_alone: float, gained: float, doubt: tuple[str, float] | None) -> Cutoff:
     """Return a result without a filter, or, with a ``doubt``, with an ambiguous one and its N."""
-    absent = Parameter(None, "absent", "the spectrum shows no low-pass")
+    absent = Parameter(None, "absent", texts.no_filter())
     if doubt is None:
         return Cutoff(absent, None, Parameter(N_alone), 0.0, gained)
     reason, before = doubt
@@ -326,9 +320,4 @@ def _explain_ambiguity(
     if not leads and gained >= _MIN_DELTA_BIC:
         return None  # another filter fits better than both
     time = 1.0 / (2.0 * math.pi * first.cutoff)
-    reason = (
-        f"a Gauss-Markov process of T_B = {time:.3g} s and a low-pass of first order at "
-        f"{first.cutoff:.3g} Hz look alike: no white noise shows beside it; bandwidth in the "
-        "sensor file would tell"
-    )
-    return reason, fits.density(first)[0]
+    return texts.process_or_filter(time, first.cutoff), fits.density(first)[0]

@@ -16,6 +16,7 @@ from imubench_pipeline.estimators.estimate import CURVE, Estimate, Parameter
 from imubench_pipeline.estimators.frame import FitSelection
 from imubench_pipeline.estimators.model_choice import Candidate
 from imubench_pipeline.estimators.whittle import Maximum, Whittle
+from imubench_pipeline.words.reasons import estimates as texts
 
 _DELTA_BIC_AGAINST_PAPERS = 6.0  # Above it, values of the papers' model are doubtful
 _DELTA_AIC_WITHOUT_WALK = 2.5  # 2 % of true random walks exceed it, and 3/4 of slow processes
@@ -65,18 +66,14 @@ def add_doubts(
             and plain is not None
             and plain.bic <= chosen.bic + _DELTA_BIC_RARE_TERM
         ):
-            worse = f"{plain.bic - chosen.bic:.1f} in BIC"
-            reason = (
-                f"{without.name}, which has none, is hardly worse than {terms.name}, by {worse}"
-            )
+            worse = plain.bic - chosen.bic
+            reason = texts.hardly_worse_without(name, without.name, terms.name, worse)
             estimate = cast_doubt(estimate, (name,), reason)
     estimate = _equate_bias_statuses(estimate)
     against = papers_candidate.bic - chosen.bic
     if against > _DELTA_BIC_AGAINST_PAPERS:
-        reason = (
-            f"the data favour {chosen.terms.name} over "
-            f"{papers_candidate.terms.name} by {against:.1f} in BIC"
-        )
+        names = chosen.terms.name, papers_candidate.terms.name
+        reason = texts.model_disfavoured(*names, against)
         papers = cast_doubt(papers, ("B", "T_B", "K"), reason)
     return estimate, papers
 
@@ -90,10 +87,7 @@ def _doubt_walk(chosen: Candidate, candidates: Sequence[Candidate]) -> str | Non
     best = min(without, key=lambda candidate: candidate.aic, default=chosen)
     better = chosen.aic - best.aic
     if best.aic <= chosen.aic - _DELTA_AIC_WITHOUT_WALK:
-        return (
-            f"{best.terms.name}, which has no random walk, is better by {better:.1f} in AIC: a "
-            "process as slow as the log passes for a random walk"
-        )
+        return texts.slow_process(best.terms.name, better)
     beside = next((c for c in candidates if c.terms == replace(terms, ramp=True)), chosen)
     if beside.aic > chosen.aic - _DELTA_AIC_WITHOUT_WALK:
         return None
@@ -101,8 +95,7 @@ def _doubt_walk(chosen: Candidate, candidates: Sequence[Candidate]) -> str | Non
     if least > _MIN_WALK_BESIDE_RAMP * K:
         return None
     better = chosen.aic - beside.aic
-    leaves = f"the ramp leaves {least / K:.2g} of K"
-    return f"{beside.terms.name} is better by {better:.1f} in AIC, and {leaves}"
+    return texts.ramp_explains(beside.terms.name, better, least / K)
 
 
 def _doubt_bias(chosen: Candidate, candidates: Sequence[Candidate]) -> str | None:
@@ -118,17 +111,15 @@ def _doubt_bias(chosen: Candidate, candidates: Sequence[Candidate]) -> str | Non
     best = min(fewer, key=lambda candidate: candidate.bic, default=None)
     most = _DELTA_BIC_EXTRA_TERM if biases > 1 else _DELTA_BIC_WITHOUT_BIAS
     if best is not None and best.bic <= chosen.bic + most:
-        worse = f"{best.bic - chosen.bic:.1f} in BIC"
-        instead = "another B; B_curve is that of both" if biases > 1 else "no B"
-        return f"{best.terms.name} is hardly worse than {terms.name}, by {worse}, and has {instead}"
+        worse = best.bic - chosen.bic
+        return texts.hardly_worse_bias(best.terms.name, terms.name, worse, several=biases > 1)
     other = min(candidates, key=lambda candidate: candidate.aic)
     better = chosen.aic - other.aic
     if terms.gauss_markov == 0 or "K" in terms.linear or other.terms.biases == terms.biases:
         return None
     if better < _DELTA_AIC_OTHER_BIAS_TERMS:
         return None
-    name = other.terms.name
-    return f"{name}, with other terms of bias instability, is better by {better:.1f} in AIC"
+    return texts.other_bias_terms(other.terms.name, better)
 
 
 def _equate_bias_statuses(estimate: Estimate) -> Estimate:
@@ -137,7 +128,7 @@ def _equate_bias_statuses(estimate: Estimate) -> Estimate:
     if estimate.further or of_curve is None:
         return estimate
     if of_curve.status == "not_identified":
-        reason = f"the bias instability of the curve is not told: {of_curve.reason}"
+        reason = texts.curve_bias_unknown(of_curve.reason)
         return cast_doubt(estimate, ("B", "T_B"), reason, of_curve=False)
     if of_curve.status != "ok" or B.status not in ("not_identified", "doubtful"):
         return estimate
@@ -175,10 +166,7 @@ def _flag_excluded_band(estimate: Estimate, highest: float) -> Estimate:
     B = estimate.parameters["B"]
     if B.status != "absent":
         return estimate
-    reason = (
-        f"beyond {highest:.4g} Hz neither a process nor a low-pass explains the spectrum: a faster "
-        "process would not be seen"
-    )
+    reason = texts.band_excluded(highest)
     B = replace(B, status="not_identified", reason=reason, lower=None, upper=None)
     return replace(estimate, parameters={**estimate.parameters, "B": B})
 
@@ -191,15 +179,9 @@ def describe_drift_alternative(whittle: Whittle, chosen: Maximum) -> str | None:
     beyond = _likelihood_without_lowest_cosines(whittle, _DRIFT_COSINES)
     bare = replace(terms, linear=terms.linear.replace("K", ""))
     if len(beyond.spectrum.density) <= terms.parameters:
-        return (
-            f"the log has too few frequencies beyond the {_DRIFT_COSINES} lowest, "
-            "which drift has too"
-        )
+        return texts.few_frequencies(_DRIFT_COSINES)
     if 2.0 * (beyond.maximum(bare).cost - beyond.maximum(terms).cost) < _MIN_WALK_GAIN:
-        return (
-            f"beyond the {_DRIFT_COSINES} lowest frequencies {bare.name} explains the log as "
-            "well, and in these a drift with temperature or time passes for a random walk"
-        )
+        return texts.drift_or_walk(_DRIFT_COSINES, bare.name)
     first = float(whittle.spectrum.frequency[0])
     for number in _EXCLUDED_COSINES:
         rest = _likelihood_without_lowest_cosines(whittle, number)
@@ -207,10 +189,7 @@ def describe_drift_alternative(whittle: Whittle, chosen: Maximum) -> str | None:
         drift = rest.with_column("K", rest.column("K") * steep)
         better = 2.0 * (rest.maximum(terms).cost - drift.maximum(terms).cost)
         if better > _DELTA_AIC_SMOOTH_DRIFT:
-            return (
-                f"a smooth drift, whose spectrum falls as f^-4, and {bare.name} are better by "
-                f"{better:.1f} in AIC: a drift with temperature or time passes for a random walk"
-            )
+            return texts.smooth_drift(bare.name, better)
     return None
 
 

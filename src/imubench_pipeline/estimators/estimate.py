@@ -12,6 +12,7 @@ from imubench_pipeline import units
 from imubench_pipeline.estimators.dimensions import DIMENSIONS
 from imubench_pipeline.noise import GaussMarkov, NoiseModel, Sinusoid
 from imubench_pipeline.typing import Array
+from imubench_pipeline.words.reasons import estimates as texts
 
 Status = Literal["ok", "doubtful", "not_shown", "at_bound", "not_identified", "absent"]
 
@@ -98,10 +99,10 @@ class Parameter:
         if signs > 0 and far <= MAX_LIMIT_RATIO * near:
             return self
         if signs > 0:
-            where = f"the 95 % limits are {far / near:.2g} times apart"
+            reason = texts.wide_interval(far / near)
         else:
-            where = "the 95 % interval contains 0" if signs < 0 else "the lower 95 % limit is 0"
-        reason, fitted = f"{where}; only the interval is given", self.in_model
+            reason = texts.interval_with_zero(at_limit=signs == 0)
+        fitted = self.in_model
         # The prior, and not the data, decides how far down such draws reach.
         is_open = signs > 0 and self.lower > 0.0 and far > _MAX_OPEN_RATIO * near
         lower = 0.0 if is_open else self.lower

@@ -31,12 +31,13 @@ from imubench_pipeline.estimators.whittle import (
     model_of,
     whittle_of,
 )
+from imubench_pipeline.model.states import BandSource
 from imubench_pipeline.typing import Array
+from imubench_pipeline.words.reasons import spectra as texts
 
 Mask = NDArray[np.bool_]
 
 _LINE_MODEL_BAND = 0.05  # Fraction of the rate below which the model for line detection is fitted
-_SOURCE_UP_TO_NYQUIST = "found: the spectrum follows its model up to Nyquist"
 _MIN_CORRELATION_SAMPLES = 3.0  # Shortest process that is tried where longer ones do not fit
 _SEPARATE_BEND_RATIO = 60.0  # Correlation time of a process over the filter's with separate bends
 _MIN_QUANTIZATION_BAND = 1 / 10  # Fraction of the rate at which quantization noise is visible
@@ -59,6 +60,12 @@ class FitSelection:
     """Shortest correlation time of a process, s; None: the default of `whittle_of`."""
     stated: float | None = None  # configured cut-off of the sensor's filter, Hz, if known
     cut: bool = False  # frequencies are excluded that neither a process nor a filter fits
+
+    @property
+    def band_words(self) -> str:
+        """Why the spectrum is fitted up to this frequency."""
+        low_pass = self.low_pass.words if self.low_pass is not None else ""
+        return texts.band_text(self.band.source, self.band.highest, low_pass)
 
     def whittle(self, spectrum: Spectrum) -> Whittle:
         """Return the likelihood of the bins that are fitted."""
@@ -91,8 +98,7 @@ class FitSelection:
         if self.low_pass is None:
             return self
         low_pass = refine_cutoff(self.low_pass, spectrum, self.used, candidates)
-        source = self.band.source.replace(self.low_pass.words, low_pass.words)
-        return replace(self, low_pass=low_pass, band=replace(self.band, source=source))
+        return replace(self, low_pass=low_pass)
 
     def rescore(self, candidates: Sequence[Candidate]) -> list[Candidate]:
         """Return the candidates, sorted by their fits with a cut-off for each model."""
@@ -134,7 +140,7 @@ class FitSelection:
         return replace(
             self,
             used=self.clear,
-            band=Band(0.5 * rate, _SOURCE_UP_TO_NYQUIST),
+            band=Band(0.5 * rate, "whole"),
             low_pass=_without_filter_fit(self.low_pass),
             shortest=_MIN_CORRELATION_SAMPLES / rate,
         )
@@ -197,17 +203,15 @@ def select_for_fit(
     low_pass = find_cutoff(spectrum, clear, resolution=resolution, stated=bandwidth)
     if low_pass.or_quantization:
         low_pass = replace(low_pass, behind=None, readings=())
-    used, source = clear, _SOURCE_UP_TO_NYQUIST
+    used = clear
+    source: BandSource = "whole"
     if low_pass.behind is not None and low_pass.ruled is not None:
         used = clear & ~low_pass.ruled
-        source = f"found: behind a {low_pass.words}, {source.removeprefix('found: ')}"
+        source = "filtered"
     highest = 0.5 * spectrum.rate
     if used.any() and not used[clear][-1]:
         highest = float(spectrum.upper[used].max())
-        source = (
-            f"{source.removesuffix(' up to Nyquist')} up to {highest:.4g} Hz; beyond, the filter "
-            "leaves nothing of it"
-        )
+        source = "attenuated"
     return FitSelection(lines, clear, used, Band(highest, source), low_pass, shortest, bandwidth)
 
 
@@ -253,10 +257,7 @@ def sensor_density(
         whole = frame.likelihood_of_all_bins(spectrum)
         shapes = [whole.gauss_markov(float(time))[0] for time in maximum.times[fast]]
         before = math.sqrt(N**2 + float(maximum.process_powers[fast] @ np.array(shapes)))
-        reason = (
-            f"a process with a correlation time of {maximum.times[fast].max():.3g} s, a few "
-            "samples, may be the low-pass of the sensor; bandwidth in the sensor file would tell"
-        )
+        reason = texts.fast_process_or_filter(float(maximum.times[fast].max()))
         return _describe_interval(reason, posterior.parameters[:, column], before)
     draws = frame.before_the_filter(posterior, terms, rng).parameters[:, column]
     lower, upper = np.quantile(draws, (0.025, 0.975)).tolist()
@@ -264,10 +265,7 @@ def sensor_density(
     if share < _MIN_FLOOR_RATIO:
         return Parameter(N, lower=lower, upper=upper)
     times = math.sqrt(1.0 + share)
-    reason = (
-        f"white noise of {100 * share:.2g} % of its power does not pass the {low_pass.words}, as "
-        f"in an interpolated log: N_sensor may be up to {times:.3g} times as high"
-    )
+    reason = texts.unfiltered_noise(share, low_pass.words, times)
     return Parameter(N, "doubtful", reason, lower, upper * times)
 
 

@@ -10,6 +10,7 @@ from scipy.special import erfc, polygamma, psi
 
 from imubench_pipeline.model.states import GoodnessVerdict
 from imubench_pipeline.typing import Array
+from imubench_pipeline.words.reasons import spectra as texts
 
 MIN_FIT_CHANCE = 1e-3  # Probability below which a fit is rejected
 
@@ -66,8 +67,5 @@ def _describe_worst_band(residual: Array, frequency: Array) -> str:
         if abs(total) > best:
             best = abs(total)
             first, last = frequency[inside][[0, -1]]
-            text = (
-                f"furthest from the model from {first:.3g} to {last:.3g} Hz: "
-                f"{'above' if total > 0 else 'below'} it by {best:.1f} standard errors"
-            )
+            text = texts.worst_band(float(first), float(last), best, above=total > 0)
     return text

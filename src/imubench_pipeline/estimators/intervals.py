@@ -15,11 +15,10 @@ from imubench_pipeline.estimators.model_choice import Candidate
 from imubench_pipeline.estimators.posterior import Posterior
 from imubench_pipeline.estimators.whittle import Terms, Whittle
 from imubench_pipeline.typing import Array
+from imubench_pipeline.words.reasons import estimates as texts
 
 _AT_BOUND = 0.985
 _ABOUT_AS_GOOD = 2.0
-_ABSENT = "the data do not ask for it"
-_ABSENT_BELOW = f"{_ABSENT}; with 95 % it is below the upper limit"
 
 
 def with_upper_limits(
@@ -49,12 +48,9 @@ def with_upper_limits(
             if as_good(other, alike[0]) and powers.get(name, 0.0) > 0.0:
                 good.append(other)
         if not good:
-            parameters[name] = Parameter(None, "absent", _ABSENT_BELOW, 0.0, upper)
+            parameters[name] = Parameter(None, "absent", texts.absent_below(), 0.0, upper)
             continue
-        names = " and ".join(candidate.terms.name for candidate in good)
-        verb = "is" if len(good) == 1 else "are"
-        reason = f"{names}, which {'has' if len(good) == 1 else 'have'} it, {verb} about as good"
-        reason += f" as {alike[0].terms.name}; only its interval is given"
+        reason = texts.models_alike([c.terms.name for c in good], alike[0].terms.name)
         parameters[name] = Parameter(None, "not_identified", reason, 0.0, upper)
         timed = [c.terms for c in good if "T_B" in parameter_names(c.terms)]
         if name == "B" and timed:
@@ -103,7 +99,7 @@ def describe(
         own = [(_draws_of(name, chosen.terms, draws), 1.0)]
         lower, upper = mixture_limits(_over_models(name, chosen, alike, draws), own)
         if value == 0.0:
-            described[name] = Parameter(None, "absent", _ABSENT_BELOW, 0.0, upper)
+            described[name] = Parameter(None, "absent", texts.absent_below(), 0.0, upper)
             continue
         # At the end of a search, or where draws are few, the best value lies at the edge.
         limits = min(lower, float(value)), max(upper, float(value))
@@ -111,8 +107,8 @@ def describe(
         longest, shortest = whittle.longest, whittle.shortest
         at_longest, at_shortest = value > longest * _AT_BOUND, value < shortest / _AT_BOUND
         if name.startswith("T_B") and (at_longest or at_shortest):
-            end, bound = ("longest", longest) if at_longest else ("shortest", shortest)
-            reason = f"the {end} correlation time that the log can show is {bound:.4g} s"
+            bound = longest if at_longest else shortest
+            reason = texts.correlation_bound(bound, longest=bool(at_longest))
             described[name] = replace(described[name], status="at_bound", reason=reason)
     if "K" in described and described["K"].checked().status == "ok":
         weighted_draws = _over_models("K", chosen, alike, draws)
@@ -123,12 +119,10 @@ def describe(
         if f"B{number}" in described and described[f"B{number}"].status == "absent":
             bias = described[f"B{number}"]
             described[f"T_B{number}"] = replace(bias, lower=None, upper=None, duration_needed=None)
-    absent = Parameter(None, "absent", _ABSENT)
+    absent = Parameter(None, "absent", texts.absent())
     parameters = {name: described.get(name, absent) for name in FAMILY}
     if "B" in described and "T_B" not in described:
-        parameters["T_B"] = Parameter(
-            None, "absent", "bias instability is flicker noise here, which has no correlation time"
-        )
+        parameters["T_B"] = Parameter(None, "absent", texts.flicker_without_time())
     second = "B 2" in described
     further = [{"B": described["B 2"], "T_B": described["T_B 2"]}] if second else []
     return Estimate(method, parameters, further)

@@ -15,14 +15,13 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq, minimize_scalar
 
 from imubench_pipeline.estimators.cutoff import (
-    ALLOWED_CUTOFFS_REASON,
     DELTA_LOG_LIKELIHOOD_EXCLUDED,
     MAX_LIMIT_RATIO,
-    UNKNOWN_BEND_REASON,
     Cutoff,
 )
 from imubench_pipeline.estimators.estimate import Parameter
 from imubench_pipeline.estimators.filter_fits import (
+    FAMILY,
     HALF_CHI_SQUARED,
     MIN_PROCESS_SAMPLES,
     Allowed,
@@ -38,6 +37,7 @@ from imubench_pipeline.estimators.filter_fits import (
 from imubench_pipeline.estimators.model_choice import Candidate
 from imubench_pipeline.estimators.spectrum import Spectrum
 from imubench_pipeline.estimators.whittle import COARSE, Behind, Maximum, Terms, Whittle, whittle_of
+from imubench_pipeline.words.reasons import spectra as texts
 
 _MAX_LOG_SHIFT = math.log(2.0)  # Maximum change of log f_c by a joint fit
 _SEARCH_HALF_WIDTHS = 6.0  # Range of the first search for a cut-off, in half widths of its interval
@@ -101,9 +101,9 @@ def refine_cutoff(
     shown, lower, upper = best.low_pass.half_power(spectrum.rate), min(ends), max(ends)
     reason = None
     if upper > MAX_LIMIT_RATIO * lower:
-        reason = ALLOWED_CUTOFFS_REASON.format(lower, upper)
+        reason = texts.cutoff_range(lower, upper)
     elif not joint.explains(fit):
-        reason = UNKNOWN_BEND_REASON
+        reason = texts.unknown_filter(len(FAMILY))
     frequency = Parameter(shown, lower=lower, upper=upper)
     if reason is not None:
         frequency = Parameter(None, "not_identified", reason, lower, upper, fitted=shown)

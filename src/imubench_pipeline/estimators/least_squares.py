@@ -27,6 +27,7 @@ from imubench_pipeline.noise import (
 )
 from imubench_pipeline.noise.terms.gauss_markov import CORRELATION_TIMES
 from imubench_pipeline.typing import Array
+from imubench_pipeline.words.reasons import curves as texts
 
 Method = Literal["weighted", "paper"]
 
@@ -113,23 +114,17 @@ def _solved(
     """Return the estimate without limits, the curve, and the tau that were fitted."""
     used = curve.cluster_size <= longest * curve.samples
     if used.sum() < _MIN_POINTS:
-        raise UnfitCurveError(
-            f"the curve has {used.sum()} points up to {longest:.3g} of the log, expected "
-            f"{_MIN_POINTS} or more"
-        )
+        raise UnfitCurveError(texts.few_points(int(used.sum()), longest, _MIN_POINTS))
     if not (curve.variance[used] > 0).all():
-        raise UnfitCurveError("the Allan variance is 0 at some tau: the samples repeat exactly")
+        raise UnfitCurveError(texts.repeated_samples())
     if method not in ("weighted", "paper"):
         raise ValueError(f"method {method!r} is not known, expected 'weighted' or 'paper'")
     used &= curve.cluster_size >= _find_first_unbent(curve, used, method)
     parameters = dict(_fit_curve(curve, used, method).parameters)
     first = int(np.flatnonzero(used)[0])
     if first > 0 and parameters["N"].value is not None:
-        parameters["N"] = replace(
-            parameters["N"],
-            reason=f"from tau = {curve.tau[first]:.3g} s: at shorter tau the curve is bent, as by "
-            "the sensor's own filter",
-        )
+        reason = texts.fitted_from(float(curve.tau[first]))
+        parameters["N"] = replace(parameters["N"], reason=reason)
     return Estimate(method, parameters), curve, used
 
 
@@ -274,20 +269,14 @@ class _Search:
             name: bool((part > _MIN_VARIANCE_FRACTION * self._variance).any())
             for name, part in parts.items()
         }
-        absent = Parameter(None, "absent", "the fit is best without this term")
+        absent = Parameter(None, "absent", texts.fit_without_term())
         bias = Parameter(bias_instability(drive, T_B)) if present["B"] else absent
         time = Parameter(T_B) if present["B"] else absent
         at_end = None
         if T_B > self.longest * 0.99:
-            at_end = (
-                f"T_B runs to the end of its search at {self.longest:.4g} s: the curve does not "
-                "show the peak of a Gauss-Markov process"
-            )
+            at_end = texts.no_peak(self.longest)
         elif T_B < self.shortest * 1.01:
-            at_end = (
-                f"T_B runs to the beginning of its search at {self.shortest:.4g} s: the process "
-                "cannot be told from white noise"
-            )
+            at_end = texts.like_white_noise(self.shortest)
         if present["B"] and at_end:
             bias = Parameter(bias.value, "at_bound", at_end)
             time = Parameter(T_B, "at_bound", at_end)

@@ -70,6 +70,7 @@ from imubench_pipeline.estimators.white_level import (
 from imubench_pipeline.estimators.whittle import Terms, Whittle, model_of
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.typing import Array
+from imubench_pipeline.words.reasons import spectra as texts
 
 _FLEXIBLE_TERMS = Terms("NFK", 1)
 """Model for the joint fit of the cut-off where no candidate explains the spectrum."""
@@ -359,20 +360,15 @@ class _InTheLog:
 
 def _too_short(spectrum: Spectrum, frame: FitSelection) -> Likelihood:
     """Return the result for a log with too few bins to fit."""
-    reason = (
-        f"{frame.used.sum()} bins of the spectrum are left up to {frame.band.highest:.4g} Hz, "
-        f"{MIN_BINS} are needed: too short a log"
-    )
-    if not frame.clear.all():
-        reason += f", or lines that hide too much of it ({(~frame.clear).sum()} bins)"
+    used, hidden = int(frame.used.sum()), int((~frame.clear).sum())
+    reason = texts.few_bins_left(used, MIN_BINS, frame.band.highest, hidden)
     nothing = Parameter(None, "not_shown", reason)
     estimate = Estimate(
         "likelihood", dict.fromkeys(FAMILY, nothing), curve=dict.fromkeys(CURVE, nothing)
     )
     both = estimate, not_shown("likelihood_gm", reason)
-    lines, clear, used = frame.lines, frame.clear, frame.used
-    fitted = np.full(len(used), np.nan)
-    return Likelihood(both, (), lines, None, spectrum, clear, used, fitted, frame)
+    fitted = np.full(len(frame.used), np.nan)
+    return Likelihood(both, (), frame.lines, None, spectrum, frame.clear, frame.used, fitted, frame)
 
 
 def fit_models(

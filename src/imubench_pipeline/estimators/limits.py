@@ -29,6 +29,7 @@ from imubench_pipeline.estimators.estimate import BROADBAND_TIME, SIGMAS, Estima
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.variance_covariance import variance_covariance
 from imubench_pipeline.typing import Array
+from imubench_pipeline.words.reasons import curves as texts
 
 _MAX_RELATIVE_ERROR = 0.5  # Relative standard error beyond which a parameter is not identified
 
@@ -162,7 +163,7 @@ def add_limits(estimate: Estimate, curve: AllanCurve, used: NDArray[np.bool_]) -
     """
     model = estimate.model
     if not model.terms:
-        nothing = Parameter(None, "not_shown", "no noise is found")
+        nothing = Parameter(None, "not_shown", texts.no_noise())
         return replace(
             estimate,
             curve={"B_curve": estimate.parameters["B"], "sigma_min": nothing, "tau_min": nothing},
@@ -172,8 +173,8 @@ def add_limits(estimate: Estimate, curve: AllanCurve, used: NDArray[np.bool_]) -
     if estimate.parameters["T_B"].status == "at_bound":
         error = fit_errors(curve, used, model, estimate.method, held=["T_B"]).of("B")
         if error > _MAX_RELATIVE_ERROR_HELD:
-            reason = f"the relative standard error of B there is {_format_percent(error)}"
-            unknown = dict.fromkeys(("B", "T_B"), f"{reason}, above 25 %")
+            reason = texts.large_error("B", error, _MAX_RELATIVE_ERROR_HELD)
+            unknown = dict.fromkeys(("B", "T_B"), reason)
     elif "B" in errors.names:
         unknown = _explain_unknown_bias(errors.of("B"), errors.of("T_B"))
     apart = errors
@@ -185,9 +186,7 @@ def add_limits(estimate: Estimate, curve: AllanCurve, used: NDArray[np.bool_]) -
         if "B" in unknown and apart.of(name) <= _MAX_RELATIVE_ERROR_HELD:
             # The term is visible; only a B that is not identified could replace it.
             continue
-        unknown[name] = (
-            f"its relative standard error is {_format_percent(errors.of(name))}, above 50 %"
-        )
+        unknown[name] = texts.large_error(name, errors.of(name), _MAX_RELATIVE_ERROR)
     doubtful = [name for name in ("B", "K") if name in unknown]
     parameters = dict(estimate.parameters)
     for name, parameter in estimate.parameters.items():
@@ -216,7 +215,7 @@ def add_limits(estimate: Estimate, curve: AllanCurve, used: NDArray[np.bool_]) -
             )
     bias = parameters["B"]
     if bias.status == "ok" and model.T_B is not None and model.T_B < BROADBAND_TIME:
-        reason = f"a process with a correlation time of {model.T_B:.2g} s is no bias instability"
+        reason = texts.broadband_process(model.T_B)
         bias = replace(bias, value=None, status="not_identified", reason=reason, fitted=model.B)
     return Estimate(
         estimate.method,
@@ -250,7 +249,7 @@ def _estimate_lowest_point(
             math.sqrt(max(float(slope @ errors.covariance @ slope), 0.0)), _CLIP_RELATIVE_ERROR
         )
         if error > _MAX_RELATIVE_ERROR:
-            reason = f"its relative standard error is {_format_percent(error)}, above 50 %"
+            reason = texts.large_error(name, error, _MAX_RELATIVE_ERROR)
             described[name] = Parameter(None, "not_identified", reason, fitted=parameter.value)
             continue
         factor = math.exp(SIGMAS * error)
@@ -263,20 +262,14 @@ def _estimate_lowest_point(
 
 def _explain_unknown_bias(error: float, error_of_time: float) -> dict[str, str]:
     """Return reasons if B and T_B, or T_B alone, are not identified."""
-    of_time = f"the relative standard error of T_B is {_format_percent(error_of_time)}"
     if error > _MAX_RELATIVE_ERROR:
-        of_bias = f"the relative standard error of B is {_format_percent(error)}, above 50 %"
-        return {"B": of_bias, "T_B": f"{of_bias}; {of_time}"}
+        of_bias = texts.large_error("B", error, _MAX_RELATIVE_ERROR)
+        return {"B": of_bias, "T_B": f"{of_bias}; {texts.large_error('T_B', error_of_time)}"}
     if error_of_time > _MAX_RELATIVE_ERROR_TIME:
-        no_peak = "no peak of a Gauss-Markov process is shown"
-        of_bias = f"the relative standard error of B is {_format_percent(error)}"
-        return {"B": f"{no_peak}: {of_bias}, but {of_time}", "T_B": f"{no_peak}: {of_time}"}
+        return {
+            "B": texts.no_significant_peak(error_of_time, error),
+            "T_B": texts.no_significant_peak(error_of_time),
+        }
     if error_of_time > _MAX_RELATIVE_ERROR:
-        return {"T_B": f"{of_time}, above 50 %"}
+        return {"T_B": texts.large_error("T_B", error_of_time, _MAX_RELATIVE_ERROR)}
     return {}
-
-
-def _format_percent(error: float) -> str:
-    if error >= _CLIP_RELATIVE_ERROR:
-        return f"{100.0 * _CLIP_RELATIVE_ERROR:.0f} % or more"
-    return f"{100.0 * error:.0f} %"

@@ -31,6 +31,7 @@ from imubench_pipeline.noise import NoiseModel, Sinusoid
 from imubench_pipeline.tables.findings import Finding, find
 from imubench_pipeline.typing import Array
 from imubench_pipeline.words.findings.spectrum import TooManyLines
+from imubench_pipeline.words.reasons import spectra as texts
 
 FALSE_ALARM_PROBABILITY = 0.005  # Probability that a line is detected in a channel without lines
 _MEDIAN_BINS = 129  # Bins of the median filter that corrects the model around a bin
@@ -322,7 +323,7 @@ def _group_lines(lines: Sequence[Line]) -> dict[str, Parameter]:
     high = math.hypot(*(line.amplitude_upper for line in lines))
     frequency = amplitude / math.hypot(*(line.amplitude / line.frequency for line in lines))
     first, last = lines[0].frequency, lines[-1].frequency
-    reason = f"{len(lines)} weak lines from {first:.4g} to {last:.4g} Hz together"
+    reason = texts.grouped_lines(len(lines), first, last)
     return {
         "amplitude": Parameter(amplitude, reason=reason, lower=low, upper=high),
         "frequency": Parameter(frequency, reason=reason, lower=first, upper=last),

@@ -98,13 +98,6 @@ class Filter:
     order: int  # n of the Butterworth filter; 1 for the boxcar
     cutoff: float  # f_c, Hz
 
-    @property
-    def name(self) -> str:
-        """Name for a text."""
-        if self.kind == "boxcar":
-            return "mean over a time (boxcar)"
-        return f"{self.kind} low-pass of order {self.order}"
-
     def white(self, at: Frequencies) -> Array:
         """Return G, the density of white noise of N = 1 behind the filter, sampled."""
         if self.kind == "bilinear":

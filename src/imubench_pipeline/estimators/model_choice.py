@@ -12,6 +12,7 @@ import numpy as np
 from imubench_pipeline.estimators.goodness import Goodness, goodness
 from imubench_pipeline.estimators.whittle import Maximum, Terms, Whittle
 from imubench_pipeline.typing import Array
+from imubench_pipeline.words.reasons import estimates as texts
 
 PAPERS_MODEL = Terms("NK", 1)  # Model of the papers: N, B, T_B and K
 
@@ -147,7 +148,6 @@ def describe_disagreement(candidates: Sequence[Candidate]) -> str | None:
     chosen = candidates[0]
     if by_aic is chosen:
         return None
-    return (
-        f"AIC favours {by_aic.terms.name} by {chosen.aic - by_aic.aic:.1f}, "
-        f"BIC {chosen.terms.name} by {by_aic.bic - chosen.bic:.1f}"
+    return texts.criteria_disagree(
+        by_aic.terms.name, chosen.aic - by_aic.aic, chosen.terms.name, by_aic.bic - chosen.bic
     )

@@ -33,8 +33,8 @@ def spectral_findings(channel: str, frame: FitSelection, white: float | None) ->
     """Return the findings on the lines and the band of a channel; ``white`` is N, SI, if known."""
     band = frame.band
     findings = line_findings(channel, frame.lines, white)
-    if band.source.startswith(("found: beyond", "default")):
-        data = BandLimit(band.highest, follows_model=band.source.startswith("found"))
+    if band.source in ("bend", "no_model"):
+        data = BandLimit(band.highest, follows_model=band.source == "bend")
         findings.append(find(data, "note", band.highest, channel))
     return findings
 

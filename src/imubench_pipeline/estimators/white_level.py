@@ -23,6 +23,7 @@ from imubench_pipeline.estimators.posterior import Posterior
 from imubench_pipeline.estimators.whittle import Maximum, Terms
 from imubench_pipeline.noise.terms import driving_density
 from imubench_pipeline.typing import Array
+from imubench_pipeline.words.reasons import curves as texts
 
 MIN_DECADES = 0.7  # Length of a stretch
 MIN_CLUSTER = 3  # Samples; fewer show the register and the sensor's filter
@@ -126,17 +127,10 @@ def merged_posterior(
 def describe_white_level(stretch: WhiteStretch | None, times: Sequence[float]) -> str | None:
     """Return a description of an N with processes of correlation times, s, or without a stretch."""
     if stretch is None:
-        return (
-            "the Allan deviation has no -1/2 stretch of 0.7 decade: N is the white noise of the "
-            "fitted model"
-        )
+        return texts.white_level_of_model(MIN_DECADES)
     if not times:
         return None
-    listed = " and ".join(f"{time:.3g} s" for time in times)
-    return (
-        f"N is the level of the Allan deviation from {stretch.first:.3g} to {stretch.last:.3g} s: "
-        f"it includes a process with a correlation time of {listed}"
-    )
+    return texts.white_level_of_curve(stretch.first, stretch.last, times)
 
 
 def _white_densities(squares: Array, times: Array) -> Array:

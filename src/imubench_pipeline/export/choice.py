@@ -14,7 +14,7 @@ from imubench_pipeline.estimators.rows import estimate_of
 from imubench_pipeline.export.imu import AxisNoise, ExportError
 from imubench_pipeline.export.temperature import AXES
 from imubench_pipeline.model.estimates import ParameterRow
-from imubench_pipeline.words.estimates import STATUS_WORDS
+from imubench_pipeline.words.reasons import exports as texts
 
 Key = tuple[str, str]  # recording, channel
 _Estimated = tuple[str, str, str]  # and method
@@ -90,26 +90,20 @@ def choose(
         raise ExportError(f"no estimate of a {quantity} with white noise")
     place = len(ranked) // 2 if axis == MEDIAN else len(ranked) - 1
     deviation, (recording, channel, used), estimate = ranked[place]
-    which = f"the {MEDIAN if axis == MEDIAN else WORST} of {len(ranked)} axes"
-    if len(ranked) == 1:
-        which = "the only axis"
-    whose = "" if axis in (WORST, MEDIAN) else f" of {axis}"
+    whose = "" if axis in (WORST, MEDIAN) else axis
+    rank = texts.axis_rank(len(ranked), MEDIAN if axis == MEDIAN else WORST, whose)
     unit = {"gyro": "rad", "accel": "m/s"}[quantity]
     error = math.sqrt(2.0) * horizon * deviation
-    origin = (
-        f"{channel} of recording {recording} by method {used}, {which}{whose} at {horizon:g} s "
-        f"({error:.3g} {unit} there, with a bias averaged as long before)"
-    )
-    others: dict[str, list[Key]] = defaultdict(list)
+    origin = texts.chosen_axis(channel, recording, used, rank, horizon, error, unit)
+    others: dict[texts.OtherAxes, list[Key]] = defaultdict(list)
     for key in everywhere:
         if key not in estimated:
-            others["of another device"].append(key[:2])
+            others["other_device"].append(key[:2])
         elif key not in (entry[1] for entry in ranked):
-            others["no white noise in the model"].append(key[:2])
+            others["no_white_noise"].append(key[:2])
         elif key != (recording, channel, used):
-            why = "not the median" if axis == MEDIAN else "less noise"
-            others[f"{why} at {horizon:g} s"].append(key[:2])
-    notes = [*_describe_other_axes(others, channel), *parameter_notes(estimate)]
+            others["not_median" if axis == MEDIAN else "less_noise"].append(key[:2])
+    notes = [*_describe_other_axes(others, channel, horizon), *parameter_notes(estimate)]
     K = estimate.parameters.get("K")
     limit_of_absent_walk = K.upper if K is not None and K.in_model is None else None
     noise = AxisNoise(estimate.model, origin, notes, limit_of_absent_walk)
@@ -129,7 +123,9 @@ def _rank_axes(
     return sorted(ranked, key=lambda entry: entry[0])
 
 
-def _describe_other_axes(others: Mapping[str, Sequence[Key]], chosen: str) -> list[str]:
+def _describe_other_axes(
+    others: Mapping[texts.OtherAxes, Sequence[Key]], chosen: str, horizon: float
+) -> list[str]:
     """List the axes of the same quantity that were not chosen, by reason."""
     quantity, _ = chosen.split("_")
     statements = []
@@ -137,16 +133,11 @@ def _describe_other_axes(others: Mapping[str, Sequence[Key]], chosen: str) -> li
         of: dict[str, list[str]] = defaultdict(list)
         for recording, channel in keys:
             of[recording].append(channel)
-        named = [f"{' and '.join(channels)} of {recording}" for recording, channels in of.items()]
-        more = len(named) - _MAX_NAMED_RECORDINGS
-        statements.append(
-            f"axes left out, {why}: {'; '.join(named[:_MAX_NAMED_RECORDINGS])}"
-            + (f"; and those of {more} more recordings" if more > 0 else "")
-        )
+        statements.append(texts.axes_not_used(why, horizon, of, _MAX_NAMED_RECORDINGS))
     channels = {chosen, *(channel for keys in others.values() for _, channel in keys)}
     without = [name for axis in AXES if (name := f"{quantity}_{axis}") not in channels]
     if without:
-        statements.append(f"axes left out, no recording has an estimate: {' and '.join(without)}")
+        statements.append(texts.axes_without_estimate(without))
     return statements
 
 
@@ -154,22 +145,19 @@ def parameter_notes(estimate: Estimate) -> list[str]:
     """Describe the treatment of the parameters without a plain value."""
     notes = []
     for number, name, parameter in estimate.components():
-        label = name if number == 1 else f"{name} of component {number}"
-        reason = f" ({parameter.reason})" if parameter.reason else ""
-        status = STATUS_WORDS[parameter.status]
-        lower, upper = parameter.lower, parameter.upper
-        between = ""
-        if lower is not None and upper is not None:
-            between = f", 95 % limits {lower:.3e} to {upper:.3e}"
-        if parameter.status == "at_bound":
-            value = f"{parameter.value:.4e} is used{between}"
-            notes.append(f"{label} is at the end of its search{reason}: {value}")
-        elif parameter.value is not None:
-            continue
+        label = texts.component_label(name, number)
+        status, reason, lower, upper = (
+            parameter.status,
+            parameter.reason,
+            parameter.lower,
+            parameter.upper,
+        )
+        limits = None if lower is None or upper is None else (lower, upper)
+        if parameter.value is not None:
+            if status == "at_bound":
+                notes.append(texts.bound_used(label, reason, parameter.value, limits))
         elif parameter.fitted is not None:
-            value = f"the fitted {parameter.fitted:.3e} is used{between}"
-            notes.append(f"{label} is {status}{reason}: {value}")
+            notes.append(texts.fitted_used(label, status, reason, parameter.fitted, limits))
         elif upper is not None:
-            limit = f"0 in the model; its upper limit is {upper:.3e}"
-            notes.append(f"{label} is {status}{reason}: {limit}")
+            notes.append(texts.zero_used(label, status, reason, upper))
     return notes

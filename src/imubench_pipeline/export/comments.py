@@ -9,6 +9,7 @@ from collections.abc import Mapping, Sequence
 from imubench_pipeline.export.imu import Imu
 from imubench_pipeline.export.mapping import Mapped, describe_terms
 from imubench_pipeline.tables.texts import printable
+from imubench_pipeline.words.reasons import exports as texts
 
 _LINE_WIDTH = 96
 
@@ -28,15 +29,13 @@ def heading(
     """
     statements = [f"Noise of the {imu.sensor} for {program}, by imubench."]
     if imu.simulated:
-        statements.append("The recordings are SIMULATED, not measured.")
+        statements.append(f"{texts.simulated_recordings()}.")
     statements += [f"CAUTION: {caution}." for caution in imu.cautions]
     statements.append(convention)
     units = {"gyro": "rad, s", "accel": "m, s"}
     estimated = {"gyro": imu.gyro, "accel": imu.accel}
     statements += [
-        f"{name} left out: there is no estimate of it."
-        for name, axis in estimated.items()
-        if axis is None
+        f"{texts.no_estimate(name)}." for name, axis in estimated.items() if axis is None
     ]
     for name, axis in imu.axes.items():
         statements.append(f"{name}: {axis.origin}.")
@@ -49,17 +48,11 @@ def heading(
             for name, effect in imu.temperature.items()
             for note in effect.notes
         ]
-        statements.append("Left out: fixed biases, which change from one start to the next.")
+        statements.append(f"{texts.biases_not_included()}.")
     else:
-        statements.append(
-            "Left out: fixed biases, which change from one start to the next, and how they follow "
-            "the temperature: the file holds noise alone."
-        )
+        statements.append(f"{texts.noise_only()}.")
     if imu.inflation != 1.0:
-        statements.append(
-            f"INFLATED: from here on all densities and amplitudes are {imu.inflation:g} times "
-            f"those above, because: {imu.because}."
-        )
+        statements.append(f"{texts.inflated(imu.inflation, imu.because or '')}.")
     printed = [_join_lines(words) for words in statements]
     replacements = (mapped or {}).items()
     return printed + [f"{name}: {words}." for name, model in replacements for words in model.words]

@@ -23,6 +23,7 @@ from imubench_pipeline.export.imu import Imu
 from imubench_pipeline.export.mapping import as_process
 from imubench_pipeline.export.target import Target
 from imubench_pipeline.noise import NoiseModel, driving_density
+from imubench_pipeline.words.reasons import exports as texts
 
 _CONVENTION = (
     "*_arw and *_vrw are N (two-sided) an hour; *_b_stability is the standard deviation of a "
@@ -40,10 +41,7 @@ def write(imu: Imu) -> str:
     about = heading(imu, "gnss-ins-sim", _CONVENTION, mapped)
     for name, process in mapped.items():
         if process.model.T_B is not None and process.model.T_B * imu.rate < _MIN_SAMPLES_IN_T_B:
-            about.append(
-                f"{name}: T_B is {process.model.T_B * imu.rate:.3g} samples; the program's "
-                "discretisation of so short a process is coarse."
-            )
+            about.append(f"{name}: {texts.short_process(process.model.T_B * imu.rate)}.")
     degrees = math.degrees(1.0)
     entries = [
         ("gyro_b", 0.0, "deg/h, fixed bias"),

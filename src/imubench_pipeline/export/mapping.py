@@ -27,6 +27,7 @@ import numpy as np
 
 from imubench_pipeline.noise import GaussMarkov, NoiseModel, Role, Term, bias_instability
 from imubench_pipeline.typing import Array
+from imubench_pipeline.words.reasons import exports as texts
 
 _MIN_TIME_OVER_HORIZON = 1 / 30
 """Shortest tau of the fit of a process, and shortest T_B of its search, over the horizon."""
@@ -76,18 +77,13 @@ def as_walk(
     """
     slow = _select_slow_terms(model)
     if not slow:
-        words = "the model has no random walk, and no upper limit of one is known: it is 0"
-        if least_walk:
-            words = (
-                f"the model has no random walk; K = {least_walk:.3e}, its upper 95 % limit, stands "
-                "in, since a filter whose bias is never to move stops to estimate it"
-            )
+        words = texts.upper_walk_used(least_walk) if least_walk else texts.no_walk_known()
         replacement = NoiseModel(N=model.N, K=least_walk or 0.0)
         return Mapped(replacement, [words, *_describe_omitted_terms(model)])
     if all(term.role is Role.RANDOM_WALK for term in slow):
         return Mapped(NoiseModel(N=model.N, K=model.K), _describe_omitted_terms(model))
     K = math.sqrt(3.0 * _sum_allan_variance(slow, horizon) / horizon)
-    words = f"a random walk K = {K:.3e}"
+    words = texts.random_walk(K)
     return _describe_replacement(model, NoiseModel(N=model.N, K=K), words, slow, horizon, rate)
 
 
@@ -108,7 +104,7 @@ def as_process(model: NoiseModel, horizon: float, rate: float, *, walk: bool = F
         return Mapped(NoiseModel(N=model.N, B=B, T_B=T_B, K=K), _describe_omitted_terms(model))
     process = _fit_nearest_process(replaced, model.N, horizon)
     replacement = NoiseModel(N=model.N, B=process.B, T_B=process.T_B, K=K)
-    what = f"a Gauss-Markov process B = {process.B:.3e}, T_B = {process.T_B:.4g} s"
+    what = texts.gauss_markov_process(process.B, process.T_B)
     return _describe_replacement(model, replacement, what, replaced, horizon, rate)
 
 
@@ -123,13 +119,13 @@ def _select_slow_terms(model: NoiseModel) -> list[Term]:
 
 def _describe_omitted_terms(model: NoiseModel) -> list[str]:
     words = [
-        f"{term.label} noise {term.in_words} is left out: its error does not grow"
+        texts.growing_only(term.label, term.in_words)
         for term in model.terms
         if term.role is Role.NOT_GROWING
     ]
     lines = [term for term in model.terms if term.role is Role.NO_NOISE]
     if lines:
-        words.append(f"{describe_terms(lines)}: left out, a line is no noise")
+        words.append(texts.lines_not_included(describe_terms(lines)))
     return words
 
 
@@ -176,13 +172,6 @@ def _describe_replacement(
     tau = np.geomspace(1.0 / rate, horizon, 200)
     below = error(tau)
     worst = int(np.argmax(np.abs(below)))
-    words = [
-        f"{describe_terms(replaced)}: replaced by {what}, of the same Allan variance at the "
-        f"horizon of {horizon:g} s; the Allan deviation of the whole is off by "
-        f"{100 * half:+.1f} % at {horizon / 2:g} s, by {100 * twice:+.1f} % at "
-        f"{2 * horizon:g} s, and below the horizon by at most {100 * float(below[worst]):+.1f} % "
-        f"(at {tau[worst]:.3g} s)"
-    ]
-    return Mapped(
-        replacement, [*words, *_describe_omitted_terms(model)], half, twice, float(below[worst])
-    )
+    at_worst = float(below[worst]), float(tau[worst])
+    words = texts.terms_replaced(describe_terms(replaced), what, horizon, half, twice, at_worst)
+    return Mapped(replacement, [words, *_describe_omitted_terms(model)], half, twice, at_worst[0])

@@ -34,6 +34,7 @@ from imubench_pipeline.export.mapping import Mapped, as_process
 from imubench_pipeline.export.target import Target
 from imubench_pipeline.export.temperature import AXES, TemperatureEffect
 from imubench_pipeline.noise import NoiseModel, driving_density
+from imubench_pipeline.words.reasons import exports as texts
 
 _CONVENTION = (
     "NoiseDensity is N and RandomWalk is K in the two-sided convention, which this program calls "
@@ -100,10 +101,7 @@ def _map_temperature(
     """Return the settings of the effect of temperature on a bias, and remarks on omitted axes."""
     if effect is None:
         return [], []
-    words = [
-        f"axis {axis} left out: its bias bends with temperature, and the program has a line alone"
-        for axis in effect.square
-    ]
+    words = [texts.axis_not_included(axis, texts.bias_not_linear()) for axis in effect.square]
     slopes = [0.0 if axis in effect.square else effect.slope.get(axis, 0.0) for axis in AXES]
     if not any(slopes):
         return [], words
@@ -120,14 +118,11 @@ def _map_parameters(axis: AxisNoise, imu: Imu) -> tuple[Mapped, _Parameters]:
     flickers = model.B > 0 and model.T_B is None and not model.further
     if flickers and not model.R and samples <= _MAX_SAMPLES_PER_POLE * _MAX_POLES:
         poles = min(math.ceil(2.0 * samples), _MAX_POLES)
-        words = [
-            f"flicker noise B = {model.B:.3e} is made by {poles} poles; its Allan deviation is "
-            f"within 11 % up to {_MAX_SAMPLES_PER_POLE * poles / imu.rate:.4g} s"
-        ]
+        words = texts.flicker_poles(model.B, poles, _MAX_SAMPLES_PER_POLE * poles / imu.rate)
         rest = NoiseModel(Q=model.Q, N=model.N, K=model.K, sinusoids=model.sinusoids)
         with_walk = as_process(rest, imu.horizon, imu.rate, walk=True)
         flicker = NoiseModel(N=model.N, B=model.B, K=model.K)
-        mapped = Mapped(flicker, [*words, *with_walk.words])
+        mapped = Mapped(flicker, [words, *with_walk.words])
         return mapped, _Parameters(model.N, model.K, model.B, f"fractalcoef({poles})")
     mapped = as_process(model, imu.horizon, imu.rate, walk=True)
     process = mapped.model

@@ -64,6 +64,7 @@ from imubench_pipeline.export.smallest_model import (
 )
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.typing import Array
+from imubench_pipeline.words.reasons import exports as texts
 
 _ALLAN_PEAK_FREQUENCY = 0.37
 """f tau at the maximum of the transfer function of the Allan variance.
@@ -129,27 +130,13 @@ class Overbound:
     @property
     def words(self) -> str:
         """Description of the model, for the head of a file."""
-        return (
-            f"this is the smallest {self.family} that lies above the measured Allan variance at "
-            f"every tau up to {self.longest:.4g} s (95 % for all together), above the fitted "
-            f"spectral density from {self.band[0]:.3g} to {self.band[1]:.4g} Hz, and above the "
-            f"fitted growth of the integrals up to {self.horizon:.4g} s; at the minimum of the "
-            f"measured curve its Allan deviation is {math.sqrt(self.at_minimum):.2f} times the "
-            "measured one"
-        )
+        excess = math.sqrt(self.at_minimum)
+        return texts.overbound_used(self.family, self.longest, self.band, self.horizon, excess)
 
     @property
     def density_words(self) -> str:
         """Range of frequencies where the density is bounded, for the head of a file."""
-        low = self.band[0]
-        if self.passed_below is None:
-            below = "the fitted density is nowhere above it there, but it is less sure"
-        else:
-            below = f"the fitted density is above it below {self.passed_below:.3g} Hz"
-        return (
-            f"the bound on the spectral density holds above {low:.3g} Hz only; below, it is none "
-            f"({below}): it does not cover a filter that averages for longer than {1.0 / low:.4g} s"
-        )
+        return texts.density_bounded(self.band[0], self.passed_below)
 
 
 def simultaneous_upper(curve: AllanCurve, longest: float, confidence: float = 0.95) -> Array:
@@ -223,15 +210,12 @@ def overbound(
     processes = [term.gauss_markov for term in fitted.terms if term.gauss_markov is not None]
     shortest = min((process.T_B for process in processes), default=math.inf)
     if "GM" not in family and max(horizon, reach) > _MAX_HORIZON_OVER_T_B * shortest:
-        unsuited = (
-            f"a random walk cannot follow a Gauss-Markov process of T_B = {shortest:.4g} s beyond "
-            f"2 T_B = {_MAX_HORIZON_OVER_T_B * shortest:.4g} s"
-        )
+        unsuited = texts.walk_cannot_follow(shortest, _MAX_HORIZON_OVER_T_B * shortest)
     warning = None
     if excess[0] > most_excess or unsuited:
         offer = _compare_families(limits, family, times, excess, unsuited, most_excess)
         if excess[0] > most_excess:
-            raise ValueError(f"{offer}; at most {most_excess:g} times is allowed")
+            raise ValueError(f"{offer}. At most {most_excess:g} times is allowed")
         warning = offer
     within = curve.tau <= reach * (1.0 + 1e-9)
     tau, measured = curve.tau[within], curve.variance[within]
@@ -266,10 +250,6 @@ def _compare_families(
     most_excess: float,
 ) -> str:
     """Describe the excess of a family, its reason, and the excess of the other families."""
-    words = (
-        f"the Allan deviation of the smallest {family} is {excess[0]:.3g} times its limit at "
-        f"{excess[1]:.4g} s"
-    )
     others = {
         other: _find_excess(limits[0], find_smallest(limits, other, times))[0]
         for other in FAMILIES
@@ -278,12 +258,8 @@ def _compare_families(
     better = {
         other: value for other, value in others.items() if value < min(excess[0], most_excess)
     }
-    reason = f": {unsuited}" if unsuited else ""
-    offer = ", ".join(f"{other} is {value:.3g} times" for other, value in better.items())
-    if offer:
-        return f"{words}{reason}; the smallest {offer} at most"
     least = min([excess[0], *others.values()])
-    return f"{words}{reason}; no family comes closer than {least:.3g} times"
+    return texts.families_compared(family, excess, unsuited, [*better.items()], least)
 
 
 def limits_of(

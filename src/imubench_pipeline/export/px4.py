@@ -33,6 +33,7 @@ from imubench_pipeline.export.imu import ExportError, Imu
 from imubench_pipeline.export.target import Target
 from imubench_pipeline.export.temperature import AXES
 from imubench_pipeline.export.walks import walks
+from imubench_pipeline.words.reasons import exports as texts
 
 DEFAULT_PERIOD = 10_000
 """Default of EKF2_PREDICT_US, us."""
@@ -81,10 +82,7 @@ def write(imu: Imu, period: int = DEFAULT_PERIOD) -> str:
         low, high = _PARAMETER_RANGES[name]
         clipped = min(max(value, low), high)
         if clipped != value:
-            about.append(
-                f"{name}: {value:.4g} is outside the range of {low:g} to {high:g}; {clipped:g} is "
-                "set."
-            )
+            about.append(f"{name}: {texts.value_clipped(value, low, high, clipped)}.")
         about.append(f"{name} = {clipped:.6g} {comment}.")
         rows.append(f"1\t1\t{name}\t{clipped:.9g}\t{_REAL32_TYPE}\n")
     rows.append(f"1\t1\tEKF2_PREDICT_US\t{period}\t{_INT32_TYPE}\n")
@@ -103,11 +101,10 @@ def write(imu: Imu, period: int = DEFAULT_PERIOD) -> str:
             for key, value in corrections.items()
         ]
         about.append(
-            f"TC_{letter}0_*: x, y and z of the log are taken for the axes of the device, and "
-            "its temperature for that of the driver; nothing is corrected before "
-            f"TC_{letter}0_ID names the device, as CAL_{calibration}0_ID does, and "
-            f"TC_{letter}_ENABLE is 1. The noise above is that of the log as it is, the "
-            "temperature's part included; --method compensated gives what is left."
+            f"TC_{letter}0_*: x, y and z of the log are taken as the axes of the device, and its "
+            f"temperature as that of the driver. PX4 corrects nothing until TC_{letter}0_ID names "
+            f"the device, as CAL_{calibration}0_ID does, and TC_{letter}_ENABLE is 1. The noise "
+            "above includes the effect of temperature; --method compensated leaves it out."
         )
     columns = "# Vehicle-Id Component-Id Name Value Type\n"
     return commented(["Onboard parameters for Vehicle 1", *about]) + columns + "".join(rows)

@@ -25,6 +25,8 @@ from imubench_pipeline.model.recordings import RecordingRow
 from imubench_pipeline.model.table import R
 from imubench_pipeline.recordings.fitness import left_out
 from imubench_pipeline.tables import read, tables_folder, tables_of_run
+from imubench_pipeline.words.reasons import exports as texts
+from imubench_pipeline.words.reasons.pools import recordings_not_used
 from imubench_pipeline.words.verdicts import doubts_text
 
 Tables = Mapping[str, pa.Table]
@@ -139,7 +141,7 @@ def build_imu(tables: Tables, request: Request, folder: Path | None = None) -> I
         )
         about = by_name[choice.recording]
         if about.doubts:
-            cautions.append(f"{choice.recording} is in doubt: {doubts_text(about.doubts)}")
+            cautions.append(texts.recording_in_doubt(choice.recording, doubts_text(about.doubts)))
         simulated = simulated or about.simulated
         if about.rate is None:
             raise ExportError(f"{choice.recording}: its rate is not known; state it (--rate)")
@@ -176,25 +178,24 @@ def _select_deciding(
     rows = _select_rows(ParameterRow, tables, sensor=request.sensor)
     apart = left_out(recordings)
     without = [
-        f"left out: {row.recording} is {row.status}: {row.reason}"
+        texts.recording_rejected(row.recording, row.status, row.reason)
         for row in recordings
         if row.status != "ok"
     ]
     if not apart:
         return rows, without
-    reasons = "; ".join(
-        f"{recording} is not used: {doubts_text(doubts)}"
-        for (_, recording), doubts in apart.items()
+    reasons = recordings_not_used(
+        [(recording, doubts_text(doubts)) for (_, recording), doubts in apart.items()]
     )
     if (request.because or "").strip():
-        return rows, [f"{reasons}; used all the same, because: {request.because}", *without]
+        return rows, [texts.used_despite_doubts(reasons, request.because or ""), *without]
     deciding = [row for row in rows if (row.sensor, row.recording) not in apart]
     if rows and not deciding:
         raise ExportError(
             f"{request.sensor}: {reasons}; look at the findings, or say why it may be used all the "
             "same (--because; exports: because; decide: include)"
         )
-    return deciding, [f"left out: {reasons}", *without]
+    return deciding, [reasons, *without]
 
 
 def _bound_axis(
@@ -220,26 +221,27 @@ def _bound_axis(
             drawn=[drawn.model(number) for number in range(len(drawn))] if drawn else [],
         )
     except ValueError as error:
+        larger = _list_larger_programs(family)
         raise ExportError(
-            f"{choice.channel} of {choice.recording}: {error}{_name_larger_programs(family)}; or "
+            f"{choice.channel} of {choice.recording}: {'; '.join([str(error), *larger])}; or "
             f"take a horizon shorter than {request.horizon:g} s, or the fitted model without "
             "overbound, or allow a larger excess"
         ) from error
-    fitted = f"the fitted model was: {describe_terms(choice.axis.model.terms)}"
+    fitted = texts.fitted_terms(describe_terms(choice.axis.model.terms))
     notes = [bound.words, bound.density_words, fitted, *choice.axis.notes]
     if bound.warning:
-        notes.insert(0, f"WARNING: {bound.warning}{_name_larger_programs(family)}")
+        notes.insert(0, texts.excess_warning(bound.warning, _list_larger_programs(family)))
     return replace(choice.axis, model=bound.model, notes=notes, bounded=bound.band)
 
 
-def _name_larger_programs(family: Family) -> str:
-    """Name the programs that support more terms than a family has."""
+def _list_larger_programs(family: Family) -> list[str]:
+    """List the programs that support more terms than a family has."""
     kinds = {
-        other: ", ".join(name for name, target in TARGETS.items() if target.family == other)
+        other: [name for name, target in TARGETS.items() if target.family == other]
         for other in FAMILIES
         if set(other.split("+")) - set(family.split("+"))
     }
-    return "".join(f"; {other} is held by {names}" for other, names in kinds.items() if names)
+    return [texts.programs_of(other, names) for other, names in kinds.items() if names]
 
 
 def curve_of(rows: Sequence[AllanRow]) -> AllanCurve:

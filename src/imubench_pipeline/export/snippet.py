@@ -13,6 +13,7 @@ from imubench_pipeline.export.mapping import describe_terms
 from imubench_pipeline.export.matrices import FLICKER_TAU_OVER_HORIZON
 from imubench_pipeline.export.target import Target
 from imubench_pipeline.noise.terms.base import drives_of
+from imubench_pipeline.words.reasons import exports as texts
 
 _CONVENTION = (
     "White noise and random walk by their two-sided densities N^2 and K^2, Gauss-Markov processes "
@@ -74,7 +75,7 @@ def write(imu: Imu) -> str:
     for name, axis in imu.axes.items():
         others = [term for term in axis.model.terms if term.drive is None]
         if others:
-            left_out.append(f"{name}: not held: {describe_terms(others)}.")
+            left_out.append(f"{name}: {texts.terms_not_supported(describe_terms(others))}.")
         longest = max(FLICKER_TAU_OVER_HORIZON * imu.horizon, 4.0 / imu.rate)
         drives = drives_of(axis.model.realised(1.0 / imu.rate, longest))
         white = float(drives.white)

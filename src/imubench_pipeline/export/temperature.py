@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 
 from imubench_pipeline.model.estimates import TemperatureRow
 from imubench_pipeline.model.recordings import RecordingRow
-from imubench_pipeline.words.estimates import STATUS_WORDS
+from imubench_pipeline.words.reasons import exports as texts
 
 AXES = "xyz"
 
@@ -57,37 +57,28 @@ def temperature_effect(
         if of == quantity:
             by_axis.setdefault(axis, {})[row.parameter] = row
     if not by_axis or low is None or high is None:
-        why = f"{recording.recording} has no readings of the temperature"
-        return TemperatureEffect(notes=[f"left out: {why}"])
+        return TemperatureEffect(notes=[texts.no_temperature(recording.recording)])
     reference = _require_value(min(by_axis.items())[1]["T_0"])
     unit = {"gyro": "rad/s", "accel": "m/s^2"}[quantity]
     slope: dict[str, float] = {}
     square: dict[str, float] = {}
-    notes = [
-        f"T_0 = {reference:.2f} degC, of recording {recording.recording}, device "
-        f"{recording.device}: it holds for that device, from {low:.2f} to {high:.2f} degC"
-    ]
+    notes = [texts.temperature_range(reference, recording.recording, recording.device, low, high)]
     for axis in AXES:
         if axis not in by_axis:
-            notes.append(f"axis {axis} left out: no fit of the temperature")
+            notes.append(texts.axis_not_included(axis, texts.no_temperature_fit()))
             continue
         fit = by_axis[axis]
         reason = _find_objection(fit, high - low, horizon)
         if reason is not None:
-            notes.append(f"axis {axis} left out: {reason}")
+            notes.append(texts.axis_not_included(axis, reason))
             continue
         s, q = fit["sensitivity"], fit["quadratic"].value or 0.0
         # The axes of one quantity may come from files whose mean temperatures differ.
         slope[axis] = _require_value(s) + 2.0 * q * (reference - _require_value(fit["T_0"]))
         if q:
             square[axis] = q
-        longest = fit["lag"].upper
-        lag = "no lag" if longest is None else f"a lag of up to {longest:.3g} s is not corrected"
-        bends = f", square {q:.3e} {unit}/K^2" if q else ""
-        notes.append(
-            f"axis {axis}: {s.value:.4e} {unit}/K, 95 % limits {s.lower:.3e} to "
-            f"{s.upper:.3e}{bends}; {lag}"
-        )
+        limits, lag = (s.lower, s.upper), fit["lag"].upper
+        notes.append(texts.axis_slope(axis, _require_value(s), limits, q, unit, lag))
     return TemperatureEffect(reference, float(low), float(high), slope, square, notes)
 
 
@@ -102,26 +93,18 @@ def _find_objection(fit: Mapping[str, TemperatureRow], span: float, horizon: flo
     """Return the reason against a correction with a fit; None if it is safe."""
     s, lag = fit["sensitivity"], fit["lag"]
     if s.value is None or s.lower is None or s.upper is None:
-        return f"the sensitivity is {STATUS_WORDS[s.status]}: {s.reason}"
+        return texts.sensitivity_status(s.status, s.reason)
     if not s.compensated:
-        return f"the log does not show it: {s.reason}"
+        return texts.effect_not_shown(s.reason)
     error = 0.5 * (s.upper - s.lower) / abs(s.value)
     if error > _MAX_RELATIVE_ERROR:
-        return (
-            f"it is known to {100 * error:.0f} % only, by the noise and by what the register of "
-            f"the temperature leaves open; {100 * _MAX_RELATIVE_ERROR:.0f} % is needed"
-        )
+        return texts.sensitivity_uncertain(error, _MAX_RELATIVE_ERROR)
     if span < _MIN_TEMPERATURE_RANGE:
-        return (
-            f"the temperature varies by {span:.2g} K only; {_MIN_TEMPERATURE_RANGE:g} K is needed"
-        )
+        return texts.small_temperature_range(span, _MIN_TEMPERATURE_RANGE)
     if lag.status != "absent":
         longest = lag.upper
         if longest is None:
-            return f"its lag is {STATUS_WORDS[lag.status]}: {lag.reason}"
+            return texts.lag_status(lag.status, lag.reason)
         if longest > horizon:
-            return (
-                f"it may lag the temperature by {longest:.3g} s, longer than the horizon of "
-                f"{horizon:g} s, and the program has no lag"
-            )
+            return texts.long_lag(longest, horizon)
     return None

@@ -14,7 +14,7 @@ from imubench_pipeline.estimators.estimate import Estimate, JointDraws, Paramete
 from imubench_pipeline.navigation.error_budget.uncertainty import draw_models
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.typing import Array
-from imubench_pipeline.words.estimates import STATUS_WORDS
+from imubench_pipeline.words.reasons import pools as texts
 
 _MIN_RELEVANT_SHARE = 0.1
 """Minimum share of the Allan variance for which an unknown parameter matters."""
@@ -97,8 +97,8 @@ class ComparedChannel:
                     continue
                 part = _bound_variance(name, group, tau)
                 if part > _MIN_RELEVANT_SHARE * total:
-                    status = STATUS_WORDS[parameter.status]
-                    yield f"{name} of {self.sensor}/{self.recording} {self.channel} is {status}"
+                    recording = f"{self.sensor}/{self.recording}"
+                    yield texts.undetermined(name, recording, self.channel, parameter.status)
 
 
 def _bound_variance(name: str, group: Mapping[str, Parameter], tau: float) -> float:

@@ -44,7 +44,7 @@ from imubench_pipeline.navigation.pooled import (
     usable,
 )
 from imubench_pipeline.noise import PARAMETERS, TERMS
-from imubench_pipeline.words.estimates import STATUS_WORDS
+from imubench_pipeline.words.reasons import pools as texts
 
 Order = Literal["started", "name"]
 
@@ -166,12 +166,11 @@ def _make_rows(
             change = value / expected[0] - 1.0 if noise and value and expected[0] else None
             reasons = [_explain_no_verdict(own, count)] if math.isnan(p) else []
             if alone >= 0.0:
-                reasons.append(f"{series.recordings[int(alone)].recording} stood alone")
+                reasons.append(texts.outlier_before(series.recordings[int(alone)].recording))
             if changed:
-                side = "above" if changed > 0.0 else "below"
-                reasons.append(f"{side} what the {count:.0f} before it lead one to expect")
+                reasons.append(texts.level_changed(round(count), above=changed > 0.0))
                 if not noise and key[0].startswith("accel"):
-                    reasons.append("gravity is in it: the sensor may lie differently")
+                    reasons.append(texts.tilt_changed())
             p_value: float | None = None
             verdict: DriftVerdict | None = None
             if not math.isnan(p):
@@ -224,21 +223,17 @@ def _make_point(row: Estimated) -> tuple[float, ...]:
 
 
 def _explain_no_verdict(row: Estimated | None, count: float) -> str:
-    status = STATUS_WORDS[_get_status(row)]
-    reason = row.reason if isinstance(row, ParameterRow) else None
+    status = _get_status(row)
     if status != "ok":
-        return f"{status}: {reason}" if reason else status
+        reason = row.reason if isinstance(row, ParameterRow) else None
+        return texts.status_reason(status, reason)
     if count < 0.0:
-        return "no value with limits"
+        return texts.value_without_limits()
     if count == 0.0:
-        return "the first value" + f" with {_get_bias_terms(row)}" * bool(_get_bias_terms(row))
+        return texts.first_value(_get_bias_terms(row))
     if count < _MIN_RECORDINGS:
-        return f"{count:.0f} before it at this level: the spread between recordings is not known"
-    return (
-        "limits far narrower than before"
-        if isinstance(row, ParameterRow)
-        else "all before it are the same"
-    )
+        return texts.few_earlier(round(count))
+    return texts.narrow_limits() if isinstance(row, ParameterRow) else texts.equal_earlier()
 
 
 class _Levels:

@@ -33,11 +33,10 @@ from imubench_pipeline.navigation.error_budget import (
 from imubench_pipeline.navigation.error_budget.parts import Largest
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.simulate import channel_rng
-from imubench_pipeline.settings.printed import SENSORS
 from imubench_pipeline.settings.requirements import DIMENSIONS, Axis, Error, Requirement
 from imubench_pipeline.settings.sensor import quantity_of
 from imubench_pipeline.units import SI_UNITS, difference_to_si, quantity_to_si
-from imubench_pipeline.words.estimates import STATUS_WORDS
+from imubench_pipeline.words.reasons import budgets as texts
 
 NO_FIGURES_OF_CHANNELS: Mapping[str, Figures] = MappingProxyType({})
 
@@ -199,11 +198,10 @@ def error_rows(
             for quantity in question.needs:
                 silent = _list_channels(quantity, estimates)
                 if not silent:
-                    missing.append(f"no {SENSORS[quantity]} in the recording")
+                    missing.append(texts.not_recorded(quantity))
                 elif not _list_channels(quantity, axes):
                     missing.append(
-                        f"nothing is known of the noise of {', '.join(silent)}: "
-                        f"{_find_reason(estimates[silent[0]])}"
+                        texts.noise_not_known(silent, _find_reason(estimates[silent[0]]))
                     )
             yield replace(asked, reason="; ".join(missing))
             continue
@@ -220,19 +218,14 @@ def error_rows(
         reasons = [
             *nominal.assumptions,
             *(
-                f"{name} of {channel} is {STATUS_WORDS[parameter.status]}"
+                texts.parameter_status(name, channel, parameter.status)
                 for channel in used
                 for _, name, parameter in estimates[channel].components()
                 if parameter.status in ("not_identified", "at_bound")
             ),
+            *(texts.independent_draws(estimates[channel].method, channel) for channel in apart),
             *(
-                f"method {estimates[channel].method} tells the parameters of {channel} one by one: "
-                "the interval is too wide where they trade off"
-                for channel in apart
-            ),
-            *(
-                f"{channel} does not count: nothing is known of its noise "
-                f"({_find_reason(estimate)})"
+                texts.channel_not_used(channel, _find_reason(estimate))
                 for channel, estimate in estimates.items()
                 if quantity_of(channel) in question.needs and not estimate.model.terms
             ),
@@ -306,6 +299,6 @@ def _draw_figures(figures: Figures, draws: int, rng: np.random.Generator) -> lis
     ]
 
 
-def _find_reason(estimate: Estimate) -> str:
+def _find_reason(estimate: Estimate) -> str | None:
     reasons = (parameter.reason for parameter in estimate.parameters.values())
-    return next((reason for reason in reasons if reason), "its log does not show it")
+    return next((reason for reason in reasons if reason), None)

@@ -33,7 +33,7 @@ from scipy.special import chdtrc, chdtri, fdtrc, stdtrit
 
 from imubench_pipeline.model.comparisons import PooledRow
 from imubench_pipeline.model.estimates import FixedBiasRow, ParameterRow
-from imubench_pipeline.words.estimates import STATUS_WORDS
+from imubench_pipeline.words.reasons import pools as texts
 
 Verdict = Literal["agree", "differ"]
 
@@ -328,18 +328,16 @@ def _make_parameter_row(
         if usable(triple):
             logs.append((math.log(triple[0]), of))
         else:
-            left_out["no limits" if row.status == "ok" else STATUS_WORDS[row.status]] += 1
-    reasons = [f"{number} left out: {status}" for status, number in left_out.items()]
+            left_out[texts.not_comparable(row.status)] += 1
+    reasons = [texts.not_pooled(number, why) for why, number in left_out.items()]
     if pooled.contradicting:
-        reasons.append(f"limits of {pooled.contradicting} left out lie outside what is predicted")
+        reasons.append(texts.contradicting_limits(pooled.contradicting))
     if absent:
-        reasons.append(f"absent in {absent} of {absent + len(present)}: that is no agreement")
+        reasons.append(texts.absent_in(absent, absent + len(present)))
     if pooled.verdict == "differ":
-        reasons.append(
-            "differ: " + "the devices, or " * of_devices + "the sensor is not stationary"
-        )
+        reasons.append(texts.recordings_differ(of_devices=of_devices))
     elif pooled.spread_upper == 0.0:
-        reasons.append("the values agree better than their limits allow")
+        reasons.append(texts.close_agreement())
     spread = (pooled.spread, pooled.spread_lower, pooled.spread_upper)
     in_unit = [None if part is None else part * (pooled.value or 0.0) for part in spread]
     return PooledRow(
@@ -368,9 +366,9 @@ def _make_bias_row(
     sensor, device, channel, parameter = group
     pairs = [(row.value, of) for of, row in present]
     bias = turn_on_bias(value for value, _ in pairs)
-    reasons = [f"{bias.left_out} left out: no mean"] * (bias.left_out > 0)
+    reasons = [texts.not_pooled(bias.left_out, texts.without_mean())] * (bias.left_out > 0)
     if channel.startswith("accel"):
-        reasons.append("gravity is in it: the spread also shows how differently the sensor lay")
+        reasons.append(texts.gravity_in_mean())
     reasons += _describe_device_effects(pairs, several and device is None)
     return PooledRow(
         sensor=sensor,
@@ -411,5 +409,4 @@ def _describe_device_effects(pairs: Iterable[tuple[float | None, str]], several:
     if not inside:
         return []
     p_value = float(fdtrc(between, within, apart * within / between / inside))
-    beyond = "beyond the" if p_value < SIGNIFICANCE_LEVEL else "no more than their"
-    return [f"devices differ {beyond} spread from recording to recording (p = {p_value:.2g})"]
+    return [texts.devices_compared(p_value, differ=p_value < SIGNIFICANCE_LEVEL)]

@@ -27,7 +27,7 @@ from imubench_pipeline.navigation.compared import ComparedChannel, number_needed
 from imubench_pipeline.noise.simulate import channel_rng
 from imubench_pipeline.noise.stacked import summed
 from imubench_pipeline.typing import Array
-from imubench_pipeline.words.estimates import STATUS_WORDS
+from imubench_pipeline.words.reasons import pools as texts
 
 Verdict = Literal["lower", "higher", "not told apart", "not known"]
 
@@ -63,8 +63,8 @@ def ratio_of_parameters(first: Parameter, second: Parameter) -> Ratio:
     If one has limits but no value, the interval is that of all quotients within the limits.
     """
     doubts = [
-        f"{which} is {STATUS_WORDS[parameter.status]}"
-        for which, parameter in (("the first", first), ("the second", second))
+        texts.operand_status(which, parameter.status)
+        for which, parameter in (("first", first), ("second", second))
         if parameter.status != "ok"
     ]
     reason = "; ".join(doubts) or None
@@ -122,11 +122,11 @@ def ratio_of_deviations(
     the estimate of each log, and all pairs are used. Each channel has its own random stream of the
     seed.
     """
-    told = longest * min(first.duration, second.duration)
-    if tau > told:
-        return Ratio(None, None, None, f"the logs tell tau up to {told:.3g} s alone")
+    longest_tau = longest * min(first.duration, second.duration)
+    if tau > longest_tau:
+        return Ratio(None, None, None, texts.tau_beyond(longest_tau))
     if not first.model.terms or not second.model.terms:
-        return Ratio(None, None, None, "one has no noise model")
+        return Ratio(None, None, None, texts.no_model())
     value = math.sqrt(float(number_needed(first.variance(tau), 0.0, second.variance(tau))))
     own, other = (_draw_variances(channel, draws, seed, [tau])[0] for channel in (first, second))
     ratios = np.sqrt(number_needed(own[:, None], 0.0, other[None, :]))

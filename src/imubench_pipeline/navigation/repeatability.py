@@ -12,6 +12,7 @@ from imubench_pipeline.model.estimates import FixedBiasRow
 from imubench_pipeline.model.recordings import RecordingRow
 from imubench_pipeline.navigation.pooled import turn_on_bias
 from imubench_pipeline.settings.sensor import Sensor
+from imubench_pipeline.words.reasons import pools as texts
 
 
 def repeatability_rows(
@@ -39,17 +40,12 @@ def repeatability_rows(
         # The first recording of a device has no previous one: its flag does not matter.
         unknown = sum(row.power_cycled is None for row, _ in several) > 1
         if channel.startswith("accel"):
-            reason = "gravity is in the mean: how the sensor lay each time would be in the spread"
-            spread = Parameter(None, "not_shown", reason)
+            spread = Parameter(None, "not_shown", texts.gravity_in_mean())
         else:
-            conditions = [
-                "the power was off between the recordings, which is not known (power_cycled beside "
-                "the log)"
-            ] * unknown
-            conditions.append(
-                "the sensor pointed the same way each time, and the Earth's rate is no part of it"
-            )
-            reason = f"on condition that {', and that '.join(conditions)}"
+            assumptions = [texts.same_heading_assumed()]
+            if unknown:
+                assumptions.append(texts.power_cycles_assumed())
+            reason = "; ".join(assumptions)
             bias = turn_on_bias(value for _, value in several)
             limits = bias.deviation_lower, bias.deviation_upper
             spread = Parameter(bias.deviation, "ok", reason, *limits)

@@ -12,6 +12,7 @@ from pathlib import Path
 from imubench_pipeline.readers import is_endless, log_files
 from imubench_pipeline.settings.validation import cut
 from imubench_pipeline.tables.texts import printable
+from imubench_pipeline.words.reasons import files as texts
 
 PARTIAL = frozenset({".part", ".tmp", ".filepart", ".crdownload"})
 """How the names of files end that are still being transferred."""
@@ -119,7 +120,7 @@ def account_for(
         if owner := owners.get(file):
             found.append(FoundFile(place, owner.sensor, owner.name))
         elif file in waiting:
-            found.append(FoundFile(place, reason="still being written: the next run reads it"))
+            found.append(FoundFile(place, reason=texts.still_written()))
         else:
             found.append(FoundFile(place, reason=_why_skipped(file, logs)))
     return found
@@ -147,34 +148,31 @@ def _why_skipped(file: Path, logs: Path) -> str:
     """Return why a file of the drop zone belongs to no recording, by its name and place."""
     name, suffix = file.name, file.suffix.lower()
     if copy := next((part for part in file.relative_to(logs).parts if part.endswith("~")), ""):
-        return f"backup of an editor: the name {copy!a} ends in ~"
+        return texts.editor_backup(copy)
     if suffix in PARTIAL or Path(name.lstrip(".")).suffix.lower() in PARTIAL:
-        return f"still being transferred, by its ending {suffix}"
-    if hidden := next((part for part in file.relative_to(logs).parts if part.startswith(".")), ""):
-        return f"hidden: the name {hidden!a} begins with a dot"
+        return texts.still_transferred(suffix)
+    if dotted := next((part for part in file.relative_to(logs).parts if part.startswith(".")), ""):
+        return texts.hidden(dotted)
     if "__MACOSX" in file.parts:
-        return "copy of attributes that macOS adds to archives"
+        return texts.archive_attributes()
     if suffix == ".md":
-        return "documentation (.md)"
+        return texts.documentation()
     if suffix in _MISNAMED_NOTES:
         if file.parent == logs:
-            return "settings beside the folders of the sensors; nothing reads them there"
+            return texts.settings_beside_sensors()
         if suffix == file.suffix == _NOTES:
-            return (
-                f"notes without a log {file.stem} beside them: rename them, or bring the log; a "
-                "sensor file belongs into the folder of the others"
-            )
-        return f"notes that are not read: rename the file to {file.stem}{_NOTES}"
+            return texts.notes_without_log(file.stem)
+        return texts.misnamed_notes(f"{file.stem}{_NOTES}")
     try:
         if file.is_symlink() and file.is_dir():
-            return "link to a folder, which is not followed: link to its files, or copy it"
+            return texts.linked_folder()
         if file.is_dir():
-            return "folder that cannot be listed"
+            return texts.closed_folder()
         if is_endless(file):
-            return "neither a file nor a folder"
+            return texts.neither_file_nor_folder()
     except OSError as error:
-        return f"cannot be looked at ({error.strerror})"
-    return "no log: it was not there when the run was planned, or belongs to no recording"
+        return texts.unreadable(error.strerror)
+    return texts.no_recording()
 
 
 def _logs_of(folder: Path) -> Iterator[Recording]:

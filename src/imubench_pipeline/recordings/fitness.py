@@ -21,6 +21,7 @@ from imubench_pipeline.model.table import ChannelRow, OfRecordingRow, TableRow
 from imubench_pipeline.model.verdicts import DoubtMark
 from imubench_pipeline.tables.findings import LEFT_OUT
 from imubench_pipeline.words.findings import FINDINGS
+from imubench_pipeline.words.reasons import simulations as texts
 
 Key = tuple[str, str]  # sensor, recording
 
@@ -108,12 +109,12 @@ def doubts(
             for factor, names in (by_factor or {None: [*affected]}).items()
         ]
     every += [
-        Doubt(*_place(row), "not_explained", f"no model explains the spectrum of {row.channel}")
+        Doubt(*_place(row), "not_explained", texts.no_model_explains(row.channel))
         for row in models
         if row.chosen and row.verdict == "not explained"
     ]
     every += [
-        Doubt(*_place(row), "doubtful", row.reason or "its status is doubtful", (row.parameter,))
+        Doubt(*_place(row), "doubtful", row.reason or texts.estimate_doubtful(), (row.parameter,))
         for row in parameters
         if row.status == "doubtful"
     ]
@@ -124,7 +125,7 @@ def not_sold(recordings: Iterable[RecordingRow], sensors: Collection[str]) -> It
     """Yield a doubt for each recording of sensors that cannot be bought: they decide nothing."""
     for row in recordings:
         if row.sensor in sensors:
-            yield Doubt(*_key(row), None, "not_sold", "no such sensor is sold", unfit=True)
+            yield Doubt(*_key(row), None, "not_sold", texts.not_sold(), unfit=True)
 
 
 def simulated_beside_measured(recordings: Sequence[RecordingRow]) -> Iterator[Doubt]:
@@ -132,7 +133,7 @@ def simulated_beside_measured(recordings: Sequence[RecordingRow]) -> Iterator[Do
 
     ``recordings``: of one sensor or of all.
     """
-    reason = "it is simulated, and other recordings are measured"
+    reason = texts.simulated_beside_measured()
     if any(row.status == "ok" and not row.simulated for row in recordings):
         for row in recordings:
             if row.simulated:

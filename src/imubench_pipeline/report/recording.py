@@ -277,9 +277,7 @@ def _describe_model(channel: ChannelView) -> str:
         f"{model_text(best.model)} has the lowest BIC ({best.verdict}). The deviance per bin is "
         f"{number_text(best.deviance, 3)}; a correct model gives about 1."
     )
-    notes = (best.note or "").split("; ")
-    band = f"Band: {best.band_source.removeprefix('found: ')}" if best.band_source else ""
-    return " ".join(filter(None, [text, *(sentence(n) for n in notes), sentence(band)]))
+    return " ".join(filter(None, [text, sentence(best.note), sentence(best.band_source)]))
 
 
 def about_of(

@@ -17,6 +17,7 @@ from imubench_pipeline.simulate.imu import ImuModel
 from imubench_pipeline.simulate.model import SensorModel, TemperatureDrift
 from imubench_pipeline.simulate.sources import Origin, Remark, Topic
 from imubench_pipeline.units import dimension_of, quantity_to_si, to_si
+from imubench_pipeline.words.reasons import simulations as texts
 
 _STEPS_PER_SIDE = 1 << 15  # steps on each side of 0 of a 16-bit register
 
@@ -32,15 +33,15 @@ def from_datasheet(name: str, sensor: Sensor, seed: int) -> Origin:
     ConfigError
         If no noise is printed for any channel of the log format.
     """
-    document = sensor.datasheet.document or "the sensor file"
-    origin = Origin(ImuModel(axes={}), f"the datasheet of {name}: {document}", sensor=name)
+    source = texts.of_data_sheet(name, sensor.datasheet.document)
+    origin = Origin(ImuModel(axes={}), source, sensor=name)
     axes: dict[str, SensorModel] = {}
     for channel in (name for name in CHANNELS if name in sensor.log.channels):
         axis = _Printed(sensor, channel, origin)
         noise = axis.noise()
         if noise is None:
             origin.figures.pop(channel)
-            origin.assume("noise", f"{channel} is left out: no noise is printed of it")
+            origin.assume("noise", texts.channel_not_printed(channel))
             continue
         signs = channel_rng(seed, name, channel, "signs").choice([-1.0, 1.0], 2)
         axes[channel] = axis.model(noise, [float(sign) for sign in signs])
@@ -70,8 +71,8 @@ class _Printed:
         if density is None or density.value is None:
             return None
         self._note("N", density)
-        if density.figure and density.quantity == "N" and "assumed" in (density.reason or ""):
-            self._assume("noise", "the printed noise density is one-sided (N is it / sqrt(2))")
+        if density.is_side_assumed:
+            self._assume("noise", texts.one_sided_density())
         B = T_B = K = None
         floor = _select_best([row for row in rows if row.statistic == "adev_minimum"])
         time = _select_best([row for row in rows if row.statistic == "T_B"])
@@ -79,40 +80,38 @@ class _Printed:
         if floor is not None and floor.value:
             self._note("bias instability", floor)
             B, T_B = floor.value / FLOOR, time.value if time else None
-            text = "" if T_B else ", as flicker noise: no correlation time is printed"
-            self._assume("noise", f"B is the printed bias instability / {FLOOR:.3f}{text}")
+            self._assume("noise", texts.bias_instability_printed(FLOOR, timed=bool(T_B)))
         else:
-            self._assume("noise", "no bias instability, it is not printed")
+            self._assume("noise", texts.no_bias_instability())
         if walk is not None and walk.value:
             self._note("K", walk)
             K = walk.value
         else:
-            self._assume("noise", "no random walk K, it is not printed")
+            self._assume("noise", texts.no_random_walk())
         return NoiseModel(N=density.value, B=B or 0.0, T_B=T_B, K=K or 0.0)
 
     def model(self, noise: NoiseModel, signs: Sequence[float]) -> SensorModel:
         bias = self._single("offset", "bias", "bias")
         if bias is not None:
-            self._assume("bias", "the sign of the bias is drawn")
+            self._assume("bias", texts.bias_sign_drawn())
         slope = self._single("temperature_coefficient", "drift", "temperature sensitivity")
         drift = None
         if slope is not None:
             drift = TemperatureDrift(sensitivity=signs[1] * slope)
-            self._assume("drift", "no drift at 25 degC, and no thermal lag; its sign is drawn")
+            self._assume("drift", texts.drift_sign_drawn())
         else:
-            self._assume("drift", "no drift with temperature, no coefficient is printed")
+            self._assume("drift", texts.no_drift())
         steps = (self._single(name, "register", name) for name in ("sensitivity", "resolution"))
         step = next((each for each in steps if each is not None), None)
         if step is None:
-            self._assume("register", "not rounded, no sensitivity is printed")
+            self._assume("register", texts.not_rounded())
         stated = self._sensor.log.bandwidth
         if stated is not None:
-            self._remarks.append(Remark("low-pass", f"cut-off {stated}: of the log format"))
+            self._remarks.append(Remark("low-pass", texts.stated_cutoff(stated)))
             cutoff: float | None = quantity_to_si(stated, "frequency")
         else:
             cutoff = self._single("bandwidth", "low-pass", "cut-off")
-        text = "no low-pass, its cut-off is not known"
-        self._assume("low-pass", text if cutoff is None else "the low-pass is of first order")
+        self._assume("low-pass", texts.low_pass_assumed(known=cutoff is not None))
         return SensorModel(
             noise=noise,
             bias=signs[0] * bias if bias else 0.0,
@@ -134,12 +133,12 @@ class _Printed:
             if step is not None and len(ranges) > 1:
                 # The printed sensitivity belongs to the range that it gives with a 16-bit register.
                 chosen = int(np.argmin(np.abs(np.log(np.array(ranges) / (step * _STEPS_PER_SIDE)))))
-            text = f"full scale {values[chosen]:g} {figure.unit}: datasheet"
+            text = texts.printed_full_scale(values[chosen], figure.unit)
             self._remarks.append(Remark("register", text))
             if len(ranges) > 1:
-                self._assume("register", f"range {values[chosen]:g} {figure.unit}")
+                self._assume("register", texts.chosen_range(values[chosen], figure.unit))
             return ranges[chosen]
-        self._assume("register", "no saturation, no full scale is printed")
+        self._assume("register", texts.no_saturation())
         return None
 
     def _assume(self, topic: Topic, text: str) -> None:
@@ -153,7 +152,7 @@ class _Printed:
         for figure in self._typical(name):
             value = figure.on_axis(self._axis)
             if isinstance(value, float) and figure.unit is not None:
-                text = f"{label} {value:g} {figure.unit}: {figure.kind}, datasheet"
+                text = texts.printed_figure(label, value, figure.unit, figure.kind)
                 self._remarks.append(Remark(topic, text))
                 dimension = dimension_of(figure.unit, FIGURE_DIMENSIONS[self._quantity][name])
                 in_si = to_si(value, figure.unit, dimension)
@@ -171,8 +170,8 @@ class _Printed:
 
     def _note(self, name: str, row: Comparable) -> None:
         assert row.figure is not None  # it has a value
-        why = f" ({row.reason})" if row.reason else ""
-        text = f"{name} {row.printed:g} {row.figure.unit}: {row.figure.kind}, datasheet{why}"
+        printed, unit = row.printed or 0.0, row.figure.unit or ""
+        text = texts.printed_figure(name, printed, unit, row.figure.kind, row.reason)
         self._remarks.append(Remark("noise", text))
 
 
@@ -182,7 +181,7 @@ def _select_best(rows: Sequence[Comparable]) -> Comparable | None:
     def doubt(row: Comparable) -> tuple[bool, bool, bool]:
         assert row.figure is not None  # it has a value
         unsure = row.figure.sidedness == "unknown" and row.sidedness is not None
-        rms = (row.reason or "").startswith("rms")
-        return (row.figure.kind not in ("typ", "1sigma", "derived"), unsure and not rms, rms)
+        kind = row.figure.kind not in ("typ", "1sigma", "derived")
+        return kind, unsure and not row.is_rms, row.is_rms
 
     return min(rows, key=doubt, default=None)

@@ -19,6 +19,7 @@ from imubench_pipeline.simulate.imu import ImuModel
 from imubench_pipeline.simulate.model import SensorModel, TemperatureDrift, before_the_filter
 from imubench_pipeline.simulate.sources import Origin, Remark, Topic
 from imubench_pipeline.tables import read, tables_folder, tables_of_run
+from imubench_pipeline.words.reasons import simulations as texts
 
 _NEEDED_TABLES = ("recordings", "parameters", "fixed_bias", "temperature", "low_pass")
 
@@ -67,16 +68,15 @@ def with_estimates(
     estimated = set[Topic].intersection(*topics)
     origin = Origin(
         ImuModel(axes=axes),
-        f"the estimates of a run in {results}, from the recording {name}/{chosen}",
+        texts.of_run(str(results), f"{name}/{chosen}"),
         figures,
         [remark for remark in printed.assumed if remark.topic not in estimated],
         name,
     )
     if recorded.simulated:
-        origin.assume("log", f"{name}/{chosen} is itself simulated")
+        origin.assume("log", texts.log_is_simulated(f"{name}/{chosen}"))
     if any(quantity_of(channel) == "accel" for channel in axes):
-        text = "accel: the mean of a recording is mostly gravity, so it is no bias here"
-        origin.assume("bias", text)
+        origin.assume("bias", texts.gravity_is_no_bias())
     return origin
 
 
@@ -106,8 +106,7 @@ def _estimate_axis(
     low_pass, drift, bias = printed.low_pass, printed.drift, printed.bias
     if cutoffs and cutoffs[-1].value is not None and cutoffs[-1].order is not None:
         low_pass = LowPass(cutoffs[-1].value, cutoffs[-1].order)
-        text = f"cut-off {low_pass.cutoff:.4g} Hz: estimated from {log}"
-        remarks.append(Remark("low-pass", text))
+        remarks.append(Remark("low-pass", texts.estimated_cutoff(low_pass.cutoff, log)))
     effect = {row.parameter: row for row in TemperatureRow.rows_of(tables["temperature"])}
     compensated = any(row.compensated for row in effect.values())
     reference = effect["T_0"].value if compensated else None
@@ -119,25 +118,26 @@ def _estimate_axis(
         drift = TemperatureDrift(
             sensitivity=sensitivity, reference=reference, quadratic=quadratic, lag=lag
         )
-        figure = f"{drift.sensitivity:.4g} {effect['sensitivity'].unit}"
-        remarks.append(Remark("drift", f"temperature sensitivity {figure}: estimated from {log}"))
+        unit = effect["sensitivity"].unit
+        text = texts.estimated_sensitivity(drift.sensitivity, unit, log)
+        remarks.append(Remark("drift", text))
     rows = [
         row
         for row in ParameterRow.rows_of(tables["parameters"])
         if (row.method == "compensated" if compensated else row.recommended)
     ]
     estimate = estimate_of(rows[0].method, rows)
-    text = f"noise {estimate.model.name}: estimated by {estimate.method} from {log}"
-    remarks.append(Remark("noise", f"{text}, N taken back to before low-pass and rounding"))
+    text = texts.estimated_noise(estimate.model.name, estimate.method, log)
+    remarks.append(Remark("noise", text))
     # The mean of an accelerometer is mostly gravity.
     if quantity_of(channel) != "accel":
         fixed = FixedBiasRow.rows_of(tables["fixed_bias"])
         at_reference = effect["bias"].value if compensated else None
         if at_reference is not None:
             bias = at_reference
-            remarks.append(Remark("bias", f"bias {bias:g} rad/s at T_0: estimated from {log}"))
+            remarks.append(Remark("bias", texts.bias_at_reference(bias, log)))
         elif fixed:
             bias = fixed[0].value
-            remarks.append(Remark("bias", f"bias {bias:g} rad/s: mean of {log}"))
+            remarks.append(Remark("bias", texts.bias_of_mean(bias, log)))
     model = replace(printed, low_pass=low_pass, drift=drift, bias=bias)
     return replace(model, noise=before_the_filter(model, estimate.model, rate)), remarks

@@ -12,6 +12,7 @@ from imubench_pipeline.settings.validation import ConfigError
 from imubench_pipeline.settings.yaml_files import read_settings
 from imubench_pipeline.simulate.imu import ImuModel
 from imubench_pipeline.simulate.models import imu_model
+from imubench_pipeline.words.reasons import simulations as texts
 
 Topic = Literal["noise", "bias", "drift", "low-pass", "register", "log"]
 """Part of a model; ``log``: remarks on the written log."""
@@ -49,14 +50,14 @@ def from_file(path: Path) -> Origin:
     Raises ConfigError if the file does not exist, or a figure cannot be used.
     """
     settings = read_settings(ModelSettings, path)
-    named = f"{path.name}" + (f" ({settings.source})" if settings.source else "")
-    as_given = Remark("noise", f"as {path.name} has it")
+    source = texts.of_model_file(path.name, settings.source)
+    as_given = Remark("noise", texts.stated_in(path.name))
     figures = {str(name): [as_given] for name in settings.axes}
     try:
         model = imu_model(settings.axes, settings)
     except ValueError as error:
         raise ConfigError(f"{path}: axes.{error}") from error
-    return Origin(model, f"the model file {named}", figures, [], settings.sensor)
+    return Origin(model, source, figures, [], settings.sensor)
 
 
 def select_channels(origin: Origin, channels: Sequence[str]) -> Origin:

@@ -53,6 +53,8 @@ from imubench_pipeline.tables.findings import Finding
 from imubench_pipeline.tables.keys import Key
 from imubench_pipeline.typing import Array
 from imubench_pipeline.units import quantity_to_si
+from imubench_pipeline.words.numbers import sentence
+from imubench_pipeline.words.reasons import simulations as texts
 
 
 @dataclass
@@ -293,13 +295,13 @@ def _model_rows(key: Key, fit: Likelihood) -> Iterator[ModelRow]:
             note=_note(fit) if place == 0 else candidate.goodness.where,
             bins=int(fit.used.sum()),
             band=fit.band.highest if fit.band else None,
-            band_source=fit.band.source if fit.band else None,
+            band_source=fit.frame.band_words if fit.band else None,
         )
 
 
 def _note(fit: Likelihood) -> str:
     notes = [fit.candidates[0].goodness.where, describe_disagreement(fit.candidates)]
-    return "; ".join(note for note in notes if note)
+    return " ".join(filter(None, map(sentence, notes)))
 
 
 def _line_rows(key: Key, fit: Likelihood) -> Iterator[LineRow]:
@@ -420,6 +422,6 @@ def estimation(
 
 def _of_authors(read: Mapping[str, float]) -> Estimate:
     """Return what the authors of a simulated recording read from the curve of their own log."""
-    unread = Parameter(None, "not_shown", "the source does not print it")
+    unread = Parameter(None, "not_shown", texts.not_printed_by_source())
     parameters = {name: Parameter(read[name]) if name in read else unread for name in PARAMETERS}
     return Estimate("authors", parameters)

@@ -11,6 +11,7 @@ from typing import Any
 from imubench_pipeline.model.recordings import FailureRow, FileRow, RecordingRow
 from imubench_pipeline.model.states import FileStatus, RecordingStatus
 from imubench_pipeline.tables import build, read, write_arrow
+from imubench_pipeline.words.reasons import simulations as texts
 
 NEEDED = ("recordings", "failures")
 
@@ -45,7 +46,7 @@ def file_rows(
         elif row := outcome.get((file.sensor, file.recording)):
             yield replace(file, status=_STATUS[row.status], reason=row.reason)
         else:
-            reason = of_sensor.get(file.sensor, "it is in no table of its sensor")
+            reason = of_sensor.get(file.sensor, texts.in_no_table())
             yield replace(file, status="failed", reason=reason)
 
 

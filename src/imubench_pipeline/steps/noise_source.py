@@ -23,11 +23,9 @@ from imubench_pipeline.settings.sensor import Sensor
 from imubench_pipeline.settings.validation import ConfigError
 from imubench_pipeline.simulate.from_datasheet import from_datasheet
 from imubench_pipeline.tables.keys import Key
+from imubench_pipeline.words.reasons import simulations as texts
 
-NO_MODEL = (
-    "the noise of this sensor is not known: no static recording of it could be used, and its "
-    "datasheet prints no noise; add a static log of this sensor"
-)
+NO_MODEL = texts.no_noise_model()
 """Reason of missing results without a `NoiseSource`."""
 
 Kept = tuple[RecordingRow, Path]
@@ -90,7 +88,7 @@ def from_static(
             name = min(gyros, key=lambda name: (name != channel, name))
             every = {estimate.method: estimate for estimate in estimates(parameters)[name]}
             papers = every.get("likelihood_gm", best[name]).model
-            words = f"{_words(row, own, name, channel)}; method {best[name].method}"
+            words = _words(row, own, name, channel, best[name].method)
             rng = channel_rng(_DRAW_SEED, repr(best[name].model), name)
             drawn = tuple(draw_models(best[name], draws, rng)) if draws else ()
             return NoiseSource(best[name].model, papers, words, drawn)
@@ -140,25 +138,20 @@ def from_printed(name: str, sensor: Sensor, channel: str) -> NoiseSource | None:
     return NoiseSource(
         model,
         model,
-        f"typical figures of {origin.source}, not measured: no static recording of this sensor "
-        "tells its noise",
+        texts.printed_noise(origin.source),
     )
 
 
 def segments_reason(log: ChannelLog) -> str:
     """Return the reason why a log of several segments cannot be used as one."""
-    return (
-        f"the log is in {len(log.segments)} segments, with gaps of unknown length between "
-        "them; use one of them ('use:' beside the log)"
+    return texts.several_segments(len(log.segments))
+
+
+def _words(row: RecordingRow, own: RecordingRow, name: str, channel: str, method: str) -> str:
+    return texts.static_noise(
+        row.recording,
+        method,
+        device=row.device if row.device != own.device else None,
+        simulated=row.simulated,
+        channels=(name, channel) if name != channel else None,
     )
-
-
-def _words(row: RecordingRow, own: RecordingRow, name: str, channel: str) -> str:
-    words = [f"static recording {row.recording}"]
-    if row.device != own.device:
-        words.append(f"of another device, {row.device}")
-    if row.simulated:
-        words.append("simulated")
-    if name != channel:
-        words.append(f"of its {name}, as {channel} has no estimate there")
-    return ", ".join(words)

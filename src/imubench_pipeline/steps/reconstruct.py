@@ -29,6 +29,7 @@ from imubench_pipeline.settings.config import ReconstructionSettings
 from imubench_pipeline.steps.kept_curves import compensated_curves, curves
 from imubench_pipeline.tables import replacing, write
 from imubench_pipeline.tables.keys import Key
+from imubench_pipeline.words.reasons import simulations as texts
 
 
 @dataclass(frozen=True)
@@ -58,7 +59,7 @@ def reconstruct(
     model = estimate.model
     if not model.terms:
         reasons = {p.reason for p in estimate.parameters.values() if p.reason}
-        reason = "no term has a value: " + "; ".join(sorted(reasons))
+        reason = texts.nothing_to_simulate(sorted(reasons))
         return Reconstruction([], ScoreRow(**names, reason=reason))
     sizes, samples = measured.cluster_size, measured.samples
 

@@ -17,6 +17,7 @@ from imubench_pipeline.estimators.deterministic.scores import MIN_CYCLES, Gain
 from imubench_pipeline.estimators.deterministic.search import SearchResult, move_regressors, search
 from imubench_pipeline.estimators.estimate import SIGMAS
 from imubench_pipeline.typing import Array
+from imubench_pipeline.words.reasons import estimates as texts
 
 Kind = Literal["bias_step", "warm_up_drift", "periodic_drift"]
 
@@ -112,29 +113,23 @@ class DeterministicSignals:
             return None
         rival = self.searched.rival
         if rival is not None:
-            signal = _describe_alternative(rival.signals, self.means)
-            return f"{signal} would explain the log about as well as a random walk"
+            return texts.signal_or_walk(_describe_alternative(rival.signals, self.means))
         if self.signals and _compute_walk_leverage(self.searched.fit) > _MAX_WALK_LEVERAGE:
-            return (
-                "what is taken out as deterministic takes most of what the log tells of a random "
-                "walk with it"
-            )
+            return texts.signals_hide_walk()
         return None
 
 
 def _describe_alternative(signals: Sequence[Regressor], means: Means) -> str:
     regressor = signals[0]
     if regressor.kind == "restart":
-        if len(signals) == 1:
-            return "a step of the bias at a pause of the log"
-        return f"steps of the bias at {len(signals)} pauses of the log"
+        return texts.pause_steps(len(signals))
     start = means.parts[regressor.part].start / means.rate
     where = regressor.where * means.interval
     if regressor.kind == "step":
-        return f"a step of the bias at {start + where:.5g} s"
+        return texts.step_at(start + where)
     if regressor.kind == "exponential":
-        return f"a warm-up with a time constant of {where:.3g} s"
-    return f"a periodic drift with a period of {means.interval / regressor.where:.3g} s"
+        return texts.warm_up(where)
+    return texts.periodic_drift(means.interval / regressor.where)
 
 
 def _compute_walk_leverage(fit: Fit) -> float:

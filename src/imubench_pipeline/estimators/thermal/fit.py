@@ -44,6 +44,7 @@ from imubench_pipeline.estimators.thermal.uncertainty import (
 )
 from imubench_pipeline.estimators.whittle import Maximum, Whittle, model_of
 from imubench_pipeline.typing import Array
+from imubench_pipeline.words.reasons import estimates as texts
 
 _MAX_ROUNDS = 10
 _TOLERANCE = 0.02
@@ -140,9 +141,9 @@ def fit_temperature(
         fit = _Fit(blocks(), samples, rate, spans, path, frame, longest_lag)
         plain = plain or likelihood.fit_spectrum(fit.spectrum, fit.frame, rng=rng, stretch=None)
     if not fit.possible:
-        return _nothing(plain, path, fit, "too short a log")
+        return _nothing(plain, path, fit, texts.short_log())
     if not varies:
-        return _nothing(plain, path, fit, f"the temperature changes by {path.range:.2g} K only")
+        return _nothing(plain, path, fit, texts.small_temperature_range(path.range))
     settled = fit.settle(quadratic)
     verdict = fit.judged(settled, rng)
     if not verdict.compensated and len(fit.lags) > 1:

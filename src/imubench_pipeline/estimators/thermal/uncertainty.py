@@ -27,6 +27,7 @@ from imubench_pipeline.estimators.thermal.regression import Regression, Regresso
 from imubench_pipeline.estimators.whittle import Terms, Whittle
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.typing import Array
+from imubench_pipeline.words.reasons import estimates as texts
 
 _MAX_DRAWS = 1_000
 _NOISE_DRAWS = 250  # draws of the effect, and of the noise, over all models
@@ -96,17 +97,13 @@ def assess_fit(
     excluded = any(lower[i] > 0.0 or upper[i] < 0.0 for i in range(1 + regressors.quadratic))
     confused = _explain_confusion(regressors, regression, weights, excluded)
     compensated = excluded and confused is None and gained > _MIN_DELTA_BIC
-    reason = confused or "the interval of the sensitivity contains 0"
+    reason = confused or texts.sensitivity_with_zero()
     if excluded and confused is None:
-        only = "" if gained > _MIN_DELTA_BIC else " only"
-        reason = f"BIC favours the noise with temperature by {gained:.1f}{only}"
+        reason = texts.temperature_preferred(gained, enough=gained > _MIN_DELTA_BIC)
     if regressors.settling > 0.0:
-        reason += (
-            f"; the first {regressors.settling:.0f} s follow it otherwise and do not count for the "
-            "sensitivity"
-        )
+        reason += f"; {texts.settling_excluded(regressors.settling)}"
     s = _make_parameter(float(regression.beta[0]), float(lower[0]), float(upper[0]), confused)
-    q = Parameter(None, "absent", "the data do not ask for it")
+    q = Parameter(None, "absent", texts.absent())
     if regressors.quadratic:
         q = _make_parameter(float(regression.beta[1]), float(lower[1]), float(upper[1]), confused)
     return Verdict(
@@ -133,9 +130,9 @@ def lag_parameter(value: float, draws: Array, longest: float, compensated: bool)
     likely lag, ``longest`` the longest that was tried, s.
     """
     if longest == 0.0:
-        return Parameter(None, "absent", "no lag was asked for")
+        return Parameter(None, "absent", texts.lag_not_asked())
     if not compensated:
-        return Parameter(None, "not_identified", "temperature explains nothing that would lag")
+        return Parameter(None, "not_identified", texts.no_effect_to_lag())
     ordered, inside = np.sort(draws), math.ceil(0.95 * len(draws))
     first = int(np.argmin(ordered[inside - 1 :] - ordered[: len(ordered) - inside + 1]))
     lower, upper = float(ordered[first]), float(ordered[first + inside - 1])
@@ -145,10 +142,10 @@ def lag_parameter(value: float, draws: Array, longest: float, compensated: bool)
         lower, upper = 0.0, below
     lower, upper = min(lower, value), max(upper, value)
     if upper - lower > _MAX_LAG_WIDTH * longest:
-        reason = f"the log allows lags from {lower:.3g} to {upper:.3g} s"
+        reason = texts.lag_range(lower, upper)
         return Parameter(None, "not_identified", reason, lower, upper, fitted=value)
     if lower == 0.0:
-        reason = "its interval contains 0; only that is given"
+        reason = texts.interval_with_zero(at_limit=False)
         return Parameter(None, "not_identified", reason, lower, upper, fitted=value)
     return Parameter(value, "ok", None, lower, upper)
 
@@ -161,23 +158,17 @@ def _explain_confusion(
     of_s, of_time = both.information[0, 0], both.information[-1, -1]
     shared = both.information[0, -1] ** 2 / (of_s * of_time)
     if shared > _MAX_RAMP_FRACTION:
-        return (
-            "the temperature is too close to a ramp: time alone would explain "
-            f"{100 * shared:.0f} % of what the log says of the sensitivity"
-        )
+        return texts.temperature_like_ramp(float(shared))
     value = regressors.path.value
     if abs(value[-1] - value[0]) > _MIN_MONOTONE_RANGE * regressors.path.range:
         z = both.beta[0] / both.error
         if excluded and abs(z) < SIGMAS:
-            return "the temperature only rises or falls, and a drift with time explains as much"
+            return texts.monotone_temperature()
     if (
         not excluded
         and _compute_explained_fraction(regressors, regression) > _MIN_EXPLAINED_FRACTION
     ):
-        return (
-            "temperature follows most of the slow drift, but a random walk as strong as the "
-            "log's own would do so by chance"
-        )
+        return texts.temperature_by_chance()
     return None
 
 

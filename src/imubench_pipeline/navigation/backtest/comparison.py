@@ -38,6 +38,7 @@ from imubench_pipeline.noise.growth import Calibrated
 from imubench_pipeline.tables.findings import find
 from imubench_pipeline.typing import Array
 from imubench_pipeline.words.findings.backtest import BacktestContradicts
+from imubench_pipeline.words.reasons import pools as texts
 
 _MIN_SCATTER_SHARE = 0.3
 """Minimum remaining variance, as a fraction of the scatter of the log. If the model is hardly
@@ -202,10 +203,9 @@ def _explain_too_few_windows(
     """Return why a log has too few windows."""
     span, needed = asked.rest + asked.time, asked.duration_needed
     longest = cut.block * max(len(segment) for segment in means)
-    wanted = f"{MIN_WINDOWS} windows of {span:g} s, one after the other, need {needed:g} s"
     if longest < needed:
-        return f"log too short: {wanted}; its longest part without a break has {longest:.3g} s"
-    return f"gaps leave {count} overlapping windows: {wanted} without a gap"
+        return texts.short_for_windows(MIN_WINDOWS, span, needed, longest)
+    return texts.gaps_between_windows(count, MIN_WINDOWS, span, needed)
 
 
 def findings(rows: Iterable[BacktestRow]) -> Iterator[FindingRow]:

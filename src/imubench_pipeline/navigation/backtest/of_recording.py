@@ -16,6 +16,7 @@ from imubench_pipeline.recordings.recording import ChannelLog
 from imubench_pipeline.settings.requirements import DIMENSIONS, Error, Requirement
 from imubench_pipeline.settings.sensor import quantity_of
 from imubench_pipeline.units import SI_UNITS, quantity_to_si
+from imubench_pipeline.words.reasons import pools as texts
 
 CONTRADICTION_LEVEL = 0.01
 """Significance level of a contradiction, for all rows of a recording together (Bonferroni)."""
@@ -90,15 +91,13 @@ def _test_channel(
             # The error that the limit needs, or why the log cannot show it.
             asked: DeadReckoning | str
             if key == ("gyro", "north"):
-                asked = (
-                    "a log at one position does not tell the bias of a gyro from the Earth's rate"
-                )
+                asked = texts.north_not_tested()
             elif key not in _INTEGRATIONS:
                 continue
             elif requirement.static_window is None:
-                asked = "turn_on: a log shows one turn-on bias, not how these scatter"
+                asked = texts.turn_on_not_tested()
             elif not estimate.model.terms:
-                asked = "nothing is known of the noise of this channel"
+                asked = texts.noise_not_known()
             else:
                 order, factor = _INTEGRATIONS[key]
                 rest = quantity_to_si(requirement.static_window, "time")
@@ -128,8 +127,7 @@ def _test_channel(
         if not isinstance(asked, DeadReckoning):
             yield replace(about, reason=asked)
         elif (cut := cuts[asked]) is None:
-            reason = f"two samples are further apart than the times: {log.rate:g} Hz"
-            yield replace(about, reason=reason)
+            yield replace(about, reason=texts.long_sampling_interval(log.rate))
         else:
             found = compare(asked, cut, means[cut.block], estimate.model, drawn, efficient=jointly)
             yield replace(

@@ -44,7 +44,8 @@ from imubench_pipeline.navigation.error_budget.parts import (
 )
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.growth import Calibrated, SensorStart, Uncalibrated, of_constant
-from imubench_pipeline.settings.printed import SENSORS, Measured
+from imubench_pipeline.settings.printed import Measured
+from imubench_pipeline.words.reasons import budgets as texts
 
 GYRO_ORDER: dict[Quantity, int] = {"attitude": 0, "heading": 0, "velocity": 1, "position": 2}
 ACCEL_ORDER: dict[Quantity, int] = {"velocity": 0, "position": 1}
@@ -231,7 +232,7 @@ def budget(
         elif part is not None:
             missing.append(part)
             if cause == "turn_on_bias":
-                assumptions.append(f"turn-on bias of the {SENSORS[measured]}: not known, left out")
+                assumptions.append(texts.bias_not_known(measured))
     return Budget(time, quantity, contributions, assumptions, missing)
 
 

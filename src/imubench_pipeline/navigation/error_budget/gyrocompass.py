@@ -26,8 +26,7 @@ from imubench_pipeline.navigation.error_budget.in_use import (
 )
 from imubench_pipeline.navigation.error_budget.parts import Budget, Contribution, Missing, of_figure
 from imubench_pipeline.noise import NoiseModel, Sinusoid
-
-_BIAS_LEFT_OUT_NOTE = "turn-on bias of the gyro: left out; the heading is no better than this"
+from imubench_pipeline.words.reasons import budgets as texts
 
 _WINDOW_LENGTHS: NDArray[np.float64] = np.geomspace(1e-3, 1e9, 601)
 
@@ -90,7 +89,7 @@ class Gyrocompass:
                 *self._list_noise_errors(time, swings=True),
                 *(part for part in biases if isinstance(part, Contribution)),
             ],
-            [_BIAS_LEFT_OUT_NOTE] if missing else [],
+            [texts.heading_bias_not_known()] if missing else [],
             missing,
         )
 

@@ -25,6 +25,7 @@ from typing import Literal
 
 from imubench_pipeline.noise.growth import Calibrated, SensorStart, Uncalibrated, of_constant
 from imubench_pipeline.settings.printed import Measured
+from imubench_pipeline.words.reasons import budgets as texts
 
 Cause = Literal[
     "turn_on_bias",
@@ -94,7 +95,7 @@ class Figure:
     reason: str | None = None
 
 
-STATED_FIGURE = Figure(origin="requirement", convention="as it is stated, 1 sigma")
+STATED_FIGURE = Figure(origin="requirement", convention=texts.STATED_SIGMA)
 """Figure that is stated in a requirement."""
 
 Figures = Mapping[Cause, Figure]

@@ -15,6 +15,7 @@ from imubench_pipeline.navigation.error_budget.in_use import Cause, Figure, Figu
 from imubench_pipeline.navigation.error_budget.printed_errors import DATASHEET_KEY_OF_CAUSE
 from imubench_pipeline.settings.printed import FIGURE_DIMENSIONS, Measured
 from imubench_pipeline.units import SI_UNITS
+from imubench_pipeline.words.reasons import budgets as texts
 
 Quantity = Literal["attitude", "heading", "velocity", "position"]
 
@@ -27,6 +28,7 @@ class Contribution:
     sigma: float  # 1 sigma, rad, m/s or m
     cause: Cause | Literal["noise", "start"] = "noise"  # ``start``: a stated angle
     figure: Figure | None = None  # the figure that it follows from, if it is not noise
+    quantity: Measured | None = None  # sensor of a figure of the sensor file or the log
 
 
 @dataclass(frozen=True)
@@ -64,11 +66,11 @@ def of_figure(
     ``lever`` is the error from a figure of 1 SI unit. None if no figure is required, or another is
     used.
     """
-    figure = figures.get(cause, Figure(reason="the sensor file does not give it"))
+    figure = figures.get(cause, Figure(reason=texts.not_stated()))
     if figure.sigma is not None:
-        return Contribution(source, lever * figure.sigma, cause, figure)
+        return Contribution(source, lever * figure.sigma, cause, figure, measured)
     if needed(measured, cause, figures):
-        return Missing(source, measured, cause, lever, figure.reason or "not known")
+        return Missing(source, measured, cause, lever, figure.reason or texts.not_known())
     return None
 
 
@@ -117,9 +119,11 @@ class Largest:
             kind=figure.kind if figure else None,
             convention=figure.convention if figure else None,
         )
-        if not self.room or contribution not in self.biases or figure is None or not figure.sigma:
+        quantity = contribution.quantity
+        if not self.room or contribution not in self.biases or quantity is None:
             return row
-        quantity = "accel" if "accel" in contribution.source.split() else "gyro"
+        if figure is None or not figure.sigma:
+            return row
         return self._add_largest(
             row, quantity, contribution.cause, contribution.sigma / figure.sigma
         )

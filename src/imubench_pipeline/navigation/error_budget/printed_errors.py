@@ -14,6 +14,7 @@ from imubench_pipeline.datasheets.comparable import Comparable, PrintedAxis
 from imubench_pipeline.model.estimates import TemperatureRow
 from imubench_pipeline.navigation.error_budget.in_use import Cause, Figure
 from imubench_pipeline.settings.printed import FIGURE_DIMENSIONS, Datasheet
+from imubench_pipeline.words.reasons import budgets as texts
 
 DATASHEET_KEY_OF_CAUSE: Mapping[Cause, str] = {
     "turn_on_bias": "offset",
@@ -27,11 +28,11 @@ DATASHEET_KEY_OF_CAUSE: Mapping[Cause, str] = {
 """Datasheet key of the figure for each cause."""
 
 _SIGMA_CONVENTIONS: Mapping[str, tuple[float, str]] = {
-    "1sigma": (1.0, "1 sigma as printed"),
-    "typ": (1.0, "typical taken as 1 sigma"),
-    "derived": (1.0, "typical taken as 1 sigma"),
-    "range": (math.sqrt(3.0), "any value of the range as likely: its end is sqrt(3) sigma"),
-    "max": (3.0, "maximum taken as 3 sigma"),
+    "1sigma": (1.0, texts.PRINTED_SIGMA),
+    "typ": (1.0, texts.TYPICAL_AS_SIGMA),
+    "derived": (1.0, texts.TYPICAL_AS_SIGMA),
+    "range": (math.sqrt(3.0), texts.RANGE_AS_UNIFORM),
+    "max": (3.0, texts.MAXIMUM_AS_SIGMAS),
 }
 """By kind, in order of preference: number of sigmas of a figure, and description."""
 
@@ -84,7 +85,7 @@ def of_log(rows: Iterable[TemperatureRow]) -> dict[Cause, Figure]:
         figures[_CAUSE_OF_COEFFICIENT[row.parameter]] = Figure(
             sigma=abs(row.value),
             origin="measured",
-            convention="of this specimen, at the mean temperature of the log",
+            convention=texts.OF_THIS_UNIT,
             spread=spread,
         )
     return figures

@@ -20,6 +20,7 @@ from imubench_pipeline.noise import FLOOR, NoiseModel
 from imubench_pipeline.recordings.fitness import left_out
 from imubench_pipeline.settings.printed import SENSORS, Datasheet, QuantityDatasheet
 from imubench_pipeline.settings.sensor import Sensor, quantity_of
+from imubench_pipeline.words.reasons import budgets as texts
 
 _FIGURE_OF_PARAMETER = {"N": "N", "B_curve": "B", "K": "K", "T_B": "T_B"}
 """Figure for each parameter of the estimates: B is taken from the curve."""
@@ -56,19 +57,17 @@ class MeasuredRanges:
             for (sensor, of, name), ends in self.of_sensor.items()
             if (of, name) == (quantity, figure)
         }
-        source = "measured sensors"
+        measured = bool(by_sensor)
         if not by_sensor and figure == "B":
             by_sensor = {name: ends for (name, of), ends in self.printed.items() if of == quantity}
-            source = "datasheets"
         if not by_sensor:
             return None
         wanted = class_of(price_class)
         own = {s: ends for s, ends in by_sensor.items() if wanted and self.classes.get(s) == wanted}
-        which = f"of class {wanted}" if own else "of any class, for there is none of its own"
         used = own or by_sensor
-        named = ", ".join(sorted(used))
         low, high = min(ends[0] for ends in used.values()), max(ends[1] for ends in used.values())
-        return Span(low, high, f"that of {source} {which} ({named})")
+        source = texts.range_source(sorted(used), wanted if own else "", measured=measured)
+        return Span(low, high, source)
 
 
 def class_of(price_class: str | None) -> str:
@@ -155,43 +154,40 @@ class Figures:
 def figures_of(sensor: Sensor, quantity: str, ranges: MeasuredRanges) -> Figures | str:
     """Return the ranges that a datasheet allows for a quantity, or why there are none."""
     if getattr(sensor.datasheet, quantity) is None:
-        return f"it has no {SENSORS[quantity]}"
+        return texts.no_quantity(quantity)
     printed, options = _read_printed(sensor.datasheet, quantity)
-    of = SENSORS[quantity]
-    assumed: list[str] = [f"{of}: any of {', '.join(options)}"] if options else []
+    assumed: list[str] = [texts.any_option(quantity, options)] if options else []
     unknown: list[str] = []
 
     def filled(figure: str, statistic: str) -> Span | None:
         own = [row for row in printed if row.statistic == statistic]
         if own:
-            if any("assumed" in (row.reason or "") for row in own):
-                assumed.append(f"{of} {figure}: the side of the density is not stated: both")
+            if any(row.is_side_assumed for row in own):
+                assumed.append(texts.either_side(quantity, figure))
             if all(row.figure is not None and row.figure.kind == "max" for row in own):
-                assumed.append(
-                    f"{of} {figure}: a maximum alone is printed, the typical one may be better"
-                )
+                assumed.append(texts.only_maximum(quantity, figure))
             return _find_ends(own)
         span = ranges.span(sensor.price_class, quantity, figure)
         if span is None:
             unknown.append(figure)
         else:
-            assumed.append(f"{of} {figure}: {span.low:.2g} to {span.high:.2g} SI, {span.words}")
+            assumed.append(texts.assumed_range(quantity, figure, span.low, span.high, span.words))
         return span
 
     if not any(row.statistic == "N" for row in printed):
-        return f"no noise density of the {of} is published"
+        return texts.no_density(quantity)
     N = filled("N", "N")
     assert N is not None  # at least one is printed
     B = filled("B", "adev_minimum")
     if B is not None and not B.words:
-        assumed.append(f"{of} B: the printed figure at best, the minimum of the curve at worst")
+        assumed.append(texts.floor_and_minimum(quantity))
         B = Span(B.low, B.high / FLOOR)
     K = filled("K", "K")
     T_B = filled("T_B", "T_B")
     if unknown:
-        assumed.append(f"{of} {', '.join(unknown)}: not published, and not measured of any sensor")
+        assumed.append(texts.neither_printed_nor_measured(quantity, unknown))
         if B is not None and "T_B" in unknown:
-            assumed.append(f"{of} B: flicker noise, for want of a T_B")
+            assumed.append(texts.flicker_assumed(quantity))
     times: tuple[float | None, ...] = (None,)
     if T_B is not None:
         middle = math.sqrt(T_B.low * T_B.high)

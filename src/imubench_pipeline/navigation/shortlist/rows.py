@@ -21,6 +21,7 @@ from imubench_pipeline.navigation.shortlist.figures import End, Figures, Measure
 from imubench_pipeline.navigation.suitability.abilities import abilities, judge
 from imubench_pipeline.settings.requirements import Requirement
 from imubench_pipeline.settings.sensor import Sensor
+from imubench_pipeline.words.reasons import budgets as texts
 from imubench_pipeline.words.verdicts import subject_text
 
 _QUANTITIES = ("gyro", "accel")
@@ -103,7 +104,7 @@ def _judge(
         best_margin=best[least],
         worst_margin=worst,
         decides=requirement.by_dead_reckoning[least].text,
-        assumed=(*assumed, *(f"{subject_text(each)}: not known" for each in unknown)),
+        assumed=(*assumed, *(texts.figure_not_known(subject_text(each)) for each in unknown)),
     )
     if not requirement.admits(price_class):
         asked = " or ".join(requirement.price_class or ())
@@ -139,7 +140,7 @@ def _compute_margins(
         if question.limit is not None  # every question of a requirement has one
     ]
     missing = (
-        f"{missed.source}: not known ({missed.reason})"
+        texts.figure_not_known(missed.source, missed.reason)
         for budget in budgets
         for missed in budget.missing
     )

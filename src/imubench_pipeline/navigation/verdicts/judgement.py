@@ -24,6 +24,7 @@ from imubench_pipeline.navigation.verdicts.evidence import quantity_behind, weak
 from imubench_pipeline.navigation.verdicts.specimens import Spread, usual_spread
 from imubench_pipeline.navigation.verdicts.standing import Standing, deciding, limit_of, standings
 from imubench_pipeline.settings.requirements import Requirement
+from imubench_pipeline.words.reasons import pools as texts
 from imubench_pipeline.words.verdicts import doubts_text
 
 Factors = Mapping[str, float]  # by quantity
@@ -234,7 +235,7 @@ def _select_deciding_rows(rows: Sequence[ErrorBudgetRow], basis: Basis) -> list[
     for row in rows:
         doubts = basis.apart.get((row.sensor, row.recording))
         if doubts is not None:
-            reason = f"{row.recording} is not used: {doubts_text(doubts)}"
+            reason = texts.recording_not_used(row.recording, doubts_text(doubts))
             row = replace(row, sigma=None, lower=None, upper=None, within=None)
             row = replace(row, reached_after=None, reason=reason)
         selected.append(row)

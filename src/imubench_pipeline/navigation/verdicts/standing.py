@@ -13,6 +13,7 @@ from imubench_pipeline.model.states import SURE_PROBABILITY, Verdict
 from imubench_pipeline.model.verdicts import Share
 from imubench_pipeline.navigation.suitability.conditions import is_condition, shares_of, with_sigma
 from imubench_pipeline.navigation.verdicts.specimens import Expected, Spread, expected
+from imubench_pipeline.words.reasons import budgets as texts
 
 MAX_LIMIT_RATIO = 4.0
 """Maximum ratio of upper to lower limit of an error; beyond it, the log is not conclusive."""
@@ -106,7 +107,7 @@ def standings(
             needed = ("sigma", "lower", "upper", "within", "limit")
             missing = [name for name in needed if getattr(row, name) is None]
             if missing:
-                reason = row.reason or f"it has no {' and no '.join(missing)}"
+                reason = row.reason or texts.missing_numbers(missing)
                 row = replace(row, sigma=None, reason=reason)
         by_limit.setdefault(limit_of(row), []).append(row)
     listed = []

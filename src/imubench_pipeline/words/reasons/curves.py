@@ -1,0 +1,189 @@
+"""Reasons for what an Allan deviation shows, by its slopes or by a fit to it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from imubench_pipeline.words.numbers import number_text, percent_text
+
+_MAX_PRINTED_ERROR = 10.0
+"""Maximum relative standard error that is printed as a number."""
+
+
+def repeated_samples() -> str:
+    """Return why a curve is not used whose Allan variance is 0."""
+    return (
+        "the Allan variance is 0 at some τ because samples repeat exactly. "
+        "Check the log for stuck values"
+    )
+
+
+def few_points(points: int, longest: float, needed: int) -> str:
+    """Return why a curve is too short; ``longest``: longest tau over the length of the log."""
+    return (
+        f"the curve has {points} of the {needed} points that are needed up to "
+        f"{percent_text(longest)} of the log. Record a longer log"
+    )
+
+
+def short_curve() -> str:
+    """Return why no slope is read."""
+    return "the curve is too short to show a slope. Record a longer log"
+
+
+def no_white_slope(lowest: float, highest: float) -> str:
+    """Return why N is not read, with the range of the slopes."""
+    return (
+        "no part of the curve has the slope −1/2 of white noise: its slopes are between "
+        f"{number_text(lowest, 2)} and {number_text(highest, 2)}"
+    )
+
+
+def no_fall() -> str:
+    """Return why a curve that does not fall first has no minimum."""
+    return "the curve has no minimum: it is lowest at its shortest τ"
+
+
+def no_rise(tau: float, sigmas: float) -> str:
+    """Return why a curve that is lowest at ``tau``, s, has no significant minimum."""
+    return (
+        f"the curve has no minimum: after its lowest point at {number_text(tau, 3)} s it rises by "
+        f"less than {number_text(sigmas, 2)} standard errors. A longer log may show one"
+    )
+
+
+def read_at_minimum() -> str:
+    """Return what B includes that is read at the minimum."""
+    return "read at the minimum of the whole curve, where N and K add to B"
+
+
+def no_walk_slope(steepest: float | None) -> str:
+    """Return why K is not read; ``steepest``: slope of the steepest end, None if it has none."""
+    text = "the curve does not end with the slope +1/2 of a random walk: its "
+    if steepest is None:
+        return f"{text}lowest point is near its end"
+    return f"{text}steepest end has the slope {number_text(steepest, 2)}"
+
+
+def fit_without_term() -> str:
+    """Return why a term is absent from a fit to the curve."""
+    return "the curve is fitted best without this term"
+
+
+def no_peak(longest: float) -> str:
+    """Return why T_B is at the longest time of its search, s."""
+    return (
+        f"T_B reaches the longest time of its search, {number_text(longest)} s: the curve shows no "
+        "peak of a Gauss-Markov process"
+    )
+
+
+def like_white_noise(shortest: float) -> str:
+    """Return why T_B is at the shortest time of its search, s."""
+    return (
+        f"T_B reaches the shortest time of its search, {number_text(shortest)} s: the process "
+        "looks like white noise"
+    )
+
+
+def fitted_from(tau: float) -> str:
+    """Return why a fit begins at ``tau``, s."""
+    return (
+        f"fitted from τ = {number_text(tau, 3)} s: at shorter τ the curve bends, as by the filter "
+        "of the sensor"
+    )
+
+
+def no_noise() -> str:
+    """Return why a model without terms has no figures."""
+    return "the model has no noise"
+
+
+def large_error(symbol: str, error: float, most: float | None = None) -> str:
+    """Return the relative standard error of a parameter, and the limit that it exceeds."""
+    above = "" if most is None else f", above {percent_text(most)}"
+    return f"the relative standard error of {symbol} is {_error_text(error)}{above}"
+
+
+def no_significant_peak(error_of_time: float, error: float | None = None) -> str:
+    """Return why T_B, or, with its own relative standard error, B is not identified."""
+    of_time = _error_text(error_of_time)
+    text = "no peak of a Gauss-Markov process is significant: the relative standard error of "
+    if error is None:
+        return f"{text}T_B is {of_time}"
+    return f"{text}B is {_error_text(error)}, but {of_time} for T_B"
+
+
+def _error_text(error: float) -> str:
+    if error >= _MAX_PRINTED_ERROR:
+        return f"{percent_text(_MAX_PRINTED_ERROR)} or more"
+    return percent_text(error, 2)
+
+
+def broadband_process(time: float) -> str:
+    """Return why a process with a short correlation time, s, is no bias instability."""
+    return (
+        f"a process with a correlation time of {number_text(time, 2)} s is broadband noise, not "
+        "bias instability"
+    )
+
+
+def broadband_peak(tau: float, longest: float) -> str:
+    """Return why a peak at ``tau``, s, is no bias instability; ``longest``: correlation time."""
+    return (
+        f"the peak at {number_text(tau, 2)} s is broadband noise with a correlation time below "
+        f"{number_text(longest, 2)} s, not bias instability: only the interval is given"
+    )
+
+
+def rises_to_end(tau: float) -> str:
+    """Return why the peak of processes that still rise at ``tau``, s, is not known."""
+    return (
+        f"the processes still rise at {number_text(tau)} s, a ninth of the log: only the interval "
+        "is given"
+    )
+
+
+def time_at_bound(reason: str) -> str:
+    """Return why B_curve is not identified, with the reason of a T_B at its bound."""
+    return f"a correlation time is not determined: {reason}"
+
+
+def no_bias_terms() -> str:
+    """Return why the curve of a model has no bias instability."""
+    return "the model has no flicker noise and no Gauss-Markov process"
+
+
+def no_model_minimum(falls_to: float | None) -> str:
+    """Return why a model has no minimum: it falls up to a tau, s, or, with None, rises at once."""
+    text = "the Allan deviation of the fitted noise has no minimum: it "
+    if falls_to is None:
+        return f"{text}rises from its shortest τ"
+    return f"{text}still falls at {number_text(falls_to)} s, a ninth of the log"
+
+
+def minimum_beyond() -> str:
+    """Return why tau_min is not identified."""
+    return "some models that fit the log have no minimum within a ninth of it"
+
+
+def white_level_of_model(decades: float) -> str:
+    """Return which N is given where no stretch of the curve is long enough."""
+    return (
+        f"the Allan deviation has no slope of −1/2 over {number_text(decades, 2)} decades: N is "
+        "the white noise of the fitted model"
+    )
+
+
+def white_level_of_curve(first: float, last: float, times: Sequence[float]) -> str:
+    """Return where N is read, s, and the correlation times, s, of the processes in it."""
+    listed = " and ".join(f"{number_text(time, 3)} s" for time in times)
+    process = (
+        "a process with a correlation time"
+        if len(times) == 1
+        else "processes with correlation times"
+    )
+    return (
+        f"N is the level of the Allan deviation from {number_text(first, 3)} to "
+        f"{number_text(last, 3)} s and includes {process} of {listed}"
+    )

@@ -1,0 +1,403 @@
+"""Cautions and notes in the head of exported files. Numbers are as in programs: ``1.2e-06``."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Literal
+
+from imubench_pipeline.model.states import Status
+from imubench_pipeline.words.estimates import STATUS_WORDS
+from imubench_pipeline.words.findings.base import channel_name
+from imubench_pipeline.words.numbers import counted, join_names, number_text, percent_text
+
+OtherAxes = Literal["other_device", "no_white_noise", "not_median", "less_noise"]
+"""Why an axis is not the one that represents a sensor."""
+
+_OTHER_AXES: Mapping[OtherAxes, str] = {
+    "other_device": "of another device",
+    "no_white_noise": "no white noise in the model",
+    "not_median": "not the median at {horizon} s",
+    "less_noise": "less noise at {horizon} s",
+}
+
+
+def simulated_recordings() -> str:
+    """Return that the numbers are not measured."""
+    return "The recordings are SIMULATED, not measured"
+
+
+def no_estimate(quantity: str) -> str:
+    """Return why a file has no ``gyro`` or ``accel``."""
+    return f"{quantity}: not included, as there is no estimate"
+
+
+def biases_not_included() -> str:
+    """Return that a file has no fixed biases."""
+    return "Fixed biases are not included, as they change from one start to the next"
+
+
+def noise_only() -> str:
+    """Return that a file has neither fixed biases nor the effect of the temperature."""
+    return (
+        "The file contains noise only. Fixed biases change from one start to the next, and they "
+        "and their dependence on temperature are not included"
+    )
+
+
+def inflated(factor: float, because: str) -> str:
+    """Return that all numbers of a file are larger, and the reason of the user."""
+    return (
+        f"INFLATED: all densities and amplitudes below are {number_text(factor)} times those "
+        f"above, because: {because}"
+    )
+
+
+def chosen_axis(
+    channel: str, recording: str, method: str, rank: str, horizon: float, error: float, unit: str
+) -> str:
+    """Return which axis represents a sensor; ``error`` after the horizon, s, in ``unit``."""
+    times = number_text(horizon)
+    return (
+        f"{channel_name(channel)} of recording {recording} by method {method}, {rank} at "
+        f"{times} s. Its error after {times} s is {number_text(error, 3)} {unit}, with a bias "
+        f"averaged over the {times} s before"
+    )
+
+
+def axis_rank(number: int, place: str, of: str = "") -> str:
+    """Return the place of an axis, ``worst`` or ``median``; ``of``: its device, if asked for."""
+    rank = "the only axis" if number == 1 else f"the {place} of {number} axes"
+    return f"{rank} of {of}" if of else rank
+
+
+def axes_not_used(
+    why: OtherAxes, horizon: float, of: Mapping[str, Sequence[str]], most: int
+) -> str:
+    """Return which axes are not used; ``of``: channels by recording, the first ``most`` named."""
+    named = [
+        f"{join_names(list(map(channel_name, channels)))} of {recording}"
+        for recording, channels in of.items()
+    ]
+    reason = _OTHER_AXES[why].format(horizon=number_text(horizon))
+    text = f"axes not used ({reason}): {'; '.join(named[:most])}"
+    more = len(named) - most
+    return f"{text}; and of {counted(more, 'more recording')}" if more > 0 else text
+
+
+def axes_without_estimate(channels: Sequence[str]) -> str:
+    """Return which axes have no estimate in any recording."""
+    return f"axes without an estimate: {join_names(list(map(channel_name, channels)))}"
+
+
+def component_label(symbol: str, number: int) -> str:
+    """Return a parameter of a component: ``B``, ``B of component 2``."""
+    return symbol if number == 1 else f"{symbol} of component {number}"
+
+
+def bound_used(
+    label: str, reason: str | None, value: float, limits: tuple[float, float] | None
+) -> str:
+    """Return that a value at the end of its search is used, SI."""
+    return (
+        f"{label} is at the end of its search{_because(reason)}. "
+        f"Its value of {value:.4e} is used{_limits_text(limits)}"
+    )
+
+
+def fitted_used(
+    label: str,
+    status: Status,
+    reason: str | None,
+    value: float,
+    limits: tuple[float, float] | None,
+) -> str:
+    """Return that the fit is used where no value is given, SI."""
+    return (
+        f"{label} is {STATUS_WORDS[status]}{_because(reason)}. "
+        f"The fitted {value:.3e} is used{_limits_text(limits)}"
+    )
+
+
+def zero_used(label: str, status: Status, reason: str | None, upper: float) -> str:
+    """Return that 0 is used where a term has an upper limit, SI."""
+    return (
+        f"{label} is {STATUS_WORDS[status]}{_because(reason)}. "
+        f"It is 0 in this file, and its upper limit is {upper:.3e}"
+    )
+
+
+def _because(reason: str | None) -> str:
+    return f" ({reason})" if reason else ""
+
+
+def _limits_text(limits: tuple[float, float] | None) -> str:
+    return "" if limits is None else f", with 95 % limits of {limits[0]:.3e} to {limits[1]:.3e}"
+
+
+def no_walk_known() -> str:
+    """Return why the random walk of a file is 0."""
+    return "the model has no random walk, and no upper limit of it is known, so it is 0"
+
+
+def upper_walk_used(K: float) -> str:
+    """Return why the random walk of a file is an upper limit, SI."""
+    return (
+        f"the model has no random walk, and its upper 95 % limit K = {K:.3e} is used. "
+        "A filter stops estimating a bias that does not change"
+    )
+
+
+def random_walk(K: float) -> str:
+    """Return a random walk that replaces other terms, SI."""
+    return f"a random walk K = {K:.3e}"
+
+
+def gauss_markov_process(B: float, T_B: float) -> str:
+    """Return a process that replaces other terms, SI."""
+    return f"a Gauss-Markov process B = {B:.3e}, T_B = {number_text(T_B)} s"
+
+
+def terms_replaced(
+    terms: str,
+    by: str,
+    horizon: float,
+    half: float,
+    twice: float,
+    worst: tuple[float, float],
+) -> str:
+    """Return by what terms are replaced, and the relative errors of the Allan deviation.
+
+    ``half``, ``twice``: at half and at twice the horizon, s; ``worst``: largest error below the
+    horizon, and its tau, s.
+    """
+    at = number_text
+    return (
+        f"{terms}: replaced by {by}, with the same Allan variance at the horizon of "
+        f"{at(horizon)} s. The Allan deviation differs by {_signed(half)} at {at(horizon / 2)} s "
+        f"and {_signed(twice)} at {at(2 * horizon)} s. Below the horizon the largest "
+        f"difference is {_signed(worst[0])}, at {at(worst[1], 3)} s"
+    )
+
+
+def _signed(share: float) -> str:
+    return f"{100 * share:+.1f} %"
+
+
+def growing_only(label: str, term: str) -> str:
+    """Return why a noise is not in a file."""
+    return f"{label} noise {term} is not included, as its error does not grow"
+
+
+def lines_not_included(lines: str) -> str:
+    """Return why spectral lines are not in a file."""
+    return f"{lines}: not included, as a spectral line is not noise"
+
+
+def fitted_terms(terms: str) -> str:
+    """Return the model that an overbound replaces."""
+    return f"the fitted model was: {terms}"
+
+
+def overbound_used(
+    family: str,
+    longest: float,
+    band: tuple[float, float],
+    horizon: float,
+    excess: float,
+) -> str:
+    """Return what an overbound is above: times in s, frequencies in Hz.
+
+    ``excess``: its Allan deviation over the measured one at the minimum of the curve.
+    """
+    low, high = (number_text(frequency, 3) for frequency in band)
+    return (
+        f"this is the smallest {family} above the measured Allan variance at every "
+        f"tau up to {number_text(longest)} s (95 % for all together). It is also above the fitted spectral "
+        f"density from {low} to {high} Hz, and the growth of the integrals up to "
+        f"{number_text(horizon)} s. Its Allan deviation is {number_text(excess, 3)} times the "
+        "measured one at the minimum of the curve"
+    )
+
+
+def density_bounded(lowest: float, passed: float | None) -> str:
+    """Return above which frequency, Hz, the density is bounded.
+
+    ``passed``: frequency below which the fitted density is above the bound, Hz.
+    """
+    if passed is None:
+        below = "Below, the fitted density does not exceed the bound, but is less certain"
+    else:
+        below = f"The fitted density exceeds the bound below {number_text(passed, 3)} Hz"
+    return (
+        f"the spectral density is bounded above {number_text(lowest, 3)} Hz only. {below}. "
+        f"Filters that average for longer than {number_text(1.0 / lowest)} s are not covered"
+    )
+
+
+def walk_cannot_follow(T_B: float, longest: float) -> str:
+    """Return why a random walk does not suit times above ``longest``, s."""
+    return (
+        f"a random walk cannot follow a Gauss-Markov process of T_B = {number_text(T_B)} s beyond "
+        f"{number_text(longest)} s"
+    )
+
+
+def families_compared(
+    family: str,
+    excess: tuple[float, float],
+    unsuited: str | None,
+    better: Sequence[tuple[str, float]],
+    least: float,
+) -> str:
+    """Return how far a family of models is above its limit, and which are closer.
+
+    ``excess``: ratio of the Allan deviation to its limit, and its tau, s; ``least``: of all.
+    """
+    text = (
+        f"the Allan deviation of the smallest {family} is {number_text(excess[0], 3)} times its "
+        f"limit at {number_text(excess[1])} s"
+    )
+    if unsuited:
+        text += f". Reason: {unsuited}"
+    if better:
+        offers = ", ".join(f"{name} {number_text(x, 3)} times" for name, x in better)
+        return f"{text}. Smaller excess: {offers}"
+    return f"{text}. No family is closer than {number_text(least, 3)} times"
+
+
+def programs_of(family: str, programs: Sequence[str]) -> str:
+    """Return which programs support a family of models."""
+    return f"{family} is supported by {', '.join(programs)}"
+
+
+def excess_warning(text: str, programs: Sequence[str]) -> str:
+    """Return the warning of an overbound with the programs that support closer models."""
+    return "WARNING: " + "; ".join([text, *programs])
+
+
+def recording_in_doubt(recording: str, doubts: str) -> str:
+    """Return that the recording of a file has doubts."""
+    return f"{recording} is in doubt: {doubts}"
+
+
+def recording_rejected(recording: str, status: str, reason: str | None) -> str:
+    """Return why a recording has no estimates."""
+    return f"{recording} is not used, as it was {status}: {reason or 'no reason is known'}"
+
+
+def used_despite_doubts(reasons: str, because: str) -> str:
+    """Return that recordings are used all the same, with the reason of the user."""
+    return f"{reasons}; used all the same, because: {because}"
+
+
+def no_temperature(recording: str) -> str:
+    """Return why a file has no effect of the temperature."""
+    return f"not included, as {recording} has no temperature readings"
+
+
+def temperature_range(
+    reference: float, recording: str, device: str, low: float, high: float
+) -> str:
+    """Return where the effect of the temperature is measured, degC."""
+    at = number_text
+    return (
+        f"T_0 = {at(reference)} degC, from recording {recording} of device {device}. It is valid "
+        f"for that device from {at(low)} to {at(high)} degC"
+    )
+
+
+def axis_not_included(axis: str, reason: str) -> str:
+    """Return why the effect of the temperature on an axis is not in a file."""
+    return f"axis {axis} is not included: {reason}"
+
+
+def axis_slope(
+    axis: str,
+    slope: float,
+    limits: tuple[float | None, float | None],
+    square: float,
+    unit: str,
+    lag: float | None,
+) -> str:
+    """Return the effect of the temperature on an axis, in ``unit`` per K; lag in s."""
+    lower, upper = (0.0 if limit is None else limit for limit in limits)
+    bends = f", square {square:.3e} {unit}/K^2" if square else ""
+    late = "no lag" if lag is None else f"a lag of up to {number_text(lag, 3)} s is not corrected"
+    return (
+        f"axis {axis}: {slope:.4e} {unit}/K, 95 % limits {lower:.3e} to {upper:.3e}{bends}; {late}"
+    )
+
+
+def no_temperature_fit() -> str:
+    """Return why an axis is not corrected."""
+    return "no fit of the temperature"
+
+
+def sensitivity_status(status: Status, reason: str | None) -> str:
+    """Return why an axis without a sensitivity is not corrected."""
+    return f"the sensitivity is {STATUS_WORDS[status]}{_because(reason)}"
+
+
+def effect_not_shown(reason: str | None) -> str:
+    """Return why an axis is not corrected whose log does not show the effect."""
+    return f"the log does not show an effect{_because(reason)}"
+
+
+def sensitivity_uncertain(error: float, most: float) -> str:
+    """Return why an axis is not corrected; relative half-widths of the 95 % interval."""
+    return (
+        f"the sensitivity is known to {percent_text(error, 2)}, from noise and the resolution of "
+        f"the temperature, and {percent_text(most, 2)} is needed"
+    )
+
+
+def small_temperature_range(span: float, least: float) -> str:
+    """Return why an axis is not corrected; ranges in K."""
+    return (
+        f"the temperature varies by only {number_text(span, 2)} K, and {number_text(least)} K is "
+        "needed"
+    )
+
+
+def lag_status(status: Status, reason: str | None) -> str:
+    """Return why an axis with an unknown lag is not corrected."""
+    return f"its lag is {STATUS_WORDS[status]}{_because(reason)}"
+
+
+def long_lag(longest: float, horizon: float) -> str:
+    """Return why an axis with a lag, s, is not corrected."""
+    return (
+        f"it may lag the temperature by {number_text(longest, 3)} s, more than the horizon of "
+        f"{number_text(horizon)} s, and the program has no lag"
+    )
+
+
+def bias_not_linear() -> str:
+    """Return why an axis is not corrected by a program with slopes alone."""
+    return "its bias is not linear in temperature, and the program supports a slope only"
+
+
+def flicker_poles(B: float, poles: int, longest: float) -> str:
+    """Return how flicker noise, SI, is made, and up to which tau, s."""
+    return (
+        f"flicker noise B = {B:.3e} is generated by {poles} poles. Its Allan deviation is within "
+        f"11 % up to {number_text(longest)} s"
+    )
+
+
+def short_process(samples: float) -> str:
+    """Return that a process is short for a program."""
+    return (
+        f"T_B is {number_text(samples, 3)} samples, and the discretisation of the program is "
+        "inaccurate for so short a process"
+    )
+
+
+def terms_not_supported(terms: str) -> str:
+    """Return which terms a file does not have."""
+    return f"not included: {terms}"
+
+
+def value_clipped(value: float, low: float, high: float, used: float) -> str:
+    """Return that a value is outside the range of a program."""
+    return f"{value:.4g} is outside the range of {low:g} to {high:g}, and {used:g} is used"

@@ -1,0 +1,226 @@
+"""Sources and assumptions of simulated models, and of the noise that results are computed with."""
+
+from __future__ import annotations
+
+from imubench_pipeline.words.findings.base import channel_name
+from imubench_pipeline.words.numbers import counted, number_text
+
+
+def of_data_sheet(name: str, document: str | None) -> str:
+    """Return the source of a model; ``document``: of the data sheet, if it is named."""
+    return f"the data sheet of {name}" + (f": {document}" if document else "")
+
+
+def of_run(results: str, recording: str) -> str:
+    """Return the source of a model that a run estimated from a recording."""
+    return f"the estimates of a run in {results}, from the recording {recording}"
+
+
+def of_model_file(name: str, source: str | None) -> str:
+    """Return the source of a model in a file, with the source that it states."""
+    return f"the model file {name}" + (f" ({source})" if source else "")
+
+
+def stated_in(name: str) -> str:
+    """Return that a figure is as a file states it."""
+    return f"as stated in {name}"
+
+
+def printed_figure(
+    label: str, value: float, unit: str, kind: str, reason: str | None = None
+) -> str:
+    """Return a figure of the data sheet, in its unit, with its conversion."""
+    text = f"{label} {number_text(value)} {unit}: {kind}, data sheet"
+    return f"{text} ({reason})" if reason else text
+
+
+def printed_full_scale(value: float, unit: str) -> str:
+    """Return the full scale of the data sheet, in its unit."""
+    return f"full scale {number_text(value)} {unit}: data sheet"
+
+
+def chosen_range(value: float, unit: str) -> str:
+    """Return which of several full scales is assumed, in its unit."""
+    return f"range {number_text(value)} {unit}"
+
+
+def channel_not_printed(channel: str) -> str:
+    """Return why a channel is not simulated."""
+    return f"{channel_name(channel)} is not included, as no noise of it is printed"
+
+
+def one_sided_density() -> str:
+    """Return what is assumed of a density whose side is not stated."""
+    return "the printed noise density is one-sided (N is this density / √2)"
+
+
+def bias_instability_printed(floor: float, *, timed: bool) -> str:
+    """Return how a printed bias instability is used; ``floor``: over B."""
+    text = f"B is the printed bias instability / {number_text(floor, 3)}"
+    return text if timed else f"{text}, as flicker noise, because no correlation time is printed"
+
+
+def no_bias_instability() -> str:
+    """Return what is assumed without a printed bias instability."""
+    return "no bias instability, as none is printed"
+
+
+def no_random_walk() -> str:
+    """Return what is assumed without a printed K."""
+    return "no random walk K, as none is printed"
+
+
+def bias_sign_drawn() -> str:
+    """Return what is assumed of a printed bias."""
+    return "the sign of the bias is random"
+
+
+def drift_sign_drawn() -> str:
+    """Return what is assumed of a printed temperature coefficient."""
+    return "drift with temperature is 0 at 25 °C, without lag, and its sign is random"
+
+
+def no_drift() -> str:
+    """Return what is assumed without a printed temperature coefficient."""
+    return "no drift with temperature, as no coefficient is printed"
+
+
+def not_rounded() -> str:
+    """Return what is assumed without a printed sensitivity."""
+    return "values are not rounded, as no sensitivity is printed"
+
+
+def no_saturation() -> str:
+    """Return what is assumed without a printed full scale."""
+    return "no saturation, as no full scale is printed"
+
+
+def stated_cutoff(text: str) -> str:
+    """Return a cut-off as the sensor file states it."""
+    return f"cut-off {text}: stated for the log"
+
+
+def low_pass_assumed(*, known: bool) -> str:
+    """Return what is assumed of the low-pass."""
+    return "the low-pass is of first order" if known else "no low-pass, as no cut-off is known"
+
+
+def estimated_cutoff(cutoff: float, log: str) -> str:
+    """Return a cut-off, Hz, that is estimated from a log."""
+    return f"cut-off {number_text(cutoff)} Hz: estimated from {log}"
+
+
+def estimated_sensitivity(value: float, unit: str, log: str) -> str:
+    """Return a temperature sensitivity that is estimated from a log."""
+    return f"temperature sensitivity {number_text(value)} {unit}: estimated from {log}"
+
+
+def estimated_noise(model: str, method: str, log: str) -> str:
+    """Return how the noise of a model is estimated."""
+    return (
+        f"noise {model}: estimated by method {method} from {log}. "
+        "N is converted to its value before low-pass and rounding"
+    )
+
+
+def bias_at_reference(bias: float, log: str) -> str:
+    """Return a bias, rad/s, at the reference temperature of a log."""
+    return f"bias {number_text(bias)} rad/s at T_0: estimated from {log}"
+
+
+def bias_of_mean(bias: float, log: str) -> str:
+    """Return a bias, rad/s, that is the mean of a log."""
+    return f"bias {number_text(bias)} rad/s: mean of {log}"
+
+
+def log_is_simulated(log: str) -> str:
+    """Return that the source of a model is simulated."""
+    return f"{log} is itself simulated"
+
+
+def gravity_is_no_bias() -> str:
+    """Return why the bias of an accelerometer is not that of its log."""
+    return "accel: no bias from the log, as the mean of a recording is mostly gravity"
+
+
+def no_noise_model() -> str:
+    """Return why results are missing that need the noise of a sensor."""
+    return (
+        "the noise of this sensor is not known: no static recording is usable, and its data sheet "
+        "prints no noise. Add a static log of this sensor"
+    )
+
+
+def printed_noise(source: str) -> str:
+    """Return that results use printed noise."""
+    return (
+        f"typical figures of {source}, not measured. No static recording of this sensor determines "
+        "its noise"
+    )
+
+
+def static_noise(
+    recording: str,
+    method: str,
+    *,
+    device: str | None = None,
+    simulated: bool = False,
+    channels: tuple[str, str] | None = None,
+) -> str:
+    """Return from which static recording a noise model is.
+
+    ``device``: of the recording if it is another one; ``channels``: the channel that is used, and
+    the channel without an estimate, if they differ.
+    """
+    words = [f"static recording {recording}"]
+    if device is not None:
+        words.append(f"of another device, {device}")
+    if simulated:
+        words.append("simulated")
+    if channels is not None:
+        used, asked = map(channel_name, channels)
+        words.append(f"of its {used}, as {asked} has no estimate there")
+    return f"{', '.join(words)}; method {method}"
+
+
+def several_segments(segments: int) -> str:
+    """Return why a log with gaps is not used."""
+    return (
+        f"the log has {counted(segments, 'segment')}, with gaps of unknown length between them. "
+        "State one of them as 'use:' beside the log"
+    )
+
+
+def nothing_to_simulate(reasons: list[str]) -> str:
+    """Return why an estimate is not reconstructed, with the reasons of its parameters."""
+    return f"no term has a value: {'; '.join(reasons)}"
+
+
+def not_printed_by_source() -> str:
+    """Return why a parameter of the authors of a recording is not known."""
+    return "the source does not print it"
+
+
+def no_model_explains(channel: str) -> str:
+    """Return a doubt about a channel whose models do not fit."""
+    return f"no model explains the spectrum of {channel_name(channel)}"
+
+
+def estimate_doubtful() -> str:
+    """Return a doubt about a parameter without a reason."""
+    return "the estimate is doubtful"
+
+
+def not_sold() -> str:
+    """Return why recordings of a sensor are not used for decisions."""
+    return "this sensor is not sold"
+
+
+def simulated_beside_measured() -> str:
+    """Return why simulated recordings are not used beside measured ones."""
+    return "it is simulated, and other recordings are measured"
+
+
+def in_no_table() -> str:
+    """Return why a file has no result."""
+    return "it is in no table of its sensor"

@@ -1,0 +1,122 @@
+"""Reasons for what a spectrum shows: the fitted band, the filter of the sensor, lines."""
+
+from __future__ import annotations
+
+from imubench_pipeline.model.states import BandSource
+from imubench_pipeline.words.numbers import counted, number_text, percent_text
+
+
+def filter_text(kind: str, order: int, cutoff: float) -> str:
+    """Return a low-pass filter: ``analogue low-pass of order 2 at 5 Hz``."""
+    name = "running mean (boxcar)" if kind == "boxcar" else f"{kind} low-pass of order {order}"
+    return f"{name} at {number_text(cutoff)} Hz"
+
+
+def band_text(source: BandSource, highest: float, low_pass: str = "") -> str:
+    """Return why the spectrum is fitted up to a frequency, Hz; ``low_pass``: filter in it."""
+    limit = f"{number_text(highest)} Hz"
+    match source:
+        case "set":
+            return f"frequencies up to {limit} are fitted, as set"
+        case "bandwidth":
+            return f"the band ends at {limit}, a tenth of the stated bandwidth"
+        case "bend":
+            return f"the spectrum bends above {limit}, as by the filter of the sensor"
+        case "no_model":
+            return (
+                f"no model fits the spectrum up to any frequency: the band ends at {limit}, a "
+                "twentieth of the sampling rate"
+            )
+        case "whole":
+            return "the spectrum follows its model up to the Nyquist frequency"
+        case "filtered":
+            return (
+                f"with a filter ({low_pass}), the spectrum follows its model up to the Nyquist "
+                "frequency"
+            )
+        case "attenuated":
+            return (
+                f"with a filter ({low_pass}), the spectrum follows its model up to {limit}. Above, "
+                "the filter leaves too little noise"
+            )
+
+
+def cutoff_range(lower: float, upper: float) -> str:
+    """Return which cut-offs, Hz, fit the log."""
+    return f"cut-offs from {number_text(lower)} to {number_text(upper)} Hz fit the log"
+
+
+def unknown_filter(number: int) -> str:
+    """Return why a bend is no known filter; ``number``: of the filters that were tried."""
+    return f"the spectrum bends, but like none of the {number} filters that were tried"
+
+
+def filter_or_quantization(lower: float, upper: float) -> str:
+    """Return why a filter with a cut-off between limits, Hz, is not certain."""
+    return (
+        "the spectrum rises towards the Nyquist frequency. Quantization noise explains it as well "
+        f"as a low-pass with a cut-off from {number_text(lower)} to {number_text(upper)} Hz"
+    )
+
+
+def no_filter() -> str:
+    """Return why there is no cut-off."""
+    return "the spectrum shows no low-pass"
+
+
+def few_bins(bins: int, needed: int) -> str:
+    """Return why no filter is searched for."""
+    return f"the spectrum has {bins} bins, {needed} are needed. Record a longer log"
+
+
+def few_bins_left(bins: int, needed: int, highest: float, hidden: int) -> str:
+    """Return why nothing is fitted up to a frequency, Hz; ``hidden``: number of bins with lines."""
+    text = (
+        f"the log is too short: {counted(bins, 'bin')} of the spectrum up to "
+        f"{number_text(highest)} Hz can be fitted, {needed} are needed"
+    )
+    return f"{text}. Spectral lines hide {counted(hidden, 'bin')}" if hidden else text
+
+
+def process_or_filter(time: float, cutoff: float) -> str:
+    """Return why a process with T_B, s, may be a filter with a cut-off, Hz."""
+    return (
+        f"a Gauss-Markov process (T_B = {number_text(time, 3)} s) and a first-order low-pass at "
+        f"{number_text(cutoff, 3)} Hz fit equally well, as no white noise is visible. "
+        "State the bandwidth in the sensor file"
+    )
+
+
+def fast_process_or_filter(time: float) -> str:
+    """Return why a process with a correlation time, s, may be a filter."""
+    return (
+        f"a process with a correlation time of {number_text(time, 3)} s, a few samples, may be the "
+        "low-pass of the sensor. State the bandwidth in the sensor file"
+    )
+
+
+def unfiltered_noise(share: float, low_pass: str, factor: float) -> str:
+    """Return how much of N_sensor bypasses a filter.
+
+    ``share``: power of the noise that bypasses it over that of the other; ``factor``: of N_sensor.
+    """
+    return (
+        f"white noise with {percent_text(share, 2)} of the filtered power bypasses the {low_pass}, "
+        f"as in interpolated logs. N_sensor may be up to {number_text(factor, 3)} times as high"
+    )
+
+
+def worst_band(first: float, last: float, sigmas: float, *, above: bool) -> str:
+    """Return where, Hz, and by how many standard errors a spectrum departs from its model."""
+    side = "above" if above else "below"
+    return (
+        f"the spectrum is furthest from the model at {number_text(first, 3)} to "
+        f"{number_text(last, 3)} Hz, {number_text(sigmas, 2)} standard errors {side} it"
+    )
+
+
+def grouped_lines(lines: int, first: float, last: float) -> str:
+    """Return from which lines, Hz, one is made."""
+    return (
+        f"{counted(lines, 'weak line')} from {number_text(first)} to {number_text(last)} Hz, merged"
+    )
