@@ -357,11 +357,7 @@ def _without(names: Mapping[str, Any], status: str, reason: str) -> Rows:
     return Rows(
         [
             CalibrationRow(
-                **names,
-                parameter=parameter,
-                unit=UNITS[parameter],
-                status=status,
-                reason=reason,
+                **names, parameter=parameter, unit=UNITS[parameter], status=status, reason=reason
             )
             for parameter in _RUN_PARAMETERS[names["run"]]
         ]

@@ -7,11 +7,7 @@ EXTENSION = Extension(
     needs=("calibration",),
     tables="earth_rate.tables",
     blocks=(
-        Block(
-            "run",
-            "earth_rate",
-            "earth_rate.settings:EarthRateSettings",
-        ),
+        Block("run", "earth_rate", "earth_rate.settings:EarthRateSettings"),
         Block(
             "notes",
             "two_position",
@@ -19,11 +15,7 @@ EXTENSION = Extension(
             "a gyro that was turned between north and south to find the Earth's rate; "
             "null: the sensor was at rest all the time",
         ),
-        Block(
-            "simulated",
-            "two_position",
-            "earth_rate.settings:SimulatedTurns",
-        ),
+        Block("simulated", "two_position", "earth_rate.settings:SimulatedTurns"),
     ),
     motions={"two_position": "earth_rate.simulated:turned"},
     rules="rules.smk",

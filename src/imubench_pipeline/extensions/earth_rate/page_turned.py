@@ -187,11 +187,7 @@ def line(row: EarthRateRow) -> dict[str, Any]:
 def published_lines(rows: Sequence[EarthRatePublishedRow]) -> Iterator[dict[str, Any]]:
     """Yield the lines of the table of published estimates."""
     for row in rows:
-        yield {
-            **row.columns(),
-            "length": duration_text(row.duration),
-            "off": off_words(row),
-        }
+        yield {**row.columns(), "length": duration_text(row.duration), "off": off_words(row)}
 
 
 def off_words(row: EarthRatePublishedRow) -> str:
@@ -269,10 +265,7 @@ def _list_stretches(turning: Sequence[TurningRow]) -> Iterator[dict[str, Any]]:
 
 
 def _pack_figures(
-    view: RecordingView,
-    rows: Sequence[EarthRateRow],
-    turning: Sequence[TurningRow],
-    arrays: Arrays,
+    view: RecordingView, rows: Sequence[EarthRateRow], turning: Sequence[TurningRow], arrays: Arrays
 ) -> dict[str, Any]:
     """Return the data of the figures of dwells and estimates."""
     dwells, turns = ([row for row in turning if row.what == what] for what in ("dwell", "turn"))

@@ -61,8 +61,7 @@ class TwoPosition(Experiment):
         False, description="take the schedule's word where nothing of the turns is seen"
     )
     turn_on_bias: Annotated[Text, _deviation("angular_rate")] | None = Field(
-        None,
-        description="standard deviation of the fixed bias, such as 0.1 deg/s; null: not known",
+        None, description="standard deviation of the fixed bias, such as 0.1 deg/s; null: not known"
     )
     drift: Annotated[Text, _deviation("gyro_ramp")] | None = Field(
         None,
@@ -178,8 +177,7 @@ class EarthRateSettings(Strict):
         description="standard deviation of the fixed bias of gyros whose datasheet prints none",
     )
     accelerometer_bias: AccelerationFromZero = Field(
-        "20 mg",
-        description="standard deviation of that of accelerometers, likewise",
+        "20 mg", description="standard deviation of that of accelerometers, likewise"
     )
     draws: int = Field(60, ge=20, description="noise models that give the range of a sigma")
 

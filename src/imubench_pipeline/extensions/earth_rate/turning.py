@@ -32,12 +32,7 @@ from imubench_pipeline.extensions.earth_rate.transients import (
     steps,
     transients,
 )
-from imubench_pipeline.extensions.earth_rate.turns import (
-    DETECTION_ORDER,
-    FoundDwell,
-    Turn,
-    Turning,
-)
+from imubench_pipeline.extensions.earth_rate.turns import DETECTION_ORDER, FoundDwell, Turn, Turning
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.typing import Array
 

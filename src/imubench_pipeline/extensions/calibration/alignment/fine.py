@@ -31,10 +31,7 @@ from imubench_pipeline.extensions.calibration.alignment.attitude import (
 from imubench_pipeline.extensions.calibration.alignment.coarse import coarse_alignment, mean_vectors
 from imubench_pipeline.extensions.calibration.alignment.triad import Positions, Site, Triad
 from imubench_pipeline.extensions.calibration.block_filter import BlockFilter
-from imubench_pipeline.extensions.calibration.least_squares import (
-    NotObservable,
-    NotObservableError,
-)
+from imubench_pipeline.extensions.calibration.least_squares import NotObservable, NotObservableError
 from imubench_pipeline.extensions.calibration.states import block_states
 from imubench_pipeline.typing import Array
 
