@@ -39,8 +39,8 @@ EXTENSION = Extension(
         "rate_table": "calibration.pages:RATE_TABLE",
         "positions": "calibration.pages:POSITIONS",
     },
-    sections=("calibration.figures:NOT_CALIBRATED",),
-    recording_sections=("calibration.figures:at_rest",),
+    sections=("calibration.pages:NOT_CALIBRATED",),
+    recording_sections=("calibration.pages:at_rest",),
     templates="templates",
     static="static",
 )

@@ -17,12 +17,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from imubench_pipeline.estimators.missing import yield_present_samples
+from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.typing import Array
 
 Integers = NDArray[np.int64]
 
+# Least share of the samples of a block that must be present, or its mean is left out
 _MIN_PRESENT_SHARE = 0.5
-"""Least share of the samples of a block that must be present, or its mean is left out."""
 
 
 @dataclass(frozen=True)
@@ -273,3 +274,23 @@ def _compute_edges(dwell: Dwell, longest: int) -> Integers:
     length = dwell.stop - dwell.start
     number = -(-length // longest)
     return dwell.start + np.arange(number + 1) * length // number
+
+
+def block_mean_covariance(model: NoiseModel, blocks: Blocks) -> Array:
+    """Return the covariance of the means of b blocks in closed form, (rad/s)^2, shape (b, b).
+
+    It is the covariance of the samples, as `noise.simulate` draws them, summed over the blocks,
+    without the fixed bias and the Earth's rate. The random walk counts from the first sample of the
+    first block; flicker noise is its bank of Gauss-Markov processes, up to the duration of the
+    blocks. It is independent of the filter, so that bounds and standard errors computed with it
+    check the filter.
+    """
+    total = np.zeros((len(blocks), len(blocks)))
+    for term in model.realised(1.0 / blocks.rate, longest_tau(blocks)):
+        total += term.mean_covariance(blocks)
+    return total
+
+
+def longest_tau(blocks: Blocks) -> float:
+    """Return the longest tau of flicker noise, s: the duration, and at least 2 samples."""
+    return max(blocks.duration, 2.0 / blocks.rate)

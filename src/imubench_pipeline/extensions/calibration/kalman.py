@@ -32,8 +32,8 @@ from imubench_pipeline.extensions.calibration.states import UNINFORMATIVE_SIGMA,
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.typing import Array
 
+# Relative singular value of a predicted root with unit rows, below which it is rounding
 _SINGULAR_TOLERANCE = 1e-12
-"""Relative singular value of a predicted root with unit rows, below which it is rounding."""
 
 
 @dataclass(frozen=True)
@@ -186,23 +186,19 @@ class RateFilter:
         gains = np.empty((len(self.blocks) - 1, *root.shape))
         sigma = np.empty(len(self.blocks))
         sigma[-1] = deviation(root, -1)
+        n = len(root)
         for k in range(len(gains) - 1, -1, -1):
-            gains[k], rest = self._compute_smoothing(k)
+            transition, noise = self._filter.matrices(k + 1)
+            filtered = self._filter.roots[k]
+            joint = np.zeros((2 * n, n + noise.shape[1]))
+            joint[:n, :n], joint[:n, n:], joint[n:, :n] = transition @ filtered, noise, filtered
+            after = triangle(joint)
+            predicted, shared, rest = after[:n, :n], after[n:, :n], after[n:, n:]
+            # Without process noise the mean of a block depends on the states: no plain inverse.
+            scale = np.linalg.norm(predicted, axis=1)
+            unit = np.where(scale > 0.0, scale, 1.0)
+            inverse = np.linalg.pinv(predicted / unit[:, None], rcond=_SINGULAR_TOLERANCE)
+            gains[k] = shared @ inverse / unit
             root = triangle(np.concatenate([rest, gains[k] @ root], axis=1))
             sigma[k] = deviation(root, -1)
         return gains, sigma
-
-    def _compute_smoothing(self, k: int) -> tuple[Array, Array]:
-        """Return the smoother gain at a block, and a root of its covariance given the next one."""
-        transition, noise = self._filter.matrices(k + 1)
-        root = self._filter.roots[k]
-        n = len(root)
-        joint = np.zeros((2 * n, n + noise.shape[1]))
-        joint[:n, :n], joint[:n, n:], joint[n:, :n] = transition @ root, noise, root
-        after = triangle(joint)
-        predicted, shared, rest = after[:n, :n], after[n:, :n], after[n:, n:]
-        # Without process noise the mean of a block depends on the states: no plain inverse.
-        scale = np.linalg.norm(predicted, axis=1)
-        unit = np.where(scale > 0.0, scale, 1.0)
-        gain = shared @ np.linalg.pinv(predicted / unit[:, None], rcond=_SINGULAR_TOLERANCE) / unit
-        return gain, rest

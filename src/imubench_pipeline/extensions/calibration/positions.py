@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import asdict, replace
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -16,50 +15,38 @@ from imubench_pipeline.extensions.calibration.alignment.fine import align
 from imubench_pipeline.extensions.calibration.alignment.triad import Positions, Site, Triad
 from imubench_pipeline.extensions.calibration.experiment import Dwell, Experiment, block_means
 from imubench_pipeline.extensions.calibration.least_squares import NotObservableError
-from imubench_pipeline.extensions.calibration.settings import TRIAD, InPositions
+from imubench_pipeline.extensions.calibration.settings import TRIAD, InPositions, SimulatedPositions
 from imubench_pipeline.extensions.calibration.tables import CalibrationRow
 from imubench_pipeline.extensions.earth_rate.outlook import noise_at_rest
-from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.recordings.recording import ChannelLog
 from imubench_pipeline.settings.sensor import Sensor
 from imubench_pipeline.steps.noise_source import NO_MODEL, from_printed, segments_reason
+from imubench_pipeline.tables.keys import Key
+from imubench_pipeline.typing import Array
 from imubench_pipeline.units import quantity_to_si
 
 ANGLES = ("roll", "pitch", "heading")
 """Estimated angles, of the first position."""
 
-_Z_95 = 1.96
-"""Standard deviations of a 95 % limit."""
+_Z_95 = 1.96  # standard deviations of a 95 % limit
 
 
 def attitude_rows(
-    names: Mapping[str, Any],
+    key: Key,
     logs: Mapping[str, ChannelLog],
     static: Sequence[Path],
     sensor: Sensor,
     declared: InPositions,
     truth: Mapping[str, float],
 ) -> Iterator[CalibrationRow]:
-    """Yield roll, pitch and heading of the first position, or why they are not found.
+    """Yield roll, pitch and heading of the first position, or the reason without them.
 
-    Parameters
-    ----------
-    names : mapping
-        Sensor and recording.
-    logs : mapping of str to ChannelLog
-        The channels that can be analysed.
-    static : sequence of Path
-        Folders of the static recordings of the same sensor.
-    sensor : Sensor
-    declared : InPositions
-    truth : mapping of str to float
-        The angles of a simulation, rad.
+    `logs` are the channels that can be analysed, `static` the folders of the static recordings of
+    the same sensor, `truth` the angles of a simulation, rad.
     """
     about = partial(
         CalibrationRow,
-        sensor=names["sensor"],
-        recording=names["recording"],
-        channel="gyro_x",
+        **asdict(key),
         run="positions",
         unit="rad",
         latitude=declared.latitude_si,
@@ -78,11 +65,17 @@ def attitude_rows(
     if any(len(log.segments) > 1 for log in axes):
         yield from without("not_shown", segments_reason(axes[0]))
         return
-    noise = _noise(names["sensor"], static, sensor)
-    if noise is None:
-        yield from without("no_model", NO_MODEL)
-        return
-    models, words = noise
+    at_rest = noise_at_rest(static)
+    if at_rest is not None and any(channel.startswith("accel") for channel in at_rest.models):
+        models = [*at_rest.three("gyro").values(), *at_rest.three("accel").values()]
+        words = f"static recording {at_rest.recording}"
+    else:
+        printed = [from_printed(key.sensor, sensor, channel) for channel in TRIAD]
+        known = [source for source in printed if source is not None]
+        if len(known) < 6:
+            yield from without("no_model", NO_MODEL)
+            return
+        models, words = [source.model for source in known], known[0].words
     about = partial(about, model=models[0].name, model_from=words)
     try:
         positions, means = _means(axes, declared)
@@ -117,22 +110,7 @@ def attitude_rows(
         )
 
 
-def _noise(
-    name: str, static: Sequence[Path], sensor: Sensor
-) -> tuple[list[NoiseModel], str] | None:
-    """Return the noise of the six axes, and where it is from; None where nothing tells it."""
-    at_rest = noise_at_rest(static)
-    if at_rest is not None and any(channel.startswith("accel") for channel in at_rest.models):
-        six = [*at_rest.three("gyro").values(), *at_rest.three("accel").values()]
-        return six, f"static recording {at_rest.recording}"
-    printed = [from_printed(name, sensor, channel) for channel in TRIAD]
-    known = [source for source in printed if source is not None]
-    return ([source.model for source in known], known[0].words) if len(known) == 6 else None
-
-
-def _means(
-    axes: Sequence[ChannelLog], declared: InPositions
-) -> tuple[Positions, np.ndarray[Any, np.dtype[np.float64]]]:
+def _means(axes: Sequence[ChannelLog], declared: InPositions) -> tuple[Positions, Array]:
     """Return the positions of a log, and the mean of each axis in each, shape (b, 6)."""
     rate, grid = axes[0].rate, min(log.grid for log in axes)
     dwell, turning = declared.seconds("dwell"), declared.seconds("turning")
@@ -148,20 +126,18 @@ def _means(
     experiment = Experiment(tuple(dwells), rate, 0.0)
     longest = max(one.stop - one.start for one in dwells)
     measured = [block_means(log.blocks(), experiment, longest) for log in axes]
-    counts = {len(one.blocks) for one in measured}
-    if counts != {len(dwells)}:
+    if {len(one.blocks) for one in measured} != {len(dwells)}:
         raise ValueError("too many samples of a position are missing")
     angles = np.zeros((len(dwells), 3))
     angles[:, 2] = [declared.angle(number) for number in range(len(dwells))]
-    blocks = replace(
-        measured[0].blocks, count=np.min([one.blocks.count for one in measured], axis=0)
-    )
+    count = np.min([one.blocks.count for one in measured], axis=0)
+    blocks = replace(measured[0].blocks, count=count)
     means = np.stack([one.means[0] for one in measured], axis=1)
     return Positions(blocks, rotation(angles)), means
 
 
-def true_angles(declared: Mapping[str, str]) -> dict[str, float]:
-    """Return roll, pitch and heading as declared, rad, the heading from -pi to pi."""
-    angles = {name: quantity_to_si(declared[name], "angle") for name in ANGLES}
+def true_angles(simulated: SimulatedPositions) -> dict[str, float]:
+    """Return roll, pitch and heading of a simulation, rad, the heading from -pi to pi."""
+    angles = {name: quantity_to_si(getattr(simulated, name), "angle") for name in ANGLES}
     angles["heading"] = math.remainder(angles["heading"], 2.0 * math.pi)
     return angles

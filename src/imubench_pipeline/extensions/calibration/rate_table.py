@@ -30,8 +30,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2
 
-from imubench_pipeline.extensions.calibration.covariance import block_mean_covariance
-from imubench_pipeline.extensions.calibration.experiment import Blocks, Measured, block_means
+from imubench_pipeline.extensions.calibration.experiment import (
+    Blocks,
+    Measured,
+    block_mean_covariance,
+    block_means,
+)
 from imubench_pipeline.extensions.calibration.least_squares import (
     CONFIDENCE_LEVEL,
     Fit,
@@ -48,15 +52,10 @@ from imubench_pipeline.extensions.calibration.schedule import Schedule
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.typing import Array
 
+# Largest unknown part of the Earth's rate along the axis that is ignored, rad/s
 _MAX_UNKNOWN_RATE = 1e-12
-"""Largest unknown part of the Earth's rate along the axis that is ignored, rad/s."""
 
-_NO_SCALE = NotObservable(
-    "asymmetry", "the gyro does not follow the table: there is no scale factor to be a fraction of"
-)
-
-_RATE_TOLERANCE = 1e-9
-"""Relative difference below which two rates are equal up to rounding."""
+_RATE_TOLERANCE = 1e-9  # relative difference below which two rates are equal up to rounding
 
 
 @dataclass(frozen=True)
@@ -177,11 +176,8 @@ class RateTable:
     ) -> None:
         if not (math.isfinite(setting_sigma) and setting_sigma >= 0):
             raise ValueError(f"setting_sigma is {setting_sigma}, expected a number from 0")
-        if (
-            pointing is not None
-            and pointing.heading is None
-            and pointing.half_width > _MAX_UNKNOWN_RATE
-        ):
+        open_heading = pointing is not None and pointing.heading is None
+        if pointing and open_heading and pointing.half_width > _MAX_UNKNOWN_RATE:
             raise ValueError(
                 "the heading of the table's axis is not known: give it, or leave the direction out "
                 "and the Earth's rate is a part of the bias"
@@ -243,16 +239,18 @@ class RateTable:
         ValueError
             If there is not one finite mean a block.
         """
-        line = self._line.fit(means)
-        asymmetry = self._fit_asymmetry(means)
-        still = self._asymmetry is not None and asymmetry is None
+        line, quadratic = self._line.fit(means), None
+        if (squares := self._quadratic) is not None:
+            quadratic = Term(squares.fit(means).value[:, -1], float(squares.sigma[-1]))
+        asymmetry, not_observable = self._fit_asymmetry(means), self._open
+        if self._asymmetry is not None and asymmetry is None:
+            reason = (
+                "the gyro does not follow the table: there is no scale factor to be a fraction of"
+            )
+            not_observable = [*self._open, NotObservable("asymmetry", reason)]
+        linearity = self._test_linearity(line, means)
         return Calibration(
-            line,
-            self.sigma[0],
-            _fit_term(self._quadratic, means),
-            asymmetry,
-            self._test_linearity(line, means),
-            (*self._open, *[_NO_SCALE] * still),
+            line, self.sigma[0], quadratic, asymmetry, linearity, tuple(not_observable)
         )
 
     def _test_linearity(self, line: Fit, means: Array) -> Linearity | None:
@@ -324,12 +322,6 @@ def _index_levels(rate: Array) -> NDArray[np.int64]:
     levels = np.empty(len(rate), dtype=np.int64)
     levels[order] = np.cumsum(risen)
     return levels
-
-
-def _fit_term(squares: LeastSquares | None, means: Array) -> Term | None:
-    if squares is None:
-        return None
-    return Term(squares.fit(means).value[:, -1], float(squares.sigma[-1]))
 
 
 @dataclass(frozen=True)

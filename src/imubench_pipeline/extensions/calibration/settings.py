@@ -24,8 +24,8 @@ from imubench_pipeline.settings.validation import (
 )
 from imubench_pipeline.units import quantity_to_si
 
+# Largest uncertainty of the Earth's rate about an axis without a heading, rad/s
 _MAX_UNKNOWN_EARTH_RATE = 1e-9
-"""Largest uncertainty of the Earth's rate about an axis without a heading, rad/s."""
 
 TRIAD = ("gyro_x", "gyro_y", "gyro_z", "accel_x", "accel_y", "accel_z")
 """The axes that it takes, in the order of `imubench_pipeline.extensions.calibration.alignment`."""

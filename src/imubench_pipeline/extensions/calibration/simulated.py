@@ -53,7 +53,7 @@ def in_positions(recording: SimulatedRecording, rate: float) -> dict[str, Sample
     at = np.arange(samples) / rate
     angle = np.interp(at, times, angles)
     turned = np.diff(np.interp(at[0] + (np.arange(samples + 1) - 0.5) / rate, times, angles)) * rate
-    attitude = matrix(*true_angles(positions.model_dump()).values())
+    attitude = matrix(*true_angles(positions).values())
     true = sensed(Site(latitude=positions.latitude_si), attitude, angle, turned)
     return {name: SampledProfile(true[:, k], rate) for k, name in enumerate(TRIAD)}
 

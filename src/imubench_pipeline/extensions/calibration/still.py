@@ -35,8 +35,8 @@ from imubench_pipeline.extensions.calibration.pointing import Pointing
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.typing import Array
 
+# Least share of the Earth's rate along an axis that may depend on the heading
 _MIN_HEADING_SENSITIVITY = 1e-9
-"""Least share of the Earth's rate along an axis that may depend on the heading."""
 
 
 @dataclass(frozen=True)

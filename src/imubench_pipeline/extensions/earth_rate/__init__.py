@@ -17,7 +17,7 @@ EXTENSION = Extension(
         ),
         Block("simulated", "two_position", "earth_rate.settings:SimulatedTurns"),
     ),
-    motions={"two_position": "earth_rate.simulated:turned"},
+    motions={"two_position": "earth_rate.simulation:turned"},
     rules="rules.smk",
     pages=("earth_rate.page:EARTH_RATE_PAGE",),
     recording_pages={"two_position": "earth_rate.page_turned:TURNED_PAGE"},

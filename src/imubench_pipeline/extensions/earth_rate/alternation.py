@@ -11,11 +11,10 @@ import numpy as np
 from imubench_pipeline.extensions.earth_rate.transients import LevelBlocks, calm_means
 from imubench_pipeline.typing import Array
 
+# Least size, in standard errors, of the alternations before and after an extra turn
 _MIN_CONTRADICTION_SIGMAS = 3.5
-"""Least size, in standard errors, of the alternations before and after an extra turn."""
-
+# Variance of the mean of a dwell over the variance of an A-B-A difference / 4, in white noise
 _WHITE_VARIANCE_RATIO = 16.0 / 6.0
-"""Variance of the mean of a dwell over the variance of an A-B-A difference / 4, in white noise."""
 
 
 @dataclass(frozen=True)
@@ -37,21 +36,11 @@ def differences(
 ) -> tuple[Array, Array]:
     """Return the A-B-A differences of the dwells, with equal signs.
 
-    They are (-1)^i (2 m_i - m_(i-1) - m_(i+1)) / 4, where a drift that is linear over three dwells
-    cancels. For two dwells, half their difference is returned.
-
-    Parameters
-    ----------
-    blocks : LevelBlocks
-    stretches : sequence of (float, float)
-        Start and stop of the dwells, s; at least two.
-
-    Returns
-    -------
-    difference : ndarray, shape (n - 2,), or (1,) of two dwells
-        rad/s; positive where the first dwell is of the sense that reads more.
-    white : ndarray, shape (n,)
-        Variance of the means of the dwells from the noise of the blocks alone, (rad/s)^2.
+    They are (-1)^i (2 m_i - m_(i-1) - m_(i+1)) / 4, rad/s, shape (n - 2,), where a drift that is
+    linear over three dwells cancels; for two dwells, half their difference. They are positive if
+    the sense of the first dwell reads more. Also returned is the variance of the means of the
+    dwells from the noise of the blocks alone, (rad/s)^2, shape (n,). ``stretches`` are start and
+    stop of the dwells, s, at least two.
     """
     total = np.concatenate(([0.0], np.cumsum(calm_means(blocks))))
     present = np.concatenate(([0], np.cumsum(blocks.present)))
@@ -71,11 +60,8 @@ def alternation(blocks: LevelBlocks, stretches: Sequence[tuple[float, float]]) -
     """Return the mean of the A-B-A differences, with its standard error.
 
     The error assumes white noise with the observed scatter, and at least the noise of the blocks.
-
-    `blocks` and `stretches`: as of `differences`.
     """
-    difference, white = differences(blocks, stretches)
-    return _average(difference, white)
+    return _average(*differences(blocks, stretches))
 
 
 def _average(difference: Array, white: Array) -> Alternation:
@@ -96,8 +82,6 @@ def contradiction(blocks: LevelBlocks, stretches: Sequence[tuple[float, float]])
     """Return the dwell from which the alternation has the opposite sign, or None.
 
     An extra or a missed turn inverts the sign of all later dwells. The result only raises a doubt.
-
-    `blocks` and `stretches`: as of `differences`.
     """
     difference, white = differences(blocks, stretches)
     if len(difference) < 6:
@@ -119,19 +103,8 @@ def best_shift(
 
     Only the constancy of the alternation is used, not its size or sign. All shifts share one
     standard error, so that z^2 is twice the log-likelihood. Returned are the shift, s, and the
-    alternation in standard errors with and without it.
-
-    Parameters
-    ----------
-    blocks : LevelBlocks
-    turns : ndarray, shape (n,)
-        Middle of the turns of the schedule, s.
-    half_width : float
-        Half of the time that is left out about a turn, s.
-    longest : float
-        Largest shift to try to either side, s.
-    duration : float
-        Of the log, s.
+    alternation in standard errors with and without it. The largest shift to either side is
+    ``longest``, s; the turns are those of the schedule (see `split_at_turns`).
     """
     shifts = np.arange(-math.floor(longest / 0.5), math.floor(longest / 0.5) + 1) * 0.5
     alternations = []

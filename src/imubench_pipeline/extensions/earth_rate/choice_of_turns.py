@@ -18,37 +18,28 @@ _MIN_CALM, _MIN_CALM_PER_DWELL, _MAX_REQUIRED_CALM = 2.5, 0.2, 6.0
 """Least calm between two turns, in s, in dwells, and its upper limit in s; closer events belong to
 the same turn."""
 
-_DOUBLE_DWELL_SHARE = 0.07
-"""Prior share of the dwells that last twice as long."""
-
-_EXTRA_DWELL_FACTOR = 0.35
-"""Factor on the prior share for each further dwell without a turn."""
-
-_KNOCKS_PER_DWELL = 0.01
-"""Expected disturbances as long as a turn, per dwell."""
+_DOUBLE_DWELL_SHARE = 0.07  # prior share of the dwells that last twice as long
+_EXTRA_DWELL_FACTOR = 0.35  # factor on the prior share for each further dwell without a turn
+_KNOCKS_PER_DWELL = 0.01  # expected disturbances as long as a turn, per dwell
 
 _MAX_WEAKNESS_COST = 3.5
 """Largest log-likelihood cost of a clear transient that is weaker than the usual turn; noise is
 excluded for it."""
 
-_FALSE_ALARM_PLACES = 8.0
-"""Independent places where noise can look like a transient, 1/s."""
-
+_FALSE_ALARM_PLACES = 8.0  # independent places where noise can look like a transient, 1/s
+# Weight of the given tolerance, as a number of dwells, against the dwells found
 _PRIOR_DWELLS = 5.0
-"""Weight of the given tolerance, as a number of dwells, against the dwells found."""
 
 _MIN_STRENGTH_SIGMA, _MIN_STEP_STRENGTH_SIGMA = 0.4, 0.15
 """Least standard deviation of the strengths of turns. Turns by hand vary more than steps, whose
 height is set by the Earth's rate."""
 
+# Strength below which a turn is hardly detectable, and the largest share of such turns
 _WEAK_STRENGTH, _MAX_WEAK_SHARE = math.log(2.0), 0.02
-"""Strength below which a turn is hardly detectable, and the largest share of such turns."""
-
+# Least number of transients, and least share of equal intervals, that show a pace of their own
 _MIN_PACE_TRANSIENTS, _MIN_EQUAL_INTERVAL_SHARE = 5, 0.75
-"""Least number of transients, and least share of equal intervals, that show a pace of their own."""
-
+# Probability that a turn is not detected, above which the schedule fills a gap
 _MAX_MISS_PROBABILITY = 0.05
-"""Probability that a turn is not detected, above which the schedule fills a gap."""
 
 
 def compute_min_calm(dwell: float) -> float:

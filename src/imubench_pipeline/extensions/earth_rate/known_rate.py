@@ -149,24 +149,14 @@ def mean_sigma(
         As `track`.
     """
     one = _build_filter(model, rate)
-    return _propagate_sigma(
-        samples,
-        start,
-        np.array([one.decay, one.of_f, one.of_rrw, one.white]),
-        np.array([one.stationary, turn_on_bias**2]),
-    )
-
-
-def _propagate_sigma(samples: int, start: float, matrices: Array, initial: Array) -> Array:
-    """Propagate the covariance of [z_f, z_rrw, tracked z_f, tracked z_rrw, sum of residuals]."""
-    decay, of_f, of_rrw, white = matrices
+    decay, of_f, of_rrw, white = one.decay, one.of_f, one.of_rrw, one.white
     sigma = np.empty(samples)
+    # Covariance of [z_f, z_rrw, tracked z_f, tracked z_rrw, sum of residuals].
     joint = np.zeros((5, 5))
-    joint[0, 0], joint[1, 1] = initial
+    joint[0, 0], joint[1, 1] = one.stationary, turn_on_bias**2
     var_f, cross, var_rrw = start, 0.0, start
     seen = np.array([[1.0, 1.0, -1.0, -1.0, 0.0]])
     moved = np.array([decay, 1.0, decay, 1.0, 1.0])
-    driven = np.array([initial[0] * (1.0 - decay * decay), of_rrw])
     for k in range(samples):
         to_f, to_rrw = var_f + cross, cross + var_rrw
         total = to_f + to_rrw + white
@@ -176,8 +166,8 @@ def _propagate_sigma(samples: int, start: float, matrices: Array, initial: Array
         joint = step @ joint @ step.T + white * (noise @ noise.T)
         sigma[k] = math.sqrt(joint[4, 4]) / (k + 1)
         joint = joint * np.outer(moved, moved)
-        joint[0, 0] += driven[0]
-        joint[1, 1] += driven[1]
+        joint[0, 0] += one.stationary * (1.0 - decay * decay)
+        joint[1, 1] += of_rrw
         var_f = decay * decay * (var_f - to_f * to_f / total) + of_f
         cross = decay * (cross - to_f * to_rrw / total)
         var_rrw += of_rrw - to_rrw * to_rrw / total

@@ -14,8 +14,6 @@ from functools import partial
 from itertools import product
 from pathlib import Path
 
-import numpy as np
-
 from imubench_pipeline.estimators.rows import recommended_estimates
 from imubench_pipeline.extensions.calibration.alignment.accuracy import accuracies
 from imubench_pipeline.extensions.calibration.alignment.fine import UNIFORM_HEADING_SIGMA
@@ -40,8 +38,7 @@ DWELL = 28.0
 TURN_TIME = 2.0
 """Duration of a turn, s."""
 
-_SIMULATED_TRIADS = 400
-"""Number of simulated triads of the check; their rms is accurate to 3.5 %."""
+_SIMULATED_TRIADS = 400  # number of simulated triads of the check; their rms is accurate to 3.5 %
 
 _CHECK_SEED = 20260101
 _TYPICAL_KINDS = ("1sigma", "typ")
@@ -74,12 +71,8 @@ class Noise:
         gyros = [name for name in self.models if name.startswith("gyro_")]
         if not gyros:
             return None
-        tau = np.array([DWELL])
-
-        def over_dwell(name: str) -> float:
-            return float(self.models[name].allan_variance(tau)[0])
-
-        return sorted(gyros, key=over_dwell)[len(gyros) // 2]
+        variances = {name: float(self.models[name].allan_variance(DWELL)) for name in gyros}
+        return sorted(gyros, key=variances.__getitem__)[len(gyros) // 2]
 
 
 def noise_at_rest(folders: Sequence[Path]) -> Noise | None:

@@ -8,15 +8,13 @@ from typing import Any
 import numpy as np
 
 from imubench_pipeline.earth import EARTH_RATE
-from imubench_pipeline.extensions.calibration.figures import calibrated, of_all, without_result
+from imubench_pipeline.extensions.calibration.pages import calibrated, of_all, without_result
 from imubench_pipeline.extensions.earth_rate.page_turned import (
     ESTIMATES,
     answer,
     given_words,
-    latitude_text,
     line,
     needs,
-    off_words,
     prediction_payload,
     published_lines,
 )
@@ -52,18 +50,18 @@ def predicted(site: Site) -> list[RecordingView]:
 
 def _make_context(site: Site) -> dict[str, Any]:
     arrays = Arrays()
-    runs = [_describe_run(site, view) for view in turned(site)]
-    published = [row for view in turned(site) for row in view.rows(EarthRatePublishedRow)]
+    turned_gyros = turned(site)
+    published = [row for view in turned_gyros for row in view.rows(EarthRatePublishedRow)]
     predicted = list(_list_predictions(site))
     aligned = alignments(site, arrays)
     return {
         "truth": EARTH_RATE,
-        "runs": runs,
-        "given": given_words([row for view in turned(site) for row in view.rows(EarthRateRow)]),
-        "rejected": [view for view in turned(site) if view.left_out],
+        "runs": [_describe_run(site, view) for view in turned_gyros],
+        "given": given_words([row for view in turned_gyros for row in view.rows(EarthRateRow)]),
+        "rejected": [view for view in turned_gyros if view.left_out],
         "published": [
             {**line, "view": view}
-            for view in turned(site)
+            for view in turned_gyros
             for line in published_lines(view.rows(EarthRatePublishedRow))
         ],
         "verdict": published_words(published),
@@ -74,7 +72,16 @@ def _make_context(site: Site) -> dict[str, Any]:
         "page": {
             "looks": {},
             "channels": [],
-            "published": [_pack_estimates(row) for row in published],
+            "published": [
+                {
+                    "name": row.recording + ("" if row.part == "whole" else f", {row.part}"),
+                    "published": row.published,
+                    "truth": row.truth,
+                    "sigma": row.sigma,
+                    "simulated": row.simulated,
+                }
+                for row in published
+            ],
             "predictions": {
                 line["place"]: prediction_payload(line["rows"], arrays) for line in predicted
             },
@@ -135,19 +142,8 @@ def _list_predictions(site: Site) -> Iterator[dict[str, Any]]:
         if needed is None or (view.sensor, needed) in yielded:
             continue
         yielded.append((view.sensor, needed))
-        place = f"{view.sensor}-{view.name}"
-        latitude = latitude_text(rows)
+        place, latitude = f"{view.sensor}-{view.name}", degrees_text(rows[0].latitude)
         yield needed | {"view": view, "place": place, "rows": rows, "latitude": latitude}
-
-
-def _pack_estimates(row: EarthRatePublishedRow) -> dict[str, Any]:
-    return {
-        "name": row.recording + ("" if row.part == "whole" else f", {row.part}"),
-        "published": row.published,
-        "truth": row.truth,
-        "sigma": row.sigma,
-        "simulated": row.simulated,
-    }
 
 
 def published_words(rows: Sequence[EarthRatePublishedRow]) -> str:
@@ -155,10 +151,6 @@ def published_words(rows: Sequence[EarthRatePublishedRow]) -> str:
     if not rows:
         return ""
     beyond = [row for row in rows if row.verdict == "beyond the noise"]
-    names = ", ".join(
-        row.recording + ("" if row.part == "whole" else f" ({row.part})") + f" by {off_words(row)}"
-        for row in beyond
-    )
     if not beyond:
         every = (
             "the error of the published estimate"
@@ -167,6 +159,12 @@ def published_words(rows: Sequence[EarthRatePublishedRow]) -> str:
         )
         return f"Noise explains {every}. {_describe_gain(rows)}"
     within = len(rows) - len(beyond)
+    names = ", ".join(
+        row.recording
+        + ("" if row.part == "whole" else f" ({row.part})")
+        + f" by {number_text(row.off_sigma, 3)} σ"
+        for row in beyond
+    )
     return (
         f"The noise that the source prints explains {counted(within, 'published estimate')}. "
         f"{len(beyond)} of {len(rows)} {'has' if len(beyond) == 1 else 'have'} a larger error: "
@@ -192,8 +190,7 @@ def _describe_gain(rows: Sequence[EarthRatePublishedRow]) -> str:
     )
 
 
-_TABLE_TIMES = (60.0, 600.0, 3600.0)
-"""Times at rest that the table shows, s; the figure has more."""
+_TABLE_TIMES = (60.0, 600.0, 3600.0)  # times at rest that the table shows, s; the figure has more
 
 _POSITION_TEXTS = {1: "one position", 2: "two opposite positions"}
 
@@ -201,11 +198,11 @@ _POSITION_TEXTS = {1: "one position", 2: "two opposite positions"}
 def alignments(site: Site, arrays: Arrays) -> list[dict[str, Any]]:
     """Return the section of each sensor with gyros and accelerometers; ``arrays`` gets its data."""
     entries = []
+    unit, fine = page_unit("gyro", "adev", site.system), page_unit("accel", "adev", "si")
     for view in site.views:
         rows = view.rows(AlignmentRow)
         if rows:
             about = rows[0]
-            unit, fine = page_unit("gyro", "adev", site.system), page_unit("accel", "adev", "si")
             entries.append(
                 {
                     "view": view,
@@ -217,7 +214,18 @@ def alignments(site: Site, arrays: Arrays) -> list[dict[str, Any]]:
                         f"({about.accelerometer_bias_from})."
                     ),
                     "axes": _describe_missing_axes(about),
-                    "lines": [_format_line(row) for row in rows if row.time in _TABLE_TIMES],
+                    "lines": [
+                        {
+                            "position": _POSITION_TEXTS[row.positions],
+                            "method": row.method,
+                            "time": duration_text(row.time),
+                            "roll": _format_angle(row.roll),
+                            "pitch": _format_angle(row.pitch),
+                            "heading": _format_angle(row.heading),
+                        }
+                        for row in rows
+                        if row.time in _TABLE_TIMES
+                    ],
                     "none": list(dict.fromkeys(sentence(row.reason) for row in rows if row.reason)),
                     "check": _describe_check(rows),
                     "drawn": _pack_curves(rows, arrays),
@@ -239,17 +247,6 @@ def _describe_missing_axes(row: AlignmentRow) -> str:
     return f"The log has no {', '.join(lent_axes)}; the other axes replace them."
 
 
-def _format_line(row: AlignmentRow) -> dict[str, Any]:
-    return {
-        "position": _POSITION_TEXTS[row.positions],
-        "method": row.method,
-        "time": duration_text(row.time),
-        "roll": _format_angle(row.roll),
-        "pitch": _format_angle(row.pitch),
-        "heading": _format_angle(row.heading),
-    }
-
-
 def _format_angle(value: float | None) -> str:
     return "not determined" if value is None else degrees_text(value, 3)
 
@@ -260,15 +257,11 @@ def _describe_check(rows: Sequence[AlignmentRow]) -> str:
     for row in rows:
         if row.simulated is None:
             continue
+        errors = {"roll": row.error_roll, "pitch": row.error_pitch, "heading": row.error_heading}
         ratios = (
-            ("roll", row.error_roll),
-            ("pitch", row.error_pitch),
-            ("heading", row.error_heading),
+            f"{name} {number_text(one, 3)}" for name, one in errors.items() if one is not None
         )
-        ratio_words = ", ".join(
-            f"{name} {number_text(ratio, 3)}" for name, ratio in ratios if ratio is not None
-        )
-        comparisons.append(f"in {_POSITION_TEXTS[row.positions]} {ratio_words}")
+        comparisons.append(f"in {_POSITION_TEXTS[row.positions]} {', '.join(ratios)}")
     if not comparisons:
         return ""
     number = next(row.simulated for row in rows if row.simulated is not None)
@@ -285,11 +278,10 @@ def _pack_curves(rows: Sequence[AlignmentRow], arrays: Arrays) -> list[dict[str,
     for positions in _POSITION_TEXTS:
         for method in ("coarse", "fine"):
             own = [r for r in rows if r.positions == positions and r.method == method]
-            values = {
-                "heading": [r.heading for r in own],
-                "level": [_find_largest(r.roll, r.pitch) for r in own],
-            }
-            for angle, sigma in values.items():
+            level = [
+                None if r.roll is None or r.pitch is None else max(r.roll, r.pitch) for r in own
+            ]
+            for angle, sigma in (("heading", [r.heading for r in own]), ("level", level)):
                 points = [(r.time, s) for r, s in zip(own, sigma, strict=True) if s]
                 if points:
                     courses.append(
@@ -302,8 +294,3 @@ def _pack_curves(rows: Sequence[AlignmentRow], arrays: Arrays) -> list[dict[str,
                         }
                     )
     return courses
-
-
-def _find_largest(*angles: float | None) -> float | None:
-    """Return the largest angle; None if one is unknown."""
-    return None if None in angles else max(angle for angle in angles if angle is not None)

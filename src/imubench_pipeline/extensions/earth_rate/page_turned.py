@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
+from operator import attrgetter
 from pathlib import Path
 from typing import Any
 
 from imubench_pipeline.earth import EARTH_RATE
-from imubench_pipeline.extensions.calibration.figures import noise_words
+from imubench_pipeline.extensions.calibration.pages import noise_words
 from imubench_pipeline.extensions.earth_rate.tables import (
     EarthRatePredictionRow,
     EarthRatePublishedRow,
@@ -31,24 +32,16 @@ from imubench_pipeline.words.numbers import (
     sentence,
 )
 
-METHOD_TERMS = {
-    "pairs": "by_pairs",
-    "triples": "by_triples",
-    "filter": "rate_filter",
-    "smoother": "rate_smoother",
-    "known_rate": "known_rate",
-    "known_rate_radians": "known_rate",
+_METHODS = {
+    "pairs": ("by_pairs", "pairs of dwells"),
+    "triples": ("by_triples", "A-B-A differences"),
+    "filter": ("rate_filter", "filter, rate unknown"),
+    "smoother": ("rate_smoother", "smoother, rate unknown"),
+    "known_rate": ("known_rate", "bias tracking with known rate, P₀ in (°/s)²"),
+    "known_rate_radians": ("known_rate", "bias tracking with known rate, P₀ in (rad/s)²"),
 }
-"""Term of the glossary of each method."""
+"""Term of the glossary, and words, of each method."""
 
-METHOD_WORDS = {
-    "pairs": "pairs of dwells",
-    "triples": "A-B-A differences",
-    "filter": "filter, rate unknown",
-    "smoother": "smoother, rate unknown",
-    "known_rate": "bias tracking with known rate, P₀ in (°/s)²",
-    "known_rate_radians": "bias tracking with known rate, P₀ in (rad/s)²",
-}
 ESTIMATES = ("filter", "pairs", "triples")
 """The methods that estimate the rate, the recommended one first; filter and smoother agree."""
 
@@ -63,10 +56,13 @@ def context(site: Site, view: RecordingView, folder: Path) -> dict[str, Any]:
     parts = list(dict.fromkeys(row.part for row in rows if row.value is not None))
     envelope = rows_of_samples(folder, EnvelopeRow)
     prediction = view.rows(EarthRatePredictionRow)
+    latitude = degrees_text(rows[0].latitude) if rows else ""
+    turns = counted(sum(event.what == "turn" for event in turning), "turn")
+    summary = [f"{turns} between north and south", *[f"at latitude {latitude}"] * bool(rows)]
     return {
         **about_of(site, view, [], folder),
         "channel": channel,
-        "summary": _summarise(view, turning, rows),
+        "summary": summary_words(view, summary),
         "answer": answer(whole, site.system),
         "doubts": [sentence(row.doubts) for row in turning if row.what == "doubt"],
         "findings": view.findings,
@@ -74,7 +70,7 @@ def context(site: Site, view: RecordingView, folder: Path) -> dict[str, Any]:
         "given": given_words(rows),
         "noise": noise_words(rows),
         "has_range": any(row.sigma_lower is not None for row in rows),
-        "latitude": latitude_text(rows) if rows else "",
+        "latitude": latitude,
         "parts": parts,
         "has_samples": any(row.channel == channel for row in envelope),
         "has_drift": any(row.quantity == "drift" for row in view.rows(EarthRateSeriesRow)),
@@ -97,21 +93,6 @@ def context(site: Site, view: RecordingView, folder: Path) -> dict[str, Any]:
 
 TURNED_PAGE = RecordingPage("turned.html.jinja", context, "two positions")
 """The page of a gyro that was turned between north and south."""
-
-
-def _summarise(
-    view: RecordingView, turning: Sequence[TurningRow], rows: Sequence[EarthRateRow]
-) -> str:
-    turns = sum(event.what == "turn" for event in turning)
-    parts = [f"{counted(turns, 'turn')} between north and south"]
-    if rows:
-        parts.append(f"at latitude {latitude_text(rows)}")
-    return summary_words(view, parts)
-
-
-def latitude_text(rows: Sequence[EarthRateRow | EarthRatePredictionRow]) -> str:
-    """Return the latitude of a recording in degrees, of rows that have it, at least one."""
-    return degrees_text(rows[0].latitude)
 
 
 def answer(rows: Sequence[EarthRateRow], system: System) -> str:
@@ -167,16 +148,16 @@ def given_words(rows: Sequence[EarthRateRow]) -> str:
     )
 
 
+# Error of an estimate in standard deviations beyond which noise does not explain it
 _MAX_NOISE_ERROR = 4.0
-"""Error of an estimate in standard deviations beyond which noise does not explain it."""
 
 
 def line(row: EarthRateRow) -> dict[str, Any]:
     """Return a line of the table of estimates, from a row of ``earth_rate``."""
     return {
         **row.columns(),
-        "term": METHOD_TERMS[row.method],
-        "words": METHOD_WORDS[row.method],
+        "term": _METHODS[row.method][0],
+        "words": _METHODS[row.method][1],
         "digits": limit_digits(row.lower, row.upper, 4),
         "off": "–" if row.off_sigma is None else f"{number_text(row.off_sigma, 2)} σ",
         "why": sentence(row.reason),
@@ -187,12 +168,11 @@ def line(row: EarthRateRow) -> dict[str, Any]:
 def published_lines(rows: Sequence[EarthRatePublishedRow]) -> Iterator[dict[str, Any]]:
     """Yield the lines of the table of published estimates."""
     for row in rows:
-        yield {**row.columns(), "length": duration_text(row.duration), "off": off_words(row)}
-
-
-def off_words(row: EarthRatePublishedRow) -> str:
-    """Return the error of a published estimate in standard deviations."""
-    return f"{number_text(row.off_sigma, 3)} σ"
+        yield {
+            **row.columns(),
+            "length": duration_text(row.duration),
+            "off": f"{number_text(row.off_sigma, 3)} σ",
+        }
 
 
 def needs(rows: Sequence[EarthRatePredictionRow]) -> dict[str, Any] | None:
@@ -205,7 +185,15 @@ def needs(rows: Sequence[EarthRatePredictionRow]) -> dict[str, Any] | None:
         return None
     curve = [row for row in rows if row.of == "dwell"]
     best = next((row for row in curve if row.best), None)
-    nearly = [row.dwell for row in curve if row.nearly_best]
+    best_words = ""
+    if best is not None:
+        nearly = [row.dwell for row in curve if row.nearly_best]
+        best_words = (
+            f"In a run of {duration_text(best.time)} the best dwell has "
+            f"{number_text(best.dwell, 3)} s of data ({counted(best.turns, 'turn')}) and gives "
+            f"the Earth's rate to {percent_text(best.relative)} (1σ). "
+            + _describe_near_best(best.dwell, [row.dwell for row in curve], nearly)
+        )
     return {
         "dwell": duration_text(goals[0].dwell),
         "goals": [
@@ -219,14 +207,7 @@ def needs(rows: Sequence[EarthRatePredictionRow]) -> dict[str, Any] | None:
             }
             for row in goals
         ],
-        "best": ""
-        if best is None
-        else (
-            f"In a run of {duration_text(best.time)} the best dwell has "
-            f"{number_text(best.dwell, 3)} s of data ({counted(best.turns, 'turn')}) and gives "
-            f"the Earth's rate to {percent_text(best.relative)} (1σ). "
-            + _describe_near_best(best.dwell, [row.dwell for row in curve], nearly)
-        ),
+        "best": best_words,
     }
 
 
@@ -246,8 +227,8 @@ def _describe_near_best(best: float, tried: Sequence[float], nearly: Sequence[fl
     return f"Dwells from {low} s to {high} s are less than 1 % worse."
 
 
+# Largest standard deviation of a heading for which the small-angle formula holds, rad
 _MAX_SMALL_HEADING = 0.5
-"""Largest standard deviation of a heading for which the small-angle formula holds, rad."""
 
 
 def _format_heading(heading: float | None) -> str:
@@ -298,7 +279,7 @@ def _pack_courses(series: Sequence[EarthRateSeriesRow], arrays: Arrays) -> dict[
     for name in dict.fromkeys((row.quantity, row.method) for row in series):
         own = [row for row in series if (row.quantity, row.method) == name]
         courses["drift" if name[0] == "drift" else name[1]] = {
-            "name": "drift" if name[0] == "drift" else METHOD_WORDS[name[1]],
+            "name": "drift" if name[0] == "drift" else _METHODS[name[1]][1],
             "time": arrays.exact([row.time for row in own]),
             "value": arrays.exact([row.value for row in own]),
             "sigma": arrays.exact(numbers(row.sigma for row in own)),
@@ -317,18 +298,11 @@ def _find_range(series: Sequence[EarthRateSeriesRow], truth: float) -> list[floa
     return [truth - 1.1 * high, truth + 1.1 * high]
 
 
-_ABSCISSAE: Mapping[str, Callable[[EarthRatePredictionRow], float]] = {
-    "time": lambda row: row.time,
-    "dwell": lambda row: row.dwell,
-}
-"""Abscissa of the curves of a prediction, by the kind of its rows."""
-
-
 def prediction_payload(rows: Sequence[EarthRatePredictionRow], arrays: Arrays) -> dict[str, Any]:
     """Return the data of the figures of the prediction of a recording."""
     goals = [row.goal for row in rows if row.of == "goal"]
     payload: dict[str, Any] = {"goals": goals, "truth": EARTH_RATE}
-    for of, x in _ABSCISSAE.items():
+    for of, x in (("time", attrgetter("time")), ("dwell", attrgetter("dwell"))):
         own = sorted((row for row in rows if row.of == of and row.sigma is not None), key=x)
         payload[of] = {
             "x": arrays.exact([x(row) for row in own]),

@@ -7,8 +7,8 @@ dwells appears as rotation, with alternating sign if the turns alternate. A-B-A 
 the linear part of the drift.
 
 The weights of an estimate on the means of the dwells add up to 0: the fixed bias drops out. The
-standard error is the root of w^T C w with C the covariance of these means, in closed form
-(`covariance`). The scatter of the estimates is not used, since they are few and correlated.
+standard error is the root of w^T C w with C the covariance of these means in closed form. The
+scatter of the estimates is not used, since they are few and correlated.
 """
 
 from __future__ import annotations
@@ -17,8 +17,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from imubench_pipeline.extensions.calibration.covariance import block_mean_covariance
-from imubench_pipeline.extensions.calibration.experiment import Blocks
+from imubench_pipeline.extensions.calibration.experiment import Blocks, block_mean_covariance
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.typing import Array
 

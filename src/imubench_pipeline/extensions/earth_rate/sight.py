@@ -28,17 +28,13 @@ from imubench_pipeline.extensions.earth_rate.transients import (
 from imubench_pipeline.extensions.earth_rate.turns import Turn
 from imubench_pipeline.typing import Array
 
+# Least share of the scheduled turns that must be detected for the events to decide
 _MIN_SEEN_SHARE = 0.4
-"""Least share of the scheduled turns that must be detected for the events to decide."""
-
+# Least alternation, in standard errors, of a log without transients that was turned
 _MIN_ALTERNATION_SIGMAS = 3.0
-"""Least alternation, in standard errors, of a log without transients that was turned."""
-
+# Least alternation, in standard errors, that may shift the start of the schedule
 _MIN_SHIFT_SIGMAS = 6.0
-"""Least alternation, in standard errors, that may shift the start of the schedule."""
-
-_KNOCK_MARGIN = 0.25
-"""Margin that is left out on either side of a knock, s."""
+_KNOCK_MARGIN = 0.25  # margin that is left out on either side of a knock, s
 
 
 @dataclass(frozen=True)
@@ -63,12 +59,8 @@ def find_turns(
     """Return turns (at least one), knocks and doubts for a log without a column, in order.
 
     The events are in order of time; ``trust`` accepts the schedule if nothing is detected. Knocks
-    are the start and stop of further times to leave out, s.
-
-    Raises
-    ------
-    ValueError
-        If there is no evidence of turns, and the schedule is not trusted.
+    are the start and stop of further times to leave out, s. Raises ValueError if there is no
+    evidence of turns, and the schedule is not trusted.
     """
     chosen = choose(events, schedule.dwell, schedule.tolerance, schedule.duration)
     declared = schedule.dwell
@@ -89,10 +81,13 @@ def find_turns(
     else:
         seen, rest, doubts = _follow_schedule(blocks, events, schedule, trust)
     quick = [e for e in rest if e.kind == "transient"]
-    ends = sum(
-        _is_at_end(event, schedule) and event.likelihood > CLEAR_LOG_LIKELIHOOD for event in quick
-    )
-    if ends:
+    edge = EDGE_DWELL_FRACTION * schedule.dwell
+    if any(
+        not edge <= event.time <= schedule.duration - edge
+        and not event.haste
+        and event.likelihood > CLEAR_LOG_LIKELIHOOD
+        for event in quick
+    ):
         doubts.append("handling at the ends of the log is left out")
     silent = sum(turn.found_by == "schedule" for turn in seen)
     if silent:
@@ -122,11 +117,8 @@ def _merge_into_turns(
                 gap = max(other.start - stop, start - other.stop)
                 if gap > near:
                     break
-                if (
-                    not other.haste
-                    and other.likelihood > CLEAR_LOG_LIKELIHOOD
-                    and other.kind == "transient"
-                ):
+                clear = other.likelihood > CLEAR_LOG_LIKELIHOOD and not other.haste
+                if clear and other.kind == "transient":
                     start, stop = min(start, other.start), max(stop, other.stop)
                     peak = max(peak, other.peak)
                     used.add(i)
@@ -154,16 +146,17 @@ def _fill_gaps(
     single = gaps[(gaps > 0.5 * schedule.dwell) & (gaps < 1.5 * schedule.dwell)]
     usual = float(np.median(single)) if len(single) else schedule.dwell
     filled: list[Turn] = []
+    edge = (EDGE_DWELL_FRACTION + 0.3) * schedule.dwell
     if silent:
-        more = np.arange(time[0] - usual, (EDGE_DWELL_FRACTION + 0.3) * schedule.dwell, -usual)[
-            ::-1
-        ]
+        more = np.arange(time[0] - usual, edge, -usual)[::-1]
         filled += [_make_silent_turn(float(at), schedule) for at in more]
     for k, turn in enumerate(turns):
         many = max(1, round(float(gaps[k - 1]) / usual)) if k else 1
         missed = 0
         for at in np.linspace(time[k - 1], time[k], many + 1)[1:-1].tolist() if many > 1 else []:
-            if silent or _is_gap(blocks, at, schedule):
+            first = max(0, int((at - 0.5 * schedule.turning) / blocks.length))
+            last = int((at + 0.5 * schedule.turning) / blocks.length)
+            if silent or not blocks.present[first : last + 1].any():
                 filled.append(_make_silent_turn(at, schedule))
             else:
                 missed += 1
@@ -172,19 +165,9 @@ def _fill_gaps(
             turn = replace(turn, doubts=(*turn.doubts, words))
         filled.append(turn)
     if silent:
-        last = schedule.duration - (EDGE_DWELL_FRACTION + 0.3) * schedule.dwell
-        filled += [
-            _make_silent_turn(float(at), schedule)
-            for at in np.arange(time[-1] + usual, last, usual)
-        ]
+        more = np.arange(time[-1] + usual, schedule.duration - edge, usual)
+        filled += [_make_silent_turn(float(at), schedule) for at in more]
     return filled
-
-
-def _is_gap(blocks: LevelBlocks, time: float, schedule: TurnSchedule) -> bool:
-    """Return whether the samples are missing where a turn would be."""
-    first = max(0, int((time - 0.5 * schedule.turning) / blocks.length))
-    last = int((time + 0.5 * schedule.turning) / blocks.length)
-    return not blocks.present[first : last + 1].any()
 
 
 def _make_silent_turn(time: float, schedule: TurnSchedule) -> Turn:
@@ -202,10 +185,8 @@ def _follow_schedule(
     blocks: LevelBlocks, events: list[Event], schedule: TurnSchedule, trust: bool
 ) -> tuple[list[Turn], list[Event], list[str]]:
     """Return the turns of the schedule, each replaced by a clear transient near it."""
-    half, longest = (
-        _compute_half_width(schedule),
-        schedule.duration - EDGE_DWELL_FRACTION * schedule.dwell,
-    )
+    half = _compute_half_width(schedule)
+    longest = schedule.duration - EDGE_DWELL_FRACTION * schedule.dwell
     count = max(0, math.ceil((longest - schedule.start) / schedule.dwell))
     slots: Array = schedule.start + schedule.dwell * np.arange(1.0, count) + 0.5 * schedule.turning
     slots = slots[(slots > half) & (slots < longest)]
@@ -253,11 +234,6 @@ def _follow_schedule(
         else:
             turns.append(_make_silent_turn(slot, schedule))
     return turns, [e for k, e in enumerate(events) if k not in used], doubts
-
-
-def _is_at_end(event: Event, schedule: TurnSchedule) -> bool:
-    edge = EDGE_DWELL_FRACTION * schedule.dwell
-    return not event.haste and not edge <= event.time <= schedule.duration - edge
 
 
 def disturbances(events: Sequence[Event]) -> list[tuple[float, float]]:

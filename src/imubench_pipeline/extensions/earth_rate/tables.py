@@ -16,6 +16,14 @@ from imubench_pipeline.model.table import (
 )
 
 TurnedGyro = Annotated[str, Column("the gyro that was turned")]
+Part = Annotated[str, Column("whole, or the last minutes of the recording")]
+Method = Annotated[
+    str,
+    Column(
+        "pairs, triples, filter, smoother; known_rate is given the rate and starts with 0.1 "
+        "(deg/s)^2, known_rate_radians with 0.1 (rad/s)^2"
+    ),
+]
 
 
 @table("earth_rate")
@@ -23,14 +31,8 @@ class EarthRateRow(OfRecordingRow):
     """A row of the table ``earth_rate``."""
 
     channel: TurnedGyro
-    part: Annotated[str, Column("whole, or the last minutes of the recording")]
-    method: Annotated[
-        str,
-        Column(
-            "pairs, triples, filter, smoother; known_rate is given the rate and starts with 0.1 "
-            "(deg/s)^2, known_rate_radians with 0.1 (rad/s)^2"
-        ),
-    ]
+    part: Part
+    method: Method
     parameter: Annotated[str, Column("earth_rate")]
     value: Estimate = None
     lower: LowerLimit = None
@@ -81,14 +83,8 @@ class EarthRateSeriesRow(OfRecordingRow):
     """A row of the table ``earth_rate_series``."""
 
     channel: TurnedGyro
-    part: Annotated[str, Column("whole, or the last minutes of the recording")]
-    method: Annotated[
-        str,
-        Column(
-            "pairs, triples, filter, smoother; known_rate is given the rate and starts with 0.1 "
-            "(deg/s)^2, known_rate_radians with 0.1 (rad/s)^2"
-        ),
-    ]
+    part: Part
+    method: Method
     quantity: Annotated[
         str, Column("rate: the estimate of the Earth's; drift: the gyro's slow error")
     ]
@@ -148,7 +144,7 @@ class EarthRatePublishedRow(OfRecordingRow):
     """A row of the table ``earth_rate_published``."""
 
     channel: TurnedGyro
-    part: Annotated[str, Column("whole, or the last minutes of the recording")]
+    part: Part
     place: Annotated[str, Column("of the source")]
     printed: Annotated[str, Column("as printed, with its unit")]
     published: Annotated[float, Column("the same", "rad/s")]

@@ -43,16 +43,9 @@ class FoundDwell:
     doubts: tuple[str, ...] = ()
 
     def in_samples(self, rate: float) -> Dwell:
-        """Return the dwell as an experiment at a rate, Hz, has it: the samples that lie in it.
-
-        Raises
-        ------
-        ValueError
-            If none does.
-        """
-        return Dwell(
-            _find_first_sample(self.start, rate), _find_first_sample(self.stop, rate), self.sense
-        )
+        """Return the dwell in samples at a rate, Hz; raise ValueError if it has none."""
+        first, last = (_find_first_sample(time, rate) for time in (self.start, self.stop))
+        return Dwell(first, last, self.sense)
 
 
 @dataclass(frozen=True)
@@ -82,13 +75,11 @@ class Turning:
         """
         sense = np.zeros(samples, dtype=np.int8)
         for dwell in self.dwells:
-            sense[_find_first_sample(dwell.start, rate) : _find_first_sample(dwell.stop, rate)] = (
-                dwell.sense
-            )
-        for start, stop in self.knocks:
-            sense[
-                max(0, _find_first_sample(start, rate)) : max(0, _find_first_sample(stop, rate))
-            ] = 0
+            first, last = (_find_first_sample(time, rate) for time in (dwell.start, dwell.stop))
+            sense[first:last] = dwell.sense
+        for knock in self.knocks:
+            first, last = (max(0, _find_first_sample(time, rate)) for time in knock)
+            sense[first:last] = 0
         return sense
 
 

@@ -17,7 +17,7 @@ import numpy as np
 
 from imubench_pipeline.extensions.calibration.alignment.attitude import euler_jacobian
 from imubench_pipeline.extensions.calibration.alignment.triad import Positions, Site, Triad
-from imubench_pipeline.extensions.calibration.covariance import block_mean_covariance
+from imubench_pipeline.extensions.calibration.experiment import block_mean_covariance
 from imubench_pipeline.typing import Array
 
 

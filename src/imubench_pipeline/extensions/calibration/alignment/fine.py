@@ -6,7 +6,7 @@ positions. The residual of the block means for an attitude C~ = (I - [psi x]) C 
     y - T^T C~^T v = T^T C~^T [v x] psi + mean error + white noise,
 
 v the Earth's rate or the specific force, T the turn since the first position. The errors of the six
-axes are states of their noise models (`earth_rate.states`), with the fixed biases. The filter
+axes are states of their noise models (`calibration.states`), with the fixed biases. The filter
 estimates psi and all of them; its discretisation is exact. In one position it cannot separate the
 biases of the level accelerometers from tilt, nor the bias of the east gyro from the heading. Its
 covariance shows this:
@@ -41,8 +41,7 @@ INITIAL_ANGLE_SIGMA = 10.0
 UNIFORM_HEADING_SIGMA = math.pi / math.sqrt(3.0)
 """Standard deviation of a uniformly distributed heading, rad; the limit for an unknown heading."""
 
-_MAX_LAST_CORRECTION = 1e-7
-"""Largest last correction, rad, of an attitude that has converged."""
+_MAX_LAST_CORRECTION = 1e-7  # largest last correction, rad, of an attitude that has converged
 
 _MAX_ITERATIONS = 20
 
@@ -152,7 +151,7 @@ class FineAlignment:
         residual = np.empty_like(means)
         for part, true in (
             (slice(0, 3), self.site.earth_rate),
-            (slice(3, 6), self._specific_force),
+            (slice(3, 6), self.site.specific_force),
         ):
             error = np.einsum("rbij,rbj->rbi", to_navigation, means[:, :, part]) - true
             residual[:, :, part] = np.einsum("bij,rbj->rbi", self._to_body, error)
@@ -162,10 +161,6 @@ class FineAlignment:
         return Aligned(
             correct(attitudes, psi[:, -1]), psi, states[:, :, -6:], np.sum(white**2, axis=2)
         )
-
-    @property
-    def _specific_force(self) -> Array:
-        return self.site.specific_force
 
 
 def align(

@@ -14,8 +14,7 @@ from imubench_pipeline.extensions.calibration.experiment import Blocks, Dwell, E
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.typing import Array
 
-_NEAREST_POLE = 1e-6
-"""Least cosine of the latitude; nearer to a pole there is no north."""
+_NEAREST_POLE = 1e-6  # least cosine of the latitude; nearer to a pole there is no north
 
 
 @dataclass(frozen=True, kw_only=True)
