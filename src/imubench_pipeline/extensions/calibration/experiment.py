@@ -30,10 +30,7 @@ _MIN_PRESENT_SHARE = 0.5
 class Dwell:
     """A time at rest in one position.
 
-    Raises
-    ------
-    ValueError
-        If there is no sample, or the sense is neither 1 nor -1.
+    Raises ValueError if there is no sample, or the sense is neither 1 nor -1.
     """
 
     # start, stop: first sample of the log, and the one past the last
@@ -52,11 +49,8 @@ class Dwell:
 class Experiment:
     """Dwells in their order.
 
-    Raises
-    ------
-    ValueError
-        If dwells overlap or are not in order, the rate is not above 0, or the latitude is not
-        between the poles.
+    Raises ValueError if dwells overlap or are not in order, the rate is not above 0, or the
+    latitude is not between the poles.
     """
 
     # at least one; the time between them is turning. Two consecutive ones have the same sense after
@@ -111,12 +105,8 @@ class Experiment:
     def blocks(self, longest: int) -> Blocks:
         """Return the blocks of a log without missing samples.
 
-        Of ``longest`` samples at most; a dwell is divided evenly (`block_length`).
-
-        Raises
-        ------
-        ValueError
-            If it is below 1.
+        Of ``longest`` samples at most; a dwell is divided evenly (`block_length`). Raises
+        ValueError if it is below 1.
         """
         if longest < 1:
             raise ValueError(f"a block of {longest} samples is empty")
@@ -236,12 +226,8 @@ def block_means(parts: Iterable[Array], experiment: Experiment, longest: int) ->
     left out; its length still counts as a gap. With a third of all samples missing, a standard
     deviation is right to 1 %, or 3 % too small if most of the noise is a process with a correlation
     time of two samples. The parts of the log are in order, rad/s, each ndarray of one axis; NaN
-    where a sample is missing.
-
-    Raises
-    ------
-    ValueError
-        If the log ends before the last dwell does, or no block has enough samples.
+    where a sample is missing. Raises ValueError if the log ends before the last dwell does, or no
+    block has enough samples.
     """
     whole = experiment.blocks(longest)
     total, count = np.zeros(len(whole)), np.zeros(len(whole), dtype=np.int64)

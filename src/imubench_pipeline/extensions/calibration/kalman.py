@@ -146,11 +146,8 @@ class RateFilter:
     def run(self, means: Array) -> Filtered:
         """Filter runs of one design from block means, rad/s, shape (runs, b).
 
-        Raises
-        ------
-        ValueError
-            If there is not one mean a block, or one is not finite: a block without a mean is no
-            block (`experiment.block_means`).
+        Raises ValueError if there is not one mean a block, or one is not finite: a block without a
+        mean is no block (`experiment.block_means`).
         """
         self.blocks.check_means(means)
         states, innovation = self._filter.run(means[:, :, None])

@@ -234,10 +234,7 @@ class RateTable:
     def fit(self, means: Array) -> Calibration:
         """Estimate bias and scale factor in runs of this design from block means, rad/s, (runs, b).
 
-        Raises
-        ------
-        ValueError
-            If there is not one finite mean a block.
+        Raises ValueError if there is not one finite mean a block.
         """
         line, quadratic = self._line.fit(means), None
         if (squares := self._quadratic) is not None:
@@ -292,15 +289,9 @@ def calibrate(
 ) -> tuple[Calibration, Measured]:
     """Return bias and scale factor of a gyro from a log on a rate table, and its block means.
 
-    The log is in rad/s, shape (n,); NaN where a sample is missing. The other parameters are as
-    in `RateTable`.
-
-    Raises
-    ------
-    NotObservableError
-        If there is one rate only.
-    ValueError
-        If the log ends before the schedule does, or too few samples are present.
+    The log is in rad/s, shape (n,); NaN where a sample is missing. The other parameters are as in
+    `RateTable`. Raises NotObservableError if there is one rate only. Raises ValueError if the log
+    ends before the schedule does, or too few samples are present.
     """
     run = schedule.experiment
     whole = max(stretch.stop - stretch.start for stretch in schedule.stretches)

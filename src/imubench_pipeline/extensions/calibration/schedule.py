@@ -57,12 +57,8 @@ class Schedule:
         """Return the schedule of known steps.
 
         Each step is start and end of a steady rate, s from the first sample, and the rate, rad/s.
-        The settling time, s, at its start is left out. The sampling rate is in Hz.
-
-        Raises
-        ------
-        ValueError
-            If a step holds no sample after it has settled; see `Schedule`.
+        The settling time, s, at its start is left out. The sampling rate is in Hz. Raises
+        ValueError if a step holds no sample after it has settled; see `Schedule`.
         """
         stretches = []
         for start, stop, table_rate in steps:

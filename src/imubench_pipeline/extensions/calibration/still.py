@@ -116,10 +116,7 @@ class StillRun:
     def fit(self, means: Array) -> StillBias:
         """Estimate the bias in runs of this design from block means, rad/s, shape (runs, b).
 
-        Raises
-        ------
-        ValueError
-            If there is not one finite mean a block.
+        Raises ValueError if there is not one finite mean a block.
         """
         pointing = self.pointing
         error = means - pointing.rate
@@ -173,13 +170,8 @@ def bias_at_rest(
     """Return the bias of a gyro from a log at rest.
 
     The log is in rad/s, shape (n,); NaN where a sample is missing; the rate in Hz. A block has
-    ``longest`` samples at most; by default the longest without loss of
-    information.
-
-    Raises
-    ------
-    ValueError
-        If the log is empty, or has too few samples present.
+    ``longest`` samples at most; by default the longest without loss of information. Raises
+    ValueError if the log is empty, or has too few samples present.
     """
     run = Experiment((Dwell(0, len(log), 1),), rate, 0.0)
     if longest is None:

@@ -82,12 +82,8 @@ def track(
     although the first entry of Q_d is an approximation; P_0 = ``start`` I. Samples of turning are
     left out, as if no time lay between dwells. The log, shape (samples,), is in rad/s, NaN where a
     sample is missing; the known rate is in rad/s, the start in (rad/s)^2. N, B with T_B, and K of
-    the model are used.
-
-    Raises
-    ------
-    ValueError
-        If the model has no white noise, or its B no correlation time.
+    the model are used. Raises ValueError if the model has no white noise, or its B no correlation
+    time.
     """
     one = _build_filter(model, experiment.rate)
     sample = np.concatenate([np.arange(dwell.start, dwell.stop) for dwell in experiment.dwells])
@@ -141,12 +137,8 @@ def mean_sigma(
 
     Exact, over the noise of the model and a fixed bias of the standard deviation ``turn_on_bias``,
     rad/s: the covariance of the true errors, the tracked errors and the sum is propagated with the
-    filter. It is independent of the known rate. The start is in (rad/s)^2, the rate in Hz.
-
-    Raises
-    ------
-    ValueError
-        As `track`.
+    filter. It is independent of the known rate. The start is in (rad/s)^2, the rate in Hz. Raises
+    ValueError as `track`.
     """
     one = _build_filter(model, rate)
     decay, of_f, of_rrw, white = one.decay, one.of_f, one.of_rrw, one.white
@@ -178,12 +170,7 @@ def as_printed(model: NoiseModel, rate: float, steps: int, start: float) -> Arra
     """Return the trace of P after each measurement by eq. 13 as printed, (rad/s)^2, shape (steps,).
 
     (I - K H)^-1 P replaces (I - K H) P. The start is in (rad/s)^2, the rate in Hz; on overflow the
-    trace is infinite.
-
-    Raises
-    ------
-    ValueError
-        As `track`.
+    trace is infinite. Raises ValueError as `track`.
     """
     one = _build_filter(model, rate)
     moved, driven = np.diag([one.decay, 1.0]), np.diag([one.of_f, one.of_rrw])

@@ -40,13 +40,9 @@ class Differences:
 def by_pairs(means: Array, blocks: Blocks, model: NoiseModel) -> Differences:
     """Estimate the rate from pairs of dwells, each in one pair at most (Silva et al., eq. 14).
 
-    A dwell followed by one of the same sense (a missed turn) is left out. The block means are
-    in rad/s, shape (runs, b); the noise model is for the standard errors.
-
-    Raises
-    ------
-    ValueError
-        If there is no pair.
+    A dwell followed by one of the same sense (a missed turn) is left out. The block means are in
+    rad/s, shape (runs, b); the noise model is for the standard errors. Raises ValueError if there
+    is no pair.
     """
     dwells = blocks.of_dwells()
     differences, i = [], 0

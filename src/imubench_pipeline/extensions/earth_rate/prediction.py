@@ -105,12 +105,7 @@ class Outlook:
         None: more than `MAX_TURNS`.
 
         The run lasts (turns + 1) dwells, each with ``dwell`` s of data, and the turns. A
-        ``relative`` of 0.01 is 1 % of the Earth's rate.
-
-        Raises
-        ------
-        ValueError
-            If it is not above 0.
+        ``relative`` of 0.01 is 1 % of the Earth's rate. Raises ValueError if it is not above 0.
         """
         if not relative > 0:
             raise ValueError(f"relative is {relative}, expected a number above 0")
@@ -145,12 +140,7 @@ class Outlook:
         """Return the bound of a run of a length, s, over the dwell, from one turn to short dwells.
 
         The run consists of dwells and turns. The shortest dwell is a fourth of the turning time, or
-        one second.
-
-        Raises
-        ------
-        ValueError
-            If there is no time for two dwells and a turn.
+        one second. Raises ValueError if there is no time for two dwells and a turn.
         """
         if run_time - self.turning < 2.0 / self.rate:
             raise ValueError(f"{run_time} s do not hold two dwells and a turn")
@@ -220,12 +210,8 @@ def prediction_rows(
     """Yield the rows of the table ``earth_rate_prediction``, without the names.
 
     ``dwell`` is the data in each dwell, s; the goals are standard deviations relative to the
-    Earth's rate; the best dwell is computed for the run time, s.
-
-    Raises
-    ------
-    ValueError
-        If the run time does not hold two dwells and a turn.
+    Earth's rate; the best dwell is computed for the run time, s. Raises ValueError if the run time
+    does not hold two dwells and a turn.
     """
     about = {"latitude": outlook.latitude}
     most = 1

@@ -171,14 +171,9 @@ def align(
     This is the Gauss-Newton method: each iteration linearises about a better attitude, which
     removes the nonlinear effect of a large error of the coarse heading. The block means are of
     gyros and accelerometers x, y, z, rad/s and m/s^2, shape (b, 6). Returned are the alignment of
-    the run and the last filter, which has the standard deviations.
-
-    Raises
-    ------
-    NotObservableError
-        If the heading is not observable; use roll and pitch of the coarse alignment.
-    ValueError
-        If the attitude does not converge.
+    the run and the last filter, which has the standard deviations. Raises NotObservableError if the
+    heading is not observable; use roll and pitch of the coarse alignment. Raises ValueError if the
+    attitude does not converge.
     """
     attitude = coarse_alignment(*mean_vectors(means, positions), site)
     for _ in range(_MAX_ITERATIONS):

@@ -21,10 +21,8 @@ _NEAREST_POLE = 1e-6  # least cosine of the latitude; nearer to a pole there is 
 class Site:
     """A place on the Earth, with the rate and specific force of a triad at rest.
 
-    Raises
-    ------
-    ValueError
-        If the latitude is not between the poles, where there is no north, or gravity not above 0.
+    Raises ValueError if the latitude is not between the poles, where there is no north, or gravity
+    not above 0.
     """
 
     latitude: float  # rad, north positive
@@ -107,10 +105,7 @@ class Triad:
 class Positions:
     """Blocks of a run at rest, in one position or in several with known turns from the first.
 
-    Raises
-    ------
-    ValueError
-        If there is no rotation matrix for every dwell.
+    Raises ValueError if there is no rotation matrix for every dwell.
     """
 
     blocks: Blocks  # neither their sense nor their latitude is used
