@@ -110,7 +110,11 @@ class Experiment:
         """
         if longest < 1:
             raise ValueError(f"a block of {longest} samples is empty")
-        edges = [_compute_edges(dwell, longest) for dwell in self.dwells]
+        edges = []
+        for dwell in self.dwells:
+            length = dwell.stop - dwell.start
+            count = -(-length // longest)
+            edges.append(dwell.start + np.arange(count + 1) * length // count)
         number = [len(of_dwell) - 1 for of_dwell in edges]
         start = np.concatenate([of_dwell[:-1] for of_dwell in edges])
         stop = np.concatenate([of_dwell[1:] for of_dwell in edges])
@@ -254,12 +258,6 @@ def block_means(parts: Iterable[Array], experiment: Experiment, longest: int) ->
         int(count[~enough].sum()),
         length - experiment.samples_in_dwells,
     )
-
-
-def _compute_edges(dwell: Dwell, longest: int) -> Integers:
-    length = dwell.stop - dwell.start
-    number = -(-length // longest)
-    return dwell.start + np.arange(number + 1) * length // number
 
 
 def block_mean_covariance(model: NoiseModel, blocks: Blocks) -> Array:

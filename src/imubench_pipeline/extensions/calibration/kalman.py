@@ -100,21 +100,10 @@ class Smoothed:
 class RateFilter:
     """The filter of one design: blocks and noise model. It filters any number of runs at once.
 
-    Parameters
-    ----------
-    blocks : Blocks
-    model : NoiseModel
-        Its flicker noise is a bank of Gauss-Markov processes; a ramp and lines are estimated, see
-        `states.block_states`.
-    turn_on_bias : float
-        Standard deviation of the fixed bias, rad/s. By default it is unknown.
-    rate_sigma : float
-        Standard deviation of the prior of the rate about 0, rad/s; by default uninformative.
-
-    Raises
-    ------
-    ValueError
-        If a standard deviation is negative or not finite.
+    Flicker noise of the model is a bank of Gauss-Markov processes; a ramp and lines are estimated,
+    see `states.block_states`. ``turn_on_bias`` is the standard deviation of the fixed bias,
+    ``rate_sigma`` of the prior of the rate about 0, both in rad/s and by default uninformative.
+    Raises ValueError if one of them is negative or not finite.
     """
 
     def __init__(
@@ -129,9 +118,8 @@ class RateFilter:
             raise ValueError(f"rate_sigma is {rate_sigma}, expected a number from 0")
         self.blocks = blocks
         self._states = block_states(model, blocks, turn_on_bias)
-        self._filter = BlockFilter(
-            (self._states,), blocks.seen[:, None, None], np.array([[rate_sigma]])
-        )
+        start = np.array([[rate_sigma]])
+        self._filter = BlockFilter((self._states,), blocks.seen[:, None, None], start)
 
     @property
     def names(self) -> tuple[str, ...]:

@@ -286,7 +286,7 @@ def _rate_table(site: Site, view: RecordingView, folder: Path) -> dict[str, Any]
     """Return what the template needs; ``folder`` is the recording's."""
     rows = view.rows(CalibrationRow)
     points = view.rows(CalibrationPointRow)
-    summary = []
+    arrays, summary = Arrays(), []
     if points:
         most = math.degrees(max(abs(point.table_rate) for point in points))
         rates = counted(len(points), "constant rate")
@@ -303,27 +303,25 @@ def _rate_table(site: Site, view: RecordingView, folder: Path) -> dict[str, Any]
         "points": points,
         "findings": view.findings,
         "command": site.again(view, "calibration"),
-        "page": {"looks": {}, "channels": [], "findings": [], **_pack_points(points)},
+        "page": {
+            "looks": {},
+            "channels": [],
+            "findings": [],
+            "table": {
+                "table_rate": arrays.exact([row.table_rate for row in points]),
+                "mean": arrays.exact([row.mean for row in points]),
+                "line": arrays.exact([row.line for row in points]),
+                "residual": arrays.exact([row.residual for row in points]),
+                "sigma": arrays.exact([row.sigma for row in points]),
+                "number": [row.number for row in points],
+            },
+            "arrays": arrays.texts,
+        },
     }
 
 
 RATE_TABLE = RecordingPage("rate_table.html.jinja", _rate_table, "rate table")
 """The page of a gyro on a rate table."""
-
-
-def _pack_points(points: Sequence[CalibrationPointRow]) -> dict[str, Any]:
-    arrays = Arrays()
-    return {
-        "table": {
-            "table_rate": arrays.exact([row.table_rate for row in points]),
-            "mean": arrays.exact([row.mean for row in points]),
-            "line": arrays.exact([row.line for row in points]),
-            "residual": arrays.exact([row.residual for row in points]),
-            "sigma": arrays.exact([row.sigma for row in points]),
-            "number": [row.number for row in points],
-        },
-        "arrays": arrays.texts,
-    }
 
 
 def _positions(site: Site, view: RecordingView, folder: Path) -> dict[str, Any]:

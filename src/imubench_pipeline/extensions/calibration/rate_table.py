@@ -141,28 +141,14 @@ class Calibration:
 
 
 class RateTable:
-    """A recording on a rate table: its blocks, the gyro's noise, and the rates that are known.
+    """A recording on a rate table: its blocks, the gyro's noise, and the known rates.
 
-    Parameters
-    ----------
-    schedule : Schedule
-    blocks : Blocks
-        Of the schedule's `experiment`.
-    model : NoiseModel
-        Of the gyro, with some noise in every sample.
-    pointing : Pointing, optional
-        Direction of the table's axis, along which the gyro's is; without one the Earth's rate is
-        a part of the bias. Its heading may be left open where the axis is vertical.
-    setting_sigma : float
-        Standard deviation of the table's true rate about the stated one, of each stretch by
-        itself, rad/s.
-
-    Raises
-    ------
-    NotObservableError
-        If there is one rate only: the scale factor cannot be told from the bias.
-    ValueError
-        If the deviation is negative, or the heading is left open where it counts.
+    The blocks are of the schedule's `experiment`; the noise model has some noise in every sample.
+    ``pointing`` is the direction of the axis of table and gyro; without one the Earth's rate is a
+    part of the bias. Only a vertical axis may have no heading. ``setting_sigma``, rad/s, is the
+    standard deviation of the true rate of each stretch about the stated one. Raises
+    NotObservableError if there is one rate only: scale factor and bias are not separable. Raises
+    ValueError if the deviation is negative, or a required heading is missing.
     """
 
     def __init__(

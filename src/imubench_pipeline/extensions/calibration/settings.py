@@ -34,10 +34,8 @@ TRIAD = ("gyro_x", "gyro_y", "gyro_z", "accel_x", "accel_y", "accel_z")
 class Direction(Strict):
     """Where an axis points on the Earth.
 
-    Raises
-    ------
-    ValueError
-        If the latitude is missing, or a figure has a unit of another dimension or is out of range.
+    Raises ValueError if the latitude is missing, or a figure has a unit of another dimension or is
+    out of range.
     """
 
     latitude: Latitude = Field(description="of the place, with its unit; south is negative")
@@ -109,11 +107,9 @@ class Step(Strict):
 class OnRateTable(Experiment):
     """A log of a gyro on a rate table, its axis along that of the table.
 
-    Raises
-    ------
-    ValueError
-        If a figure has a unit of another dimension or is out of range, steps are not in order,
-        settling takes all of a step, or the heading of an axis that is not vertical is missing.
+    Raises ValueError if a figure has a unit of another dimension or is out of range, steps are not
+    in order, settling takes all of a step, or the heading of an axis that is not vertical is
+    missing.
     """
 
     steps: tuple[Step, ...] = Field(
@@ -178,12 +174,8 @@ class OnRateTable(Experiment):
     def moved_gyro(self, channels: Sequence[str], *, column: bool) -> str:
         """Return the one of the log's channels that is along the axis of the table.
 
-        `column`: the log has a column with the rate of the table.
-
-        Raises
-        ------
-        ValueError
-            As `stated_gyro`; and if the rates of the table are stated nowhere, or twice.
+        `column`: the log has a column with the rate of the table. Raises ValueError as
+        `stated_gyro`; and if the rates of the table are stated nowhere, or twice.
         """
         if not self.steps and not column:
             raise ValueError(
@@ -202,11 +194,8 @@ class OnRateTable(Experiment):
 class InPositions(Experiment):
     """A triad that is turned about its z axis, by the clock, and stands still between the turns.
 
-    Raises
-    ------
-    ValueError
-        If a figure has a unit of another dimension or is out of range, or a turn takes all of a
-        dwell.
+    Raises ValueError if a figure has a unit of another dimension or is out of range, or a turn
+    takes all of a dwell.
     """
 
     latitude: Latitude = Field(description="of the place, with its unit; south is negative")
@@ -280,6 +269,15 @@ class SimulatedPositions(InPositions):
     pitch: Angle = Field("0 deg", description="likewise")
     heading: Angle = Field("0 deg", description="likewise, from north towards east")
     assumed: tuple[Text, ...] = Field((), description="figures that no source publishes")
+
+    @property
+    def true_angles(self) -> dict[str, float]:
+        """Roll, pitch and heading, rad, the heading from -pi to pi."""
+        roll, pitch, heading = (
+            quantity_to_si(angle, "angle") for angle in (self.roll, self.pitch, self.heading)
+        )
+        heading = math.remainder(heading, 2.0 * math.pi)
+        return {"roll": roll, "pitch": pitch, "heading": heading}
 
     @property
     def declared(self) -> InPositions:

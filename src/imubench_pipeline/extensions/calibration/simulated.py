@@ -8,7 +8,6 @@ import numpy as np
 
 from imubench_pipeline.extensions.calibration.alignment.attitude import matrix
 from imubench_pipeline.extensions.calibration.alignment.triad import Site
-from imubench_pipeline.extensions.calibration.positions import true_angles
 from imubench_pipeline.extensions.calibration.settings import (
     TRIAD,
     SimulatedPositions,
@@ -53,7 +52,7 @@ def in_positions(recording: SimulatedRecording, rate: float) -> dict[str, Sample
     at = np.arange(samples) / rate
     angle = np.interp(at, times, angles)
     turned = np.diff(np.interp(at[0] + (np.arange(samples + 1) - 0.5) / rate, times, angles)) * rate
-    attitude = matrix(*true_angles(positions).values())
+    attitude = matrix(**positions.true_angles)
     true = sensed(Site(latitude=positions.latitude_si), attitude, angle, turned)
     return {name: SampledProfile(true[:, k], rate) for k, name in enumerate(TRIAD)}
 

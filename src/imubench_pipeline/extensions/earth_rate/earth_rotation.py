@@ -81,15 +81,8 @@ def earth_rate_tables(
 ) -> dict[str, list[TableRow]]:
     """Return the rows of the tables of a gyro that was turned; none of a rejected recording.
 
-    Parameters
-    ----------
-    folder : Path
-        Of the recording.
-    static : sequence of Path
-        Folders of the static recordings of the same sensor.
-    sensor, recording : str
-    settings : str
-        As `imubench_pipeline.run.plan.Plan.experiment_settings` gives them.
+    `folder`: of the recording; `static`: of the static recordings of the same sensor; `settings`:
+    of `imubench_pipeline.run.plan.Plan.experiment_settings`.
     """
     rows: dict[str, list[TableRow]] = {name: [] for name in TURNED}
     sections = json.loads(settings)
@@ -125,7 +118,7 @@ def _published(
     turns: SimulatedTurns,
     estimates: Sequence[EarthRateRow],
 ) -> Iterator[EarthRatePublishedRow]:
-    """Yield what the source of a simulated recording prints, beside what is found of it."""
+    """Yield the printed estimates of a simulated recording, with the estimates from its log."""
     rate = quantity_to_si(simulated.rate, "frequency")
     schedule = RunDesign(turns.seconds("dwell"), turns.seconds("turning"), rate, turns.latitude_si)
     axes = {str(name): axis for name, axis in simulated.channels.items()}

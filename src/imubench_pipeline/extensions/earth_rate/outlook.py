@@ -65,15 +65,6 @@ class Noise:
             models[f"{axis}: {name}"] = self.models[name]
         return models
 
-    @property
-    def middle_gyro(self) -> str | None:
-        """The gyro with the median Allan deviation over a dwell; None: there is none."""
-        gyros = [name for name in self.models if name.startswith("gyro_")]
-        if not gyros:
-            return None
-        variances = {name: float(self.models[name].allan_variance(DWELL)) for name in gyros}
-        return sorted(gyros, key=variances.__getitem__)[len(gyros) // 2]
-
 
 def noise_at_rest(folders: Sequence[Path]) -> Noise | None:
     """Return the noise of a sensor from its static recordings; None if none has an estimate."""
@@ -110,8 +101,13 @@ def outlook_tables(
 def _predict_earth_rate(
     sensor: str, noise: Noise, how: EarthRateSettings
 ) -> Iterator[EarthRatePredictionRow]:
-    gyro = noise.middle_gyro
-    assert gyro is not None  # noise_at_rest has seen to it
+    variances = {
+        name: float(model.allan_variance(DWELL))
+        for name, model in noise.models.items()
+        if name.startswith("gyro_")
+    }
+    # The gyro with the median Allan deviation over a dwell; there is at least one.
+    gyro = sorted(variances, key=variances.__getitem__)[len(variances) // 2]
     latitude = quantity_to_si(how.latitude, "angle")
     outlook = Outlook(noise.models[gyro], latitude, TURN_TIME, noise.rate)
     run_time = max(quantity_to_si(how.run_time, "time"), 3.0 * DWELL)

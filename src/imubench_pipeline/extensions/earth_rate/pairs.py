@@ -62,14 +62,8 @@ def by_triples(means: Array, blocks: Blocks, model: NoiseModel) -> Differences:
 
     Of three consecutive dwells of alternating sense, the middle one is compared with the line
     through the outer two at its mean time. Triples overlap: each dwell except the first and the
-    last is the middle of one.
-
-    Parameters and shapes are as in `by_pairs`.
-
-    Raises
-    ------
-    ValueError
-        If there are no three such dwells.
+    last is the middle of one. Arguments and shapes are as in `by_pairs`. Raises ValueError if there
+    are no three such dwells.
     """
     dwells = blocks.of_dwells()
     # The mean time of the samples present is taken from their blocks.

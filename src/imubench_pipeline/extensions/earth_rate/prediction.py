@@ -225,8 +225,8 @@ def prediction_rows(
         sigma = outlook.sigma_after(dwell, turns)
         yield about | {"of": "goal", "goal": goal} | _make_row(dwell, turns, time, sigma)
     course = outlook.against_time(dwell, min(max(most, 2), _MAX_CURVE_TURNS))
-    number = np.rint(np.geomspace(1, len(course.turns), _TIME_CURVE_POINTS)).astype(np.int64)
-    for k in (np.unique(number) - 1).tolist():
+    shown = np.rint(np.geomspace(1, len(course.turns), _TIME_CURVE_POINTS)).astype(np.int64) - 1
+    for k in np.unique(shown).tolist():
         point = int(course.turns[k]), float(course.time[k]), float(course.sigma[k])
         yield about | {"of": "time"} | _make_row(dwell, *point)
     curve = outlook.over_dwell(run_time)

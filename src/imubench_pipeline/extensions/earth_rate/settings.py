@@ -19,13 +19,12 @@ from imubench_pipeline.settings.validation import (
 from imubench_pipeline.units import quantity_to_si
 
 
-def _deviation(dimension: str) -> AfterValidator:
-    return checked(dimension, "a standard deviation from 0", from_zero=True)
+def _from_zero(dimension: str, what: str = "a standard deviation") -> AfterValidator:
+    return checked(dimension, f"{what} from 0", from_zero=True)
 
 
-_from_zero = checked("time", "a time from 0", from_zero=True)
 _Rate = Annotated[Text, checked("angular_rate")]
-TimeFromZero = Annotated[Text, _from_zero, Field(examples=["2 s"])]
+TimeFromZero = Annotated[Text, _from_zero("time", "a time"), Field(examples=["2 s"])]
 
 _REQUIRED_KEYS = {
     "latitude": "where the log was recorded, such as latitude: 45.1 deg (south: negative)",
@@ -36,11 +35,8 @@ _REQUIRED_KEYS = {
 class TwoPosition(Experiment):
     """A log in which one gyro was turned end for end, between north and south, again and again.
 
-    Raises
-    ------
-    ValueError
-        If latitude or dwell is missing, a figure has a unit of another dimension or is out of
-        range, or turning takes half of the dwell or more.
+    Raises ValueError if latitude or dwell is missing, a figure has a unit of another dimension or
+    is out of range, or turning takes half of the dwell or more.
     """
 
     latitude: Latitude = Field(
@@ -60,10 +56,10 @@ class TwoPosition(Experiment):
     trust_schedule: bool = Field(
         False, description="take the schedule's word where nothing of the turns is seen"
     )
-    turn_on_bias: Annotated[Text, _deviation("angular_rate")] | None = Field(
+    turn_on_bias: Annotated[Text, _from_zero("angular_rate")] | None = Field(
         None, description="standard deviation of the fixed bias, such as 0.1 deg/s; null: not known"
     )
-    drift: Annotated[Text, _deviation("gyro_ramp")] | None = Field(
+    drift: Annotated[Text, _from_zero("gyro_ramp")] | None = Field(
         None,
         description="standard deviation of a steady drift beside the noise, such as 20 deg/h/h "
         "while the sensor warms up; null: none",

@@ -15,9 +15,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from imubench_pipeline.extensions.earth_rate.alternation import alternation, contradiction
-from imubench_pipeline.extensions.earth_rate.choice_of_turns import EDGE_DWELL_FRACTION
-from imubench_pipeline.extensions.earth_rate.sight import (
+from imubench_pipeline.extensions.earth_rate.choice_of_turns import (
+    EDGE_DWELL_FRACTION,
     TurnSchedule,
     disturbances,
     find_turns,
@@ -32,7 +31,14 @@ from imubench_pipeline.extensions.earth_rate.transients import (
     steps,
     transients,
 )
-from imubench_pipeline.extensions.earth_rate.turns import DETECTION_ORDER, FoundDwell, Turn, Turning
+from imubench_pipeline.extensions.earth_rate.turns import (
+    DETECTION_ORDER,
+    FoundDwell,
+    Turn,
+    Turning,
+    alternation,
+    contradiction,
+)
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.typing import Array
 

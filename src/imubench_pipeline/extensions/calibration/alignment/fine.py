@@ -64,18 +64,8 @@ class Aligned:
 class FineAlignment:
     """The filter of one design, about an attitude; it aligns any number of runs at once.
 
-    Parameters
-    ----------
-    triad : Triad
-    positions : Positions
-    site : Site
-    attitude : ndarray, shape (3, 3)
-        From body to navigation frame in the first position, as from a coarse alignment.
-
-    Raises
-    ------
-    ValueError
-        If the x axis is vertical.
+    The attitude, shape (3, 3), is from body to navigation frame in the first position, as from a
+    coarse alignment. Raises ValueError if the x axis is vertical.
     """
 
     def __init__(self, triad: Triad, positions: Positions, site: Site, attitude: Array) -> None:
@@ -123,19 +113,11 @@ class FineAlignment:
         return (NotObservable("heading", reason),)
 
     def run(self, means: Array, attitude: Array | None = None) -> Aligned:
-        """Align runs.
+        """Align runs from block means of gyros and accelerometers x, y, z, shape (runs, b, 6).
 
-        Parameters
-        ----------
-        means : ndarray, shape (runs, b, 6)
-            Block means of gyros and accelerometers x, y, z, rad/s and m/s^2.
-        attitude : ndarray, shape (runs, 3, 3), optional
-            Attitude of each run to correct, near the attitude of the filter, which is the default.
-
-        Raises
-        ------
-        ValueError
-            If there are not six finite means per block.
+        The means are in rad/s and m/s^2. ``attitude``, shape (runs, 3, 3), is the attitude of each
+        run to correct, near the attitude of the filter, which is the default. Raises ValueError if
+        there are not six finite means per block.
         """
         if means.ndim != 3 or means.shape[1:] != (len(self.positions.blocks), 6):
             raise ValueError(

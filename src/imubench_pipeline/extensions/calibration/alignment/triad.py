@@ -49,23 +49,13 @@ class Site:
 class Triad:
     """Three gyros and three accelerometers along the axes x, y, z of the body.
 
-    Parameters
-    ----------
-    gyros, accelerometers : sequence of NoiseModel
-        Three each, SI.
-    gyro_bias, accelerometer_bias : float
-        Standard deviations of the fixed biases, of each axis by itself, rad/s and m/s^2.
-
-    Raises
-    ------
-    ValueError
-        If there are not three of each, or a deviation is negative or not finite.
+    Raises ValueError if there are not three of each, or a deviation is negative or not finite.
     """
 
-    gyros: Sequence[NoiseModel]
-    accelerometers: Sequence[NoiseModel]
-    gyro_bias: float
-    accelerometer_bias: float
+    gyros: Sequence[NoiseModel]  # three, SI
+    accelerometers: Sequence[NoiseModel]  # three, SI
+    gyro_bias: float  # standard deviation of the fixed bias of each axis, rad/s
+    accelerometer_bias: float  # likewise, m/s^2
 
     def __post_init__(self) -> None:
         for name in ("gyros", "accelerometers"):
