@@ -152,7 +152,7 @@ def _truth(simulated: SimulatedRecording | None, channel: str) -> dict[str, floa
 
 @dataclass
 class Rows:
-    """Rows of the tables that a calibration leaves."""
+    """Rows of the tables of a calibration."""
 
     calibration: list[CalibrationRow] = field(default_factory=list)
     calibration_points: list[CalibrationPointRow] = field(default_factory=list)
@@ -187,11 +187,7 @@ def _attitude(
     declared: InPositions,
     truth: Mapping[str, float],
 ) -> Iterator[CalibrationRow]:
-    """Yield roll, pitch and heading of the first position, or the reason without them.
-
-    `logs` are the channels that can be analysed, `static` the folders of the static recordings of
-    the same sensor, `truth` the angles of a simulation, rad.
-    """
+    """Yield roll, pitch and heading, rad, of the first position, or the reason without them."""
     about = partial(
         CalibrationRow,
         **asdict(key),

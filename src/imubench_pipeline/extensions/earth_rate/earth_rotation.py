@@ -142,7 +142,7 @@ def _published(
 
 @dataclass
 class EarthRate:
-    """Rows of the tables that an experiment leaves."""
+    """Rows of the tables of an experiment."""
 
     earth_rate: list[EarthRateRow] = field(default_factory=list)
     earth_rate_series: list[EarthRateSeriesRow] = field(default_factory=list)
@@ -151,7 +151,7 @@ class EarthRate:
 
 
 def _names(key: Key, declared: TwoPosition, source: NoiseSource | None = None) -> dict[str, Any]:
-    """Return what every row of the table ``earth_rate`` says."""
+    """Return the columns that all rows of the table ``earth_rate`` share."""
     return asdict(key) | {
         "latitude": declared.latitude_si,
         "model": source.model.name if source else None,
@@ -298,7 +298,7 @@ def _turning_rows(
 
 
 def _unsure(turning: Turning, trusted: bool) -> dict[str, Any]:
-    """Return status and reason of estimates of which sign or turns are not known."""
+    """Return status and reason of estimates with uncertain sign or turns."""
     reasons = []
     by_schedule, turns = turning.by_schedule, len(turning.turns)
     unseen = by_schedule >= _MIN_SCHEDULED_SHARE * turns
@@ -359,7 +359,7 @@ def _estimates(
 
 
 def _without(names: dict[str, Any], part: str, status: str, reason: str) -> Iterator[EarthRateRow]:
-    """Yield the rows of a part of which nothing can be estimated."""
+    """Yield the rows of a part without estimates."""
     for method in METHODS:
         yield EarthRateRow(
             **names,

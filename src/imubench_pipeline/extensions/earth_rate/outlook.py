@@ -46,16 +46,16 @@ _TYPICAL_KINDS = ("1sigma", "typ")
 
 @dataclass(frozen=True)
 class Noise:
-    """The noise of a sensor at rest: the recording that it is from, Hz, and models by channel."""
+    """The noise of a sensor at rest."""
 
     recording: str
-    rate: float
-    models: dict[str, NoiseModel]
+    rate: float  # Hz
+    models: dict[str, NoiseModel]  # by channel
 
     def three(self, quantity: str) -> dict[str, NoiseModel]:
-        """Return the models of the axes x, y and z of a quantity, and of which channel each is.
+        """Return the models of the axes x, y and z of a quantity, by axis and source channel.
 
-        An axis that is not in the log has the noise of the next one that is; one is.
+        An axis that is missing in the log has the noise of another one.
         """
         names = [name for name in self.models if name.startswith(quantity)]
         models = {}
@@ -82,8 +82,8 @@ def outlook_tables(
     """Return the rows of ``alignment`` and ``earth_rate_prediction`` of a sensor at rest.
 
     `folders` are those of its static recordings; `settings`: of
-    `imubench_pipeline.extensions.earth_rate.plan.outlook_settings`. There are no rows where no
-    recording tells the noise of a gyro, and none of ``alignment`` without an accelerometer.
+    `imubench_pipeline.extensions.earth_rate.plan.outlook_settings`. There are no rows without the
+    noise of a gyro, and none of ``alignment`` without an accelerometer.
     """
     rows: dict[str, Sequence[TableRow]] = {"alignment": [], "earth_rate_prediction": []}
     sections = json.loads(settings)

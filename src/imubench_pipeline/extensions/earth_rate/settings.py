@@ -1,4 +1,4 @@
-"""What is declared of gyros that are turned between north and south, and sought of them."""
+"""Settings of gyros that are turned between north and south."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ class TwoPosition(Experiment):
 
     @model_validator(mode="before")
     @classmethod
-    def _said(cls, data: Any) -> Any:
+    def _require_keys(cls, data: Any) -> Any:
         if isinstance(data, dict):
             for key, needed in _REQUIRED_KEYS.items():
                 if data.get(key) is None:
@@ -79,7 +79,7 @@ class TwoPosition(Experiment):
 
     @field_validator("latitude")
     @classmethod
-    def _sees_rotation(cls, latitude: str) -> str:
+    def _check_latitude(cls, latitude: str) -> str:
         if abs(quantity_to_si(latitude, "angle")) > quantity_to_si("89 deg", "angle"):
             raise ValueError(
                 "expected at most 89 deg: at a pole a horizontal axis sees nothing of the Earth's "
@@ -88,7 +88,7 @@ class TwoPosition(Experiment):
         return latitude
 
     @model_validator(mode="after")
-    def _turns_fit(self) -> Self:
+    def _check_turning(self) -> Self:
         if 2.0 * self.seconds("turning") >= self.seconds("dwell"):
             raise ValueError(
                 f"turning is {self.turning}; expected less than half of the dwell of {self.dwell}"
@@ -140,7 +140,7 @@ class SimulatedTurns(TwoPosition):
     published: tuple[PublishedRate, ...] = ()
 
     @model_validator(mode="after")
-    def _parts_are_there(self) -> Self:
+    def _check_parts(self) -> Self:
         parts = {"whole", *(f"last {text}" for text in self.last)}
         for rate in self.published:
             if rate.part not in parts:
@@ -149,7 +149,7 @@ class SimulatedTurns(TwoPosition):
 
     @property
     def declared(self) -> TwoPosition:
-        """What would stand beside such a log."""
+        """The notes of a log like this one."""
         return TwoPosition(**{name: getattr(self, name) for name in TwoPosition.model_fields})
 
 
@@ -179,7 +179,7 @@ class EarthRateSettings(Strict):
 
     @field_validator("goals")
     @classmethod
-    def _above_zero(cls, goals: tuple[float, ...]) -> tuple[float, ...]:
+    def _check_goals(cls, goals: tuple[float, ...]) -> tuple[float, ...]:
         if min(goals) <= 0:
             raise ValueError("expected parts above 0, such as 0.01 for 1 %")
         return goals

@@ -144,7 +144,7 @@ def true_rate(experiment: Experiment, earth_rate: float, transient: ArrayLike) -
 
 
 def turned(recording: SimulatedRecording, rate: float) -> dict[str, SampledProfile]:
-    """Return what the gyro senses that is turned by the clock; each turn is sensed otherwise."""
+    """Return the readings of a gyro that is turned by the clock; the transients differ."""
     turns, samples = recording.block(SimulatedTurns), recording.samples
     assert turns is not None
     dwell, turning = turns.seconds("dwell"), turns.seconds("turning")
