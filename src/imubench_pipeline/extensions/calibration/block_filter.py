@@ -7,13 +7,8 @@ of the error of each axis, and the mean of this error over the last block:
 
 The mean is a state, so that its correlation with the process noise of the block is exact
 (`states`). Covariances do not depend on the data: they are computed once, as triangular roots that
-are updated by QR (P. Park and T. Kailath 1995). From an uninformative start a root keeps its
-precision, while a covariance would lose it.
-
-References
-----------
-P. Park and T. Kailath, "New square-root algorithms for Kalman filtering", IEEE Trans. Autom.
-Control 40(5), 1995.
+are updated by QR (P. Park and T. Kailath, IEEE Trans. Autom. Control 40(5), 1995). From an
+uninformative start a root keeps its precision, while a covariance would lose it.
 """
 
 from __future__ import annotations

@@ -189,11 +189,7 @@ def _attitude(
 ) -> Iterator[CalibrationRow]:
     """Yield roll, pitch and heading, rad, of the first position, or the reason without them."""
     about = partial(
-        CalibrationRow,
-        **asdict(key),
-        run="positions",
-        unit="rad",
-        latitude=declared.latitude_si,
+        CalibrationRow, **asdict(key), run="positions", unit="rad", latitude=declared.latitude_si
     )
 
     def without(status: str, reason: str) -> Iterator[CalibrationRow]:

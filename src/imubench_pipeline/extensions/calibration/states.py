@@ -19,8 +19,8 @@ from imubench_pipeline.noise.block_means import of_block_means
 from imubench_pipeline.noise.state_space import StateSpace, repeat_step, root_of
 from imubench_pipeline.typing import Array
 
+# Standard deviation of an uninformative prior, rad/s: 14,000 times the Earth's rate
 UNINFORMATIVE_SIGMA = 1.0
-"""Standard deviation of an uninformative prior, rad/s: 14,000 times the Earth's rate."""
 
 
 @dataclass(frozen=True)

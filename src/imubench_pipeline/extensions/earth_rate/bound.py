@@ -9,10 +9,9 @@ bias,
 It uses nothing of the filter. White noise alone gives N / sqrt(T) / cos(latitude) for T seconds in
 dwells, if the bias is known; all other noise only adds to it.
 
-`whiten` decorrelates block means in a time that grows with their number, not with its cube. For any
-blocks, `covariance.block_mean_covariance` and a Cholesky root do the same. For noise with states,
-the innovations of a Kalman filter over their standard deviations are L^-1 y, with L the root of the
-same covariance (R. E. Kalman 1960). The tests compare the closed-form covariance with the states.
+`whiten` decorrelates block means in a time that grows with their number, not with its cube: the
+innovations of a Kalman filter over their standard deviations are L^-1 y, with L the Cholesky root
+of the covariance (R. E. Kalman 1960).
 """
 
 from __future__ import annotations
@@ -37,8 +36,7 @@ from imubench_pipeline.typing import Array
 _MAX_SIGMA_INCREASE = 1e-3  # largest relative increase of the standard deviation by longer blocks
 _TESTED_DWELLS = 4  # dwells on which a block length is tested
 
-MAX_BLOCKS = 2048
-"""Largest number of blocks in the test of a block length, and in a prediction."""
+MAX_BLOCKS = 2048  # largest number of blocks in the test of a block length, and in a prediction
 
 
 def whiten(model: NoiseModel, blocks: Blocks, columns: Array) -> Array:

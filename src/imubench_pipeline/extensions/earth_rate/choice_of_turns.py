@@ -25,8 +25,8 @@ from imubench_pipeline.extensions.earth_rate.turns import (
 )
 from imubench_pipeline.typing import Array
 
+# Part of a dwell at either end of a log; a transient there is handling, not a turn
 EDGE_DWELL_FRACTION = 0.2
-"""Part of a dwell at either end of a log; a transient there is handling, not a turn."""
 
 _MIN_CALM, _MIN_CALM_PER_DWELL, _MAX_REQUIRED_CALM = 2.5, 0.2, 6.0
 """Least calm between two turns, in s, in dwells, and its upper limit in s; closer events belong to

@@ -1,9 +1,8 @@
 """Estimates of an Earth-rate experiment by every method, over time.
 
 The noise model is an estimate with limits, so that the standard deviations have a range, too
-(`sigma_ranges`). Each standard deviation is computed again for models drawn from these limits; 95 %
-of the values lie between its limits. The effect of weights from a wrong model is of second order
-and neglected.
+(`sigma_ranges`): 95 % of the values for models drawn from these limits. The effect of weights from
+a wrong model is of second order and neglected.
 """
 
 from __future__ import annotations

@@ -58,8 +58,7 @@ from imubench_pipeline.tables.keys import Key
 from imubench_pipeline.typing import Array
 from imubench_pipeline.units import quantity_to_si
 
-WHOLE = "whole"
-"""Name of the part that is all of a recording."""
+WHOLE = "whole"  # name of the part that is a whole recording
 
 # Min. share of turns found only by the schedule from which the turns count as not visible
 _MIN_SCHEDULED_SHARE = 0.9

@@ -29,14 +29,9 @@ from imubench_pipeline.settings.sensor import QUANTITIES
 from imubench_pipeline.steps.noise_source import static_recordings
 from imubench_pipeline.units import quantity_to_si
 
-TIMES = (10.0, 30.0, 60.0, 120.0, 300.0, 600.0, 1200.0, 1800.0, 3600.0)
-"""Durations of rest, s."""
-
-DWELL = 28.0
-"""Length of each dwell of the predicted turns, s; with the turn half a minute."""
-
-TURN_TIME = 2.0
-"""Duration of a turn, s."""
+TIMES = (10.0, 30.0, 60.0, 120.0, 300.0, 600.0, 1200.0, 1800.0, 3600.0)  # durations of rest, s
+DWELL = 28.0  # length of each dwell of the predicted turns, s; with the turn half a minute
+TURN_TIME = 2.0  # duration of a turn, s
 
 _SIMULATED_TRIADS = 400  # number of simulated triads of the check; their rms is accurate to 3.5 %
 

@@ -6,10 +6,9 @@ deviation of `extensions.earth_rate.pairs`. A published estimate many standard d
 other errors: warm-up of the sensor, a misaligned axis, turns within the mean, or a wrong sense.
 
 A printed estimate v of the rate w is the mean over pairs (Silva et al., eq. 14) of a run. If noise
-does not explain v - w, another cause of a certain size must. The sizes follow from the printed
-figures alone. If a run is printed as a whole and by its last part, its first part follows, and a
-constant cause must explain both. With P the time between turns, D the data in a dwell and L the
-latitude:
+does not explain v - w, another cause must, whose size follows from the printed figures. If a run is
+printed as a whole and by its last part, its first part follows, and a constant cause must explain
+both. With P the time between turns, D the data in a dwell and L the latitude:
 
 - a bias that drifts by r moves a pair that begins in the north by -r P / (2 cos L);
 - an angle a of turning that remains in each dwell, with the sign of the turn, by a / (D cos L);

@@ -31,20 +31,13 @@ PAPER_MODEL = NoiseModel(
 )
 """SiRRS01-03 by Silva et al., section 5.1, SI."""
 
-PAPER_RATE = 32.0
-"""Sampling rate of the runs, Hz (Silva et al., section 6)."""
-
-PAPER_PERIOD = 30.0
-"""Time between turns, s (Silva et al., section 6)."""
-
+PAPER_RATE = 32.0  # sampling rate of the runs, Hz (Silva et al., section 6)
+PAPER_PERIOD = 30.0  # time between turns, s (Silva et al., section 6)
+# Length of the runs, min (Silva et al., section 6); the last is a part of run 4
 PAPER_MINUTES = {"1": 120.0, "2": 12.0, "3": 25.0, "4": 60.0, "4, last 13 min": 13.0}
-"""Length of the runs, min (Silva et al., section 6); the last is a part of run 4."""
-
+# Latitude of Londrina, where the authors work, rad: the paper prints none
 ASSUMED_LATITUDE = math.radians(-23.3)
-"""Latitude of Londrina, where the authors work, rad: the paper prints none."""
-
-ASSUMED_TURNING = 2.0
-"""Time of a turn within each 30 s, s: the paper prints none."""
+ASSUMED_TURNING = 2.0  # time of a turn within each 30 s, s: the paper prints none
 
 
 def paper_run(minutes: float) -> Experiment:

@@ -19,8 +19,8 @@ from scipy.ndimage import median_filter
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.typing import Array
 
+# Length of a block in s: four to a turn of half a second, the quickest by hand
 BLOCK_LENGTH = 0.125
-"""Length of a block in s: four to a turn of half a second, the quickest by hand."""
 
 # Lengths in blocks of the windows of the energy detector: 0.125 to 4 s
 _WINDOW_LENGTHS = (1, 2, 4, 8, 16, 32)
@@ -31,8 +31,8 @@ _MAX_LEVEL_WINDOW = 30.0
 # Least log-likelihood ratio of a transient; noise exceeds it once in about 1,000 s
 _MIN_LOG_LIKELIHOOD = 9.0
 
+# Log-likelihood ratio of a transient that is hardly noise: noise exceeds it once a day
 CLEAR_LOG_LIKELIHOOD = 14.0
-"""Log-likelihood ratio of a transient that is hardly noise: noise exceeds it once a day."""
 
 _EDGE_SIGMAS = 3.0  # standard deviations above which a block belongs to the neighbouring transient
 _MAX_CALM_BLOCKS = 4  # largest number of calm blocks within one transient
