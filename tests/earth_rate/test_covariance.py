@@ -3,8 +3,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from imubench_pipeline.extensions.calibration.covariance import block_mean_covariance
-from imubench_pipeline.extensions.calibration.experiment import Dwell, Experiment, block_means
+from imubench_pipeline.extensions.calibration.experiment import (
+    Dwell,
+    Experiment,
+    block_mean_covariance,
+    block_means,
+)
 from imubench_pipeline.noise import Flicker, NoiseModel, RandomWalk, WhiteNoise
 from tests.earth_rate.brute import MODELS, of_blocks
 from tests.earth_rate.test_experiment import experiments

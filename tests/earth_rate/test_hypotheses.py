@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from imubench_pipeline.extensions.calibration.experiment import Blocks, Experiment
-from imubench_pipeline.extensions.earth_rate.hypotheses import (
+from imubench_pipeline.extensions.earth_rate.pairs import by_pairs
+from imubench_pipeline.extensions.earth_rate.published import (
     PrintedRun,
     angle_needed,
     apart,
@@ -18,7 +19,6 @@ from imubench_pipeline.extensions.earth_rate.hypotheses import (
     warm_up,
     wrong_part,
 )
-from imubench_pipeline.extensions.earth_rate.pairs import by_pairs
 from imubench_pipeline.noise import NoiseModel
 
 RATE, LATITUDE = 7.292115e-5, math.radians(-23.3)

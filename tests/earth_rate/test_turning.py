@@ -5,7 +5,6 @@ import pytest
 from scipy.signal import lfilter
 
 from imubench_pipeline.extensions.calibration.experiment import Dwell
-from imubench_pipeline.extensions.earth_rate.alternation import alternation, split_at_turns
 from imubench_pipeline.extensions.earth_rate.choice_of_turns import interval_density
 from imubench_pipeline.extensions.earth_rate.transients import (
     CLEAR_LOG_LIKELIHOOD,
@@ -13,7 +12,7 @@ from imubench_pipeline.extensions.earth_rate.transients import (
     transients,
 )
 from imubench_pipeline.extensions.earth_rate.turning import find_turning
-from imubench_pipeline.extensions.earth_rate.turns import Turning
+from imubench_pipeline.extensions.earth_rate.turns import Turning, alternation, split_at_turns
 from imubench_pipeline.noise import NoiseModel
 from tests.conftest import few
 from tests.earth_rate.runs import DEGREE, EARTH, PAPER, RATE, TURN, bump, turned

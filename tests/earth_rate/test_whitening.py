@@ -4,7 +4,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.linalg import cholesky, solve_triangular
 
-from imubench_pipeline.extensions.calibration.covariance import block_mean_covariance
+from imubench_pipeline.extensions.calibration.experiment import block_mean_covariance
 from imubench_pipeline.extensions.earth_rate.bound import whiten
 from imubench_pipeline.extensions.earth_rate.simulation import PAPER_MODEL, paper_run
 from imubench_pipeline.noise import NoiseModel

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from imubench_pipeline.extensions.calibration.figures import answer, earth_words, scatter_words
+from imubench_pipeline.extensions.calibration.pages import answer, earth_words, scatter_words
 from imubench_pipeline.extensions.calibration.tables import CalibrationRow
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.report.publish import publish

@@ -8,8 +8,7 @@ from typing import Any
 
 import pytest
 
-from imubench_pipeline.extensions.earth_rate.page import published_words
-from imubench_pipeline.extensions.earth_rate.page_turned import answer, given_words, needs
+from imubench_pipeline.extensions.earth_rate.page import answer, given_words, needs, published_words
 from imubench_pipeline.extensions.earth_rate.tables import (
     EarthRatePredictionRow,
     EarthRatePublishedRow,

@@ -25,21 +25,9 @@ EXTENSION = Extension(
             "where the axis of a gyro at rest points, for its bias without what the Earth "
             "adds; null: not known",
         ),
-        Block(
-            "simulated",
-            "rate_table",
-            "calibration.settings:SimulatedTable",
-        ),
-        Block(
-            "simulated",
-            "positions",
-            "calibration.settings:SimulatedPositions",
-        ),
-        Block(
-            "simulated",
-            "pointing",
-            "calibration.settings:SimulatedRest",
-        ),
+        Block("simulated", "rate_table", "calibration.settings:SimulatedTable"),
+        Block("simulated", "positions", "calibration.settings:SimulatedPositions"),
+        Block("simulated", "pointing", "calibration.settings:SimulatedRest"),
     ),
     motions={
         "rate_table": "calibration.simulated:on_table",
@@ -51,8 +39,8 @@ EXTENSION = Extension(
         "rate_table": "calibration.pages:RATE_TABLE",
         "positions": "calibration.pages:POSITIONS",
     },
-    sections=("calibration.figures:NOT_CALIBRATED",),
-    recording_sections=("calibration.figures:at_rest",),
+    sections=("calibration.pages:NOT_CALIBRATED",),
+    recording_sections=("calibration.pages:at_rest",),
     templates="templates",
     static="static",
 )

@@ -7,13 +7,8 @@ of the error of each axis, and the mean of this error over the last block:
 
 The mean is a state, so that its correlation with the process noise of the block is exact
 (`states`). Covariances do not depend on the data: they are computed once, as triangular roots that
-are updated by QR (P. Park and T. Kailath 1995). From an uninformative start a root keeps its
-precision, while a covariance would lose it.
-
-References
-----------
-P. Park and T. Kailath, "New square-root algorithms for Kalman filtering", IEEE Trans. Autom.
-Control 40(5), 1995.
+are updated by QR (P. Park and T. Kailath, IEEE Trans. Autom. Control 40(5), 1995). From an
+uninformative start a root keeps its precision, while a covariance would lose it.
 """
 
 from __future__ import annotations
@@ -30,30 +25,19 @@ from imubench_pipeline.typing import Array
 class BlockFilter:
     """The filter of one design; it filters any number of runs at once.
 
-    Parameters
-    ----------
-    axes : sequence of BlockStates
-        The a axes, over the same blocks.
-    seen : ndarray, shape (b, a, p)
-        Sensitivity of the mean of each axis over each block to the constants.
-    start : ndarray, shape (p, p)
-        A root of the prior covariance of the constants about 0.
-
-    Attributes
-    ----------
-    roots : ndarray, shape (b, n, n)
-        Lower triangular roots of the covariances after each block.
-    gains : ndarray, shape (b, n, a)
-        Kalman gains for the innovations.
-    innovation_roots : ndarray, shape (b, a, a)
-        Lower triangular roots of the covariances of the innovations.
+    The a axes are over the same b blocks; ``seen``, shape (b, a, p), is the sensitivity of the mean
+    of each axis over each block to the p constants; ``start``, shape (p, p), a root of their prior
+    covariance about 0. ``roots``, shape (b, n, n), ``gains``, shape (b, n, a), and
+    ``innovation_roots``, shape (b, a, a), are the lower triangular roots of the covariances after
+    each block, the Kalman gains, and the roots of the covariances of the innovations.
     """
 
     def __init__(self, axes: Sequence[BlockStates], seen: Array, start: Array) -> None:
         b, a, p = seen.shape
         sizes = [len(axis.names) for axis in axes]
         self._which = axes[0].which
-        self._slices = _make_slices(p, sizes)
+        edges = p + np.concatenate(([0], np.cumsum(sizes)))
+        self._slices = [slice(int(first), int(last)) for first, last in pairwise(edges)]
         n = p + sum(sizes) + a
         self._matrices = [
             self._build_matrix(axes, kind, n, p) for kind in range(len(axes[0].steps))
@@ -65,11 +49,20 @@ class BlockFilter:
         root[:p, :p] = start
         for axis, place in zip(axes, self._slices, strict=True):
             root[place, place] = axis.initial
-        white = np.stack([axis.white for axis in axes], axis=1)
         self.roots = np.empty((b, n, n))
         self.gains = np.empty((b, n, a))
         self.innovation_roots = np.empty((b, a, a))
-        self._propagate_covariance(root, white)
+        for k in range(b):
+            transition, noise = self.matrices(k)
+            predicted = np.concatenate([transition @ root, noise], axis=1)
+            before = np.zeros((n + a, predicted.shape[1] + a))
+            before[:a, :a] = np.diag([axis.white[k] for axis in axes])
+            before[:a, a:] = self._seen[k] @ predicted
+            before[a:, a:] = predicted
+            after = triangle(before)
+            self.innovation_roots[k] = after[:a, :a]
+            self.gains[k] = np.linalg.solve(after[:a, :a].T, after[a:, :a].T).T
+            root = self.roots[k] = after[a:, a:]
 
     def matrices(self, block: int) -> tuple[Array, Array]:
         """Return the transition into a block, (n, n), and a root of its noise, (n, r)."""
@@ -107,22 +100,6 @@ class BlockFilter:
             noise[mean, driven] = step.factor[-1]
         return transition, noise
 
-    def _propagate_covariance(self, root: Array, white: Array) -> None:
-        """Propagate the root of the covariance through the blocks."""
-        a = white.shape[1]
-        for k in range(len(self._seen)):
-            transition, noise = self.matrices(k)
-            predicted = np.concatenate([transition @ root, noise], axis=1)
-            before = np.zeros((len(predicted) + a, predicted.shape[1] + a))
-            before[:a, :a] = np.diag(white[k])
-            before[:a, a:] = self._seen[k] @ predicted
-            before[a:, a:] = predicted
-            after = triangle(before)
-            self.innovation_roots[k] = after[:a, :a]
-            self.gains[k] = np.linalg.solve(after[:a, :a].T, after[a:, :a].T).T
-            root = after[a:, a:]
-            self.roots[k] = root
-
 
 def triangle(root: Array) -> Array:
     """Return a lower triangular root, shape (n, n), of a covariance with a root (n, r)."""
@@ -132,8 +109,3 @@ def triangle(root: Array) -> Array:
 def deviation(roots: Array, state: int) -> Array:
     """Return the standard deviation of a state, shape (...), from roots of shape (..., n, n)."""
     return np.asarray(np.linalg.norm(roots[..., state, :], axis=-1))
-
-
-def _make_slices(first: int, sizes: Sequence[int]) -> list[slice]:
-    edges = first + np.concatenate(([0], np.cumsum(sizes))).astype(int)
-    return [slice(int(a), int(b)) for a, b in pairwise(edges)]

@@ -1,25 +1,30 @@
-"""Bias and scale factor of one recording of a gyro on a rate table or at rest, as rows."""
+"""Bias, scale factor or attitude of one recording with known rates or directions, as rows."""
 
 from __future__ import annotations
 
 import json
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from imubench_pipeline.extensions.calibration.alignment.attitude import euler_angles, rotation
+from imubench_pipeline.extensions.calibration.alignment.fine import align
+from imubench_pipeline.extensions.calibration.alignment.triad import Positions, Site, Triad
+from imubench_pipeline.extensions.calibration.experiment import Dwell, Experiment, block_means
 from imubench_pipeline.extensions.calibration.least_squares import (
     Limits,
     NotObservable,
     NotObservableError,
 )
 from imubench_pipeline.extensions.calibration.pointing import Pointing
-from imubench_pipeline.extensions.calibration.positions import attitude_rows, true_angles
 from imubench_pipeline.extensions.calibration.rate_table import Calibration, calibrate, residuals
 from imubench_pipeline.extensions.calibration.schedule import Schedule
 from imubench_pipeline.extensions.calibration.settings import (
+    TRIAD,
     AtRest,
     InPositions,
     OnRateTable,
@@ -33,6 +38,7 @@ from imubench_pipeline.extensions.calibration.tables import (
     CalibrationPointRow,
     CalibrationRow,
 )
+from imubench_pipeline.extensions.earth_rate.outlook import noise_at_rest
 from imubench_pipeline.model.table import TableRow
 from imubench_pipeline.recordings.kept import kept_logs
 from imubench_pipeline.recordings.recording import ChannelLog, on_grid, read_metadata
@@ -41,6 +47,7 @@ from imubench_pipeline.settings.simulated_recordings import SimulatedRecording
 from imubench_pipeline.steps.noise_source import (
     NO_MODEL,
     NoiseSource,
+    from_printed,
     noise_source,
     segments_reason,
 )
@@ -60,13 +67,15 @@ UNITS = {
 }
 """SI unit of each quantity of the table ``calibration``."""
 
+_ANGLES = ("roll", "pitch", "heading")  # of the first position
+_Z_95 = 1.96  # standard deviations of a 95 % limit
 _RUN_PARAMETERS = {"rate_table": ("bias", "scale_factor"), "at_rest": ("bias", "present_bias")}
 
 
 def calibration_tables(
     folder: Path, static: Sequence[Path], sensor: str, recording: str, settings: str
 ) -> dict[str, Sequence[TableRow]]:
-    """Return the rows of the tables of a gyro on a rate table, or at rest where it points known.
+    """Return the rows of the tables of a gyro on a rate table, or at rest with a known direction.
 
     `folder`: of the recording; `static`: of the static recordings of the same sensor; `settings`:
     of `imubench_pipeline.run.plan.Plan.experiment_settings`. A rejected recording has no rows.
@@ -76,12 +85,18 @@ def calibration_tables(
     if not logs:
         return rows
     sections = json.loads(settings)
-    if (positions := _positions(sections)) is not None:
-        stated = Sensor.model_validate(sections["sensor"])
-        names = {"sensor": sensor, "recording": recording}
-        rows["calibration"] = list(attitude_rows(names, logs, static, stated, *positions))
-        return rows
-    declared, simulated = _declared(sections)
+    simulated = None
+    if "simulated" in sections:
+        simulated = SimulatedRecording.model_validate(sections["simulated"])
+    declared = _declared(sections, simulated)
+    stated = Sensor.model_validate(sections["sensor"])
+    if isinstance(declared, InPositions):
+        triad = None if simulated is None else simulated.block(SimulatedPositions)
+        truth = {} if triad is None else triad.true_angles
+        attitude = _attitude(
+            Key(sensor, recording, "gyro_x"), logs, static, stated, declared, truth
+        )
+        return rows | {"calibration": list(attitude)}
     # Of several gyros the notes name one: the ingest has seen to it.
     metadata = read_metadata(next(iter(logs.values())).path)
     gyros = (name for name in [*logs, *metadata["unusable"]] if name.startswith("gyro_"))
@@ -94,7 +109,7 @@ def calibration_tables(
     log = GyroLog(
         key,
         logs[channel],
-        noise_source(folder, static, key, Sensor.model_validate(sections["sensor"])),
+        noise_source(folder, static, key, stated),
         metadata.get("begins", 0.0),
         _truth(simulated, channel),
     )
@@ -103,38 +118,27 @@ def calibration_tables(
     return rows | vars(_at_rest(log, declared))
 
 
-def _positions(sections: Mapping[str, Any]) -> tuple[InPositions, dict[str, float]] | None:
-    """Return the positions of a triad, and the true attitude of a simulated one; else None."""
-    if "simulated" in sections:
-        positions = SimulatedRecording.model_validate(sections["simulated"]).block(
-            SimulatedPositions
-        )
-        if positions is None:
-            return None
-        return positions.declared, true_angles(positions.model_dump())
-    if "positions" in sections:
-        return InPositions.model_validate(sections["positions"]), {}
-    return None
-
-
 def _declared(
-    sections: Mapping[str, Any],
-) -> tuple[OnRateTable | AtRest, SimulatedRecording | None]:
-    """Return what stands beside a log, or would stand beside a simulated one."""
-    if "simulated" not in sections:
-        if "rate_table" in sections:
-            return OnRateTable.model_validate(sections["rate_table"]), None
-        return AtRest.model_validate(sections["pointing"]), None
-    simulated = SimulatedRecording.model_validate(sections["simulated"])
-    if (table := simulated.block(SimulatedTable)) is not None:
-        return table.declared, simulated
-    rest = simulated.block(SimulatedRest)
-    assert rest is not None  # only recordings with one of both are calibrated
-    return rest.declared, simulated
+    sections: Mapping[str, Any], simulated: SimulatedRecording | None
+) -> InPositions | OnRateTable | AtRest:
+    """Return the block in the notes of a log, or its equivalent for a simulated one."""
+    if simulated is not None:
+        block = (
+            simulated.block(SimulatedPositions)
+            or simulated.block(SimulatedTable)
+            or simulated.block(SimulatedRest)
+        )
+        assert block is not None  # only recordings with one of them are calibrated
+        return block.declared
+    if "positions" in sections:
+        return InPositions.model_validate(sections["positions"])
+    if "rate_table" in sections:
+        return OnRateTable.model_validate(sections["rate_table"])
+    return AtRest.model_validate(sections["pointing"])
 
 
 def _truth(simulated: SimulatedRecording | None, channel: str) -> dict[str, float]:
-    """Return the true figures of a simulation: its bias, and what it has of a line."""
+    """Return the true bias of a simulation, and its line on a rate table, SI."""
     if simulated is None:
         return {}
     truth = {}
@@ -142,14 +146,13 @@ def _truth(simulated: SimulatedRecording | None, channel: str) -> dict[str, floa
         if name == channel and axis.bias is not None:
             truth["bias"] = quantity_to_si(axis.bias, "angular_rate")
     if (table := simulated.block(SimulatedTable)) is not None:
-        truth |= {"scale_factor": table.scale_factor}
-        truth |= {"quadratic": 0.0, "asymmetry": 0.0}
+        truth |= {"scale_factor": table.scale_factor, "quadratic": 0.0, "asymmetry": 0.0}
     return truth
 
 
 @dataclass
 class Rows:
-    """Rows of the tables that a calibration leaves."""
+    """Rows of the tables of a calibration."""
 
     calibration: list[CalibrationRow] = field(default_factory=list)
     calibration_points: list[CalibrationPointRow] = field(default_factory=list)
@@ -157,40 +160,126 @@ class Rows:
 
 @dataclass(frozen=True)
 class GyroLog:
-    """The log of a gyro that is calibrated, with what is known of it.
-
-    Attributes
-    ----------
-    source : NoiseSource or None
-        Its noise; without it nothing is estimated.
-    begins : float
-        Time of the first sample that is used, s from the first of the recording.
-    truth : dict of str to float
-        True figures of a simulation, SI.
-    """
+    """The log of a calibrated gyro."""
 
     key: Key
     log: ChannelLog
-    source: NoiseSource | None
-    begins: float = 0.0
-    truth: Mapping[str, float] = field(default_factory=dict)
+    source: NoiseSource | None  # without it nothing is estimated
+    begins: float  # time of the first sample used, s from the first of the recording
+    truth: Mapping[str, float]  # true figures of a simulation, SI
 
     def names(self, run: str, pointing: Pointing | None) -> dict[str, Any]:
-        """Return what every row of the table ``calibration`` says."""
+        """Return the columns that all rows of the table ``calibration`` share."""
         row: dict[str, Any] = asdict(self.key) | {"run": run}
         if self.source is not None:
             row |= {"model": self.source.model.name, "model_from": self.source.words}
         if pointing is not None:
-            row |= {name: getattr(pointing, name) for name in _DIRECTION_PARAMETERS}
+            row |= {name: getattr(pointing, name) for name in ("latitude", "heading", "elevation")}
             row |= {"earth_rate": pointing.rate, "earth_rate_sigma": pointing.rate_sigma}
         return row
 
 
-_DIRECTION_PARAMETERS = ("latitude", "heading", "elevation")
+def _attitude(
+    key: Key,
+    logs: Mapping[str, ChannelLog],
+    static: Sequence[Path],
+    sensor: Sensor,
+    declared: InPositions,
+    truth: Mapping[str, float],
+) -> Iterator[CalibrationRow]:
+    """Yield roll, pitch and heading, rad, of the first position, or the reason without them."""
+    about = partial(
+        CalibrationRow, **asdict(key), run="positions", unit="rad", latitude=declared.latitude_si
+    )
+
+    def without(status: str, reason: str) -> Iterator[CalibrationRow]:
+        for name in _ANGLES:
+            yield about(parameter=name, status=status, reason=reason)
+
+    missing = [name for name in TRIAD if name not in logs]
+    if missing:
+        reason = f"{', '.join(missing)} cannot be used; the findings of the recording say why"
+        yield from without("not_shown", reason)
+        return
+    axes = [logs[name] for name in TRIAD]
+    if any(len(log.segments) > 1 for log in axes):
+        yield from without("not_shown", segments_reason(axes[0]))
+        return
+    at_rest = noise_at_rest(static)
+    if at_rest is not None and any(channel.startswith("accel") for channel in at_rest.models):
+        models = [*at_rest.three("gyro").values(), *at_rest.three("accel").values()]
+        words = f"static recording {at_rest.recording}"
+    else:
+        printed = [from_printed(key.sensor, sensor, channel) for channel in TRIAD]
+        known = [source for source in printed if source is not None]
+        if len(known) < 6:
+            yield from without("no_model", NO_MODEL)
+            return
+        models, words = [source.model for source in known], known[0].words
+    about = partial(about, model=models[0].name, model_from=words)
+    try:
+        positions, means = _average_positions(axes, declared)
+        triad = Triad(
+            gyros=models[:3],
+            accelerometers=models[3:],
+            gyro_bias=quantity_to_si(declared.gyro_bias, "angular_rate"),
+            accelerometer_bias=quantity_to_si(declared.accelerometer_bias, "acceleration"),
+        )
+        aligned, fine = align(means, triad, positions, Site(latitude=declared.latitude_si))
+    except NotObservableError as error:
+        yield from without("not_observable", str(error))
+        return
+    except ValueError as error:
+        yield from without("too_short", str(error))
+        return
+    for name, value, sigma in zip(
+        _ANGLES, euler_angles(aligned.attitude[0]).tolist(), fine.sigma[-1].tolist(), strict=True
+    ):
+        yield about(
+            parameter=name,
+            value=value,
+            lower=value - _Z_95 * sigma,
+            upper=value + _Z_95 * sigma,
+            status="ok",
+            sigma=sigma,
+            sigma_noise=sigma,
+            truth=truth.get(name),
+            duration=positions.blocks.duration,
+            samples=int(positions.blocks.count.sum()),
+            rates=len(positions.turned),
+        )
+
+
+def _average_positions(
+    axes: Sequence[ChannelLog], declared: InPositions
+) -> tuple[Positions, Array]:
+    """Return the positions of a log, and the mean of each axis in each, shape (b, 6)."""
+    rate, grid = axes[0].rate, min(log.grid for log in axes)
+    dwell, turning = declared.seconds("dwell"), declared.seconds("turning")
+    dwells: list[Dwell] = []
+    while True:
+        start = len(dwells) * dwell
+        stop = round((start + dwell - turning) * rate)
+        if stop > grid:
+            break
+        dwells.append(Dwell(round(start * rate), stop, 1))
+    if len(dwells) < 2:
+        raise ValueError(f"{len(dwells)} positions are in the log; expected two or more")
+    experiment = Experiment(tuple(dwells), rate, 0.0)
+    longest = max(one.stop - one.start for one in dwells)
+    measured = [block_means(log.blocks(), experiment, longest) for log in axes]
+    if {len(one.blocks) for one in measured} != {len(dwells)}:
+        raise ValueError("too many samples of a position are missing")
+    angles = np.zeros((len(dwells), 3))
+    angles[:, 2] = [declared.angle(number) for number in range(len(dwells))]
+    count = np.min([one.blocks.count for one in measured], axis=0)
+    blocks = replace(measured[0].blocks, count=count)
+    means = np.stack([one.means[0] for one in measured], axis=1)
+    return Positions(blocks, rotation(angles)), means
 
 
 def _at_rest(gyro: GyroLog, declared: AtRest) -> Rows:
-    """Return the bias of a gyro whose axis points where it is stated; else the rows say why not."""
+    """Return the bias of a gyro with a stated direction, or the reason why there is none."""
     pointing = declared.pointing
     names = gyro.names("at_rest", pointing)
     if len(gyro.log.segments) > 1:
@@ -212,12 +301,12 @@ def _at_rest(gyro: GyroLog, declared: AtRest) -> Rows:
     fixed = _figure(gyro, "bias", bias.fixed, bias.fixed_sigma, limits, noise)
     limits, noise = bias.present_interval(), bias.present_noise_sigma
     present = _figure(gyro, "present_bias", bias.present, bias.present_sigma, limits, noise)
-    found = [CalibrationRow(**(about | row)) for row in (fixed, present)]
-    return Rows([*found, *_open(names, bias.not_observable)])
+    estimated = [CalibrationRow(**(about | row)) for row in (fixed, present)]
+    return Rows([*estimated, *_open(names, bias.not_observable)])
 
 
 def _on_rate_table(gyro: GyroLog, declared: OnRateTable) -> Rows:
-    """Return scale factor and bias of a gyro on a rate table; else the rows say why not."""
+    """Return scale factor and bias of a gyro on a rate table, or the reason without them."""
     pointing = None if declared.axis is None else declared.axis.pointing
     names = gyro.names("rate_table", pointing)
     if len(gyro.log.segments) > 1:
@@ -305,7 +394,7 @@ def _schedule(gyro: GyroLog, declared: OnRateTable) -> Schedule:
 
 
 def _line(gyro: GyroLog, fit: Calibration) -> Iterator[dict[str, Any]]:
-    """Yield what is found of the line, and of its straightness."""
+    """Yield the estimates of the line, and of its deviations."""
     noise = float(fit.line.sigma[0])
     yield _figure(gyro, "bias", fit.bias, fit.bias_sigma, fit.bias_interval(), noise)
     sigma, interval = fit.scale_factor_sigma, fit.scale_factor_interval()
@@ -340,7 +429,7 @@ def _figure(
 def _open(
     names: Mapping[str, Any], quantities: tuple[NotObservable, ...]
 ) -> Iterator[CalibrationRow]:
-    """Yield what the run cannot tell, each with its reason."""
+    """Yield the quantities that are not observable, each with its reason."""
     for unknown in quantities:
         yield CalibrationRow(
             **names,
@@ -353,19 +442,10 @@ def _open(
 
 
 def _without(names: Mapping[str, Any], status: str, reason: str) -> Rows:
-    """Return the rows of a run of which nothing can be estimated."""
-    return Rows(
-        [
-            CalibrationRow(
-                **names,
-                parameter=parameter,
-                unit=UNITS[parameter],
-                status=status,
-                reason=reason,
-            )
-            for parameter in _RUN_PARAMETERS[names["run"]]
-        ]
-    )
+    """Return the rows of a run without estimates."""
+    about = {**names, "status": status, "reason": reason}
+    parameters = _RUN_PARAMETERS[names["run"]]
+    return Rows([CalibrationRow(**about, parameter=one, unit=UNITS[one]) for one in parameters])
 
 
 def _finite(value: float) -> float | None:

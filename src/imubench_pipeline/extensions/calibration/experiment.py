@@ -17,22 +17,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from imubench_pipeline.estimators.missing import yield_present_samples
+from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.typing import Array
 
 Integers = NDArray[np.int64]
 
+# Least share of the samples of a block that must be present, or its mean is left out
 _MIN_PRESENT_SHARE = 0.5
-"""Least share of the samples of a block that must be present, or its mean is left out."""
 
 
 @dataclass(frozen=True)
 class Dwell:
     """A time at rest in one position.
 
-    Raises
-    ------
-    ValueError
-        If there is no sample, or the sense is neither 1 nor -1.
+    Raises ValueError if there is no sample, or the sense is neither 1 nor -1.
     """
 
     # start, stop: first sample of the log, and the one past the last
@@ -51,11 +49,8 @@ class Dwell:
 class Experiment:
     """Dwells in their order.
 
-    Raises
-    ------
-    ValueError
-        If dwells overlap or are not in order, the rate is not above 0, or the latitude is not
-        between the poles.
+    Raises ValueError if dwells overlap or are not in order, the rate is not above 0, or the
+    latitude is not between the poles.
     """
 
     # at least one; the time between them is turning. Two consecutive ones have the same sense after
@@ -110,16 +105,16 @@ class Experiment:
     def blocks(self, longest: int) -> Blocks:
         """Return the blocks of a log without missing samples.
 
-        Of ``longest`` samples at most; a dwell is divided evenly (`block_length`).
-
-        Raises
-        ------
-        ValueError
-            If it is below 1.
+        Of ``longest`` samples at most; a dwell is divided evenly (`block_length`). Raises
+        ValueError if it is below 1.
         """
         if longest < 1:
             raise ValueError(f"a block of {longest} samples is empty")
-        edges = [_compute_edges(dwell, longest) for dwell in self.dwells]
+        edges = []
+        for dwell in self.dwells:
+            length = dwell.stop - dwell.start
+            count = -(-length // longest)
+            edges.append(dwell.start + np.arange(count + 1) * length // count)
         number = [len(of_dwell) - 1 for of_dwell in edges]
         start = np.concatenate([of_dwell[:-1] for of_dwell in edges])
         stop = np.concatenate([of_dwell[1:] for of_dwell in edges])
@@ -235,12 +230,8 @@ def block_means(parts: Iterable[Array], experiment: Experiment, longest: int) ->
     left out; its length still counts as a gap. With a third of all samples missing, a standard
     deviation is right to 1 %, or 3 % too small if most of the noise is a process with a correlation
     time of two samples. The parts of the log are in order, rad/s, each ndarray of one axis; NaN
-    where a sample is missing.
-
-    Raises
-    ------
-    ValueError
-        If the log ends before the last dwell does, or no block has enough samples.
+    where a sample is missing. Raises ValueError if the log ends before the last dwell does, or no
+    block has enough samples.
     """
     whole = experiment.blocks(longest)
     total, count = np.zeros(len(whole)), np.zeros(len(whole), dtype=np.int64)
@@ -269,7 +260,21 @@ def block_means(parts: Iterable[Array], experiment: Experiment, longest: int) ->
     )
 
 
-def _compute_edges(dwell: Dwell, longest: int) -> Integers:
-    length = dwell.stop - dwell.start
-    number = -(-length // longest)
-    return dwell.start + np.arange(number + 1) * length // number
+def block_mean_covariance(model: NoiseModel, blocks: Blocks) -> Array:
+    """Return the covariance of the means of b blocks in closed form, (rad/s)^2, shape (b, b).
+
+    It is the covariance of the samples, as `noise.simulate` draws them, summed over the blocks,
+    without the fixed bias and the Earth's rate. The random walk counts from the first sample of the
+    first block; flicker noise is its bank of Gauss-Markov processes, up to the duration of the
+    blocks. It is independent of the filter, so that bounds and standard errors computed with it
+    check the filter.
+    """
+    total = np.zeros((len(blocks), len(blocks)))
+    for term in model.realised(1.0 / blocks.rate, longest_tau(blocks)):
+        total += term.mean_covariance(blocks)
+    return total
+
+
+def longest_tau(blocks: Blocks) -> float:
+    """Return the longest tau of flicker noise, s: the duration, and at least 2 samples."""
+    return max(blocks.duration, 2.0 / blocks.rate)

@@ -32,8 +32,8 @@ from imubench_pipeline.extensions.calibration.states import UNINFORMATIVE_SIGMA,
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.typing import Array
 
+# Relative singular value of a predicted root with unit rows, below which it is rounding
 _SINGULAR_TOLERANCE = 1e-12
-"""Relative singular value of a predicted root with unit rows, below which it is rounding."""
 
 
 @dataclass(frozen=True)
@@ -100,21 +100,10 @@ class Smoothed:
 class RateFilter:
     """The filter of one design: blocks and noise model. It filters any number of runs at once.
 
-    Parameters
-    ----------
-    blocks : Blocks
-    model : NoiseModel
-        Its flicker noise is a bank of Gauss-Markov processes; a ramp and lines are estimated, see
-        `states.block_states`.
-    turn_on_bias : float
-        Standard deviation of the fixed bias, rad/s. By default it is unknown.
-    rate_sigma : float
-        Standard deviation of the prior of the rate about 0, rad/s; by default uninformative.
-
-    Raises
-    ------
-    ValueError
-        If a standard deviation is negative or not finite.
+    Flicker noise of the model is a bank of Gauss-Markov processes; a ramp and lines are estimated,
+    see `states.block_states`. ``turn_on_bias`` is the standard deviation of the fixed bias,
+    ``rate_sigma`` of the prior of the rate about 0, both in rad/s and by default uninformative.
+    Raises ValueError if one of them is negative or not finite.
     """
 
     def __init__(
@@ -129,9 +118,8 @@ class RateFilter:
             raise ValueError(f"rate_sigma is {rate_sigma}, expected a number from 0")
         self.blocks = blocks
         self._states = block_states(model, blocks, turn_on_bias)
-        self._filter = BlockFilter(
-            (self._states,), blocks.seen[:, None, None], np.array([[rate_sigma]])
-        )
+        start = np.array([[rate_sigma]])
+        self._filter = BlockFilter((self._states,), blocks.seen[:, None, None], start)
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -146,11 +134,8 @@ class RateFilter:
     def run(self, means: Array) -> Filtered:
         """Filter runs of one design from block means, rad/s, shape (runs, b).
 
-        Raises
-        ------
-        ValueError
-            If there is not one mean a block, or one is not finite: a block without a mean is no
-            block (`experiment.block_means`).
+        Raises ValueError if there is not one mean a block, or one is not finite: a block without a
+        mean is no block (`experiment.block_means`).
         """
         self.blocks.check_means(means)
         states, innovation = self._filter.run(means[:, :, None])
@@ -186,23 +171,19 @@ class RateFilter:
         gains = np.empty((len(self.blocks) - 1, *root.shape))
         sigma = np.empty(len(self.blocks))
         sigma[-1] = deviation(root, -1)
+        n = len(root)
         for k in range(len(gains) - 1, -1, -1):
-            gains[k], rest = self._compute_smoothing(k)
+            transition, noise = self._filter.matrices(k + 1)
+            filtered = self._filter.roots[k]
+            joint = np.zeros((2 * n, n + noise.shape[1]))
+            joint[:n, :n], joint[:n, n:], joint[n:, :n] = transition @ filtered, noise, filtered
+            after = triangle(joint)
+            predicted, shared, rest = after[:n, :n], after[n:, :n], after[n:, n:]
+            # Without process noise the mean of a block depends on the states: no plain inverse.
+            scale = np.linalg.norm(predicted, axis=1)
+            unit = np.where(scale > 0.0, scale, 1.0)
+            inverse = np.linalg.pinv(predicted / unit[:, None], rcond=_SINGULAR_TOLERANCE)
+            gains[k] = shared @ inverse / unit
             root = triangle(np.concatenate([rest, gains[k] @ root], axis=1))
             sigma[k] = deviation(root, -1)
         return gains, sigma
-
-    def _compute_smoothing(self, k: int) -> tuple[Array, Array]:
-        """Return the smoother gain at a block, and a root of its covariance given the next one."""
-        transition, noise = self._filter.matrices(k + 1)
-        root = self._filter.roots[k]
-        n = len(root)
-        joint = np.zeros((2 * n, n + noise.shape[1]))
-        joint[:n, :n], joint[:n, n:], joint[n:, :n] = transition @ root, noise, root
-        after = triangle(joint)
-        predicted, shared, rest = after[:n, :n], after[n:, :n], after[n:, n:]
-        # Without process noise the mean of a block depends on the states: no plain inverse.
-        scale = np.linalg.norm(predicted, axis=1)
-        unit = np.where(scale > 0.0, scale, 1.0)
-        gain = shared @ np.linalg.pinv(predicted / unit[:, None], rcond=_SINGULAR_TOLERANCE) / unit
-        return gain, rest

@@ -2,7 +2,7 @@
 
     y = X b + e,   cov(e) = C,   b^ = (X^T C^-1 X)^-1 X^T C^-1 y,   cov(b^) = (X^T C^-1 X)^-1
 
-(A. C. Aitken 1935). `earth_rate.covariance` gives C: the covariance of the means by white noise,
+(A. C. Aitken 1935). `block_mean_covariance` gives C: the covariance of the means by white noise,
 Gauss-Markov processes, flicker noise, random walk and the other terms. The standard errors follow
 from the noise model, not from the scatter, which contains little of the slow noise. The scatter is
 a check: (y - X b^)^T C^-1 (y - X b^) is chi-squared of b - p degrees of freedom if the noise model
@@ -13,25 +13,25 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cache
 from typing import Literal
 
 import numpy as np
 from scipy.linalg import cholesky, solve_triangular
 from scipy.stats import chi2, norm
 
-from imubench_pipeline.extensions.calibration.covariance import block_mean_covariance
-from imubench_pipeline.extensions.calibration.experiment import Blocks, Experiment
+from imubench_pipeline.extensions.calibration.experiment import (
+    Blocks,
+    Experiment,
+    block_mean_covariance,
+)
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.typing import Array
 
-_MAX_SIGMA_INCREASE = 1e-3
-"""Largest relative increase of a standard error by longer blocks."""
-
-_MAX_BLOCKS = 1024
-"""Largest number of blocks in the test of a block length."""
-
+_MAX_SIGMA_INCREASE = 1e-3  # largest relative increase of a standard error by longer blocks
+_MAX_BLOCKS = 1024  # largest number of blocks in the test of a block length
+# Least singular value of independent whitened regressors of unit length; others are rounding
 _MIN_SINGULAR_VALUE = 1e-8
-"""Least singular value of independent whitened regressors of unit length; others are rounding."""
 
 CONFIDENCE_LEVEL = 0.95
 """Confidence level of intervals."""
@@ -94,12 +94,7 @@ def limits(value: Array, sigma: Array | float) -> Limits:
 def half_width(level: float = CONFIDENCE_LEVEL) -> float:
     """Return half of a two-sided interval of the normal distribution, in standard deviations.
 
-    A level of 0.95 gives 1.96.
-
-    Raises
-    ------
-    ValueError
-        If it is not between 0 and 1.
+    A level of 0.95 gives 1.96. Raises ValueError if it is not between 0 and 1.
     """
     if not 0 < level < 1:
         raise ValueError(f"level is {level}, expected one between 0 and 1")
@@ -107,24 +102,11 @@ def half_width(level: float = CONFIDENCE_LEVEL) -> float:
 
 
 class LeastSquares:
-    """The estimator of one design: blocks, noise model and regressors.
+    """The estimator of one design: blocks, noise model and regressors of shape (b, p).
 
-    Parameters
-    ----------
-    blocks : Blocks
-        Their sense is not used.
-    model : NoiseModel
-        With some noise in every sample.
-    regressors : ndarray, shape (b, p)
-    further : ndarray, shape (b, b), optional
-        Covariance that is added to the covariance of the noise, (rad/s)^2.
-    names : sequence of str
-        Of the regressors, for the error.
-
-    Raises
-    ------
-    NotObservableError
-        If there are fewer blocks than regressors, or the regressors are collinear.
+    The model has some noise in every sample. ``further``, shape (b, b), is added to the covariance
+    of the noise, (rad/s)^2; ``names`` of the regressors are for errors. Raises NotObservableError
+    if there are fewer blocks than regressors, or the regressors are collinear.
     """
 
     def __init__(
@@ -165,10 +147,7 @@ class LeastSquares:
     def fit(self, means: Array) -> Fit:
         """Estimate the parameters of runs of one design from means of shape (runs, b).
 
-        Raises
-        ------
-        ValueError
-            If there is not one finite mean a block.
+        Raises ValueError if there is not one finite mean a block.
         """
         self._blocks.check_means(means)
         white = solve_triangular(self._root, means.T, lower=True).T
@@ -189,21 +168,15 @@ def block_length(
 
     Blocks are shortened by halves until a fourth of their length would lower no standard error by
     0.1 %. There are 1,024 blocks at most, none longer than the longest dwell. ``regressors`` gives
-    the regressors of blocks, shape (b, p).
-
-    Raises
-    ------
-    NotObservableError
-        If samples do not determine the parameters, either.
+    the regressors of blocks, shape (b, p). Raises NotObservableError if samples do not determine
+    the parameters, either.
     """
     length = max(dwell.stop - dwell.start for dwell in experiment.dwells)
-    sigmas: dict[int, Array] = {}
 
+    @cache
     def sigma(longest: int) -> Array:
-        if longest not in sigmas:
-            blocks = experiment.blocks(longest)
-            sigmas[longest] = LeastSquares(blocks, model, regressors(blocks)).sigma
-        return sigmas[longest]
+        blocks = experiment.blocks(longest)
+        return LeastSquares(blocks, model, regressors(blocks)).sigma
 
     while len(blocks := experiment.blocks(length)) < regressors(blocks).shape[1] and length > 1:
         length //= 2

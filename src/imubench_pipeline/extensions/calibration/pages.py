@@ -1,36 +1,299 @@
-"""The pages of recordings on a rate table, and in several positions."""
+"""The pages of recordings on a rate table and in positions, and sections for other pages."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
-from imubench_pipeline.extensions.calibration.figures import (
-    answer,
-    attitude_lines,
-    earth_words,
-    lines,
-    noise_words,
-    not_observable,
-    scatter_words,
-)
 from imubench_pipeline.extensions.calibration.tables import CalibrationPointRow, CalibrationRow
+from imubench_pipeline.extensions.earth_rate.tables import EarthRateRow
 from imubench_pipeline.report.payload import Arrays
+from imubench_pipeline.report.practical import System, page_unit
 from imubench_pipeline.report.recording import about_of, summary_words
-from imubench_pipeline.report.site import RecordingPage, Site
+from imubench_pipeline.report.site import RecordingPage, Section, Site
 from imubench_pipeline.report.view import RecordingView
-from imubench_pipeline.words.numbers import counted, number_text
+from imubench_pipeline.words.numbers import (
+    counted,
+    degrees_text,
+    limit_digits,
+    number_text,
+    percent_text,
+    sentence,
+)
+
+WORDS = {
+    "bias": "bias at the start",
+    "present_bias": "bias at the end",
+    "scale_factor": "scale factor",
+    "quadratic": "quadratic term",
+    "asymmetry": "asymmetry",
+    "linearity": "linearity, of the largest rate",
+    "earth_rate": "the Earth's rate",
+    "heading": "heading",
+}
+"""Name of each figure on a page."""
+
+_PPM_PER_UNIT = 1e6
+_PERCENT_PER_UNIT = 1e2
+_RATIO_UNITS = {
+    "scale_factor": ("", 1.0),
+    "asymmetry": (" ppm", _PPM_PER_UNIT),
+    "quadratic": (" ppm per °/s", _PPM_PER_UNIT * math.radians(1.0)),
+    "linearity": (" %", _PERCENT_PER_UNIT),
+}
+"""Unit of each dimensionless quantity on a page, and the factor to it."""
+
+_MIN_LINEARITY_P_VALUE = 0.05  # p-value below which the response of a gyro counts as nonlinear
+# p-value below which the scatter of the means contradicts the noise model
+_MIN_SCATTER_P_VALUE = 0.01
+
+
+def answer(rows: Sequence[CalibrationRow], system: System) -> str:
+    """Return scale factor and bias of a recording in a sentence, or the reason without them.
+
+    ``rows`` are those of the recording in the table ``calibration``, as in all functions below.
+    """
+    by_parameter = {row.parameter: row for row in rows}
+    bias = by_parameter.get("bias")
+    if bias is None:
+        return "This recording has no result."
+    if bias.value is None:
+        return sentence(bias.reason)
+    unit = page_unit("gyro", "adev", system)
+    size = _format_half_width((bias.value, bias.lower, bias.upper), unit.text)
+    text = f"The bias is {size} {unit.sign} (95 %)"
+    scale = by_parameter.get("scale_factor")
+    if scale is not None and scale.value is not None:
+        errors = [
+            None if factor is None else _PPM_PER_UNIT * (factor - 1.0)
+            for factor in (scale.value, scale.lower, scale.upper)
+        ]
+        off = _format_half_width(errors, number_text)
+        text = f"The scale factor error is {off} ppm. {text}"
+    text += ". "
+    straight = by_parameter.get("linearity")
+    if straight is not None and straight.chance is not None and straight.value is not None:
+        nonlinear = straight.chance < _MIN_LINEARITY_P_VALUE
+        largest = number_text(_PERCENT_PER_UNIT * straight.value, 3)
+        text += f"The largest deviation from the line is {largest} % of the largest rate. "
+        text += f"Noise {'does not explain' if nonlinear else 'explains'} this deviation "
+        text += f"(p = {percent_text(straight.chance, 2)})."
+    return text.strip()
+
+
+def _format_half_width(
+    limits: Sequence[float | None], as_text: Callable[[float | None, int], str]
+) -> str:
+    """Return a value with half of its interval as text, from value, lower and upper limit."""
+    value, lower, upper = limits
+    half = None if lower is None or upper is None else (upper - lower) / 2.0
+    return f"{as_text(value, limit_digits(lower, upper, 3))} ± {as_text(half, 2)}"
+
+
+def lines(rows: Sequence[CalibrationRow]) -> Iterator[dict[str, Any]]:
+    """Yield the lines of the table of results; dimensionless quantities as text."""
+    for row in rows:
+        if row.status == "not_observable" and row.parameter in ("earth_rate", "heading"):
+            continue
+        line = {
+            **row.columns(),
+            "words": WORDS[row.parameter],
+            "digits": limit_digits(row.lower, row.upper, 4),
+            "is_rate": row.unit == "rad/s",
+            "percent": None if row.chance is None else percent_text(row.chance, 2),
+            "why": sentence(row.reason),
+        }
+        yield line | _format_ratio(row)
+
+
+def _format_ratio(row: CalibrationRow) -> dict[str, str]:
+    """Return a dimensionless quantity with its limits as text."""
+    name = row.parameter
+    if row.value is None or name not in _RATIO_UNITS:
+        return dict.fromkeys(("text", "limits", "sigma_text", "truth_text"), "–")
+    shown = (row.value, row.lower, row.upper, row.truth)
+    if name == "scale_factor":
+        digits = limit_digits(row.lower, row.upper, 4)
+        value, low, high, true = (number_text(size, digits) for size in shown)
+        sigma = "–" if row.sigma is None else f"{number_text(_PPM_PER_UNIT * row.sigma, 3)} ppm"
+    else:
+        _, per = _RATIO_UNITS[name]
+        value, low, high, true, sigma = (
+            number_text(None if size is None else per * size, 3) for size in (*shown, row.sigma)
+        )
+    return {
+        "text": value + _RATIO_UNITS[name][0],
+        "limits": f"{low} to {high}",
+        "sigma_text": sigma,
+        "truth_text": true,
+    }
+
+
+def not_observable(rows: Sequence[CalibrationRow]) -> list[dict[str, Any]]:
+    """Return the quantities that a recording cannot determine, each with the reason."""
+    return [
+        {"words": WORDS[row.parameter], "why": sentence(row.reason), **row.columns()}
+        for row in rows
+        if row.status == "not_observable"
+    ]
+
+
+def scatter_words(rows: Sequence[CalibrationRow]) -> str:
+    """Return whether the scatter agrees with the noise model, in a sentence."""
+    chance = next((row.scatter for row in rows if row.scatter is not None), None)
+    if chance is None:
+        return ""
+    text = percent_text(chance, 2)
+    if chance < _MIN_SCATTER_P_VALUE:
+        return (
+            f"The means scatter more than the noise model predicts (p = {text}), so the intervals "
+            "are too narrow. Check for other noise, a warm-up or motion."
+        )
+    return f"The scatter of the means agrees with the noise model (p = {text})."
+
+
+def earth_words(rows: Sequence[CalibrationRow], system: System) -> str:
+    """Return the correction for the Earth's rate, in a sentence."""
+    row = next((row for row in rows if row.earth_rate is not None), None)
+    if row is None:
+        return "The bias includes the Earth's rate along the axis."
+    unit = page_unit("gyro", "adev", system)
+    text = (
+        f"The Earth's rate along the axis, {unit.text(row.earth_rate, 4)} {unit.sign} (latitude "
+        f"{degrees_text(row.latitude)}, {_describe_direction(row)}), is subtracted"
+    )
+    if row.half_width:
+        half = f"{unit.text(row.half_width, 3)} {unit.sign}"
+        text += f"; without a heading it is uncertain by ± {half}"
+    elif row.earth_rate_sigma:
+        sigma = f"{unit.text(row.earth_rate_sigma, 2)} {unit.sign}"
+        text += f"; the stated direction determines it to {sigma} (1σ)"
+    return text + "."
+
+
+def _describe_direction(row: CalibrationRow) -> str:
+    elevation = f"elevation {degrees_text(row.elevation)}"
+    if row.heading is not None:
+        return f"heading {degrees_text(row.heading)}, {elevation}"
+    upright = row.elevation is not None and abs(math.cos(row.elevation)) < 1e-6
+    return elevation if upright else f"{elevation}, no heading"
+
+
+Estimated = CalibrationRow | EarthRateRow
+
+
+def calibrated(site: Site) -> list[RecordingView]:
+    """Return the recordings on a rate table, in positions, or at rest with a direction."""
+    named = site.named_in(CalibrationRow)
+    return [
+        view
+        for view in site.views
+        if view.row.kind in ("rate_table", "positions") or view.full_name in named
+    ]
+
+
+def without_result(
+    views: Sequence[RecordingView], rows_of: Callable[[RecordingView], Sequence[Estimated]]
+) -> Iterator[dict[str, Any]]:
+    """Yield the recordings of an experiment without an estimate, with the reasons."""
+    for view in views:
+        rows = rows_of(view)
+        if rows and all(row.value is None for row in rows):
+            yield {"view": view, "reason": sentence(rows[0].reason)}
+
+
+NOT_CALIBRATED = Section(
+    page="index.html",
+    template="not_calibrated.html.jinja",
+    context=lambda site: (
+        list(without_result(calibrated(site), lambda view: view.rows(CalibrationRow))) or None
+    ),
+)
+"""The recordings without a calibration result, on the start page."""
+
+
+def at_rest(site: Site, view: RecordingView) -> tuple[str, dict[str, Any]] | None:
+    """Return the bias of a static recording for its page; None without a known direction."""
+    rows = [row for row in view.rows(CalibrationRow) if row.run == "at_rest"]
+    if not rows:
+        return None
+    return "at_rest.html.jinja", {
+        "channel": rows[0].channel,
+        "lines": [line for line in lines(rows) if line["status"] != "not_observable"],
+        "open": not_observable(rows),
+        "noise": noise_words(rows),
+        "scatter": scatter_words(rows),
+        "earth": earth_words(rows, site.system),
+    }
+
+
+def of_all(site: Site) -> dict[str, list[dict[str, Any]]]:
+    """Return the lines of all calibrated recordings, by kind of run."""
+    by_run: dict[str, list[dict[str, Any]]] = {"rate_table": [], "at_rest": [], "positions": []}
+    for view in calibrated(site):
+        rows = view.rows(CalibrationRow)
+        if not rows:
+            continue
+        if rows[0].run == "positions":
+            by_run["positions"].append({"view": view, "lines": list(attitude_lines(rows))})
+            continue
+        by_run[rows[0].run].append(
+            {
+                "view": view,
+                "lines": {line["parameter"]: line for line in lines(rows)},
+                "answer": answer(rows, site.system),
+                "earth": earth_words(rows, site.system),
+            }
+        )
+    return by_run
+
+
+def attitude_lines(rows: Sequence[CalibrationRow]) -> Iterator[dict[str, Any]]:
+    """Yield roll, pitch and heading in degrees, of rows of ``calibration`` of one recording."""
+    for row in rows:
+        value, lower, upper, truth = (
+            None if angle is None else math.degrees(angle)
+            for angle in (row.value, row.lower, row.upper, row.truth)
+        )
+        digits = limit_digits(lower, upper, 3)
+        off = None
+        if value is not None and truth is not None and row.sigma is not None:
+            off = math.remainder(value - truth, 360.0) / math.degrees(row.sigma)
+        yield {
+            "words": row.parameter,
+            "value": "–" if value is None else f"{number_text(value, digits)}°",
+            "limits": ""
+            if lower is None or upper is None
+            else f"{number_text(lower, digits)}° to {number_text(upper, digits)}°",
+            "truth": "–" if truth is None else f"{number_text(truth, digits)}°",
+            "off": "–" if off is None else f"{number_text(off, 2)} σ",
+            "why": sentence(row.reason),
+        }
+
+
+def noise_words(rows: Sequence[Estimated]) -> str:
+    """Return the noise model that weights the data, in a sentence."""
+    fitted = next((row for row in rows if row.model), None)
+    if fitted is None:
+        return ""
+    origin = f", from {fitted.model_from}" if fitted.model_from else ""
+    return f"Noise model: {fitted.model}{origin}."
 
 
 def _rate_table(site: Site, view: RecordingView, folder: Path) -> dict[str, Any]:
     """Return what the template needs; ``folder`` is the recording's."""
     rows = view.rows(CalibrationRow)
     points = view.rows(CalibrationPointRow)
+    arrays, summary = Arrays(), []
+    if points:
+        most = math.degrees(max(abs(point.table_rate) for point in points))
+        rates = counted(len(points), "constant rate")
+        summary = [f"{rates} up to {number_text(most)} °/s"]
     return {
         **about_of(site, view, [], folder),
-        "summary": _summarise(view, points),
+        "summary": summary_words(view, summary),
         "answer": answer(rows, site.system),
         "lines": list(lines(rows)),
         "open": not_observable(rows),
@@ -40,35 +303,25 @@ def _rate_table(site: Site, view: RecordingView, folder: Path) -> dict[str, Any]
         "points": points,
         "findings": view.findings,
         "command": site.again(view, "calibration"),
-        "page": {"looks": {}, "channels": [], "findings": [], **_pack_points(points)},
+        "page": {
+            "looks": {},
+            "channels": [],
+            "findings": [],
+            "table": {
+                "table_rate": arrays.exact([row.table_rate for row in points]),
+                "mean": arrays.exact([row.mean for row in points]),
+                "line": arrays.exact([row.line for row in points]),
+                "residual": arrays.exact([row.residual for row in points]),
+                "sigma": arrays.exact([row.sigma for row in points]),
+                "number": [row.number for row in points],
+            },
+            "arrays": arrays.texts,
+        },
     }
 
 
 RATE_TABLE = RecordingPage("rate_table.html.jinja", _rate_table, "rate table")
 """The page of a gyro on a rate table."""
-
-
-def _pack_points(points: Sequence[CalibrationPointRow]) -> dict[str, Any]:
-    arrays = Arrays()
-    return {
-        "table": {
-            "table_rate": arrays.exact([row.table_rate for row in points]),
-            "mean": arrays.exact([row.mean for row in points]),
-            "line": arrays.exact([row.line for row in points]),
-            "residual": arrays.exact([row.residual for row in points]),
-            "sigma": arrays.exact([row.sigma for row in points]),
-            "number": [row.number for row in points],
-        },
-        "arrays": arrays.texts,
-    }
-
-
-def _summarise(view: RecordingView, points: Sequence[CalibrationPointRow]) -> str:
-    if not points:
-        return summary_words(view, [])
-    most = math.degrees(max(abs(point.table_rate) for point in points))
-    rates = f"{counted(len(points), 'constant rate')} up to {number_text(most)} °/s"
-    return summary_words(view, [rates])
 
 
 def _positions(site: Site, view: RecordingView, folder: Path) -> dict[str, Any]:

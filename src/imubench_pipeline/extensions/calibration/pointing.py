@@ -21,28 +21,15 @@ from imubench_pipeline.earth import EARTH_RATE
 
 @dataclass(frozen=True, kw_only=True)
 class Pointing:
-    """How a sensitive axis stands on the Earth, in rad.
+    """Direction of a sensitive axis on the Earth, in rad, with standard deviations.
 
-    Parameters
-    ----------
-    latitude : float
-        North positive.
-    heading : float or None
-        Of the axis' horizontal part, from north towards east; None: not known.
-    elevation : float
-        Of the axis above the horizon: 0 level, pi/2 up, -pi/2 down.
-    heading_sigma, elevation_sigma : float
-        Standard deviations of these.
-
-    Raises
-    ------
-    ValueError
-        If the latitude is beyond a pole, an angle is not finite, or a deviation is negative.
+    Raises ValueError if the latitude is beyond a pole, an angle is not finite, or a deviation is
+    negative.
     """
 
-    latitude: float
-    heading: float | None
-    elevation: float = 0.0
+    latitude: float  # north positive
+    heading: float | None  # of the horizontal part, from north towards east; None: not known
+    elevation: float = 0.0  # above the horizon: 0 level, pi/2 up, -pi/2 down
     heading_sigma: float = 0.0
     elevation_sigma: float = 0.0
 
@@ -65,7 +52,7 @@ class Pointing:
 
     @property
     def rate_sigma(self) -> float:
-        """Standard deviation of that, as the direction is not known exactly, rad/s."""
+        """Standard deviation of this rate by the uncertain direction, rad/s."""
         mean, square = self._moments()
         return math.sqrt(max(square - mean**2, 0.0))
 
@@ -76,9 +63,9 @@ class Pointing:
 
     @property
     def tilt_sigma(self) -> float:
-        """What the spread of the elevation does to the rate at the worst heading, rad/s.
+        """Effect of the spread of the elevation on the rate at the worst heading, rad/s.
 
-        To the first order: w_ie (cos(L) |sin(e)| + |sin(L) cos(e)|) times it.
+        To the first order: w_ie (cos(L) |sin(e)| + |sin(L) cos(e)|) times the spread.
         """
         most = abs(math.cos(self.latitude) * math.sin(self.elevation))
         most += abs(math.sin(self.latitude) * math.cos(self.elevation))

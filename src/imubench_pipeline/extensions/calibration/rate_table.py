@@ -30,8 +30,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2
 
-from imubench_pipeline.extensions.calibration.covariance import block_mean_covariance
-from imubench_pipeline.extensions.calibration.experiment import Blocks, Measured, block_means
+from imubench_pipeline.extensions.calibration.experiment import (
+    Blocks,
+    Measured,
+    block_mean_covariance,
+    block_means,
+)
 from imubench_pipeline.extensions.calibration.least_squares import (
     CONFIDENCE_LEVEL,
     Fit,
@@ -48,15 +52,10 @@ from imubench_pipeline.extensions.calibration.schedule import Schedule
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.typing import Array
 
+# Largest unknown part of the Earth's rate along the axis that is ignored, rad/s
 _MAX_UNKNOWN_RATE = 1e-12
-"""Largest unknown part of the Earth's rate along the axis that is ignored, rad/s."""
 
-_NO_SCALE = NotObservable(
-    "asymmetry", "the gyro does not follow the table: there is no scale factor to be a fraction of"
-)
-
-_RATE_TOLERANCE = 1e-9
-"""Relative difference below which two rates are equal up to rounding."""
+_RATE_TOLERANCE = 1e-9  # relative difference below which two rates are equal up to rounding
 
 
 @dataclass(frozen=True)
@@ -142,28 +141,14 @@ class Calibration:
 
 
 class RateTable:
-    """A recording on a rate table: its blocks, the gyro's noise, and the rates that are known.
+    """A recording on a rate table: its blocks, the gyro's noise, and the known rates.
 
-    Parameters
-    ----------
-    schedule : Schedule
-    blocks : Blocks
-        Of the schedule's `experiment`.
-    model : NoiseModel
-        Of the gyro, with some noise in every sample.
-    pointing : Pointing, optional
-        Direction of the table's axis, along which the gyro's is; without one the Earth's rate is
-        a part of the bias. Its heading may be left open where the axis is vertical.
-    setting_sigma : float
-        Standard deviation of the table's true rate about the stated one, of each stretch by
-        itself, rad/s.
-
-    Raises
-    ------
-    NotObservableError
-        If there is one rate only: the scale factor cannot be told from the bias.
-    ValueError
-        If the deviation is negative, or the heading is left open where it counts.
+    The blocks are of the schedule's `experiment`; the noise model has some noise in every sample.
+    ``pointing`` is the direction of the axis of table and gyro; without one the Earth's rate is a
+    part of the bias. Only a vertical axis may have no heading. ``setting_sigma``, rad/s, is the
+    standard deviation of the true rate of each stretch about the stated one. Raises
+    NotObservableError if there is one rate only: scale factor and bias are not separable. Raises
+    ValueError if the deviation is negative, or a required heading is missing.
     """
 
     def __init__(
@@ -177,11 +162,8 @@ class RateTable:
     ) -> None:
         if not (math.isfinite(setting_sigma) and setting_sigma >= 0):
             raise ValueError(f"setting_sigma is {setting_sigma}, expected a number from 0")
-        if (
-            pointing is not None
-            and pointing.heading is None
-            and pointing.half_width > _MAX_UNKNOWN_RATE
-        ):
+        open_heading = pointing is not None and pointing.heading is None
+        if pointing and open_heading and pointing.half_width > _MAX_UNKNOWN_RATE:
             raise ValueError(
                 "the heading of the table's axis is not known: give it, or leave the direction out "
                 "and the Earth's rate is a part of the bias"
@@ -238,21 +220,20 @@ class RateTable:
     def fit(self, means: Array) -> Calibration:
         """Estimate bias and scale factor in runs of this design from block means, rad/s, (runs, b).
 
-        Raises
-        ------
-        ValueError
-            If there is not one finite mean a block.
+        Raises ValueError if there is not one finite mean a block.
         """
-        line = self._line.fit(means)
-        asymmetry = self._fit_asymmetry(means)
-        still = self._asymmetry is not None and asymmetry is None
+        line, quadratic = self._line.fit(means), None
+        if (squares := self._quadratic) is not None:
+            quadratic = Term(squares.fit(means).value[:, -1], float(squares.sigma[-1]))
+        asymmetry, not_observable = self._fit_asymmetry(means), self._open
+        if self._asymmetry is not None and asymmetry is None:
+            reason = (
+                "the gyro does not follow the table: there is no scale factor to be a fraction of"
+            )
+            not_observable = [*self._open, NotObservable("asymmetry", reason)]
+        linearity = self._test_linearity(line, means)
         return Calibration(
-            line,
-            self.sigma[0],
-            _fit_term(self._quadratic, means),
-            asymmetry,
-            self._test_linearity(line, means),
-            (*self._open, *[_NO_SCALE] * still),
+            line, self.sigma[0], quadratic, asymmetry, linearity, tuple(not_observable)
         )
 
     def _test_linearity(self, line: Fit, means: Array) -> Linearity | None:
@@ -294,15 +275,9 @@ def calibrate(
 ) -> tuple[Calibration, Measured]:
     """Return bias and scale factor of a gyro from a log on a rate table, and its block means.
 
-    The log is in rad/s, shape (n,); NaN where a sample is missing. The other parameters are as
-    in `RateTable`.
-
-    Raises
-    ------
-    NotObservableError
-        If there is one rate only.
-    ValueError
-        If the log ends before the schedule does, or too few samples are present.
+    The log is in rad/s, shape (n,); NaN where a sample is missing. The other parameters are as in
+    `RateTable`. Raises NotObservableError if there is one rate only. Raises ValueError if the log
+    ends before the schedule does, or too few samples are present.
     """
     run = schedule.experiment
     whole = max(stretch.stop - stretch.start for stretch in schedule.stretches)
@@ -324,12 +299,6 @@ def _index_levels(rate: Array) -> NDArray[np.int64]:
     levels = np.empty(len(rate), dtype=np.int64)
     levels[order] = np.cumsum(risen)
     return levels
-
-
-def _fit_term(squares: LeastSquares | None, means: Array) -> Term | None:
-    if squares is None:
-        return None
-    return Term(squares.fit(means).value[:, -1], float(squares.sigma[-1]))
 
 
 @dataclass(frozen=True)

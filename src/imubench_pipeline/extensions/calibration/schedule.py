@@ -21,25 +21,14 @@ from imubench_pipeline.typing import Array
 class Schedule:
     """Steady rates of a table, in their order.
 
-    Parameters
-    ----------
-    stretches : sequence of Dwell
-        Samples of each; their sense is not used.
-    table_rates : ndarray, shape (stretches,)
-        Rate of the table with respect to the Earth, rad/s, of the gyro's sign.
-    rate : float
-        Sampling rate, Hz.
-
-    Raises
-    ------
-    ValueError
-        If there is none, there is not one rate for each stretch, one is not finite, or stretches
-        overlap.
+    Raises ValueError if there is none, there is not one rate for each stretch, one is not finite,
+    or stretches overlap.
     """
 
-    stretches: Sequence[Dwell]
+    stretches: Sequence[Dwell]  # samples of each; their sense is not used
+    # shape (stretches,); rate of the table with respect to the Earth, rad/s, of the gyro's sign
     table_rates: Array
-    rate: float
+    rate: float  # sampling rate, Hz
 
     def __post_init__(self) -> None:
         if len(self.table_rates) != len(self.stretches):
@@ -57,12 +46,8 @@ class Schedule:
         """Return the schedule of known steps.
 
         Each step is start and end of a steady rate, s from the first sample, and the rate, rad/s.
-        The settling time, s, at its start is left out. The sampling rate is in Hz.
-
-        Raises
-        ------
-        ValueError
-            If a step holds no sample after it has settled; see `Schedule`.
+        The settling time, s, at its start is left out. The sampling rate is in Hz. Raises
+        ValueError if a step holds no sample after it has settled; see `Schedule`.
         """
         stretches = []
         for start, stop, table_rate in steps:
@@ -85,26 +70,11 @@ class Schedule:
         A sample is steady if the column stays within the tolerance for half the shortest time about
         it. Consecutive steady samples are a stretch if they last long enough, and if the column
         stays within twice the tolerance over all of them, which excludes slow ramps. The rate is
-        the mean of the column.
-
-        Parameters
-        ----------
-        column : ndarray, shape (n,)
-            rad/s; NaN is not steady.
-        rate : float
-            Sampling rate, Hz.
-        tolerance : float
-            Range of the column at a steady rate, including its noise, rad/s.
-        shortest : float
-            Shorter stretches are left out, s; the time includes settling.
-        settling : float
-            Time at the start of each stretch that is left out, s.
-
-        Raises
-        ------
-        ValueError
-            If the tolerance is negative, the shortest time is not longer than the settling, or
-            there is no steady rate.
+        the mean of the column. The column, shape (n,), is in rad/s, NaN is not steady; the sampling
+        rate in Hz. ``tolerance``, rad/s, is the range of the column at a steady rate, including its
+        noise; stretches below ``shortest``, s, settling included, are left out, and so is the
+        settling time, s, at the start of each stretch. Raises ValueError if the tolerance is
+        negative, the shortest time is not longer than the settling, or there is no steady rate.
         """
         if not tolerance >= 0:
             raise ValueError(f"tolerance is {tolerance}, expected a rate from 0")

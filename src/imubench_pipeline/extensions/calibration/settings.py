@@ -1,4 +1,4 @@
-"""What is declared of sensors whose rates or directions are known: beside logs, and simulated."""
+"""Settings of recordings with known rates or directions, measured and simulated."""
 
 from __future__ import annotations
 
@@ -24,20 +24,18 @@ from imubench_pipeline.settings.validation import (
 )
 from imubench_pipeline.units import quantity_to_si
 
+# Largest uncertainty of the Earth's rate about an axis without a heading, rad/s
 _MAX_UNKNOWN_EARTH_RATE = 1e-9
-"""Largest uncertainty of the Earth's rate about an axis without a heading, rad/s."""
 
 TRIAD = ("gyro_x", "gyro_y", "gyro_z", "accel_x", "accel_y", "accel_z")
-"""The axes that it takes, in the order of `imubench_pipeline.extensions.calibration.alignment`."""
+"""The axes of a triad, in the order of `imubench_pipeline.extensions.calibration.alignment`."""
 
 
 class Direction(Strict):
     """Where an axis points on the Earth.
 
-    Raises
-    ------
-    ValueError
-        If the latitude is missing, or a figure has a unit of another dimension or is out of range.
+    Raises ValueError if the latitude is missing, or a figure has a unit of another dimension or is
+    out of range.
     """
 
     latitude: Latitude = Field(description="of the place, with its unit; south is negative")
@@ -54,7 +52,7 @@ class Direction(Strict):
 
     @model_validator(mode="before")
     @classmethod
-    def _placed(cls, data: Any) -> Any:
+    def _require_latitude(cls, data: Any) -> Any:
         if isinstance(data, dict) and data.get("latitude") is None:
             raise ValueError(
                 "latitude is missing; expected where the log was recorded, such as "
@@ -83,7 +81,7 @@ class AtRest(Direction, Experiment):
     )
 
     def moved_gyro(self, channels: Sequence[str], *, column: bool = False) -> str:
-        """Return the one of the log's channels whose axis is stated, as of `stated_gyro`."""
+        """Return the channel of the log with a stated axis (see `stated_gyro`)."""
         return stated_gyro(self.channel, channels, "points there")
 
 
@@ -95,7 +93,7 @@ class Step(Strict):
     rate: Rate = Field(description="of the table, positive where a good gyro reads more")
 
     @model_validator(mode="after")
-    def _lasts(self) -> Self:
+    def _check_end(self) -> Self:
         if self.seconds[1] <= self.seconds[0]:
             raise ValueError(f"end is {self.end}; expected a time after start, {self.start}")
         return self
@@ -109,11 +107,9 @@ class Step(Strict):
 class OnRateTable(Experiment):
     """A log of a gyro on a rate table, its axis along that of the table.
 
-    Raises
-    ------
-    ValueError
-        If a figure has a unit of another dimension or is out of range, steps are not in order,
-        settling takes all of a step, or the heading of an axis that is not vertical is missing.
+    Raises ValueError if a figure has a unit of another dimension or is out of range, steps are not
+    in order, settling takes all of a step, or the heading of an axis that is not vertical is
+    missing.
     """
 
     steps: tuple[Step, ...] = Field(
@@ -139,7 +135,7 @@ class OnRateTable(Experiment):
     )
 
     @model_validator(mode="after")
-    def _in_order(self) -> Self:
+    def _check_steps(self) -> Self:
         settling = quantity_to_si(self.settling, "time")
         for number, step in enumerate(self.steps, 1):
             if step.seconds[1] - step.seconds[0] <= settling:
@@ -160,7 +156,7 @@ class OnRateTable(Experiment):
         return self
 
     @model_validator(mode="after")
-    def _heading_where_it_counts(self) -> Self:
+    def _require_heading(self) -> Self:
         if self.axis is None or self.axis.heading is not None:
             return self
         if self.axis.pointing.half_width > _MAX_UNKNOWN_EARTH_RATE:
@@ -178,12 +174,8 @@ class OnRateTable(Experiment):
     def moved_gyro(self, channels: Sequence[str], *, column: bool) -> str:
         """Return the one of the log's channels that is along the axis of the table.
 
-        `column`: the log has a column with the rate of the table.
-
-        Raises
-        ------
-        ValueError
-            As `stated_gyro`; and if the rates of the table are stated nowhere, or twice.
+        `column`: the log has a column with the rate of the table. Raises ValueError as
+        `stated_gyro`; and if the rates of the table are stated nowhere, or twice.
         """
         if not self.steps and not column:
             raise ValueError(
@@ -202,11 +194,8 @@ class OnRateTable(Experiment):
 class InPositions(Experiment):
     """A triad that is turned about its z axis, by the clock, and stands still between the turns.
 
-    Raises
-    ------
-    ValueError
-        If a figure has a unit of another dimension or is out of range, or a turn takes all of a
-        dwell.
+    Raises ValueError if a figure has a unit of another dimension or is out of range, or a turn
+    takes all of a dwell.
     """
 
     latitude: Latitude = Field(description="of the place, with its unit; south is negative")
@@ -222,7 +211,7 @@ class InPositions(Experiment):
     accelerometer_bias: AccelerationFromZero = Field("20 mg", description="likewise")
 
     @model_validator(mode="after")
-    def _stands(self) -> Self:
+    def _check_turning(self) -> Self:
         if self.seconds("turning") >= self.seconds("dwell"):
             raise ValueError(
                 f"turning is {self.turning}; expected less than the dwell, {self.dwell}"
@@ -262,14 +251,14 @@ class SimulatedTable(OnRateTable):
     assumed: tuple[Text, ...] = Field((), description="figures that no source publishes")
 
     @model_validator(mode="after")
-    def _has_steps(self) -> Self:
+    def _require_steps(self) -> Self:
         if not self.steps:
             raise ValueError("steps is missing; expected the steady rates of the table")
         return self
 
     @property
     def declared(self) -> OnRateTable:
-        """What would stand beside such a log."""
+        """The notes of a log like this one."""
         return OnRateTable(**{name: getattr(self, name) for name in OnRateTable.model_fields})
 
 
@@ -282,8 +271,17 @@ class SimulatedPositions(InPositions):
     assumed: tuple[Text, ...] = Field((), description="figures that no source publishes")
 
     @property
+    def true_angles(self) -> dict[str, float]:
+        """Roll, pitch and heading, rad, the heading from -pi to pi."""
+        roll, pitch, heading = (
+            quantity_to_si(angle, "angle") for angle in (self.roll, self.pitch, self.heading)
+        )
+        heading = math.remainder(heading, 2.0 * math.pi)
+        return {"roll": roll, "pitch": pitch, "heading": heading}
+
+    @property
     def declared(self) -> InPositions:
-        """What would stand beside such a log."""
+        """The notes of a log like this one."""
         return InPositions(**{name: getattr(self, name) for name in InPositions.model_fields})
 
 
@@ -295,7 +293,7 @@ class SimulatedRest(AtRest):
 
     @property
     def declared(self) -> AtRest:
-        """What would stand beside such a log."""
+        """The notes of a log like this one."""
         return AtRest(**{name: getattr(self, name) for name in AtRest.model_fields})
 
     @property

@@ -1,4 +1,4 @@
-"""What ideal gyros and accelerometers sense on a rate table, in positions, and at rest."""
+"""Readings of ideal gyros and accelerometers on a rate table, in positions, and at rest."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ import numpy as np
 
 from imubench_pipeline.extensions.calibration.alignment.attitude import matrix
 from imubench_pipeline.extensions.calibration.alignment.triad import Site
-from imubench_pipeline.extensions.calibration.positions import true_angles
 from imubench_pipeline.extensions.calibration.settings import (
     TRIAD,
     SimulatedPositions,
@@ -29,7 +28,7 @@ def at_rest(recording: SimulatedRecording, rate: float) -> dict[str, Constant]:
 
 
 def on_table(recording: SimulatedRecording, rate: float) -> dict[str, SampledProfile]:
-    """Return what the gyro indicates of the table, which goes straight from rate to rate."""
+    """Return the readings of a gyro on a table that ramps linearly from rate to rate."""
     table = recording.block(SimulatedTable)
     assert table is not None
     times = [time for step in table.steps for time in step.seconds]
@@ -41,7 +40,7 @@ def on_table(recording: SimulatedRecording, rate: float) -> dict[str, SampledPro
 
 
 def in_positions(recording: SimulatedRecording, rate: float) -> dict[str, SampledProfile]:
-    """Return what a triad senses that is turned at a steady rate between its positions."""
+    """Return the readings of a triad that turns at a steady rate between its positions."""
     positions, samples = recording.block(SimulatedPositions), recording.samples
     assert positions is not None
     dwell, turning = positions.seconds("dwell"), positions.seconds("turning")
@@ -53,7 +52,7 @@ def in_positions(recording: SimulatedRecording, rate: float) -> dict[str, Sample
     at = np.arange(samples) / rate
     angle = np.interp(at, times, angles)
     turned = np.diff(np.interp(at[0] + (np.arange(samples + 1) - 0.5) / rate, times, angles)) * rate
-    attitude = matrix(*true_angles(positions.model_dump()).values())
+    attitude = matrix(**positions.true_angles)
     true = sensed(Site(latitude=positions.latitude_si), attitude, angle, turned)
     return {name: SampledProfile(true[:, k], rate) for k, name in enumerate(TRIAD)}
 

@@ -13,15 +13,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from imubench_pipeline.extensions.calibration.covariance import longest_tau
-from imubench_pipeline.extensions.calibration.experiment import Blocks
-from imubench_pipeline.noise import NoiseModel, Role, Term
+from imubench_pipeline.extensions.calibration.experiment import Blocks, longest_tau
+from imubench_pipeline.noise import NoiseModel, Role
 from imubench_pipeline.noise.block_means import of_block_means
 from imubench_pipeline.noise.state_space import StateSpace, repeat_step, root_of
 from imubench_pipeline.typing import Array
 
+# Standard deviation of an uninformative prior, rad/s: 14,000 times the Earth's rate
 UNINFORMATIVE_SIGMA = 1.0
-"""Standard deviation of an uninformative prior, rad/s: 14,000 times the Earth's rate."""
 
 
 @dataclass(frozen=True)
@@ -55,12 +54,8 @@ def block_states(
 
     Gauss-Markov processes start in their stationary distribution; flicker noise is its bank up to
     the duration of the blocks; a ramp has a slope of variance R^2, of either sign; a line's phase
-    is not known; z_K starts with the standard deviation of the fixed bias, rad/s.
-
-    Raises
-    ------
-    ValueError
-        If the turn-on bias is negative or not finite.
+    is not known; z_K starts with the standard deviation of the fixed bias, rad/s. Raises ValueError
+    if the turn-on bias is negative or not finite.
     """
     if not (math.isfinite(turn_on_bias) and turn_on_bias >= 0):
         raise ValueError(f"turn_on_bias is {turn_on_bias}, expected a number from 0")
@@ -75,7 +70,11 @@ def block_states(
             continue
         white += space.measurement_noise
         spaces.append(space)
-        names += _name_states(term, names)
+        if len(term.states) == 1:  # a single state gets a number
+            (name,) = term.states
+            names.append(f"{name}{sum(other.startswith(name) for other in names) + 1}")
+        else:
+            names += term.states
     spaces.append(StateSpace.scalar(1.0, drive, turn_on_bias**2))
     names.append("z_K")
     whole = StateSpace.together(spaces)
@@ -92,14 +91,6 @@ def block_states(
         which.ravel(),
         np.sqrt(white / blocks.count),
     )
-
-
-def _name_states(term: Term, before: list[str]) -> list[str]:
-    """Return the names of a term's states; a single state gets a number."""
-    if len(term.states) != 1:
-        return list(term.states)
-    (name,) = term.states
-    return [f"{name}{sum(other.startswith(name) for other in before) + 1}"]
 
 
 def _build_step(space: StateSpace, gap: int, size: int) -> Step:

@@ -35,8 +35,8 @@ from imubench_pipeline.extensions.calibration.pointing import Pointing
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.typing import Array
 
+# Least share of the Earth's rate along an axis that may depend on the heading
 _MIN_HEADING_SENSITIVITY = 1e-9
-"""Least share of the Earth's rate along an axis that may depend on the heading."""
 
 
 @dataclass(frozen=True)
@@ -47,16 +47,13 @@ class StillBias:
     fixed_noise_sigma: float  # its standard error by the noise model, rad/s
     present: Array  # shape (runs,); mean of bias and slow noise over the last block, rad/s
     present_noise_sigma: float  # its standard error by the noise model, rad/s
-    # the subtracted Earth's rate along the axis, rad/s; with an unknown heading the middle of its
-    # range
+    # the subtracted Earth's rate along the axis, rad/s; the middle of its range without a heading
     rate: float
-    # its standard deviation, which adds to the noise of both biases, rad/s
-    rate_sigma: float
+    rate_sigma: float  # its standard deviation, which adds to the noise of both biases, rad/s
     # for an unknown heading: largest distance of the true rate from ``rate`` at the stated
     # elevation, rad/s
     bound: float | None
-    # standard deviation from the elevation, at the worst heading, rad/s
-    tilt_sigma: float
+    tilt_sigma: float  # standard deviation by the elevation, at the worst heading, rad/s
     # shape (runs,); probability of a scatter of the block means at least as large, if the noise
     # model is right; NaN for one block
     p_value: Array
@@ -92,15 +89,10 @@ class StillBias:
 
 
 class StillRun:
-    """A run at rest in one position: blocks, noise model, and where the axis points.
+    """A run at rest in one position: blocks, noise model, and direction of the axis.
 
-    Parameters
-    ----------
-    blocks : Blocks
-        Neither their sense nor their latitude is used.
-    model : NoiseModel
-        Of the gyro, with some noise in every sample.
-    pointing : Pointing
+    Neither the sense nor the latitude of the blocks is used; the model has some noise in every
+    sample.
     """
 
     def __init__(self, blocks: Blocks, model: NoiseModel, pointing: Pointing) -> None:
@@ -116,10 +108,7 @@ class StillRun:
     def fit(self, means: Array) -> StillBias:
         """Estimate the bias in runs of this design from block means, rad/s, shape (runs, b).
 
-        Raises
-        ------
-        ValueError
-            If there is not one finite mean a block.
+        Raises ValueError if there is not one finite mean a block.
         """
         pointing = self.pointing
         error = means - pointing.rate
@@ -173,13 +162,8 @@ def bias_at_rest(
     """Return the bias of a gyro from a log at rest.
 
     The log is in rad/s, shape (n,); NaN where a sample is missing; the rate in Hz. A block has
-    ``longest`` samples at most; by default the longest without loss of
-    information.
-
-    Raises
-    ------
-    ValueError
-        If the log is empty, or has too few samples present.
+    ``longest`` samples at most; by default the longest without loss of information. Raises
+    ValueError if the log is empty, or has too few samples present.
     """
     run = Experiment((Dwell(0, len(log), 1),), rate, 0.0)
     if longest is None:

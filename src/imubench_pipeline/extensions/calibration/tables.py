@@ -22,8 +22,7 @@ class CalibrationRow(OfRecordingRow):
 
     channel: Annotated[str, Column("the gyro that was calibrated")]
     run: Annotated[
-        str,
-        Column("rate_table; at_rest with a direction that is stated; positions of a triad"),
+        str, Column("rate_table; at_rest with a direction that is stated; positions of a triad")
     ]
     parameter: Annotated[
         str,
@@ -31,7 +30,7 @@ class CalibrationRow(OfRecordingRow):
             "bias at the first sample used; present_bias: at the end; scale_factor (indicated "
             "over true rate), quadratic, asymmetry (of the scale factors of both senses, over "
             "their mean), linearity (largest deviation from the line over the largest rate); "
-            "earth_rate, heading",
+            "earth_rate, heading"
         ),
     ]
     value: Estimate = None
@@ -39,43 +38,34 @@ class CalibrationRow(OfRecordingRow):
     upper: UpperLimit = None
     unit: EstimateUnit
     status: Annotated[
-        str,
-        Column("ok; not_observable: the run cannot tell it; no_model, too_short or not_shown"),
+        str, Column("ok; not_observable: the run cannot tell it; no_model, too_short or not_shown")
     ]
     reason: EstimateReason = None
     sigma: Annotated[
-        float | None,
-        Column("standard deviation of value: noise and direction", "as in unit"),
+        float | None, Column("standard deviation of value: noise and direction", "as in unit")
     ] = None
     sigma_noise: Annotated[
-        float | None,
-        Column("the part of it that is by the noise model", "as in unit"),
+        float | None, Column("the part of it that is by the noise model", "as in unit")
     ] = None
     chance: Annotated[
-        float | None,
-        Column("of a quadratic, an asymmetry or deviations at least as large"),
+        float | None, Column("of a quadratic, an asymmetry or deviations at least as large")
     ] = None
     half_width: Annotated[
-        float | None,
-        Column("half of the range of the bias that is left open", "rad/s"),
+        float | None, Column("half of the range of the bias that is left open", "rad/s")
     ] = None
     earth_rate: Annotated[
-        float | None,
-        Column("along the axis, which was taken off; null: it was not", "rad/s"),
+        float | None, Column("along the axis, which was taken off; null: it was not", "rad/s")
     ] = None
     earth_rate_sigma: Annotated[
-        float | None,
-        Column("its standard deviation, by the direction's", "rad/s"),
+        float | None, Column("its standard deviation, by the direction's", "rad/s")
     ] = None
     truth: Annotated[float | None, Column("of a simulation", "as in unit")] = None
     scatter: Annotated[
-        float | None,
-        Column("chance of a scatter of the means at least as large, by the noise"),
+        float | None, Column("chance of a scatter of the means at least as large, by the noise")
     ] = None
     latitude: Annotated[float | None, Column("as stated", "rad")] = None
     heading: Annotated[
-        float | None,
-        Column("of the axis, from north towards east; null: not known", "rad"),
+        float | None, Column("of the axis, from north towards east; null: not known", "rad")
     ] = None
     elevation: Annotated[float | None, Column("of the axis above the horizon", "rad")] = None
     duration: Annotated[float | None, Column("from the first to the last sample used", "s")] = None
@@ -92,21 +82,18 @@ class CalibrationPointRow(OfRecordingRow):
     channel: Annotated[str, Column("the gyro that was calibrated")]
     number: Annotated[int, Column("of the steady rate, in order, from 1")]
     start: Annotated[
-        float,
-        Column("from the first sample of the recording, settling left out", "s"),
+        float, Column("from the first sample of the recording, settling left out", "s")
     ]
     stop: Annotated[float, Column("its end", "s")]
     table_rate: Annotated[float, Column("of the table", "rad/s")]
     earth_rate: Annotated[
-        float,
-        Column("along the axis, beside it; 0 where it is not known", "rad/s"),
+        float, Column("along the axis, beside it; 0 where it is not known", "rad/s")
     ]
     mean: Annotated[float, Column("mean reading", "rad/s")]
     line: Annotated[float, Column("bias and scale factor at that rate", "rad/s")]
     residual: Annotated[float, Column("mean less line", "rad/s")]
     sigma: Annotated[
-        float,
-        Column("standard deviation of the residual, by the noise model", "rad/s"),
+        float, Column("standard deviation of the residual, by the noise model", "rad/s")
     ]
 
 

@@ -7,11 +7,7 @@ EXTENSION = Extension(
     needs=("calibration",),
     tables="earth_rate.tables",
     blocks=(
-        Block(
-            "run",
-            "earth_rate",
-            "earth_rate.settings:EarthRateSettings",
-        ),
+        Block("run", "earth_rate", "earth_rate.settings:EarthRateSettings"),
         Block(
             "notes",
             "two_position",
@@ -19,16 +15,12 @@ EXTENSION = Extension(
             "a gyro that was turned between north and south to find the Earth's rate; "
             "null: the sensor was at rest all the time",
         ),
-        Block(
-            "simulated",
-            "two_position",
-            "earth_rate.settings:SimulatedTurns",
-        ),
+        Block("simulated", "two_position", "earth_rate.settings:SimulatedTurns"),
     ),
-    motions={"two_position": "earth_rate.simulated:turned"},
+    motions={"two_position": "earth_rate.simulation:turned"},
     rules="rules.smk",
     pages=("earth_rate.page:EARTH_RATE_PAGE",),
-    recording_pages={"two_position": "earth_rate.page_turned:TURNED_PAGE"},
+    recording_pages={"two_position": "earth_rate.page:TURNED_PAGE"},
     sections=("earth_rate.page:NOT_FOUND",),
     templates="templates",
     static="static",

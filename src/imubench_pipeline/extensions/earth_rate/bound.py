@@ -9,46 +9,41 @@ bias,
 It uses nothing of the filter. White noise alone gives N / sqrt(T) / cos(latitude) for T seconds in
 dwells, if the bias is known; all other noise only adds to it.
 
-`whiten` decorrelates block means in a time that grows with their number, not with its cube. For any
-blocks, `covariance.block_mean_covariance` and a Cholesky root do the same. For noise with states,
-the innovations of a Kalman filter over their standard deviations are L^-1 y, with L the root of the
-same covariance (R. E. Kalman 1960). The tests compare the closed-form covariance with the states.
+`whiten` decorrelates block means in a time that grows with their number, not with its cube: the
+innovations of a Kalman filter over their standard deviations are L^-1 y, with L the Cholesky root
+of the covariance (R. E. Kalman 1960).
 """
 
 from __future__ import annotations
 
 import math
+from functools import cache
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 from scipy.linalg import cholesky, solve_triangular
 
-from imubench_pipeline.extensions.calibration.covariance import block_mean_covariance
-from imubench_pipeline.extensions.calibration.experiment import Blocks, Experiment
+from imubench_pipeline.extensions.calibration.experiment import (
+    Blocks,
+    Experiment,
+    block_mean_covariance,
+)
 from imubench_pipeline.extensions.calibration.states import block_states
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.typing import Array
 
-_MAX_SIGMA_INCREASE = 1e-3
-"""Largest relative increase of the standard deviation by longer blocks."""
+_MAX_SIGMA_INCREASE = 1e-3  # largest relative increase of the standard deviation by longer blocks
+_TESTED_DWELLS = 4  # dwells on which a block length is tested
 
-_TESTED_DWELLS = 4
-"""Dwells on which a block length is tested."""
-
-MAX_BLOCKS = 2048
-"""Largest number of blocks in the test of a block length, and in a prediction."""
+MAX_BLOCKS = 2048  # largest number of blocks in the test of a block length, and in a prediction
 
 
 def whiten(model: NoiseModel, blocks: Blocks, columns: Array) -> Array:
     """Return L^-1 columns, shape (b, c), with L L^T the covariance of the block means of a model.
 
-    The model must have some noise in every sample.
-
-    Raises
-    ------
-    ValueError
-        If a mean has no noise, given those before it.
+    The model must have some noise in every sample. Raises ValueError if a mean has no noise, given
+    those before it.
     """
     states = block_states(model, blocks, turn_on_bias=0.0)
     innovations = _compute_innovations(
@@ -119,12 +114,8 @@ def cramer_rao(blocks: Blocks, model: NoiseModel, turn_on_bias: float = math.inf
 
     In rad/s, shape (b,); infinite where the rate and the bias are not separable. The standard
     deviation of the bias, rad/s, is by default unknown. The model must have some noise in every
-    sample: N, or a process with such noise.
-
-    Raises
-    ------
-    ValueError
-        If the turn-on bias is negative, or NaN.
+    sample: N, or a process with such noise. Raises ValueError if the turn-on bias is negative, or
+    NaN.
     """
     return sigma_of(information(blocks, model, turn_on_bias))
 
@@ -136,17 +127,14 @@ def information(blocks: Blocks, model: NoiseModel, turn_on_bias: float = math.in
     """
     # The root of the leading blocks is the leading part of the root.
     root = cholesky(block_mean_covariance(model, blocks), lower=True, overwrite_a=True)
-    return _eliminate_bias(solve_triangular(root, _build_design(blocks), lower=True), turn_on_bias)
+    design = np.column_stack([blocks.seen, np.ones(len(blocks))])
+    return _eliminate_bias(solve_triangular(root, design, lower=True), turn_on_bias)
 
 
 def information_by_states(blocks: Blocks, model: NoiseModel, turn_on_bias: float) -> Array:
     """Return the same as `information`, faster for many blocks."""
-    return _eliminate_bias(whiten(model, blocks, _build_design(blocks)), turn_on_bias)
-
-
-def _build_design(blocks: Blocks) -> Array:
-    """Return the sensitivity of the means to the rate, and to a fixed bias, shape (b, 2)."""
-    return np.column_stack([blocks.seen, np.ones(len(blocks))])
+    design = np.column_stack([blocks.seen, np.ones(len(blocks))])
+    return _eliminate_bias(whiten(model, blocks, design), turn_on_bias)
 
 
 def _eliminate_bias(white: Array, turn_on_bias: float) -> Array:
@@ -177,14 +165,10 @@ def block_length(experiment: Experiment, model: NoiseModel) -> int:
     length = max(dwell.stop - dwell.start for dwell in experiment.dwells)
     if len({dwell.sense for dwell in tried.dwells}) < 2:
         return length  # the rate is not observable, from samples either
-    sigmas: dict[int, float] = {}
 
+    @cache
     def sigma(longest: int) -> float:
-        if longest not in sigmas:
-            sigmas[longest] = float(
-                sigma_of(information_by_states(tried.blocks(longest), model, math.inf))[-1]
-            )
-        return sigmas[longest]
+        return bound(tried.blocks(longest), model)
 
     while length > 4 and len(tried.blocks(length // 4)) <= MAX_BLOCKS:
         if sigma(length // 4) > (1.0 - _MAX_SIGMA_INCREASE) * sigma(length):

@@ -1,54 +1,284 @@
-"""Choose the transients and steps that are turns, by dynamic programming with the schedule."""
+"""Find turns by the events of a log, and by the schedule where there are none.
+
+The events that are turns are chosen by dynamic programming with the schedule (`choose`).
+"""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.stats import norm
 
-from imubench_pipeline.extensions.earth_rate.transients import CLEAR_LOG_LIKELIHOOD, Event
+from imubench_pipeline.extensions.earth_rate.transients import (
+    CLEAR_LOG_LIKELIHOOD,
+    Event,
+    LevelBlocks,
+)
+from imubench_pipeline.extensions.earth_rate.turns import (
+    Turn,
+    alternation,
+    best_shift,
+    split_at_turns,
+)
 from imubench_pipeline.typing import Array
 
+# Part of a dwell at either end of a log; a transient there is handling, not a turn
 EDGE_DWELL_FRACTION = 0.2
-"""Part of a dwell at either end of a log; a transient there is handling, not a turn."""
 
 _MIN_CALM, _MIN_CALM_PER_DWELL, _MAX_REQUIRED_CALM = 2.5, 0.2, 6.0
 """Least calm between two turns, in s, in dwells, and its upper limit in s; closer events belong to
 the same turn."""
 
-_DOUBLE_DWELL_SHARE = 0.07
-"""Prior share of the dwells that last twice as long."""
-
-_EXTRA_DWELL_FACTOR = 0.35
-"""Factor on the prior share for each further dwell without a turn."""
-
-_KNOCKS_PER_DWELL = 0.01
-"""Expected disturbances as long as a turn, per dwell."""
+_DOUBLE_DWELL_SHARE = 0.07  # prior share of the dwells that last twice as long
+_EXTRA_DWELL_FACTOR = 0.35  # factor on the prior share for each further dwell without a turn
+_KNOCKS_PER_DWELL = 0.01  # expected disturbances as long as a turn, per dwell
 
 _MAX_WEAKNESS_COST = 3.5
 """Largest log-likelihood cost of a clear transient that is weaker than the usual turn; noise is
 excluded for it."""
 
-_FALSE_ALARM_PLACES = 8.0
-"""Independent places where noise can look like a transient, 1/s."""
-
+_FALSE_ALARM_PLACES = 8.0  # independent places where noise can look like a transient, 1/s
+# Weight of the given tolerance, as a number of dwells, against the dwells found
 _PRIOR_DWELLS = 5.0
-"""Weight of the given tolerance, as a number of dwells, against the dwells found."""
 
 _MIN_STRENGTH_SIGMA, _MIN_STEP_STRENGTH_SIGMA = 0.4, 0.15
 """Least standard deviation of the strengths of turns. Turns by hand vary more than steps, whose
 height is set by the Earth's rate."""
 
+# Strength below which a turn is hardly detectable, and the largest share of such turns
 _WEAK_STRENGTH, _MAX_WEAK_SHARE = math.log(2.0), 0.02
-"""Strength below which a turn is hardly detectable, and the largest share of such turns."""
-
+# Least number of transients, and least share of equal intervals, that show a pace of their own
 _MIN_PACE_TRANSIENTS, _MIN_EQUAL_INTERVAL_SHARE = 5, 0.75
-"""Least number of transients, and least share of equal intervals, that show a pace of their own."""
-
+# Probability that a turn is not detected, above which the schedule fills a gap
 _MAX_MISS_PROBABILITY = 0.05
-"""Probability that a turn is not detected, above which the schedule fills a gap."""
+
+# Least share of the scheduled turns that must be detected for the events to decide
+_MIN_SEEN_SHARE = 0.4
+# Least alternation, in standard errors, of a log without transients that was turned
+_MIN_ALTERNATION_SIGMAS = 3.0
+# Least alternation, in standard errors, that may shift the start of the schedule
+_MIN_SHIFT_SIGMAS = 6.0
+_KNOCK_MARGIN = 0.25  # margin that is left out on either side of a knock, s
+
+
+@dataclass(frozen=True)
+class TurnSchedule:
+    """The stated turns, before any analysis of the log."""
+
+    # dwell, start, turning, margin: as
+    # `imubench_pipeline.extensions.earth_rate.turning.find_turning` takes them, s
+    dwell: float
+    start: float
+    turning: float
+    # how far a turn may be from the schedule, s (a standard deviation): a tenth of a dwell, and at
+    # least 2 s. So much is left out on both sides of a turn that is not seen
+    tolerance: float
+    margin: float
+    duration: float  # of the log, s
+
+
+def find_turns(
+    blocks: LevelBlocks, events: list[Event], schedule: TurnSchedule, trust: bool
+) -> tuple[list[Turn], list[tuple[float, float]], list[str]]:
+    """Return turns (at least one), knocks and doubts for a log without a column, in order.
+
+    The events are in order of time; ``trust`` accepts the schedule if nothing is detected. Knocks
+    are the start and stop of further times to leave out, s. Raises ValueError if there is no
+    evidence of turns, and the schedule is not trusted.
+    """
+    chosen = choose(events, schedule.dwell, schedule.tolerance, schedule.duration)
+    declared = schedule.dwell
+    pace = shorter_dwell(events, chosen, declared)
+    if pace is not None:
+        schedule = replace(
+            schedule,
+            dwell=pace,
+            tolerance=schedule.tolerance * pace / declared,
+            turning=min(schedule.turning, 0.4 * pace),
+        )
+        chosen = choose(events, schedule.dwell, schedule.tolerance, schedule.duration)
+    expected = max(1.0, round((schedule.duration - schedule.start) / schedule.dwell) - 1.0)
+    doubts: list[str] = []
+    if len(chosen) >= _MIN_SEEN_SHARE * expected:
+        turns, rest = _merge_into_turns(events, chosen, schedule)
+        seen = _fill_gaps([events[k] for k in chosen], turns, schedule, blocks)
+    else:
+        seen, rest, doubts = _follow_schedule(blocks, events, schedule, trust)
+    quick = [e for e in rest if e.kind == "transient"]
+    edge = EDGE_DWELL_FRACTION * schedule.dwell
+    if any(
+        not edge <= event.time <= schedule.duration - edge
+        and not event.haste
+        and event.likelihood > CLEAR_LOG_LIKELIHOOD
+        for event in quick
+    ):
+        doubts.append("handling at the ends of the log is left out")
+    silent = sum(turn.found_by == "schedule" for turn in seen)
+    if silent:
+        doubts.append(f"{silent} of {len(seen)} turns rest on the schedule: nothing shows them")
+    usual = float(np.median(np.diff([turn.time for turn in seen]))) if len(seen) > 1 else declared
+    if abs(usual / declared - 1.0) > 0.25:
+        doubts.append(f"the usual dwell is {usual:.1f} s, not {declared:g} s")
+    return seen, disturbances(quick), doubts
+
+
+def _merge_into_turns(
+    events: list[Event], chosen: Sequence[int], schedule: TurnSchedule
+) -> tuple[list[Turn], list[Event]]:
+    """Return turns from the chosen events, merged with events of the same turn, and the others."""
+    near = compute_min_calm(schedule.dwell)
+    turns: list[Turn] = []
+    used = set(chosen)
+    for k in chosen:
+        event = events[k]
+        doubts = []
+        start, stop, peak = event.start, event.stop, event.peak
+        for step in (-1, 1):
+            i = k + step
+            while 0 <= i < len(events) and i not in used:
+                other = events[i]
+                # A near event belongs to the turn: overshoot and return.
+                gap = max(other.start - stop, start - other.stop)
+                if gap > near:
+                    break
+                clear = other.likelihood > CLEAR_LOG_LIKELIHOOD and not other.haste
+                if clear and other.kind == "transient":
+                    start, stop = min(start, other.start), max(stop, other.stop)
+                    peak = max(peak, other.peak)
+                    used.add(i)
+                    doubts = ["overrun and come back, or handled beside the turn"]
+                i += step
+        if event.likelihood < CLEAR_LOG_LIKELIHOOD:
+            doubts.append("hardly above the noise")
+        if event.haste:
+            doubts.append("as short as a knock")
+        if event.kind == "step":
+            doubts.append("no transient: a step of the level alone")
+        middle = 0.5 * (start + stop)
+        margin = schedule.margin + (0.5 * schedule.turning if event.kind == "step" else 0.0)
+        turns.append(Turn(start - margin, stop + margin, middle, event.kind, peak, tuple(doubts)))
+    return turns, [event for i, event in enumerate(events) if i not in used]
+
+
+def _fill_gaps(
+    chosen: list[Event], turns: list[Turn], schedule: TurnSchedule, blocks: LevelBlocks
+) -> list[Turn]:
+    """Insert scheduled turns where turns may be missed: too weak, or without samples."""
+    silent = may_be_silent(chosen)
+    time = np.array([turn.time for turn in turns])
+    gaps = np.diff(time)
+    single = gaps[(gaps > 0.5 * schedule.dwell) & (gaps < 1.5 * schedule.dwell)]
+    usual = float(np.median(single)) if len(single) else schedule.dwell
+    filled: list[Turn] = []
+    edge = (EDGE_DWELL_FRACTION + 0.3) * schedule.dwell
+    if silent:
+        more = np.arange(time[0] - usual, edge, -usual)[::-1]
+        filled += [_make_silent_turn(float(at), schedule) for at in more]
+    for k, turn in enumerate(turns):
+        many = max(1, round(float(gaps[k - 1]) / usual)) if k else 1
+        missed = 0
+        for at in np.linspace(time[k - 1], time[k], many + 1)[1:-1].tolist() if many > 1 else []:
+            first = max(0, int((at - 0.5 * schedule.turning) / blocks.length))
+            last = int((at + 0.5 * schedule.turning) / blocks.length)
+            if silent or not blocks.present[first : last + 1].any():
+                filled.append(_make_silent_turn(at, schedule))
+            else:
+                missed += 1
+        if missed:
+            words = f"{gaps[k - 1]:.0f} s after the turn before: {missed} turn missed?"
+            turn = replace(turn, doubts=(*turn.doubts, words))
+        filled.append(turn)
+    if silent:
+        more = np.arange(time[-1] + usual, schedule.duration - edge, usual)
+        filled += [_make_silent_turn(float(at), schedule) for at in more]
+    return filled
+
+
+def _make_silent_turn(time: float, schedule: TurnSchedule) -> Turn:
+    half = _compute_half_width(schedule)
+    words = ("nothing is seen of it: the schedule says so",)
+    return Turn(time - half, time + half, time, "schedule", None, words)
+
+
+def _compute_half_width(schedule: TurnSchedule) -> float:
+    """Return half of the time that is left out about a turn that is not detected, s."""
+    return min(schedule.tolerance + 0.5 * schedule.turning, 0.4 * schedule.dwell)
+
+
+def _follow_schedule(
+    blocks: LevelBlocks, events: list[Event], schedule: TurnSchedule, trust: bool
+) -> tuple[list[Turn], list[Event], list[str]]:
+    """Return the turns of the schedule, each replaced by a clear transient near it."""
+    half = _compute_half_width(schedule)
+    longest = schedule.duration - EDGE_DWELL_FRACTION * schedule.dwell
+    count = max(0, math.ceil((longest - schedule.start) / schedule.dwell))
+    slots: Array = schedule.start + schedule.dwell * np.arange(1.0, count) + 0.5 * schedule.turning
+    slots = slots[(slots > half) & (slots < longest)]
+    if len(slots) == 0:
+        raise ValueError("the schedule has no turn within the log")
+    calm = leave_out_knocks(blocks, disturbances([e for e in events if e.kind == "transient"]))
+    longest_shift = min(schedule.dwell / 3.0, 3.0 * schedule.tolerance)
+    shift, z, unshifted = best_shift(
+        calm, slots, 0.5 * schedule.turning, longest_shift, schedule.duration
+    )
+    doubts: list[str] = []
+    by_step = abs(z) > _MIN_SHIFT_SIGMAS and z**2 - unshifted**2 > 2.0 * CLEAR_LOG_LIKELIHOOD
+    if by_step:
+        slots = slots + shift
+        slots = slots[(slots > half) & (slots < schedule.duration - half)]
+        doubts.append(f"the level alternates {shift:+.1f} s from the schedule: that is used")
+    else:
+        # At the used shift, not the best one: a search exceeds 3 in one of 50 logs at rest.
+        size = abs(alternation(calm, split_at_turns(slots, half, schedule.duration)).z)
+        if not (size >= _MIN_ALTERNATION_SIGMAS or trust):
+            raise ValueError(
+                f"nothing shows that the log was turned every {schedule.dwell:g} s: no transients, "
+                f"and its level alternates by {size:.1f} standard errors (trust_schedule takes "
+                "the schedule's word)"
+            )
+        doubts.append(
+            f"no turns are seen: the schedule decides, and the level alternates with it by "
+            f"{size:.1f} standard errors"
+        )
+    turns, used = [], set()
+    for slot in slots.tolist():
+        near = [
+            k
+            for k, e in enumerate(events)
+            if abs(e.time - slot) < 2.0 * schedule.tolerance
+            and (e.likelihood > CLEAR_LOG_LIKELIHOOD and not e.haste and k not in used)
+        ]
+        if near:
+            best = max(near, key=lambda k: events[k].likelihood)
+            used.update(near)
+            turns += _merge_into_turns([events[best]], [0], schedule)[0]
+        elif by_step:
+            words = ("no transient: the level alternates with the schedule",)
+            turns.append(Turn(slot - half, slot + half, slot, "step", None, words))
+        else:
+            turns.append(_make_silent_turn(slot, schedule))
+    return turns, [e for k, e in enumerate(events) if k not in used], doubts
+
+
+def disturbances(events: Sequence[Event]) -> list[tuple[float, float]]:
+    """Return start and stop, s, of transients to leave out: neither turns nor noise."""
+    return [
+        (event.start - _KNOCK_MARGIN, event.stop + _KNOCK_MARGIN)
+        for event in events
+        if event.haste or event.likelihood > CLEAR_LOG_LIKELIHOOD
+    ]
+
+
+def leave_out_knocks(blocks: LevelBlocks, knocks: Sequence[tuple[float, float]]) -> LevelBlocks:
+    """Return the blocks with the blocks of knocks, from start to stop, s, marked as missing."""
+    present = blocks.present.copy()
+    for start, stop in knocks:
+        first, last = int(start / blocks.length), math.ceil(stop / blocks.length)
+        present[max(0, first) : max(0, last)] = False
+    return replace(blocks, present=present)
 
 
 def compute_min_calm(dwell: float) -> float:

@@ -1,9 +1,8 @@
 """Estimates of an Earth-rate experiment by every method, over time.
 
 The noise model is an estimate with limits, so that the standard deviations have a range, too
-(`sigma_ranges`). Each standard deviation is computed again for models drawn from these limits; 95 %
-of the values lie between its limits. The effect of weights from a wrong model is of second order
-and neglected.
+(`sigma_ranges`): 95 % of the values for models drawn from these limits. The effect of weights from
+a wrong model is of second order and neglected.
 """
 
 from __future__ import annotations
@@ -26,7 +25,7 @@ from imubench_pipeline.extensions.calibration.kalman import RateFilter
 from imubench_pipeline.extensions.calibration.states import UNINFORMATIVE_SIGMA
 from imubench_pipeline.extensions.earth_rate.bound import block_length, bound
 from imubench_pipeline.extensions.earth_rate.known_rate import STARTS, settled, track
-from imubench_pipeline.extensions.earth_rate.pairs import Differences, by_pairs, by_triples
+from imubench_pipeline.extensions.earth_rate.pairs import by_pairs, by_triples
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.sigma_range import sigma_range
 from imubench_pipeline.typing import Array
@@ -88,26 +87,11 @@ def estimate_courses(
 ) -> Courses:
     """Estimate the Earth's rate by every method.
 
-    The filter starts with the variance of the turn-on bias, or an uninformative one, and the
-    stationary variances of its Gauss-Markov processes.
-
-    Parameters
-    ----------
-    log : ndarray, shape (n,)
-        rad/s; NaN where a sample is missing.
-    experiment : Experiment
-        Dwells of both senses.
-    model : NoiseModel
-        Noise of the gyro, with N.
-    papers : NoiseModel
-        N, B with T_B, and K, for the filter of Silva et al.
-    turn_on_bias : float or None
-        Standard deviation of the fixed bias, rad/s; None: unknown.
-
-    Raises
-    ------
-    ValueError
-        If the dwells are all of one sense, or no block of them has enough samples.
+    The log, shape (n,), is in rad/s, NaN where a sample is missing; the noise model has N. N, B
+    with T_B, and K of ``papers`` are for the filter of Silva et al. The filter starts with the
+    variance of the turn-on bias, rad/s (None: unknown), and the stationary variances of its Gauss-
+    Markov processes. Raises ValueError if the dwells are all of one sense, or no block of them has
+    enough samples.
     """
     if len({dwell.sense for dwell in experiment.dwells}) < 2:
         raise ValueError("all dwells are of one position: the rate cannot be told from the bias")
@@ -123,9 +107,14 @@ def estimate_courses(
     # Before the second position the rate and the bias are not separable.
     from_second = slice(int(np.argmax(blocks.sense != blocks.sense[0])), None)
     whole = np.array([first, first + blocks.duration])
-    courses = (
-        _estimate_by_differences("pairs", blocks, lambda: by_pairs(means, blocks, model)),
-        _estimate_by_differences("triples", blocks, lambda: by_triples(means, blocks, model)),
+    courses = []
+    for method, estimate in (("pairs", by_pairs), ("triples", by_triples)):
+        try:
+            found = estimate(means, blocks, model)
+            courses.append(Course(method, first + found.time, found.rate[0], found.sigma))
+        except ValueError as error:
+            courses.append(Course(method, np.empty(0), np.empty(0), np.empty(0), str(error)))
+    courses += [
         Course(
             "filter",
             first + filtered.time[from_second],
@@ -134,21 +123,9 @@ def estimate_courses(
         ),
         Course("smoother", whole, np.full(2, smoothed.rate[0]), np.full(2, smoothed.rate_sigma)),
         *(_track_known_rate(log, experiment, papers, method) for method in GIVEN),
-    )
-    return Courses(
-        courses, measured, longest, first + blocks.middle, smoothed.drift[0], smoothed.drift_sigma
-    )
-
-
-def _estimate_by_differences(
-    method: str, blocks: Blocks, estimate: Callable[[], Differences]
-) -> Course:
-    try:
-        differences = estimate()
-    except ValueError as error:
-        return Course(method, np.empty(0), np.empty(0), np.empty(0), str(error))
-    first = blocks.start[0] / blocks.rate
-    return Course(method, first + differences.time, differences.rate[0], differences.sigma)
+    ]
+    middle, drift = first + blocks.middle, smoothed.drift[0]
+    return Courses(tuple(courses), measured, longest, middle, drift, smoothed.drift_sigma)
 
 
 def _track_known_rate(
@@ -158,13 +135,8 @@ def _track_known_rate(
         tracked = track(log, experiment, papers, EARTH_RATE, GIVEN[method])
     except ValueError as error:
         return Course(method, np.empty(0), np.empty(0), None, str(error))
-    return Course(
-        method,
-        tracked.sample / experiment.rate,
-        tracked.mean,
-        None,
-        settled=settled(tracked.mean, experiment.rate, EARTH_RATE),
-    )
+    after = settled(tracked.mean, experiment.rate, EARTH_RATE)
+    return Course(method, tracked.sample / experiment.rate, tracked.mean, None, settled=after)
 
 
 def thin(points: int) -> Iterator[int]:
@@ -191,16 +163,12 @@ def sigma_ranges(
     """
     if not drawn:
         return {}
-    zero_means = np.zeros((1, len(blocks)))
+    zeros = np.zeros((1, len(blocks)))
     bias = math.inf if turn_on_bias is None else turn_on_bias
-
-    def filtered(drawn_model: NoiseModel) -> float:
-        return bound(blocks, drawn_model, bias)
-
     methods: dict[str, Callable[[NoiseModel], float]] = {
-        "pairs": lambda drawn_model: float(by_pairs(zero_means, blocks, drawn_model).sigma[-1]),
-        "triples": lambda drawn_model: float(by_triples(zero_means, blocks, drawn_model).sigma[-1]),
-        "filter": filtered,
+        "pairs": lambda one: float(by_pairs(zeros, blocks, one).sigma[-1]),
+        "triples": lambda one: float(by_triples(zeros, blocks, one).sigma[-1]),
+        "filter": lambda one: bound(blocks, one, bias),
     }
     ranges: dict[str, Range] = {}
     for method, sigma in methods.items():

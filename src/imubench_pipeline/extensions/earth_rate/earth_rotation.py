@@ -7,7 +7,7 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 from numpy.linalg import LinAlgError
@@ -18,6 +18,7 @@ from imubench_pipeline.extensions.earth_rate.courses import (
     METHODS,
     Course,
     Courses,
+    Range,
     estimate_courses,
     sigma_ranges,
     thin,
@@ -57,20 +58,16 @@ from imubench_pipeline.tables.keys import Key
 from imubench_pipeline.typing import Array
 from imubench_pipeline.units import quantity_to_si
 
-WHOLE = "whole"
-"""Name of the part that is all of a recording."""
+WHOLE = "whole"  # name of the part that is a whole recording
 
+# Min. share of turns found only by the schedule from which the turns count as not visible
 _MIN_SCHEDULED_SHARE = 0.9
-"""Min. share of turns found only by the schedule from which the turns count as not visible."""
-
-_Z_95 = 1.96
-"""Standard deviations of a 95 % limit."""
+_Z_95 = 1.96  # standard deviations of a 95 % limit
 
 _KNOWN_RATE_REASON = (
     "bias tracking with known rate: the filter is given the Earth's rate and returns it; whatever "
     "rate it is given, it finds"
 )
-
 
 _POSITION_CLOCK_REASON = (
     "the position has a clock of its own; give it as a column of the file that the gyro is in, or "
@@ -78,23 +75,13 @@ _POSITION_CLOCK_REASON = (
 )
 
 
-_Timed = TypeVar("_Timed", TurningRow, EarthRateSeriesRow)
-
-
 def earth_rate_tables(
     folder: Path, static: Sequence[Path], sensor: str, recording: str, settings: str
 ) -> dict[str, list[TableRow]]:
     """Return the rows of the tables of a gyro that was turned; none of a rejected recording.
 
-    Parameters
-    ----------
-    folder : Path
-        Of the recording.
-    static : sequence of Path
-        Folders of the static recordings of the same sensor.
-    sensor, recording : str
-    settings : str
-        As `imubench_pipeline.run.plan.Plan.experiment_settings` gives them.
+    `folder`: of the recording; `static`: of the static recordings of the same sensor; `settings`:
+    of `imubench_pipeline.run.plan.Plan.experiment_settings`.
     """
     rows: dict[str, list[TableRow]] = {name: [] for name in TURNED}
     sections = json.loads(settings)
@@ -130,14 +117,11 @@ def _published(
     turns: SimulatedTurns,
     estimates: Sequence[EarthRateRow],
 ) -> Iterator[EarthRatePublishedRow]:
-    """Yield what the source of a simulated recording prints, beside what is found of it."""
+    """Yield the printed estimates of a simulated recording, with the estimates from its log."""
     rate = quantity_to_si(simulated.rate, "frequency")
     schedule = RunDesign(turns.seconds("dwell"), turns.seconds("turning"), rate, turns.latitude_si)
-    (noise,) = (
-        axis_model(axis, name).noise
-        for name, axis in simulated.channels.items()
-        if name == key.channel
-    )
+    axes = {str(name): axis for name, axis in simulated.channels.items()}
+    noise = axis_model(axes[key.channel], key.channel).noise
     values = {(row.part, row.method): row.value for row in estimates}
     for figure in turns.published:
         part = figure.part
@@ -157,7 +141,7 @@ def _published(
 
 @dataclass
 class EarthRate:
-    """Rows of the tables that an experiment leaves."""
+    """Rows of the tables of an experiment."""
 
     earth_rate: list[EarthRateRow] = field(default_factory=list)
     earth_rate_series: list[EarthRateSeriesRow] = field(default_factory=list)
@@ -166,7 +150,7 @@ class EarthRate:
 
 
 def _names(key: Key, declared: TwoPosition, source: NoiseSource | None = None) -> dict[str, Any]:
-    """Return what every row of the table ``earth_rate`` says."""
+    """Return the columns that all rows of the table ``earth_rate`` share."""
     return asdict(key) | {
         "latitude": declared.latitude_si,
         "model": source.model.name if source else None,
@@ -194,7 +178,7 @@ def _earth_rate(
         tables.earth_rate += _without(names, WHOLE, "not_shown", reason)
         return tables
     if source is not None:
-        _predict(key, log.rate, declared, source, settings, tables)
+        tables.earth_rate_prediction += _predict(key, log.rate, declared, source, settings)
     samples = on_grid(log.blocks(), log.grid)
     try:
         turning = find_turning(
@@ -216,108 +200,80 @@ def _earth_rate(
         )
         tables.earth_rate += _without(names, WHOLE, "no_turns", reason)
         return tables
-    tables.turning += _later(_turning_rows(key, turning, samples, log.rate), begins)
+    used = np.where(turning.senses(len(samples), log.rate) == 0, np.nan, samples)  # no knocks
+    dwells = [
+        (dwell, dwell.in_samples(log.rate))
+        for dwell in turning.dwells
+        if dwell.stop - dwell.start > 2.0 / log.rate
+    ]
+    tables.turning += _turning_rows(key, turning, dwells, used, begins)
     if source is None:
         tables.earth_rate += _without(names, WHOLE, "no_model", NO_MODEL)
         return tables
-    used = _used(samples, turning, log.rate)
-    dwells = [dwell for _, dwell in _dwells(turning, log.rate)]
-    bias, unsure = declared.turn_on_bias_si, _unsure(turning, declared.trust_schedule)
-    model, *drawn = (_drifting(each, declared.drift_si) for each in (source.model, *source.drawn))
-    for part, start in _parts(declared, len(samples) / log.rate):
-        chosen = [dwell for dwell in dwells if dwell.start >= start * log.rate]
+    model, *drawn = (_add_drift(each, declared.drift_si) for each in (source.model, *source.drawn))
+    parts = {WHOLE: 0.0}  # start of each part in the log, s
+    for text in declared.last:
+        parts[f"last {text}"] = max(len(samples) / log.rate - quantity_to_si(text, "time"), 0.0)
+    for part, start in parts.items():
+        chosen = tuple(dwell for _, dwell in dwells if dwell.start >= start * log.rate)
+        if len(chosen) < 2:
+            reason = f"{len(chosen)} dwells are not enough; it takes one of each position"
+            tables.earth_rate += _without(names, part, "too_short", reason)
+            continue
+        bias = declared.turn_on_bias_si
         try:
-            experiment = _experiment(chosen, log.rate, declared)
+            experiment = Experiment(chosen, log.rate, declared.latitude_si)
             courses = estimate_courses(used, experiment, model, source.papers, bias)
         except (ValueError, LinAlgError) as error:
             tables.earth_rate += _without(names, part, "too_short", str(error))
             continue
-        extent = {"dwells": len(chosen), "turns": len(chosen) - 1}
+        about = names | {"part": part, "dwells": len(chosen), "turns": len(chosen) - 1}
         ranges = sigma_ranges(courses.measured.blocks, model, drawn, bias)
-        rows = _estimates(names | extent, part, courses, source, unsure, log.rate)
-        tables.earth_rate += [EarthRateRow(**(row | ranges.get(row["method"], {}))) for row in rows]
-        tables.earth_rate_series += _later(_series(key, part, courses), begins)
+        unsure = _unsure(turning, declared.trust_schedule)
+        tables.earth_rate += _estimates(about, courses, source, unsure, ranges)
+        tables.earth_rate_series += _series(key, part, courses, begins)
     return tables
 
 
-def _drifting(model: NoiseModel, drift: float) -> NoiseModel:
-    """Return a model with a steady drift of a standard deviation beside its own, rad/s^2."""
+def _add_drift(model: NoiseModel, drift: float) -> NoiseModel:
+    """Return a model with a steady drift of a standard deviation, rad/s^2, beside its own."""
     return replace(model, R=(model.R**2 + drift**2) ** 0.5) if drift else model
 
 
 def _predict(
-    key: Key,
-    rate: float,
-    declared: TwoPosition,
-    source: NoiseSource,
-    settings: EarthRateSettings,
-    into: EarthRate,
-) -> None:
-    turning = declared.seconds("turning")
+    key: Key, rate: float, declared: TwoPosition, source: NoiseSource, settings: EarthRateSettings
+) -> Iterator[EarthRatePredictionRow]:
+    """Yield the rows of the table ``earth_rate_prediction``."""
+    dwell, turning = declared.seconds("dwell"), declared.seconds("turning")
+    bias = declared.turn_on_bias_si
     outlook = Outlook(
-        source.model,
-        declared.latitude_si,
-        turning,
-        rate,
-        math.inf if declared.turn_on_bias_si is None else declared.turn_on_bias_si,
+        source.model, declared.latitude_si, turning, rate, math.inf if bias is None else bias
     )
-    run_time = max(
-        quantity_to_si(settings.run_time, "time"), 3.0 * declared.seconds("dwell") + turning
-    )
-    rows = prediction_rows(outlook, declared.seconds("dwell") - turning, settings.goals, run_time)
-    into.earth_rate_prediction += [EarthRatePredictionRow(**asdict(key), **row) for row in rows]
+    run_time = max(quantity_to_si(settings.run_time, "time"), 3.0 * dwell + turning)
+    for row in prediction_rows(outlook, dwell - turning, settings.goals, run_time):
+        yield EarthRatePredictionRow(**asdict(key), **row)
 
 
-def _experiment(dwells: Sequence[Dwell], rate: float, declared: TwoPosition) -> Experiment:
-    if len(dwells) < 2:
-        raise ValueError(f"{len(dwells)} dwells are not enough; it takes one of each position")
-    return Experiment(tuple(dwells), rate, declared.latitude_si)
-
-
-def _parts(declared: TwoPosition, duration: float) -> Iterator[tuple[str, float]]:
-    """Yield what is estimated by itself, and where in the log it begins, s."""
-    yield WHOLE, 0.0
-    for text in declared.last:
-        yield f"last {text}", max(duration - quantity_to_si(text, "time"), 0.0)
-
-
-def _later(rows: Iterator[_Timed], begins: float) -> Iterator[_Timed]:
-    """Yield rows with their times counted from the first sample of the recording."""
-    for row in rows:
-        times = {name: getattr(row, name, None) for name in ("start", "stop", "time")}
-        later = {name: time + begins for name, time in times.items() if time is not None}
-        yield replace(row, **later)
-
-
-def _dwells(turning: Turning, rate: float) -> Iterator[tuple[FoundDwell, Dwell]]:
-    """Yield the dwells that hold samples."""
-    for dwell in turning.dwells:
-        if dwell.stop - dwell.start > 2.0 / rate:
-            yield dwell, dwell.in_samples(rate)
-
-
-def _used(samples: Array, turning: Turning, rate: float) -> Array:
-    """Return the samples without those of knocks."""
-    used = samples.copy()
-    used[turning.senses(len(samples), rate) == 0] = np.nan
-    return used
-
-
-def _turning_rows(key: Key, turning: Turning, samples: Array, rate: float) -> Iterator[TurningRow]:
+def _turning_rows(
+    key: Key,
+    turning: Turning,
+    dwells: Sequence[tuple[FoundDwell, Dwell]],
+    used: Array,
+    begins: float,
+) -> Iterator[TurningRow]:
     """Yield the rows of the table ``turning``."""
     names = asdict(key)
     for text in turning.doubts:
         yield TurningRow(**names, what="doubt", doubts=text)
-    used = _used(samples, turning, rate)
-    for number, (dwell, part) in enumerate(_dwells(turning, rate), 1):
+    for number, (dwell, part) in enumerate(dwells, 1):
         values = used[part.start : part.stop]
         finite = np.isfinite(values)
         yield TurningRow(
             **names,
             what="dwell",
             number=number,
-            start=dwell.start,
-            stop=dwell.stop,
+            start=dwell.start + begins,
+            stop=dwell.stop + begins,
             sense=dwell.sense,
             found_by=dwell.found_by,
             mean=float(values[finite].mean()) if finite.any() else None,
@@ -328,42 +284,20 @@ def _turning_rows(key: Key, turning: Turning, samples: Array, rate: float) -> It
             **names,
             what="turn",
             number=number,
-            start=turn.start,
-            stop=turn.stop,
-            time=turn.time,
+            start=turn.start + begins,
+            stop=turn.stop + begins,
+            time=turn.time + begins,
             found_by=turn.found_by,
             peak=turn.peak,
             doubts="; ".join(turn.doubts) or None,
         )
     for number, (start, stop) in enumerate(turning.knocks, 1):
+        start, stop = start + begins, stop + begins
         yield TurningRow(**names, what="knock", number=number, start=start, stop=stop)
 
 
-def _estimates(
-    names: dict[str, Any],
-    part: str,
-    courses: Courses,
-    source: NoiseSource,
-    unsure: dict[str, Any],
-    rate: float,
-) -> Iterator[dict[str, Any]]:
-    measured, blocks = courses.measured, courses.measured.blocks
-    about = names | {
-        "part": part,
-        "unit": "rad/s",
-        "truth": EARTH_RATE,
-        "white": white_sigma(source.model, blocks),
-        "duration": blocks.duration,
-        "samples": int(blocks.count.sum()),
-        "missing": measured.missing + measured.left_out,
-        "block": courses.longest / rate,
-    }
-    for course in courses.courses:
-        yield about | _figure(course, unsure)
-
-
 def _unsure(turning: Turning, trusted: bool) -> dict[str, Any]:
-    """Return status and reason of estimates of which sign or turns are not known."""
+    """Return status and reason of estimates with uncertain sign or turns."""
     reasons = []
     by_schedule, turns = turning.by_schedule, len(turning.turns)
     unseen = by_schedule >= _MIN_SCHEDULED_SHARE * turns
@@ -388,32 +322,43 @@ def _unsure(turning: Turning, trusted: bool) -> dict[str, Any]:
     return {"status": "ambiguous" if doubtful else "ok", "reason": "; ".join(reasons)}
 
 
-def _figure(course: Course, unsure: dict[str, Any]) -> dict[str, Any]:
-    row: dict[str, Any] = {"method": course.method, "parameter": "earth_rate"}
-    if course.reason is not None:
-        return row | {"status": "not_shown", "reason": course.reason}
-    value = float(course.rate[-1])
-    if course.sigma is None:
-        return row | {
-            "value": value,
-            "status": "given",
-            "reason": _KNOWN_RATE_REASON,
-            "settled": None if course.settled in (None, math.inf) else course.settled,
-        }
-    sigma = float(course.sigma[-1])
-    row |= {
-        "status": "ok",
-        "value": value,
-        "lower": value - _Z_95 * sigma,
-        "upper": value + _Z_95 * sigma,
-        "sigma": sigma,
-        "off_sigma": (value - EARTH_RATE) / sigma,
+def _estimates(
+    names: dict[str, Any],
+    courses: Courses,
+    source: NoiseSource,
+    unsure: dict[str, Any],
+    ranges: dict[str, Range],
+) -> Iterator[EarthRateRow]:
+    """Yield the estimates of each method; ``unsure`` replaces their status."""
+    measured, blocks = courses.measured, courses.measured.blocks
+    about = names | {
+        "parameter": "earth_rate",
+        "unit": "rad/s",
+        "truth": EARTH_RATE,
+        "white": white_sigma(source.model, blocks),
+        "duration": blocks.duration,
+        "samples": int(blocks.count.sum()),
+        "missing": measured.missing + measured.left_out,
+        "block": courses.longest / blocks.rate,
     }
-    return row | unsure
+    for course in courses.courses:
+        row: dict[str, Any] = {"method": course.method, **ranges.get(course.method, {})}
+        if course.reason is not None:
+            row |= {"status": "not_shown", "reason": course.reason}
+        elif course.sigma is None:
+            row |= {"value": float(course.rate[-1]), "status": "given"}
+            row |= {"reason": _KNOWN_RATE_REASON}
+            row |= {"settled": None if course.settled in (None, math.inf) else course.settled}
+        else:
+            value, sigma = float(course.rate[-1]), float(course.sigma[-1])
+            row |= {"value": value, "sigma": sigma, "off_sigma": (value - EARTH_RATE) / sigma}
+            row |= {"lower": value - _Z_95 * sigma, "upper": value + _Z_95 * sigma}
+            row |= {"status": "ok"} | unsure
+        yield EarthRateRow(**about, **row)
 
 
 def _without(names: dict[str, Any], part: str, status: str, reason: str) -> Iterator[EarthRateRow]:
-    """Yield the rows of a part of which nothing can be estimated."""
+    """Yield the rows of a part without estimates."""
     for method in METHODS:
         yield EarthRateRow(
             **names,
@@ -427,18 +372,17 @@ def _without(names: dict[str, Any], part: str, status: str, reason: str) -> Iter
         )
 
 
-def _series(key: Key, part: str, courses: Courses) -> Iterator[EarthRateSeriesRow]:
+def _series(key: Key, part: str, courses: Courses, begins: float) -> Iterator[EarthRateSeriesRow]:
     """Yield the rows of the table ``earth_rate_series``."""
     drift = Course("smoother", courses.drift_time, courses.drift, courses.drift_sigma)
-    shown = [*(("rate", course) for course in courses.courses), ("drift", drift)]
-    for quantity, course in shown:
+    for quantity, course in [*(("rate", course) for course in courses.courses), ("drift", drift)]:
         for k in thin(len(course.time)):
             yield EarthRateSeriesRow(
                 **asdict(key),
                 part=part,
                 method=course.method,
                 quantity=quantity,
-                time=float(course.time[k]),
+                time=float(course.time[k]) + begins,
                 value=float(course.rate[k]),
                 sigma=None if course.sigma is None else float(course.sigma[k]),
             )

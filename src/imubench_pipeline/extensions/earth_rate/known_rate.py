@@ -82,12 +82,8 @@ def track(
     although the first entry of Q_d is an approximation; P_0 = ``start`` I. Samples of turning are
     left out, as if no time lay between dwells. The log, shape (samples,), is in rad/s, NaN where a
     sample is missing; the known rate is in rad/s, the start in (rad/s)^2. N, B with T_B, and K of
-    the model are used.
-
-    Raises
-    ------
-    ValueError
-        If the model has no white noise, or its B no correlation time.
+    the model are used. Raises ValueError if the model has no white noise, or its B no correlation
+    time.
     """
     one = _build_filter(model, experiment.rate)
     sample = np.concatenate([np.arange(dwell.start, dwell.stop) for dwell in experiment.dwells])
@@ -141,32 +137,18 @@ def mean_sigma(
 
     Exact, over the noise of the model and a fixed bias of the standard deviation ``turn_on_bias``,
     rad/s: the covariance of the true errors, the tracked errors and the sum is propagated with the
-    filter. It is independent of the known rate. The start is in (rad/s)^2, the rate in Hz.
-
-    Raises
-    ------
-    ValueError
-        As `track`.
+    filter. It is independent of the known rate. The start is in (rad/s)^2, the rate in Hz. Raises
+    ValueError as `track`.
     """
     one = _build_filter(model, rate)
-    return _propagate_sigma(
-        samples,
-        start,
-        np.array([one.decay, one.of_f, one.of_rrw, one.white]),
-        np.array([one.stationary, turn_on_bias**2]),
-    )
-
-
-def _propagate_sigma(samples: int, start: float, matrices: Array, initial: Array) -> Array:
-    """Propagate the covariance of [z_f, z_rrw, tracked z_f, tracked z_rrw, sum of residuals]."""
-    decay, of_f, of_rrw, white = matrices
+    decay, of_f, of_rrw, white = one.decay, one.of_f, one.of_rrw, one.white
     sigma = np.empty(samples)
+    # Covariance of [z_f, z_rrw, tracked z_f, tracked z_rrw, sum of residuals].
     joint = np.zeros((5, 5))
-    joint[0, 0], joint[1, 1] = initial
+    joint[0, 0], joint[1, 1] = one.stationary, turn_on_bias**2
     var_f, cross, var_rrw = start, 0.0, start
     seen = np.array([[1.0, 1.0, -1.0, -1.0, 0.0]])
     moved = np.array([decay, 1.0, decay, 1.0, 1.0])
-    driven = np.array([initial[0] * (1.0 - decay * decay), of_rrw])
     for k in range(samples):
         to_f, to_rrw = var_f + cross, cross + var_rrw
         total = to_f + to_rrw + white
@@ -176,8 +158,8 @@ def _propagate_sigma(samples: int, start: float, matrices: Array, initial: Array
         joint = step @ joint @ step.T + white * (noise @ noise.T)
         sigma[k] = math.sqrt(joint[4, 4]) / (k + 1)
         joint = joint * np.outer(moved, moved)
-        joint[0, 0] += driven[0]
-        joint[1, 1] += driven[1]
+        joint[0, 0] += one.stationary * (1.0 - decay * decay)
+        joint[1, 1] += of_rrw
         var_f = decay * decay * (var_f - to_f * to_f / total) + of_f
         cross = decay * (cross - to_f * to_rrw / total)
         var_rrw += of_rrw - to_rrw * to_rrw / total
@@ -188,12 +170,7 @@ def as_printed(model: NoiseModel, rate: float, steps: int, start: float) -> Arra
     """Return the trace of P after each measurement by eq. 13 as printed, (rad/s)^2, shape (steps,).
 
     (I - K H)^-1 P replaces (I - K H) P. The start is in (rad/s)^2, the rate in Hz; on overflow the
-    trace is infinite.
-
-    Raises
-    ------
-    ValueError
-        As `track`.
+    trace is infinite. Raises ValueError as `track`.
     """
     one = _build_filter(model, rate)
     moved, driven = np.diag([one.decay, 1.0]), np.diag([one.of_f, one.of_rrw])

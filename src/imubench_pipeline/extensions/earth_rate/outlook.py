@@ -14,8 +14,6 @@ from functools import partial
 from itertools import product
 from pathlib import Path
 
-import numpy as np
-
 from imubench_pipeline.estimators.rows import recommended_estimates
 from imubench_pipeline.extensions.calibration.alignment.accuracy import accuracies
 from imubench_pipeline.extensions.calibration.alignment.fine import UNIFORM_HEADING_SIGMA
@@ -31,17 +29,11 @@ from imubench_pipeline.settings.sensor import QUANTITIES
 from imubench_pipeline.steps.noise_source import static_recordings
 from imubench_pipeline.units import quantity_to_si
 
-TIMES = (10.0, 30.0, 60.0, 120.0, 300.0, 600.0, 1200.0, 1800.0, 3600.0)
-"""Durations of rest, s."""
+TIMES = (10.0, 30.0, 60.0, 120.0, 300.0, 600.0, 1200.0, 1800.0, 3600.0)  # durations of rest, s
+DWELL = 28.0  # length of each dwell of the predicted turns, s; with the turn half a minute
+TURN_TIME = 2.0  # duration of a turn, s
 
-DWELL = 28.0
-"""Length of each dwell of the predicted turns, s; with the turn half a minute."""
-
-TURN_TIME = 2.0
-"""Duration of a turn, s."""
-
-_SIMULATED_TRIADS = 400
-"""Number of simulated triads of the check; their rms is accurate to 3.5 %."""
+_SIMULATED_TRIADS = 400  # number of simulated triads of the check; their rms is accurate to 3.5 %
 
 _CHECK_SEED = 20260101
 _TYPICAL_KINDS = ("1sigma", "typ")
@@ -49,16 +41,16 @@ _TYPICAL_KINDS = ("1sigma", "typ")
 
 @dataclass(frozen=True)
 class Noise:
-    """The noise of a sensor at rest: the recording that it is from, Hz, and models by channel."""
+    """The noise of a sensor at rest."""
 
     recording: str
-    rate: float
-    models: dict[str, NoiseModel]
+    rate: float  # Hz
+    models: dict[str, NoiseModel]  # by channel
 
     def three(self, quantity: str) -> dict[str, NoiseModel]:
-        """Return the models of the axes x, y and z of a quantity, and of which channel each is.
+        """Return the models of the axes x, y and z of a quantity, by axis and source channel.
 
-        An axis that is not in the log has the noise of the next one that is; one is.
+        An axis that is missing in the log has the noise of another one.
         """
         names = [name for name in self.models if name.startswith(quantity)]
         models = {}
@@ -67,19 +59,6 @@ class Noise:
             name = own if own in self.models else names[place % len(names)]
             models[f"{axis}: {name}"] = self.models[name]
         return models
-
-    @property
-    def middle_gyro(self) -> str | None:
-        """The gyro with the median Allan deviation over a dwell; None: there is none."""
-        gyros = [name for name in self.models if name.startswith("gyro_")]
-        if not gyros:
-            return None
-        tau = np.array([DWELL])
-
-        def over_dwell(name: str) -> float:
-            return float(self.models[name].allan_variance(tau)[0])
-
-        return sorted(gyros, key=over_dwell)[len(gyros) // 2]
 
 
 def noise_at_rest(folders: Sequence[Path]) -> Noise | None:
@@ -98,8 +77,8 @@ def outlook_tables(
     """Return the rows of ``alignment`` and ``earth_rate_prediction`` of a sensor at rest.
 
     `folders` are those of its static recordings; `settings`: of
-    `imubench_pipeline.extensions.earth_rate.plan.outlook_settings`. There are no rows where no
-    recording tells the noise of a gyro, and none of ``alignment`` without an accelerometer.
+    `imubench_pipeline.extensions.earth_rate.plan.outlook_settings`. There are no rows without the
+    noise of a gyro, and none of ``alignment`` without an accelerometer.
     """
     rows: dict[str, Sequence[TableRow]] = {"alignment": [], "earth_rate_prediction": []}
     sections = json.loads(settings)
@@ -117,8 +96,13 @@ def outlook_tables(
 def _predict_earth_rate(
     sensor: str, noise: Noise, how: EarthRateSettings
 ) -> Iterator[EarthRatePredictionRow]:
-    gyro = noise.middle_gyro
-    assert gyro is not None  # noise_at_rest has seen to it
+    variances = {
+        name: float(model.allan_variance(DWELL))
+        for name, model in noise.models.items()
+        if name.startswith("gyro_")
+    }
+    # The gyro with the median Allan deviation over a dwell; there is at least one.
+    gyro = sorted(variances, key=variances.__getitem__)[len(variances) // 2]
     latitude = quantity_to_si(how.latitude, "angle")
     outlook = Outlook(noise.models[gyro], latitude, TURN_TIME, noise.rate)
     run_time = max(quantity_to_si(how.run_time, "time"), 3.0 * DWELL)

@@ -1,42 +1,321 @@
-"""The page of the Earth's rate: estimates by gyros, and recordings that they would need."""
+"""The pages of the Earth's rate: of one turned gyro, and of all estimates and predictions."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from operator import attrgetter
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from imubench_pipeline.earth import EARTH_RATE
-from imubench_pipeline.extensions.calibration.figures import calibrated, of_all, without_result
-from imubench_pipeline.extensions.earth_rate.page_turned import (
-    ESTIMATES,
-    answer,
-    given_words,
-    latitude_text,
-    line,
-    needs,
-    off_words,
-    prediction_payload,
-    published_lines,
+from imubench_pipeline.extensions.calibration.pages import (
+    calibrated,
+    noise_words,
+    of_all,
+    without_result,
 )
 from imubench_pipeline.extensions.earth_rate.tables import (
     AlignmentRow,
     EarthRatePredictionRow,
     EarthRatePublishedRow,
     EarthRateRow,
+    EarthRateSeriesRow,
+    TurningRow,
 )
-from imubench_pipeline.report.payload import Arrays
-from imubench_pipeline.report.practical import page_unit
-from imubench_pipeline.report.site import Entry, Section, Site
+from imubench_pipeline.model.estimates import EnvelopeRow
+from imubench_pipeline.report.payload import Arrays, numbers, samples_payload
+from imubench_pipeline.report.practical import System, page_unit
+from imubench_pipeline.report.recording import about_of, rows_of_samples, summary_words
+from imubench_pipeline.report.site import Entry, RecordingPage, Section, Site
 from imubench_pipeline.report.view import RecordingView
 from imubench_pipeline.words.numbers import (
     counted,
     degrees_text,
     duration_text,
+    limit_digits,
     number_text,
+    percent_text,
     sentence,
 )
+
+_METHODS = {
+    "pairs": ("by_pairs", "pairs of dwells"),
+    "triples": ("by_triples", "A-B-A differences"),
+    "filter": ("rate_filter", "filter, rate unknown"),
+    "smoother": ("rate_smoother", "smoother, rate unknown"),
+    "known_rate": ("known_rate", "bias tracking with known rate, P₀ in (°/s)²"),
+    "known_rate_radians": ("known_rate", "bias tracking with known rate, P₀ in (rad/s)²"),
+}
+"""Term of the glossary, and words, of each method."""
+
+ESTIMATES = ("filter", "pairs", "triples")
+"""The methods that estimate the rate, the recommended one first; filter and smoother agree."""
+
+
+def context(site: Site, view: RecordingView, folder: Path) -> dict[str, Any]:
+    """Return what the template needs; ``folder`` is the recording's."""
+    arrays = Arrays()
+    rows = view.rows(EarthRateRow)
+    channel = rows[0].channel if rows else ""
+    whole = [row for row in rows if row.part == "whole"]
+    turning = view.rows(TurningRow)
+    parts = list(dict.fromkeys(row.part for row in rows if row.value is not None))
+    envelope = rows_of_samples(folder, EnvelopeRow)
+    prediction = view.rows(EarthRatePredictionRow)
+    latitude = degrees_text(rows[0].latitude) if rows else ""
+    # Dwells, turns and knocks in the order of time.
+    listed = sorted(
+        (row for row in turning if row.start is not None), key=lambda row: (row.start, row.what)
+    )
+    positions = {1: "north", -1: "south"}
+    stretches = [{**row.columns(), "position": positions.get(row.sense or 0, "")} for row in listed]
+    turns = counted(sum(event.what == "turn" for event in turning), "turn")
+    summary = [f"{turns} between north and south", *[f"at latitude {latitude}"] * bool(rows)]
+    return {
+        **about_of(site, view, [], folder),
+        "channel": channel,
+        "summary": summary_words(view, summary),
+        "answer": answer(whole, site.system),
+        "doubts": [sentence(row.doubts) for row in turning if row.what == "doubt"],
+        "findings": view.findings,
+        "lines": [line(row) for row in rows],
+        "given": given_words(rows),
+        "noise": noise_words(rows),
+        "has_range": any(row.sigma_lower is not None for row in rows),
+        "latitude": latitude,
+        "parts": parts,
+        "has_samples": any(row.channel == channel for row in envelope),
+        "has_drift": any(row.quantity == "drift" for row in view.rows(EarthRateSeriesRow)),
+        "published": list(published_lines(view.rows(EarthRatePublishedRow))),
+        "needs": needs(prediction),
+        "has_prediction": bool(prediction),
+        "stretches": stretches,
+        "command": site.again(view, "earth_rate"),
+        "page": {
+            "looks": {},
+            "channels": [],
+            "findings": [],
+            "samples": samples_payload(envelope, [], arrays),
+            "turned": _pack_figures(view, rows, turning, arrays),
+            "prediction": prediction_payload(prediction, arrays),
+            "arrays": arrays.texts,
+        },
+    }
+
+
+TURNED_PAGE = RecordingPage("turned.html.jinja", context, "two positions")
+"""The page of a gyro that was turned between north and south."""
+
+
+def answer(rows: Sequence[EarthRateRow], system: System) -> str:
+    """Return the filter's estimate in a sentence, or the reason why there is none.
+
+    ``rows`` are those of the whole recording in the table ``earth_rate``.
+    """
+    by_method = {row.method: row for row in rows}
+    best = by_method.get("filter")
+    if best is None:
+        return "This recording has no estimate of the Earth's rate."
+    if best.value is None:
+        return sentence(best.reason)
+    unit = page_unit("gyro", "adev", system)
+    value, truth = (unit.text(number, 4) for number in (best.value, best.truth))
+    size = None if best.upper is None else best.upper - best.value
+    away = None if best.off_sigma is None else abs(best.off_sigma)
+    text = (
+        f"The filter estimates an Earth's rate of {value} ± {unit.text(size, 2)} {unit.sign} "
+        f"(95 %). The true rate is {truth} {unit.sign}, {number_text(away, 2)} standard deviations "
+        "away."
+    )
+    if away is not None and away > _MAX_NOISE_ERROR:
+        text += (
+            " Noise does not explain this error. Check sense, axis and latitude, a warm-up, and "
+            "whether the noise is that at rest."
+        )
+    return text + (f" {sentence(best.reason)}" if best.reason else "")
+
+
+def given_words(rows: Sequence[EarthRateRow]) -> str:
+    """Return the settling time of the filter that is given the rate, in a sentence.
+
+    ``rows`` are those of ``earth_rate``, of one or several recordings; empty without this filter.
+    """
+    given = [row for row in rows if row.part == "whole" and row.status == "given"]
+    parts = []
+    for method, unit in (("known_rate", "(°/s)²"), ("known_rate_radians", "(rad/s)²")):
+        times = [row.settled for row in given if row.method == method]
+        reached = sorted(time for time in times if time is not None)
+        if not times:
+            continue
+        ends = [duration_text(time) for time in dict.fromkeys(reached[:1] + reached[-1:])]
+        text = f"after {' to '.join(ends)} of data" if ends else "never"
+        if ends and len(reached) < len(times):
+            text += f" (never in {len(times) - len(reached)} of {len(times)} runs)"
+        parts.append(f"{text} with P₀ in {unit}")
+    if not parts:
+        return ""
+    return (
+        f"It settles within 10 % of the given rate {'; '.join(parts)}. Until then, noise dominates "
+        "its mean."
+    )
+
+
+# Error of an estimate in standard deviations beyond which noise does not explain it
+_MAX_NOISE_ERROR = 4.0
+
+
+def line(row: EarthRateRow) -> dict[str, Any]:
+    """Return a line of the table of estimates, from a row of ``earth_rate``."""
+    return {
+        **row.columns(),
+        "term": _METHODS[row.method][0],
+        "words": _METHODS[row.method][1],
+        "digits": limit_digits(row.lower, row.upper, 4),
+        "off": "–" if row.off_sigma is None else f"{number_text(row.off_sigma, 2)} σ",
+        "why": sentence(row.reason),
+        "use": row.method == "filter" and row.status == "ok",
+    }
+
+
+def published_lines(rows: Sequence[EarthRatePublishedRow]) -> Iterator[dict[str, Any]]:
+    """Yield the lines of the table of published estimates."""
+    for row in rows:
+        yield {
+            **row.columns(),
+            "length": duration_text(row.duration),
+            "off": f"{number_text(row.off_sigma, 3)} σ",
+        }
+
+
+def needs(rows: Sequence[EarthRatePredictionRow]) -> dict[str, Any] | None:
+    """Return the recordings required to find the Earth's rate, for a table and a sentence.
+
+    ``rows`` are those of one recording in the table ``earth_rate_prediction``.
+    """
+    goals = [row for row in rows if row.of == "goal"]
+    if not goals:
+        return None
+    curve = [row for row in rows if row.of == "dwell"]
+    best = next((row for row in curve if row.best), None)
+    best_words = ""
+    if best is not None:
+        nearly = [row.dwell for row in curve if row.nearly_best]
+        best_words = (
+            f"In a run of {duration_text(best.time)} the best dwell has "
+            f"{number_text(best.dwell, 3)} s of data ({counted(best.turns, 'turn')}) and gives "
+            f"the Earth's rate to {percent_text(best.relative)} (1σ). "
+            + _describe_near_best(best.dwell, [row.dwell for row in curve], nearly)
+        )
+    return {
+        "dwell": duration_text(goals[0].dwell),
+        "goals": [
+            {
+                "goal": percent_text(row.goal),
+                "turns": f"{row.turns:,}".replace(",", " "),
+                "time": duration_text(row.time),
+                "seconds": row.time,
+                "sigma": row.sigma,
+                "heading": f"above {degrees_text(_MAX_SMALL_HEADING, 2)}"
+                if row.heading is not None and row.heading > _MAX_SMALL_HEADING
+                else degrees_text(row.heading, 3),
+            }
+            for row in goals
+        ],
+        "best": best_words,
+    }
+
+
+def _describe_near_best(best: float, tried: Sequence[float], nearly: Sequence[float]) -> str:
+    """Return which dwells are nearly as good as the best, in a sentence."""
+    near = [*nearly, best]
+    low, high = (number_text(limit, 3) for limit in (min(near), max(near)))
+    if best in (max(tried), min(tried)):
+        longest = best == max(tried)
+        text = f"It is the {'longest' if longest else 'shortest'} dwell that was tried"
+        if low == high:
+            return f"{text}."
+        limit = f"down to {low}" if longest else f"up to {high}"
+        return f"{text}; dwells {limit} s are less than 1 % worse."
+    if low == high:
+        return "All other dwells that were tried are at least 1 % worse."
+    return f"Dwells from {low} s to {high} s are less than 1 % worse."
+
+
+# Largest standard deviation of a heading for which the small-angle formula holds, rad
+_MAX_SMALL_HEADING = 0.5
+
+
+def _pack_figures(
+    view: RecordingView, rows: Sequence[EarthRateRow], turning: Sequence[TurningRow], arrays: Arrays
+) -> dict[str, Any]:
+    """Return the data of the figures of dwells and estimates."""
+    dwells, turns = ([row for row in turning if row.what == what] for what in ("dwell", "turn"))
+    series = view.rows(EarthRateSeriesRow)
+    return {
+        "channel": rows[0].channel if rows else "",
+        "truth": rows[0].truth if rows else None,
+        "latitude": rows[0].latitude if rows else None,
+        "simulated": view.simulated,
+        "dwells": {
+            "start": arrays.exact(numbers(row.start for row in dwells)),
+            "stop": arrays.exact(numbers(row.stop for row in dwells)),
+            "mean": arrays.exact(numbers(row.mean for row in dwells)),
+            "north": [row.sense == 1 for row in dwells],
+        },
+        "turns": arrays.exact(numbers(row.time for row in turns)),
+        "found_by": [row.found_by for row in turns],
+        "parts": {
+            part: {
+                "range": _find_range([row for row in series if row.part == part], rows[0].truth),
+                "courses": _pack_courses([row for row in series if row.part == part], arrays),
+            }
+            for part in dict.fromkeys(row.part for row in series)
+        },
+    }
+
+
+def _pack_courses(series: Sequence[EarthRateSeriesRow], arrays: Arrays) -> dict[str, Any]:
+    courses: dict[str, Any] = {}
+    for name in dict.fromkeys((row.quantity, row.method) for row in series):
+        own = [row for row in series if (row.quantity, row.method) == name]
+        courses["drift" if name[0] == "drift" else name[1]] = {
+            "name": "drift" if name[0] == "drift" else _METHODS[name[1]][1],
+            "time": arrays.exact([row.time for row in own]),
+            "value": arrays.exact([row.value for row in own]),
+            "sigma": arrays.exact(numbers(row.sigma for row in own)),
+        }
+    return courses
+
+
+def _find_range(series: Sequence[EarthRateSeriesRow], truth: float) -> list[float]:
+    """Return the range of the rate in the figure of estimates, without the first estimates."""
+    rates = [row for row in series if row.quantity == "rate"]
+    if not rates:
+        return [0.0, 2.0 * truth]
+    first, last = rates[0].time, max(row.time for row in rates)
+    later = [row for row in rates if row.time >= first + 0.12 * (last - first)]
+    high = max(abs(row.value - truth) + 2.0 * (row.sigma or 0.0) for row in later)
+    return [truth - 1.1 * high, truth + 1.1 * high]
+
+
+def prediction_payload(rows: Sequence[EarthRatePredictionRow], arrays: Arrays) -> dict[str, Any]:
+    """Return the data of the figures of the prediction of a recording."""
+    goals = [row.goal for row in rows if row.of == "goal"]
+    payload: dict[str, Any] = {"goals": goals, "truth": EARTH_RATE}
+    for of, x in (("time", attrgetter("time")), ("dwell", attrgetter("dwell"))):
+        own = sorted((row for row in rows if row.of == of and row.sigma is not None), key=x)
+        payload[of] = {
+            "x": arrays.exact([x(row) for row in own]),
+            "sigma": arrays.exact(numbers(row.sigma for row in own)),
+            "turns": [row.turns for row in own],
+            "run": own[0].time if own else None,
+            "length": own[0].dwell if own else None,
+            "best": next((k for k, row in enumerate(own) if row.best), None),
+            "nearly": [row.dwell for row in own if row.nearly_best],
+        }
+    return payload
 
 
 def turned(site: Site) -> list[RecordingView]:
@@ -52,18 +331,18 @@ def predicted(site: Site) -> list[RecordingView]:
 
 def _make_context(site: Site) -> dict[str, Any]:
     arrays = Arrays()
-    runs = [_describe_run(site, view) for view in turned(site)]
-    published = [row for view in turned(site) for row in view.rows(EarthRatePublishedRow)]
+    turned_gyros = turned(site)
+    published = [row for view in turned_gyros for row in view.rows(EarthRatePublishedRow)]
     predicted = list(_list_predictions(site))
     aligned = alignments(site, arrays)
     return {
         "truth": EARTH_RATE,
-        "runs": runs,
-        "given": given_words([row for view in turned(site) for row in view.rows(EarthRateRow)]),
-        "rejected": [view for view in turned(site) if view.left_out],
+        "runs": [_describe_run(site, view) for view in turned_gyros],
+        "given": given_words([row for view in turned_gyros for row in view.rows(EarthRateRow)]),
+        "rejected": [view for view in turned_gyros if view.left_out],
         "published": [
             {**line, "view": view}
-            for view in turned(site)
+            for view in turned_gyros
             for line in published_lines(view.rows(EarthRatePublishedRow))
         ],
         "verdict": published_words(published),
@@ -74,7 +353,16 @@ def _make_context(site: Site) -> dict[str, Any]:
         "page": {
             "looks": {},
             "channels": [],
-            "published": [_pack_estimates(row) for row in published],
+            "published": [
+                {
+                    "name": row.recording + ("" if row.part == "whole" else f", {row.part}"),
+                    "published": row.published,
+                    "truth": row.truth,
+                    "sigma": row.sigma,
+                    "simulated": row.simulated,
+                }
+                for row in published
+            ],
             "predictions": {
                 line["place"]: prediction_payload(line["rows"], arrays) for line in predicted
             },
@@ -135,19 +423,8 @@ def _list_predictions(site: Site) -> Iterator[dict[str, Any]]:
         if needed is None or (view.sensor, needed) in yielded:
             continue
         yielded.append((view.sensor, needed))
-        place = f"{view.sensor}-{view.name}"
-        latitude = latitude_text(rows)
+        place, latitude = f"{view.sensor}-{view.name}", degrees_text(rows[0].latitude)
         yield needed | {"view": view, "place": place, "rows": rows, "latitude": latitude}
-
-
-def _pack_estimates(row: EarthRatePublishedRow) -> dict[str, Any]:
-    return {
-        "name": row.recording + ("" if row.part == "whole" else f", {row.part}"),
-        "published": row.published,
-        "truth": row.truth,
-        "sigma": row.sigma,
-        "simulated": row.simulated,
-    }
 
 
 def published_words(rows: Sequence[EarthRatePublishedRow]) -> str:
@@ -155,10 +432,6 @@ def published_words(rows: Sequence[EarthRatePublishedRow]) -> str:
     if not rows:
         return ""
     beyond = [row for row in rows if row.verdict == "beyond the noise"]
-    names = ", ".join(
-        row.recording + ("" if row.part == "whole" else f" ({row.part})") + f" by {off_words(row)}"
-        for row in beyond
-    )
     if not beyond:
         every = (
             "the error of the published estimate"
@@ -167,6 +440,12 @@ def published_words(rows: Sequence[EarthRatePublishedRow]) -> str:
         )
         return f"Noise explains {every}. {_describe_gain(rows)}"
     within = len(rows) - len(beyond)
+    names = ", ".join(
+        row.recording
+        + ("" if row.part == "whole" else f" ({row.part})")
+        + f" by {number_text(row.off_sigma, 3)} σ"
+        for row in beyond
+    )
     return (
         f"The noise that the source prints explains {counted(within, 'published estimate')}. "
         f"{len(beyond)} of {len(rows)} {'has' if len(beyond) == 1 else 'have'} a larger error: "
@@ -192,8 +471,7 @@ def _describe_gain(rows: Sequence[EarthRatePublishedRow]) -> str:
     )
 
 
-_TABLE_TIMES = (60.0, 600.0, 3600.0)
-"""Times at rest that the table shows, s; the figure has more."""
+_TABLE_TIMES = (60.0, 600.0, 3600.0)  # times at rest that the table shows, s; the figure has more
 
 _POSITION_TEXTS = {1: "one position", 2: "two opposite positions"}
 
@@ -201,11 +479,11 @@ _POSITION_TEXTS = {1: "one position", 2: "two opposite positions"}
 def alignments(site: Site, arrays: Arrays) -> list[dict[str, Any]]:
     """Return the section of each sensor with gyros and accelerometers; ``arrays`` gets its data."""
     entries = []
+    unit, fine = page_unit("gyro", "adev", site.system), page_unit("accel", "adev", "si")
     for view in site.views:
         rows = view.rows(AlignmentRow)
         if rows:
             about = rows[0]
-            unit, fine = page_unit("gyro", "adev", site.system), page_unit("accel", "adev", "si")
             entries.append(
                 {
                     "view": view,
@@ -217,7 +495,18 @@ def alignments(site: Site, arrays: Arrays) -> list[dict[str, Any]]:
                         f"({about.accelerometer_bias_from})."
                     ),
                     "axes": _describe_missing_axes(about),
-                    "lines": [_format_line(row) for row in rows if row.time in _TABLE_TIMES],
+                    "lines": [
+                        {
+                            "position": _POSITION_TEXTS[row.positions],
+                            "method": row.method,
+                            "time": duration_text(row.time),
+                            "roll": _format_angle(row.roll),
+                            "pitch": _format_angle(row.pitch),
+                            "heading": _format_angle(row.heading),
+                        }
+                        for row in rows
+                        if row.time in _TABLE_TIMES
+                    ],
                     "none": list(dict.fromkeys(sentence(row.reason) for row in rows if row.reason)),
                     "check": _describe_check(rows),
                     "drawn": _pack_curves(rows, arrays),
@@ -239,17 +528,6 @@ def _describe_missing_axes(row: AlignmentRow) -> str:
     return f"The log has no {', '.join(lent_axes)}; the other axes replace them."
 
 
-def _format_line(row: AlignmentRow) -> dict[str, Any]:
-    return {
-        "position": _POSITION_TEXTS[row.positions],
-        "method": row.method,
-        "time": duration_text(row.time),
-        "roll": _format_angle(row.roll),
-        "pitch": _format_angle(row.pitch),
-        "heading": _format_angle(row.heading),
-    }
-
-
 def _format_angle(value: float | None) -> str:
     return "not determined" if value is None else degrees_text(value, 3)
 
@@ -260,15 +538,11 @@ def _describe_check(rows: Sequence[AlignmentRow]) -> str:
     for row in rows:
         if row.simulated is None:
             continue
+        errors = {"roll": row.error_roll, "pitch": row.error_pitch, "heading": row.error_heading}
         ratios = (
-            ("roll", row.error_roll),
-            ("pitch", row.error_pitch),
-            ("heading", row.error_heading),
+            f"{name} {number_text(one, 3)}" for name, one in errors.items() if one is not None
         )
-        ratio_words = ", ".join(
-            f"{name} {number_text(ratio, 3)}" for name, ratio in ratios if ratio is not None
-        )
-        comparisons.append(f"in {_POSITION_TEXTS[row.positions]} {ratio_words}")
+        comparisons.append(f"in {_POSITION_TEXTS[row.positions]} {', '.join(ratios)}")
     if not comparisons:
         return ""
     number = next(row.simulated for row in rows if row.simulated is not None)
@@ -285,11 +559,10 @@ def _pack_curves(rows: Sequence[AlignmentRow], arrays: Arrays) -> list[dict[str,
     for positions in _POSITION_TEXTS:
         for method in ("coarse", "fine"):
             own = [r for r in rows if r.positions == positions and r.method == method]
-            values = {
-                "heading": [r.heading for r in own],
-                "level": [_find_largest(r.roll, r.pitch) for r in own],
-            }
-            for angle, sigma in values.items():
+            level = [
+                None if r.roll is None or r.pitch is None else max(r.roll, r.pitch) for r in own
+            ]
+            for angle, sigma in (("heading", [r.heading for r in own]), ("level", level)):
                 points = [(r.time, s) for r, s in zip(own, sigma, strict=True) if s]
                 if points:
                     courses.append(
@@ -302,8 +575,3 @@ def _pack_curves(rows: Sequence[AlignmentRow], arrays: Arrays) -> list[dict[str,
                         }
                     )
     return courses
-
-
-def _find_largest(*angles: float | None) -> float | None:
-    """Return the largest angle; None if one is unknown."""
-    return None if None in angles else max(angle for angle in angles if angle is not None)

@@ -7,8 +7,8 @@ dwells appears as rotation, with alternating sign if the turns alternate. A-B-A 
 the linear part of the drift.
 
 The weights of an estimate on the means of the dwells add up to 0: the fixed bias drops out. The
-standard error is the root of w^T C w with C the covariance of these means, in closed form
-(`covariance`). The scatter of the estimates is not used, since they are few and correlated.
+standard error is the root of w^T C w with C the covariance of these means in closed form. The
+scatter of the estimates is not used, since they are few and correlated.
 """
 
 from __future__ import annotations
@@ -17,8 +17,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from imubench_pipeline.extensions.calibration.covariance import block_mean_covariance
-from imubench_pipeline.extensions.calibration.experiment import Blocks
+from imubench_pipeline.extensions.calibration.experiment import Blocks, block_mean_covariance
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.typing import Array
 
@@ -41,13 +40,9 @@ class Differences:
 def by_pairs(means: Array, blocks: Blocks, model: NoiseModel) -> Differences:
     """Estimate the rate from pairs of dwells, each in one pair at most (Silva et al., eq. 14).
 
-    A dwell followed by one of the same sense (a missed turn) is left out. The block means are
-    in rad/s, shape (runs, b); the noise model is for the standard errors.
-
-    Raises
-    ------
-    ValueError
-        If there is no pair.
+    A dwell followed by one of the same sense (a missed turn) is left out. The block means are in
+    rad/s, shape (runs, b); the noise model is for the standard errors. Raises ValueError if there
+    is no pair.
     """
     dwells = blocks.of_dwells()
     differences, i = [], 0
@@ -67,14 +62,8 @@ def by_triples(means: Array, blocks: Blocks, model: NoiseModel) -> Differences:
 
     Of three consecutive dwells of alternating sense, the middle one is compared with the line
     through the outer two at its mean time. Triples overlap: each dwell except the first and the
-    last is the middle of one.
-
-    Parameters and shapes are as in `by_pairs`.
-
-    Raises
-    ------
-    ValueError
-        If there are no three such dwells.
+    last is the middle of one. Arguments and shapes are as in `by_pairs`. Raises ValueError if there
+    are no three such dwells.
     """
     dwells = blocks.of_dwells()
     # The mean time of the samples present is taken from their blocks.

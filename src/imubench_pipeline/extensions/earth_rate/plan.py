@@ -1,4 +1,4 @@
-"""The settings of what is predicted for sensors at rest."""
+"""Settings of the predictions for sensors at rest."""
 
 from __future__ import annotations
 

@@ -25,34 +25,22 @@ from imubench_pipeline.extensions.earth_rate.bound import (
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.typing import Array
 
+# Largest number of computed dwells; beyond, the information grows as over their latter half
 _MAX_COMPUTED_DWELLS = 64
-"""Largest number of computed dwells; beyond, the information grows as over their latter half."""
-
-_MIN_COMPUTED_DWELLS = 8
-"""Least number of computed dwells, if 64 of them have too many blocks."""
-
-_INFORMATION_TOLERANCE = 1e-9
-"""Relative tolerance of the information for rounding."""
-
+_MIN_COMPUTED_DWELLS = 8  # least number of computed dwells, if 64 of them have too many blocks
+_INFORMATION_TOLERANCE = 1e-9  # relative tolerance of the information for rounding
+# Relative rise of the standard deviation within which a dwell is nearly the best
 _NEARLY_BEST_LOSS = 0.01
-"""Relative rise of the standard deviation within which a dwell is nearly the best."""
-
-_DWELL_CURVE_POINTS = 40
-"""Approximate number of points on a curve over the dwell."""
-
-_REFINEMENT_POINTS = 15
-"""Number of further points about the best one."""
+_DWELL_CURVE_POINTS = 40  # approximate number of points on a curve over the dwell
+_REFINEMENT_POINTS = 15  # number of further points about the best one
 
 Row = dict[str, Any]
 
 MAX_TURNS = 10**12
 """Largest number of turns of a goal; at one a second they take 30 000 years."""
 
-_TIME_CURVE_POINTS = 60
-"""Number of points on the curve over time."""
-
-_MAX_CURVE_TURNS = 20_000
-"""Largest number of turns on the curve over time; goals may need more."""
+_TIME_CURVE_POINTS = 60  # number of points on the curve over time
+_MAX_CURVE_TURNS = 20_000  # largest number of turns on the curve over time; goals may need more
 
 
 @dataclass(frozen=True)
@@ -117,12 +105,7 @@ class Outlook:
         None: more than `MAX_TURNS`.
 
         The run lasts (turns + 1) dwells, each with ``dwell`` s of data, and the turns. A
-        ``relative`` of 0.01 is 1 % of the Earth's rate.
-
-        Raises
-        ------
-        ValueError
-            If it is not above 0.
+        ``relative`` of 0.01 is 1 % of the Earth's rate. Raises ValueError if it is not above 0.
         """
         if not relative > 0:
             raise ValueError(f"relative is {relative}, expected a number above 0")
@@ -157,12 +140,7 @@ class Outlook:
         """Return the bound of a run of a length, s, over the dwell, from one turn to short dwells.
 
         The run consists of dwells and turns. The shortest dwell is a fourth of the turning time, or
-        one second.
-
-        Raises
-        ------
-        ValueError
-            If there is no time for two dwells and a turn.
+        one second. Raises ValueError if there is no time for two dwells and a turn.
         """
         if run_time - self.turning < 2.0 / self.rate:
             raise ValueError(f"{run_time} s do not hold two dwells and a turn")
@@ -183,11 +161,9 @@ class Outlook:
 
     def _compute_sigma(self, run_time: float, dwells: NDArray[np.int64]) -> Array:
         """Return the bound of a run for these numbers of dwells, shape (k,)."""
-        last = [
-            self._compute_information((run_time - (n - 1) * self.turning) / n, n)[-1]
-            for n in dwells.tolist()
-        ]
-        return sigma_of(np.array(last))
+        lengths = ((run_time - (n - 1) * self.turning) / n for n in dwells.tolist())
+        pairs = zip(lengths, dwells.tolist(), strict=True)
+        return sigma_of(np.array([self._compute_information(*pair)[-1] for pair in pairs]))
 
     def heading(self, dwell: float, turns: int) -> Array:
         """Return the least standard deviation of the heading by gyrocompassing after each turn.
@@ -217,11 +193,9 @@ class Outlook:
         last = np.flatnonzero(np.diff(blocks.dwell, append=-1))
         information = information_by_states(blocks, self.model, self.turn_on_bias)[last]
         more = np.arange(1, dwells - len(information) + 1)
-        return (
-            np.concatenate([information, information[-1] + _compute_growth(information) * more])
-            if len(more)
-            else information
-        )
+        if not len(more):
+            return information
+        return np.append(information, information[-1] + _compute_growth(information) * more)
 
 
 def _compute_growth(information: Array) -> float:
@@ -236,20 +210,10 @@ def prediction_rows(
     """Yield the rows of the table ``earth_rate_prediction``, without the names.
 
     ``dwell`` is the data in each dwell, s; the goals are standard deviations relative to the
-    Earth's rate; the best dwell is computed for the run time, s.
-
-    Raises
-    ------
-    ValueError
-        If the run time does not hold two dwells and a turn.
+    Earth's rate; the best dwell is computed for the run time, s. Raises ValueError if the run time
+    does not hold two dwells and a turn.
     """
-    for row in _yield_rows(outlook, dwell, goals, run_time):
-        yield {"latitude": outlook.latitude, **row}
-
-
-def _yield_rows(
-    outlook: Outlook, dwell: float, goals: Sequence[float], run_time: float
-) -> Iterator[Row]:
+    about = {"latitude": outlook.latitude}
     most = 1
     for goal in sorted(goals, reverse=True):
         turns = outlook.turns_needed(dwell, goal)
@@ -259,23 +223,18 @@ def _yield_rows(
         time = (turns + 1) * dwell + turns * outlook.turning
         # The reached value: the last necessary turn may give far more than the goal.
         sigma = outlook.sigma_after(dwell, turns)
-        yield {"of": "goal", "goal": goal} | _make_row(dwell, turns, time, sigma)
+        yield about | {"of": "goal", "goal": goal} | _make_row(dwell, turns, time, sigma)
     course = outlook.against_time(dwell, min(max(most, 2), _MAX_CURVE_TURNS))
-    shown = (
-        np.unique(np.rint(np.geomspace(1, len(course.turns), _TIME_CURVE_POINTS)).astype(np.int64))
-        - 1
-    )
-    for k in shown.tolist():
+    shown = np.rint(np.geomspace(1, len(course.turns), _TIME_CURVE_POINTS)).astype(np.int64) - 1
+    for k in np.unique(shown).tolist():
         point = int(course.turns[k]), float(course.time[k]), float(course.sigma[k])
-        yield {"of": "time"} | _make_row(dwell, *point)
+        yield about | {"of": "time"} | _make_row(dwell, *point)
     curve = outlook.over_dwell(run_time)
     low, high = curve.nearly_best()
     for k, number in enumerate(curve.dwells.tolist()):
-        length = float(curve.dwell[k])
-        yield (
-            {"of": "dwell", "best": k == curve.best, "nearly_best": low <= length <= high}
-            | _make_row(length, number - 1, run_time, float(curve.sigma[k]))
-        )
+        length, sigma = float(curve.dwell[k]), float(curve.sigma[k])
+        verdict = {"of": "dwell", "best": k == curve.best, "nearly_best": low <= length <= high}
+        yield about | verdict | _make_row(length, number - 1, run_time, sigma)
 
 
 def _make_row(dwell: float, turns: int, time: float, sigma: float) -> Row:

@@ -1,4 +1,4 @@
-"""What is declared of gyros that are turned between north and south, and sought of them."""
+"""Settings of gyros that are turned between north and south."""
 
 from __future__ import annotations
 
@@ -19,13 +19,12 @@ from imubench_pipeline.settings.validation import (
 from imubench_pipeline.units import quantity_to_si
 
 
-def _deviation(dimension: str) -> AfterValidator:
-    return checked(dimension, "a standard deviation from 0", from_zero=True)
+def _from_zero(dimension: str, what: str = "a standard deviation") -> AfterValidator:
+    return checked(dimension, f"{what} from 0", from_zero=True)
 
 
-_from_zero = checked("time", "a time from 0", from_zero=True)
 _Rate = Annotated[Text, checked("angular_rate")]
-TimeFromZero = Annotated[Text, _from_zero, Field(examples=["2 s"])]
+TimeFromZero = Annotated[Text, _from_zero("time", "a time"), Field(examples=["2 s"])]
 
 _REQUIRED_KEYS = {
     "latitude": "where the log was recorded, such as latitude: 45.1 deg (south: negative)",
@@ -36,11 +35,8 @@ _REQUIRED_KEYS = {
 class TwoPosition(Experiment):
     """A log in which one gyro was turned end for end, between north and south, again and again.
 
-    Raises
-    ------
-    ValueError
-        If latitude or dwell is missing, a figure has a unit of another dimension or is out of
-        range, or turning takes half of the dwell or more.
+    Raises ValueError if latitude or dwell is missing, a figure has a unit of another dimension or
+    is out of range, or turning takes half of the dwell or more.
     """
 
     latitude: Latitude = Field(
@@ -60,11 +56,10 @@ class TwoPosition(Experiment):
     trust_schedule: bool = Field(
         False, description="take the schedule's word where nothing of the turns is seen"
     )
-    turn_on_bias: Annotated[Text, _deviation("angular_rate")] | None = Field(
-        None,
-        description="standard deviation of the fixed bias, such as 0.1 deg/s; null: not known",
+    turn_on_bias: Annotated[Text, _from_zero("angular_rate")] | None = Field(
+        None, description="standard deviation of the fixed bias, such as 0.1 deg/s; null: not known"
     )
-    drift: Annotated[Text, _deviation("gyro_ramp")] | None = Field(
+    drift: Annotated[Text, _from_zero("gyro_ramp")] | None = Field(
         None,
         description="standard deviation of a steady drift beside the noise, such as 20 deg/h/h "
         "while the sensor warms up; null: none",
@@ -75,7 +70,7 @@ class TwoPosition(Experiment):
 
     @model_validator(mode="before")
     @classmethod
-    def _said(cls, data: Any) -> Any:
+    def _require_keys(cls, data: Any) -> Any:
         if isinstance(data, dict):
             for key, needed in _REQUIRED_KEYS.items():
                 if data.get(key) is None:
@@ -84,7 +79,7 @@ class TwoPosition(Experiment):
 
     @field_validator("latitude")
     @classmethod
-    def _sees_rotation(cls, latitude: str) -> str:
+    def _check_latitude(cls, latitude: str) -> str:
         if abs(quantity_to_si(latitude, "angle")) > quantity_to_si("89 deg", "angle"):
             raise ValueError(
                 "expected at most 89 deg: at a pole a horizontal axis sees nothing of the Earth's "
@@ -93,7 +88,7 @@ class TwoPosition(Experiment):
         return latitude
 
     @model_validator(mode="after")
-    def _turns_fit(self) -> Self:
+    def _check_turning(self) -> Self:
         if 2.0 * self.seconds("turning") >= self.seconds("dwell"):
             raise ValueError(
                 f"turning is {self.turning}; expected less than half of the dwell of {self.dwell}"
@@ -145,7 +140,7 @@ class SimulatedTurns(TwoPosition):
     published: tuple[PublishedRate, ...] = ()
 
     @model_validator(mode="after")
-    def _parts_are_there(self) -> Self:
+    def _check_parts(self) -> Self:
         parts = {"whole", *(f"last {text}" for text in self.last)}
         for rate in self.published:
             if rate.part not in parts:
@@ -154,7 +149,7 @@ class SimulatedTurns(TwoPosition):
 
     @property
     def declared(self) -> TwoPosition:
-        """What would stand beside such a log."""
+        """The notes of a log like this one."""
         return TwoPosition(**{name: getattr(self, name) for name in TwoPosition.model_fields})
 
 
@@ -178,14 +173,13 @@ class EarthRateSettings(Strict):
         description="standard deviation of the fixed bias of gyros whose datasheet prints none",
     )
     accelerometer_bias: AccelerationFromZero = Field(
-        "20 mg",
-        description="standard deviation of that of accelerometers, likewise",
+        "20 mg", description="standard deviation of that of accelerometers, likewise"
     )
     draws: int = Field(60, ge=20, description="noise models that give the range of a sigma")
 
     @field_validator("goals")
     @classmethod
-    def _above_zero(cls, goals: tuple[float, ...]) -> tuple[float, ...]:
+    def _check_goals(cls, goals: tuple[float, ...]) -> tuple[float, ...]:
         if min(goals) <= 0:
             raise ValueError("expected parts above 0, such as 0.01 for 1 %")
         return goals

@@ -13,32 +13,31 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from imubench_pipeline.earth import EARTH_RATE
 from imubench_pipeline.extensions.calibration.experiment import Blocks, Experiment
 from imubench_pipeline.extensions.calibration.states import block_states
+from imubench_pipeline.extensions.earth_rate.settings import SimulatedTurns
 from imubench_pipeline.noise import NoiseModel
+from imubench_pipeline.noise.simulate import channel_rng
+from imubench_pipeline.settings.simulated_recordings import SimulatedRecording
 from imubench_pipeline.simulate.model import SensorModel
+from imubench_pipeline.simulate.profiles import SampledProfile
 from imubench_pipeline.simulate.simulation import simulate
 from imubench_pipeline.typing import Array
+from imubench_pipeline.units import quantity_to_si
 
 PAPER_MODEL = NoiseModel(
     N=math.radians(0.0122), B=math.radians(0.0027), T_B=238.1, K=math.radians(6.8314e-5)
 )
 """SiRRS01-03 by Silva et al., section 5.1, SI."""
 
-PAPER_RATE = 32.0
-"""Sampling rate of the runs, Hz (Silva et al., section 6)."""
-
-PAPER_PERIOD = 30.0
-"""Time between turns, s (Silva et al., section 6)."""
-
+PAPER_RATE = 32.0  # sampling rate of the runs, Hz (Silva et al., section 6)
+PAPER_PERIOD = 30.0  # time between turns, s (Silva et al., section 6)
+# Length of the runs, min (Silva et al., section 6); the last is a part of run 4
 PAPER_MINUTES = {"1": 120.0, "2": 12.0, "3": 25.0, "4": 60.0, "4, last 13 min": 13.0}
-"""Length of the runs, min (Silva et al., section 6); the last is a part of run 4."""
-
+# Latitude of Londrina, where the authors work, rad: the paper prints none
 ASSUMED_LATITUDE = math.radians(-23.3)
-"""Latitude of Londrina, where the authors work, rad: the paper prints none."""
-
-ASSUMED_TURNING = 2.0
-"""Time of a turn within each 30 s, s: the paper prints none."""
+ASSUMED_TURNING = 2.0  # time of a turn within each 30 s, s: the paper prints none
 
 
 def paper_run(minutes: float) -> Experiment:
@@ -135,3 +134,27 @@ def true_rate(experiment: Experiment, earth_rate: float, transient: ArrayLike) -
             true[before.stop : dwell.start] = before.sense * seen * np.cos(angle)
         true[before.stop : dwell.start] += peaks[i - 1] * np.sin(math.pi * part) ** 2
     return true
+
+
+def turned(recording: SimulatedRecording, rate: float) -> dict[str, SampledProfile]:
+    """Return the readings of a gyro that is turned by the clock; the transients differ."""
+    turns, samples = recording.block(SimulatedTurns), recording.samples
+    assert turns is not None
+    dwell, turning = turns.seconds("dwell"), turns.seconds("turning")
+    design = Experiment.regular(
+        dwell=dwell - turning,
+        turning=turning,
+        dwells=max(round((samples / rate - turns.seconds("start")) / dwell), 1),
+        rate=rate,
+        latitude=turns.latitude_si,
+        first=turns.first_sense or 1,
+    )
+    rng = channel_rng(recording.seed, recording.sensor, recording.recording, "turns")
+    number = len(design.dwells) - 1
+    peaks = rng.choice([-1.0, 1.0], number) * rng.uniform(0.7, 1.3, number)
+    peaks = peaks * quantity_to_si(turns.transient, "angular_rate")
+    true = true_rate(design, EARTH_RATE, peaks)
+    before = np.full(round(turns.seconds("start") * rate), true[0])
+    after = np.full(samples, true[-1])
+    sensed = np.concatenate([before, true, after])[:samples]
+    return {str(recording.moved_gyro): SampledProfile(sensed, rate)}

@@ -16,6 +16,14 @@ from imubench_pipeline.model.table import (
 )
 
 TurnedGyro = Annotated[str, Column("the gyro that was turned")]
+Part = Annotated[str, Column("whole, or the last minutes of the recording")]
+Method = Annotated[
+    str,
+    Column(
+        "pairs, triples, filter, smoother; known_rate is given the rate and starts with 0.1 "
+        "(deg/s)^2, known_rate_radians with 0.1 (rad/s)^2"
+    ),
+]
 
 
 @table("earth_rate")
@@ -23,14 +31,8 @@ class EarthRateRow(OfRecordingRow):
     """A row of the table ``earth_rate``."""
 
     channel: TurnedGyro
-    part: Annotated[str, Column("whole, or the last minutes of the recording")]
-    method: Annotated[
-        str,
-        Column(
-            "pairs, triples, filter, smoother; known_rate is given the rate and starts with 0.1 "
-            "(deg/s)^2, known_rate_radians with 0.1 (rad/s)^2",
-        ),
-    ]
+    part: Part
+    method: Method
     parameter: Annotated[str, Column("earth_rate")]
     value: Estimate = None
     lower: LowerLimit = None
@@ -40,44 +42,37 @@ class EarthRateRow(OfRecordingRow):
         str,
         Column(
             "ok; ambiguous: the sign may be the other one; given: no estimate; no_turns, "
-            "no_model, too_short or not_shown",
+            "no_model, too_short or not_shown"
         ),
     ]
     reason: EstimateReason = None
     sigma: Annotated[
-        float | None,
-        Column("standard deviation of value, by the noise model", "rad/s"),
+        float | None, Column("standard deviation of value, by the noise model", "rad/s")
     ] = None
     sigma_lower: Annotated[
-        float | None,
-        Column("lower 95 % limit of sigma: the noise model is an estimate", "rad/s"),
+        float | None, Column("lower 95 % limit of sigma: the noise model is an estimate", "rad/s")
     ] = None
     sigma_upper: Annotated[float | None, Column("upper 95 % limit of sigma", "rad/s")] = None
     white: Annotated[
-        float | None,
-        Column("the least that it can be, N / sqrt(T) / cos(latitude)", "rad/s"),
+        float | None, Column("the least that it can be, N / sqrt(T) / cos(latitude)", "rad/s")
     ] = None
     truth: Annotated[float, Column("the Earth's rate", "rad/s")]
     off_sigma: Annotated[float | None, Column("value less truth, in sigma")] = None
     settled: Annotated[
-        float | None,
-        Column("of known_rate: data until it stays within 10 % of the given", "s"),
+        float | None, Column("of known_rate: data until it stays within 10 % of the given", "s")
     ] = None
     dwells: Annotated[int | None, Column("used")] = None
     turns: Annotated[int | None, Column("between them")] = None
     samples: Annotated[int | None, Column("used")] = None
     missing: Annotated[
-        int | None,
-        Column("samples of the dwells that are not there, or left out as knocks"),
+        int | None, Column("samples of the dwells that are not there, or left out as knocks")
     ] = None
     duration: Annotated[
-        float | None,
-        Column("from the begin of the first dwell to the end of the last", "s"),
+        float | None, Column("from the begin of the first dwell to the end of the last", "s")
     ] = None
     latitude: Annotated[float, Column("as stated with the log", "rad")]
     block: Annotated[
-        float | None,
-        Column("length of the blocks that are averaged, at most", "s"),
+        float | None, Column("length of the blocks that are averaged, at most", "s")
     ] = None
     model: Annotated[str | None, Column("terms of the noise model")] = None
     model_from: Annotated[str | None, Column("what that is from")] = None
@@ -88,22 +83,14 @@ class EarthRateSeriesRow(OfRecordingRow):
     """A row of the table ``earth_rate_series``."""
 
     channel: TurnedGyro
-    part: Annotated[str, Column("whole, or the last minutes of the recording")]
-    method: Annotated[
-        str,
-        Column(
-            "pairs, triples, filter, smoother; known_rate is given the rate and starts with 0.1 "
-            "(deg/s)^2, known_rate_radians with 0.1 (rad/s)^2",
-        ),
-    ]
+    part: Part
+    method: Method
     quantity: Annotated[
-        str,
-        Column("rate: the estimate of the Earth's; drift: the gyro's slow error"),
+        str, Column("rate: the estimate of the Earth's; drift: the gyro's slow error")
     ]
     time: Annotated[float, Column("from the first sample of the recording", "s")]
     value: Annotated[
-        float,
-        Column("estimate from the data up to then; smoother: from all", "rad/s"),
+        float, Column("estimate from the data up to then; smoother: from all", "rad/s")
     ]
     sigma: Annotated[float | None, Column("its standard deviation", "rad/s")] = None
 
@@ -134,21 +121,18 @@ class EarthRatePredictionRow(OfRecordingRow):
 
     channel: TurnedGyro
     of: Annotated[
-        str,
-        Column("goal: what it takes; time: as a run grows; dwell: a run divided in dwells"),
+        str, Column("goal: what it takes; time: as a run grows; dwell: a run divided in dwells")
     ]
     latitude: Annotated[float, Column("where", "rad")]
     dwell: Annotated[float, Column("data in each dwell", "s")]
     turns: Annotated[int, Column("of the run")]
     time: Annotated[float, Column("length of the run", "s")]
     sigma: Annotated[
-        float | None,
-        Column("least standard deviation of the Earth's rate", "rad/s"),
+        float | None, Column("least standard deviation of the Earth's rate", "rad/s")
     ] = None
     relative: Annotated[float | None, Column("the same over the Earth's rate")] = None
     heading: Annotated[
-        float | None,
-        Column("standard deviation of north, the axis lying across it", "rad"),
+        float | None, Column("standard deviation of north, the axis lying across it", "rad")
     ] = None
     goal: Annotated[float | None, Column("relative standard deviation that is wanted")] = None
     best: Annotated[bool | None, Column("of dwell: the best of these")] = None
@@ -160,26 +144,23 @@ class EarthRatePublishedRow(OfRecordingRow):
     """A row of the table ``earth_rate_published``."""
 
     channel: TurnedGyro
-    part: Annotated[str, Column("whole, or the last minutes of the recording")]
+    part: Part
     place: Annotated[str, Column("of the source")]
     printed: Annotated[str, Column("as printed, with its unit")]
     published: Annotated[float, Column("the same", "rad/s")]
     truth: Annotated[float, Column("the Earth's rate", "rad/s")]
     duration: Annotated[float, Column("of the run, or of the part", "s")]
-    white: Annotated[
-        float | None,
-        Column("standard deviation by white noise alone", "rad/s"),
-    ] = None
+    white: Annotated[float | None, Column("standard deviation by white noise alone", "rad/s")] = (
+        None
+    )
     sigma: Annotated[
-        float | None,
-        Column("of the mean over pairs, by the noise that the source prints", "rad/s"),
+        float | None, Column("of the mean over pairs, by the noise that the source prints", "rad/s")
     ] = None
     sigma_filter: Annotated[float | None, Column("of the filter, likewise", "rad/s")] = None
     off_sigma: Annotated[float | None, Column("published less truth, in sigma")] = None
     verdict: Annotated[str, Column("within the noise or beyond the noise")]
     simulated: Annotated[
-        float | None,
-        Column("what the pairs find in the log simulated of this run", "rad/s"),
+        float | None, Column("what the pairs find in the log simulated of this run", "rad/s")
     ] = None
     simulated_filter: Annotated[float | None, Column("what the filter finds in it", "rad/s")] = None
     assumed: Annotated[str | None, Column("what the source does not print")] = None
@@ -199,13 +180,11 @@ class AlignmentRow(OfRecordingRow):
     ] = None
     pitch: Annotated[float | None, Column("likewise", "rad")] = None
     heading: Annotated[
-        float | None,
-        Column("likewise; null where reason says why it is not to be had", "rad"),
+        float | None, Column("likewise; null where reason says why it is not to be had", "rad")
     ] = None
     reason: Annotated[str | None, Column("why an angle is missing")] = None
     error_roll: Annotated[
-        float | None,
-        Column("rms of the errors of simulated triads, over roll"),
+        float | None, Column("rms of the errors of simulated triads, over roll")
     ] = None
     error_pitch: Annotated[float | None, Column("likewise, over pitch")] = None
     error_heading: Annotated[float | None, Column("likewise, over heading")] = None

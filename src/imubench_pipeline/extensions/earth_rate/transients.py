@@ -19,45 +19,34 @@ from scipy.ndimage import median_filter
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.typing import Array
 
+# Length of a block in s: four to a turn of half a second, the quickest by hand
 BLOCK_LENGTH = 0.125
-"""Length of a block in s: four to a turn of half a second, the quickest by hand."""
 
+# Lengths in blocks of the windows of the energy detector: 0.125 to 4 s
 _WINDOW_LENGTHS = (1, 2, 4, 8, 16, 32)
-"""Lengths in blocks of the windows of the energy detector: 0.125 to 4 s."""
-
+# Clipping limit of a block in standard deviations: one knocked block cannot outweigh a turn
 _MAX_BLOCK_SIGMAS = 8.0
-"""Clipping limit of a block in standard deviations: one knocked block cannot outweigh a turn."""
-
+# Longest window of the running median in s: the bias hardly drifts over it
 _MAX_LEVEL_WINDOW = 30.0
-"""Longest window of the running median in s: the bias hardly drifts over it."""
-
+# Least log-likelihood ratio of a transient; noise exceeds it once in about 1,000 s
 _MIN_LOG_LIKELIHOOD = 9.0
-"""Least log-likelihood ratio of a transient; noise exceeds it once in about 1,000 s."""
 
+# Log-likelihood ratio of a transient that is hardly noise: noise exceeds it once a day
 CLEAR_LOG_LIKELIHOOD = 14.0
-"""Log-likelihood ratio of a transient that is hardly noise: noise exceeds it once a day."""
 
-_EDGE_SIGMAS = 3.0
-"""Standard deviations above which a block belongs to the neighbouring transient."""
-
-_MAX_CALM_BLOCKS = 4
-"""Largest number of calm blocks within one transient."""
-
+_EDGE_SIGMAS = 3.0  # standard deviations above which a block belongs to the neighbouring transient
+_MAX_CALM_BLOCKS = 4  # largest number of calm blocks within one transient
+# Time in s; a transient above the noise for less is a knock: no hand turns so fast
 _MAX_KNOCK_TIME = 0.2
-"""Time in s; a transient above the noise for less is a knock: no hand turns so fast."""
-
+# Standard deviations above which a sample is an outlier: in noise, one sample in 500 million
 _OUTLIER_SIGMAS = 6.0
-"""Standard deviations above which a sample is an outlier: in noise, one sample in 500 million."""
 
 _KNOCK_ONSET_SIGMAS, _KNOCK_FULL_SIGMAS, _MAX_KNOCK_LOG_ODDS = 8.0, 30.0, 12.0
 """Standard deviations of a sample between which the log odds of a knock rise from 0 to 12, if the
 transient is short enough for one."""
 
-_MIN_STEP_SIGMAS = 8.0
-"""Standard deviations above which a step is an event without a transient."""
-
-_MAX_TRANSIENTS = 2000
-"""Largest number of transients; a gyro at rest has fewer."""
+_MIN_STEP_SIGMAS = 8.0  # standard deviations above which a step is an event without a transient
+_MAX_TRANSIENTS = 2000  # largest number of transients; a gyro at rest has fewer
 
 
 @dataclass(frozen=True)
@@ -105,12 +94,8 @@ def blocks_of(
     The level is a running median over less than a dwell, which follows a step at once. The noise is
     the median absolute deviation from it, without outliers. The log, shape (n,), is in rad/s, NaN
     where a sample is missing; the rate in Hz, the nominal dwell in s. The noise of the sensor at
-    rest, if given, is used if the noise of the log is within a factor of 1.5 of it.
-
-    Raises
-    ------
-    ValueError
-        If there are hardly any samples, or all are the same.
+    rest, if given, is used if the noise of the log is within a factor of 1.5 of it. Raises
+    ValueError if there are hardly any samples, or all are the same.
     """
     size = max(1, round(BLOCK_LENGTH * rate))
     length = size / rate
@@ -163,11 +148,17 @@ def transients(blocks: LevelBlocks, log: Array, rate: float) -> list[Event]:
     one given to `blocks_of`, in shape and units.
     """
     correlation = _estimate_correlation(blocks)
-    ratios = [
-        _compute_log_likelihoods(blocks, window, correlation)
-        for window in _WINDOW_LENGTHS
-        if window < len(blocks.z)
-    ]
+    lag = np.arange(1, len(correlation) + 1)
+    square = np.minimum(blocks.z**2, _MAX_BLOCK_SIGMAS**2)
+    present = blocks.present.astype(float)
+    ratios: list[Array] = []  # of the windows that begin at each block
+    for window in _WINDOW_LENGTHS:
+        if window < len(blocks.z):
+            count = _sum_windows(present, window)
+            r = np.maximum(_sum_windows(square, window) / np.maximum(count, 1.0), 1.0)
+            share = np.maximum(1.0 - lag / window, 0.0)
+            largest = 1.0 + 2.0 * float(np.sum(share * correlation))
+            ratios.append(0.5 * count / largest * (r - 1.0 - np.log(r)))
     stretches: list[tuple[int, int, float]] = []
     while len(stretches) < _MAX_TRANSIENTS:
         best = [int(np.argmax(ratio)) for ratio in ratios]
@@ -197,17 +188,6 @@ def _estimate_correlation(blocks: LevelBlocks) -> Array:
     return np.array(correlations)
 
 
-def _compute_log_likelihoods(blocks: LevelBlocks, window: int, correlation: Array) -> Array:
-    """Return the log-likelihood ratios of the windows that begin at each block."""
-    square = np.minimum(blocks.z**2, _MAX_BLOCK_SIGMAS**2)
-    energy = _sum_windows(square, window)
-    count = _sum_windows(blocks.present.astype(float), window)
-    r = np.maximum(energy / np.maximum(count, 1.0), 1.0)
-    lag = np.arange(1, len(correlation) + 1)
-    largest = 1.0 + 2.0 * float(np.sum(np.maximum(1.0 - lag / window, 0.0) * correlation))
-    return np.asarray(0.5 * count / largest * (r - 1.0 - np.log(r)))
-
-
 def _sum_windows(values: Array, window: int) -> Array:
     total = np.concatenate(([0.0], np.cumsum(values)))
     return np.asarray(total[window:] - total[:-window])
@@ -220,12 +200,10 @@ def _find_edges(z: Array, first: int, last: int) -> tuple[int, int]:
         np.abs(z[first:last]) > min(_EDGE_SIGMAS, 0.8 * np.abs(z[first:last]).max())
     )
     first, last = first + int(inside[0]), first + int(inside[-1]) + 1
-    while first > 0 and loud[max(0, first - _MAX_CALM_BLOCKS) : first].any():
-        first = max(0, first - _MAX_CALM_BLOCKS) + int(
-            np.argmax(loud[max(0, first - _MAX_CALM_BLOCKS) : first])
-        )
-    while last < len(z) and loud[last : last + _MAX_CALM_BLOCKS].any():
-        last += int(np.flatnonzero(loud[last : last + _MAX_CALM_BLOCKS])[-1]) + 1
+    while (near := loud[max(0, first - _MAX_CALM_BLOCKS) : first]).any():
+        first += int(np.argmax(near)) - len(near)
+    while (near := loud[last : last + _MAX_CALM_BLOCKS]).any():
+        last += int(np.flatnonzero(near)[-1]) + 1
     return first, last
 
 
@@ -305,9 +283,7 @@ def steps(
         variance = np.maximum(variance, 2.0 * model.allan_variance(width * blocks.length, rate))
     z = np.where(enough > width / 2, np.abs(difference) / np.sqrt(variance), 0.0)
     events: list[Event] = []
-    while (
-        (k := int(np.argmax(z))) >= 0 and z[k] > _MIN_STEP_SIGMAS and len(events) < _MAX_TRANSIENTS
-    ):
+    while z[k := int(np.argmax(z))] > _MIN_STEP_SIGMAS and len(events) < _MAX_TRANSIENTS:
         at = (k + width) * blocks.length
         height = float(np.abs(difference[k]))
         strength = math.log(float(z[k]) / _MIN_STEP_SIGMAS)

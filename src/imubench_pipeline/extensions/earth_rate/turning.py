@@ -15,9 +15,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from imubench_pipeline.extensions.earth_rate.alternation import alternation, contradiction
-from imubench_pipeline.extensions.earth_rate.choice_of_turns import EDGE_DWELL_FRACTION
-from imubench_pipeline.extensions.earth_rate.sight import (
+from imubench_pipeline.extensions.earth_rate.choice_of_turns import (
+    EDGE_DWELL_FRACTION,
     TurnSchedule,
     disturbances,
     find_turns,
@@ -37,12 +36,14 @@ from imubench_pipeline.extensions.earth_rate.turns import (
     FoundDwell,
     Turn,
     Turning,
+    alternation,
+    contradiction,
 )
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.typing import Array
 
+# Tolerance about a position, as a share of the distance between the two positions
 _POSITION_TOLERANCE = 0.1
-"""Tolerance about a position, as a share of the distance between the two positions."""
 
 
 @dataclass(frozen=True)
@@ -65,14 +66,10 @@ def stays(position: Array, rate: float, shortest: float) -> Stays:
 
     The positions are the medians of the column's lower and upper half, by range. A sample within a
     tenth of their distance of one is in it; other samples are turning, or overshoot. Consecutive
-    stays in the same position are merged. The column, shape (n,), has two positions as
-    numbers in any unit, such as angles, 0 and 1, or -1 and +1; NaN where it is not known. An angle
-    must not wrap at one of them. The rate is in Hz; stays below the shortest, s, are overshoots.
-
-    Raises
-    ------
-    ValueError
-        If the column has one position only, or none.
+    stays in the same position are merged. The column, shape (n,), has two positions as numbers in
+    any unit, such as angles, 0 and 1, or -1 and +1; NaN where it is not known. An angle must not
+    wrap at one of them. The rate is in Hz; stays below the shortest, s, are overshoots. Raises
+    ValueError if the column has one position only, or none.
     """
     finite = np.flatnonzero(np.isfinite(position))
     if len(finite) == 0:
@@ -146,35 +143,14 @@ def find_turning(
     chance hides the alternation are then refused, which favours large estimates.
     ``trust_schedule`` accepts the schedule instead.
 
-    Parameters
-    ----------
-    log : ndarray, shape (n,)
-        Rate of the gyro, rad/s; NaN where a sample is missing.
-    rate : float
-        Hz.
-    dwell : float
-        Nominal time from the start of a turn to the start of the next, s.
-    turning : float
-        Time that a turn takes, s; for turns that are not detected.
-    start : float
-        When the first dwell of the schedule begins, s from the first sample; only for turns that
-        are not detected.
-    first_sense : {1, -1}, optional
-        Sense of the first dwell.
-    position : ndarray, shape (n,), optional
-        Position of the sensor (`stays`), sampled as the log.
-    model : NoiseModel, optional
-        Noise of the sensor at rest, SI; by default estimated from the log.
-    margin : float
-        Margin that is left out on both sides of a detected turn, s.
-    trust_schedule : bool
-        Accept the schedule if no turns are detected at all.
-
-    Raises
-    ------
-    ValueError
-        If an argument is out of range; if the log is shorter than two dwells; if there is no
-        evidence of turns.
+    The log, shape (n,), is in rad/s, NaN where a sample is missing; the rate in Hz. ``dwell`` is
+    the nominal time from the start of a turn to the start of the next, ``margin`` is left out on
+    both sides of a detected turn. ``turning``, the time that a turn takes, and ``start``, the start
+    of the first dwell of the schedule after the first sample, are only for turns that are not
+    detected; all in s. ``position``, shape (n,), is the position of the sensor (`stays`). ``model``
+    is the noise of the sensor at rest, SI, by default estimated from the log. Raises ValueError if
+    an argument is out of range; if the log is shorter than two dwells; if there is no evidence of
+    turns.
     """
     log = np.asarray(log, dtype=np.float64)
     schedule = _check_schedule(log, rate, dwell, turning, start, first_sense, margin)
@@ -191,21 +167,26 @@ def find_turning(
     else:
         turns, knocks, more_doubts = find_turns(blocks, events, schedule, trust_schedule)
     doubts += more_doubts
-    stretches, more_doubts = _find_stretches(turns, knocks, schedule)
-    doubts += more_doubts
+    stretches = _find_stretches(turns, knocks, schedule)
+    short = sum(stop - start < 0.1 * dwell for start, stop in stretches)
+    if short:
+        doubts.append(f"{short} dwells are shorter than a tenth of {dwell:g} s")
     knocks = sorted([*knocks, *_select_outliers(outliers(blocks, log, rate), turns, knocks)])
     knocks = [(max(start, 0.0), min(stop, schedule.duration)) for start, stop in knocks]
     signs = leave_out_knocks(blocks, knocks)
     size = alternation(signs, stretches)
-    first, more_doubts = _choose_first_sense(first_sense, column_sense)
-    doubts += more_doubts
+    first = column_sense or first_sense or 1
+    if first_sense not in (None, first):
+        doubts.append(f"the first sense is {first:+d} by the column, {first_sense:+d} was given")
+    ambiguous = first_sense is None and column_sense is None
+    if ambiguous:
+        doubts.append("the sense of the first dwell is assumed: all may be the other way round")
     place = contradiction(signs, stretches)
     if place is not None:
         doubts.append(
             f"from {stretches[place][0]:.0f} s on the log alternates the other way: "
             "a turn too many or too few near there?"
         )
-    ambiguous = first_sense is None and column_sense is None
     return Turning(
         tuple(_build_dwells(stretches, turns, first, schedule)),
         tuple(turns),
@@ -304,7 +285,7 @@ def _select_outliers(
 
 def _find_stretches(
     turns: Sequence[Turn], knocks: Sequence[tuple[float, float]], schedule: TurnSchedule
-) -> tuple[list[tuple[float, float]], list[str]]:
+) -> list[tuple[float, float]]:
     """Return start and stop of the dwells between turns; handling at the ends is cut off."""
     edge = EDGE_DWELL_FRACTION * schedule.dwell
     first = max((stop for _, stop in knocks if stop < min(edge, turns[0].start)), default=0.0)
@@ -312,21 +293,7 @@ def _find_stretches(
     last = min((start for start, _ in knocks if start > late), default=schedule.duration)
     starts = [first, *(turn.stop for turn in turns)]
     stops = [*(turn.start for turn in turns), last]
-    stretches = [(start, max(start, stop)) for start, stop in zip(starts, stops, strict=True)]
-    short = sum(stop - start < 0.1 * schedule.dwell for start, stop in stretches)
-    doubts = [f"{short} dwells are shorter than a tenth of {schedule.dwell:g} s"] if short else []
-    return stretches, doubts
-
-
-def _choose_first_sense(stated: int | None, column: int | None) -> tuple[int, list[str]]:
-    """Return the sense of the first dwell, and the doubts about it."""
-    if column is not None:
-        if stated not in (None, column):
-            return column, [f"the first sense is {column:+d} by the column, {stated:+d} was given"]
-        return column, []
-    if stated is not None:
-        return stated, []
-    return 1, ["the sense of the first dwell is assumed: all may be the other way round"]
+    return [(start, max(start, stop)) for start, stop in zip(starts, stops, strict=True)]
 
 
 def _build_dwells(

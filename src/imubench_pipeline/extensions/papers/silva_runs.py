@@ -7,10 +7,9 @@ from collections.abc import Callable, Iterator
 from functools import cache
 
 from imubench_pipeline.earth import EARTH_RATE
-from imubench_pipeline.extensions.earth_rate import hypotheses as causes
-from imubench_pipeline.extensions.earth_rate.hypotheses import PrintedRun
+from imubench_pipeline.extensions.earth_rate import published as causes
 from imubench_pipeline.extensions.earth_rate.known_rate import STARTS, mean_sigma
-from imubench_pipeline.extensions.earth_rate.published import RunDesign, allowed_sigmas
+from imubench_pipeline.extensions.earth_rate.published import PrintedRun, RunDesign, allowed_sigmas
 from imubench_pipeline.extensions.earth_rate.simulation import (
     ASSUMED_LATITUDE,
     ASSUMED_TURNING,

@@ -81,8 +81,8 @@ _BLOCKS_BY_POSITIONS = {1: 16, 2: 64}
 """Blocks of a run, by the number of its positions. Twice as many lower a sigma by 5 % at most,
 after an hour in two positions."""
 
+# Largest standard deviation of a heading, rad, for a start from coarse alignment
 _MAX_LINEAR_HEADING_SIGMA = 0.2
-"""Largest standard deviation of a heading, rad, for a start from coarse alignment."""
 
 _LEVEL_ATTITUDE = np.eye(3)
 
@@ -137,7 +137,14 @@ def accuracies(
     """
     for number in (1, 2):
         for time in times:
-            positions = _build_positions(number, time, rate)
+            block = time / _BLOCKS_BY_POSITIONS[number]
+            if number == 1:
+                positions = Positions.at_rest(time, block, rate)
+            else:
+                dwell, turning = (time - TURN_TIME) / 2.0, TURN_TIME
+                positions = Positions.turned_about_z(
+                    [0.0, math.pi], dwell=dwell, turning=turning, block=block, rate=rate
+                )
             coarse = coarse_accuracy(triad, positions, site, _LEVEL_ATTITUDE)
             yield Accuracy(number, "coarse", time, coarse.sigma)
             fine = FineAlignment(triad, positions, site, _LEVEL_ATTITUDE)
@@ -147,16 +154,6 @@ def accuracies(
             yield Accuracy(
                 number, "fine", time, fine.sigma[-1], errors, 0 if errors is None else runs
             )
-
-
-def _build_positions(number: int, time: float, rate: float) -> Positions:
-    block = time / _BLOCKS_BY_POSITIONS[number]
-    if number == 1:
-        return Positions.at_rest(time, block, rate)
-    dwell = (time - TURN_TIME) / 2.0
-    return Positions.turned_about_z(
-        [0.0, math.pi], dwell=dwell, turning=TURN_TIME, block=block, rate=rate
-    )
 
 
 def _simulate_errors(

@@ -86,11 +86,7 @@ def euler_jacobian(attitude: Array) -> Array:
     """Return the Jacobian of roll, pitch and heading with respect to a small error psi.
 
     Multiplied by psi, it gives the errors of the three angles, rad. Shape (3, 3), as the attitude.
-
-    Raises
-    ------
-    ValueError
-        If the pitch is +-pi/2: roll and heading are not separable.
+    Raises ValueError if the pitch is +-pi/2: roll and heading are not separable.
     """
     _, pitch, heading = euler_angles(attitude)
     cp, sp, ch, sh = np.cos(pitch), np.sin(pitch), np.cos(heading), np.sin(heading)

@@ -17,7 +17,7 @@ import numpy as np
 
 from imubench_pipeline.extensions.calibration.alignment.attitude import euler_jacobian
 from imubench_pipeline.extensions.calibration.alignment.triad import Positions, Site, Triad
-from imubench_pipeline.extensions.calibration.covariance import block_mean_covariance
+from imubench_pipeline.extensions.calibration.experiment import block_mean_covariance
 from imubench_pipeline.typing import Array
 
 
@@ -33,12 +33,7 @@ def coarse_alignment(force: Array, rate: Array, site: Site) -> Array:
     """Return the attitude from mean specific force and mean rate, shape (..., 3, 3).
 
     The matrices turn from body to navigation frame. Force, m/s^2, and rate, rad/s, are in the body
-    frame, shape (..., 3).
-
-    Raises
-    ------
-    ValueError
-        If the two vectors are parallel.
+    frame, shape (..., 3). Raises ValueError if the two vectors are parallel.
     """
     return np.asarray(
         _build_triad(site.specific_force, site.earth_rate)
@@ -65,12 +60,8 @@ def coarse_accuracy(
 ) -> CoarseAccuracy:
     """Return the uncertainty of coarse alignment about an attitude, to first order.
 
-    The attitude, shape (3, 3), is the true one, in the first position.
-
-    Raises
-    ------
-    ValueError
-        If the x axis is vertical.
+    The attitude, shape (3, 3), is the true one, in the first position. Raises ValueError if the x
+    axis is vertical.
     """
     weighted = _compute_weights(positions)[:, None, None] * positions.of_blocks
     of_sensor = []

@@ -6,7 +6,7 @@ positions. The residual of the block means for an attitude C~ = (I - [psi x]) C 
     y - T^T C~^T v = T^T C~^T [v x] psi + mean error + white noise,
 
 v the Earth's rate or the specific force, T the turn since the first position. The errors of the six
-axes are states of their noise models (`earth_rate.states`), with the fixed biases. The filter
+axes are states of their noise models (`calibration.states`), with the fixed biases. The filter
 estimates psi and all of them; its discretisation is exact. In one position it cannot separate the
 biases of the level accelerometers from tilt, nor the bias of the east gyro from the heading. Its
 covariance shows this:
@@ -31,10 +31,7 @@ from imubench_pipeline.extensions.calibration.alignment.attitude import (
 from imubench_pipeline.extensions.calibration.alignment.coarse import coarse_alignment, mean_vectors
 from imubench_pipeline.extensions.calibration.alignment.triad import Positions, Site, Triad
 from imubench_pipeline.extensions.calibration.block_filter import BlockFilter
-from imubench_pipeline.extensions.calibration.least_squares import (
-    NotObservable,
-    NotObservableError,
-)
+from imubench_pipeline.extensions.calibration.least_squares import NotObservable, NotObservableError
 from imubench_pipeline.extensions.calibration.states import block_states
 from imubench_pipeline.typing import Array
 
@@ -44,8 +41,7 @@ INITIAL_ANGLE_SIGMA = 10.0
 UNIFORM_HEADING_SIGMA = math.pi / math.sqrt(3.0)
 """Standard deviation of a uniformly distributed heading, rad; the limit for an unknown heading."""
 
-_MAX_LAST_CORRECTION = 1e-7
-"""Largest last correction, rad, of an attitude that has converged."""
+_MAX_LAST_CORRECTION = 1e-7  # largest last correction, rad, of an attitude that has converged
 
 _MAX_ITERATIONS = 20
 
@@ -68,18 +64,8 @@ class Aligned:
 class FineAlignment:
     """The filter of one design, about an attitude; it aligns any number of runs at once.
 
-    Parameters
-    ----------
-    triad : Triad
-    positions : Positions
-    site : Site
-    attitude : ndarray, shape (3, 3)
-        From body to navigation frame in the first position, as from a coarse alignment.
-
-    Raises
-    ------
-    ValueError
-        If the x axis is vertical.
+    The attitude, shape (3, 3), is from body to navigation frame in the first position, as from a
+    coarse alignment. Raises ValueError if the x axis is vertical.
     """
 
     def __init__(self, triad: Triad, positions: Positions, site: Site, attitude: Array) -> None:
@@ -127,19 +113,11 @@ class FineAlignment:
         return (NotObservable("heading", reason),)
 
     def run(self, means: Array, attitude: Array | None = None) -> Aligned:
-        """Align runs.
+        """Align runs from block means of gyros and accelerometers x, y, z, shape (runs, b, 6).
 
-        Parameters
-        ----------
-        means : ndarray, shape (runs, b, 6)
-            Block means of gyros and accelerometers x, y, z, rad/s and m/s^2.
-        attitude : ndarray, shape (runs, 3, 3), optional
-            Attitude of each run to correct, near the attitude of the filter, which is the default.
-
-        Raises
-        ------
-        ValueError
-            If there are not six finite means per block.
+        The means are in rad/s and m/s^2. ``attitude``, shape (runs, 3, 3), is the attitude of each
+        run to correct, near the attitude of the filter, which is the default. Raises ValueError if
+        there are not six finite means per block.
         """
         if means.ndim != 3 or means.shape[1:] != (len(self.positions.blocks), 6):
             raise ValueError(
@@ -155,7 +133,7 @@ class FineAlignment:
         residual = np.empty_like(means)
         for part, true in (
             (slice(0, 3), self.site.earth_rate),
-            (slice(3, 6), self._specific_force),
+            (slice(3, 6), self.site.specific_force),
         ):
             error = np.einsum("rbij,rbj->rbi", to_navigation, means[:, :, part]) - true
             residual[:, :, part] = np.einsum("bij,rbj->rbi", self._to_body, error)
@@ -166,10 +144,6 @@ class FineAlignment:
             correct(attitudes, psi[:, -1]), psi, states[:, :, -6:], np.sum(white**2, axis=2)
         )
 
-    @property
-    def _specific_force(self) -> Array:
-        return self.site.specific_force
-
 
 def align(
     means: Array, triad: Triad, positions: Positions, site: Site
@@ -179,14 +153,9 @@ def align(
     This is the Gauss-Newton method: each iteration linearises about a better attitude, which
     removes the nonlinear effect of a large error of the coarse heading. The block means are of
     gyros and accelerometers x, y, z, rad/s and m/s^2, shape (b, 6). Returned are the alignment of
-    the run and the last filter, which has the standard deviations.
-
-    Raises
-    ------
-    NotObservableError
-        If the heading is not observable; use roll and pitch of the coarse alignment.
-    ValueError
-        If the attitude does not converge.
+    the run and the last filter, which has the standard deviations. Raises NotObservableError if the
+    heading is not observable; use roll and pitch of the coarse alignment. Raises ValueError if the
+    attitude does not converge.
     """
     attitude = coarse_alignment(*mean_vectors(means, positions), site)
     for _ in range(_MAX_ITERATIONS):

@@ -14,18 +14,15 @@ from imubench_pipeline.extensions.calibration.experiment import Blocks, Dwell, E
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.typing import Array
 
-_NEAREST_POLE = 1e-6
-"""Least cosine of the latitude; nearer to a pole there is no north."""
+_NEAREST_POLE = 1e-6  # least cosine of the latitude; nearer to a pole there is no north
 
 
 @dataclass(frozen=True, kw_only=True)
 class Site:
     """A place on the Earth, with the rate and specific force of a triad at rest.
 
-    Raises
-    ------
-    ValueError
-        If the latitude is not between the poles, where there is no north, or gravity not above 0.
+    Raises ValueError if the latitude is not between the poles, where there is no north, or gravity
+    not above 0.
     """
 
     latitude: float  # rad, north positive
@@ -52,23 +49,13 @@ class Site:
 class Triad:
     """Three gyros and three accelerometers along the axes x, y, z of the body.
 
-    Parameters
-    ----------
-    gyros, accelerometers : sequence of NoiseModel
-        Three each, SI.
-    gyro_bias, accelerometer_bias : float
-        Standard deviations of the fixed biases, of each axis by itself, rad/s and m/s^2.
-
-    Raises
-    ------
-    ValueError
-        If there are not three of each, or a deviation is negative or not finite.
+    Raises ValueError if there are not three of each, or a deviation is negative or not finite.
     """
 
-    gyros: Sequence[NoiseModel]
-    accelerometers: Sequence[NoiseModel]
-    gyro_bias: float
-    accelerometer_bias: float
+    gyros: Sequence[NoiseModel]  # three, SI
+    accelerometers: Sequence[NoiseModel]  # three, SI
+    gyro_bias: float  # standard deviation of the fixed bias of each axis, rad/s
+    accelerometer_bias: float  # likewise, m/s^2
 
     def __post_init__(self) -> None:
         for name in ("gyros", "accelerometers"):
@@ -108,10 +95,7 @@ class Triad:
 class Positions:
     """Blocks of a run at rest, in one position or in several with known turns from the first.
 
-    Raises
-    ------
-    ValueError
-        If there is no rotation matrix for every dwell.
+    Raises ValueError if there is no rotation matrix for every dwell.
     """
 
     blocks: Blocks  # neither their sense nor their latitude is used

@@ -1,4 +1,4 @@
-"""Predict what a sensor at rest finds of attitude, north and the Earth's rate."""
+"""Predict the accuracy of attitude, north and the Earth's rate by a sensor at rest."""
 
 from pathlib import Path
 
