@@ -1,112 +1,102 @@
-"""Claims of a paper: the printed value, how this project evaluates it, and the verdict."""
+"""Evaluate the lines of a paper: the result of this project, the ratio, and the verdict."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import replace
 
-from imubench_pipeline.extensions.papers.about import About, Basis, Verdict
-from imubench_pipeline.extensions.papers.evidence import Evidence
+from imubench_pipeline.extensions.papers import (
+    engers,
+    engers_figures,
+    maia,
+    maia_equations,
+    silva,
+    silva_simulated,
+)
+from imubench_pipeline.extensions.papers.evidence import Evidence, Result
+from imubench_pipeline.extensions.papers.printed import (
+    Line,
+    Paper,
+    Unit,
+    Verdict,
+    parse_number,
+)
 from imubench_pipeline.extensions.papers.tables import PublishedRow
 
-
-@dataclass(frozen=True, kw_only=True)
-class Result:
-    """Result of the evaluation of a claim: a number, or a text."""
-
-    value: float | None = None  # SI
-    lower: float | None = None  # of an interval, SI
-    upper: float | None = None
-    words: str = ""  # with the number, or instead of it
-    verdict: Verdict | None = None  # None: it follows from the numbers
-    reason: str | None = None  # replaces the reason of the claim
+_MODULES = {
+    module.__name__.rpartition(".")[2]: module
+    for module in (engers, engers_figures, maia, maia_equations, silva, silva_simulated)
+}
 
 
-def numeric_result(value: float, words: str = "") -> Callable[[Evidence], Result]:
-    """Return an evaluation that gives a number without data of a run."""
-    return lambda _: Result(value=value, words=words)
+def evaluate(line: Line, evidence: Evidence) -> Result:
+    """Return the counterpart of a line.
+
+    It is a number (SI), or a function of the evidence and texts that returns a number, a `Result`,
+    or None if the run has no log for it.
+    """
+    if not line.find:
+        return Result()
+    name, *arguments = (part.format(**line.fields) for part in line.find)
+    module, _, attribute = name.partition(".")
+    found = getattr(_MODULES[module], attribute)
+    if callable(found):
+        found = found(evidence, *arguments)
+    if found is None:
+        return Result(words="", verdict="not to be had", reason=line.missing)
+    return found if isinstance(found, Result) else Result(value=found)
 
 
-def verbal_result(words: str, verdict: Verdict = "agrees") -> Callable[[Evidence], Result]:
-    """Return an evaluation that gives a text without data of a run."""
-    return lambda _: Result(words=words, verdict=verdict)
-
-
-def no_result(reason: str) -> Result:
-    """Return the result of a claim that cannot be evaluated."""
-    return Result(verdict="not to be had", reason=reason)
-
-
-DERIVED = "derived:"
-"""Prefix of a value that is not printed, but follows from printed values alone."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Claim:
-    """One line of a paper."""
-
-    place: str  # "Table 3", "Figure 5", "Equation 26" or "Section 6", as numbered there
-    quantity: str  # in words
-    printed: str  # as printed, with its unit; or `DERIVED` and the derived value
-    value: float | None = None  # ``printed`` in SI; None: it is no number
-    unit: str = "-"  # SI
-    evaluate: Callable[[Evidence], Result]
-    basis: Basis
-    reason: str = ""  # why the two differ; shown only then
-    page: str = ""  # page of the report with the counterpart, and its anchor if any
-    check: str  # test or benchmark of the claim: "tests/...::name" or a file
-    tolerance: float = 0.05  # relative difference that still agrees
-    printed_unit: str = ""  # unit in which the result is shown; empty: the SI unit
-    scale: float = 1.0  # SI per printed unit
-
-
-@dataclass(frozen=True, kw_only=True)
-class Paper:
-    """A paper with its claims, in the order of the paper."""
-
-    about: About
-    claims: Callable[[Evidence], Iterable[Claim]]
-
-
-def verdict_of(claim: Claim, result: Result) -> Verdict:
-    """Return the verdict on a claim from its printed value and the result."""
-    if result.verdict is not None:
-        return result.verdict
-    if result.value is None or claim.value is None:
+def judge(printed: float | None, result: Result, tolerance: float) -> Verdict:
+    """Return the verdict on a printed number from the numbers of the result."""
+    if result.value is None or printed is None:
         return "not to be had"
     inside = (
         result.lower is not None
         and result.upper is not None
-        and result.lower <= claim.value <= result.upper
+        and result.lower <= printed <= result.upper
     )
-    near = abs(result.value - claim.value) <= claim.tolerance * abs(claim.value)
+    near = abs(result.value - printed) <= tolerance * abs(printed)
     return "agrees" if inside or near else "differs"
 
 
 def rows_of(paper: Paper, evidence: Evidence) -> Iterator[PublishedRow]:
     """Yield the rows of the table ``published`` of a paper."""
-    for claim in paper.claims(evidence):
-        result = claim.evaluate(evidence)
-        verdict = verdict_of(claim, result)
-        ratio = result.value / claim.value if result.value is not None and claim.value else None
+    for line in paper.lines:
+        result = evaluate(line, evidence)
+        fields = {**line.fields, **result.fields}
+        printed_unit = line.unit.format(**fields)
+        unit = paper.units.get(printed_unit, Unit(printed_unit))
+        if line.found:
+            value = parse_number(line.found.format(**fields)) * unit.scale
+            result = replace(result, value=value)
+        printed = result.printed
+        if line.value:
+            printed = parse_number(line.value.format(**fields)) * unit.scale
+        ratio = result.value / printed if result.value is not None and printed else None
+        verdict = result.verdict or line.verdict or judge(printed, result, line.tolerance)
+        words = line.words.format(**fields) if result.words is None else result.words
+        reason = None
+        if verdict != "agrees":
+            reason = result.reason or line.why.format(**fields) or None
         yield PublishedRow(
-            paper=paper.about.name,
-            place=claim.place,
-            quantity=claim.quantity,
-            printed_as=claim.printed,
-            printed=claim.value,
+            paper=paper.name,
+            place=line.place.format(**fields),
+            quantity=line.quantity.format(**fields),
+            printed_as=line.printed.format(**fields),
+            printed=printed,
             found=result.value,
             lower=result.lower,
             upper=result.upper,
-            found_words=result.words or None,
+            found_words=words or None,
             ratio=ratio,
-            tolerance=claim.tolerance if ratio is not None else None,
-            unit=claim.unit,
-            printed_unit=claim.printed_unit or claim.unit,
-            scale=claim.scale,
-            basis=claim.basis,
+            tolerance=line.tolerance if ratio is not None else None,
+            unit=unit.si,
+            printed_unit=printed_unit,
+            scale=unit.scale,
+            basis=line.basis,
             verdict=verdict,
-            reason=(result.reason or claim.reason or None) if verdict != "agrees" else None,
-            page=claim.page or None,
-            check=claim.check,
+            reason=reason,
+            page=line.page.format(**fields) or None,
+            check=line.check,
         )

@@ -6,13 +6,13 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from typing import Any
 
-from imubench_pipeline.extensions.papers.about import (
-    BASES,
-    PAPERS,
-    VERDICTS,
-    About,
+from imubench_pipeline.extensions.papers.printed import (
+    KEYS,
     Drawn,
+    Paper,
     Verdict,
+    read_paper,
+    read_terms,
 )
 from imubench_pipeline.extensions.papers.tables import AccuracyRow, PublishedRow
 from imubench_pipeline.report.payload import Arrays, channel_payload, looks
@@ -20,6 +20,10 @@ from imubench_pipeline.report.search import Found
 from imubench_pipeline.report.site import Entry, Section, Site
 from imubench_pipeline.report.view import ChannelView, RecordingView
 from imubench_pipeline.words.numbers import limit_digits, number_text, percent_text
+
+
+def _read_papers() -> list[Paper]:
+    return [read_paper(key) for key in KEYS]
 
 
 def _make_context(site: Site) -> dict[str, Any]:
@@ -30,13 +34,13 @@ def _make_context(site: Site) -> dict[str, Any]:
     payloads = [channel_payload(channel, channel.rate, arrays) for _, _, channel in drawn]
     used = {channel["sensor"]: site.looks[channel["sensor"]] for channel in payloads}
     return {
-        "bases": BASES,
-        "verdicts": VERDICTS,
+        "bases": read_terms().bases,
+        "verdicts": read_terms().verdicts,
         "panel": _describe_accuracy(site.rows(AccuracyRow)),
         "papers": [
             _describe_paper(paper, own, there)
             | {"figures": [figure for figure in drawn if figure[0] in paper.drawn]}
-            for paper in PAPERS
+            for paper in _read_papers()
             if (own := [row for row in rows if row.paper == paper.name])
         ],
         "page": {"looks": looks(used), "channels": payloads, "arrays": arrays.texts},
@@ -45,7 +49,9 @@ def _make_context(site: Site) -> dict[str, Any]:
 
 def _select_recordings(site: Site) -> list[RecordingView]:
     """Return the recordings whose curves are drawn."""
-    names = dict.fromkeys((one.sensor, one.recording) for paper in PAPERS for one in paper.drawn)
+    names = dict.fromkeys(
+        (one.sensor, one.recording) for paper in _read_papers() for one in paper.drawn
+    )
     views = {view.full_name: view for view in site.views if view.simulated and not view.left_out}
     return [views[name] for name in names if name in views]
 
@@ -71,7 +77,7 @@ def _select_curves(site: Site) -> list[tuple[Drawn, RecordingView, ChannelView]]
     }
     return [
         (one, *channels[key])
-        for paper in PAPERS
+        for paper in _read_papers()
         for one in paper.drawn
         if (key := (one.sensor, one.recording, one.channel)) in channels
     ]
@@ -122,7 +128,7 @@ _VERDICT_COUNTS: dict[Verdict, tuple[str, str]] = {
 }
 
 
-def _describe_paper(paper: About, rows: Sequence[PublishedRow], there: set[str]) -> dict[str, Any]:
+def _describe_paper(paper: Paper, rows: Sequence[PublishedRow], there: set[str]) -> dict[str, Any]:
     verdicts = Counter(row.verdict for row in rows)
     return {
         "about": paper,
@@ -173,7 +179,7 @@ def cells(row: PublishedRow) -> dict[str, str]:
 
 def find_lines(site: Site) -> Iterator[Found]:
     """Yield every line of the papers, for the search."""
-    sections = {paper.name: paper.key for paper in PAPERS}
+    sections = {paper.name: paper.key for paper in _read_papers()}
     for row in site.rows(PublishedRow):
         title = f"{row.place}: {row.quantity}"
         words = f"{row.paper} {row.printed_as} {row.verdict}"

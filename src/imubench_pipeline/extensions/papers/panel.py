@@ -20,7 +20,7 @@ from imubench_pipeline.estimators.identifiability import bounds_of
 from imubench_pipeline.estimators.model_choice import PAPERS_MODEL
 from imubench_pipeline.estimators.spectrum import spectra
 from imubench_pipeline.estimators.whittle import Whittle, whittle_of
-from imubench_pipeline.extensions.papers.maia_printed import DURATION, MTI_GYRO
+from imubench_pipeline.extensions.papers.maia_draws import DURATION, MTI_GYRO
 from imubench_pipeline.extensions.papers.tables import AccuracyRow
 from imubench_pipeline.noise.simulate import channel_rng, simulate
 

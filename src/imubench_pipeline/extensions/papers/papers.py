@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
-from imubench_pipeline.extensions.papers import engers, maia, silva
-from imubench_pipeline.extensions.papers.about import MAIA
-from imubench_pipeline.extensions.papers.claims import Paper, rows_of
+from imubench_pipeline.extensions.papers.claims import rows_of
 from imubench_pipeline.extensions.papers.evidence import Evidence
 from imubench_pipeline.extensions.papers.panel import panel_rows
+from imubench_pipeline.extensions.papers.printed import KEYS, read_paper
 from imubench_pipeline.extensions.papers.tables import PublishedRow
 from imubench_pipeline.tables import build, read, write_arrow
 
-PAPERS: Sequence[Paper] = (maia.PAPER, silva.PAPER, engers.PAPER)
+PAPERS = tuple(read_paper(key) for key in KEYS)
+"""In the order in which they are shown."""
 
 
 def write_published(tables: Iterable[Path], outputs: Iterable[Path]) -> None:
@@ -26,7 +26,7 @@ def write_published(tables: Iterable[Path], outputs: Iterable[Path]) -> None:
     for path in tables:
         parts.setdefault(path.stem, []).append(path)
     evidence = Evidence({name: read(name, paths) for name, paths in parts.items()})
-    of_maia = any(evidence.has(*log) for log in MAIA.logs)
+    of_maia = any(evidence.has(*log) for log in read_paper("maia").logs)
     made = {
         "published": build("published", published_rows(evidence)),
         "accuracy": build("accuracy", panel_rows() if of_maia else ()),
@@ -38,7 +38,7 @@ def write_published(tables: Iterable[Path], outputs: Iterable[Path]) -> None:
 def published_rows(evidence: Evidence) -> Iterator[PublishedRow]:
     """Yield the rows of the table ``published`` for the papers with logs in the run."""
     for paper in PAPERS:
-        if any(evidence.has(*log) for log in paper.about.logs):
+        if any(evidence.has(*log) for log in paper.logs):
             yield from rows_of(paper, evidence)
 
 
