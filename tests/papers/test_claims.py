@@ -4,10 +4,9 @@ from pathlib import Path
 
 import pytest
 
-from imubench_pipeline.extensions.papers.claims import judge
 from imubench_pipeline.extensions.papers.evidence import Evidence, Result
-from imubench_pipeline.extensions.papers.papers import PAPERS, published_rows
-from imubench_pipeline.extensions.papers.printed import parse_number
+from imubench_pipeline.extensions.papers.papers import judge, published_rows
+from imubench_pipeline.extensions.papers.printed import parse_number, read_papers
 from imubench_pipeline.tables import build
 from tests.conftest import PROJECT
 
@@ -45,7 +44,7 @@ def test_a_run_without_logs_of_a_paper_says_nothing_of_it() -> None:
     assert list(published_rows(Evidence(tables))) == []
 
 
-@pytest.mark.parametrize("paper", PAPERS, ids=lambda paper: paper.key)
+@pytest.mark.parametrize("paper", read_papers(), ids=lambda paper: paper.key)
 def test_each_line_names_a_test_or_benchmark_that_there_is(paper) -> None:
     for line in paper.lines:
         path, _, name = line.check.partition("::")

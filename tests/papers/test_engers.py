@@ -7,9 +7,9 @@ import pytest
 from scipy import signal
 
 from imubench_pipeline.allan import allan_variance
-from imubench_pipeline.extensions.papers.claims import rows_of
 from imubench_pipeline.extensions.papers.engers import AXES, DEGREE, cutoff_of_bandwidth
 from imubench_pipeline.extensions.papers.evidence import Evidence
+from imubench_pipeline.extensions.papers.papers import rows_of
 from imubench_pipeline.extensions.papers.printed import read_paper
 from imubench_pipeline.extensions.papers.tables import PublishedRow
 from imubench_pipeline.settings.sensor import read_sensors

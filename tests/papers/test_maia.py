@@ -11,9 +11,14 @@ from numpy.typing import NDArray
 from scipy.linalg import expm
 
 from imubench_pipeline.extensions.papers import maia, maia_draws
-from imubench_pipeline.extensions.papers.claims import rows_of
 from imubench_pipeline.extensions.papers.evidence import Evidence
-from imubench_pipeline.extensions.papers.maia import read_manufacturer
+from imubench_pipeline.extensions.papers.maia import (
+    WEIGHED_AT,
+    compute_weight_ratios,
+    evaluate_as_printed,
+    integrate_density,
+    read_manufacturer,
+)
 from imubench_pipeline.extensions.papers.maia_draws import (
     CHANNELS,
     GRIDS,
@@ -22,12 +27,7 @@ from imubench_pipeline.extensions.papers.maia_draws import (
     lowest_point,
     readings,
 )
-from imubench_pipeline.extensions.papers.maia_equations import (
-    WEIGHED_AT,
-    compute_weight_ratios,
-    evaluate_as_printed,
-    integrate_density,
-)
+from imubench_pipeline.extensions.papers.papers import rows_of
 from imubench_pipeline.extensions.papers.printed import read_paper
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.simulate import simulate
@@ -192,7 +192,7 @@ def test_table_3_lies_in_the_spread_of_single_draws(lines: dict[str, Any], membe
             spread = lottery(channel, grid)
             assert 0.15 < spread.beats < 0.6  # never the 0 that one draw each seems to show
             assert spread.slow > 0.95
-            for low, _, high in (spread.state_space, spread.optimised):
+            for low, _, high in spread.ranges:
                 assert high / low > (3.0 if members >= 200 else 2.5)
 
 
@@ -226,7 +226,7 @@ def test_single_draws_spread_as_full_length_logs_do(single: Any) -> None:
         by_every = np.sqrt(square[..., np.isin(taus, (np.arange(30) + 0.5) * 600)].mean(-1))
         for values, grid in ((by_steps, "steps"), (by_every, "every")):
             spread = lottery(MTI_GYRO, grid)  # type: ignore[arg-type]  # the two that there are
-            expected = (spread.state_space, spread.optimised)[place]
+            expected = spread.ranges[place]
             assert np.median(values) == pytest.approx(expected[1], rel=0.35)
             beyond = float(np.mean(values >= MTI_GYRO.table_3[place]))
             assert beyond == pytest.approx(spread.beyond[place], abs=0.12)

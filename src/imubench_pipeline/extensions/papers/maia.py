@@ -1,4 +1,4 @@
-"""Counterparts of the tables and figures of Maia et al. (MTi-7, C102-F9R)."""
+"""Counterparts of the lines of Maia et al.; equations are evaluated for the MTi-7 gyro, Table 2."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from imubench_pipeline.extensions.papers.maia_draws import (
     CHANNELS,
     DURATION,
     GRIDS,
+    MTI_GYRO,
     Grid,
     lottery,
     lowest_point,
@@ -22,7 +23,16 @@ from imubench_pipeline.extensions.papers.maia_draws import (
 from imubench_pipeline.extensions.papers.printed import parse_number, read_paper
 from imubench_pipeline.model.estimates import ParameterRow, ScoreRow
 from imubench_pipeline.navigation.error_budget import Quantity, Start, budget
-from imubench_pipeline.noise import FLOOR, PEAK_TAU, NoiseModel
+from imubench_pipeline.noise import (
+    FLOOR,
+    PEAK_TAU,
+    GaussMarkov,
+    NoiseModel,
+    RandomWalk,
+    WhiteNoise,
+    driving_density,
+)
+from imubench_pipeline.noise.variance_covariance import variance_covariance
 from imubench_pipeline.settings.sensor import quantity_of
 from imubench_pipeline.units import to_si
 
@@ -32,6 +42,15 @@ _TABLE_4 = {
     symbol: {row["key"]: row for row in _FIGURES[table]}
     for symbol, table in (("N", "density"), ("B", "stability"))
 }
+
+_MODEL = MTI_GYRO.table_2
+_RATE = MTI_GYRO.rate
+assert _MODEL.T_B is not None
+_PROCESS = GaussMarkov(_MODEL.B, _MODEL.T_B)
+_DEFAULT_TAU = 100.0  # s
+
+WEIGHED_AT = (10.0, 100.0, 1000.0)
+"""Cluster times, s, for the comparison of the weight of equation 25 with the spread."""
 
 
 def read_manufacturer(symbol: str, key: str) -> float:
@@ -46,10 +65,6 @@ def _format_power(value: float, digits: int) -> str:
         return text
     mantissa, power = f"{value:.{digits - 1}e}".split("e")
     return f"{mantissa}·10{str(int(power)).translate(_SUPERSCRIPTS)}"
-
-
-def _get_model(key: str, table: str) -> NoiseModel:
-    return CHANNELS[key].table_1 if table == "table_1" else CHANNELS[key].table_2
 
 
 def _describe(row: ParameterRow | None, what: str) -> str:
@@ -87,30 +102,25 @@ def read_curve(run: Evidence, key: str, symbol: str) -> Result:
     return Result(value=read, lower=lower, upper=upper, fields={"simulated": simulated})
 
 
-def lowest_tau(_: Evidence, key: str) -> Result:
-    """Return tau of the lowest point of the curve of Table 1, with 1.89 T_B, s."""
-    model = CHANNELS[key].table_1
-    peak = 1.89 * (model.T_B or 0.0)
-    return Result(value=lowest_point(model)[0], printed=peak, fields={"peak": peak})
+def lowest_of_table_1(_: Evidence, key: str, quantity: str) -> Result:
+    """Return tau (s) or deviation of the lowest point of Table 1, with 1.89 T_B or 0.664 B.
 
-
-def lowest_deviation(_: Evidence, key: str) -> Result:
-    """Return the deviation at that point, with 0.664 B and the part of the process, %."""
+    The share is the part of the process in that deviation, over 0.664 B, %.
+    """
     model = CHANNELS[key].table_1
-    tau, level = lowest_point(model)
     assert model.T_B is not None
+    tau, level = lowest_point(model)
+    peak, floor = 1.89 * model.T_B, FLOOR * model.B
     process = math.sqrt(float(NoiseModel(B=model.B, T_B=model.T_B).allan_variance(tau)))
-    floor = FLOOR * model.B
-    return Result(
-        value=level,
-        printed=floor,
-        fields={
-            "floor": _format_power(floor, 2).replace(".", ","),
-            "tau": tau,
-            "side": "before" if tau < PEAK_TAU * model.T_B else "past",
-            "share": 100.0 * process / floor,
-        },
-    )
+    fields = {
+        "tau": tau,
+        "peak": peak,
+        "floor": _format_power(floor, 2).replace(".", ","),
+        "side": "before" if tau < PEAK_TAU * model.T_B else "past",
+        "share": 100.0 * process / floor,
+    }
+    value, printed = (tau, peak) if quantity == "tau" else (level, floor)
+    return Result(value=value, printed=printed, fields=fields)
 
 
 def error_in_use(_: Evidence, key: str, quantity: Quantity) -> Result:
@@ -140,7 +150,7 @@ def rms_of_draws(_: Evidence, key: str, table: str, grid: Grid) -> Result:
     """Return the median and 90 % range of the RMS of single reconstructions."""
     spread = lottery(CHANNELS[key], grid)
     place = ("table_1", "table_2").index(table)
-    lower, median, upper = (spread.state_space, spread.optimised)[place]
+    lower, median, upper = spread.ranges[place]
     return Result(
         value=median,
         lower=lower,
@@ -162,9 +172,7 @@ def _count_in_range() -> dict[str, int]:
     inside: dict[str, int] = dict.fromkeys(GRIDS, 0)
     for grid, channel in product(GRIDS, CHANNELS.values()):
         spread = lottery(channel, grid)
-        for (lower, _, upper), printed in zip(
-            (spread.state_space, spread.optimised), channel.table_3, strict=True
-        ):
+        for (lower, _, upper), printed in zip(spread.ranges, channel.table_3, strict=True):
             inside[grid] += lower <= printed <= upper
     return inside
 
@@ -187,29 +195,20 @@ def weighted_rms(run: Evidence, key: str, method: str) -> Result | None:
     row = rows[0]
     return Result(
         value=row.rms,
-        fields={
-            "decades": row.rms_log10,
-            "drawn": row.drawn_log10,
-            "low": row.drawn_log10_lower,
-            "high": row.drawn_log10_upper,
-            "surest": SUREST,
-        },
+        fields={**row.columns(), "surest": SUREST},
     )
 
 
-def convert_vendor_figure(_: Evidence, value: str, unit: str, dimension: str) -> float:
-    """Return a figure of the vendor in SI."""
-    return to_si(float(value), unit, dimension)
-
-
-def over_vendor(_: Evidence, symbol: str, key: str, table: str) -> Result:
-    """Return N, or the lowest point of the curve (B), of a table over the vendor's figure.
-
-    The printed number is the parameter over the figure of Table 4.
-    """
-    model = _get_model(key, table)
+def vendor_figure(_: Evidence, symbol: str, key: str) -> float:
+    """Return the figure of the vendor behind one of Table 4, SI."""
     row = _TABLE_4[symbol][key]
-    vendor = convert_vendor_figure(_, row["vendor"], row["in"], row["dimension"])
+    return to_si(float(row["vendor"]), row["in"], row["dimension"])
+
+
+def over_vendor(run: Evidence, symbol: str, key: str, table: str) -> Result:
+    """Return N, or the lowest point (B), over the vendor's figure; N or B over Table 4."""
+    channel, vendor = CHANNELS[key], vendor_figure(run, symbol, key)
+    model = channel.table_1 if table == "table_1" else channel.table_2
     if symbol == "N":
         value = model.N / (vendor / math.sqrt(2.0))
     else:
@@ -273,4 +272,90 @@ def datasheet_floor(_: Evidence, key: str) -> Result:
     shown = _format_power(floor, 2).replace(".", ",")
     return Result(
         value=lowest_point(CHANNELS[key].table_2)[1], printed=floor, fields={"floor": shown}
+    )
+
+
+def integrate_density(model: NoiseModel, tau: float) -> float:
+    """Return the Allan variance at a tau, s, by integration of the density, as a reference.
+
+    4 ∫ S(f) sin⁴(π f τ) / (π f τ)² df from 0, with x = π f τ.
+    """
+    # The random walk is steep at 0. White noise converges slowly: its tail has the mean 3/8 of
+    # sin⁴.
+    ends = np.concatenate(([1e-9, 1e-3, 1e-2, 0.1], np.pi * np.arange(0.5, 400.5, 0.5)))
+    nodes, weights = np.polynomial.legendre.leggauss(12)
+    half = np.diff(ends)[:, None] / 2.0
+    x = ends[:-1, None] + half * (1.0 + nodes)
+    last = float(ends[-1])
+    density = model.psd(x / (math.pi * tau))
+    total = float((half * (density * np.sin(x) ** 4 / x**2) @ weights[:, None]).sum())
+    rest = float(model.psd(last / (math.pi * tau))) * 0.375 / last
+    return 4.0 / (math.pi * tau) * (total + rest)
+
+
+def evaluate_as_printed(model: NoiseModel, tau: float) -> float:
+    """Return equation 26 as it is printed, with e^(+τ/T_B)."""
+    assert model.T_B is not None
+    T_B, x = model.T_B, tau / model.T_B
+    bracket = 1.0 - (3.0 - 4.0 * math.exp(x) + math.exp(-2.0 * x)) / (2.0 * x)
+    driven = driving_density(model.B, T_B) * T_B**2 / tau * bracket
+    return model.N**2 / tau + driven + model.K**2 * tau / 3.0
+
+
+def compute_weight_ratios(tau: float) -> tuple[float, float]:
+    """Return the standard deviation of an Allan variance over the one that a weight assumes.
+
+    First for the intended weight, 2 √(n/2L) σ̂²; then for the printed one, 2 √(n/2L) σ̂. Its
+    dimension is wrong, so that the ratio depends on the unit. For the MTi-7 gyro at a tau, s.
+    """
+    samples, n = round(DURATION * _RATE), round(tau * _RATE)
+    variance = float(_MODEL.allan_variance(tau, _RATE))
+    spread = math.sqrt(variance_covariance(_MODEL, _RATE, samples, np.array([n]))[0, 0])
+    meant = 2.0 * math.sqrt(n / (2.0 * samples)) * variance
+    return spread / meant, spread / (meant / math.sqrt(variance))
+
+
+def equation(_: Evidence, number: str) -> Result:
+    """Return the result of an equation, with the printed one where it follows from Table 2."""
+    return _evaluate_equations()[number]
+
+
+@cache
+def _evaluate_equations() -> dict[str, Result]:
+    N, B, K, T_B, T = _MODEL.N, _MODEL.B, _MODEL.K, _PROCESS.T_B, 1.0 / _RATE
+    f, omega = np.array(1e-3), 2.0 * math.pi * 1e-3
+    space, driven = _MODEL.state_space(_RATE), driving_density(B, T_B)
+    parts = [NoiseModel(N=N), NoiseModel(B=B, T_B=T_B), NoiseModel(K=K)]
+    of_parts = sum(part.allan_variance(_DEFAULT_TAU) for part in parts)
+    decay = _PROCESS.state_space(T_B).transition[0, 0]
+    S_B = 2.0 * B**2 * math.log(2.0) / (math.pi * 0.4365**2 * T_B)
+    return {
+        "2": Result(value=float(_MODEL.allan_variance(_DEFAULT_TAU) / of_parts)),
+        "4": Result(value=float(decay), printed=math.exp(-1.0)),
+        "5": Result(value=float(RandomWalk(1.0).state_space(1.0).process_noise[0, 0])),
+        "7": Result(value=float(WhiteNoise(2.0).psd(f) / 4.0)),
+        "8": Result(value=driven, printed=S_B),
+        "9": Result(value=float(RandomWalk(1.0).psd(f) * omega**2)),
+        # Differences of adjacent clusters of two, begun at every one of ten samples.
+        "10": Result(value=float(sum(start + 2 * 2 <= 10 for start in range(10)))),
+        "11": Result(value=math.sqrt(float(NoiseModel(N=1.0).allan_variance(1.0)))),
+        "12": Result(value=math.sqrt(float(NoiseModel(K=1.0).allan_variance(3.0)))),
+        "20": Result(value=float(space.transition[0, 0]), printed=math.exp(-T / T_B)),
+        "21": Result(fields={"matrix": space.output.astype(int).tolist()}),
+        "22": Result(value=float(space.process_noise[0, 0]) / (driven / _RATE)),
+        "23": Result(value=float(space.measurement_noise), printed=N**2 / T),
+    }
+
+
+def spread_over_weight(_: Evidence) -> Result:
+    """Return the spread of the Allan variance over the one that the intended weight assumes."""
+    return Result(fields={f"at_{tau:.0f}": compute_weight_ratios(tau)[0] for tau in WEIGHED_AT})
+
+
+def sign_of_exponent(_: Evidence) -> Result:
+    """Return the error of equation 26 as meant, and the ratio as printed, against the density."""
+    truth = integrate_density(_MODEL, _DEFAULT_TAU)
+    ours = abs(float(_MODEL.allan_variance(_DEFAULT_TAU)) / truth - 1.0)
+    return Result(
+        fields={"ours": ours, "printed_ratio": evaluate_as_printed(_MODEL, _DEFAULT_TAU) / truth}
     )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import cache, lru_cache
+from functools import cache
 from typing import Literal
 
 import numpy as np
@@ -85,26 +85,26 @@ Range = tuple[float, float, float]
 class Lottery:
     """Scores of single reconstructions against single logs of Table 2, for one grid of tau."""
 
-    state_space: Range  # reconstructed by Table 1
-    optimised: Range  # by Table 2 itself
+    ranges: tuple[Range, Range]  # reconstructed by Table 1, and by Table 2 itself
     beats: float  # chance that a reconstruction by Table 1 has the lower RMS of two
     beyond: tuple[float, float]  # shares of them at least as large as the printed figures
     slow: float  # share of the mean square that comes of tau beyond 300 s, by Table 2
 
 
-def sizes(channel: Channel, grid: Grid) -> NDArray[np.int64]:
-    """Return the cluster sizes of a grid up to half of the log, shape (m,)."""
+def sizes(channel: Channel, grid: str) -> NDArray[np.int64]:
+    """Return the cluster sizes of a grid of `GRIDS`, or ("read") of reading a curve, shape (m,)."""
     longest = round(DURATION * channel.rate) // 2
+    if grid == "steps":
+        steps = np.outer(10 ** np.arange(len(str(longest))), np.arange(1, 10)).ravel()
+        return steps[steps <= longest]
     if grid == "every":
-        return np.rint((np.arange(_CLUSTER_SIZES) + 0.5) * longest / _CLUSTER_SIZES).astype(
-            np.int64
-        )
-    decades = 10 ** np.arange(len(str(longest)))
-    steps = np.outer(decades, np.arange(1, 10)).ravel()
-    return steps[steps <= longest]
+        chosen = (np.arange(_CLUSTER_SIZES) + 0.5) * longest / _CLUSTER_SIZES
+    else:
+        chosen = np.geomspace(1.0, DURATION / 9.0, _CLUSTER_SIZES) * channel.rate
+    return np.rint(chosen).astype(np.int64)
 
 
-@lru_cache(maxsize=len(CHANNELS) * len(GRIDS))
+@cache
 def lottery(channel: Channel, grid: Grid) -> Lottery:
     """Return the spread of Table 3 for logs with the model of Table 2.
 
@@ -123,21 +123,20 @@ def lottery(channel: Channel, grid: Grid) -> Lottery:
         for values, printed in zip(of_each, channel.table_3, strict=True)
     ]
     return Lottery(
-        _compute_range(of_each[0]),
-        _compute_range(of_each[1]),
+        (_compute_range(of_each[0]), _compute_range(of_each[1])),
         float(np.mean(chances)),
         (beyond[0], beyond[1]),
         float(square[:, n > 300.0 * channel.rate].sum() / square.sum()),
     )
 
 
-@lru_cache(maxsize=len(CHANNELS))
+@cache
 def readings(channel: Channel) -> dict[str, Range]:
     """Return what reading the curves of single logs of Table 2 gives of N, B, K and T_B.
 
     N is read at 1 s, K at a ninth of the log, B and T_B at the lowest point between them.
     """
-    tau = _select_reading_sizes(channel) / channel.rate
+    tau = sizes(channel, "read") / channel.rate
     curves = _simulate_deviations(channel)[0]["read"]
     return {
         "N": _compute_range(curves[:, 0] * math.sqrt(tau[0])),
@@ -147,18 +146,10 @@ def readings(channel: Channel) -> dict[str, Range]:
     }
 
 
-def _select_reading_sizes(channel: Channel) -> NDArray[np.int64]:
-    """Return the cluster sizes at which a curve is read, shape (m,)."""
-    return np.rint(np.geomspace(1.0, DURATION / 9.0, _CLUSTER_SIZES) * channel.rate).astype(
-        np.int64
-    )
-
-
-@lru_cache(maxsize=len(CHANNELS))
+@cache
 def _simulate_deviations(channel: Channel) -> tuple[dict[str, Array], ...]:
     """Return Allan deviations: of logs of Table 2, of draws by Table 1, of others by Table 2."""
-    grids: dict[str, NDArray[np.int64]] = {grid: sizes(channel, grid) for grid in GRIDS}
-    grids["read"] = _select_reading_sizes(channel)
+    grids = {grid: sizes(channel, grid) for grid in (*GRIDS, "read")}
     together = np.unique(np.concatenate(list(grids.values())))
     samples = round(DURATION * channel.rate)
 

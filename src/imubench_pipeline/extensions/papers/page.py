@@ -6,14 +6,7 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from typing import Any
 
-from imubench_pipeline.extensions.papers.printed import (
-    KEYS,
-    Drawn,
-    Paper,
-    Verdict,
-    read_paper,
-    read_terms,
-)
+from imubench_pipeline.extensions.papers.printed import Drawn, Paper, read_papers, read_terms
 from imubench_pipeline.extensions.papers.tables import AccuracyRow, PublishedRow
 from imubench_pipeline.report.payload import Arrays, channel_payload, looks
 from imubench_pipeline.report.search import Found
@@ -22,12 +15,9 @@ from imubench_pipeline.report.view import ChannelView, RecordingView
 from imubench_pipeline.words.numbers import limit_digits, number_text, percent_text
 
 
-def _read_papers() -> list[Paper]:
-    return [read_paper(key) for key in KEYS]
-
-
 def _make_context(site: Site) -> dict[str, Any]:
-    there = _list_pages(site)
+    of_recordings = {view.page for view in site.views if not view.left_out}
+    there = of_recordings | {file for file, _ in site.navigation}  # pages to link to
     rows = site.rows(PublishedRow)
     arrays = Arrays()
     drawn = _select_curves(site)
@@ -35,12 +25,12 @@ def _make_context(site: Site) -> dict[str, Any]:
     used = {channel["sensor"]: site.looks[channel["sensor"]] for channel in payloads}
     return {
         "bases": read_terms().bases,
-        "verdicts": read_terms().verdicts,
+        "verdicts": {name: one.meaning for name, one in read_terms().verdicts.items()},
         "panel": _describe_accuracy(site.rows(AccuracyRow)),
         "papers": [
             _describe_paper(paper, own, there)
             | {"figures": [figure for figure in drawn if figure[0] in paper.drawn]}
-            for paper in _read_papers()
+            for paper in read_papers()
             if (own := [row for row in rows if row.paper == paper.name])
         ],
         "page": {"looks": looks(used), "channels": payloads, "arrays": arrays.texts},
@@ -50,7 +40,7 @@ def _make_context(site: Site) -> dict[str, Any]:
 def _select_recordings(site: Site) -> list[RecordingView]:
     """Return the recordings whose curves are drawn."""
     names = dict.fromkeys(
-        (one.sensor, one.recording) for paper in _read_papers() for one in paper.drawn
+        (one.sensor, one.recording) for paper in read_papers() for one in paper.drawn
     )
     views = {view.full_name: view for view in site.views if view.simulated and not view.left_out}
     return [views[name] for name in names if name in views]
@@ -77,7 +67,7 @@ def _select_curves(site: Site) -> list[tuple[Drawn, RecordingView, ChannelView]]
     }
     return [
         (one, *channels[key])
-        for paper in _read_papers()
+        for paper in read_papers()
         for one in paper.drawn
         if (key := (one.sensor, one.recording, one.channel)) in channels
     ]
@@ -111,23 +101,6 @@ def _format_cell(row: AccuracyRow) -> dict[str, str]:
     }
 
 
-def _list_pages(site: Site) -> set[str]:
-    """Return the pages that a line may link to."""
-    of_recordings = {view.page for view in site.views if not view.left_out}
-    return of_recordings | {file for file, _ in site.navigation}
-
-
-_VERDICT_COUNTS: dict[Verdict, tuple[str, str]] = {
-    "agrees": ("agrees", "agree"),
-    "differs": ("differs", "differ"),
-    "possible": ("is possible", "are possible"),
-    "refuted": ("is refuted", "are refuted"),
-    "misprint": ("is a misprint", "are misprints"),
-    "done here": ("is done here", "are done here"),
-    "not to be had": ("is not to be had", "are not to be had"),
-}
-
-
 def _describe_paper(paper: Paper, rows: Sequence[PublishedRow], there: set[str]) -> dict[str, Any]:
     verdicts = Counter(row.verdict for row in rows)
     return {
@@ -141,14 +114,13 @@ def _describe_paper(paper: Paper, rows: Sequence[PublishedRow], there: set[str])
             for row in rows
         ],
         "counts": [
-            f"{verdicts[verdict]} {words[verdicts[verdict] > 1]}"
-            for verdict, words in _VERDICT_COUNTS.items()
-            if verdicts[verdict]
+            f"{count} {words.several if count > 1 else words.one}"
+            for verdict, words in read_terms().verdicts.items()
+            if (count := verdicts[verdict])
         ],
         "filters": {
-            "place": list(dict.fromkeys(row.place for row in rows)),
-            "verdict": list(dict.fromkeys(row.verdict for row in rows)),
-            "basis": list(dict.fromkeys(row.basis for row in rows)),
+            name: list(dict.fromkeys(getattr(row, name) for row in rows))
+            for name in ("place", "verdict", "basis")
         },
     }
 
@@ -163,7 +135,7 @@ def cells(row: PublishedRow) -> dict[str, str]:
         digits = limit_digits(row.lower, row.upper, 3)
         shown = (row.found, row.lower, row.upper)
         value, lower, upper = (
-            None if x is None else number_text(x / row.scale, digits) for x in shown
+            x if x is None else number_text(x / row.scale, digits) for x in shown
         )
         unit = "" if row.printed_unit == "-" else f" {row.printed_unit}"
         found = f"{value}{unit}"
@@ -179,11 +151,10 @@ def cells(row: PublishedRow) -> dict[str, str]:
 
 def find_lines(site: Site) -> Iterator[Found]:
     """Yield every line of the papers, for the search."""
-    sections = {paper.name: paper.key for paper in _read_papers()}
+    sections = {paper.name: f"papers.html#{paper.key}" for paper in read_papers()}
     for row in site.rows(PublishedRow):
-        title = f"{row.place}: {row.quantity}"
         words = f"{row.paper} {row.printed_as} {row.verdict}"
-        yield "paper", title, f"papers.html#{sections[row.paper]}", words
+        yield "paper", f"{row.place}: {row.quantity}", sections[row.paper], words
 
 
 READING = Section(
@@ -200,8 +171,7 @@ def words_of_reading(rows: Sequence[AccuracyRow]) -> str:
     of_curve = {row.parameter: row for row in rows if row.method == "curve"}
     if not of_curve:
         return ""
-    bias, walk = of_curve["B"], of_curve["K"]
-    off = ""
+    bias, walk, off = of_curve["B"], of_curve["K"], ""
     if bias.bias is not None:
         size = number_text(100.0 * abs(bias.bias), 2)
         off = f", {size} % too {'small' if bias.bias < 0 else 'large'}"

@@ -88,11 +88,19 @@ class _File(Strict):
     paper: Paper
 
 
+class Explained(Strict):
+    """A verdict: its meaning, and the words after one line and after several."""
+
+    meaning: str
+    one: str
+    several: str
+
+
 class Terms(Strict):
     """Explanations of the bases and verdicts of the table ``published``."""
 
     bases: dict[Basis, str]
-    verdicts: dict[Verdict, str]
+    verdicts: dict[Verdict, Explained]
 
 
 @cache
@@ -100,6 +108,11 @@ def read_terms() -> Terms:
     """Return the explanations of the bases and verdicts."""
     path = _FOLDER / "terms.yaml"
     return parse(Terms, read_yaml(path), str(path))
+
+
+def read_papers() -> list[Paper]:
+    """Return all papers, in the order in which they are shown."""
+    return [read_paper(key) for key in KEYS]
 
 
 @cache

@@ -1,17 +1,27 @@
-"""Counterparts of the lines of Silva et al. (SiRRS01-03, Earth's rotation) without simulations."""
+"""Counterparts of the lines of Silva et al. (SiRRS01-03, Earth's rotation)."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from functools import cache
 
 import numpy as np
 
+from imubench_pipeline.allan import allan_variance
 from imubench_pipeline.earth import EARTH_RATE
+from imubench_pipeline.estimators import curve as reading
+from imubench_pipeline.estimators.estimate import PARAMETERS
 from imubench_pipeline.extensions.calibration.tables import CalibrationRow
 from imubench_pipeline.extensions.earth_rate import hypotheses as causes
 from imubench_pipeline.extensions.earth_rate.hypotheses import PrintedRun
-from imubench_pipeline.extensions.earth_rate.known_rate import STARTS, as_printed, mean_sigma
+from imubench_pipeline.extensions.earth_rate.known_rate import (
+    STARTS,
+    as_printed,
+    mean_sigma,
+    settled,
+    track,
+)
 from imubench_pipeline.extensions.earth_rate.published import RunDesign, allowed_sigmas
 from imubench_pipeline.extensions.earth_rate.simulation import (
     ASSUMED_LATITUDE,
@@ -20,17 +30,30 @@ from imubench_pipeline.extensions.earth_rate.simulation import (
     PAPER_MODEL,
     PAPER_PERIOD,
     PAPER_RATE,
+    paper_run,
+    simulate_log,
 )
 from imubench_pipeline.extensions.earth_rate.tables import EarthRateRow
 from imubench_pipeline.extensions.papers.evidence import Evidence, Log, Result
 from imubench_pipeline.extensions.papers.printed import read_paper
 from imubench_pipeline.noise import FLOOR, PEAK_TAU
+from imubench_pipeline.noise.simulate import channel_rng, simulate
+from imubench_pipeline.simulate.model import SensorModel
 
 DEGREE = math.pi / 180.0
 SENSOR = "sirrs01_03"
 AT_REST = Log(SENSOR, "sim_published", "gyro_x")
 PRINTED = {row["run"]: float(row["rate"]) for row in read_paper("silva").figures["runs"]}
 """Estimates of the Earth's rate by run, deg/s (section 6)."""
+
+RUNS = 100
+"""Number of simulations of each of the four runs."""
+
+LOGS = 20
+"""Number of simulated logs of a week, and of 48 h."""
+
+_ASSUMED_BIAS = math.radians(0.05)  # rad/s; assumed
+_WEEK, _TWO_DAYS = 168, 48  # h
 
 _DESIGN = RunDesign(PAPER_PERIOD, ASSUMED_TURNING, PAPER_RATE, ASSUMED_LATITUDE)
 _Z_95 = 1.96
@@ -53,29 +76,21 @@ def estimate_at_rest(run: Evidence, name: str, method: str) -> Result | None:
     return Result(value=row.value, lower=row.lower, upper=row.upper)
 
 
-@cache
-def find_lowest_point() -> tuple[float, float]:
-    """Return tau and deviation of the lowest point of the curve of the four printed numbers, SI."""
+def lowest_point(_: Evidence, quantity: str) -> Result:
+    """Return tau (s), deviation (rad/s) or T_B (s) at the lowest point of the printed curve.
+
+    With tau and deviation go 1.89 T_B and 0.664 B.
+    """
     tau = np.geomspace(1.0, 1e4, 40_001)
     variance = PAPER_MODEL.allan_variance(tau)
     place = int(np.argmin(variance))
-    return float(tau[place]), math.sqrt(float(variance[place]))
-
-
-def lowest_cluster_time(_: Evidence) -> Result:
-    """Return tau of the lowest point, with 1.89 T_B, s."""
+    lowest = float(tau[place])
     assert PAPER_MODEL.T_B is not None
-    return Result(value=find_lowest_point()[0], printed=PAPER_MODEL.T_B * 1.89)
-
-
-def lowest_deviation(_: Evidence) -> Result:
-    """Return the deviation at the lowest point, with 0.664 B, rad/s."""
-    return Result(value=find_lowest_point()[1], printed=FLOOR * PAPER_MODEL.B)
-
-
-def read_correlation_time(_: Evidence) -> float:
-    """Return T_B as read at the lowest point, s."""
-    return find_lowest_point()[0] / PEAK_TAU
+    return {
+        "tau": Result(value=lowest, printed=PAPER_MODEL.T_B * 1.89),
+        "deviation": Result(value=math.sqrt(float(variance[place])), printed=FLOOR * PAPER_MODEL.B),
+        "T_B": Result(value=lowest / PEAK_TAU),
+    }[quantity]
 
 
 def count_turns(evidence: Evidence, run: str) -> float | None:
@@ -116,7 +131,6 @@ def allowed_rates(evidence: Evidence, run: str) -> Result:
     )
 
 
-@cache
 def explain_errors(_: Evidence) -> Result:
     """Return the size of each cause that would explain runs 2, 3 and 4, and the limits of it."""
     runs = {run: printed_run(run) for run in "234"}
@@ -153,6 +167,68 @@ def explain_errors(_: Evidence) -> Result:
     )
 
 
+@cache
+def settling_times(run: str) -> Mapping[str, tuple[float, ...]]:
+    """Return the settling time of each simulated run, s, by the unit of P_0; inf: not settled."""
+    design = paper_run(PAPER_MINUTES[run])
+    model = SensorModel(noise=PAPER_MODEL, bias=_ASSUMED_BIAS)
+    times: dict[str, list[float]] = {name: [] for name in STARTS}
+    for number in range(RUNS):
+        rng = channel_rng(1, SENSOR, "gyro_x", f"run {run}, {number}")
+        log = simulate_log(model, design, earth_rate=EARTH_RATE, transient=0.0, rng=rng)
+        for name, start in STARTS.items():
+            mean = track(log, design, PAPER_MODEL, EARTH_RATE, start).mean
+            times[name].append(settled(mean, PAPER_RATE, EARTH_RATE))
+    return {name: tuple(values) for name, values in times.items()}
+
+
+def settling_time(evidence: Evidence, run: str) -> Result | None:
+    """Return the median settling time of the simulated runs, s."""
+    if not evidence.has(SENSOR, f"sim_run_{run}"):
+        return None
+    times = {name: np.array(values) for name, values in settling_times(run).items()}
+    own = times["degrees"]
+    # The settling time of an unsettled run is only known to exceed its duration.
+    early, median = np.percentile(own, [5.0, 50.0], method="higher")
+    other = np.percentile(times["radians"], 50.0, method="higher")
+    late = f"not in its {PAPER_MINUTES[run]:.0f} min"
+    words = f"{100.0 * np.mean(np.isinf(own)):.0f} % {late}, 5 % by {early:.0f} s"
+    return Result(
+        value=float(median) if math.isfinite(median) else None,
+        fields={
+            "runs": RUNS,
+            "times": words if math.isfinite(median) else f"{late}; {words}",
+            "other": late if math.isinf(other) else f"{other:.0f} s",
+        },
+    )
+
+
+@cache
+def read_values(hours: int) -> Mapping[str, tuple[float, ...]]:
+    """Return the parameters read from the curves of `LOGS` logs, SI, without missing ones."""
+    shown: dict[str, list[float]] = {name: [] for name in PARAMETERS}
+    for number in range(LOGS):
+        rng = channel_rng(1, SENSOR, "gyro_x", f"{hours} h, {number}")
+        log = simulate(PAPER_MODEL, 1.0, hours * 3600, rng)
+        estimate = reading.read(allan_variance(log, 1.0, overlap="octave"))
+        for name, values in shown.items():
+            value = estimate.parameters[name].value
+            if value is not None:
+                values.append(value)
+    return {name: tuple(values) for name, values in shown.items()}
+
+
+def read_weeks(run: Evidence, name: str) -> Result | None:
+    """Return a parameter read from logs of a week: median and 90 % interval."""
+    if not run.has(AT_REST.sensor, AT_REST.recording):
+        return None
+    values = read_values(_WEEK)[name]
+    lower, median, upper = np.percentile(values, [5.0, 50.0, 95.0]).tolist()
+    shown = {"weeks": len(values), "short": len(read_values(_TWO_DAYS)[name])}
+    fields = shown | {"logs": LOGS, "hours": _TWO_DAYS}
+    return Result(value=median, lower=lower, upper=upper, fields=fields)
+
+
 def error_of_mean(_: Evidence) -> Result:
     """Return errors of the Earth's rate, deg/h: of 1000 samples by the start, and of one pair."""
     hour = DEGREE / 3600.0
@@ -165,15 +241,12 @@ def error_of_mean(_: Evidence) -> Result:
     return Result(fields=errors | {"rate": EARTH_RATE / hour, "pair": pair / hour})
 
 
-def compute_filter_gain(run: str) -> float:
-    """Return the relative reduction of sigma by a filter with unknown rate, against pairs."""
-    sigmas = allowed_sigmas(_DESIGN, 60.0 * PAPER_MINUTES[run], PAPER_MODEL)
-    return float(1.0 - sigmas["sigma_filter"] / sigmas["sigma"])
-
-
 def gain_of_filter(_: Evidence) -> Result:
-    """Return the least and greatest reduction of sigma by a filter, %."""
-    gains = [100.0 * compute_filter_gain(run) for run in PRINTED]
+    """Return the least and greatest reduction of sigma by a filter with unknown rate, %."""
+    gains = []
+    for run in PRINTED:
+        sigmas = allowed_sigmas(_DESIGN, 60.0 * PAPER_MINUTES[run], PAPER_MODEL)
+        gains.append(100.0 * float(1.0 - sigmas["sigma_filter"] / sigmas["sigma"]))
     return Result(fields={"least": min(gains), "most": max(gains)})
 
 
