@@ -7,10 +7,10 @@ import pytest
 from scipy import signal
 
 from imubench_pipeline.allan import allan_variance
-from imubench_pipeline.extensions.papers import engers
-from imubench_pipeline.extensions.papers.claims import rows_of
-from imubench_pipeline.extensions.papers.engers_axes import AXES, DEGREE, OF_BIAS, OF_NOISE
+from imubench_pipeline.extensions.papers.engers import AXES, DEGREE, cutoff_of_bandwidth
 from imubench_pipeline.extensions.papers.evidence import Evidence
+from imubench_pipeline.extensions.papers.papers import rows_of
+from imubench_pipeline.extensions.papers.printed import read_paper
 from imubench_pipeline.extensions.papers.tables import PublishedRow
 from imubench_pipeline.settings.sensor import read_sensors
 from imubench_pipeline.settings.simulated_recordings import read_simulated
@@ -18,7 +18,7 @@ from imubench_pipeline.tables import build
 from tests.conftest import PROJECT
 
 SENSORS = read_sensors(PROJECT / "config/sensors")
-ROWS = list(rows_of(engers.PAPER, Evidence()))
+ROWS = list(rows_of(read_paper("engers"), Evidence()))
 
 
 def test_every_table_figure_and_equation_has_a_line() -> None:
@@ -30,8 +30,8 @@ def test_every_table_figure_and_equation_has_a_line() -> None:
 
 def test_the_factor_of_60_has_its_check() -> None:
     # The -1/2 line N/sqrt(tau) is at the floor where tau = (N/floor)^2, by solving for it.
-    times = {axis.name: (axis.meeting(True), axis.meeting(False)) for axis in AXES}
-    for axis in AXES:
+    times = {axis.name: (axis.meeting(True), axis.meeting(False)) for axis in AXES.values()}
+    for axis in AXES.values():
         for density, tau in zip((60.0 * axis.psd, axis.psd), times[axis.name], strict=True):
             assert density / math.sqrt(tau) == pytest.approx(axis.floor)
         # A curve begins at one sample: of 500 Hz, the BNO055's of 100 Hz.
@@ -44,7 +44,7 @@ def test_the_factor_of_60_has_its_check() -> None:
     assert rows[0]["found_words"].endswith("at 120 s with the 60, at 0.033 s without")
     # What speaks against it: Table 1 has 0.005, 0.01 and 0.014.
     sheets = {"scc2130": 0.005, "mpu9250": 0.01, "bno055": 0.014}
-    for axis, row in zip(AXES, rows, strict=True):
+    for axis, row in zip(AXES.values(), rows, strict=True):
         times = 60.0 * axis.psd / sheets[axis.sensor]
         assert f"N is then {times:.2g} times the datasheet’s" in row["reason"]
         assert ("against it" in row["reason"]) is (axis.sensor != "scc2130")
@@ -56,7 +56,7 @@ def test_the_factor_of_60_has_its_check() -> None:
 def test_table_8_has_its_columns_mixed() -> None:
     assert 0.005 / math.sqrt(500.0) == pytest.approx(0.0002236, rel=1e-3)
     assert 1.03 / 3600.0 == pytest.approx(0.0002861, rel=1e-3)
-    assert AXES[0].floor == 0.00041
+    assert AXES["scc2130", "x"].floor == 0.00041
 
 
 def of_figure(number: int) -> PublishedRow:
@@ -109,7 +109,7 @@ def test_one_curve_in_twenty_is_less_in_its_band() -> None:
 
 def test_a_first_order_of_120_hz_passes_the_noise_of_188_hz() -> None:
     # White noise through a digital low-pass of first order, far below the rate, by its variance.
-    rate, cutoff = 100_000.0, engers.first_order_of_noise_bandwidth(188.0)
+    rate, cutoff = 100_000.0, cutoff_of_bandwidth(Evidence(), "188")
     assert cutoff == pytest.approx(119.7, abs=0.05)
     filters = signal.butter(1, cutoff, fs=rate)
     log = signal.lfilter(*filters, np.random.default_rng(1).standard_normal(4_000_000))
@@ -119,10 +119,10 @@ def test_a_first_order_of_120_hz_passes_the_noise_of_188_hz() -> None:
 def test_what_is_typed_here_is_what_the_board_is_simulated_from() -> None:
     recordings = read_simulated(PROJECT / "config/simulated.yaml", SENSORS).recordings
     board = {one.sensor: one for one in recordings if one.recording == "sim_engers"}
-    for axis in AXES:
+    for axis in AXES.values():
         figures = board[axis.sensor].channels[f"gyro_{axis.axis}"].published
         si = {(one.where, one.parameter): one.si("gyro") for one in figures if one.of == "log"}
-        noise, bias = OF_NOISE[axis.sensor], OF_BIAS[axis.sensor]
+        noise, bias = axis.noise, axis.drift
         assert si[noise, "N"] == pytest.approx(60.0 * axis.psd * DEGREE, rel=1e-3)
         assert si[noise, "B"] == pytest.approx(axis.floor / 0.664 * DEGREE, rel=2e-3)
         assert si[bias, "bias"] == pytest.approx(axis.bias * DEGREE)
@@ -133,7 +133,7 @@ def found_in(rows: dict[str, list[dict]], place: str, quantity: str) -> Publishe
     evidence = Evidence({name: build(name, own) for name, own in rows.items()})
     (line,) = [
         row
-        for row in rows_of(engers.PAPER, evidence)
+        for row in rows_of(read_paper("engers"), evidence)
         if row["place"] == place and quantity in row["quantity"]
     ]
     return line

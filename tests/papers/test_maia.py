@@ -10,24 +10,25 @@ import pytest
 from numpy.typing import NDArray
 from scipy.linalg import expm
 
-from imubench_pipeline.extensions.papers import maia, maia_printed
-from imubench_pipeline.extensions.papers.claims import rows_of
+from imubench_pipeline.extensions.papers import maia, maia_draws
 from imubench_pipeline.extensions.papers.evidence import Evidence
-from imubench_pipeline.extensions.papers.maia_equations import (
+from imubench_pipeline.extensions.papers.maia import (
     WEIGHED_AT,
-    as_printed,
-    by_integral,
-    spread_over_weight,
+    compute_weight_ratios,
+    evaluate_as_printed,
+    integrate_density,
+    read_manufacturer,
 )
-from imubench_pipeline.extensions.papers.maia_printed import (
+from imubench_pipeline.extensions.papers.maia_draws import (
     CHANNELS,
     GRIDS,
     MTI_GYRO,
-    TABLE_4,
     lottery,
     lowest_point,
     readings,
 )
+from imubench_pipeline.extensions.papers.papers import rows_of
+from imubench_pipeline.extensions.papers.printed import read_paper
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.simulate import simulate
 from imubench_pipeline.settings.sensor import read_sensors
@@ -44,17 +45,17 @@ PRINTED = {
 }
 
 
-@pytest.fixture(scope="module", params=few([60], [maia_printed.MEMBERS]))
+@pytest.fixture(scope="module", params=few([60], [maia_draws.MEMBERS]))
 def members(request: pytest.FixtureRequest) -> Iterator[int]:
     """The number of reconstructions: less than what the page has, every day."""
     cached = (
-        maia_printed.lottery,
-        maia_printed.readings,
-        maia_printed._simulate_deviations,
+        maia_draws.lottery,
+        maia_draws.readings,
+        maia_draws._simulate_deviations,
         maia._count_in_range,
     )
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(maia_printed, "MEMBERS", request.param)
+        patch.setattr(maia_draws, "MEMBERS", request.param)
         for function in cached:
             function.cache_clear()
         yield request.param
@@ -64,9 +65,9 @@ def members(request: pytest.FixtureRequest) -> Iterator[int]:
 
 @pytest.fixture(scope="module")
 def lines(members: int) -> dict[str, list[dict[str, Any]]]:
-    assert members == maia_printed.MEMBERS
+    assert members == maia_draws.MEMBERS
     by_place: dict[str, list[dict[str, Any]]] = {}
-    for row in rows_of(maia.PAPER, Evidence()):
+    for row in rows_of(read_paper("maia"), Evidence()):
         by_place.setdefault(row["place"], []).append(dict(row))
     return by_place
 
@@ -77,7 +78,7 @@ def test_every_table_figure_and_equation_has_a_line(lines: dict[str, Any]) -> No
 
 
 def test_the_tables_are_typed_as_printed() -> None:
-    for channel in CHANNELS:
+    for channel in CHANNELS.values():
         first, second, *table_3 = PRINTED[channel.name]
         for model, digits in ((channel.table_1, first), (channel.table_2, second)):
             shown = [f"{value:.1e}".split("e")[0] for value in (model.N, model.B, model.K)]
@@ -90,7 +91,7 @@ def test_the_demonstration_simulates_table_2_and_has_table_1_beside_it() -> None
         PROJECT / "config/simulated.yaml", read_sensors(PROJECT / "config/sensors")
     )
     entries = {(entry.sensor, entry.recording): entry for entry in run.recordings}
-    for channel in CHANNELS:
+    for channel in CHANNELS.values():
         entry = entries[channel.sensor, "sim_published"]
         axis = entry.channels[channel.channel]  # type: ignore[index]  # its names are those keys
         assert axis.read is not None
@@ -110,7 +111,7 @@ def test_what_differs_has_its_reason_and_what_agrees_none(lines: dict[str, Any])
 
 def test_reading_the_curve_of_table_2(lines: dict[str, Any]) -> None:
     tau = np.geomspace(1, 18_000, 100_000)
-    for channel in CHANNELS:
+    for channel in CHANNELS.values():
         N, B, K, T_B = (row for row in lines["Table 1"] if channel.name in row["quantity"][:40]
                         and "read from" in row["quantity"])  # fmt: skip
         adev = np.sqrt(channel.table_2.allan_variance(tau))
@@ -149,19 +150,19 @@ def test_what_the_log_is_made_of_is_said_to_come_back(lines: dict[str, Any]) -> 
 
 
 def test_the_numbers_of_table_1_do_not_fit_equation_26(lines: dict[str, Any]) -> None:
-    taus = {channel.name: lowest_point(channel.table_1)[0] for channel in CHANNELS}
+    taus = {channel.name: lowest_point(channel.table_1)[0] for channel in CHANNELS.values()}
     assert taus["MTi-7 gyro"] == pytest.approx(27.3, abs=0.1)
-    for channel in CHANNELS:
+    for channel in CHANNELS.values():
         T_B = channel.table_1.T_B
         assert T_B is not None
         assert not 0.5 < taus[channel.name] / (1.89 * T_B) < 2.0
         # By the integral of the density the curve is lower there than at 1.89 T_B.
         here, there = (
-            by_integral(channel.table_1, tau) for tau in (taus[channel.name], 1.89 * T_B)
+            integrate_density(channel.table_1, tau) for tau in (taus[channel.name], 1.89 * T_B)
         )
         assert here < there
         # The process alone is below its peak there, and N and K do not make up for that.
-        process = by_integral(NoiseModel(B=channel.table_1.B, T_B=T_B), taus[channel.name])
+        process = integrate_density(NoiseModel(B=channel.table_1.B, T_B=T_B), taus[channel.name])
         share = math.sqrt(process) / (0.6643 * channel.table_1.B)
         row = next(row for row in lines["Table 1"]
                    if row["quantity"] == f"{channel.name}: deviation at that point")  # fmt: skip
@@ -186,12 +187,12 @@ def test_table_3_lies_in_the_spread_of_single_draws(lines: dict[str, Any], membe
     ]
     for row in differing:
         assert "6 are inside at nine τ" in row["reason"] and "5 are inside" in row["reason"]
-    for channel in CHANNELS:
+    for channel in CHANNELS.values():
         for grid in GRIDS:
             spread = lottery(channel, grid)
             assert 0.15 < spread.beats < 0.6  # never the 0 that one draw each seems to show
             assert spread.slow > 0.95
-            for low, _, high in (spread.state_space, spread.optimised):
+            for low, _, high in spread.ranges:
                 assert high / low > (3.0 if members >= 200 else 2.5)
 
 
@@ -225,7 +226,7 @@ def test_single_draws_spread_as_full_length_logs_do(single: Any) -> None:
         by_every = np.sqrt(square[..., np.isin(taus, (np.arange(30) + 0.5) * 600)].mean(-1))
         for values, grid in ((by_steps, "steps"), (by_every, "every")):
             spread = lottery(MTI_GYRO, grid)  # type: ignore[arg-type]  # the two that there are
-            expected = (spread.state_space, spread.optimised)[place]
+            expected = spread.ranges[place]
             assert np.median(values) == pytest.approx(expected[1], rel=0.35)
             beyond = float(np.mean(values >= MTI_GYRO.table_3[place]))
             assert beyond == pytest.approx(spread.beyond[place], abs=0.12)
@@ -257,7 +258,9 @@ def test_table_4(lines: dict[str, Any]) -> None:
     }
     for place, symbol in enumerate("NB"):
         for channel, figures in vendor.items():
-            assert TABLE_4[symbol][channel] == pytest.approx(figures[place], rel=0.03)
+            assert read_manufacturer(symbol, f"mti_{channel.removesuffix('_x')}") == pytest.approx(
+                figures[place], rel=0.03
+            )
     shown = {row["quantity"]: row for row in lines["Table 4"]}
     gyro = shown["N of the MTi-7 gyro, optimised over manufacturer"]
     assert gyro["printed"] == pytest.approx(0.70)
@@ -265,7 +268,7 @@ def test_table_4(lines: dict[str, Any]) -> None:
     floor = shown["B of the MTi-7 gyro, optimised over manufacturer"]
     assert floor["printed"] == pytest.approx(6.7 / 4.8)
     tau = np.geomspace(1, 1e4, 3000)
-    lowest = min(math.sqrt(by_integral(GYRO, t)) for t in tau[:: 3000 // 40])
+    lowest = min(math.sqrt(integrate_density(GYRO, t)) for t in tau[:: 3000 // 40])
     assert floor["found"] == pytest.approx(lowest / math.radians(10 / 3600), rel=0.05)
     on_1_s, line = lines["Figure 9"]
     assert on_1_s["found"] == pytest.approx(12.0e-5 / 8.42e-5, rel=1e-3)
@@ -275,7 +278,9 @@ def test_table_4(lines: dict[str, Any]) -> None:
 def test_figures_6_and_7(lines: dict[str, Any]) -> None:
     (accel,), (gyro,) = lines["Figure 6"], lines["Figure 7"]
     # The walks alone are 106 times apart, the white noise 68: it grows up to the end of the range.
-    there = math.sqrt(by_integral(CHANNELS[3].table_2, 18e3) / by_integral(GYRO, 18e3))
+    there = math.sqrt(
+        integrate_density(CHANNELS["c102_gyro"].table_2, 18e3) / integrate_density(GYRO, 18e3)
+    )
     assert gyro["found"] == pytest.approx(there, rel=1e-3)
     assert 68 < gyro["found"] < 8.7e-5 / 8.2e-7 and "18,000 s, the end" in gyro["found_words"]
     assert 1.1 / 0.96 < accel["found"] < 7.2 / 3.4 * 1.1
@@ -288,11 +293,11 @@ def test_lines_and_floor(lines: dict[str, Any]) -> None:
         (NoiseModel(K=2.0), 3.0, 2.0),
         (NoiseModel(B=2.0), 7.0, 0.6643 * 2.0),
     ):
-        assert math.sqrt(by_integral(model, tau)) == pytest.approx(expected, rel=2e-3)
+        assert math.sqrt(integrate_density(model, tau)) == pytest.approx(expected, rel=2e-3)
     floor, place = (row["found"] for row in lines["Equation 13"])
     assert floor == pytest.approx(math.sqrt(2 * math.log(2) / math.pi))
     process = NoiseModel(B=1.0, T_B=10.0)
-    around = [by_integral(process, 10.0 * place * factor) for factor in (0.9, 1.0, 1.1)]
+    around = [integrate_density(process, 10.0 * place * factor) for factor in (0.9, 1.0, 1.1)]
     assert max(around) == around[1]
     assert math.sqrt(around[1]) == pytest.approx(floor, rel=1e-3)
 
@@ -336,7 +341,7 @@ def test_the_weight_of_equation_25(members: int, known: float) -> None:
     )
     relative = variances.std(axis=0) / variances.mean(axis=0)
     for tau, spread in zip(taus, relative / (2 * np.sqrt(taus / 72_000.0)), strict=True):
-        meant, printed = spread_over_weight(tau)
+        meant, printed = compute_weight_ratios(tau)
         assert spread == pytest.approx(meant, rel=known)  # of 50 to 10 %, of 200 to 5
         assert 0.7 < meant < 1.1  # the weight meant takes about what is there
         assert printed < 1e-3  # in rad/s; in degrees it would be 57 times that
@@ -344,7 +349,9 @@ def test_the_weight_of_equation_25(members: int, known: float) -> None:
 
 def test_the_sign_of_equation_26(lines: dict[str, Any]) -> None:
     for tau in (1.0, 30.0, 300.0, 3000.0):
-        assert float(GYRO.allan_variance(tau)) == pytest.approx(by_integral(GYRO, tau), rel=1e-6)
-    assert as_printed(GYRO, 100.0) > 10 * by_integral(GYRO, 100.0)
+        assert float(GYRO.allan_variance(tau)) == pytest.approx(
+            integrate_density(GYRO, tau), rel=1e-6
+        )
+    assert evaluate_as_printed(GYRO, 100.0) > 10 * integrate_density(GYRO, 100.0)
     for number in (26, 27):
         assert lines[f"Equation {number}"][0]["verdict"] == "misprint"

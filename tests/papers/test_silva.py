@@ -8,13 +8,14 @@ import pytest
 from scipy.signal import lfilter
 
 from imubench_pipeline.extensions.earth_rate.simulation import PAPER_MINUTES
-from imubench_pipeline.extensions.papers import silva, silva_runs, silva_settling, silva_weeks
-from imubench_pipeline.extensions.papers.claims import rows_of
+from imubench_pipeline.extensions.papers import silva
 from imubench_pipeline.extensions.papers.evidence import Evidence
+from imubench_pipeline.extensions.papers.papers import rows_of
+from imubench_pipeline.extensions.papers.printed import read_paper
 from imubench_pipeline.tables import build
 from tests.conftest import few
 
-ROWS = {(row["place"], row["quantity"]): row for row in rows_of(silva.PAPER, Evidence())}
+ROWS = {(row["place"], row["quantity"]): row for row in rows_of(read_paper("silva"), Evidence())}
 
 
 def test_every_figure_and_equation_has_a_line() -> None:
@@ -41,8 +42,8 @@ def test_the_four_numbers_do_not_fit_each_other() -> None:
 
 @pytest.mark.release  # logs of weeks; test_maia.py reads curves every day
 def test_a_week_shows_k_by_reading_and_two_days_seldom_do() -> None:
-    of_weeks, of_days = silva_weeks.read_values(168), silva_weeks.read_values(48)
-    assert len(of_days["K"]) <= silva_weeks.LOGS // 2 < len(of_weeks["K"])
+    of_weeks, of_days = silva.read_values(168), silva.read_values(48)
+    assert len(of_days["K"]) <= silva.LOGS // 2 < len(of_weeks["K"])
     assert max(of_weeks["T_B"]) < 100.0  # never the 238.1 s that the logs are made with
     # A week by other means: no code of the simulator, and the slope of 5 to 15 h, where K rules.
     rng, phi = np.random.default_rng(1), math.exp(-1 / 238.1)
@@ -52,13 +53,13 @@ def test_a_week_shows_k_by_reading_and_two_days_seldom_do() -> None:
     log = of_process * slow + walk + 0.0122 * rng.normal(size=604_800)
     means = log.reshape(-1, 3600).mean(axis=1)
     k = math.sqrt(0.5 * np.mean(np.diff(means) ** 2) * 3 / 3600)
-    median = float(np.median(of_weeks["K"])) / silva_runs.DEGREE
+    median = float(np.median(of_weeks["K"])) / silva.DEGREE
     assert median == pytest.approx(k, rel=0.2) and median == pytest.approx(6.8314e-5, rel=0.15)
 
 
 def test_a_filter_improves_the_pairs_by_a_per_cent() -> None:
-    gains = [silva_runs.gain_of_the_filter(run) for run in silva_runs.PRINTED]
-    assert 0.003 < min(gains) and max(gains) < 0.0135
+    gains = silva.gain_of_filter(Evidence()).fields
+    assert 0.3 < gains["least"] and gains["most"] < 1.35
     assert ROWS["Section 8", "what a Kalman filter improves"]["found_words"] == (
         "σ is 0.4 to 1.2 % less than that of the mean over pairs"
     )
@@ -106,14 +107,14 @@ def test_each_hypothesis_is_possible_or_refuted() -> None:
     assert len(verdicts) == 8 and set(verdicts.values()) == {"possible", "refuted"}
 
 
-@pytest.fixture(scope="module", params=few([9], [25, silva_settling.RUNS]))
+@pytest.fixture(scope="module", params=few([9], [25, silva.RUNS]))
 def runs(request: pytest.FixtureRequest) -> Iterator[int]:
     """The number of simulated runs: less than what the page has, every day."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(silva_settling, "RUNS", request.param)
-        silva_settling.settling_times.cache_clear()
+        patch.setattr(silva, "RUNS", request.param)
+        silva.settling_times.cache_clear()
         yield request.param
-    silva_settling.settling_times.cache_clear()
+    silva.settling_times.cache_clear()
 
 
 @pytest.mark.release
@@ -121,7 +122,7 @@ def test_runs_settle_after_minutes_and_not_by_the_unit_of_the_start(runs: int) -
     for run, minutes in PAPER_MINUTES.items():
         if "," in run:
             continue
-        times = silva_settling.settling_times(run)
+        times = silva.settling_times(run)
         degrees, radians = (np.minimum(times[unit], 60.0 * minutes) for unit in times)
         assert len(degrees) == runs
         # Tenfold the 30 to 60 s that are printed, or more, in the middle of the runs.
@@ -130,7 +131,7 @@ def test_runs_settle_after_minutes_and_not_by_the_unit_of_the_start(runs: int) -
     # White noise alone: the mean of 12 min is beyond a tenth of the rate by chance in as many.
     sigma = 0.0122 / math.sqrt(12 * 56.0) / 0.1 / 0.0041781
     beyond = math.erfc(1.0 / sigma / math.sqrt(2.0))
-    unsettled = np.mean(np.isinf(silva_settling.settling_times("2")["degrees"]))
+    unsettled = np.mean(np.isinf(silva.settling_times("2")["degrees"]))
     assert unsettled == pytest.approx(beyond, abs=2.0 / math.sqrt(runs))
 
 
@@ -156,9 +157,9 @@ def test_the_median_of_many_runs_stands_beside_what_is_printed() -> None:
     told = {"device": "a", "kind": "two_position", "simulated": True, "status": "ok"}
     runs = [{"sensor": "sirrs01_03", "recording": f"sim_run_{run}"} | told for run in "1234"]
     evidence = Evidence({"recordings": build("recordings", runs)})
-    lines = {row["place"]: row for row in rows_of(silva.PAPER, evidence)}
+    lines = {row["place"]: row for row in rows_of(read_paper("silva"), evidence)}
     for figure, run in (("10", "1"), ("11", "2"), ("12", "3"), ("13", "4")):
-        line, times = lines[f"Figure {figure}"], silva_settling.settling_times(run)["degrees"]
+        line, times = lines[f"Figure {figure}"], silva.settling_times(run)["degrees"]
         assert line["verdict"] == "differs"
         never = 100.0 * sum(map(math.isinf, times)) / len(times)
         assert f"{never:.0f} % not in its" in line["found_words"]

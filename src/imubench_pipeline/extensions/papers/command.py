@@ -15,7 +15,6 @@ if TYPE_CHECKING:
 
     from imubench_pipeline.extensions.papers.tables import PublishedRow
 
-_PAPER_KEYS = ("maia", "silva", "engers")
 _RATIO_LEGEND = (
     "Ratio: result / printed, ± the tolerance. A printed value inside the interval of the result "
     "agrees, too. Derived: not printed, but follows from printed values."
@@ -30,14 +29,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         nargs="?",
         help="folder of the results of a run; default: only lines that need no log",
     )
-    parser.add_argument("--paper", choices=_PAPER_KEYS, help="only this paper; default: all")
+    parser.add_argument(
+        "--paper", choices=("maia", "silva", "engers"), help="only this paper; default: all"
+    )
     parser.add_argument("--place", help='such as "Table 3"; default: all')
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Print the lines; return the exit status."""
     # Imported here, so that the other commands start fast.
-    from imubench_pipeline.extensions.papers.about import PAPERS
+    from imubench_pipeline.extensions.papers.printed import read_papers
     from imubench_pipeline.extensions.papers.tables import PublishedRow
     from imubench_pipeline.report.show import show
 
@@ -56,7 +57,7 @@ def run(arguments: argparse.Namespace) -> int:
             print(error, file=sys.stderr)
             return 2
         expected = f"{path}: the run simulates the logs of no paper"
-    wanted = [paper for paper in PAPERS if arguments.paper in (None, paper.key)]
+    wanted = [paper for paper in read_papers() if arguments.paper in (None, paper.key)]
     names = {paper.name for paper in wanted}
     places = list(dict.fromkeys(row.place for row in rows if row.paper in names))
     if arguments.place is not None and arguments.place not in places:
@@ -64,13 +65,11 @@ def run(arguments: argparse.Namespace) -> int:
         print(f"no place {arguments.place!r}; there are: {shown}", file=sys.stderr)
         return 2
 
+    shown_rows = [row for row in rows if arguments.place in (None, row.place)]
+
     def shown_parts(width: int) -> Iterator[RenderableType]:
         for paper in wanted:
-            own = [
-                row
-                for row in rows
-                if row.paper == paper.name and arguments.place in (None, row.place)
-            ]
+            own = [row for row in shown_rows if row.paper == paper.name]
             if own:
                 yield from _make_parts(f"{paper.name}: {paper.title}", own, width)
 
@@ -84,8 +83,8 @@ def _make_parts(title: str, rows: Sequence[PublishedRow], width: int) -> Iterato
     """Yield the table of a paper, and the reasons for differences."""
     from rich.text import Text
 
-    from imubench_pipeline.extensions.papers.about import VERDICTS
     from imubench_pipeline.extensions.papers.page import cells
+    from imubench_pipeline.extensions.papers.printed import read_terms
     from imubench_pipeline.report.terminal_table import fitting
 
     reasons = list(dict.fromkeys(row.reason for row in rows if row.reason))
@@ -93,23 +92,16 @@ def _make_parts(title: str, rows: Sequence[PublishedRow], width: int) -> Iterato
     for row in rows:
         shown = cells(row)
         note = f" [{reasons.index(row.reason) + 1}]" if row.reason else ""
-        lines.append(
-            [
-                row.place,
-                row.quantity,
-                row.printed_as,
-                shown["found_text"],
-                f"{shown['ratio_text']} {shown['tolerance_text']}".strip(),
-                row.verdict + note,
-            ]
-        )
+        ratio = f"{shown['ratio_text']} {shown['tolerance_text']}".strip()
+        texts = [row.place, row.quantity, row.printed_as, shown["found_text"], ratio]
+        lines.append([*texts, row.verdict + note])
     heads = ["Place", "Quantity", "Printed", "Result", "Ratio", "Verdict"]
     yield fitting(title, heads, lines, width, names=1)
     yield Text()
     yield Text(_RATIO_LEGEND)
     for number, reason in enumerate(reasons, start=1):
         yield Text(f"  [{number}] {reason}")
-    meanings = {str(verdict): meaning for verdict, meaning in VERDICTS.items()}
+    meanings = {str(verdict): words.meaning for verdict, words in read_terms().verdicts.items()}
     for verdict in dict.fromkeys(row.verdict for row in rows):
         yield Text(f"  {verdict}: {meanings[verdict]}")
     yield Text()

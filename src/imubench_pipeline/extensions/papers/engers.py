@@ -1,312 +1,261 @@
-"""Claims of Engers about SCC2130, MPU-9250 and BNO055, and about his simulator."""
+"""Counterparts of the lines of Engers (2021), and of his aim: cheap gyros, fused."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
-from functools import cache
 
 import numpy as np
 
-from imubench_pipeline.extensions.fusion.tables import PublishedFigureRow
-from imubench_pipeline.extensions.papers.about import ENGERS, Verdict
-from imubench_pipeline.extensions.papers.claims import (
-    Claim,
-    Paper,
-    Result,
-    no_result,
-    numeric_result,
-    verbal_result,
+from imubench_pipeline.extensions.fusion.tables import GradeRow, PublishedFigureRow
+from imubench_pipeline.extensions.papers.evidence import Evidence, Log, Result
+from imubench_pipeline.extensions.papers.printed import Verdict, read_paper
+from imubench_pipeline.model.estimates import (
+    AllanRow,
+    CompensatedAllanRow,
+    ModelSampleRow,
+    ReconstructionRow,
 )
-from imubench_pipeline.extensions.papers.engers_aim import aim
-from imubench_pipeline.extensions.papers.engers_axes import (
-    AXES,
-    DATASHEETS,
-    DEGREE,
-    NAMES,
-    NO_LOG,
-    OF_BIAS,
-    OF_NOISE,
-    RATES,
-    READ_AT,
-    Axis,
-    in_unit,
-    page_of,
-)
-from imubench_pipeline.extensions.papers.engers_figures import figures
-from imubench_pipeline.extensions.papers.evidence import Evidence
 from imubench_pipeline.noise import FLOOR
+from imubench_pipeline.settings.validation import Strict
 
-_TEST = "tests/papers/test_engers.py"
-_OF_BOARD = "tests/test_published_figures.py"
+DEGREE = math.pi / 180.0
+RECORDING = "sim_engers"
+READ_AT = 3600.0
+"""Cluster time at which the figures under "PSD" were read, s (section 2.2.4)."""
+
+_MIN_TAU_ABOVE_LOW_PASS = 0.1
+"""Cluster time above which the low-passes of these sensors have no effect, s."""
+
+_MIN_PERCENT_IN_BAND = 80.0
+"""Least share of a curve, in per cent, within a pointwise band of 95 %. By chance, one curve in
+twenty is below."""
+
+_MAX_DEVIATION_DIFFERENCE = 0.05
+"""Largest relative difference of two deviations of samples that look alike."""
+
+_SINGLE_SENSOR, _FUSED_SENSOR, _FUSED_COUNT = "scc2130", "scc2130_x25", 25
 
 
-def first_order_of_noise_bandwidth(bandwidth: float) -> float:
-    """Return the cut-off of a low-pass of first order whose noise bandwidth is this, Hz.
+class Axis(Strict):
+    """An axis of Tables 2 to 7, and Table 1 of its sensor; in degrees."""
+
+    sensor: str
+    axis: str
+    name: str  # of sensor and axis, in words
+    noise: str  # table of the noise
+    drift: str  # table of the fixed drift
+    psd: float  # ordinate of the -1/2 line at 1 h, deg/s
+    bias: float  # deg/s
+    floor: float  # lowest point of the curve, deg/s; printed per kelvin
+    rate: float  # of the log, Hz
+    sheet: float  # PSD of the datasheet, (deg/s)/sqrt(Hz)
+
+    @property
+    def density(self) -> float:
+        """N, if the figure under "PSD" is the ordinate at 1 h, (deg/s)/sqrt(Hz)."""
+        return self.psd * math.sqrt(READ_AT)
+
+    @property
+    def log(self) -> Log:
+        """The channel that is simulated of it."""
+        return Log(self.sensor, RECORDING, f"gyro_{self.axis}")
+
+    def meeting(self, scaled: bool) -> float:
+        """Return where the -1/2 line, of N or (not scaled) of the figure, meets the floor, s."""
+        return ((self.density if scaled else self.psd) / self.floor) ** 2
+
+
+_FIGURES = read_paper("engers").figures
+_SENSORS = {row["sensor"]: row for row in _FIGURES["sensors"]}
+AXES = {
+    (row["sensor"], row["axis"]): Axis.model_validate({**_SENSORS[row["sensor"]], **row})
+    for row in _FIGURES["axes"]
+}
+"""The axes by sensor and axis."""
+
+
+def cutoff_of_bandwidth(_: Evidence, bandwidth: str) -> float:
+    """Return the cut-off of a low-pass of first order with this noise bandwidth, Hz.
 
     White noise passes it as it passes a filter of this width with steep edges: pi/2 times the
     cut-off is its noise bandwidth.
     """
-    return 2.0 / math.pi * bandwidth
+    return 2.0 / math.pi * float(bandwidth)
 
 
-def _evaluate_published(
-    axis: Axis, place: str, parameter: str, times: float
-) -> Callable[[Evidence], Result]:
-    """Return the evaluation of a printed figure of an axis from the run.
+def published_figure(run: Evidence, sensor: str, axis: str, parameter: str) -> Result | None:
+    """Return the estimate of a printed figure: bias, the -1/2 line at 1 h (N), or the floor (B)."""
+    one = AXES[sensor, axis]
+    place = one.drift if parameter == "bias" else one.noise
+    times = {"bias": 1.0, "N": 1.0 / math.sqrt(READ_AT), "B": FLOOR}[parameter]
+    of_axis = run.of_log(PublishedFigureRow, one.log, place=place, parameter=parameter)
+    row = next((row for row in of_axis if row.of == "log"), None)
+    if row is None or row.value is None:
+        return None
+    value, lower, upper = (
+        None if end is None else times * end for end in (row.value, row.lower, row.upper)
+    )
+    if parameter == "bias" or row.curve is None:
+        return Result(value=value, lower=lower, upper=upper, words="")
+    curve = times * row.curve / DEGREE
+    shown = np.format_float_positional(curve, precision=3, fractional=False, trim="-")
+    return Result(value=value, lower=lower, upper=upper, fields={"curve": shown})
 
-    The printed figure is ``times`` the parameter.
-    """
 
-    def evaluate(run: Evidence) -> Result:
-        of_axis = run.of_log(PublishedFigureRow, axis.log, place=place, parameter=parameter)
-        row = next((row for row in of_axis if row.of == "log"), None)
-        if row is None or row.value is None:
-            return no_result(NO_LOG)
-        value, lower, upper = (
-            None if end is None else times * end for end in (row.value, row.lower, row.upper)
+def derive_from_axis(_: Evidence, sensor: str, axis: str) -> Result:
+    """Return numbers that follow from the printed figures of an axis: times in s, and ratios."""
+    one = AXES[sensor, axis]
+    ratio = one.density / one.sheet
+    scaled, samples = one.meeting(True), one.meeting(False) * one.rate
+    drift = one.floor / 0.662 / 18_000.0 * scaled / math.sqrt(2.0)  # his divisor; 1 K over the log
+    return Result(
+        fields={
+            "scaled": scaled,
+            "unscaled": one.meeting(False),
+            "samples": f"{samples:.0f} samples" if samples >= 1.5 else "one sample",
+            "against": "against it: " if one.density > 2.0 * one.sheet else "",
+            "ratio": ratio,
+            "one_sided": math.sqrt(2.0) * ratio,
+            "as_power": math.sqrt(one.psd * one.rate) / (one.density * math.sqrt(one.rate)),
+            "over_drift": one.floor / drift,
+            "sheet_two_sided": (one.sheet / one.floor) ** 2,
+            "sheet_one_sided": (one.sheet / one.floor) ** 2 / 2.0,
+            "sheet_drift": (one.sheet / 0.015) ** 2,  # 0.015 (deg/s)/K as if it were the floor
+        }
+    )
+
+
+def compare_axes(_: Evidence, sensor: str) -> Result:
+    """Return the noise of each axis of a sensor over that of x, and over the datasheet's."""
+    axes = [axis for axis in AXES.values() if axis.sensor == sensor]
+    over_x = {axis.axis: axis.psd / axes[0].psd for axis in axes}
+    return Result(fields=over_x | {f"sheet_{one.axis}": one.density / one.sheet for one in axes})
+
+
+def share_in_band(run: Evidence, sensor: str, axis: str) -> Result | None:
+    """Return the share of the curve within the band of logs of its estimate, %."""
+    log = AXES[sensor, axis].log
+    for method in ("compensated", "likelihood"):
+        bands = run.of_log(ReconstructionRow, log, method=method)
+        if bands:
+            break
+    else:
+        return None
+    curve: type[AllanRow] | type[CompensatedAllanRow] = (
+        CompensatedAllanRow if method == "compensated" else AllanRow
+    )
+    measured = {row.tau: row.adev for row in run.of_log(curve, log)}
+    seen = [row for row in bands if row.tau >= _MIN_TAU_ABOVE_LOW_PASS and row.tau in measured]
+    inside = sum(row.lower <= measured[row.tau] <= row.upper for row in seen)
+    share = 100.0 * inside / len(seen)
+    return Result(
+        verdict="agrees" if share >= _MIN_PERCENT_IN_BAND else "differs",
+        fields={
+            "share": share,
+            "tau": _MIN_TAU_ABOVE_LOW_PASS,
+            "method": method,
+            "least": _MIN_PERCENT_IN_BAND,
+        },
+    )
+
+
+def _get_sample_deviations(run: Evidence, sensor: str) -> dict[tuple[str, str], float]:
+    """Return the deviation of samples by channel, of the log and of the models; maybe none."""
+    rows = run.rows(ModelSampleRow, sensor=sensor, recording=RECORDING, what="deviation")
+    return {(row.channel, row.of): row.mean for row in rows if row.mean is not None}
+
+
+def sample_deviations(run: Evidence, sensor: str, if_alike: Verdict) -> Result | None:
+    """Return the deviations of samples of the fitted model over those of the log."""
+    by = _get_sample_deviations(run, sensor)
+    ratios = [value / by[channel, "log"] for (channel, of), value in by.items() if of == "after"]
+    if not ratios:
+        return None
+    alike = all(abs(ratio - 1.0) < _MAX_DEVIATION_DIFFERENCE for ratio in ratios)
+    return Result(
+        verdict=if_alike if alike else "differs",
+        fields={"ratios": ", ".join(f"{ratio:.3f}" for ratio in ratios)},
+    )
+
+
+def deviations_over_x(run: Evidence, sensor: str) -> Result | None:
+    """Return the deviations of samples of y and z over that of x, of log and fitted model."""
+    by = _get_sample_deviations(run, sensor)
+    if not by:
+        return None
+    ratios = {
+        f"{of}_{axis}": by[f"gyro_{axis}", of] / by["gyro_x", of]
+        for of in ("log", "after")
+        for axis in "yz"
+    }
+    alike = all(
+        abs(ratios[f"after_{axis}"] / ratios[f"log_{axis}"] - 1.0) < _MAX_DEVIATION_DIFFERENCE
+        for axis in "yz"
+    )
+    return Result(verdict="agrees" if alike else "differs", fields=ratios)
+
+
+def adjacent_samples(run: Evidence, sensor: str, of: str) -> Result | None:
+    """Return the correlation of adjacent samples, of log and model."""
+    rows = run.rows(
+        ModelSampleRow, sensor=sensor, recording=RECORDING, channel="gyro_x", what="stretch"
+    )
+    stretches = {
+        one: [row.mean for row in rows if row.of == one and row.mean is not None]
+        for one in ("log", of)
+    }
+    if not all(stretches.values()):
+        return None
+    log, model = (
+        float(np.corrcoef(values[:-1], values[1:])[0, 1]) for values in stretches.values()
+    )
+    count = len(stretches["log"])
+    error = math.sqrt(2.0 * (1.0 - log * log) / count)
+    return Result(
+        verdict="agrees" if abs(model - log) < 3.0 * error else "differs",
+        fields={"model": model, "log": log, "count": count},
+    )
+
+
+def count_equal(run: Evidence, grade: str, option: str) -> Result | None:
+    """Return how many sensors equal one of a grade, by white noise and by lowest point."""
+    words = []
+    for sensor, name in ((_SINGLE_SENSOR, ""), (_FUSED_SENSOR, f"of {_FUSED_COUNT} fused ")):
+        rows = run.rows(
+            GradeRow, sensor=sensor, quantity="gyro", grade=grade, option=option or None
         )
-        curve = None if parameter == "bias" else row.curve
-        words = ""
-        if curve is not None:
-            shown = np.format_float_positional(
-                times * curve / DEGREE, precision=3, fractional=False, trim="-"
-            )
-            words = f"{shown} read from its curve, before the fit"
-        return Result(value=value, lower=lower, upper=upper, words=words)
-
-    return evaluate
-
-
-def _datasheets() -> Iterator[Claim]:
-    def line(sensor: str, quantity: str, printed: str, value: float, found: float | None,
-             reason: str, unit: str) -> Claim:  # fmt: skip
-        known = Result(value=found * DEGREE) if found is not None else no_result(reason)
-        return in_unit(unit, Claim(
-            place="Table 1", quantity=f"{NAMES[sensor]}: {quantity}", printed=printed,
-            value=value * DEGREE, evaluate=lambda _: known, basis="computed", reason=reason,
-            page=page_of(sensor), check="tests/test_printed.py",
-        ))  # fmt: skip
-
-    secondary = "the document is not at hand: what is known of it is what this paper quotes"
-    yield line("scc2130", "PSD", "0.005 (°/s)/√Hz", 0.005, None, secondary, "density")
-    yield line("scc2130", "fixed drift", "±1 °/s", 1.0, None, secondary, "rate")
-    yield line("scc2130", "dynamic drift", "0.008 (°/s)/K", 0.008, None, secondary, "coefficient")
-    yield line(
-        "bno055", "PSD", "0.014 (°/s)/√Hz", 0.014, 0.1 / math.sqrt(47.0),
-        "the document prints 0.1 °/s rms over 47 Hz and no density", "density",
-    )  # fmt: skip
-    yield line(
-        "bno055", "fixed drift", "±3 °/s", 3.0, 1.0,
-        "±3 °/s is the largest that the document prints, ±1 °/s is typical; all three axes of "
-        "Table 4 are beyond both", "rate",
-    )  # fmt: skip
-    yield line("bno055", "dynamic drift", "0.015 (°/s)/K", 0.015, 0.015, "", "coefficient")
-    yield line("mpu9250", "PSD", "0.01 (°/s)/√Hz", 0.01, 0.01, "", "density")
-    yield line("mpu9250", "fixed drift", "±5 °/s", 5.0, 5.0, "", "rate")
-    yield line(
-        "mpu9250", "dynamic drift", "0.05 (°/s)/K", 0.05, 30.0 / 125.0,
-        "the document prints ±30 °/s over -40 to 85 °C and no coefficient; 0.05 is printed of "
-        "another gyro of the vendor", "coefficient",
-    )  # fmt: skip
+        if not rows:
+            return None
+        if all(row.printed is None for row in rows):
+            reason = f"noise of {rows[0].grade_name}: {rows[0].reason}"
+            return Result(words="", verdict="not to be had", reason=reason)
+        by = {row.statistic: row for row in reversed(rows)}
+        shown = [
+            f"{count} by its {what}"
+            for statistic, what in (("N", "white noise"), ("sigma_min", "lowest point"))
+            if (count := _format_count(by.get(statistic)))
+        ]
+        words.append(name + ", ".join(shown))
+    return Result(fields={"counts": "; ".join(words)})
 
 
-def _of_axes() -> Iterator[Claim]:
-    for axis in AXES:
-        place = OF_BIAS[axis.sensor]
-        yield in_unit("rate", Claim(
-            place=place, quantity=f"fixed drift, {axis.name}", printed=f"{axis.bias_as} °/s",
-            value=axis.bias * DEGREE, evaluate=_evaluate_published(axis, place, "bias", 1.0),
-            basis="come back", page=axis.page, check=_OF_BOARD, tolerance=0.0,
-            reason="temperature moves the mean; ours is that at the mean temperature"
-        ))  # fmt: skip
-    for axis in AXES:
-        place = OF_NOISE[axis.sensor]
-        yield in_unit("rate", Claim(
-            place=place, quantity=f"PSD, {axis.name}: N/60, the −½ line at 1 h",
-            printed=f"{axis.psd_as} (°/s)/√Hz", value=axis.psd * DEGREE,
-            evaluate=_evaluate_published(axis, place, "N", 1.0 / math.sqrt(READ_AT)),
-            basis="come back",
-            page=axis.page, check=_OF_BOARD, reason="the log is one draw of the noise",
-        ))  # fmt: skip
-        yield _factor(axis, place)
-        yield in_unit("rate", Claim(
-            place=place, quantity=f"fixed drift, {axis.name}", printed=f"{axis.bias_as} °/s",
-            value=axis.bias * DEGREE,
-            evaluate=numeric_result(axis.bias * DEGREE, f"as in {OF_BIAS[axis.sensor]}"),
-            basis="checked", page=axis.page, tolerance=0.0,
-            check=f"{_TEST}::test_what_is_typed_here_is_what_the_board_is_simulated_from",
-        ))  # fmt: skip
-        yield in_unit("rate", Claim(
-            place=place, quantity=f"dynamic drift, {axis.name}: the floor, 0.664 B",
-            printed=f"{axis.floor_as} (°/s)/K", value=axis.floor * DEGREE,
-            evaluate=_evaluate_published(axis, place, "B", FLOOR), basis="come back",
-            page=axis.page,
-            check=_OF_BOARD,
-            reason="a floor in °/s, printed as a coefficient of temperature; read from the curve "
-            "it holds what N and temperature add", ))  # fmt: skip
-    yield Claim(
-        place="Table 8", quantity="SCC2130: fixed drift by the datasheet", printed="0 °/s",
-        evaluate=verbal_result("left out: the Allan deviation does not see it"), basis="checked",
-        page=page_of("scc2130"), check=f"{_TEST}::test_a_fixed_drift_does_not_move_the_curve",
-    )  # fmt: skip
-    yield Claim(
-        place="Table 8", quantity="SCC2130: ARW by the datasheet", printed="0.0002861 °/√Hz",
-        evaluate=verbal_result(
-            "0.0002236 by his own rule, 0.005/√500; 0.0002861 °/s is the bias instability, "
-            "1.03 °/h", "misprint"),
-        basis="checked", page=page_of("scc2130"),
-        check=f"{_TEST}::test_table_8_has_its_columns_mixed",
-        reason="the columns are mixed",
-    )  # fmt: skip
-    yield Claim(
-        place="Table 8", quantity="SCC2130: dynamic drift by the datasheet", printed="0.00041 °/K",
-        evaluate=verbal_result("the floor that Table 5 measured, not the datasheet's 0.0002861 °/s",
-                    "misprint"),
-        basis="checked", page=page_of("scc2130"),
-        check=f"{_TEST}::test_table_8_has_its_columns_mixed",
-        reason="the columns are mixed, and the floor is no coefficient of temperature",
-    )  # fmt: skip
-    yield Claim(
-        place="Section 4.1.1", quantity="deviation of a sample from a density",
-        printed="0.005 (°/s)/√Hz divided by √500",
-        evaluate=verbal_result(
-            "σ = N √f: 0.005/√2 × √500 = 0.079 °/s before the low-pass", "misprint"
-        ),
-        basis="checked", page="theory.html#units", check="tests/test_conversions.py",
-        reason="a density is multiplied by the root of the rate, and its one side is √2 too much",
-    )  # fmt: skip
-    two_sided = AXES[0].density / DATASHEETS["scc2130"]
-    yield Claim(
-        place="Section 4.1.1", quantity="SCC2130: noise beside its datasheet",
-        printed="lower, above all the ARW",
-        evaluate=verbal_result(
-            f"N by Table 5 is {two_sided:.2f} times the datasheet’s density if that is "
-            f"two-sided, {math.sqrt(2.0) * two_sided:.2f} times if one-sided", "possible"),
-        basis="computed", page=page_of("scc2130"),
-        check=f"{_TEST}::test_the_factor_of_60_has_its_check",
-        reason="lower or higher by the side of a density whose document is not at hand; most "
-        "vendors print one-sided ones",
-    )  # fmt: skip
-    yield Claim(
-        place="Section 4.1.2", quantity="MPU-9250: cut-off in the simulation",
-        printed="120 Hz in place of 188 Hz, as more alike", value=120.0, unit="Hz",
-        evaluate=numeric_result(first_order_of_noise_bandwidth(188.0),
-                      "first order, noise bandwidth 188 Hz"),
-        basis="computed", page=page_of("mpu9250"), tolerance=0.01,
-        check=f"{_TEST}::test_a_first_order_of_120_hz_passes_the_noise_of_188_hz",
-    )  # fmt: skip
+def _format_count(row: GradeRow | None) -> str:
+    """Return the least sufficient whole number as text; empty if it is unknown."""
+    if row is None or row.n_upper is None:
+        return ""
+    most = "at most " if row.n is None else ""
+    return f"{most}{max(math.ceil(row.n_upper if row.n is None else row.n), 1)}"
 
 
-def _factor(axis: Axis, place: str) -> Claim:
-    """Return the line for and against N as 60 times what is printed of an axis."""
-    samples = axis.meeting(False) * RATES[axis.sensor]
-    sheet = DATASHEETS[axis.sensor]
-    return Claim(
-        place=place, quantity=f"PSD, {axis.name}: is N 60 times the figure?",
-        printed="the −½ line, read at 1 h (section 3.8.1)",
-        evaluate=verbal_result(
-            f"the −½ line meets the floor at {axis.meeting(True):.3g} s with the 60, at "
-            f"{axis.meeting(False):.2g} s without", "possible"),
-        basis="computed", page=axis.page, check=f"{_TEST}::test_the_factor_of_60_has_its_check",
-        reason=f"for it: without the 60 the floor would begin after {_sample(samples)}, and hardly "
-        f"a −½ line could be drawn; {_AGAINST[axis.density > 2.0 * sheet]}N is then "
-        f"{axis.density / sheet:.2g} times the datasheet’s as Table 1 quotes it "
-        f"({math.sqrt(2.0) * axis.density / sheet:.2g} times, of a one-sided density)",
-    )  # fmt: skip
-
-
-_AGAINST = {True: "against it: ", False: ""}
-
-
-def _sample(number: float) -> str:
-    return f"{number:.0f} samples" if number >= 1.5 else "one sample"
-
-
-@dataclass(frozen=True)
-class _Equation:
-    number: int
-    quantity: str
-    printed: str
-    words: str = "holds"
-    verdict: Verdict = "agrees"
-    reason: str = ""
-    page: str = "theory.html#terms"
-    check: str = "tests/noise/test_terms.py"
-
-
-_FLOOR_PAGE, _SIDES = "theory.html#bias-instability", "theory.html#sidedness"
-_SIMULATOR = "tests/sensor_model/test_truth.py"
-_OF_SIDES = "of two-sided densities; of one-sided ones √2 less"
-_ONE_SIDE = "a vendor's density is one-sided: N is √2 less than what this gives"
-_CONVERSIONS = "tests/test_conversions.py"
-_CURVE_PAGE, _OF_CURVES = "theory.html#allan", "tests/test_allan.py"
-
-_EQUATIONS = (
-    _Equation(1, "a spinning top", "ΣM = −I φ′² sin θ cos θ + …", "", "not to be had",
-              "of spinning gyroscopes; these vibrate", "", _TEST),
-    _Equation(2, "reading of a gyro", "Ω_g = Ω + s_g + n_g", "rate, bias and noise",
-              check=_SIMULATOR),
-    _Equation(3, "density of the bias instability", "(R²/2π)/f for f ≤ f₀, 0 for f > 0",
-              "B² in place of R², f > f₀", "misprint",
-              "R is the rate ramp; the second case is f > f₀"),
-    _Equation(4, "B from the floor", "σ/0.662", "σ/0.664", "differs",
-              "√(2 ln 2/π) is 0.6643; equation 5 has it right", _FLOOR_PAGE),
-    _Equation(5, "floor of the bias instability", "√(2 ln 2/π) B ≅ 0.664 B", page=_FLOOR_PAGE),
-    _Equation(6, "ARW from a density of power", "√PSD/60", _OF_SIDES, "differs", _ONE_SIDE,
-              _SIDES, _CONVERSIONS),
-    _Equation(7, "ARW from a density of amplitude", "FFT/60", _OF_SIDES, "differs", _ONE_SIDE,
-              _SIDES, _CONVERSIONS),
-    _Equation(8, "ARW from rms and bandwidth", "σ/(60 √BW)", _OF_SIDES, "differs", _ONE_SIDE,
-              _SIDES, _CONVERSIONS),
-    _Equation(9, "density of white noise", "N²"),
-    _Equation(10, "Allan variance of white noise", "N²/τ"),
-    *(
-        _Equation(number, quantity, printed, check="tests/test_noise.py")
-        for number, quantity, printed in (
-            (11, "correlation of white noise", "0 for τ ≠ 0"),
-            (12, "the same at 0", "A δ(τ)"),
-            (13, "its density", "A"),
-            (14, "of a limited band", "A for |ω| ≤ ω_c"),
-            (15, "its correlation", "(A ω_c/π) sin(ω_c τ)/(ω_c τ)"),
-            (16, "normal distribution", "exp(−V²/2σ²)/(√(2π) σ)"),
-        )
-    ),
-    *(
-        _Equation(number, quantity, printed, page=_CURVE_PAGE, check=_OF_CURVES)
-        for number, quantity, printed in (
-            (17, "mean of a cluster", "(1/T) ∫ Ω dt"),
-            (18, "mean of the next cluster", "(1/T) ∫ Ω dt from t_k + T"),
-            (19, "their difference", "Ω_next − Ω_k"),
-            (20, "Allan variance", "½⟨(Ω_next − Ω_k)²⟩"),
-            (21, "angle", "∫ Ω dt"),
-            (22, "mean of a cluster from the angle", "(θ(k+n) − θ(k))/T"),
-        )
-    ),
-    _Equation(23, "Allan variance from the density", "4 ∫ S sin⁴(πfτ)/(πfτ)² df", "two-sided S"),
-    _Equation(24, "error of a deviation", "100/√(2(k − 1)) %",
-              "of separate clusters; overlapping ones have more degrees of freedom", "differs",
-              "an approximation; limits here follow from the degrees of freedom of the noise",
-              "theory.html#intervals", "tests/test_confidence.py"),
-    _Equation(25, "model of the simulator", "ω_g = ω + β_g + b_g + η_g",
-              "the same, with correlated noise, lines, lag, register and range",
-              check=_SIMULATOR),
-)  # fmt: skip
-
-
-def _equations() -> Iterator[Claim]:
-    for one in _EQUATIONS:
-        yield Claim(
-            place=f"Equation {one.number}", quantity=one.quantity, printed=one.printed,
-            evaluate=verbal_result(one.words, one.verdict), basis="checked", reason=one.reason,
-            page=one.page, check=one.check,
-        )  # fmt: skip
-
-
-@cache
-def _claims() -> tuple[Claim, ...]:
-    return (*_datasheets(), *_of_axes(), *_equations(), *figures(), *aim())
-
-
-PAPER = Paper(about=ENGERS, claims=lambda _: _claims())
+def fused_noise(run: Evidence) -> Result | None:
+    """Return N of the fused log, with the expectation from the log of one sensor, deg/sqrt(h)."""
+    one, fused = (
+        next(iter(run.rows(GradeRow, sensor=sensor, quantity="gyro", statistic="N")), None)
+        for sensor in (_SINGLE_SENSOR, _FUSED_SENSOR)
+    )
+    if one is None or fused is None or not one.value:
+        return None
+    expected = one.value / math.sqrt(_FUSED_COUNT) / DEGREE * 60.0
+    return Result(
+        value=fused.value, lower=fused.lower, upper=fused.upper, fields={"expected": expected}
+    )

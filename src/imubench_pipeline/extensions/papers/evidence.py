@@ -1,13 +1,15 @@
-"""Results of a run, for the claims of the papers."""
+"""Results of a run, and the counterparts that lines of the papers have in them."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import pyarrow as pa
 import pyarrow.compute as pc
 
+from imubench_pipeline.extensions.papers.printed import Verdict
 from imubench_pipeline.model.estimates import ParameterRow
 from imubench_pipeline.model.recordings import RecordingRow
 from imubench_pipeline.model.table import R
@@ -19,6 +21,20 @@ class Log(NamedTuple):
     sensor: str
     recording: str
     channel: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class Result:
+    """Counterpart of a line: a number, a text, or numbers for the texts of the line."""
+
+    value: float | None = None  # SI
+    lower: float | None = None  # of an interval, SI
+    upper: float | None = None
+    printed: float | None = None  # value of the line if it has none, SI
+    words: str | None = None  # replaces the words of the line
+    verdict: Verdict | None = None  # None: that of the line, or it follows from the numbers
+    reason: str | None = None  # replaces the reason of the line
+    fields: Mapping[str, object] = field(default_factory=dict)  # for the templates of the line
 
 
 class Evidence:

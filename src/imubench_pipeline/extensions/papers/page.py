@@ -6,14 +6,7 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from typing import Any
 
-from imubench_pipeline.extensions.papers.about import (
-    BASES,
-    PAPERS,
-    VERDICTS,
-    About,
-    Drawn,
-    Verdict,
-)
+from imubench_pipeline.extensions.papers.printed import Drawn, Paper, read_papers, read_terms
 from imubench_pipeline.extensions.papers.tables import AccuracyRow, PublishedRow
 from imubench_pipeline.report.payload import Arrays, channel_payload, looks
 from imubench_pipeline.report.search import Found
@@ -23,20 +16,21 @@ from imubench_pipeline.words.numbers import limit_digits, number_text, percent_t
 
 
 def _make_context(site: Site) -> dict[str, Any]:
-    there = _list_pages(site)
+    of_recordings = {view.page for view in site.views if not view.left_out}
+    there = of_recordings | {file for file, _ in site.navigation}  # pages to link to
     rows = site.rows(PublishedRow)
     arrays = Arrays()
     drawn = _select_curves(site)
     payloads = [channel_payload(channel, channel.rate, arrays) for _, _, channel in drawn]
     used = {channel["sensor"]: site.looks[channel["sensor"]] for channel in payloads}
     return {
-        "bases": BASES,
-        "verdicts": VERDICTS,
+        "bases": read_terms().bases,
+        "verdicts": {name: one.meaning for name, one in read_terms().verdicts.items()},
         "panel": _describe_accuracy(site.rows(AccuracyRow)),
         "papers": [
             _describe_paper(paper, own, there)
             | {"figures": [figure for figure in drawn if figure[0] in paper.drawn]}
-            for paper in PAPERS
+            for paper in read_papers()
             if (own := [row for row in rows if row.paper == paper.name])
         ],
         "page": {"looks": looks(used), "channels": payloads, "arrays": arrays.texts},
@@ -45,7 +39,9 @@ def _make_context(site: Site) -> dict[str, Any]:
 
 def _select_recordings(site: Site) -> list[RecordingView]:
     """Return the recordings whose curves are drawn."""
-    names = dict.fromkeys((one.sensor, one.recording) for paper in PAPERS for one in paper.drawn)
+    names = dict.fromkeys(
+        (one.sensor, one.recording) for paper in read_papers() for one in paper.drawn
+    )
     views = {view.full_name: view for view in site.views if view.simulated and not view.left_out}
     return [views[name] for name in names if name in views]
 
@@ -71,7 +67,7 @@ def _select_curves(site: Site) -> list[tuple[Drawn, RecordingView, ChannelView]]
     }
     return [
         (one, *channels[key])
-        for paper in PAPERS
+        for paper in read_papers()
         for one in paper.drawn
         if (key := (one.sensor, one.recording, one.channel)) in channels
     ]
@@ -105,24 +101,7 @@ def _format_cell(row: AccuracyRow) -> dict[str, str]:
     }
 
 
-def _list_pages(site: Site) -> set[str]:
-    """Return the pages that a line may link to."""
-    of_recordings = {view.page for view in site.views if not view.left_out}
-    return of_recordings | {file for file, _ in site.navigation}
-
-
-_VERDICT_COUNTS: dict[Verdict, tuple[str, str]] = {
-    "agrees": ("agrees", "agree"),
-    "differs": ("differs", "differ"),
-    "possible": ("is possible", "are possible"),
-    "refuted": ("is refuted", "are refuted"),
-    "misprint": ("is a misprint", "are misprints"),
-    "done here": ("is done here", "are done here"),
-    "not to be had": ("is not to be had", "are not to be had"),
-}
-
-
-def _describe_paper(paper: About, rows: Sequence[PublishedRow], there: set[str]) -> dict[str, Any]:
+def _describe_paper(paper: Paper, rows: Sequence[PublishedRow], there: set[str]) -> dict[str, Any]:
     verdicts = Counter(row.verdict for row in rows)
     return {
         "about": paper,
@@ -135,14 +114,13 @@ def _describe_paper(paper: About, rows: Sequence[PublishedRow], there: set[str])
             for row in rows
         ],
         "counts": [
-            f"{verdicts[verdict]} {words[verdicts[verdict] > 1]}"
-            for verdict, words in _VERDICT_COUNTS.items()
-            if verdicts[verdict]
+            f"{count} {words.several if count > 1 else words.one}"
+            for verdict, words in read_terms().verdicts.items()
+            if (count := verdicts[verdict])
         ],
         "filters": {
-            "place": list(dict.fromkeys(row.place for row in rows)),
-            "verdict": list(dict.fromkeys(row.verdict for row in rows)),
-            "basis": list(dict.fromkeys(row.basis for row in rows)),
+            name: list(dict.fromkeys(getattr(row, name) for row in rows))
+            for name in ("place", "verdict", "basis")
         },
     }
 
@@ -157,7 +135,7 @@ def cells(row: PublishedRow) -> dict[str, str]:
         digits = limit_digits(row.lower, row.upper, 3)
         shown = (row.found, row.lower, row.upper)
         value, lower, upper = (
-            None if x is None else number_text(x / row.scale, digits) for x in shown
+            x if x is None else number_text(x / row.scale, digits) for x in shown
         )
         unit = "" if row.printed_unit == "-" else f" {row.printed_unit}"
         found = f"{value}{unit}"
@@ -173,11 +151,10 @@ def cells(row: PublishedRow) -> dict[str, str]:
 
 def find_lines(site: Site) -> Iterator[Found]:
     """Yield every line of the papers, for the search."""
-    sections = {paper.name: paper.key for paper in PAPERS}
+    sections = {paper.name: f"papers.html#{paper.key}" for paper in read_papers()}
     for row in site.rows(PublishedRow):
-        title = f"{row.place}: {row.quantity}"
         words = f"{row.paper} {row.printed_as} {row.verdict}"
-        yield "paper", title, f"papers.html#{sections[row.paper]}", words
+        yield "paper", f"{row.place}: {row.quantity}", sections[row.paper], words
 
 
 READING = Section(
@@ -194,8 +171,7 @@ def words_of_reading(rows: Sequence[AccuracyRow]) -> str:
     of_curve = {row.parameter: row for row in rows if row.method == "curve"}
     if not of_curve:
         return ""
-    bias, walk = of_curve["B"], of_curve["K"]
-    off = ""
+    bias, walk, off = of_curve["B"], of_curve["K"], ""
     if bias.bias is not None:
         size = number_text(100.0 * abs(bias.bias), 2)
         off = f", {size} % too {'small' if bias.bias < 0 else 'large'}"

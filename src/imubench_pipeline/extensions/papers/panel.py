@@ -15,12 +15,12 @@ import numpy as np
 from imubench_pipeline.allan import allan_variance
 from imubench_pipeline.estimators import curve as reading
 from imubench_pipeline.estimators import least_squares
-from imubench_pipeline.estimators.estimate import PARAMETERS, Estimate
+from imubench_pipeline.estimators.estimate import PARAMETERS
 from imubench_pipeline.estimators.identifiability import bounds_of
 from imubench_pipeline.estimators.model_choice import PAPERS_MODEL
 from imubench_pipeline.estimators.spectrum import spectra
 from imubench_pipeline.estimators.whittle import Whittle, whittle_of
-from imubench_pipeline.extensions.papers.maia_printed import DURATION, MTI_GYRO
+from imubench_pipeline.extensions.papers.maia_draws import DURATION, MTI_GYRO
 from imubench_pipeline.extensions.papers.tables import AccuracyRow
 from imubench_pipeline.noise.simulate import channel_rng, simulate
 
@@ -87,9 +87,8 @@ def _estimate_log(number: int, before: Whittle | None) -> tuple[dict[str, Values
     by_likelihood = {
         name: value if value > 0.0 else None for name, value in zip(PARAMETERS, powers, strict=True)
     }
-    of_curve = {estimate.method: _get_values(estimate) for estimate in estimates}
+    of_curve: dict[str, Values] = {
+        estimate.method: {name: estimate.parameters[name].value for name in PARAMETERS}
+        for estimate in estimates
+    }
     return of_curve | {"likelihood_gm": by_likelihood}, whittle
-
-
-def _get_values(estimate: Estimate) -> Values:
-    return {name: estimate.parameters[name].value for name in PARAMETERS}

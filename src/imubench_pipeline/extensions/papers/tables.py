@@ -15,32 +15,27 @@ class PublishedRow(TableRow):
     place: Annotated[str, Column("table, figure, equation or section, with its number there")]
     quantity: Annotated[str, Column("of what, in words")]
     printed_as: Annotated[
-        str,
-        Column("as printed, with its unit; derived: what follows from it alone"),
+        str, Column("as printed, with its unit; derived: what follows from it alone")
     ]
     printed: Annotated[float | None, Column("the same; null: it is no number", "as in unit")] = None
     found: Annotated[float | None, Column("what is found here", "as in unit")] = None
     lower: Annotated[
-        float | None,
-        Column("lower limit of it, 95 % where no other is said", "as in unit"),
+        float | None, Column("lower limit of it, 95 % where no other is said", "as in unit")
     ] = None
     upper: Annotated[float | None, Column("upper limit of it", "as in unit")] = None
     found_words: Annotated[str | None, Column("beside the number, or in its place")] = None
     ratio: Annotated[float | None, Column("found over printed")] = None
     tolerance: Annotated[
-        float | None,
-        Column("how far from 1 a ratio still agrees; null: there is no ratio"),
+        float | None, Column("how far from 1 a ratio still agrees; null: there is no ratio")
     ] = None
     unit: Annotated[str, Column("SI unit of the numbers")]
     printed_unit: Annotated[str, Column("unit in which the paper prints it")]
     scale: Annotated[float, Column("one printed unit", "as in unit")]
     basis: Annotated[
-        str,
-        Column("come back, simulated, computed or checked: what is found rests on that"),
+        str, Column("come back, simulated, computed or checked: what is found rests on that")
     ]
     verdict: Annotated[
-        str,
-        Column("agrees, differs, possible, refuted, misprint, done here or not to be had"),
+        str, Column("agrees, differs, possible, refuted, misprint, done here or not to be had")
     ]
     reason: Annotated[str | None, Column("why they differ")] = None
     page: Annotated[str | None, Column("of the report, where its counterpart is")] = None
@@ -56,8 +51,7 @@ class AccuracyRow(TableRow):
     logs: Annotated[int, Column("simulated")]
     given: Annotated[int, Column("of them that the method gives a value for")]
     rmse: Annotated[
-        float | None,
-        Column("root mean square error of these values over the truth"),
+        float | None, Column("root mean square error of these values over the truth")
     ] = None
     bias: Annotated[float | None, Column("their mean error over the truth")] = None
     bound: Annotated[float, Column("Cramér-Rao bound of the standard deviation over the truth")]

@@ -1,16 +1,18 @@
-"""The tables of Maia et al., typed by hand, and results that follow from them alone."""
+"""Printed parameters of Maia et al., and the spread of single logs and reconstructions of them."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import cache, lru_cache
+from functools import cache
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from imubench_pipeline.estimators.score import beats, rms
+from imubench_pipeline.extensions.papers.evidence import Log
+from imubench_pipeline.extensions.papers.printed import parse_number, read_paper
 from imubench_pipeline.noise import FLOOR, PEAK_TAU, NoiseModel
 from imubench_pipeline.noise.simulate import channel_rng, ensemble
 from imubench_pipeline.typing import Array
@@ -23,7 +25,7 @@ MEMBERS = 200
 
 Grid = Literal["steps", "every"]
 
-GRIDS: dict[Grid, str] = {"steps": "nine τ a decade", "every": "every n of equation 10"}
+GRIDS: tuple[Grid, ...] = ("steps", "every")
 """The paper does not print at which tau it compares two curves: the program that it names plots
 1, 2, ... 9, 10, 20, ... samples; its equation 10 has every n up to half of the log."""
 
@@ -33,7 +35,7 @@ _CLUSTER_SIZES = 100
 
 @dataclass(frozen=True)
 class Channel:
-    """One axis of one sensor, with what the paper prints of it; SI throughout."""
+    """One axis of one sensor with its printed values, SI."""
 
     name: str  # as the paper calls it
     sensor: str  # its sensor file
@@ -43,42 +45,37 @@ class Channel:
     table_2: NoiseModel  # optimised
     table_3: tuple[float, float]  # RMS of one reconstruction by Table 1, and by Table 2
 
+    @property
+    def log(self) -> Log:
+        """The simulated log."""
+        return Log(self.sensor, "sim_published", self.channel)
 
-def _make_model(N: float, B: float, K: float, T_B: float) -> NoiseModel:
-    return NoiseModel(N=N, B=B, T_B=T_B, K=K)
+
+def _read_channels() -> dict[str, Channel]:
+    figures = read_paper("maia").figures
+
+    def model(key: str, table: str) -> NoiseModel:
+        by = {row["symbol"]: parse_number(row[table]) for row in figures[key]}
+        return NoiseModel(N=by["N"], B=by["B"], K=by["K"], T_B=by["T_B"])
+
+    return {
+        row["key"]: Channel(
+            row["name"],
+            row["sensor"],
+            row["channel"],
+            float(row["rate"]),
+            model(row["key"], "table_1"),
+            model(row["key"], "table_2"),
+            (parse_number(row["state_space"]), parse_number(row["optimised"])),
+        )
+        for row in figures["channels"]
+    }
 
 
-CHANNELS = (
-    Channel(
-        "MTi-7 accelerometer", "mti_7", "accel_x", 100.0,
-        _make_model(9.5e-4, 3.6e-4, 1.5e-5, 84.6), _make_model(9.6e-4, 3.4e-4, 1.7e-5, 38.3),
-        (3.9e-4, 1.0e-4),
-    ),
-    Channel(
-        "MTi-7 gyro", "mti_7", "gyro_x", 100.0,
-        _make_model(8.5e-5, 5.7e-5, 1.0e-6, 223.5), _make_model(8.4e-5, 6.7e-5, 8.2e-7, 89.5),
-        (4.2e-5, 8.6e-6),
-    ),
-    Channel(
-        "C102-F9R accelerometer", "c102_f9r", "accel_x", 50.0,
-        _make_model(1.1e-3, 7.2e-4, 1.5e-5, 18.5), _make_model(1.1e-3, 7.2e-4, 2.0e-5, 148.9),
-        (4.2e-4, 1.2e-4),
-    ),
-    Channel(
-        "C102-F9R gyro", "c102_f9r", "gyro_x", 50.0,
-        _make_model(5.8e-3, 3.0e-3, 1.3e-4, 29.0), _make_model(5.7e-3, 3.4e-3, 8.7e-5, 68.3),
-        (1.8e-3, 5.0e-4),
-    ),
-)  # fmt: skip
+CHANNELS = _read_channels()
+"""The channels of the paper by their keys."""
 
-MTI_ACCEL, MTI_GYRO, C102_ACCEL, C102_GYRO = CHANNELS
-
-TABLE_4 = {
-    "N": {"accel_x": 12.0e-4, "gyro_x": 12.0e-5},
-    "B": {"accel_x": 3.0e-4, "gyro_x": 4.8e-5},
-}
-"""Figures of the manufacturer for the MTi-7, as the paper prints them."""
-
+MTI_GYRO = CHANNELS["mti_gyro"]
 
 Range = tuple[float, float, float]
 """The quantiles of 5, 50 and 95 %, SI."""
@@ -88,26 +85,26 @@ Range = tuple[float, float, float]
 class Lottery:
     """Scores of single reconstructions against single logs of Table 2, for one grid of tau."""
 
-    state_space: Range  # reconstructed by Table 1
-    optimised: Range  # by Table 2 itself
+    ranges: tuple[Range, Range]  # reconstructed by Table 1, and by Table 2 itself
     beats: float  # chance that a reconstruction by Table 1 has the lower RMS of two
     beyond: tuple[float, float]  # shares of them at least as large as the printed figures
     slow: float  # share of the mean square that comes of tau beyond 300 s, by Table 2
 
 
-def sizes(channel: Channel, grid: Grid) -> NDArray[np.int64]:
-    """Return the cluster sizes of a grid up to half of the log, shape (m,)."""
+def sizes(channel: Channel, grid: str) -> NDArray[np.int64]:
+    """Return the cluster sizes of a grid of `GRIDS`, or ("read") of reading a curve, shape (m,)."""
     longest = round(DURATION * channel.rate) // 2
+    if grid == "steps":
+        steps = np.outer(10 ** np.arange(len(str(longest))), np.arange(1, 10)).ravel()
+        return steps[steps <= longest]
     if grid == "every":
-        return np.rint((np.arange(_CLUSTER_SIZES) + 0.5) * longest / _CLUSTER_SIZES).astype(
-            np.int64
-        )
-    decades = 10 ** np.arange(len(str(longest)))
-    steps = np.outer(decades, np.arange(1, 10)).ravel()
-    return steps[steps <= longest]
+        chosen = (np.arange(_CLUSTER_SIZES) + 0.5) * longest / _CLUSTER_SIZES
+    else:
+        chosen = np.geomspace(1.0, DURATION / 9.0, _CLUSTER_SIZES) * channel.rate
+    return np.rint(chosen).astype(np.int64)
 
 
-@lru_cache(maxsize=len(CHANNELS) * len(GRIDS))
+@cache
 def lottery(channel: Channel, grid: Grid) -> Lottery:
     """Return the spread of Table 3 for logs with the model of Table 2.
 
@@ -126,21 +123,20 @@ def lottery(channel: Channel, grid: Grid) -> Lottery:
         for values, printed in zip(of_each, channel.table_3, strict=True)
     ]
     return Lottery(
-        _compute_range(of_each[0]),
-        _compute_range(of_each[1]),
+        (_compute_range(of_each[0]), _compute_range(of_each[1])),
         float(np.mean(chances)),
         (beyond[0], beyond[1]),
         float(square[:, n > 300.0 * channel.rate].sum() / square.sum()),
     )
 
 
-@lru_cache(maxsize=len(CHANNELS))
+@cache
 def readings(channel: Channel) -> dict[str, Range]:
     """Return what reading the curves of single logs of Table 2 gives of N, B, K and T_B.
 
     N is read at 1 s, K at a ninth of the log, B and T_B at the lowest point between them.
     """
-    tau = _select_reading_sizes(channel) / channel.rate
+    tau = sizes(channel, "read") / channel.rate
     curves = _simulate_deviations(channel)[0]["read"]
     return {
         "N": _compute_range(curves[:, 0] * math.sqrt(tau[0])),
@@ -150,18 +146,10 @@ def readings(channel: Channel) -> dict[str, Range]:
     }
 
 
-def _select_reading_sizes(channel: Channel) -> NDArray[np.int64]:
-    """Return the cluster sizes at which a curve is read, shape (m,)."""
-    return np.rint(np.geomspace(1.0, DURATION / 9.0, _CLUSTER_SIZES) * channel.rate).astype(
-        np.int64
-    )
-
-
-@lru_cache(maxsize=len(CHANNELS))
+@cache
 def _simulate_deviations(channel: Channel) -> tuple[dict[str, Array], ...]:
     """Return Allan deviations: of logs of Table 2, of draws by Table 1, of others by Table 2."""
-    grids: dict[str, NDArray[np.int64]] = {grid: sizes(channel, grid) for grid in GRIDS}
-    grids["read"] = _select_reading_sizes(channel)
+    grids = {grid: sizes(channel, grid) for grid in (*GRIDS, "read")}
     together = np.unique(np.concatenate(list(grids.values())))
     samples = round(DURATION * channel.rate)
 

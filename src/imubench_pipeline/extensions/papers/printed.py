@@ -1,0 +1,154 @@
+"""The papers as printed: one YAML file of ``data/`` for each, read into frozen dataclasses."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cache
+from pathlib import Path
+from typing import Any, Literal
+
+from imubench_pipeline.settings.validation import Strict, parse
+from imubench_pipeline.settings.yaml_files import read_yaml
+
+_FOLDER = Path(__file__).with_name("data")
+KEYS = ("maia", "silva", "engers")
+"""Names of the files, in the order in which the papers are shown."""
+
+Basis = Literal["come back", "simulated", "computed", "checked"]
+"""Basis of a result; `Terms.bases` describes it."""
+
+Verdict = Literal[
+    "agrees", "differs", "possible", "refuted", "misprint", "done here", "not to be had"
+]
+
+_POWERS = str.maketrans("⁰¹²³⁴⁵⁶⁷⁸⁹⁻,", "0123456789-.")
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """A curve that corresponds to figures of a paper."""
+
+    figures: str  # of the paper
+    sensor: str
+    recording: str
+    channel: str
+    methods: str  # methods with a curve, in addition to the curve of the log
+
+
+@dataclass(frozen=True)
+class Unit:
+    """A unit as a paper prints it."""
+
+    si: str
+    scale: float = 1.0  # SI per printed unit
+
+
+@dataclass(frozen=True, kw_only=True)
+class Line:
+    """One line of a paper; its texts are templates for `str.format`."""
+
+    place: str  # "Table 3", "Figure 5", "Equation 26" or "Section 6", as numbered there
+    quantity: str
+    printed: str  # as printed, with its unit; or "derived: " and the derived value
+    value: str = ""  # number in ``printed``, in the printed unit; empty: it is no number
+    unit: str = "-"  # as printed
+    # "module.name" of the function (or number) that is its counterpart, and arguments in words
+    find: tuple[str, ...] = ()
+    found: str = ""  # result that needs no function, in the printed unit
+    words: str = ""  # with the result, or instead of it
+    verdict: Verdict | None = None  # None: it follows from the numbers
+    why: str = ""  # why the two differ; shown only then
+    missing: str = ""  # why there is no result where the function returns None
+    basis: Basis
+    page: str = ""  # page of the report with the counterpart, and its anchor if any
+    check: str  # test or benchmark of the line: "tests/...::name" or a file
+    tolerance: float = 0.05  # relative difference that still agrees
+    fields: Mapping[str, str] = field(default_factory=dict)  # for the templates
+
+
+@dataclass(frozen=True, kw_only=True)
+class Paper:
+    """A paper with its lines, in the order of the paper."""
+
+    key: str  # "maia"
+    name: str  # "Maia et al."
+    title: str  # subject of the paper
+    # sensor and recording of the logs that stand for its own; a run that has none leaves it out
+    logs: tuple[tuple[str, str], ...]
+    # sentences: what is assumed, whose input comes back, what is typed by hand
+    declared: tuple[str, ...]
+    drawn: tuple[Drawn, ...] = ()
+    units: Mapping[str, Unit]  # by the printed unit; others are SI
+    figures: Mapping[str, tuple[Mapping[str, str], ...]]  # printed tables, row by row
+    lines: tuple[Line, ...]
+
+
+class _File(Strict):
+    paper: Paper
+
+
+class Explained(Strict):
+    """A verdict: its meaning, and the words after one line and after several."""
+
+    meaning: str
+    one: str
+    several: str
+
+
+class Terms(Strict):
+    """Explanations of the bases and verdicts of the table ``published``."""
+
+    bases: dict[Basis, str]
+    verdicts: dict[Verdict, Explained]
+
+
+@cache
+def read_terms() -> Terms:
+    """Return the explanations of the bases and verdicts."""
+    path = _FOLDER / "terms.yaml"
+    return parse(Terms, read_yaml(path), str(path))
+
+
+def read_papers() -> list[Paper]:
+    """Return all papers, in the order in which they are shown."""
+    return [read_paper(key) for key in KEYS]
+
+
+@cache
+def read_paper(key: str) -> Paper:
+    """Return a paper of `KEYS`.
+
+    Raises
+    ------
+    ConfigError
+        If its file cannot be used.
+    """
+    path = _FOLDER / f"{key}.yaml"
+    data: Any = read_yaml(path)
+    lines = list(_expand(data.pop("lines"), data.pop("defaults"), {}, data["figures"]))
+    return parse(_File, {"paper": data | {"key": key, "lines": lines}}, str(path)).paper
+
+
+def _expand(
+    entries: Sequence[Mapping[str, Any]],
+    inherited: Mapping[str, Any],
+    fields: Mapping[str, str],
+    tables: Mapping[str, Sequence[Mapping[str, str]]],
+) -> Iterator[dict[str, Any]]:
+    """Yield the lines of entries, which may have lines of their own, one for each of a table."""
+    for entry in entries:
+        own = {**inherited, **entry}
+        each, lines = own.pop("each", [{}]), own.pop("lines", None)
+        for row in tables[each.format(**fields)] if isinstance(each, str) else each:
+            named = {**fields, **{key: str(value).format(**fields) for key, value in row.items()}}
+            if lines is None:
+                yield {**own, "fields": named}
+            else:
+                yield from _expand(lines, own, named, tables)
+
+
+def parse_number(text: str) -> float:
+    """Return a printed number, such as 8,4·10⁻⁵ or ±3."""
+    digits = text.lstrip("±").translate(_POWERS)
+    return float(digits.replace("·10", "e").replace(" × 10", "e"))
