@@ -17,6 +17,7 @@ from typing import TypeVar
 
 import pyarrow as pa
 
+from imubench_pipeline.model.table import TableRow
 from imubench_pipeline.readers.bounded import BoundError, bounded
 from imubench_pipeline.recordings.ingest import write_failed
 from imubench_pipeline.recordings.recording import static_logs
@@ -26,14 +27,14 @@ from imubench_pipeline.run.plan import Plan
 from imubench_pipeline.run.resources import limits_of_steps
 from imubench_pipeline.settings.config import AllanSettings, ReconstructionSettings
 from imubench_pipeline.steps import allan as allan_step
-from imubench_pipeline.steps import datasheet as datasheet_step
+from imubench_pipeline.steps.datasheet import datasheet_tables
 from imubench_pipeline.steps.error_budget import error_tables
 from imubench_pipeline.steps.estimate import Estimation, estimation
 from imubench_pipeline.steps.ingest import write_recording
 from imubench_pipeline.steps.reconstruct import ReconstructionRows, reconstruction_rows
 from imubench_pipeline.steps.sensor_tables import joined_tables
 from imubench_pipeline.steps.tables import tables_of_all
-from imubench_pipeline.tables import build, write, write_arrow
+from imubench_pipeline.tables import build, write, write_arrow, write_each
 from imubench_pipeline.tables.failures import Cause, Failure, describe_error, write_empty
 from imubench_pipeline.tables.schemas import OF_ONE_RECORDING, TABLES
 
@@ -125,14 +126,8 @@ class Analysis:
 
     def _estimate(self, sensor: str, recording: str, channel: str) -> Estimation:
         folder = self._get_folder(sensor, recording)
-        rows = estimation(
-            folder / "quality.json",
-            folder / "curve.parquet",
-            sensor,
-            recording,
-            self._plan.estimate_settings(sensor, recording),
-            channels={channel},
-        )
+        settings = self._plan.estimate_settings(sensor, recording)
+        rows = estimation(folder, sensor, recording, settings, {channel})
         rows.paths.clear()
         return rows
 
@@ -155,31 +150,17 @@ class Analysis:
     def _compare(self, sensor: str, recording: str) -> None:
         """Compare a recording with its datasheet, and compute its error budget."""
         folder, plan = self._get_folder(sensor, recording), self._plan
-        stated = (folder, sensor, recording, plan.datasheet_settings(sensor))
-        write("datasheet", datasheet_step.rows(*stated), folder / "datasheet.parquet")
-        write(
-            "datasheet_curve",
-            datasheet_step.curve_rows(*stated),
-            folder / "datasheet_curve.parquet",
-        )
-        inputs = {
-            name: folder / f"{name}.parquet"
-            for name in ("parameters", "draws", "temperature", "deterministic")
-        } | {"quality": folder / "quality.json"}
-        names = {"sensor": sensor, "recording": recording}
-        for table, rows in error_tables(inputs, names, plan.error_budget_settings(sensor)).items():
-            write(table, rows, folder / f"{table}.parquet")
+        stated = plan.datasheet_settings(sensor)
+        tables: dict[str, Iterable[TableRow]] = {
+            **datasheet_tables(folder, sensor, recording, stated),
+            **error_tables(folder, sensor, recording, plan.error_budget_settings(sensor)),
+        }
+        write_each(tables, (folder / f"{name}.parquet" for name in tables))
 
     def _reconstruct(self, sensor: str, recording: str, channel: str) -> ReconstructionRows:
         folder = self._get_folder(sensor, recording)
         settings = ReconstructionSettings.model_validate_json(self._plan.settings("reconstruction"))
-        inputs = (
-            "quality.json",
-            "allan.parquet",
-            "parameters.parquet",
-            "allan_compensated.parquet",
-        )
-        return reconstruction_rows([folder / name for name in inputs], settings, {channel})
+        return reconstruction_rows(folder, settings, {channel})
 
     # ---------------------------------------------------------------------------- all together
 
