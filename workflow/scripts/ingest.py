@@ -11,5 +11,5 @@ if __name__ == "__main__":
         snakemake.params.settings,
         names.sensor,
         names.recording,
-        {name: Path(path) for name, path in snakemake.output.items()},
+        Path(snakemake.output.quality).parent,
     )

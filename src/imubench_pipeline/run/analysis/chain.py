@@ -35,16 +35,13 @@ from imubench_pipeline.steps.reconstruct import ReconstructionRows, reconstructi
 from imubench_pipeline.steps.sensor_tables import joined_tables
 from imubench_pipeline.steps.tables import tables_of_all
 from imubench_pipeline.tables import build, write, write_arrow, write_each
-from imubench_pipeline.tables.failures import Cause, Failure, describe_error, write_empty
+from imubench_pipeline.tables.failures import Failure, describe_error, write_empty
 from imubench_pipeline.tables.schemas import OF_ONE_RECORDING, TABLES
 
 T = TypeVar("T")
 K = TypeVar("K", bound=tuple[str, ...])
 Say = Callable[[str], None]
 
-_INGEST_FILES = {"quality": "quality.json"} | {
-    name: f"{name}.parquet" for name in ("envelope", "histogram")
-}
 _ESTIMATE_TABLES = tuple(
     field.name for field in fields(Estimation) if field.name not in ("estimates", "paths")
 )
@@ -116,10 +113,9 @@ class Analysis:
     def _read(self, sensor: str, recording: str) -> list[str]:
         """Read a log and take its curves; return its channels."""
         folder = self._get_folder(sensor, recording)
-        outputs = {name: folder / file for name, file in _INGEST_FILES.items()}
         source = self._plan.recordings[sensor, recording].path
         settings = self._plan.ingest_settings(sensor, recording)
-        write_recording(source, settings, sensor, recording, outputs)
+        write_recording(source, settings, sensor, recording, folder)
         how = AllanSettings.model_validate_json(self._plan.settings("allan"))
         write("allan", allan_step.curves(folder, sensor, recording, how), folder / "curve.parquet")
         return list(static_logs(folder))
@@ -172,7 +168,7 @@ class Analysis:
         for sensor in dict.fromkeys(sensor for sensor, _ in plan.recordings):
             folders = [self._get_folder(*key) for key in plan.recordings if key[0] == sensor]
             own = {name: [folder / f"{name}.parquet" for folder in folders] for name in names}
-            own["quality"] = [folder / _INGEST_FILES["quality"] for folder in folders]
+            own["quality"] = [folder / "quality.json" for folder in folders]
             tables = joined_tables(
                 own,
                 plan.truths(sensor),
@@ -204,36 +200,30 @@ class Analysis:
     def _run_bounded(self, step: str, function: Callable[..., T], key: tuple[str, ...]) -> T | None:
         """Call a step in a separate process; if it fails, its recording is left out."""
         sensor, recording, *_ = key
-        failure = self._failed.get((sensor, recording))
-        if failure is not None:
-            self._write_nothing(step, sensor, recording, failure)
+        folder = self._get_folder(sensor, recording)
+        tables = (folder / f"{name}.parquet" for name in _TABLES_OF_STEP[step])
+        if (earlier := self._failed.get((sensor, recording))) is not None:
+            write_empty(tables, earlier)
             return None
         limit = self._limits(sensor, recording)
         begun = time.monotonic()
         try:
             value = bounded(limit.seconds, limit.memory, function, *key)
         except BoundError as error:
-            self._leave_out(step, sensor, recording, "time", f"the step {step} {error}")
-            return None
+            failure = Failure(sensor, recording, step, "time", f"the step {step} {error}")
         except Exception as error:  # the others go on
             words = one_line(f"the step {step} failed: {describe_error(error)}")
-            self._leave_out(step, sensor, recording, "error", words)
-            return None
-        if time.monotonic() - begun > _MIN_REPORTED_TIME:
-            self._say(f"{'/'.join(key[1:])}: {step} done")
-        return value
-
-    def _leave_out(self, step: str, sensor: str, recording: str, cause: Cause, reason: str) -> None:
-        failure = Failure(sensor, recording, step, cause, reason)
+            failure = Failure(sensor, recording, step, "error", words)
+        else:
+            if time.monotonic() - begun > _MIN_REPORTED_TIME:
+                self._say(f"{'/'.join(key[1:])}: {step} done")
+            return value
         self._failed.setdefault((sensor, recording), failure)
         if step == "ingest":
-            quality = self._get_folder(sensor, recording) / "quality.json"
-            write_failed(self._plan.ingest_settings(sensor, recording), failure, quality)
-        self._write_nothing(step, sensor, recording, failure)
-
-    def _write_nothing(self, step: str, sensor: str, recording: str, failure: Failure) -> None:
-        folder = self._get_folder(sensor, recording)
-        write_empty((folder / f"{name}.parquet" for name in _TABLES_OF_STEP[step]), failure)
+            settings = self._plan.ingest_settings(sensor, recording)
+            write_failed(settings, failure, folder / "quality.json")
+        write_empty(tables, failure)
+        return None
 
 
 def _collect_results(begun: Mapping[K, Future[T | None]]) -> dict[K, T]:
