@@ -42,22 +42,15 @@ class Lock:
     All processes with an open ``descriptor`` hold the lock. Snakemake inherits it, so the lock
     lasts until both processes end. While the lock is held, the file contains a note about the
     holder. A note in the file of a free lock comes from a run that did not reach its end.
-
-    Attributes
-    ----------
-    descriptor : int
-    since : float
-        When it was taken, s since 1970.
-    left_over : mapping
-        The note of a run that did not reach its end; otherwise empty. After a recovery the caller
-        sets it to empty; until then, the note stays for the next run.
     """
 
     def __init__(self, path: Path) -> None:
         self.path = path
         self.descriptor = -1
-        self.since = 0.0
+        self.since = 0.0  # when it was taken, s since 1970
         self.left_over: Mapping[str, Any] = {}
+        """The note of a run that did not reach its end; otherwise empty. After a recovery the
+        caller sets it to empty; until then, the note stays for the next run."""
 
     def acquire(self, wait: float = 0.0) -> None:
         """Acquire the lock; raise `TakenError` if another run holds it for more than `wait` s."""

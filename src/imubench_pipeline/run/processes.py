@@ -33,15 +33,8 @@ _MAX_KILL_TIME = 60.0
 class StepError(Exception):
     """Raised if a script of the workflow did not finish.
 
-    Attributes
-    ----------
-    cause : {"error", "killed", "time"} or None
-        None: not caused by the recording. The run was stopped, the disk is full, or the script
-        cannot be imported.
-    reason : str
-        In one line.
-    trace : str
-        Output of the script.
+    ``cause`` is None if it is not the recording: the run was stopped, the disk is full, or the
+    script cannot be imported. ``reason`` is one line, ``trace`` the traceback in the script.
     """
 
     def __init__(
@@ -55,28 +48,16 @@ class StepError(Exception):
 
 @dataclass(frozen=True)
 class Job:
-    """A script with its inputs and outputs.
-
-    Attributes
-    ----------
-    input, output, params, wildcards : object
-        Attributes of ``snakemake`` in the script; they are pickled.
-    log : Path
-        Output of the script is appended to it.
-    memory : int or None
-        Max. memory besides the memory of the forking process, bytes; None: no limit.
-    results : Path or None
-        Folder for the seals of its outputs (`imubench_pipeline.run.sealing`); None: no seals.
-    """
+    """A script with the attributes of ``snakemake`` in it, which are pickled."""
 
     script: Path
     input: Any
     output: Any
     params: Any
     wildcards: Any
-    log: Path
-    memory: int | None = None
-    results: Path | None = None
+    log: Path  # output of the script is appended to it
+    memory: int | None = None  # max. bytes besides the forking process; None: no limit
+    results: Path | None = None  # folder for the seals of its outputs; None: no seals
 
     @property
     def name(self) -> str:
@@ -100,16 +81,8 @@ class Processes:
     def run(self, job: Job, seconds: float | None = None) -> None:
         """Run a script to its end; several threads may run one each.
 
-        Parameters
-        ----------
-        job : Job
-        seconds : float, optional
-            Max. time without imports; a longer script is ended.
-
-        Raises
-        ------
-        StepError
-            If the script fails, is killed, or takes longer.
+        `seconds`: max. time without imports. Raise a `StepError` if the script fails, is killed, or
+        takes longer.
         """
         ours, theirs = Pipe()
         with ours:

@@ -56,14 +56,9 @@ _told: list[Callable[[str, str], str]] = []
 
 
 def follow(jobs: Iterable[Recording], told: Callable[[str, str], str]) -> None:
-    """Register the jobs of recordings, to show a line for each finished recording.
+    """Show a line for each finished recording.
 
-    Parameters
-    ----------
-    jobs : iterable of (str, str)
-        The recording of each job of this run that is of one.
-    told : callable
-        Returns the line about a recording.
+    `jobs`: the recording of each job of one; `told` returns the line about a recording.
     """
     _expected.clear()
     _expected.update(jobs)
@@ -71,11 +66,10 @@ def follow(jobs: Iterable[Recording], told: Callable[[str, str], str]) -> None:
 
 
 class LogHandler(LogHandlerBase):
-    """Shows how far a run is, and what is more than progress.
+    """Shows the progress of a run, errors and warnings.
 
-    The line of a terminal is there while jobs run. It is a single one, because a step writes its
-    errors to the terminal by itself: a taller display would be drawn over them. Who asks Snakemake
-    for a dry run or for all details gets what it says itself.
+    A terminal has a single line while jobs run: steps write their errors to the terminal, too, and
+    a taller display would cover them. A dry run and verbose runs show the output of Snakemake.
     """
 
     writes_to_stream = True

@@ -29,12 +29,7 @@ class Scripts:
     scripts fail as usual. A step also fails as usual if it is stopped with the run, the disk is
     full, or it cannot be imported.
 
-    Parameters
-    ----------
-    faults : Faults
-        Records of failures.
-    limits : callable, optional
-        Limits of a step of one recording or sensor; without them, each failure ends the job.
+    `limits`: of a step of one recording or sensor; without them, each failure ends the job.
     """
 
     def __init__(self, faults: Faults, limits: Limits | None) -> None:
@@ -43,17 +38,9 @@ class Scripts:
         self._processes = Processes()
 
     def __call__(self, *values: Any, **named: Any) -> None:
-        """Run a script to its end, or leave its outputs empty.
+        """Run a script to its end, or leave its outputs empty; see `script` of Snakemake.
 
-        Parameters
-        ----------
-        *values, **named
-            Arguments of the function `script` of Snakemake, named by its signature.
-
-        Raises
-        ------
-        StepError
-            If the run cannot go on without the script.
+        Raise a `StepError` if the run cannot continue without the script.
         """
         given = _SCRIPT_SIGNATURE.bind(*values, **named).arguments
         source = infer_source_file(given["path"], infer_source_file(given["basedir"]))

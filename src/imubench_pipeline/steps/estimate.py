@@ -7,6 +7,7 @@ from collections.abc import Callable, Container, Iterable, Iterator
 from dataclasses import asdict, dataclass, field, replace
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -277,9 +278,10 @@ _METHODS_BY_PREFERENCE = ("likelihood", "likelihood_gm", "weighted", "paper", "c
 
 def _model_rows(key: Key, fit: Likelihood) -> Iterator[ModelRow]:
     """Yield the rows of the table ``models``, the chosen model first."""
-    differs = describe_disagreement(fit.candidates)
     for place, candidate in enumerate(fit.candidates):
-        notes = [candidate.goodness.where, differs if place == 0 else None]
+        notes = [candidate.goodness.where]
+        if place == 0:
+            notes += [describe_disagreement(fit.candidates) or ""]
         yield ModelRow(
             **asdict(key),
             model=candidate.terms.name,
@@ -318,9 +320,10 @@ def _spectrum_rows(key: Key, fit: Likelihood) -> Iterator[SpectrumRow]:
 def _temperature_rows(key: Key, fit: ThermalFit) -> Iterator[TemperatureRow]:
     """Yield the rows of the table ``temperature``."""
     unit = SI_UNITS[quantity_of(key.channel)]["B"]
+    reason = fit.sensitivity.reason or fit.reason
     figures = {
         "T_0": (Parameter(fit.reference), "degC"),
-        "sensitivity": (fit.sensitivity, f"{unit}/K"),
+        "sensitivity": (replace(fit.sensitivity, reason=reason), f"{unit}/K"),
         "quadratic": (fit.quadratic, f"{unit}/K^2"),
         "lag": (fit.lag, "s"),
         "bias": (fit.bias, unit),
@@ -330,13 +333,7 @@ def _temperature_rows(key: Key, fit: ThermalFit) -> Iterator[TemperatureRow]:
             **asdict(key),
             compensated=fit.compensated,
             parameter=name,
-            value=parameter.value,
-            lower=parameter.lower,
-            upper=parameter.upper,
-            unit=its_unit,
-            status=parameter.status,
-            reason=parameter.reason or (fit.reason if name == "sensitivity" else None),
-            fitted=parameter.fitted,
+            **_estimate_columns(parameter, its_unit),
         )
 
 
@@ -355,14 +352,15 @@ def _low_pass_rows(key: Key, fit: Likelihood) -> Iterator[LowPassRow]:
             kind=low_pass.kind,
             order=low_pass.order,
             parameter=name,
-            value=parameter.value,
-            lower=parameter.lower,
-            upper=parameter.upper,
-            unit=unit,
-            status=parameter.status,
-            reason=parameter.reason,
-            fitted=parameter.fitted,
+            **_estimate_columns(parameter, unit),
         )
+
+
+def _estimate_columns(parameter: Parameter, unit: str) -> dict[str, Any]:
+    """Return the columns of an estimate that tables have in common."""
+    columns = asdict(parameter) | {"unit": unit}
+    del columns["duration_needed"]
+    return columns
 
 
 def resolution_of(log: ChannelLog) -> float:
@@ -373,11 +371,7 @@ def resolution_of(log: ChannelLog) -> float:
 
 
 def estimation(
-    folder: Path,
-    sensor: str,
-    recording: str,
-    settings: str,
-    channels: Container[str] | None = None,
+    folder: Path, sensor: str, recording: str, settings: str, channels: Container[str] | None = None
 ) -> Estimation:
     """Return the rows of all or some channels in a folder; none of a rejected recording."""
     sections = json.loads(settings)

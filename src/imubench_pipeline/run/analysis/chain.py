@@ -64,18 +64,8 @@ _MIN_REPORTED_TIME = 3.0
 class Analysis:
     """The steps of all recordings of a plan: first for the numbers, then for the pages.
 
-    A recording with a failed step is left out, and is listed in the table ``failures``.
-
-    Parameters
-    ----------
-    plan : Plan
-        Its results are in a separate folder.
-    compiling : Compilation
-        Estimates wait for its end.
-    cores : int
-        Number of parallel processes.
-    say : callable
-        Called with progress messages.
+    A recording with a failed step is left out, and is listed in the table ``failures``. `cores`:
+    number of parallel processes; `say` is called with progress messages.
     """
 
     def __init__(self, plan: Plan, compiling: Compilation, cores: int, say: Say) -> None:
@@ -107,8 +97,6 @@ class Analysis:
             _collect_results(compared)
         self._write_parts(_RECONSTRUCTION_TABLES, parts)
         return self._join_tables((*_ESTIMATE_TABLES, *_COMPARISON_TABLES, *_RECONSTRUCTION_TABLES))
-
-    # ------------------------------------------------------------------ the steps of a recording
 
     def _read(self, sensor: str, recording: str) -> list[str]:
         """Read a log and take its curves; return its channels."""
@@ -158,8 +146,6 @@ class Analysis:
         settings = ReconstructionSettings.model_validate_json(self._plan.settings("reconstruction"))
         return reconstruction_rows(folder, settings, {channel})
 
-    # ---------------------------------------------------------------------------- all together
-
     def _join_tables(self, made: Sequence[str]) -> dict[str, pa.Table]:
         """Join the tables that were made, by sensor and of all sensors; the others are empty."""
         plan = self._plan
@@ -188,11 +174,7 @@ class Analysis:
         return self._plan.run.results / "recordings" / sensor / recording
 
     def _submit(
-        self,
-        beside: ThreadPoolExecutor,
-        step: str,
-        keys: Iterable[K],
-        function: Callable[..., T],
+        self, beside: ThreadPoolExecutor, step: str, keys: Iterable[K], function: Callable[..., T]
     ) -> dict[K, Future[T | None]]:
         """Begin a step for each key, of a recording that is not left out."""
         return {key: beside.submit(self._run_bounded, step, function, key) for key in keys}
