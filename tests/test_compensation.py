@@ -13,8 +13,8 @@ from imubench_pipeline.noise.simulate import simulate
 from imubench_pipeline.recordings.recording import ChannelLog
 from imubench_pipeline.settings.config import EstimateSettings, Run, read_run
 from imubench_pipeline.settings.validation import ConfigError
+from imubench_pipeline.steps.allan import read_compensated_curves
 from imubench_pipeline.steps.estimate import Estimation, estimate_channel
-from imubench_pipeline.steps.kept_curves import compensated_curves
 from imubench_pipeline.tables import build, write
 from imubench_pipeline.tables.keys import Key
 from tests.kept import curve_of, kept
@@ -169,7 +169,7 @@ def test_the_tables_give_estimate_and_curve_back(
     )
     assert back.model.name == "N+K"
     measured = curve_of(warm)
-    curve = compensated_curves(tmp_path / "left.parquet", {"gyro_x": measured})["gyro_x"]
+    curve = read_compensated_curves(tmp_path / "left.parquet", {"gyro_x": measured})["gyro_x"]
     adev = [row["adev"] for row in found.allan_compensated]
     np.testing.assert_allclose(curve.deviation, adev, rtol=1e-12)
     assert curve.edf_source == ("fitted spectrum",) * len(measured.tau)

@@ -133,10 +133,8 @@ def test_an_ingest_keeps_what_it_read(tmp_path: Path, good: bool) -> None:
     places = {name: str(tmp_path / name) for name in ("logs", "sensors", "results")}
     plan = Plan(places | {"simulated": "false"})
     folder = tmp_path / "results/recordings/s/a"
-    outputs = {name: folder / name for name in ("quality", "envelope", "histogram")}
-    outputs["quality"] = folder / "quality.json"
     settings = plan.ingest_settings("s", "a")
-    write_recording(plan.recordings["s", "a"].path, settings, "s", "a", outputs)
+    write_recording(plan.recordings["s", "a"].path, settings, "s", "a", folder)
     again = Plan(places | {"simulated": "false"})
     assert again.ingest_settings("s", "a") == settings
     log = tmp_path / "logs/s/a.csv"

@@ -16,9 +16,8 @@ from imubench_pipeline.run.plan import Plan
 from imubench_pipeline.settings.config import AllanSettings, ReconstructionSettings
 from imubench_pipeline.steps.allan import curves
 from imubench_pipeline.steps.estimate import estimation
-from imubench_pipeline.steps.reconstruct import reconstruct, write_reconstruction
+from imubench_pipeline.steps.reconstruct import reconstruct, reconstruction_rows
 from imubench_pipeline.tables import build, write
-from imubench_pipeline.tables import read as read_table
 from imubench_pipeline.tables.keys import Key
 
 MODEL = NoiseModel(N=1e-3, B=2e-3, T_B=10.0, K=1e-4)
@@ -109,17 +108,14 @@ def test_what_authors_read_is_reconstructed_and_scored_beside_the_methods(rng, t
     write("allan", curves(folder, *names, AllanSettings()), folder / "curve.parquet")
     # Twice the noise that the log has, and no B: what the source does not print is no value.
     asked = json.loads(plan.estimate_settings(*names)) | {"authors": {"gyro_x": {"N": 2e-3}}}
-    into = estimation(folder / "quality.json", folder / "curve.parquet", *names, json.dumps(asked))
+    into = estimation(folder, *names, json.dumps(asked))
     read = {row["parameter"]: row for row in into.parameters if row["method"] == "authors"}
     assert read["N"]["value"] == 2e-3 and read["B"]["status"] == "not_shown"
     assert not any(row["recommended"] for row in read.values())
     for table in ("allan", "parameters", "allan_compensated"):
         write(table, getattr(into, table), folder / f"{table}.parquet")
-    inputs = [folder / name for name in ("quality.json", "allan.parquet", "parameters.parquet",
-                                         "allan_compensated.parquet")]  # fmt: skip
-    outputs = [folder / "reconstruction.parquet", folder / "scores.parquet"]
-    write_reconstruction(inputs, outputs, ReconstructionSettings())
-    scores = {row["method"]: row for row in read_table("scores", outputs[1:]).to_pylist()}
+    rows = reconstruction_rows(folder, ReconstructionSettings())
+    scores = {row["method"]: row for row in rows.scores}
     assert scores["authors"]["rms_log10"] == pytest.approx(np.log10(2.0), abs=0.02)
     assert scores["curve"]["rms_log10"] < 0.05
     assert scores["authors"]["beats"] < 0.01

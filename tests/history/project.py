@@ -44,7 +44,6 @@ class InThisProcess(Processes):
 
     def run(self, job: Job, seconds: float | None = None) -> None:
         folder = Path(job.output[0]).parent
-        outputs = {Path(path).stem: Path(path) for path in job.output}
         try:
             folder.mkdir(parents=True, exist_ok=True)
             with sealed(job):
@@ -52,7 +51,7 @@ class InThisProcess(Processes):
                     Path(job.params.source),
                     job.params.settings,
                     *(job.wildcards[name] for name in ("sensor", "recording")),
-                    outputs,
+                    folder,
                 )
         except Exception as error:
             if isinstance(error, OSError) and error.errno == 28:

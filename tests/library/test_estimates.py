@@ -29,9 +29,9 @@ def of_workflow(drop_zone: Path, tmp_path_factory: pytest.TempPathFactory):
     settings = plan.ingest_settings(*names)
     quality = ingest_as_planned(plan.recordings[names].path, settings, *names, folder)
     quality.write(folder / "quality.json")
-    write("allan", curves(folder, *names, AllanSettings()), folder / "allan.parquet")
+    write("allan", curves(folder, *names, AllanSettings()), folder / "curve.parquet")
     asked = plan.estimate_settings(*names)
-    return estimation(folder / "quality.json", folder / "allan.parquet", *names, asked)
+    return estimation(folder, *names, asked)
 
 
 @pytest.mark.release

@@ -2,16 +2,11 @@
 
 from pathlib import Path
 
-from imubench_pipeline.steps.datasheet import curve_rows, rows
-from imubench_pipeline.tables import write
+from imubench_pipeline.steps.datasheet import datasheet_tables
+from imubench_pipeline.tables import write_each
 
 if __name__ == "__main__":
     names = snakemake.wildcards
-    given = (
-        Path(snakemake.input.parameters).parent,
-        names.sensor,
-        names.recording,
-        snakemake.params.settings,
-    )
-    write("datasheet", rows(*given), Path(snakemake.output.datasheet))
-    write("datasheet_curve", curve_rows(*given), Path(snakemake.output.datasheet_curve))
+    folder = Path(snakemake.input.parameters).parent
+    tables = datasheet_tables(folder, names.sensor, names.recording, snakemake.params.settings)
+    write_each(tables, map(Path, snakemake.output))

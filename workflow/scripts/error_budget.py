@@ -3,13 +3,10 @@
 from pathlib import Path
 
 from imubench_pipeline.steps.error_budget import error_tables
-from imubench_pipeline.tables import write
+from imubench_pipeline.tables import write_each
 
 if __name__ == "__main__":
-    found = error_tables(
-        {name: Path(path) for name, path in snakemake.input.items()},
-        {name: snakemake.wildcards[name] for name in ("sensor", "recording")},
-        snakemake.params.settings,
-    )
-    for table, path in snakemake.output.items():
-        write(table, found[table], Path(path))
+    names = snakemake.wildcards
+    folder = Path(snakemake.input.quality).parent
+    tables = error_tables(folder, names.sensor, names.recording, snakemake.params.settings)
+    write_each(tables, map(Path, snakemake.output))

@@ -3,16 +3,11 @@
 from pathlib import Path
 
 from imubench_pipeline.steps.estimate import estimation
-from imubench_pipeline.tables import write
+from imubench_pipeline.tables import write_each
 
 if __name__ == "__main__":
     names = snakemake.wildcards
-    rows = estimation(
-        Path(snakemake.input.quality),
-        Path(snakemake.input.curve),
-        names.sensor,
-        names.recording,
-        snakemake.params.settings,
-    )
-    for table, path in snakemake.output.items():
-        write(table, getattr(rows, table), Path(path))
+    folder = Path(snakemake.input.quality).parent
+    rows = estimation(folder, names.sensor, names.recording, snakemake.params.settings)
+    outputs = [Path(path) for path in snakemake.output]
+    write_each({path.stem: getattr(rows, path.stem) for path in outputs}, outputs)

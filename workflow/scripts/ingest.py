@@ -5,10 +5,11 @@ from pathlib import Path
 from imubench_pipeline.steps.ingest import write_recording
 
 if __name__ == "__main__":
+    names = snakemake.wildcards
     write_recording(
         Path(snakemake.params.source),
         snakemake.params.settings,
-        snakemake.wildcards.sensor,
-        snakemake.wildcards.recording,
-        {name: Path(path) for name, path in snakemake.output.items()},
+        names.sensor,
+        names.recording,
+        Path(snakemake.output.quality).parent,
     )

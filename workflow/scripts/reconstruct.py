@@ -3,11 +3,10 @@
 from pathlib import Path
 
 from imubench_pipeline.settings.config import ReconstructionSettings
-from imubench_pipeline.steps.reconstruct import write_reconstruction
+from imubench_pipeline.steps.reconstruct import reconstruction_rows
+from imubench_pipeline.tables import write_each
 
 if __name__ == "__main__":
-    write_reconstruction(
-        [Path(name) for name in snakemake.input],
-        [Path(name) for name in snakemake.output],
-        ReconstructionSettings.model_validate_json(snakemake.params.settings),
-    )
+    settings = ReconstructionSettings.model_validate_json(snakemake.params.settings)
+    rows = reconstruction_rows(Path(snakemake.input.quality).parent, settings)
+    write_each(vars(rows), map(Path, snakemake.output))

@@ -29,7 +29,8 @@ def check(plan: Plan) -> Iterator[tuple[str, str, Quality]]:
         if recording.simulated:
             continue
         try:
-            quality = _check_recording(plan, sensor, name, recording)
+            with tempfile.TemporaryDirectory(prefix="imubench.") as folder:
+                quality = _check_recording(plan, recording, Path(folder))
         except Exception as error:  # the others are checked all the same
             reason = one_line(f"{recording.path.name}: {describe_error(error)}")
             failure = Failure(sensor, name, "check", "error", reason)
@@ -37,18 +38,16 @@ def check(plan: Plan) -> Iterator[tuple[str, str, Quality]]:
         yield sensor, name, quality
 
 
-def _check_recording(plan: Plan, sensor: str, name: str, recording: Recording) -> Quality:
-    """Check a recording like a run, without storing results."""
-    with tempfile.TemporaryDirectory(prefix="imubench.") as folder:
-        settings = plan.ingest_settings(sensor, name)
-        quality = ingest_as_planned(
-            recording.path, settings, sensor, name, Path(folder), guarded=True
-        )
-        quality.findings.extend(implausible_of(quality, plan.sensors.get(sensor)))
-        how = AllanSettings.model_validate_json(plan.settings("allan"))
-        for channel, log in static_logs(Path(folder)).items():
-            for finding in findings_of_channel(channel, log, plan.bandwidth(sensor, name), how):
-                quality.findings.append(finding.row(sensor, name))
+def _check_recording(plan: Plan, recording: Recording, folder: Path) -> Quality:
+    """Check a recording like a run, with its samples in a temporary folder."""
+    key = recording.sensor, recording.name
+    settings = plan.ingest_settings(*key)
+    quality = ingest_as_planned(recording.path, settings, *key, folder, guarded=True)
+    quality.findings.extend(implausible_of(quality, plan.sensors.get(recording.sensor)))
+    how = AllanSettings.model_validate_json(plan.settings("allan"))
+    for channel, log in static_logs(folder).items():
+        for finding in findings_of_channel(channel, log, plan.bandwidth(*key), how):
+            quality.findings.append(finding.row(*key))
     return quality
 
 

@@ -10,18 +10,19 @@ import shutil
 import sys
 import textwrap
 from collections.abc import Sequence
+from dataclasses import fields
 from difflib import get_close_matches
 from functools import partial
 from importlib.metadata import version
 from pathlib import Path
 
+import shtab
 from pydantic import BaseModel
 
 from imubench_pipeline.registry import Hook
 from imubench_pipeline.report import command as report
 from imubench_pipeline.report import show
 from imubench_pipeline.report.static_figures import command as figures
-from imubench_pipeline.run import completion_command as completion
 from imubench_pipeline.run import formats_command as formats
 from imubench_pipeline.run import init_command as init
 from imubench_pipeline.run import run_command as run
@@ -170,6 +171,7 @@ def _add_export(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--inflate",
+        dest="inflation",
         type=number(1e-6, 1e6, "a factor of 1e-6 to 1e6"),
         default=1.0,
         metavar="FACTOR",
@@ -183,6 +185,7 @@ def _add_export(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--excess",
+        dest="most_excess",
         type=number(1.0, 1e6, "a factor of 1 to 1e6"),
         default=3.0,
         metavar="FACTOR",
@@ -209,22 +212,10 @@ def _export(options: argparse.Namespace) -> int:
     from imubench_pipeline.export.imu import ExportError
     from imubench_pipeline.export.request import Request, load, make_content, recordings_of
 
-    if options.inflate != 1.0 and not options.because:
+    if options.inflation != 1.0 and not options.because:
         print("--inflate needs its reason; expected --because '...'", file=sys.stderr)
         return 2
-    asked = Request(
-        sensor=options.sensor,
-        target=options.target,
-        axis=options.axis,
-        horizon=options.horizon,
-        inflation=options.inflate,
-        because=options.because,
-        overbound=options.overbound,
-        most_excess=options.excess,
-        method=options.method,
-        latitude=options.latitude,
-        rate=options.rate,
-    )
+    asked = Request(**{field.name: getattr(options, field.name) for field in fields(Request)})
     try:
         content = make_content(load(options.results), asked, recordings_of(options.results))
     except ExportError as error:
@@ -270,12 +261,12 @@ def _check(options: argparse.Namespace) -> int:
         print(reason, file=sys.stderr)
     worst = int(bool(plan.unusable))
     for sensor, recording, quality in check(plan):
-        serious = [f for f in quality.findings if f.severity != "note"]
-        worst = max(worst, int(bool(serious)))
+        serious = any(finding.severity != "note" for finding in quality.findings)
+        worst = max(worst, int(serious))
         status = quality.recording["status"]
-        status = status if status != "ok" or not serious else "warnings"
-        make_content = ", simulated" * bool(quality.recording.get("simulated"))
-        print(f"{sensor}/{recording}: {status}{make_content}")
+        status = "warnings" if status == "ok" and serious else status
+        simulated = ", simulated" * bool(quality.recording.get("simulated"))
+        print(f"{sensor}/{recording}: {status}{simulated}")
         for finding in quality.findings:
             line = f"  {finding.severity:8} {finding.finding}: {printable(finding.detail)}"
             if sys.stdout.isatty():  # elsewhere one line each, for programs such as grep
@@ -322,8 +313,24 @@ def _inspect(options: argparse.Namespace) -> int:
     return 0 if inspected.complete else 1
 
 
+def _add_completion(parser: argparse.ArgumentParser) -> None:
+    parser.description = (
+        'Print a script for the shell. Now: eval "$(imubench completion bash)"; always: put that '
+        "line into ~/.bashrc, for zsh the script as _imubench into a folder of $fpath."
+    )
+    parser.add_argument("shell", choices=shtab.SUPPORTED_SHELLS, help="which shell")
+
+
 def _completion(options: argparse.Namespace) -> int:
-    print(completion.script(command_parser(), options.shell))
+    parser = command_parser()
+    of_commands = next(
+        action for action in parser._actions if isinstance(action, argparse._SubParsersAction)
+    )
+    for command in of_commands.choices.values():
+        for action in command._actions:
+            if action.type is named_path:
+                action.complete = shtab.FILE
+    print(shtab.complete(parser, options.shell))
     return 0
 
 
@@ -427,7 +434,7 @@ COMMANDS = {
     **_ADDED.by_key(),
     "completion": Command(
         "print what a shell needs to complete all this",
-        completion.add_arguments,
+        _add_completion,
         _completion,
         ("printed",),
     ),

@@ -7,11 +7,13 @@ import os
 from collections.abc import Iterator
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any
+
+from pydantic import BaseModel
 
 from imubench_pipeline.recordings.kept import Quality
+from imubench_pipeline.report.run_summary import one_line
 from imubench_pipeline.tables.digests import read_sealed_json, write_sealed_json
-from imubench_pipeline.tables.failures import Failure
+from imubench_pipeline.tables.failures import Cause, Failure
 from imubench_pipeline.tables.findings import RecordingError
 from imubench_pipeline.tables.seals import place_of
 
@@ -36,7 +38,7 @@ class Faults:
         self.results = results
         self._folder = results / _FAULT_FOLDER
         self._before = dict(self._records())
-        self._failed = {of[1:] for of, record in self._before.items() if record["failed"]}
+        self._failed = {of[1:] for of, record in self._before.items() if record.failed}
         self._lost: dict[Of, bool] = {}
 
     def attempt(self, of: Of, *, again: bool = True) -> int:
@@ -45,7 +47,7 @@ class Faults:
         Without `again` a step that failed is not tried again.
         """
         record = self._before.get(of)
-        tried, failed = (record["attempt"], record["failed"]) if record else (0, False)
+        tried, failed = (record.attempt, record.failed) if record else (0, False)
         return tried + (again and (failed or self._has_lost_samples(of)))
 
     def _has_lost_samples(self, of: Of) -> bool:
@@ -59,14 +61,14 @@ class Faults:
             return False
         if of not in self._lost:
             folder = self.results / "recordings" / sensor / recording
+            whole = (sensor, recording) in self._failed
             try:
-                quality = Quality.read(folder / "quality.json")
-                fault = quality.fault(folder, whole=(sensor, recording) in self._failed)
-                self._lost[of] = fault is not None
+                fault = Quality.read(folder / "quality.json").fault(folder, whole=whole)
             except FileNotFoundError:  # it is made in any case
-                self._lost[of] = False
-            except RecordingError:
-                self._lost[of] = True
+                fault = None
+            except RecordingError as error:
+                fault = str(error)
+            self._lost[of] = fault is not None
         return self._lost[of]
 
     def failed(self, failure: Failure, attempt: int, log: Path) -> None:
@@ -82,45 +84,41 @@ class Faults:
         """Record the success of a step that failed before."""
         path = self._path(of)
         if attempt or path.is_file():
-            step, sensor, recording = of
-            about = {"step": step, "sensor": sensor, "recording": recording}
+            about = dict(zip(("step", "sensor", "recording"), of, strict=True))
             write_sealed_json({"attempt": attempt, "failed": False, **about}, path)
 
     def now(self) -> Iterator[tuple[Failure, Path]]:
         """Yield the failures of this run with their logs."""
         for of, record in self._records():
-            if record["failed"] and record["attempt"] >= self.attempt(of):
-                names = ("sensor", "recording", "step", "cause", "reason")
-                yield Failure(**{name: record[name] for name in names}), Path(record["log"])
+            if record.failed and record.attempt >= self.attempt(of):
+                step, sensor, recording = of
+                yield Failure(sensor, recording, step, record.cause, record.reason), record.log
 
     def left_out(self) -> str:
         """Return the message about failures of a run; empty if its caller reports them (`TOLD`)."""
-        from imubench_pipeline.report.run_summary import one_line
-
-        failures = [
-            f"  {one_line(f'{failure.name}: {failure.reason}')}\n    log: {log}"
-            for failure, log in self.now()
-        ]
-        if not failures or TOLD in os.environ:
-            return ""
-        title = "what failed is left out, and tried again by the next run; the report is there"
-        return "\n".join([title, *failures])
+        lines = ["what failed is left out, and tried again by the next run; the report is there"]
+        for failure, log in self.now():
+            lines.append(f"  {one_line(f'{failure.name}: {failure.reason}')}\n    log: {log}")
+        return "" if len(lines) == 1 or TOLD in os.environ else "\n".join(lines)
 
     def _path(self, of: Of) -> Path:
         return self._folder / f"{place_of(*of)}.json"
 
-    def _records(self) -> Iterator[tuple[Of, dict[str, Any]]]:
+    def _records(self) -> Iterator[tuple[Of, _Record]]:
         for path in sorted(self._folder.glob("*/**/*.json")):
             with contextlib.suppress(OSError, ValueError):  # one that was cut off
-                if _is_record(record := read_sealed_json(path)):
-                    yield (record["step"], record["sensor"], record["recording"]), record
+                record = _Record.model_validate(read_sealed_json(path))
+                yield (record.step, record.sensor, record.recording), record
 
 
-def _is_record(record: Any) -> bool:
-    """Return whether data have all fields of a record."""
-    if not isinstance(record, dict) or not isinstance(record.get("recording", 0), str | None):
-        return False
-    failed = record.get("failed")
-    texts = ("step", "sensor", *(("cause", "reason", "log") if failed else ()))
-    counted = isinstance(failed, bool) and isinstance(record.get("attempt"), int)
-    return counted and all(isinstance(record.get(name), str) for name in texts)
+class _Record(BaseModel):
+    """A step that failed, now or before."""
+
+    step: str
+    sensor: str
+    recording: str | None = None
+    attempt: int
+    failed: bool
+    cause: Cause = "error"
+    reason: str = ""
+    log: Path = Path()

@@ -7,18 +7,10 @@ compilations of the demonstration.
 from __future__ import annotations
 
 import fcntl
-import time
 import zlib
 from typing import IO, Any
 
 from numba.core.caching import FunctionCache
-
-_MAX_WAIT = 120.0
-"""Max. time to wait for another process, s. After it the kernel is compiled here, too; the result
-is the same."""
-
-_RETRY_INTERVAL = 0.02
-"""Time between two attempts to lock, s."""
 
 
 def compile_once(locks: IO[bytes]) -> None:
@@ -34,39 +26,21 @@ def compile_once(locks: IO[bytes]) -> None:
 
     def load_or_lock(kernel: FunctionCache, signature: Any, context: Any) -> Any:
         found = load(kernel, signature, context)
-        if found is None and _lock_kernel(locks, kernel):
+        if found is None:
+            # Callers wait for the kernels that they call, never the reverse: no deadlock.
+            fcntl.lockf(locks, fcntl.LOCK_EX, 1, _compute_lock_offset(kernel))
             found = load(kernel, signature, context)  # the other process may have cached it
             if found is not None:
-                _unlock_kernel(locks, kernel)
+                fcntl.lockf(locks, fcntl.LOCK_UN, 1, _compute_lock_offset(kernel))
         return found
 
-    def save_and_let_go(kernel: FunctionCache, signature: Any, compiled: Any) -> None:
+    def save_and_unlock(kernel: FunctionCache, signature: Any, compiled: Any) -> None:
         try:
             save(kernel, signature, compiled)
         finally:
-            _unlock_kernel(locks, kernel)
+            fcntl.lockf(locks, fcntl.LOCK_UN, 1, _compute_lock_offset(kernel))
 
-    FunctionCache.load_overload, FunctionCache.save_overload = load_or_lock, save_and_let_go
-
-
-def _lock_kernel(locks: IO[bytes], kernel: FunctionCache) -> bool:
-    """Wait for the kernel; return whether it is locked.
-
-    Callers wait for the kernels that they call, never the reverse: deadlocks are impossible.
-    """
-    until = time.monotonic() + _MAX_WAIT
-    while time.monotonic() < until:
-        try:
-            fcntl.lockf(locks, fcntl.LOCK_EX | fcntl.LOCK_NB, 1, _compute_lock_offset(kernel))
-        except OSError:
-            time.sleep(_RETRY_INTERVAL)
-        else:
-            return True
-    return False
-
-
-def _unlock_kernel(locks: IO[bytes], kernel: FunctionCache) -> None:
-    fcntl.lockf(locks, fcntl.LOCK_UN, 1, _compute_lock_offset(kernel))
+    FunctionCache.load_overload, FunctionCache.save_overload = load_or_lock, save_and_unlock
 
 
 def _compute_lock_offset(kernel: FunctionCache) -> int:

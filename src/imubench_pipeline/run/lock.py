@@ -10,6 +10,7 @@ import shlex
 import sys
 import time
 from collections.abc import Mapping
+from contextlib import suppress
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
@@ -41,76 +42,61 @@ class Lock:
     All processes with an open ``descriptor`` hold the lock. Snakemake inherits it, so the lock
     lasts until both processes end. While the lock is held, the file contains a note about the
     holder. A note in the file of a free lock comes from a run that did not reach its end.
-
-    Attributes
-    ----------
-    descriptor : int
-    since : float
-        When it was taken, s since 1970.
-    left_over : mapping
-        The note of a run that did not reach its end; otherwise empty. After a recovery the caller
-        sets it to empty; until then, the note stays for the next run.
     """
 
     def __init__(self, path: Path) -> None:
         self.path = path
         self.descriptor = -1
-        self.since = 0.0
+        self.since = 0.0  # when it was taken, s since 1970
         self.left_over: Mapping[str, Any] = {}
+        """The note of a run that did not reach its end; otherwise empty. After a recovery the
+        caller sets it to empty; until then, the note stays for the next run."""
 
     def acquire(self, wait: float = 0.0) -> None:
-        """Acquire the lock; `wait`: max. time to wait for another run, s.
-
-        Raises
-        ------
-        TakenError
-            If another run still holds the lock after this time.
-        """
+        """Acquire the lock; raise `TakenError` if another run holds it for more than `wait` s."""
         self.path.parent.mkdir(parents=True, exist_ok=True)
         self.descriptor = os.open(self.path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o666)
         until = time.monotonic() + wait
-        while not self._try_lock():
-            if time.monotonic() >= until:
-                note = read_note(self.path)
-                self._close()
-                raise TakenError(
-                    f"another run works on {self.path.parent.parent}: {_describe_holder(note)}; "
-                    "wait for its end, or use another folder of results"
-                )
+        while True:
+            try:
+                fcntl.flock(self.descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                break
+            except BlockingIOError:
+                if time.monotonic() >= until:
+                    note = read_note(self.path)
+                    self._close()
+                    raise TakenError(
+                        f"another run works on {self.path.parent.parent}: {_describe_holder(note)};"
+                        " wait for its end, or use another folder of results"
+                    ) from None
             time.sleep(min(_RETRY_INTERVAL, max(until - time.monotonic(), 0.0)))
         self.since = time.time()
         self.left_over = read_note(self.path)
         self.note()
 
     def acquire_unless_inherited(self) -> None:
-        """Acquire the lock, unless this process inherited it from its caller.
+        """Acquire the lock, unless this process inherited it; raise `TakenError` if it is taken.
 
         A note of a run that did not reach its end stays only if the machine was restarted since:
         `imubench nightly` then checks the files that were being written.
-
-        Raises
-        ------
-        TakenError
-            If another run holds it.
         """
-        if self.descriptor >= 0 or self._is_inherited():
+        if self.descriptor >= 0:
             return
+        with suppress(ValueError, OSError):
+            held = os.fstat(int(os.environ.get(INHERITED, "")))
+            if os.path.samestat(held, self.path.stat()):
+                return
         self.acquire()
         if not restarted(self.left_over):
             self.left_over = {}
 
-    def _is_inherited(self) -> bool:
-        try:
-            held = os.fstat(int(os.environ.get(INHERITED, "")))
-            return os.path.samestat(held, self.path.stat())
-        except (ValueError, OSError):
-            return False
-
     def note(self, **more: object) -> None:
         """Write the holder of the lock, and further data for a later run, to its file."""
+        program = Path(sys.argv[0])
+        name = program.parent.name if program.name == "__main__.py" else program.name
         about = {
             "process": os.getpid(),
-            "command": _describe_command(),
+            "command": shlex.join([name, *sys.argv[1:]])[:_MAX_COMMAND],
             "host": platform.node(),
             "since": datetime.fromtimestamp(self.since, UTC).isoformat(timespec="seconds"),
         }
@@ -130,19 +116,10 @@ class Lock:
     def __exit__(self, *_: object) -> None:
         self.release()
 
-    def _try_lock(self) -> bool:
-        try:
-            fcntl.flock(self.descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            return False
-        return True
-
     def _write(self, text: str) -> None:
-        try:
+        with suppress(OSError):  # a full disk: the lock holds without its note
             os.ftruncate(self.descriptor, 0)
             os.pwrite(self.descriptor, text.encode(), 0)
-        except OSError:
-            return  # a full disk: the lock holds without its note
 
     def _close(self) -> None:
         os.close(self.descriptor)
@@ -156,13 +133,6 @@ def read_note(path: Path) -> Mapping[str, Any]:
     except (OSError, ValueError):
         return {}
     return note if isinstance(note, dict) else {}
-
-
-def _describe_command() -> str:
-    """Return the command of this process, as a user would type it."""
-    program = Path(sys.argv[0])
-    name = program.parent.name if program.name == "__main__.py" else program.name
-    return shlex.join([name, *sys.argv[1:]])[:_MAX_COMMAND]
 
 
 def _describe_holder(note: Mapping[str, Any]) -> str:

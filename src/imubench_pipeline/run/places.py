@@ -34,22 +34,11 @@ _WORKFLOW_PARTS = ("Snakefile", "workflow", "profiles", "src", "tests", "pyproje
 def places_about(path: Path, results: Path | None = None) -> Iterator[Place]:
     """Yield the protected places that may contain a path, or be inside it.
 
-    A project is a folder with ``config/config.yaml``: the working folder, any folder at or above
-    the path, and any folder above the results of the command. The protected places of a project
-    are ``config/``, the folders of logs, results, sensors and requirements in its settings, and the
-    workflow of a checkout.
-
-    Further folders are treated as results: the results of the command, and any folder at or above
-    the path, or any folder ``results`` in one of these, with ``seals/`` or
-    ``tables/recordings.parquet``. In results only the folders that runs write are protected, and
-    also the logs that their report names. The configuration of the package is protected, too.
-
-    Parameters
-    ----------
-    path : Path
-        Absolute, without links.
-    results : Path, optional
-        The results of the command.
+    These are the configuration of the package, and the ``config/``, logs, results, sensors,
+    requirements and workflow of each project: a folder with ``config/config.yaml`` that is the
+    working folder, or lies at or above the path or the results of the command. In `results`, and in
+    any other folder with ``seals/`` or ``tables/recordings.parquet``, only the folders that runs
+    write and the logs that the report names are protected. `path` is absolute, without links.
     """
     above = [path, *path.parents]
     given = [] if results is None else [results.absolute(), Path(os.path.realpath(results))]

@@ -52,13 +52,6 @@ from imubench_pipeline.tables.provenance import source_digest
 from imubench_pipeline.units import quantity_to_si
 
 _INGEST_OUTPUTS = ("quality.json", "envelope.parquet", "histogram.parquet")
-_SOURCE_KEYS = {"published", "figures", "read"}
-_KEYS_WITHOUT_EFFECT_ON_SAMPLES: dict[str, Any] = {
-    "channels": {"__all__": _SOURCE_KEYS},
-    "shows": True,
-}
-"""Keys of a simulated recording that do not affect its samples."""
-
 _RANKING_KEYS = ("price_class", "must")
 """Keys of a requirement that do not affect the error budget."""
 
@@ -71,7 +64,6 @@ _REPORTED_SECTIONS = {
 
 _PLACEHOLDER_LOG = {"rate": "1 Hz", "channels": {"gyro_x": {"column": 1, "unit": "rad/s"}}}
 """Placeholder for the log format of a sensor where it does not matter."""
-
 
 _BRACE_BEFORE_WORD = re.compile(r"\{(?=\s*\w)")
 """A brace inside a text of JSON; structural braces come before quotes or braces."""
@@ -110,7 +102,12 @@ class Plan:
         self._read_notes: dict[Path, object] = {}
         self._still_written: list[Recording] = []
         self.recordings: dict[tuple[str, str], Recording] = {}
-        for recording in [*self._found_logs(), *self._to_simulate()]:
+        made = self.run.results / "simulated"
+        to_simulate = [
+            Recording(sensor, name, made / sensor / name, None, simulated=True)
+            for sensor, name in self.simulated
+        ]
+        for recording in [*self._found_logs(), *to_simulate]:
             other = self.recordings.setdefault((recording.sensor, recording.name), recording)
             if other is not recording:
                 fault = (
@@ -166,13 +163,6 @@ class Plan:
         readable = notes if notes and notes.is_file() else None
         return [Recording(sensor, name, path, readable, simulated=False, held_back=True)]
 
-    def _to_simulate(self) -> list[Recording]:
-        folder = self.run.results / "simulated"
-        return [
-            Recording(sensor, name, folder / sensor / name, None, simulated=True)
-            for sensor, name in self.simulated
-        ]
-
     def files(self) -> str:
         """Return every file in the drop zone, with its recording or the reason to skip it."""
         found = [log for log in self.recordings.values() if not log.simulated]
@@ -189,17 +179,16 @@ class Plan:
 
     def ingest_settings(self, sensor: str, name: str) -> str:
         """Return the settings of the ingest of a recording, or its error if it cannot be read."""
-        key = (sensor, name)
-        if key not in self._of_ingest:
-            self._of_ingest[key] = to_json(self._ingest(self.recordings[key]))
-        return self._of_ingest[key]
+        if (sensor, name) not in self._of_ingest:
+            self._of_ingest[sensor, name] = to_json(self._ingest(self.recordings[sensor, name]))
+        return self._of_ingest[sensor, name]
 
     def _ingest(self, recording: Recording) -> dict[str, object]:
         kind = self.kind(recording.sensor, recording.name)
         settings: dict[str, object] = {
             "simulated": recording.simulated,
             "kind": kind,
-            "quality": self.run.quality.model_dump(mode="json"),
+            "quality": self.run.quality,
         }
         try:
             log, notes = self._written(recording)
@@ -291,19 +280,12 @@ class Plan:
         recording = self.recordings[sensor, name]
         declared = self.sensors.get(sensor)
         settings: dict[str, object] = {
-            **{section: getattr(self.run, section).model_dump(mode="json") for section in sections},
+            **{section: getattr(self.run, section) for section in sections},
             "sensor": declared.model_dump(mode="json", exclude_unset=True) if declared else None,
         }
         if recording.simulated:
-            entry = self.simulated[sensor, name]
-            return to_json(
-                settings
-                | {
-                    "simulated": entry.model_dump(
-                        mode="json", exclude=_KEYS_WITHOUT_EFFECT_ON_SAMPLES
-                    )
-                }
-            )
+            made = _dump_for_samples(self.simulated[sensor, name])
+            return to_json(settings | {"simulated": made})
         try:
             notes = self._written(recording)[1]
         except ConfigError:
@@ -333,19 +315,13 @@ class Plan:
 
     def estimate_settings(self, sensor: str, name: str) -> str:
         """Return the settings of the estimates of a recording."""
-        settings = self.run.estimate.model_dump(mode="json")
-        return to_json(
-            {"estimate": settings, "bandwidth": self.bandwidth(sensor, name)}
-            | self._read_by_authors(sensor, name)
-        )
-
-    def _read_by_authors(self, sensor: str, name: str) -> dict[str, object]:
-        """Return the values that the source of a simulated recording read from its curve, in SI."""
-        if (sensor, name) not in self.simulated:
-            return {}
-        channels = self.simulated[sensor, name].channels.items()
-        read = {str(key): axis.read.si(key) for key, axis in channels if axis.read is not None}
-        return {"authors": read} if read else {}
+        bandwidth = self.bandwidth(sensor, name)
+        settings: dict[str, object] = {"estimate": self.run.estimate, "bandwidth": bandwidth}
+        if (sensor, name) in self.simulated:
+            channels = self.simulated[sensor, name].channels.items()
+            read = {str(key): axis.read.si(key) for key, axis in channels if axis.read is not None}
+            settings |= {"authors": read} if read else {}
+        return to_json(settings)
 
     def bandwidth(self, sensor: str, name: str) -> float | None:
         """Return the stated cut-off of the sensor's own filter, Hz."""
@@ -359,37 +335,31 @@ class Plan:
         """Return the parameters and the log format of a simulated recording."""
         recording = self.simulated[sensor, name]
         written = layout(recording, self.sensors[sensor].log)
+        try:
+            profiles = {str(path): digest_of(path) for path in profile_files(recording)}
+        except OSError as error:
+            raise ConfigError(
+                f"{sensor}/{name}: {error.filename} cannot be read "
+                f"({error.strerror}); expected the file of a profile of temperature or motion"
+            ) from None
         return to_json(
             {
-                "recording": recording.model_dump(
-                    mode="json", exclude=_KEYS_WITHOUT_EFFECT_ON_SAMPLES
-                ),
+                "recording": _dump_for_samples(recording),
                 "log": written.model_dump(mode="json", exclude={"bandwidth"}),
-                "profiles": self._profiles(recording),
+                "profiles": profiles,
             }
         )
 
-    @staticmethod
-    def _profiles(recording: SimulatedRecording) -> dict[str, str]:
-        try:
-            return {str(path): digest_of(path) for path in profile_files(recording)}
-        except OSError as error:
-            raise ConfigError(
-                f"{recording.sensor}/{recording.recording}: {error.filename} cannot be read "
-                f"({error.strerror}); expected the file of a profile of temperature or motion"
-            ) from None
-
     def settings(self, section: str) -> str:
         """Return one section of the run's configuration."""
-        value = getattr(self.run, section)
-        return to_json(value.model_dump(mode="json") if isinstance(value, BaseModel) else value)
+        return to_json(getattr(self.run, section))
 
     def datasheet_settings(self, sensor: str) -> str:
         """Return the settings of the comparison with the datasheet of a sensor."""
         declared = self.sensors.get(sensor)
         return to_json(
             {
-                "datasheet": declared.datasheet.model_dump(mode="json") if declared else {},
+                "datasheet": declared.datasheet if declared else {},
                 "tolerance": self.run.datasheet.tolerance,
                 "longest": self.run.estimate.longest,
             }
@@ -400,7 +370,7 @@ class Plan:
         declared = self.sensors.get(sensor)
         return to_json(
             {
-                "error_budget": self.run.error_budget.model_dump(mode="json"),
+                "error_budget": self.run.error_budget,
                 "fusion": self.run.fusion.model_dump(include={"longest", "draws", "seed"}),
                 "requirements": self._requirements(*_RANKING_KEYS, "title", "note", "example"),
                 "datasheet": declared.datasheet.only(IN_USE) if declared else {},
@@ -439,13 +409,13 @@ class Plan:
         """Return the settings of the report."""
         return to_json(
             {
-                "report": self.run.report.model_dump(mode="json"),
+                "report": self.run.report,
                 "results": str(self.run.results),
                 "logs": str(self.run.logs),
                 "given": given_beside(self.run, Path("config/config.yaml")),
                 "settings": self.run.model_dump(mode="json", include=_REPORTED_SECTIONS),
                 "sensors": self._described("vendor", "model", "price_class", "sold"),
-                "boards": {name: self._board(board) for name, board in self.boards.items()},
+                "boards": {name: _describe_board(board) for name, board in self.boards.items()},
                 "requirements": self._requirements(),
                 "on_purpose": {
                     f"{sensor}/{name}": dict(entry.shows)
@@ -454,20 +424,6 @@ class Plan:
                 },
             }
         )
-
-    @staticmethod
-    def _board(board: Board) -> dict[str, object]:
-        """Return the description of a board for the report."""
-        return {
-            "title": board.title,
-            "note": board.note,
-            "sensors": {
-                sensor.sensor: {name: channel.figures for name, channel in sensor.channels.items()}
-                for sensor in board.sensors
-            },
-            "temperature": board.temperature is not None,
-            "motion": sorted(board.motion),
-        }
 
     def figures_settings(self) -> str:
         """Return the settings of the figures of all sensors."""
@@ -502,12 +458,33 @@ class Plan:
     def truths(self, sensor: str) -> str:
         """Return the true parameters of the simulated recordings of a sensor."""
         entries = (entry for (of, _), entry in self.simulated.items() if of == sensor)
-        return to_json([entry.model_dump(mode="json") for entry in entries])
+        return to_json([*entries])
 
     @staticmethod
     def code(step: str, package: str = "steps") -> str:
         """Return the digest of the code that a step runs: the module of its name in a package."""
         return source_digest(f"{package}.{step}")
+
+
+def _dump_for_samples(recording: SimulatedRecording) -> dict[str, Any]:
+    """Return the settings of a simulated recording that affect its samples."""
+    of_source = {"published", "figures", "read"}
+    without: dict[str, Any] = {"channels": {"__all__": of_source}, "shows": True}
+    return recording.model_dump(mode="json", exclude=without)
+
+
+def _describe_board(board: Board) -> dict[str, object]:
+    """Return the description of a board for the report."""
+    return {
+        "title": board.title,
+        "note": board.note,
+        "sensors": {
+            sensor.sensor: {name: channel.figures for name, channel in sensor.channels.items()}
+            for sensor in board.sensors
+        },
+        "temperature": board.temperature is not None,
+        "motion": sorted(board.motion),
+    }
 
 
 def _check_places(run: Run) -> None:
@@ -528,5 +505,9 @@ def _check_places(run: Run) -> None:
 
 def to_json(value: object) -> str:
     """Return a value as JSON, in which Snakemake finds no wildcard: a name may have braces."""
-    text = json.dumps(value, sort_keys=True, ensure_ascii=False)
+    text = json.dumps(value, sort_keys=True, ensure_ascii=False, default=_dump_model)
     return _BRACE_BEFORE_WORD.sub(r"\\u007b", text)
+
+
+def _dump_model(model: BaseModel) -> dict[str, Any]:
+    return model.model_dump(mode="json")

@@ -46,6 +46,8 @@ _MAX_LINE_LENGTH = 200
 _MIN_LINE_INTERVAL = 10.0
 """Min. time between two lines of progress in a pipe, s."""
 
+_TIME_UNITS = ((3600, "h"), (60, "min"))
+
 Recording = tuple[str, str]
 """Sensor and name."""
 
@@ -54,14 +56,9 @@ _told: list[Callable[[str, str], str]] = []
 
 
 def follow(jobs: Iterable[Recording], told: Callable[[str, str], str]) -> None:
-    """Register the jobs of recordings, to show a line for each finished recording.
+    """Show a line for each finished recording.
 
-    Parameters
-    ----------
-    jobs : iterable of (str, str)
-        The recording of each job of this run that is of one.
-    told : callable
-        Returns the line about a recording.
+    `jobs`: the recording of each job of one; `told` returns the line about a recording.
     """
     _expected.clear()
     _expected.update(jobs)
@@ -69,11 +66,10 @@ def follow(jobs: Iterable[Recording], told: Callable[[str, str], str]) -> None:
 
 
 class LogHandler(LogHandlerBase):
-    """Shows how far a run is, and what is more than progress.
+    """Shows the progress of a run, errors and warnings.
 
-    The line of a terminal is there while jobs run. It is a single one, because a step writes its
-    errors to the terminal by itself: a taller display would be drawn over them. Who asks Snakemake
-    for a dry run or for all details gets what it says itself.
+    A terminal has a single line while jobs run: steps write their errors to the terminal, too, and
+    a taller display would cover them. A dry run and verbose runs show the output of Snakemake.
     """
 
     writes_to_stream = True
@@ -114,7 +110,11 @@ class LogHandler(LogHandlerBase):
             self._end_job(about.get("job_id"))
         elif event == LogEvent.PROGRESS:
             self._done, self._total = about["done"], about["total"]
-            self._say_in_pipe()
+            now = time.monotonic()
+            waited = now - self._last_line >= _MIN_LINE_INTERVAL
+            if not self._moves and waited and self._done < self._total:
+                self._last_line = now
+                self._print(self._describe_progress(now))
         if event in _EVENTS_OF_PROGRESS_LINE:
             return
         text = self.format(record)
@@ -133,26 +133,12 @@ class LogHandler(LogHandlerBase):
     def _print(self, text: str, style: str = "") -> None:
         self._console.print(Text(text, style=style), soft_wrap=True)
 
-    def _say_in_pipe(self) -> None:
-        """Print how far the run is, where no line moves, now and then."""
-        now = time.monotonic()
-        if (
-            not self._moves
-            and now - self._last_line >= _MIN_LINE_INTERVAL
-            and self._done < self._total
-        ):
-            self._last_line = now
-            self._print(self._describe_progress(now))
-
     def _start_job(self, about: Mapping[str, Any]) -> None:
-        of = "/".join(str(value) for value in (about.get("wildcards") or {}).values())
-        label = one_line(f"{about.get('rule_name')} {of}")
+        wildcards: Mapping[str, Any] = about.get("wildcards") or {}
+        label = one_line(f"{about.get('rule_name')} {'/'.join(map(str, wildcards.values()))}")
         self._running[about["jobid"]] = (label, time.monotonic())
-        sensor, recording = (
-            (about.get("wildcards") or {}).get(key) for key in ("sensor", "recording")
-        )
-        if sensor and recording:
-            self._of[about["jobid"]] = (str(sensor), str(recording))
+        if wildcards.get("sensor") and wildcards.get("recording"):
+            self._of[about["jobid"]] = str(wildcards["sensor"]), str(wildcards["recording"])
         if self._live is None and self._moves:
             self._live = Live(
                 get_renderable=self._make_line,
@@ -195,32 +181,16 @@ class LogHandler(LogHandlerBase):
             cells.append(ProgressBar(self._total or 1, self._done, width=_BAR_WIDTH))
         width = sum(column.width or 0 for column in line.columns) + len(cells)
         line.add_column(width=room - width, no_wrap=True, overflow="ellipsis")
-        line.add_row(*cells, Text(self._describe_state()))
-        return line
-
-    def _describe_state(self) -> str:
         now = time.monotonic()
         running = ", ".join(
-            f"{label} {_format_clock(now - begin)}" for label, begin in list(self._running.values())
+            f"{label} {int(now - begin) // 60}:{int(now - begin) % 60:02}"
+            for label, begin in list(self._running.values())
         )
-        return (
-            f"{self._describe_progress(now)}: {running}"
-            if self._done
-            else f"first steps: {running}"
-        )
+        progress = self._describe_progress(now) if self._done else "first steps"
+        line.add_row(*cells, Text(f"{progress}: {running}"))
+        return line
 
     def _describe_progress(self, now: float) -> str:
         left = (now - self._begin) / self._done * (self._total - self._done)
-        return f"{self._done} of {self._total} steps, about {_format_rough_time(left)} left"
-
-
-def _format_clock(seconds: float) -> str:
-    minutes, rest = divmod(int(seconds), 60)
-    return f"{minutes}:{rest:02}"
-
-
-def _format_rough_time(seconds: float) -> str:
-    for size, name in ((3600, "h"), (60, "min")):
-        if seconds >= 2 * size:
-            return f"{round(seconds / size)} {name}"
-    return f"{round(seconds)} s"
+        size, unit = next((one for one in _TIME_UNITS if left >= 2 * one[0]), (1, "s"))
+        return f"{self._done} of {self._total} steps, about {round(left / size)} {unit} left"

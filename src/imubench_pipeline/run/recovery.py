@@ -66,23 +66,21 @@ def owner(locks: Iterable[Path], project: Path, results: Path) -> int | None:
         return None
     for process in psutil.process_iter():
         with contextlib.suppress(psutil.Error):
+            words = process.cmdline()
             # A process that began after the lock was made did not make it.
-            if _is_snakemake(process, project, results) and process.create_time() < max(stamps):
-                return process.pid
+            if not any(
+                Path(word).name == "snakemake" for word in words
+            ) or process.create_time() >= max(stamps):
+                continue
+            stated = [word.partition("=")[2] for word in words if word.startswith("results=")]
+            if stated and os.path.normpath(project / stated[-1]) != os.path.normpath(results):
+                continue
+            try:
+                if Path(process.cwd()) == project.resolve():
+                    return process.pid
+            except psutil.AccessDenied:
+                return process.pid  # of another user: rather wait one night
     return None
-
-
-def _is_snakemake(process: psutil.Process, project: Path, results: Path) -> bool:
-    words = process.cmdline()
-    if not any(Path(word).name == "snakemake" for word in words):
-        return False
-    stated = [word.partition("=")[2] for word in words if word.startswith("results=")]
-    if stated and os.path.normpath(project / stated[-1]) != os.path.normpath(results):
-        return False
-    try:
-        return Path(process.cwd()) == project.resolve()
-    except psutil.AccessDenied:
-        return True  # of another user: rather wait one night
 
 
 def end_left_over(note: Mapping[str, Any], project: Path) -> int:
@@ -172,18 +170,12 @@ def remove_doubtful(results: Path) -> int:
                 stamps[path] = path.stat().st_mtime
     last = max(stamps.values(), default=0.0)
     doubtful = [path for path, stamp in stamps.items() if stamp > last - _MAX_WRITE_DELAY]
-    for made in dict.fromkeys(_find_common_output(results, path) for path in doubtful):
+    for path in doubtful:
+        parts = path.relative_to(results).parts
+        depth = {"report": 1, "exports": 1, "simulated": 3}.get(parts[0], len(parts))
         with contextlib.suppress(OSError):
-            _remove(made)
+            _remove(results.joinpath(*parts[:depth]))
     return len(doubtful)
-
-
-def _find_common_output(results: Path, path: Path) -> Path:
-    """Return the folder of a file if one step makes the whole folder; else the file itself."""
-    parts = path.relative_to(results).parts
-    if parts[0] in ("report", "exports"):
-        return results / parts[0]
-    return results.joinpath(*parts[:3]) if parts[0] == "simulated" else path
 
 
 def _remove(path: Path) -> None:

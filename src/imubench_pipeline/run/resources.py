@@ -13,7 +13,6 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from typing import TypedDict
 
 from imubench_pipeline.recordings.drop_zone import COMPRESSED, Recording
 from imubench_pipeline.run.plan import Plan
@@ -32,7 +31,7 @@ _TIME_MARGIN = 10
 """Factor on measured times, for a busy node and a slow file system."""
 
 _TEXT_SUFFIXES = {".csv", ".txt", ".log", ".tsv", ".dat", ".asc", ".nmea"}
-_TEXT_EXPANSION = {"text": 1, "binary": 3, "compressed": 6}
+_BINARY_EXPANSION, _COMPRESSED_EXPANSION = 3, 6
 """Max. samples per byte of a log, relative to text."""
 
 _BYTES_PER_VALUE = 7
@@ -53,13 +52,6 @@ class Limit:
 
 Limits = Callable[[str, str | None], Limit]
 """Takes the sensor and the recording of a job; None: a step of the whole sensor."""
-
-
-class Resources(TypedDict):
-    """Resources of a job: memory in MB, time in minutes."""
-
-    mem_mb: int
-    runtime: int
 
 
 Asked = Callable[[Mapping[str, str], int], int]
@@ -127,8 +119,11 @@ class OfMany:
 Cost = OfRecording | OfMany
 
 
-def resources_of(cost: Cost, extent: Extent, attempt: int = 1) -> Resources:
-    """Return the resources of a job; each attempt, counted from 1, requests twice the last one."""
+def resources_of(cost: Cost, extent: Extent, attempt: int = 1) -> dict[str, int]:
+    """Return the memory in MB and the time in minutes that a job requests.
+
+    Each attempt, counted from 1, requests twice as much as the one before.
+    """
     memory, seconds = cost.of(extent)
     times: int = 2 ** (attempt - 1)
     return {
@@ -142,18 +137,15 @@ def asked(plan: Plan) -> Callable[[Cost], dict[str, Asked]]:
     extent = _make_extent_lookup(plan)
 
     def stated(cost: Cost) -> dict[str, Asked]:
-        def of_job(wildcards: Mapping[str, str], attempt: int) -> Resources:
-            size = extent(wildcards.get("sensor"), wildcards.get("recording"))
-            return resources_of(cost, size, attempt)
+        def of_job(what: str) -> Asked:
+            # Snakemake passes arguments by their names.
+            def amount(wildcards: Mapping[str, str], attempt: int) -> int:
+                size = extent(wildcards.get("sensor"), wildcards.get("recording"))
+                return resources_of(cost, size, attempt)[what]
 
-        # Snakemake passes arguments by their names.
-        def mem_mb(wildcards: Mapping[str, str], attempt: int) -> int:
-            return of_job(wildcards, attempt)["mem_mb"]
+            return amount
 
-        def runtime(wildcards: Mapping[str, str], attempt: int) -> int:
-            return of_job(wildcards, attempt)["runtime"]
-
-        return {"mem_mb": mem_mb, "runtime": runtime}
+        return {what: of_job(what) for what in ("mem_mb", "runtime")}
 
     return stated
 
@@ -221,7 +213,6 @@ def size_as_text(path: Path) -> int:
     if not path.is_file():
         return 0
     suffix = path.suffix.lower()
-    kind = (
-        "compressed" if suffix in COMPRESSED else "text" if suffix in _TEXT_SUFFIXES else "binary"
-    )
-    return path.stat().st_size * _TEXT_EXPANSION[kind]
+    if suffix in COMPRESSED:
+        return path.stat().st_size * _COMPRESSED_EXPANSION
+    return path.stat().st_size * (1 if suffix in _TEXT_SUFFIXES else _BINARY_EXPANSION)

@@ -6,7 +6,6 @@ import sys
 from dataclasses import replace
 from inspect import signature
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 from snakemake.script import script as script_of_snakemake
@@ -15,7 +14,7 @@ from snakemake.sourcecache import LocalSourceFile, SourceCache, infer_source_fil
 from imubench_pipeline.run.faults import Faults, Of
 from imubench_pipeline.run.processes import Job, Processes, StepError
 from imubench_pipeline.run.recovery import remove_unfinished
-from imubench_pipeline.run.resources import Limit, Limits
+from imubench_pipeline.run.resources import Limits
 from imubench_pipeline.run.sealing import sealed
 from imubench_pipeline.tables.failures import QUALITY, Failure, failure_of, write_empty
 
@@ -30,47 +29,31 @@ class Scripts:
     scripts fail as usual. A step also fails as usual if it is stopped with the run, the disk is
     full, or it cannot be imported.
 
-    Parameters
-    ----------
-    faults : Faults
-        Records of failures.
-    limits : callable, optional
-        Limits of a step of one recording or sensor; without them, each failure ends the job.
+    `limits`: of a step of one recording or sensor; without them, each failure ends the job.
     """
 
     def __init__(self, faults: Faults, limits: Limits | None) -> None:
         self._faults = faults
-        self._results = faults.results
         self._limits = limits
         self._processes = Processes()
 
     def __call__(self, *values: Any, **named: Any) -> None:
-        """Run a script to its end, or leave its outputs empty.
+        """Run a script to its end, or leave its outputs empty; see `script` of Snakemake.
 
-        Parameters
-        ----------
-        *values, **named
-            Arguments of the function `script` of Snakemake, named by its signature.
-
-        Raises
-        ------
-        StepError
-            If the run cannot go on without the script.
+        Raise a `StepError` if the run cannot continue without the script.
         """
-        given = SimpleNamespace(**_SCRIPT_SIGNATURE.bind(*values, **named).arguments)
-        script = _locate_script(given)
-        params = given.params
-        job = Job(
-            script,
-            given.input,
-            given.output,
-            params,
-            given.wildcards,
-            Path(given.log[0]),
-            results=self._results,
-        )
+        given = _SCRIPT_SIGNATURE.bind(*values, **named).arguments
+        source = infer_source_file(given["path"], infer_source_file(given["basedir"]))
+        if isinstance(source, LocalSourceFile):
+            script = source.get_path_or_uri(secret_free=True)
+        else:  # of a workflow from elsewhere
+            cache = SourceCache(given["sourcecache_path"], given["runtime_sourcecache_path"])
+            script = cache.get_path(source)
+        parts = {name: given[name] for name in ("input", "output", "params", "wildcards")}
+        log, results = Path(given["log"][0]), self._faults.results
+        job = Job(Path(script), **parts, log=log, results=results)
         job.log.unlink(missing_ok=True)
-        attempt = params.get("attempt")
+        attempt = job.params.get("attempt")
         try:
             if self._limits is None or attempt is None:
                 self._processes.run(job)
@@ -85,13 +68,21 @@ class Scripts:
         """Run a script; write empty outputs if its recording or sensor makes it fail."""
         of: Of = (job.name, job.wildcards["sensor"], job.wildcards.get("recording"))
         outputs = [Path(path) for path in job.output]
-        if before := _find_earlier_failure(job.input, outputs[0].parent):
+        own = (Path(path) for path in job.input if Path(path).parent == outputs[0].parent)
+        if before := next((failure for path in own if (failure := failure_of(path))), None):
             with sealed(job):
                 _leave_out(outputs, job.params, before)
             return
         limit = limits(*of[1:])
+        job = replace(job, memory=limit.memory)
         try:
-            self._run_with_retry(job, limit)
+            try:
+                self._processes.run(job, limit.seconds)
+            except StepError as error:
+                if error.cause != "killed":
+                    raise
+                print(f"{error}: it is run once more", file=sys.stderr, flush=True)
+                self._processes.run(job, limit.seconds)
         except StepError as error:
             if error.cause is None:
                 raise
@@ -107,36 +98,12 @@ class Scripts:
         else:
             self._faults.succeeded(of, attempt)
 
-    def _run_with_retry(self, job: Job, limit: Limit) -> None:
-        job = replace(job, memory=limit.memory)
-        try:
-            self._processes.run(job, limit.seconds)
-        except StepError as error:
-            if error.cause != "killed":
-                raise
-            print(f"{error}: it is run once more", file=sys.stderr, flush=True)
-            self._processes.run(job, limit.seconds)
-
 
 _CAUSE_VERBS = {"error": "failed: ", "killed": "was killed twice: ", "time": ""}
 
 
-def _locate_script(given: SimpleNamespace) -> Path:
-    """Return the path of a script; Snakemake caches one of a workflow from elsewhere."""
-    source = infer_source_file(given.path, infer_source_file(given.basedir))
-    if isinstance(source, LocalSourceFile):
-        return Path(source.get_path_or_uri(secret_free=True))
-    cache = SourceCache(given.sourcecache_path, given.runtime_sourcecache_path)
-    return Path(cache.get_path(source))
-
-
-def _find_earlier_failure(inputs: Any, folder: Path) -> Failure | None:
-    """Return the failure of an earlier step of the same recording, from the inputs of a job."""
-    own = (Path(path) for path in inputs if Path(path).parent == folder)
-    return next((failure for path in own if (failure := failure_of(path))), None)
-
-
 def _leave_out(outputs: list[Path], params: Any, failure: Failure) -> None:
+    """Write the outputs of a failed step: empty, with the reason."""
     write_empty((path for path in outputs if path.name != QUALITY), failure)
     for path in outputs:
         if path.name == QUALITY:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import hashlib
 import json
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 from imubench_pipeline.report.folder import files_of_report
@@ -33,7 +33,13 @@ def sealed(job: Job) -> Iterator[None]:
     inputs = digests(job.results, map(Path, job.input))
     yield
     place = place_of(job.name, job.wildcards.get("sensor"), job.wildcards.get("recording"))
-    outputs = left_by(job.name, [Path(path) for path in job.output])
+    outputs = [Path(path) for path in job.output]
+    folder = outputs[0].parent
+    # Outputs that no rule can declare: pages, and a series of each channel.
+    if job.name == "report":
+        outputs = files_of_report(folder)
+    elif job.name == "reconstruct" and (folder / "series").is_dir():
+        outputs.append(folder / "series")
     seal_files(job.results, place, outputs, inputs, settings_digest(dict(job.params.items())))
 
 
@@ -43,22 +49,12 @@ def settings_digest(params: Mapping[str, object]) -> str:
     return hashlib.sha256(json.dumps(settings, sort_keys=True).encode()).hexdigest()
 
 
-def left_by(step: str, outputs: Sequence[Path]) -> list[Path]:
-    """Return the outputs of a step, including outputs that no rule can declare."""
-    folder = outputs[0].parent
-    if step == "report":  # as many pages as there are recordings
-        return files_of_report(folder)
-    series = folder / "series"
-    return [*outputs, *([series] if step == "reconstruct" and series.is_dir() else [])]
-
-
 def unsound(results: Path, jobs: Mapping[str, str]) -> Iterator[str]:
-    """Yield the jobs whose outputs are not those that they left, of what is there now.
+    """Yield the jobs whose outputs are not those of the present inputs and settings.
 
-    They are missing or changed, have no seal, are of another form, or were made of other files or
-    with other settings. That does not rest on what Snakemake has noted: results may come from a
-    backup, or from a run elsewhere. A file that has its size and its date is taken as it is:
-    `imubench verify` reads all of it.
+    Outputs are missing or changed, have no seal, are of another form, or were made of other files
+    or with other settings. The records of Snakemake are not used: results may come from a backup,
+    or from another machine. A file with unchanged size and date is not read.
 
     A job is named by the place of its seal; `jobs` has the `settings_digest` of each.
     """
@@ -69,13 +65,10 @@ def unsound(results: Path, jobs: Mapping[str, str]) -> Iterator[str]:
     left = {name: file.sha256 for seal in seals.values() for name, file in seal.outputs.items()}
     for place, settings in jobs.items():
         seal = seals.get(place)
-        if seal is None or seal.settings != settings or not _sound(results, seal, left):
+        if (
+            seal is None
+            or (seal.settings, seal.form) != (settings, form())
+            or any(left.get(name) != digest for name, digest in seal.inputs.items())
+            or any(file.fault(results / name, whole=False) for name, file in seal.outputs.items())
+        ):
             yield place
-
-
-def _sound(results: Path, seal: Seal, left: Mapping[str, str]) -> bool:
-    return (
-        seal.form == form()
-        and all(left.get(name) == digest for name, digest in seal.inputs.items())
-        and not any(file.fault(results / name, whole=False) for name, file in seal.outputs.items())
-    )

@@ -5,9 +5,7 @@ from __future__ import annotations
 import fcntl
 import gc
 import importlib
-import json
 import os
-import pickle
 import resource
 import runpy
 import select
@@ -15,8 +13,8 @@ import signal
 import socket
 import sys
 import traceback
-from collections.abc import Mapping
 from contextlib import suppress
+from multiprocessing.connection import Connection
 from pathlib import Path
 from tempfile import TemporaryFile
 from types import FrameType
@@ -25,9 +23,10 @@ from typing import Any
 from numba import njit
 
 from imubench_pipeline.readers.bounded import limit_memory
+from imubench_pipeline.recordings.availability import OF_RESULTS
 from imubench_pipeline.report.run_summary import one_line
 from imubench_pipeline.run.kernels import compile_once
-from imubench_pipeline.run.processes import BEGUN, DONE, FAILED, KILLED, LENGTH, Job
+from imubench_pipeline.run.processes import Job, StepError
 from imubench_pipeline.run.sealing import sealed
 from imubench_pipeline.tables.failures import describe_error
 from imubench_pipeline.tables.findings import UnavailableError
@@ -39,7 +38,8 @@ _MAX_ERROR_LENGTH = 300
 def serve(requests: socket.socket) -> None:
     """Fork for each connection that comes through a socket, until the other end is closed.
 
-    A connection transfers the job of a step, and returns its outcome.
+    A connection transfers the job of a step. It returns None at the begin of the step, and then
+    its cost, or a `StepError`.
     """
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the forks end, and that the run ends is seen
     signal.signal(signal.SIGCHLD, _reap)
@@ -48,10 +48,8 @@ def serve(requests: socket.socket) -> None:
         _, descriptors, _, _ = socket.recv_fds(requests, 1, 1)
         if not descriptors:
             return
-        with socket.socket(fileno=descriptors[0]) as connection:
-            with connection.makefile("rb") as stream:
-                size = int.from_bytes(stream.read(8), "big")
-                job: Job = pickle.loads(stream.read(size))
+        with Connection(descriptors[0]) as connection:
+            job: Job = connection.recv()
             if job.script not in ready:
                 ready[job.script] = _import_modules_of(job.script)
             # Until a fork is known, that it has ended must not be heard of.
@@ -60,14 +58,17 @@ def serve(requests: socket.socket) -> None:
             if fork == 0:
                 requests.close()
                 _run(connection, job, imported=ready[job.script])
-            _running[fork] = connection.dup()
+            _running[fork] = Connection(os.dup(connection.fileno())), job.name
             signal.pthread_sigmask(signal.SIG_UNBLOCK, _CHILD_SIGNALS)
 
 
 _CHILD_SIGNALS = {signal.SIGCHLD}
 
-_running: dict[int, socket.socket] = {}
-"""The connection of each fork, by its process."""
+_STOP_SIGNALS = {signal.SIGHUP, signal.SIGINT, signal.SIGTERM, getattr(signal, "SIGIO", None)}
+"""Signals that end a step because the run ends."""
+
+_running: dict[int, tuple[Connection[Any, Any], str]] = {}
+"""The connection and the step of each fork, by its process."""
 
 
 def _reap(signal_number: int, frame: FrameType | None) -> None:
@@ -77,17 +78,18 @@ def _reap(signal_number: int, frame: FrameType | None) -> None:
             process, status = os.waitpid(-1, os.WNOHANG)
             if not process:
                 return
-            connection = _running.pop(process, None)
-            if connection is None:
+            if process not in _running:  # of a library
                 continue
+            connection, name = _running.pop(process)
             with connection, suppress(OSError):
-                if os.WIFSIGNALED(status):
-                    connection.sendall(_message(KILLED, {"signal": os.WTERMSIG(status)}))
-
-
-def _message(how: bytes, details: Mapping[str, Any]) -> bytes:
-    text = json.dumps(details).encode()
-    return how + len(text).to_bytes(LENGTH, "big") + text
+                if not os.WIFSIGNALED(status):
+                    continue
+                error, number = StepError(f"{name}.py was killed"), os.WTERMSIG(status)
+                if number not in _STOP_SIGNALS:
+                    reason = signal.Signals(number).name
+                    error.cause = "killed"
+                    error.reason = reason + ", perhaps for want of memory" * (reason == "SIGKILL")
+                connection.send(error)
 
 
 def _import_modules_of(script: Path) -> bool:
@@ -109,12 +111,11 @@ def _nothing() -> None:
     """Make numba load what every function needs that it has compiled before."""
 
 
-def _run(connection: socket.socket, job: Job, *, imported: bool) -> None:
+def _run(connection: Connection[Any, Any], job: Job, *, imported: bool) -> None:
     """Run a script in this fork, say how it ended, and end."""
-    how = FAILED
-    details: dict[str, Any] = {"imported": imported, "error": "", "trace": "", "errno": None}
+    outcome: dict[str, float] | StepError = StepError(f"{job.name}.py failed")
     try:
-        for other in _running.values():
+        for other, _ in _running.values():
             other.close()
         signal.signal(signal.SIGINT, signal.SIG_DFL)
         signal.signal(signal.SIGCHLD, signal.SIG_DFL)
@@ -122,7 +123,7 @@ def _run(connection: socket.socket, job: Job, *, imported: bool) -> None:
         if sys.platform == "linux":
             _end_with_who_asked(connection)
             Path("/proc/self/comm").write_text(job.name)  # for ps and top
-        connection.sendall(BEGUN)
+        connection.send(None)
         _print_to(job.log)
         if job.memory is not None:
             limit_memory(job.memory)
@@ -130,23 +131,25 @@ def _run(connection: socket.socket, job: Job, *, imported: bool) -> None:
             runpy.run_path(str(job.script), init_globals={"snakemake": job}, run_name="__main__")
             sys.stdout.flush()
             sys.stderr.flush()
-        how = DONE
+        used = resource.getrusage(resource.RUSAGE_SELF)
+        cpu, memory = used.ru_utime + used.ru_stime, used.ru_maxrss * 1024 / 1e6  # KiB
+        outcome = {"cpu": cpu, "memory": memory}
     except BaseException as error:
+        assert isinstance(outcome, StepError)
         if not isinstance(error, UnavailableError):  # of the surroundings: its text says it all
-            details["trace"] = _trace(error, str(job.script))
-        details["error"] = one_line(describe_error(error), _MAX_ERROR_LENGTH)
+            outcome.trace = _trace(error, str(job.script))
+        outcome.reason = one_line(describe_error(error), _MAX_ERROR_LENGTH)
         if isinstance(error, MemoryError):
-            details["error"] += f"; limits.memory allows {(job.memory or 0) // 10**6} MB"
-        details["errno"] = error.errno if isinstance(error, OSError) else None
+            outcome.reason += f"; limits.memory allows {(job.memory or 0) // 10**6} MB"
+        of_results = isinstance(error, OSError) and error.errno in OF_RESULTS
+        outcome.cause = "error" if imported and not of_results else None
     finally:
         with suppress(OSError):  # a disk that is full takes no words either
-            sys.stderr.write(details["trace"])
+            sys.stderr.write(outcome.trace if isinstance(outcome, StepError) else "")
             sys.stdout.flush()
             sys.stderr.flush()
-        used = resource.getrusage(resource.RUSAGE_SELF)
-        cost = {"cpu": used.ru_utime + used.ru_stime, "memory": used.ru_maxrss * 1024 / 1e6}  # KiB
-        connection.sendall(_message(how, cost if how == DONE else details))
-        os._exit(how != DONE)
+        connection.send(outcome)
+        os._exit(isinstance(outcome, StepError))
 
 
 def _print_to(log: Path) -> None:
@@ -158,8 +161,8 @@ def _print_to(log: Path) -> None:
     os.close(file)
 
 
-def _end_with_who_asked(connection: socket.socket) -> None:
-    """Have the system end this process as soon as the other end of a connection is closed.
+def _end_with_who_asked(connection: Connection[Any, Any]) -> None:
+    """Have the system end this process when the other end of a connection closes or sends.
 
     That the server ends would tell later: it may be importing what another step needs, while the
     next run begins.
@@ -167,7 +170,7 @@ def _end_with_who_asked(connection: socket.socket) -> None:
     signal.signal(signal.SIGIO, signal.SIG_DFL)
     fcntl.fcntl(connection, fcntl.F_SETOWN, os.getpid())
     fcntl.fcntl(connection, fcntl.F_SETFL, fcntl.fcntl(connection, fcntl.F_GETFL) | os.O_ASYNC)
-    if select.select([connection], [], [], 0.0)[0]:  # closed before; nothing more is ever sent
+    if select.select([connection], [], [], 0.0)[0]:  # closed before
         os._exit(1)
 
 

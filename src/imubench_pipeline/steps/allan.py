@@ -1,11 +1,13 @@
-"""Compute the Allan variance of every channel of a recording."""
+"""Compute the Allan variance of every channel of a recording, and read it back."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
+import pyarrow as pa
 from numpy.typing import ArrayLike
 
 from imubench_pipeline.allan import AllanCurve, cluster_sizes, of_blocks, of_phase
@@ -15,8 +17,9 @@ from imubench_pipeline.model.estimates import AllanRow
 from imubench_pipeline.recordings.kept import kept_static_logs
 from imubench_pipeline.recordings.recording import ChannelLog
 from imubench_pipeline.settings.config import AllanSettings
+from imubench_pipeline.tables import read
 from imubench_pipeline.tables.findings import Finding, find
-from imubench_pipeline.tables.keys import Key
+from imubench_pipeline.tables.keys import Key, divided
 from imubench_pipeline.words.findings.samples import TooShort
 
 
@@ -62,3 +65,49 @@ def curve_of(
         segments=segments,
         threads=threads,
     )
+
+
+def read_curves(path: Path, samples: Mapping[str, int]) -> dict[str, AllanCurve]:
+    """Read the curves of a recording from a table ``allan``, by channel.
+
+    `samples`: number of each channel, including missing ones.
+    """
+    by_channel = divided(read("allan", [path]), "channel")
+    return {
+        channel: AllanCurve(
+            tau=table["tau"].to_numpy(),
+            cluster_size=table["cluster_size"].to_numpy(),
+            variance=table["adev"].to_numpy() ** 2,
+            samples=samples[channel],
+            exponent=table["exponent"].to_numpy(),
+            averaged=table["averaged"].to_numpy(),
+            share=table["share"].to_numpy(),
+            **_read_degrees(table),
+        )
+        for (channel,), table in by_channel.items()
+    }
+
+
+def _read_degrees(table: pa.Table) -> dict[str, Any]:
+    """Return the degrees of freedom of a curve from the columns of its table."""
+    return {
+        "edf": table["edf"].to_numpy(),
+        "edf_upper": table["edf_upper"].to_numpy(),
+        "edf_source": tuple(table["edf_source"].to_pylist()),
+    }
+
+
+def read_compensated_curves(
+    path: Path, measured: Mapping[str, AllanCurve]
+) -> dict[str, AllanCurve]:
+    """Read the table ``allan_compensated`` of a recording, by channel.
+
+    `measured`: the curves of the log as it is, with the same clusters.
+    """
+    by_channel = divided(read("allan_compensated", [path]), "channel")
+    return {
+        channel: replace(
+            measured[channel], variance=table["adev"].to_numpy() ** 2, **_read_degrees(table)
+        )
+        for (channel,), table in by_channel.items()
+    }

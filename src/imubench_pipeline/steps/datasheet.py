@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
 from dataclasses import asdict
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 from imubench_pipeline.datasheets.comparable import SENSITIVITY, comparables
 from imubench_pipeline.datasheets.deltas import bias_deltas, curve_rms, deltas
@@ -16,46 +16,39 @@ from imubench_pipeline.model.comparisons import DatasheetCurveRow, DatasheetRow
 from imubench_pipeline.model.estimates import FixedBiasRow, TemperatureRow
 from imubench_pipeline.recordings.kept import Quality
 from imubench_pipeline.settings.printed import Datasheet
-from imubench_pipeline.steps.kept_curves import curves
+from imubench_pipeline.steps.allan import read_curves
 from imubench_pipeline.tables import read
 
 
-def rows(folder: Path, sensor: str, recording: str, settings: str) -> Iterator[DatasheetRow]:
-    """Yield the rows of the table ``datasheet``; none of a rejected recording."""
+def datasheet_tables(
+    folder: Path, sensor: str, recording: str, settings: str
+) -> dict[str, list[Any]]:
+    """Return the rows of ``datasheet`` and ``datasheet_curve``; none of a rejected recording."""
     quality = Quality.read(folder / "quality.json")
-    measured = curves(folder / "allan.parquet", quality.grids)
+    measured = read_curves(folder / "allan.parquet", quality.grids)
     temperatures = [quality.row.temperature_min, quality.row.temperature_max]
     thermal = TemperatureRow.rows_of(read("temperature", [folder / "temperature.parquet"]))
     biases = FixedBiasRow.rows_of(read("fixed_bias", [folder / "fixed_bias.parquet"]))
     means = {row.channel: row.value for row in biases}
     sections = json.loads(settings)
     datasheet, tolerance = Datasheet.model_validate(sections["datasheet"]), sections["tolerance"]
+    rows, of_curves = list[DatasheetRow](), list[DatasheetCurveRow]()
     for channel, by_method in estimates(folder / "parameters.parquet").items():
-        tau = measured[channel].up_to(sections["longest"])
         row = partial(DatasheetRow, sensor=sensor, recording=recording, channel=channel)
+        tau = measured[channel].up_to(sections["longest"])
         for estimate in by_method:
             for delta in deltas(datasheet, channel, estimate, tau, tolerance):
-                yield row(method=estimate.method, **asdict(delta))
-        own = [row for row in thermal if row.channel == channel]
-        for delta in bias_deltas(
-            datasheet, channel, means, tolerance, sensitivity(own, *temperatures)
-        ):
+                rows.append(row(method=estimate.method, **asdict(delta)))
+        own = sensitivity([row for row in thermal if row.channel == channel], *temperatures)
+        for delta in bias_deltas(datasheet, channel, means, tolerance, own):
             method = "temperature" if delta.statistic == SENSITIVITY else "mean"
-            yield row(method=method, **asdict(delta))
-
-
-def curve_rows(
-    folder: Path, sensor: str, recording: str, settings: str
-) -> Iterator[DatasheetCurveRow]:
-    """Yield the rows of the table ``datasheet_curve``; none where a datasheet has no line."""
-    measured = curves(folder / "allan.parquet", Quality.read(folder / "quality.json").grids)
-    datasheet = Datasheet.model_validate(json.loads(settings)["datasheet"])
+            rows.append(row(method=method, **asdict(delta)))
     for channel, curve in measured.items():
         printed = list(comparables(datasheet, channel))
         above_zero = curve.deviation > 0.0  # 0 at multiples of the period of a periodic log
         tau, deviation = curve.tau[above_zero], curve.deviation[above_zero]
         for distance in curve_rms(printed, tau, deviation) if above_zero.any() else ():
-            yield DatasheetCurveRow(
+            of_curve = DatasheetCurveRow(
                 sensor=sensor,
                 recording=recording,
                 channel=channel,
@@ -65,3 +58,5 @@ def curve_rows(
                 rms=distance.rms,
                 rms_log10=distance.rms_log10,
             )
+            of_curves.append(of_curve)
+    return {"datasheet": rows, "datasheet_curve": of_curves}

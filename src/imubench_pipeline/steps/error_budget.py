@@ -26,9 +26,10 @@ from imubench_pipeline.units import quantity_to_si
 
 
 def error_tables(
-    inputs: dict[str, Path], names: dict[str, str], settings: str
+    folder: Path, sensor: str, recording: str, settings: str
 ) -> dict[str, Iterator[TableRow]]:
-    """Return the rows of the tables that the rule leaves; none of a rejected log."""
+    """Return the rows of the tables of the step, from a folder; none of a rejected log."""
+    names = {"sensor": sensor, "recording": recording}
     sections = json.loads(settings)
     how = ErrorBudgetSettings.model_validate(sections["error_budget"])
     times = [quantity_to_si(time, "time") for time in how.times]
@@ -38,19 +39,19 @@ def error_tables(
     questions = list(standard(times, window, latitude, how.axes))
     for name, requirement in requirements.items():
         questions += of_requirement(name, requirement)
-    estimates = recommended_estimates(inputs["parameters"], inputs["draws"])
+    estimates = recommended_estimates(folder / "parameters.parquet", folder / "draws.parquet")
     if not estimates:
         return {name: iter(()) for name in _OUTPUT_TABLES}
     drawn = {"draws": how.draws, "seed": how.seed}
-    logs = kept_static_logs(inputs["quality"].parent)
-    apart = DeterministicRow.rows_of(read("deterministic", [inputs["deterministic"]]))
-    temperature = TemperatureRow.rows_of(read("temperature", [inputs["temperature"]]))
+    logs = kept_static_logs(folder)
+    apart = DeterministicRow.rows_of(read("deterministic", [folder / "deterministic.parquet"]))
+    temperature = TemperatureRow.rows_of(read("temperature", [folder / "temperature.parquet"]))
     figures = in_use(Datasheet.model_validate(sections["datasheet"]), estimates, temperature)
     tables = (
         error_rows(names, estimates, questions, figures=figures, **drawn),
         backtest_rows(names, logs, estimates, requirements, apart, **drawn),
         growth_rows(names, estimates, times=times, window=window, figures=figures, **drawn),
-        _deviations(names, Quality.read(inputs["quality"]), estimates, sections),
+        _deviations(names, Quality.read(folder / "quality.json"), estimates, sections),
     )
     return dict(zip(_OUTPUT_TABLES, tables, strict=True))
 

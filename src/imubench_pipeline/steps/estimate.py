@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Container, Iterable, Iterator, Mapping
+from collections.abc import Callable, Container, Iterable, Iterator
 from dataclasses import asdict, dataclass, field, replace
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -47,8 +48,7 @@ from imubench_pipeline.recordings.kept import kept_static_logs
 from imubench_pipeline.recordings.recording import ChannelLog, mean_of
 from imubench_pipeline.settings.config import EstimateSettings
 from imubench_pipeline.settings.sensor import quantity_of
-from imubench_pipeline.steps.allan import too_sparse
-from imubench_pipeline.steps.kept_curves import curves
+from imubench_pipeline.steps.allan import read_curves, too_sparse
 from imubench_pipeline.tables.findings import Finding
 from imubench_pipeline.tables.keys import Key
 from imubench_pipeline.typing import Array
@@ -146,7 +146,8 @@ class _Channel:
         self.mean = log.mean()
         self._bandwidth = bandwidth
         self._band = quantity_to_si(settings.band, "frequency") if settings.band else None
-        unfiltered = _unfiltered(self._band, bandwidth)
+        limits = [limit for limit in (self._band, 0.5 * (bandwidth or 0.0)) if limit]
+        unfiltered = min(limits, default=None)  # the noise is as it is up to this frequency
         self.signals = find_deterministic_signals(
             log.blocks, log.grid, log.rate, segments=log.segments, highest=unfiltered
         )
@@ -190,13 +191,19 @@ class _Channel:
             lack = slow_noise_missing(key.channel, fitted.spectrum, fitted.fitted, white)
             into.add_findings(key, [lack] if lack else [])
         into.models += _model_rows(key, fitted)
-        into.lines += _line_rows(key, fitted)
+        for line in fitted.lines:
+            about = asdict(line)
+            del about["resolution"]
+            into.lines.append(LineRow(**asdict(key), **about))
         into.spectrum += _spectrum_rows(key, fitted)
         into.low_pass += _low_pass_rows(key, fitted)
         if warm is not None:
             into.temperature += _temperature_rows(key, warm)
             if warm.compensated:
-                into.allan_compensated += _compensated_rows(key, limited(left, without), added)
+                rows = limit_rows(limited(left, without))
+                for about, effect in zip(rows, added.deviation, strict=True):
+                    row = CompensatedAllanRow(**asdict(key), **about, temperature=float(effect))
+                    into.allan_compensated.append(row)
         return estimates
 
     def _curve_of(self, blocks: Iterator[Array], *, whole: bool = False) -> AllanCurve:
@@ -259,12 +266,6 @@ class _Channel:
         return channel_rng(self.settings.seed, f"{self.mean!r}", f"{self.log.grid}", use)
 
 
-def _unfiltered(band: float | None, bandwidth: float | None) -> float | None:
-    """Return the frequency up to which a log shows its noise as it is, Hz; None: not known."""
-    limits = (band, 0.5 * bandwidth if bandwidth else None)
-    return min((frequency for frequency in limits if frequency), default=None)
-
-
 _MIN_SAMPLES_FOR_STEP = 1 << 16
 """Samples from which the step of a register is found."""
 
@@ -280,6 +281,9 @@ _METHODS_BY_PREFERENCE = ("likelihood", "likelihood_gm", "weighted", "paper", "c
 def _model_rows(key: Key, fit: Likelihood) -> Iterator[ModelRow]:
     """Yield the rows of the table ``models``, the chosen model first."""
     for place, candidate in enumerate(fit.candidates):
+        notes = [candidate.goodness.where]
+        if place == 0:
+            notes += [describe_disagreement(fit.candidates) or ""]
         yield ModelRow(
             **asdict(key),
             model=candidate.terms.name,
@@ -292,24 +296,11 @@ def _model_rows(key: Key, fit: Likelihood) -> Iterator[ModelRow]:
             deviance=candidate.goodness.deviance,
             chance=candidate.goodness.chance,
             verdict=candidate.goodness.verdict,
-            note=_note(fit) if place == 0 else candidate.goodness.where,
+            note=" ".join(filter(None, map(sentence, notes))),
             bins=int(fit.used.sum()),
             band=fit.band.highest if fit.band else None,
             band_source=fit.frame.band_words if fit.band else None,
         )
-
-
-def _note(fit: Likelihood) -> str:
-    notes = [fit.candidates[0].goodness.where, describe_disagreement(fit.candidates)]
-    return " ".join(filter(None, map(sentence, notes)))
-
-
-def _line_rows(key: Key, fit: Likelihood) -> Iterator[LineRow]:
-    """Yield the rows of the table ``lines``."""
-    for line in fit.lines:
-        row = asdict(line)
-        row.pop("resolution")
-        yield LineRow(**asdict(key), **row)
 
 
 def _spectrum_rows(key: Key, fit: Likelihood) -> Iterator[SpectrumRow]:
@@ -328,20 +319,13 @@ def _spectrum_rows(key: Key, fit: Likelihood) -> Iterator[SpectrumRow]:
         )
 
 
-def _compensated_rows(
-    key: Key, left: AllanCurve, added: AllanCurve
-) -> Iterator[CompensatedAllanRow]:
-    """Yield the rows of the table ``allan_compensated``: of what temperature leaves, and adds."""
-    for about, deviation in zip(limit_rows(left), added.deviation, strict=True):
-        yield CompensatedAllanRow(**asdict(key), **about, temperature=float(deviation))
-
-
 def _temperature_rows(key: Key, fit: ThermalFit) -> Iterator[TemperatureRow]:
     """Yield the rows of the table ``temperature``."""
     unit = SI_UNITS[quantity_of(key.channel)]["B"]
+    reason = fit.sensitivity.reason or fit.reason
     figures = {
         "T_0": (Parameter(fit.reference), "degC"),
-        "sensitivity": (fit.sensitivity, f"{unit}/K"),
+        "sensitivity": (replace(fit.sensitivity, reason=reason), f"{unit}/K"),
         "quadratic": (fit.quadratic, f"{unit}/K^2"),
         "lag": (fit.lag, "s"),
         "bias": (fit.bias, unit),
@@ -351,13 +335,7 @@ def _temperature_rows(key: Key, fit: ThermalFit) -> Iterator[TemperatureRow]:
             **asdict(key),
             compensated=fit.compensated,
             parameter=name,
-            value=parameter.value,
-            lower=parameter.lower,
-            upper=parameter.upper,
-            unit=its_unit,
-            status=parameter.status,
-            reason=parameter.reason or (fit.reason if name == "sensitivity" else None),
-            fitted=parameter.fitted,
+            **_estimate_columns(parameter, its_unit),
         )
 
 
@@ -376,14 +354,15 @@ def _low_pass_rows(key: Key, fit: Likelihood) -> Iterator[LowPassRow]:
             kind=low_pass.kind,
             order=low_pass.order,
             parameter=name,
-            value=parameter.value,
-            lower=parameter.lower,
-            upper=parameter.upper,
-            unit=unit,
-            status=parameter.status,
-            reason=parameter.reason,
-            fitted=parameter.fitted,
+            **_estimate_columns(parameter, unit),
         )
+
+
+def _estimate_columns(parameter: Parameter, unit: str) -> dict[str, Any]:
+    """Return the columns of an estimate that tables have in common."""
+    columns = asdict(parameter) | {"unit": unit}
+    del columns["duration_needed"]
+    return columns
 
 
 def resolution_of(log: ChannelLog) -> float:
@@ -394,18 +373,14 @@ def resolution_of(log: ChannelLog) -> float:
 
 
 def estimation(
-    quality: Path,
-    curve: Path,
-    sensor: str,
-    recording: str,
-    settings: str,
-    channels: Container[str] | None = None,
+    folder: Path, sensor: str, recording: str, settings: str, channels: Container[str] | None = None
 ) -> Estimation:
-    """Return the rows that the channels leave, all or some; none of a rejected recording."""
+    """Return the rows of all or some channels in a folder; none of a rejected recording."""
     sections = json.loads(settings)
     into = Estimation()
-    logs = kept_static_logs(quality.parent)
-    measured = curves(curve, {channel: log.grid for channel, log in logs.items()})
+    logs = kept_static_logs(folder)
+    grids = {channel: log.grid for channel, log in logs.items()}
+    measured = read_curves(folder / "curve.parquet", grids)
     for channel, log in logs.items():
         if channels is not None and channel not in channels:
             continue
@@ -416,12 +391,11 @@ def estimation(
         how = EstimateSettings.model_validate(sections["estimate"])
         estimate_channel(key, log, measured[channel], how, sections["bandwidth"], into)
         if read := sections.get("authors", {}).get(channel):
-            into.parameters += parameter_rows(key, _of_authors(read), recommended=False)
+            # The authors read their own log; they do not print every parameter.
+            unread = Parameter(None, "not_shown", texts.not_printed_by_source())
+            figures = {
+                name: Parameter(read[name]) if name in read else unread for name in PARAMETERS
+            }
+            estimate = Estimate("authors", figures)
+            into.parameters += parameter_rows(key, estimate, recommended=False)
     return into
-
-
-def _of_authors(read: Mapping[str, float]) -> Estimate:
-    """Return what the authors of a simulated recording read from the curve of their own log."""
-    unread = Parameter(None, "not_shown", texts.not_printed_by_source())
-    parameters = {name: Parameter(read[name]) if name in read else unread for name in PARAMETERS}
-    return Estimate("authors", parameters)

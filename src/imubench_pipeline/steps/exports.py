@@ -22,9 +22,8 @@ def exports(
 ) -> Iterator[tuple[Path, str | bytes]]:
     """Yield the files of a run, each with its place in the folder of the exports.
 
-    A place is ``<sensor>/<target>/<file of the program>``; ``<sensor>/not_made.txt`` is for what a
-    program cannot hold. `tables` and `recordings` are as
-    `imubench_pipeline.export.request.make_content` takes them.
+    A place is ``<sensor>/<target>/<file of the program>``; ``<sensor>/not_made.txt`` has the
+    reasons of missing files. `tables` and `recordings`: as of `export.request.make_content`.
     """
     for sensor in dict.fromkeys(tables["parameters"]["sensor"].to_pylist()):
         refused = []
@@ -52,6 +51,6 @@ def exports(
 def write_exports(tables: Path, settings: str, folder: Path) -> None:
     """Write a folder a sensor, with a file a program; all appear together."""
     how = ExportSettings.model_validate_json(settings)
-    with making(folder) as make_content:
+    with making(folder) as made:
         for place, content in exports(load(tables), how, recordings_of(tables)):
-            write_content(content, make_content / place)
+            write_content(content, made / place)

@@ -10,7 +10,7 @@ from typing import Any
 
 from imubench_pipeline.model.recordings import FailureRow, FileRow, RecordingRow
 from imubench_pipeline.model.states import FileStatus, RecordingStatus
-from imubench_pipeline.tables import build, read, write_arrow
+from imubench_pipeline.tables import read, write_each
 from imubench_pipeline.words.reasons import simulations as texts
 
 NEEDED = ("recordings", "failures")
@@ -29,13 +29,8 @@ def file_rows(
 ) -> Iterator[FileRow]:
     """Yield the rows of the table ``files``.
 
-    Parameters
-    ----------
-    files : iterable of mapping
-        Every file in the drop zone (`imubench_pipeline.recordings.drop_zone.FoundFile`).
-    recordings : iterable of RecordingRow
-        The files of a recording that has no row have failed with its sensor.
-    failures : iterable of FailureRow
+    `files`: every file in the drop zone (`imubench_pipeline.recordings.drop_zone.FoundFile`). The
+    files of a recording without a row have failed with its sensor.
     """
     outcome = {(row.sensor, row.recording): row for row in recordings}
     of_sensor = {row.sensor: row.reason for row in failures if row.recording is None}
@@ -54,6 +49,4 @@ def write_files(tables: Mapping[str, Path], files: str, outputs: Iterable[Path])
     """Write the table ``files``, as Parquet and CSV; `files` is what the plan found, as JSON."""
     recordings = RecordingRow.rows_of(read("recordings", [tables["recordings"]]))
     failures = FailureRow.rows_of(read("failures", [tables["failures"]]))
-    table = build("files", file_rows(json.loads(files), recordings, failures))
-    for output in outputs:
-        write_arrow(table, output)
+    write_each({"files": file_rows(json.loads(files), recordings, failures)}, outputs)

@@ -37,43 +37,22 @@ _DRAW_SEED = 20260101
 
 @dataclass(frozen=True)
 class NoiseSource:
-    """A noise model and its source.
+    """A noise model and its source, SI."""
 
-    Attributes
-    ----------
-    model : NoiseModel
-        That the data of its source favour, SI.
-    papers : NoiseModel
-        The papers' N, B, T_B and K of the same source, for their filter; it may lack some.
-    words : str
-        Where it is from.
-    drawn : tuple of NoiseModel
-        Drawn from what its log leaves open of it; none where nothing is known of that.
-    """
-
-    model: NoiseModel
-    papers: NoiseModel
-    words: str
-    drawn: tuple[NoiseModel, ...] = ()
+    model: NoiseModel  # the best one for the data of its source
+    papers: NoiseModel  # N, B, T_B and K of the same source, for the papers' filter; or some
+    words: str  # the source
+    drawn: tuple[NoiseModel, ...] = ()  # from the uncertainty of the model, if it is known
 
 
 def from_static(
     folders: Sequence[Path], own: RecordingRow, channel: str, draws: int = 0
 ) -> NoiseSource | None:
-    """Return the noise of a gyro from the static recordings of its sensor.
+    """Return the noise of a gyro from the static recordings of its sensor, in `folders`.
 
-    None where no recording has an estimate of a gyro with white noise in it.
-
-    Parameters
-    ----------
-    folders : sequence of Path
-        Of those recordings.
-    own : RecordingRow
-        Of the recording that was turned.
-    channel : str
-        The gyro that was turned; another gyro of the sensor answers where it has no estimate.
-    draws : int
-        Models that are drawn from what the log leaves open of the estimate.
+    None if no recording has an estimate of a gyro with white noise. `own` is the recording that was
+    turned, `channel` its gyro; another gyro of the sensor is used if this one has no estimate.
+    `draws`: number of models to draw from the uncertainty of the estimate.
     """
 
     def far(row: RecordingRow) -> tuple[bool, bool]:
@@ -91,16 +70,16 @@ def from_static(
             words = _words(row, own, name, channel, best[name].method)
             rng = channel_rng(_DRAW_SEED, repr(best[name].model), name)
             drawn = tuple(draw_models(best[name], draws, rng)) if draws else ()
-            return NoiseSource(best[name].model, papers, words, drawn)
+            return NoiseSource(best[name].model, papers, source, drawn)
     return None
 
 
 def static_recordings(
     folders: Sequence[Path], far: Callable[[RecordingRow], tuple[bool, ...]]
 ) -> list[Kept]:
-    """Return the static recordings that can be used: the nearest first, of these the longest.
+    """Return the usable static recordings: the nearest first, of these the longest.
 
-    `far` tells from a recording's row what speaks against it.
+    `far` returns the differences of a recording that speak against it.
     """
 
     def order(recording: Kept) -> tuple[Any, ...]:
@@ -108,8 +87,8 @@ def static_recordings(
         return *far(row), -(row.duration or 0.0), row.recording
 
     every = [(Quality.read(folder / "quality.json").row, folder) for folder in folders]
-    static = [(row, folder) for row, folder in every if row.kind == "static"]
-    return sorted((each for each in static if each[0].status == "ok"), key=order)
+    usable = [kept for kept in every if (kept[0].kind, kept[0].status) == ("static", "ok")]
+    return sorted(usable, key=order)
 
 
 def noise_source(

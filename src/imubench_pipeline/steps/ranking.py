@@ -18,7 +18,7 @@ from imubench_pipeline.navigation.verdicts.judgement import judgements
 from imubench_pipeline.navigation.verdicts.next_steps import next_step_rows
 from imubench_pipeline.registry import Hook
 from imubench_pipeline.settings.requirements import Requirement, requirements_of
-from imubench_pipeline.tables import build, read, write_arrow
+from imubench_pipeline.tables import read, write_each
 
 OtherErrors = Callable[
     [pa.Table, Sequence[RecordingRow], Mapping[str, Requirement]], Iterable[ErrorBudgetRow]
@@ -48,9 +48,5 @@ def write_ranking(tables: dict[str, Path], settings: str, outputs: list[Path]) -
         errors += errors_of(joined[name], recordings, requirements)
     of_sensors = [row for row in errors if row.sensor in sensors]
     judged = list(judgements(of_sensors, requirements, sensors, basis))
-    built = {
-        "ranking": build("ranking", ranked(judged, basis)),
-        "next_steps": build("next_steps", next_step_rows(judged, basis)),
-    }
-    for output in outputs:
-        write_arrow(built[output.stem], output)
+    rows = {"ranking": ranked(judged, basis), "next_steps": next_step_rows(judged, basis)}
+    write_each(rows, outputs)

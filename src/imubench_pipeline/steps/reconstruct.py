@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Container
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pyarrow as pa
@@ -16,7 +15,6 @@ from imubench_pipeline.estimators.estimate import Estimate
 from imubench_pipeline.estimators.rows import estimates, recommended_estimates
 from imubench_pipeline.estimators.score import beats, rms, score
 from imubench_pipeline.model.estimates import ReconstructionRow, ScoreRow
-from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.simulate import (
     channel_rng,
     ensemble,
@@ -26,8 +24,8 @@ from imubench_pipeline.noise.simulate import (
 from imubench_pipeline.recordings.kept import Quality
 from imubench_pipeline.recordings.recording import LogWriter
 from imubench_pipeline.settings.config import ReconstructionSettings
-from imubench_pipeline.steps.kept_curves import compensated_curves, curves
-from imubench_pipeline.tables import replacing, write
+from imubench_pipeline.steps.allan import read_compensated_curves, read_curves
+from imubench_pipeline.tables import replacing
 from imubench_pipeline.tables.keys import Key
 from imubench_pipeline.words.reasons import simulations as texts
 
@@ -67,7 +65,12 @@ def reconstruct(
         return channel_rng(settings.seed, repr(model), key.channel, use)
 
     if settings.keep_series:
-        _keep(model, rate, samples, stream("member 1"), series)
+        about = {"simulated": True, "rate": rate, "rows": samples, "model": asdict(model)}
+        columns = {"simulated": pa.float64()}
+        with replacing(series) as temporary, LogWriter(temporary, columns) as log:
+            for block in simulate_blocks(model, rate, samples, stream("member 1")):
+                log.write({"simulated": block})
+            log.finish(about)
     variances = [
         reconstructed_variance(model, rate, samples, sizes, stream(f"member {number}"))
         for number in range(1, settings.members + 1)
@@ -76,32 +79,19 @@ def reconstruct(
     deviations = np.sqrt(
         ensemble(model, rate, samples, sizes, settings.band_members, stream("band"))
     )
-    lower, median, upper = np.quantile(deviations, [0.025, 0.5, 0.975], axis=0)
+    quantiles = np.quantile(deviations, [0.025, 0.5, 0.975], axis=0)
     of_model = np.sqrt(model.allan_variance(measured.tau, rate))
     error = 1.0 / np.sqrt(2.0 * measured.edf)
     scores = score(measured.deviation, error, of_model, deviations)
-    rows = _rows(names, measured.tau, median, lower, upper, reconstructed)
-    differences = rms(deviations, measured.deviation)
-    return Reconstruction(list(rows), ScoreRow(**names, **asdict(scores)), differences)
-
-
-def _rows(
-    names: Mapping[str, Any], tau: NDArray[np.float64], *columns: NDArray[np.float64]
-) -> Iterator[ReconstructionRow]:
-    for values in zip(tau, *columns, strict=True):
-        at, adev, lower, upper, reconstructed = map(float, values)
-        yield ReconstructionRow(
-            **names, tau=at, adev=adev, lower=lower, upper=upper, reconstructed=reconstructed
+    points = np.column_stack([measured.tau, *quantiles, reconstructed]).tolist()
+    rows = [
+        ReconstructionRow(
+            **names, tau=tau, lower=lower, adev=median, upper=upper, reconstructed=of_full_length
         )
-
-
-def _keep(
-    model: NoiseModel, rate: float, samples: int, rng: np.random.Generator, series: Path
-) -> None:
-    with replacing(series) as temporary, LogWriter(temporary, {"simulated": pa.float64()}) as log:
-        for block in simulate_blocks(model, rate, samples, rng):
-            log.write({"simulated": block})
-        log.finish({"simulated": True, "rate": rate, "rows": samples, "model": asdict(model)})
+        for tau, lower, median, upper, of_full_length in points
+    ]
+    differences = rms(deviations, measured.deviation)
+    return Reconstruction(rows, ScoreRow(**names, **asdict(scores)), differences)
 
 
 @dataclass(frozen=True)
@@ -113,13 +103,13 @@ class ReconstructionRows:
 
 
 def reconstruction_rows(
-    inputs: list[Path], settings: ReconstructionSettings, channels: Collection[str] | None = None
+    folder: Path, settings: ReconstructionSettings, channels: Container[str] | None = None
 ) -> ReconstructionRows:
     """Return the rows of a recording, of all channels that have estimates or of some of them."""
-    quality, allan, parameters, compensated = inputs
-    about = Quality.read(quality)
-    measured = curves(allan, about.grids)
-    left = compensated_curves(compensated, measured)
+    about = Quality.read(folder / "quality.json")
+    measured = read_curves(folder / "allan.parquet", about.grids)
+    left = read_compensated_curves(folder / "allan_compensated.parquet", measured)
+    parameters = folder / "parameters.parquet"
     best = recommended_estimates(parameters)
     rows = ReconstructionRows()
     for channel, by_method in estimates(parameters).items():
@@ -129,7 +119,7 @@ def reconstruction_rows(
         rate = about.channels[channel]["rate"]
         results = {}
         for estimate in by_method:
-            series = quality.parent / "series" / f"{channel}.{estimate.method}.parquet"
+            series = folder / "series" / f"{channel}.{estimate.method}.parquet"
             curve = (left if estimate.method == "compensated" else measured)[channel]
             results[estimate.method] = reconstruct(key, estimate, curve, rate, settings, series)
         recommended = results[best[channel].method].differences
@@ -140,12 +130,3 @@ def reconstruction_rows(
             rows.scores.append(replace(result.score_row, beats=chance))
             rows.reconstruction.extend(result.curve_rows)
     return rows
-
-
-def write_reconstruction(
-    inputs: list[Path], outputs: list[Path], settings: ReconstructionSettings
-) -> None:
-    """Write the tables ``reconstruction`` and ``scores`` of a recording."""
-    rows = reconstruction_rows(inputs, settings)
-    write("reconstruction", rows.reconstruction, outputs[0])
-    write("scores", rows.scores, outputs[1])

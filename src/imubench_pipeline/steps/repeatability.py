@@ -9,7 +9,7 @@ from imubench_pipeline.model.recordings import RecordingRow
 from imubench_pipeline.navigation.repeatability import repeatability_rows
 from imubench_pipeline.settings.config import DatasheetSettings
 from imubench_pipeline.settings.sensor import sensors_of
-from imubench_pipeline.tables import build, read, write_arrow
+from imubench_pipeline.tables import read, write_each
 
 
 def write_repeatability(
@@ -20,6 +20,4 @@ def write_repeatability(
     fixed = FixedBiasRow.rows_of(read("fixed_bias", [biases]))
     about = RecordingRow.rows_of(read("recordings", [recordings]))
     rows = repeatability_rows(fixed, about, sensors_of(catalogue), how.tolerance)
-    table = build("repeatability", rows)
-    for output in outputs:
-        write_arrow(table, output)
+    write_each({"repeatability": rows}, outputs)

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import asdict
 from functools import partial
 from pathlib import Path
 
@@ -52,13 +53,7 @@ def samples_of_models(
 ) -> Iterator[ModelSampleRow]:
     """Yield the rows of the table ``samples_of_models``; none of a rejected recording.
 
-    Parameters
-    ----------
-    folder : Path
-        Of the recording.
-    sensor, recording : str
-    seed : int
-        Each channel and model has a stream of its own.
+    `folder`: of the recording; `seed`: each channel and model has a stream of its own.
     """
     logs = kept_static_logs(folder)
     if not logs:
@@ -71,7 +66,14 @@ def samples_of_models(
     }
     for channel, log in logs.items():
         key = Key(sensor, recording, channel)
-        low_pass = _low_pass(row for row in filters if row.channel == channel)
+        cutoffs = (
+            LowPass(row.value, row.order)
+            for row in filters
+            if (row.channel, row.parameter) == (channel, "cutoff")
+            and row.value is not None
+            and row.order is not None
+        )
+        low_pass = next(cutoffs, None)
         followed = {row.parameter: row for row in thermal if row.channel == channel}
         samples = min(log.grid, MAX_SAMPLES)
         yield from _rows(key, "log", log.rate, samples, log.blocks())
@@ -90,13 +92,6 @@ def samples_of_models(
             rng = channel_rng(seed, repr(noise), channel, f"samples {of}")
             blocks = simulate_blocks(model, log.rate, samples, rng, temperature=temperature)
             yield from _rows(key, of, log.rate, samples, blocks)
-
-
-def _low_pass(rows: Iterable[LowPassRow]) -> LowPass | None:
-    for row in rows:
-        if row.parameter == "cutoff" and row.value is not None and row.order is not None:
-            return LowPass(row.value, row.order)
-    return None
 
 
 def _warmed(
@@ -130,13 +125,7 @@ def _rows(
     key: Key, of: str, rate: float, samples: int, blocks: Iterable[Array]
 ) -> Iterator[ModelSampleRow]:
     """Yield the deviation of the samples, the samples of a section, and the envelope."""
-    row = partial(
-        ModelSampleRow,
-        sensor=key.sensor,
-        recording=key.recording,
-        channel=key.channel,
-        of=of,
-    )
+    row = partial(ModelSampleRow, **asdict(key), of=of)
     edges = bucket_edges(samples, BUCKETS)
     figures = no_figures(edges)
     stretch = round(STRETCH * rate)

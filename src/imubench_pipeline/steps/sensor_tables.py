@@ -58,17 +58,11 @@ _ADDED: Hook[SensorTable] = Hook("sensor_tables")
 def joined_tables(
     parts: Mapping[str, list[Path]], truths: str, sensor: str, usual: str, decide: str
 ) -> dict[str, pa.Table]:
-    """Return every table of recordings, joined of those of a sensor.
+    """Return every table of recordings, joined for a sensor.
 
-    Parameters
-    ----------
-    parts : mapping of str to list of Path
-        Files of each table, in the order of the recordings; ``quality`` for the JSON files.
-    truths, sensor, usual : str
-        Parameters of the simulated recordings, the sensor file, and figures that are usual of other
-        sensors, as the plan wrote them.
-    decide : str
-        The section of the configuration that says which recordings decide, as JSON.
+    `parts`: files of each table, in the order of the recordings, and ``quality`` for the JSON
+    files. `truths`, `sensor`, `usual`: true parameters of simulated recordings, the sensor file
+    and usual figures of other sensors, from the plan. `decide`: section of the configuration.
     """
     qualities = [Quality.read(path) for path in parts["quality"]]
     failed_steps = [Failure(**quality.failure) for quality in qualities if quality.failure]
@@ -134,19 +128,10 @@ def findings_of(
     sensors: Mapping[str, Sensor],
     usual: UsualFigures,
 ) -> list[FindingRow]:
-    """Return the rows of the table ``findings`` about recordings, each by itself.
+    """Return the rows of the table ``findings`` about single recordings.
 
-    Parameters
-    ----------
-    qualities : sequence of Quality
-        What the ingest found of each recording.
-    deterministic, of_estimates, estimated : sequence of mapping
-        Rows of the tables ``deterministic``, ``estimate_findings``, and ``parameters`` of the
-        recommended methods.
-    sensors : mapping of str to Sensor
-        Those whose files are known.
-    usual : mapping
-        What is usual of the figures of other sensors.
+    From the results of the ingest, rows of the tables ``deterministic`` and ``estimate_findings``,
+    the recommended parameters, the sensor files, and the usual figures of other sensors.
     """
     about = [quality.row for quality in qualities]
     of_logs = without_doubles(
@@ -154,12 +139,10 @@ def findings_of(
         deterministic,
         {(row.sensor, row.recording): row.duration or 0.0 for row in about},
     )
-    of_levels = (
-        row
-        for quality in qualities
-        for row in implausible_of(quality, sensors.get(quality.row.sensor))
-    )
-    return [*of_logs, *of_levels, *of_estimates, *unusual_rows(estimated, sensors, usual)]
+    found = list(of_logs)
+    for quality in qualities:
+        found += implausible_of(quality, sensors.get(quality.row.sensor))
+    return [*found, *of_estimates, *unusual_rows(estimated, sensors, usual)]
 
 
 def without_doubles(

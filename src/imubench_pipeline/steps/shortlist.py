@@ -15,7 +15,7 @@ from imubench_pipeline.navigation.shortlist.figures import measured_ranges, prin
 from imubench_pipeline.navigation.shortlist.rows import shortlist_rows
 from imubench_pipeline.settings.requirements import Requirement, requirements_of
 from imubench_pipeline.settings.sensor import Sensor, sensors_of
-from imubench_pipeline.tables import build, read, write_arrow
+from imubench_pipeline.tables import read, write_each
 
 NEEDED = ("recordings", "parameters", "ranking")
 """The tables of a run that the step reads."""
@@ -28,18 +28,8 @@ def rows_of_run(
 ) -> Iterator[ShortlistRow]:
     """Yield the rows of the table ``shortlist``.
 
-    Parameters
-    ----------
-    requirements : mapping of str to Requirement
-    sensors : mapping of str to Sensor
-        The catalogue.
-    tables : mapping of str to Path
-        Files of the tables `NEEDED`; empty: nothing is measured.
-
-    Raises
-    ------
-    OSError, ValueError
-        If a table cannot be read, or is of another form.
+    `sensors`: the catalogue; `tables`: files of the tables `NEEDED`, empty if nothing is measured.
+    Raise an OSError or a ValueError if a table cannot be read, or is of another form.
     """
     sensors = {name: sensor for name, sensor in sensors.items() if sensor.sold}
 
@@ -58,6 +48,5 @@ def write_shortlist(
 ) -> None:
     """Write the table ``shortlist``, as Parquet and CSV."""
     requirements = requirements_of(json.loads(settings)["requirements"])
-    table = build("shortlist", rows_of_run(requirements, sensors_of(catalogue), tables))
-    for output in outputs:
-        write_arrow(table, output)
+    rows = rows_of_run(requirements, sensors_of(catalogue), tables)
+    write_each({"shortlist": rows}, outputs)

@@ -16,6 +16,7 @@ from imubench_pipeline.tables.files import (
     write,
     write_arrow,
     write_content,
+    write_each,
     write_json,
 )
 from imubench_pipeline.tables.parquet import checked_parquet, checked_row_group
@@ -38,5 +39,6 @@ __all__ = [
     "write",
     "write_arrow",
     "write_content",
+    "write_each",
     "write_json",
 ]

@@ -154,6 +154,13 @@ def write(table: str, rows: Iterable[AnyRow], path: Path) -> None:
     write_arrow(build(table, rows), path)
 
 
+def write_each(tables: Mapping[str, Iterable[AnyRow]], outputs: Iterable[Path]) -> None:
+    """Write the rows of tables, by name, to the files of the same names."""
+    built = {name: build(name, rows) for name, rows in tables.items()}
+    for output in outputs:
+        write_arrow(built[output.stem], output)
+
+
 def write_arrow(table: pa.Table, path: Path) -> None:
     """Write an Arrow table as Parquet or, where the name ends so, CSV, atomically.
 

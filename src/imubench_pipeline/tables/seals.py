@@ -77,7 +77,7 @@ class Seal:
 
     def write(self, results: Path) -> None:
         """Keep it, atomically."""
-        write_sealed_json(asdict(self), _path(results, self.place))
+        write_sealed_json(asdict(self), results / seal_file(self.place))
 
 
 class SealError(ValueError):
@@ -141,9 +141,8 @@ def read_seal(results: Path, place: str) -> Seal:
 
     Raises a FileNotFoundError without one, and a `SealError` if it is damaged or of another place.
     """
-    path = _path(results, place)
     try:
-        data = read_sealed_json(path)
+        data = read_sealed_json(results / seal_file(place))
         outputs = {name: SealedFile(**file) for name, file in data["outputs"].items()}
         seal = Seal(**{**data, "outputs": outputs})
         texts = [seal.place, seal.form, seal.settings, *seal.inputs.values()]
@@ -184,10 +183,6 @@ def visible(path: Path) -> bool:
 def seal_file(place: str) -> str:
     """Return where below the results a seal is kept."""
     return f"{FOLDER}/{place}.json"
-
-
-def _path(results: Path, place: str) -> Path:
-    return results / seal_file(place)
 
 
 def _below(results: Path, paths: Iterable[Path]) -> Iterator[tuple[str, Path]]:

@@ -17,6 +17,7 @@ from typing import TypeVar
 
 import pyarrow as pa
 
+from imubench_pipeline.model.table import TableRow
 from imubench_pipeline.readers.bounded import BoundError, bounded
 from imubench_pipeline.recordings.ingest import write_failed
 from imubench_pipeline.recordings.recording import static_logs
@@ -26,24 +27,21 @@ from imubench_pipeline.run.plan import Plan
 from imubench_pipeline.run.resources import limits_of_steps
 from imubench_pipeline.settings.config import AllanSettings, ReconstructionSettings
 from imubench_pipeline.steps import allan as allan_step
-from imubench_pipeline.steps import datasheet as datasheet_step
+from imubench_pipeline.steps.datasheet import datasheet_tables
 from imubench_pipeline.steps.error_budget import error_tables
 from imubench_pipeline.steps.estimate import Estimation, estimation
 from imubench_pipeline.steps.ingest import write_recording
 from imubench_pipeline.steps.reconstruct import ReconstructionRows, reconstruction_rows
 from imubench_pipeline.steps.sensor_tables import joined_tables
 from imubench_pipeline.steps.tables import tables_of_all
-from imubench_pipeline.tables import build, write, write_arrow
-from imubench_pipeline.tables.failures import Cause, Failure, describe_error, write_empty
+from imubench_pipeline.tables import build, write, write_arrow, write_each
+from imubench_pipeline.tables.failures import Failure, describe_error, write_empty
 from imubench_pipeline.tables.schemas import OF_ONE_RECORDING, TABLES
 
 T = TypeVar("T")
 K = TypeVar("K", bound=tuple[str, ...])
 Say = Callable[[str], None]
 
-_INGEST_FILES = {"quality": "quality.json"} | {
-    name: f"{name}.parquet" for name in ("envelope", "histogram")
-}
 _ESTIMATE_TABLES = tuple(
     field.name for field in fields(Estimation) if field.name not in ("estimates", "paths")
 )
@@ -66,18 +64,8 @@ _MIN_REPORTED_TIME = 3.0
 class Analysis:
     """The steps of all recordings of a plan: first for the numbers, then for the pages.
 
-    A recording with a failed step is left out, and is listed in the table ``failures``.
-
-    Parameters
-    ----------
-    plan : Plan
-        Its results are in a separate folder.
-    compiling : Compilation
-        Estimates wait for its end.
-    cores : int
-        Number of parallel processes.
-    say : callable
-        Called with progress messages.
+    A recording with a failed step is left out, and is listed in the table ``failures``. `cores`:
+    number of parallel processes; `say` is called with progress messages.
     """
 
     def __init__(self, plan: Plan, compiling: Compilation, cores: int, say: Say) -> None:
@@ -110,29 +98,20 @@ class Analysis:
         self._write_parts(_RECONSTRUCTION_TABLES, parts)
         return self._join_tables((*_ESTIMATE_TABLES, *_COMPARISON_TABLES, *_RECONSTRUCTION_TABLES))
 
-    # ------------------------------------------------------------------ the steps of a recording
-
     def _read(self, sensor: str, recording: str) -> list[str]:
         """Read a log and take its curves; return its channels."""
         folder = self._get_folder(sensor, recording)
-        outputs = {name: folder / file for name, file in _INGEST_FILES.items()}
         source = self._plan.recordings[sensor, recording].path
         settings = self._plan.ingest_settings(sensor, recording)
-        write_recording(source, settings, sensor, recording, outputs)
+        write_recording(source, settings, sensor, recording, folder)
         how = AllanSettings.model_validate_json(self._plan.settings("allan"))
         write("allan", allan_step.curves(folder, sensor, recording, how), folder / "curve.parquet")
         return list(static_logs(folder))
 
     def _estimate(self, sensor: str, recording: str, channel: str) -> Estimation:
         folder = self._get_folder(sensor, recording)
-        rows = estimation(
-            folder / "quality.json",
-            folder / "curve.parquet",
-            sensor,
-            recording,
-            self._plan.estimate_settings(sensor, recording),
-            channels={channel},
-        )
+        settings = self._plan.estimate_settings(sensor, recording)
+        rows = estimation(folder, sensor, recording, settings, {channel})
         rows.paths.clear()
         return rows
 
@@ -155,33 +134,17 @@ class Analysis:
     def _compare(self, sensor: str, recording: str) -> None:
         """Compare a recording with its datasheet, and compute its error budget."""
         folder, plan = self._get_folder(sensor, recording), self._plan
-        stated = (folder, sensor, recording, plan.datasheet_settings(sensor))
-        write("datasheet", datasheet_step.rows(*stated), folder / "datasheet.parquet")
-        write(
-            "datasheet_curve",
-            datasheet_step.curve_rows(*stated),
-            folder / "datasheet_curve.parquet",
-        )
-        inputs = {
-            name: folder / f"{name}.parquet"
-            for name in ("parameters", "draws", "temperature", "deterministic")
-        } | {"quality": folder / "quality.json"}
-        names = {"sensor": sensor, "recording": recording}
-        for table, rows in error_tables(inputs, names, plan.error_budget_settings(sensor)).items():
-            write(table, rows, folder / f"{table}.parquet")
+        stated = plan.datasheet_settings(sensor)
+        tables: dict[str, Iterable[TableRow]] = {
+            **datasheet_tables(folder, sensor, recording, stated),
+            **error_tables(folder, sensor, recording, plan.error_budget_settings(sensor)),
+        }
+        write_each(tables, (folder / f"{name}.parquet" for name in tables))
 
     def _reconstruct(self, sensor: str, recording: str, channel: str) -> ReconstructionRows:
         folder = self._get_folder(sensor, recording)
         settings = ReconstructionSettings.model_validate_json(self._plan.settings("reconstruction"))
-        inputs = (
-            "quality.json",
-            "allan.parquet",
-            "parameters.parquet",
-            "allan_compensated.parquet",
-        )
-        return reconstruction_rows([folder / name for name in inputs], settings, {channel})
-
-    # ---------------------------------------------------------------------------- all together
+        return reconstruction_rows(folder, settings, {channel})
 
     def _join_tables(self, made: Sequence[str]) -> dict[str, pa.Table]:
         """Join the tables that were made, by sensor and of all sensors; the others are empty."""
@@ -191,7 +154,7 @@ class Analysis:
         for sensor in dict.fromkeys(sensor for sensor, _ in plan.recordings):
             folders = [self._get_folder(*key) for key in plan.recordings if key[0] == sensor]
             own = {name: [folder / f"{name}.parquet" for folder in folders] for name in names}
-            own["quality"] = [folder / _INGEST_FILES["quality"] for folder in folders]
+            own["quality"] = [folder / "quality.json" for folder in folders]
             tables = joined_tables(
                 own,
                 plan.truths(sensor),
@@ -211,11 +174,7 @@ class Analysis:
         return self._plan.run.results / "recordings" / sensor / recording
 
     def _submit(
-        self,
-        beside: ThreadPoolExecutor,
-        step: str,
-        keys: Iterable[K],
-        function: Callable[..., T],
+        self, beside: ThreadPoolExecutor, step: str, keys: Iterable[K], function: Callable[..., T]
     ) -> dict[K, Future[T | None]]:
         """Begin a step for each key, of a recording that is not left out."""
         return {key: beside.submit(self._run_bounded, step, function, key) for key in keys}
@@ -223,36 +182,30 @@ class Analysis:
     def _run_bounded(self, step: str, function: Callable[..., T], key: tuple[str, ...]) -> T | None:
         """Call a step in a separate process; if it fails, its recording is left out."""
         sensor, recording, *_ = key
-        failure = self._failed.get((sensor, recording))
-        if failure is not None:
-            self._write_nothing(step, sensor, recording, failure)
+        folder = self._get_folder(sensor, recording)
+        tables = (folder / f"{name}.parquet" for name in _TABLES_OF_STEP[step])
+        if (earlier := self._failed.get((sensor, recording))) is not None:
+            write_empty(tables, earlier)
             return None
         limit = self._limits(sensor, recording)
         begun = time.monotonic()
         try:
             value = bounded(limit.seconds, limit.memory, function, *key)
         except BoundError as error:
-            self._leave_out(step, sensor, recording, "time", f"the step {step} {error}")
-            return None
+            failure = Failure(sensor, recording, step, "time", f"the step {step} {error}")
         except Exception as error:  # the others go on
             words = one_line(f"the step {step} failed: {describe_error(error)}")
-            self._leave_out(step, sensor, recording, "error", words)
-            return None
-        if time.monotonic() - begun > _MIN_REPORTED_TIME:
-            self._say(f"{'/'.join(key[1:])}: {step} done")
-        return value
-
-    def _leave_out(self, step: str, sensor: str, recording: str, cause: Cause, reason: str) -> None:
-        failure = Failure(sensor, recording, step, cause, reason)
+            failure = Failure(sensor, recording, step, "error", words)
+        else:
+            if time.monotonic() - begun > _MIN_REPORTED_TIME:
+                self._say(f"{'/'.join(key[1:])}: {step} done")
+            return value
         self._failed.setdefault((sensor, recording), failure)
         if step == "ingest":
-            quality = self._get_folder(sensor, recording) / "quality.json"
-            write_failed(self._plan.ingest_settings(sensor, recording), failure, quality)
-        self._write_nothing(step, sensor, recording, failure)
-
-    def _write_nothing(self, step: str, sensor: str, recording: str, failure: Failure) -> None:
-        folder = self._get_folder(sensor, recording)
-        write_empty((folder / f"{name}.parquet" for name in _TABLES_OF_STEP[step]), failure)
+            settings = self._plan.ingest_settings(sensor, recording)
+            write_failed(settings, failure, folder / "quality.json")
+        write_empty(tables, failure)
+        return None
 
 
 def _collect_results(begun: Mapping[K, Future[T | None]]) -> dict[K, T]:

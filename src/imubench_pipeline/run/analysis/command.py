@@ -23,22 +23,19 @@ if TYPE_CHECKING:
 
     import pyarrow as pa
 
-    from imubench_pipeline.report.practical import System
     from imubench_pipeline.run.analysis.compilation import Compilation
     from imubench_pipeline.run.plan import Plan
 
 _MAX_DRAWING_TIME, _MAX_DRAWING_MEMORY = 600.0, 4 << 30
 """Max. time, s, and memory, bytes, of a process that draws figures."""
 
-_DESCRIPTION = (
-    "Read static logs, say what is wrong with them, and estimate the noise parameters of each "
-    "axis, as a run of the workflow does."
-)
-
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare what the command is given."""
-    parser.description = _DESCRIPTION
+    parser.description = (
+        "Read static logs, say what is wrong with them, and estimate the noise parameters of each "
+        "axis, as a run of the workflow does."
+    )
     parser.add_argument(
         "logs", type=Path, nargs="+", metavar="LOG", help="log file, or folder of a recording"
     )
@@ -98,6 +95,8 @@ def run(arguments: argparse.Namespace) -> int:
 def _run(arguments: argparse.Namespace, compiling: Compilation) -> int:
     from imubench_pipeline.model.recordings import FailureRow
     from imubench_pipeline.report.run_summary import left_out
+    from imubench_pipeline.report.show import show
+    from imubench_pipeline.report.terminal import logs
     from imubench_pipeline.run.analysis.chain import Analysis
     from imubench_pipeline.run.analysis.project import Stated, lay_out
     from imubench_pipeline.run.plan import Plan
@@ -116,7 +115,7 @@ def _run(arguments: argparse.Namespace, compiling: Compilation) -> int:
             return 2
         analysis = Analysis(plan, compiling, arguments.cores, _say)
         tables = analysis.estimates()
-        _print(tables, arguments.units)
+        show(lambda width: logs(tables, arguments.units, width))
         if arguments.output is not None:
             _say("making the page and the figures: some seconds")
             printed = FailureRow.rows_of(tables["failures"])
@@ -144,13 +143,6 @@ def _describe_command(arguments: argparse.Namespace) -> str:
 
 def _say(text: str) -> None:
     print(text, file=sys.stderr, flush=True)
-
-
-def _print(tables: Mapping[str, pa.Table], system: System) -> None:
-    from imubench_pipeline.report.show import show
-    from imubench_pipeline.report.terminal import logs
-
-    show(lambda width: logs(tables, system, width))
 
 
 def _write(plan: Plan, tables: Mapping[str, pa.Table], arguments: argparse.Namespace) -> None:

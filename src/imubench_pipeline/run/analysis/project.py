@@ -57,12 +57,8 @@ def lay_out(
     logs : sequence of Path
         Files of logs, or folders of recordings.
     sensor : Path or None
-        The sensor file of all logs, or its name in the catalogue. None: a draft for each log, as by
-        `imubench inspect`.
-    stated : Stated
-        Completes the drafts.
-    catalogue : sequence of Path
-        Folders of sensor files, for names.
+        The sensor file of all logs, or its name in the folders `catalogue`. None: a draft for each
+        log, as by `imubench inspect`, completed by `stated`.
     folder : Path
         Existing folder for the project.
 
@@ -74,8 +70,8 @@ def lay_out(
     Raises
     ------
     ConfigError
-        If a log is not there, or of two logs it cannot be told which is which, or the sensor file
-        is of no use, or a log does not say what is needed (`UnfilledError`).
+        If a log is missing, two logs would have one name, the sensor file cannot be used, or a log
+        does not state a required property (`UnfilledError`).
     """
     missing = [log for log in logs if not log.exists()]
     if missing:
@@ -164,27 +160,19 @@ def _draft_sensor(log: Path, stated: Stated) -> Mapping[str, object]:
         unit = stated.unit_of(channel)
         if unit and source["unit"] == UNKNOWN:
             source["unit"] = unit
-    open_keys = _list_open_keys(written)
+    open_keys = ["rate"] * (written.get("rate") == UNKNOWN)
+    for channel, source in written["channels"].items():
+        unknown = [key for key in ("column", "unit") if source.get(key) == UNKNOWN]
+        open_keys += [f"{quantity_of(channel)} {key}" for key in unknown]
     if open_keys:
-        raise UnfilledError(_describe_missing_keys(log, inspected, open_keys))
+        keys = list(dict.fromkeys(open_keys))
+        raise UnfilledError(_describe_missing_keys(log, keys))
     return parse(Sensor, described, f"drafted from {log}").model_dump(
         mode="json", exclude_unset=True
     )
 
 
-def _list_open_keys(written: Mapping[str, object]) -> list[str]:
-    """Return the missing keys: the rate, or a unit or column of a quantity."""
-    keys = ["rate"] * (written.get("rate") == UNKNOWN)
-    channels = written["channels"]
-    assert isinstance(channels, Mapping)
-    for channel, source in channels.items():
-        for key in ("column", "unit"):
-            if source.get(key) == UNKNOWN:
-                keys.append(f"{quantity_of(channel)} {key}")
-    return list(dict.fromkeys(keys))
-
-
-def _describe_missing_keys(log: Path, inspected: Inspection, keys: Sequence[str]) -> str:
+def _describe_missing_keys(log: Path, keys: Sequence[str]) -> str:
     """Describe the missing properties of a log, and how to state them."""
     options = {
         "rate": "--rate '100 Hz'",

@@ -41,21 +41,11 @@ _NO_SEAL = "expected a seal of the step that left it, found none"
 
 @dataclass(frozen=True)
 class Fault:
-    """A file that was changed, or is missing or unexpected.
+    """A file that was changed, or is missing or unexpected."""
 
-    Attributes
-    ----------
-    path : str
-        Below the results.
-    found : str
-        The expected and the found state.
-    mend : str
-        The command that makes the file again, or another action.
-    """
-
-    path: str
-    found: str
-    mend: str
+    path: str  # below the results
+    found: str  # the expected and the found state
+    mend: str  # the command that makes the file again, or another action
 
 
 @dataclass
@@ -128,8 +118,21 @@ class Results:
             yield from self._changed(place, seal)
         for path in sorted(self.folder.glob("recordings/*/*/quality.json")):
             yield from self._samples(path)
-        yield from self._own_digests()
-        yield from self._of_others()
+        own = [*self.folder.glob(f"recordings/*/*/{KNOWN}"), *self.folder.glob("faults/**/*.json")]
+        for path in sorted(own):
+            name = path.relative_to(self.folder).as_posix()
+            try:
+                read_sealed_json(path)
+            except (OSError, ValueError) as error:
+                yield Fault(name, f"expected what a run wrote, {_of(error)}", self._removed(name))
+        for place in self._current:  # made from other inputs that are not newer
+            others = [name for name, newer in self._others_now(self.seals[place]) if not newer]
+            if others:
+                first = next(iter(self.seals[place].outputs), seal_file(place))
+                words = (
+                    f"expected it made of the {others[0]} that is there, found it made of another"
+                )
+                yield Fault(first, words, self._mended(first, place))
         yield from self._unsealed()
         yield from self._strange_rows()
         for path in temporary(self.folder):
@@ -175,27 +178,6 @@ class Results:
         if samples and not quality.row.simulated and not known_log.exists():
             words = "expected what is known of the log, found no such file"
             yield Fault(f"{place}/{KNOWN}", words, self.run_again)
-
-    def _own_digests(self) -> Iterator[Fault]:
-        """Yield the changed files with their own digest."""
-        own = [*self.folder.glob(f"recordings/*/*/{KNOWN}"), *self.folder.glob("faults/**/*.json")]
-        for path in sorted(own):
-            place = path.relative_to(self.folder).as_posix()
-            try:
-                read_sealed_json(path)
-            except (OSError, ValueError) as error:
-                yield Fault(place, f"expected what a run wrote, {_of(error)}", self._removed(place))
-
-    def _of_others(self) -> Iterator[Fault]:
-        """Yield outputs made from inputs that differ from the present ones, and are not newer."""
-        for place in self._current:
-            others = [name for name, newer in self._others_now(self.seals[place]) if not newer]
-            if others:
-                first = next(iter(self.seals[place].outputs), seal_file(place))
-                words = (
-                    f"expected it made of the {others[0]} that is there, found it made of another"
-                )
-                yield Fault(first, words, self._mended(first, place))
 
     def _others_now(self, seal: Seal) -> list[tuple[str, bool]]:
         """Return the changed inputs of a step, and whether they are newer."""
