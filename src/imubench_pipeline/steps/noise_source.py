@@ -67,7 +67,7 @@ def from_static(
             name = min(gyros, key=lambda name: (name != channel, name))
             every = {estimate.method: estimate for estimate in estimates(parameters)[name]}
             papers = every.get("likelihood_gm", best[name]).model
-            words = _words(row, own, name, channel, best[name].method)
+            source = _words(row, own, name, channel, best[name].method)
             rng = channel_rng(_DRAW_SEED, repr(best[name].model), name)
             drawn = tuple(draw_models(best[name], draws, rng)) if draws else ()
             return NoiseSource(best[name].model, papers, source, drawn)
