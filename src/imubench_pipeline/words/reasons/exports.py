@@ -212,8 +212,8 @@ def overbound_used(
     low, high = (number_text(frequency, 3) for frequency in band)
     return (
         f"this is the smallest {family} above the measured Allan variance at every "
-        f"tau up to {number_text(longest)} s (95 % for all together). It is also above the fitted spectral "
-        f"density from {low} to {high} Hz, and the growth of the integrals up to "
+        f"tau up to {number_text(longest)} s (95 % for all together). It is also above the fitted "
+        f"spectral density from {low} to {high} Hz, and the growth of the integrals up to "
         f"{number_text(horizon)} s. Its Allan deviation is {number_text(excess, 3)} times the "
         "measured one at the minimum of the curve"
     )
