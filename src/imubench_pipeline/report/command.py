@@ -71,7 +71,7 @@ def run(arguments: argparse.Namespace) -> int:
 def _write(site: Site, arguments: argparse.Namespace) -> int:
     """Write the pages of a site to the selected place."""
     from imubench_pipeline.report.publish import one_file, publish, remove_old_pages
-    from imubench_pipeline.report.static_figures.of_run import draw_comparison
+    from imubench_pipeline.report.static_figures.files import draw_comparison
     from imubench_pipeline.tables.seals import seal_again
 
     if arguments.one_file is not None:

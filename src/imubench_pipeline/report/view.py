@@ -13,6 +13,7 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 from pandas.util import hash_array
+from scipy.special import chdtri
 
 from imubench_pipeline.estimators.rows import estimate_of
 from imubench_pipeline.model.comparisons import DatasheetCurveRow, DatasheetRow, ErrorBudgetRow
@@ -112,6 +113,15 @@ class ChannelView:
     def label(self) -> str:
         """Sensor and recording, and whether it is simulated."""
         return f"{self.sensor} / {self.recording}" + " (simulated)" * self.simulated
+
+    def bin_limits(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return the 95 % limits of the density of the bins, if the fit of the spectrum is right.
+
+        A bin scatters as chi squared of its degrees of freedom over their number.
+        """
+        fitted, freedom = self.spectrum["fitted"], self.spectrum["ordinates"]
+        lower, upper = (fitted * chdtri(freedom, tail) / freedom for tail in (0.975, 0.025))
+        return lower, upper
 
     def model(self, method: str) -> NoiseModel:
         """Return the noise model that a method estimated."""

@@ -127,9 +127,16 @@ def select(
             continue
         existing = chosen["allan"][column].unique().to_pylist()
         if asked not in existing:
-            reason = _explain_missing(chosen["recordings"], column, asked)
+            # A recording, or all recordings of a sensor, may have no curve for a reason.
+            named = _select_rows(chosen["recordings"], column, asked)
+            reasons = [
+                f" but a {row.status} one ({row.reason})"
+                for row in RecordingRow.rows_of(named)
+                if row.status != "ok" and column != "channel"
+            ]
             raise SelectionError(
-                f"found no {column} {asked!r}{reason}; there are: {', '.join(sorted(existing))}"
+                f"found no {column} {asked!r}{''.join(reasons[:1])}; there are: "
+                f"{', '.join(sorted(existing))}"
             )
         chosen = {name: _select_rows(table, column, asked) for name, table in chosen.items()}
     if not chosen["allan"].num_rows:
@@ -143,18 +150,6 @@ def _select_rows(table: pa.Table, column: str, asked: str) -> pa.Table:
     mask = pc.equal(table[column], asked)
     # A finding without a channel is about all of them.
     return table.filter(pc.fill_null(mask, True) if column == "channel" else mask)
-
-
-def _explain_missing(recordings: pa.Table, column: str, asked: str) -> str:
-    """Return why a recording, or all recordings of a sensor, have no curve."""
-    if column == "channel":
-        return ""
-    reasons = [
-        f"{row.status} one ({row.reason})"
-        for row in RecordingRow.rows_of(_select_rows(recordings, column, asked))
-        if row.status != "ok"
-    ]
-    return f" but a {reasons[0]}" if reasons else ""
 
 
 def _write(
