@@ -9,7 +9,7 @@ from imubench_pipeline.model.comparisons import ErrorBudgetRow, RankingRow
 from imubench_pipeline.report.decisions import unranked
 from imubench_pipeline.report.meaning import error_of_recording, limit_words, rankings
 from imubench_pipeline.report.site import Site
-from imubench_pipeline.report.sourced import of_ranking
+from imubench_pipeline.report.sourced import of_row
 from imubench_pipeline.report.view import RecordingView
 from imubench_pipeline.settings.requirements import Requirement
 from imubench_pipeline.words.numbers import counted, duration_text, number_text
@@ -90,7 +90,7 @@ def _alternatives(row: RankingRow) -> Iterator[tuple[str, str, str]]:
             yield (
                 words,
                 verdict_text(verdict) if verdict else "",
-                of_ranking(row, name, number_text(size, 3)),
+                of_row(row, name, number_text(size, 3)),
             )
 
 

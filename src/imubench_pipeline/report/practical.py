@@ -11,9 +11,10 @@ from functools import cache
 from typing import Literal, Protocol
 
 from imubench_pipeline.estimators.dimensions import DIMENSIONS
+from imubench_pipeline.model.recordings import RecordingRow
 from imubench_pipeline.settings.sensor import QUANTITIES
 from imubench_pipeline.units import conversion
-from imubench_pipeline.words.numbers import NO_VALUE, Unit
+from imubench_pipeline.words.numbers import NO_VALUE, Unit, number_text
 
 System = Literal["practical", "si"]
 
@@ -128,6 +129,14 @@ _MIN_SIZE_OF_PREFIX = ((1e3, "k"), (0.1, ""), (1e-4, "m"), (0.0, "µ"))
 def _make_unit(sign: str, dimension: str) -> Unit:
     factor, _ = conversion(sign, dimension)
     return Unit(sign, 1.0 / factor)
+
+
+def temperature_text(row: RecordingRow) -> str:
+    """Return the range of the temperature of a recording; empty if it is not known."""
+    if row.temperature_min is None:
+        return ""
+    low, high = (number_text(end, 3) for end in (row.temperature_min, row.temperature_max))
+    return f"{low} to {high} °C"
 
 
 def printed_text(row: Printed) -> str:

@@ -41,7 +41,7 @@ class Page:
     path: str  # below the folder of the report
     template: str
     key: str  # digest of what it shows: the page is written again only if it changes
-    context: Callable[[], Mapping[str, Any]]  # returns what the template is given
+    context: Callable[[], Mapping[str, object]]  # of the template
 
     @property
     def root(self) -> str:
@@ -55,10 +55,10 @@ class Entry:
 
     file: str  # its name; its template is called so, too, with ``.jinja``
     title: str  # what the navigation calls it
-    context: Callable[[Site], Mapping[str, Any]]  # returns what the template is given
+    context: Callable[[Site], Mapping[str, object]]  # of the template
     # the joined tables that it shows: it is written again if one of them changes
     tables: tuple[str, ...] = ()
-    # returns the recordings that it shows: likewise, whatever any table says of them alone
+    # returns the recordings that it shows: likewise if any of their rows change
     views: Callable[[Site], Sequence[RecordingView]] = lambda _: ()
     # the files kept with recordings that it shows, where they are there: likewise
     files: Callable[[Site], Iterable[Path]] = lambda _: ()
@@ -81,7 +81,7 @@ class Entry:
         kept = (path.read_bytes() for path in self.files(site) if path.is_file())
         key = site.key_of([view.key for view in self.views(site)], *shown, *kept)
 
-        def context() -> Mapping[str, Any]:
+        def context() -> Mapping[str, object]:
             made = ((section.template, section.context(site)) for section in self.sections)
             return {**self.context(site), "sections": [one for one in made if one[1] is not None]}
 
@@ -107,7 +107,7 @@ class Site:
 
     tables: Mapping[str, pa.Table]  # all joined tables
     settings: Mapping[str, Any]  # as `imubench_pipeline.run.plan.Plan.report_settings` gives them
-    results: Path  # folder of the results, for what is kept of each recording alone
+    results: Path  # folder of the results, for the tables of each recording
     entries: Sequence[Entry]  # the pages that there is one of, in the order of the navigation
     code: str = ""  # digest of the code that makes the pages
     failed: dict[str, str] = field(default_factory=dict)  # pages that could not be made, and why
@@ -151,15 +151,16 @@ class Site:
     def views(self) -> list[RecordingView]:
         """The recordings, with the pages that they have."""
         views = recording_views(self.tables)
-        together: dict[tuple[str, str, bool], int] = {}
-        for view in views:
-            device = (view.sensor, view.row.device, view.simulated)
-            together[device] = together.get(device, 0) + 1
+        together = Counter((view.sensor, view.row.device, view.simulated) for view in views)
         for view in views:
             view.page = f"recordings/{view.sensor}/{view.name}.html"
-            device = (view.sensor, view.row.device, view.simulated)
-            if together[device] > 1 or view.row.device != view.name:
-                view.device_page = _make_device_path(*device)
+            device = view.row.device
+            if together[view.sensor, device, view.simulated] > 1 or device != view.name:
+                safe = _NOT_IN_NAMES.sub("_", device)[:60]  # a file name cannot have all characters
+                if safe != device:
+                    safe += "-" + hashlib.sha256(device.encode()).hexdigest()[:8]
+                folder = f"devices/{view.sensor}/{'simulated/' if view.simulated else ''}"
+                view.device_page = f"{folder}{safe}.html"
         return views
 
     def compared(self, views: Iterable[RecordingView]) -> Iterator[ComparedRecording]:
@@ -172,14 +173,6 @@ class Site:
     def named_in(self, of: type[OfRecordingRow]) -> set[Name]:
         """Return sensor and name of the recordings that have rows of a class."""
         return {(row.sensor, row.recording) for row in self.rows(of)}
-
-    def device_page_of(self, row: DriftRow) -> str | None:
-        """Return the page of the device of a row that names a recording."""
-        return self._device_pages.get((row.sensor, row.recording))
-
-    @cached_property
-    def _device_pages(self) -> dict[tuple[str, str], str | None]:
-        return {view.full_name: view.device_page for view in self.views}
 
     @cached_property
     def navigation(self) -> list[tuple[str, str]]:
@@ -228,28 +221,22 @@ class Site:
         rows = self.rows(CoverageRow)
         return {(row.sensor, row.quantity, row.figure): row.published for row in rows}
 
-    def changed_devices(self) -> list[dict[str, Any]]:
+    def changed_devices(self) -> list[Mapping[str, object]]:
         """Return the recordings that show a change of their device, with the changed parameters."""
-        devices: dict[tuple[str, str], dict[str, Any]] = {}
+        devices: dict[Name, tuple[DriftRow, list[str]]] = {}
         for row in self.rows(DriftRow):
             if row.verdict != "changed":
                 continue
-            device = devices.setdefault(
-                (row.sensor, row.recording),
-                {
-                    "sensor": row.sensor,
-                    "device": row.device,
-                    "recording": row.recording,
-                    "page": self.device_page_of(row),
-                    "what": [],
-                },
-            )
             name = "fixed bias" if row.parameter == "bias" else row.parameter
-            device["what"].append(f"{name} of {row.channel.replace('_', ' ')}")
-        simulated = {view.full_name: view.simulated for view in self.views}
+            devices.setdefault((row.sensor, row.recording), (row, []))[1].append(
+                f"{name} of {row.channel.replace('_', ' ')}"
+            )
+        views = {view.full_name: view for view in self.views}
         return [
-            device | {"channels": ", ".join(device["what"]), "simulated": simulated[key]}
-            for key, device in devices.items()
+            row.columns()
+            | {"channels": ", ".join(what), "simulated": views[name].simulated}
+            | {"page": views[name].device_page}
+            for name, (row, what) in devices.items()
         ]
 
     @cached_property
@@ -266,7 +253,7 @@ class Site:
         """Version of this package."""
         return version("imubench_pipeline")
 
-    def shown(self, *, alone: bool = False) -> dict[str, Any]:
+    def shown(self, *, alone: bool = False) -> Mapping[str, object]:
         """Return the data of the site for all templates.
 
         ``alone``: no other file lies beside the report.
@@ -286,8 +273,8 @@ class Site:
         }
 
 
-RecordingContext = Callable[[Site, RecordingView, Path], dict[str, Any]]
-"""Returns what a template needs of a recording, from its folder, too."""
+RecordingContext = Callable[[Site, RecordingView, Path], Mapping[str, object]]
+"""Returns the context of the template for a recording, by its folder, too."""
 
 
 @dataclass(frozen=True)
@@ -296,34 +283,23 @@ class RecordingPage:
 
     template: str
     context: RecordingContext
-    words: str = ""  # what lists of recordings say of the kind
+    words: str = ""  # of the kind, in lists of recordings
 
 
 RECORDING_PAGES: Hook[RecordingPage] = Hook("recording_pages")
 """The pages of recordings that are not static, by their kind."""
 
 
-def _make_device_path(sensor: str, device: str, simulated: bool) -> str:
-    """Return the path of the page of a device, without characters that a file name cannot have."""
-    safe = _NOT_IN_NAMES.sub("_", device)[:60]
-    if safe != device:
-        safe += "-" + hashlib.sha256(device.encode()).hexdigest()[:8]
-    return f"devices/{sensor}/{'simulated/' if simulated else ''}{safe}.html"
-
-
 def _make_digest(*parts: object) -> str:
     digest = hashlib.sha256()
-    for part in _encode(parts):
-        digest.update(part + b"\0")
-    return digest.hexdigest()
-
-
-def _encode(parts: Iterable[object]) -> Iterable[bytes]:
     for part in parts:
-        if isinstance(part, bytes):
-            yield hashlib.sha256(part).digest()
-        else:
-            yield json.dumps(part, sort_keys=True, default=str).encode()
+        data = (
+            hashlib.sha256(part).digest()
+            if isinstance(part, bytes)
+            else json.dumps(part, sort_keys=True, default=str).encode()
+        )
+        digest.update(data + b"\0")
+    return digest.hexdigest()
 
 
 def sensor_names(

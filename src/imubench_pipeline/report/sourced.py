@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
 
 from markupsafe import Markup
 
@@ -52,23 +51,13 @@ class SourcedInterval(str):
         return Markup("{} to {}").format(*self.ends)
 
 
-def of_ranking(row: RankingRow, column: str, text: str, unit: str = "") -> SourcedNumber:
-    """Return a number of a row of the table ``ranking``."""
-    return _make(row, (row.requirement, row.sensor), column, text, unit)
-
-
-def of_budget(row: ErrorBudgetRow, column: str, text: str, unit: str = "") -> SourcedNumber:
-    """Return a number of a total of the table ``error_budget``, of a requirement."""
-    names = (row.requirement or "", row.sensor, row.recording)
-    return _make(row, names, column, text, unit)
-
-
-def _make(
-    row: RankingRow | ErrorBudgetRow, names: Iterable[str], column: str, text: str, unit: str
+def of_row(
+    row: RankingRow | ErrorBudgetRow, column: str, text: str, unit: str = ""
 ) -> SourcedNumber:
-    return SourcedNumber(
-        text, "/".join([row.table, *names, row.error, f"{row.time:g}", column]), unit
-    )
+    """Return a number of a row of ``ranking``, or of a total of ``error_budget``."""
+    names = [row.table, row.requirement or "", row.sensor]
+    names += [row.recording] if isinstance(row, ErrorBudgetRow) else []
+    return SourcedNumber(text, "/".join([*names, row.error, f"{row.time:g}", column]), unit)
 
 
 def margin(row: RankingRow) -> tuple[SourcedNumber, SourcedNumber, SourcedNumber] | None:
@@ -78,7 +67,7 @@ def margin(row: RankingRow) -> tuple[SourcedNumber, SourcedNumber, SourcedNumber
     low, high = margin_limits(row)
     digits = digits_by(row.margin, low, high)
     named = (("margin", row.margin), ("limit:upper", low), ("limit:lower", high))
-    first, lower, upper = (of_ranking(row, name, number_text(x, digits)) for name, x in named)
+    first, lower, upper = (of_row(row, name, number_text(x, digits)) for name, x in named)
     return first, lower, upper
 
 

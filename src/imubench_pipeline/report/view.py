@@ -29,7 +29,7 @@ from imubench_pipeline.model.estimates import (
     TemperatureRow,
 )
 from imubench_pipeline.model.recordings import FindingRow, RecordingRow
-from imubench_pipeline.model.table import ChannelRow, R
+from imubench_pipeline.model.table import R
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.settings.experiments import AT_REST
 from imubench_pipeline.tables.findings import LEFT_OUT
@@ -37,6 +37,8 @@ from imubench_pipeline.tables.schemas import BY_RECORDING
 
 Name = tuple[str, str]
 """Sensor and recording."""
+
+_ROWS_OF_CHANNELS = (ModelRow, LineRow, DeterministicRow, DatasheetRow, DatasheetCurveRow)
 
 METHOD_NAMES = {
     "likelihood": "likelihood",
@@ -47,6 +49,7 @@ METHOD_NAMES = {
     "weighted": "fit, correct weights",
     "authors": "read by the authors",
 }
+_CURVE_COLUMNS = ("tau", "adev", "lower", "upper")
 QUANTITY_NAMES = {"gyro": "Gyroscope", "accel": "Accelerometer"}
 
 
@@ -224,7 +227,44 @@ class RecordingView:
 
     def channels(self) -> list[ChannelView]:
         """Return its channels, made anew."""
-        return _make_channels(self)
+        channels = {}
+        for (name,), part in _divide(self.parts["allan"], "channel").items():
+            named = (self.sensor, self.name, name, self.simulated)
+            tau, adev, lower, upper = _read_floats(part, *_CURVE_COLUMNS).values()
+            rate = float(part["cluster_size"][0].as_py() / tau[0])
+            channels[name] = ChannelView(*named, tau, adev, lower, upper, rate)
+        for row in self.rows(ParameterRow):
+            channel = channels[row.channel]
+            channel.parameters.setdefault(row.method, []).append(row)
+            if row.recommended:
+                channel.recommended = row.method
+        reconstruction = _divide(self.parts["reconstruction"], "channel", "method")
+        for (name, method), part in reconstruction.items():
+            curve = _read_floats(part, *_CURVE_COLUMNS, "reconstructed")
+            channels[name].reconstruction[method] = curve
+        for of in _ROWS_OF_CHANNELS:
+            for one in self.rows(of):
+                getattr(channels[one.channel], of.table).append(one)
+        for (name,), part in _divide(self.parts["spectrum"], "channel").items():
+            columns = ("frequency", "ordinates", "density", "fitted", "used")
+            channels[name].spectrum = _read_floats(part, *columns)
+        for (name,), part in _divide(self.parts["allan_compensated"], "channel").items():
+            channels[name].compensated = _read_floats(part, *_CURVE_COLUMNS)
+        for score in self.rows(ScoreRow):
+            channels[score.channel].scores[score.method] = score
+        for thermal in self.rows(TemperatureRow):
+            channels[thermal.channel].temperature[thermal.parameter] = thermal
+        for low_pass in self.rows(LowPassRow):
+            channels[low_pass.channel].low_pass[low_pass.parameter] = low_pass
+        for bias in self.rows(FixedBiasRow):
+            channels[bias.channel].fixed_bias = bias.value
+        for truth in self.rows(SimulatedTruthRow):
+            if truth.channel in channels:
+                components = channels[truth.channel].true_components
+                components.setdefault(truth.parameter, []).append(truth)
+        for name, channel in channels.items():
+            channel.findings = [row for row in self.findings if row.channel in (None, name)]
+        return list(channels.values())
 
 
 def recording_views(tables: Mapping[str, pa.Table]) -> list[RecordingView]:
@@ -240,55 +280,6 @@ def recording_views(tables: Mapping[str, pa.Table]) -> list[RecordingView]:
         }
         views.append(RecordingView(row, parts, keys))
     return views
-
-
-_CURVE_COLUMNS = ("tau", "adev", "lower", "upper")
-
-
-def _make_channels(view: RecordingView) -> list[ChannelView]:
-    channels = {}
-    for (name,), part in _divide(view.parts["allan"], "channel").items():
-        named = (view.sensor, view.name, name, view.simulated)
-        tau, adev, lower, upper = _read_floats(part, *_CURVE_COLUMNS).values()
-        rate = float(part["cluster_size"][0].as_py() / tau[0])
-        channels[name] = ChannelView(*named, tau, adev, lower, upper, rate)
-    for row in view.rows(ParameterRow):
-        channel = channels[row.channel]
-        channel.parameters.setdefault(row.method, []).append(row)
-        if row.recommended:
-            channel.recommended = row.method
-    for (name, method), part in _divide(view.parts["reconstruction"], "channel", "method").items():
-        channels[name].reconstruction[method] = _read_floats(part, *_CURVE_COLUMNS, "reconstructed")
-    of_channel: tuple[type[ChannelRow], ...] = (
-        ModelRow,
-        LineRow,
-        DeterministicRow,
-        DatasheetRow,
-        DatasheetCurveRow,
-    )
-    for of in of_channel:
-        for one in view.rows(of):
-            getattr(channels[one.channel], of.table).append(one)
-    for (name,), part in _divide(view.parts["spectrum"], "channel").items():
-        columns = ("frequency", "ordinates", "density", "fitted", "used")
-        channels[name].spectrum = _read_floats(part, *columns)
-    for (name,), part in _divide(view.parts["allan_compensated"], "channel").items():
-        channels[name].compensated = _read_floats(part, *_CURVE_COLUMNS)
-    for score in view.rows(ScoreRow):
-        channels[score.channel].scores[score.method] = score
-    for thermal in view.rows(TemperatureRow):
-        channels[thermal.channel].temperature[thermal.parameter] = thermal
-    for low_pass in view.rows(LowPassRow):
-        channels[low_pass.channel].low_pass[low_pass.parameter] = low_pass
-    for bias in view.rows(FixedBiasRow):
-        channels[bias.channel].fixed_bias = bias.value
-    for truth in view.rows(SimulatedTruthRow):
-        if truth.channel in channels:
-            components = channels[truth.channel].true_components
-            components.setdefault(truth.parameter, []).append(truth)
-    for name, channel in channels.items():
-        channel.findings = [finding for finding in view.findings if finding.channel in (None, name)]
-    return list(channels.values())
 
 
 def _make_keys(tables: Mapping[str, pa.Table]) -> dict[Name, str]:

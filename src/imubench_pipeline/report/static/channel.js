@@ -87,9 +87,8 @@ kinds.allan = (figure) => {
     );
   }
   view.datasheet.forEach((printed, place) => {
-    const value = printed.value * unit.factor;
     const sheet = { light: "#B3001B", dark: "#FF8F8F", dash: TERM_DASHES[place % 4], width: 1.6 };
-    traces.push(line(tau, printed.of === "N" ? tau.map((t) => value / Math.sqrt(t)) : tau.map(() => value), sheet, {
+    traces.push(line(tau, printedLine(printed, tau, unit), sheet, {
       group: `datasheet ${place}`, hoverinfo: "name", name: `datasheet: ${printed.label}`,
     }));
     groups.push({ key: `datasheet ${place}`, label: `datasheet: ${printed.label}`, on: true, look: sheet });

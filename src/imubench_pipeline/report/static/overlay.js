@@ -86,9 +86,8 @@ function interval(low, high) {
   return Number.isFinite(low) && Number.isFinite(high) ? `${numberText(low, 3)} to ${numberText(high, 3)}` : "not known";
 }
 
-function spread(count, places) {
-  return Array.from({ length: places }, (_, i) => Math.round(((i + 0.5) * count) / places));
-}
+// A printed figure is a power of tau.
+const printedLine = (printed, tau, unit) => tau.map((t) => printed.value * unit.factor * t ** printed.slope);
 
 kinds.overlay = (figure) => {
   const quantity = quantityOf(chosenChannel);
@@ -135,11 +134,9 @@ kinds.overlay = (figure) => {
     const look = lookOf(view);
     const tau = array(view.tau);
     pageData.datasheets[view.sensor][chosenChannel].forEach((printed) => {
-      const value = printed.value * unit.factor;
-      traces.push(line(tau, printed.of === "N" ? tau.map((t) => value / Math.sqrt(t)) : tau.map(() => value),
-        { ...look, dash: "dot", width: 1.2 }, {
-          group: [groupOf(view), "datasheet"], hoverinfo: "text", text: `${nameOf(view.sensor)}, datasheet: ${printed.label}`,
-        }));
+      traces.push(line(tau, printedLine(printed, tau, unit), { ...look, dash: "dot", width: 1.2 }, {
+        group: [groupOf(view), "datasheet"], hoverinfo: "text", text: `${nameOf(view.sensor)}, datasheet: ${printed.label}`,
+      }));
     });
   }
   const { ink, soft } = inks();

@@ -59,11 +59,10 @@ kinds.pair = (figure) => {
     const model = view.models[view.recommended];
     if (model) traces.push(line(array(model[0]), scaled(model[1], unit.factor), { ...look, width: 1 }, { group: "model", name: `${name(each)}, model`, opacity: 0.8 }));
     for (const printed of pageData.datasheets[one.sensor][chosenChannel] ?? []) {
-      const value = printed.value * unit.factor;
-      const at = printed.of === "N" ? [1 / 3, 1, 3] : [tau.at(-1) / 10, tau.at(-1) / 3, tau.at(-1)];
+      const at = printed.slope !== 0 ? [1 / 3, 1, 3] : [tau.at(-1) / 10, tau.at(-1) / 3, tau.at(-1)];
       traces.push({
         group: "datasheet", type: "scatter", mode: "lines+markers", name: `${one.letter} datasheet: ${printed.label}`, x: at,
-        y: at.map((t) => (printed.of === "N" ? value / Math.sqrt(t) : value)), line: { color: colourOf(look), width: 1.2, dash: "dot" },
+        y: printedLine(printed, at, unit), line: { color: colourOf(look), width: 1.2, dash: "dot" },
         marker: { color: inks().paper, symbol: "diamond", size: [0.1, 10, 0.1], line: { color: colourOf(look), width: 1.6 } },
         hoverinfo: ["skip", "text", "skip"], text: `${one.letter} datasheet: ${printed.label}`,
       });
