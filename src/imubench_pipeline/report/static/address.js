@@ -3,6 +3,12 @@
 
 let state = new URLSearchParams();
 
+function element(name, properties = {}, ...inside) {
+  const made = Object.assign(document.createElement(name), properties);
+  made.append(...inside);
+  return made;
+}
+
 const inOneFile = () => document.body.dataset.oneFile === "yes";
 
 function stateText(hash) {
@@ -27,7 +33,7 @@ async function copyText(text) {
     await navigator.clipboard.writeText(text);
     return true;
   } catch {
-    const field = Object.assign(document.createElement("textarea"), { value: text });
+    const field = element("textarea", { value: text });
     document.body.append(field);
     field.select();
     const copied = document.execCommand("copy");
@@ -39,8 +45,8 @@ async function copyText(text) {
 function startCopying() {
   const units = document.querySelector("header .units");
   if (!units) return;
-  const button = Object.assign(document.createElement("button"), { type: "button", className: "copy", textContent: "Copy link" });
-  const said = document.createElement("output");
+  const button = element("button", { type: "button", className: "copy", textContent: "Copy link" });
+  const said = element("output");
   button.addEventListener("click", async () => {
     said.textContent = (await copyText(location.href)) ? "copied" : location.href;
     window.setTimeout(() => (said.textContent = ""), 3000);

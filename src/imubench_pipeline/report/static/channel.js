@@ -28,43 +28,30 @@ kinds.allan = (figure) => {
   const view = channelOf(figure);
   const unit = unitOf(quantityOf(view.channel), "adev");
   const tau = array(view.tau);
-  const [y, low, high] = [view.adev, view.lower, view.upper].map((place) => scaled(place, unit.factor));
+  const y = scaled(view.adev, unit.factor);
   const what = view.simulated ? "simulated log" : "measured";
   const best = view.methods[view.recommended];
   const own = { ...sensorLook(view.sensor), dash: "solid" };
   const look = { ...pageData.looks.methods, [view.recommended]: { ...pageData.looks.methods[view.recommended], ...black() } };
-  const traces = [
-    ...band(tau, low, high, own, 0.22).map((trace) => ({ ...trace, group: "limits" })),
-  ];
+  const traces = limitsOf(view, unit, own, 0.22, "limits");
   const groups = [
     { key: "measured", label: what, on: true, look: own },
     { key: "limits", label: "95 % limits", on: true, look: { ...own, marker: undefined, filled: true } },
   ];
   if (best) {
     const times = array(best.tau);
-    traces.push(...band(times, scaled(best.lower, unit.factor), scaled(best.upper, unit.factor), look[view.recommended], 0.12)
-      .map((trace) => ({ ...trace, group: "band" })));
-    traces.push({
+    traces.push(...band(times, scaled(best.lower, unit.factor), scaled(best.upper, unit.factor), look[view.recommended], 0.12, { group: "band" }), {
       group: "reconstructed", type: "scatter", mode: "markers", x: times, y: scaled(best.reconstructed, unit.factor), hoverinfo: "skip",
       marker: { color: colourOf(look[view.recommended]), symbol: "x-thin-open", size: 6 },
     });
   }
-  traces.push({
-    group: "measured", type: "scatter", mode: "lines+markers", x: tau, y, name: what, meta: { low, high },
-    line: { color: colourOf(own), width: 1.4 }, marker: { color: colourOf(own), symbol: own.marker, size: 5 },
-    text: tau.map((t, i) => `τ ${numberText(t, 3)} s: <b>${numberText(y[i], 3)} ${unit.sign}</b><br>95 %: ${interval(low[i], high[i])} ${unit.sign}`),
-    hovertemplate: `${what}<br>%{text}<extra></extra>`,
-  });
+  traces.push(curveOf(view, unit, what, {
+    group: "measured", line: { color: colourOf(own), width: 1.4 }, marker: { color: colourOf(own), symbol: own.marker, size: 5 },
+  }));
   if ("tau" in view.compensated) {
     const without = look.compensated;
-    const times = array(view.compensated.tau);
-    const [left, least, most] = ["adev", "lower", "upper"].map((name) => scaled(view.compensated[name], unit.factor));
-    traces.push({
-      group: "compensated", type: "scatter", mode: "lines+markers", x: times, y: left, name: "temperature compensated", meta: { low: least, high: most },
-      line: { color: colourOf(without), width: 1.2 }, marker: { size: 4, color: colourOf(without) },
-      text: times.map((t, i) => `τ ${numberText(t, 3)} s: <b>${numberText(left[i], 3)} ${unit.sign}</b><br>95 %: ${interval(least[i], most[i])} ${unit.sign}`),
-      hovertemplate: "temperature compensated<br>%{text}<extra></extra>",
-    });
+    const colour = colourOf(without);
+    traces.push(curveOf(view.compensated, unit, "temperature compensated", { group: "compensated", line: { color: colour, width: 1.2 }, marker: { size: 4, color: colour } }));
     groups.push({ key: "compensated", label: `${what}, temperature compensated`, on: true, look: without });
   }
   for (const [method, curve] of Object.entries(view.methods)) {
@@ -96,13 +83,8 @@ kinds.allan = (figure) => {
   const ranges = { x: logRange(tau, 0.1), y: logRange(y, 0.7, 0.25) };
   const slopes = slopeGuides(ranges.x, ranges.y);
   groups.push({ key: "slopes", label: "slopes", on: true, look: { light: inks().soft, dark: inks().soft } });
-  return {
-    traces, groups,
-    layout: {
-      xaxis: logAxis("averaging time τ (s)", ranges.x), yaxis: logAxis(`Allan deviation (${unit.sign})`, ranges.y),
-      ...(shown(figure, "slopes") ? slopes : {}),
-    },
-  };
+  const axes = { xaxis: logAxis("averaging time τ (s)", ranges.x), yaxis: logAxis(`Allan deviation (${unit.sign})`, ranges.y) };
+  return { traces, groups, layout: { ...axes, ...(shown(figure, "slopes") ? slopes : {}) } };
 };
 
 kinds.spectrum = (figure) => {
@@ -129,7 +111,7 @@ kinds.spectrum = (figure) => {
     { key: "left", label: "bins excluded", on: true, look: { light: inks().soft, dark: inks().soft, line: false, marker: "x" }, absent: left.size === 0 },
   ];
   const [least, most] = ["lower", "upper"].map((of) => scaled(spectrum[of], unit.factor));
-  traces.unshift(...band(array(spectrum.fit_frequency), least, most, look, 0.2).map((trace) => ({ ...trace, group: "scatter" })));
+  traces.unshift(...band(array(spectrum.fit_frequency), least, most, look, 0.2, { group: "scatter" }));
   traces.push(line(array(spectrum.fit_frequency), scaled(spectrum.fitted, unit.factor), { ...look, width: 2.2 }, { group: "fit", name: `fit ${spectrum.model}`, meta: { low: least, high: most } }));
   groups.push({ key: "fit", label: `fit ${spectrum.model}`, on: true, look: { ...look, marker: undefined } });
   groups.push({ key: "scatter", label: "95 % band of the bins if the model is right", on: true, look: { ...look, marker: undefined, filled: true } });
@@ -147,13 +129,8 @@ kinds.spectrum = (figure) => {
     }
     groups.push({ key: "lines", label: spectrum.lines.length === 1 ? "line" : "lines", on: true, look: own });
   }
-  return {
-    traces, groups,
-    layout: {
-      xaxis: logAxis("frequency f (Hz)", logRange(f, 0.1)),
-      yaxis: logAxis(`√PSD, two-sided (${unit.sign})`, range),
-    },
-  };
+  const layout = { xaxis: logAxis("frequency f (Hz)", logRange(f, 0.1)), yaxis: logAxis(`√PSD, two-sided (${unit.sign})`, range) };
+  return { traces, groups, layout };
 };
 
 function timeScale(longest) {
@@ -167,16 +144,11 @@ kinds.series = (figure) => {
   const warmth = pageData.samples.envelope.temperature;
   const unit = unitOf(quantityOf(channel), "signal");
   const scale = timeScale(envelope.end);
-  const middle = (of) => {
-    const count = array(of.mean).length;
-    return array(of.mean).map((_, i) => (of.start + ((i + 0.5) * (of.end - of.start)) / count) / scale.size);
-  };
+  const middle = (of) => array(of.mean).map((_, i, every) => (of.start + ((i + 0.5) * (of.end - of.start)) / every.length) / scale.size);
   const x = middle(envelope);
   const look = { ...sensorLook(pageData.channels[0]?.sensor), marker: undefined, dash: "solid" };
-  const low = scaled(envelope.low, unit.factor);
-  const high = scaled(envelope.high, unit.factor);
-  const mean = scaled(envelope.mean, unit.factor);
-  const traces = band(x, low, high, look, 0.35).map((trace) => ({ ...trace, group: "envelope" }));
+  const [low, high, mean] = ["low", "high", "mean"].map((name) => scaled(envelope[name], unit.factor));
+  const traces = band(x, low, high, look, 0.35, { group: "envelope" });
   const whole = mean.filter(Number.isFinite).reduce((sum, each, _, all) => sum + each / all.length, 0);
   traces.push({
     ...line(x, mean, black()), group: "mean", hoverinfo: "text", name: "mean", meta: { low, high },
@@ -256,7 +228,7 @@ kinds.compared = (figure) => {
     const mean = scaled(overTime ? drawn[of].mean : drawn[of].stretch, unit.factor);
     const x = mean.map((_, i) => ((i + 0.5) * end) / mean.length / scale.size);
     if (overTime) {
-      traces.push(...band(x, scaled(drawn[of].low, unit.factor), scaled(drawn[of].high, unit.factor), look, 0.18).map((trace) => ({ ...trace, group: of })));
+      traces.push(...band(x, scaled(drawn[of].low, unit.factor), scaled(drawn[of].high, unit.factor), look, 0.18, { group: of }));
     }
     traces.push({
       ...line(x, mean, { ...look, width: 1 }), group: of, name: drawn[of].name, hoverinfo: "text",

@@ -39,17 +39,9 @@ function summed(bytes) {
   return levels;
 }
 
-function scaled(place, factor) {
-  return array(place).map((value) => value * factor);
-}
-
-function printing() {
-  return window.matchMedia("print").matches || document.documentElement.dataset.printing === "yes";
-}
-
-function dark() {
-  return !printing() && window.matchMedia("(prefers-color-scheme: dark)").matches;
-}
+const scaled = (place, factor) => array(place).map((value) => value * factor);
+const printing = () => window.matchMedia("print").matches || document.documentElement.dataset.printing === "yes";
+const dark = () => !printing() && window.matchMedia("(prefers-color-scheme: dark)").matches;
 
 function inks() {
   return dark()
@@ -57,9 +49,7 @@ function inks() {
     : { ink: "#1b1b1b", soft: "#5a636b", grid: "#dfe3e6", paper: "#ffffff", mark: "#b3001b" };
 }
 
-function colourOf(look) {
-  return dark() ? look.dark : look.light;
-}
+const colourOf = (look) => (dark() ? look.dark : look.light);
 
 function faint(colour, opacity) {
   const parts = [1, 3, 5].map((at) => parseInt(colour.slice(at, at + 2), 16));
@@ -67,16 +57,12 @@ function faint(colour, opacity) {
 }
 
 function line(x, y, look, more = {}) {
-  const colour = colourOf(look);
-  return {
-    type: "scatter", mode: "lines", x, y, hoverinfo: "skip",
-    line: { color: colour, dash: look.dash ?? "solid", width: look.width ?? 1.8 },
-    ...more,
-  };
+  const style = { color: colourOf(look), dash: look.dash ?? "solid", width: look.width ?? 1.8 };
+  return { type: "scatter", mode: "lines", x, y, hoverinfo: "skip", line: style, ...more };
 }
 
-function band(x, low, high, look, opacity = 0.18) {
-  const edge = { type: "scatter", mode: "lines", x, hoverinfo: "skip", line: { width: 0, color: colourOf(look) } };
+function band(x, low, high, look, opacity = 0.18, more = {}) {
+  const edge = { type: "scatter", mode: "lines", x, hoverinfo: "skip", line: { width: 0, color: colourOf(look) }, ...more };
   const fillcolor = faint(colourOf(look), opacity);
   const present = x.map((_, i) => Number.isFinite(low[i]) && Number.isFinite(high[i]));
   const stretches = present.filter((inside, i) => inside && !present[i - 1]).length;
@@ -95,9 +81,7 @@ function band(x, low, high, look, opacity = 0.18) {
   return [{ ...edge, ...shapes, fill: "toself", fillcolor }];
 }
 
-function tickText(value) {
-  return (value >= 1e-3 && value < 1e5 ? numberText(value, 3) : numberText(value, 3).replace(/^1×/, ""));
-}
+const tickText = (value) => (value >= 1e-3 && value < 1e5 ? numberText(value, 3) : numberText(value, 3).replace(/^1×/, ""));
 
 // Labels at decades, at 1, 2, 5 or at even steps, as many as can be read; lines at all multiples.
 function logTicks(low, high) {
@@ -171,9 +155,7 @@ function baseLayout() {
   };
 }
 
-function shown(figure, group) {
-  return choices.get(figure)?.get(group) ?? true;
-}
+const shown = (figure, group) => choices.get(figure)?.get(group) ?? true;
 
 function drawFigure(figure) {
   const made = kinds[figure.dataset.kind](figure);
@@ -242,34 +224,24 @@ function drawControls(figure, groups) {
   const controls = figure.querySelector(".controls");
   if (!controls) return;
   for (const group of groups) {
-    const label = document.createElement("label");
-    label.className = "toggle";
-    label.dataset.group = group.key;
-    const box = document.createElement("input");
-    box.type = "checkbox";
-    box.checked = shown(figure, group.key);
+    const box = element("input", { type: "checkbox", checked: shown(figure, group.key) });
     box.addEventListener("change", () => {
       choices.get(figure).set(group.key, box.checked);
       redrawChosen(figure);
     });
-    const sign = document.createElement("span");
-    label.append(box, sign, ` ${group.label}`);
+    const label = element("label", { className: "toggle" }, box, element("span"), ` ${group.label}`);
+    label.dataset.group = group.key;
     controls.append(label);
   }
   if (groups.length > 8) controls.append(allOrNone(figure, groups, true), allOrNone(figure, groups, false));
 }
 
 // The choice of curves also applies to the other figures of the page.
-function redrawChosen(figure) {
-  if (figure.dataset.kind === "overlay") redrawAll();
-  else drawFigure(figure);
-}
+const redrawChosen = (figure) => (figure.dataset.kind === "overlay" ? redrawAll() : drawFigure(figure));
 
 // Layers, such as the curves themselves, stay on: without them no curve would be visible.
 function allOrNone(figure, groups, on) {
-  const button = document.createElement("button");
-  button.type = "button";
-  button.textContent = on ? "all on" : "all off";
+  const button = element("button", { type: "button", textContent: on ? "all on" : "all off" });
   button.addEventListener("click", () => {
     for (const { key, layer } of groups) {
       if (layer) continue;
@@ -311,8 +283,7 @@ function loadPlotting() {
       window.addEventListener("load", loaded, { once: true });
       return;
     }
-    const script = document.createElement("script");
-    script.src = place;
+    const script = element("script", { src: place });
     script.addEventListener("load", loaded, { once: true });
     document.head.append(script);
   });
@@ -341,15 +312,11 @@ function afterPaint(act) {
   window.setTimeout(once, 300);
 }
 
-function redrawAll() {
-  [...drawn].filter((figure) => figure.isConnected).forEach(drawFigure);
-}
+const redrawAll = () => [...drawn].filter((figure) => figure.isConnected).forEach(drawFigure);
 
 // Figures do not learn the width of a printed page in time, so it is fixed. Those of a channel are
 // printed in pairs.
-function onPaper(figure) {
-  return figure.matches("section.channel .figures > *") ? { width: 330, height: 200 } : { width: 660, height: 240 };
-}
+const onPaper = (figure) => (figure.matches("section.channel .figures > *") ? { width: 330, height: 200 } : { width: 660, height: 240 });
 
 function startPrinting() {
   const everyFigure = () => document.querySelectorAll("figure[data-kind]:not(.on-screen *)");
