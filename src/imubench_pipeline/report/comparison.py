@@ -5,11 +5,16 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from itertools import chain
-from typing import Any
 
 from imubench_pipeline.estimators.estimate import SHOWN
 from imubench_pipeline.report.parameters import cell, model_words, shown_symbols
-from imubench_pipeline.report.payload import Arrays, ComparedChannel, compared, datasheet_lines
+from imubench_pipeline.report.payload import (
+    Arrays,
+    ComparedChannel,
+    Json,
+    compared,
+    datasheet_lines,
+)
 from imubench_pipeline.report.practical import System
 from imubench_pipeline.report.view import QUANTITY_NAMES, RecordingView
 
@@ -22,15 +27,15 @@ class ComparedRecording:
 
     view: RecordingView
     channels: list[ComparedChannel]
-    datasheet: Mapping[str, list[dict[str, Any]]]  # its lines, by channel
-    lines: Mapping[str, list[dict[str, Any]]]  # of the tables of parameters, by quantity
+    datasheet: Mapping[str, list[Json]]  # its lines, by channel
+    lines: Mapping[str, list[Json]]  # of the tables of parameters, by quantity
     symbols: Mapping[str, set[str]]  # that the lines have, by quantity
 
 
 def compared_recording(view: RecordingView, system: System) -> ComparedRecording:
     """Gather the compared data of a recording; ``system`` is that of its numbers."""
     channels = view.channels()
-    lines: dict[str, list[dict[str, Any]]] = {name: [] for name in QUANTITY_NAMES}
+    lines: dict[str, list[Json]] = {name: [] for name in QUANTITY_NAMES}
     symbols: dict[str, set[str]] = {name: set() for name in QUANTITY_NAMES}
     for channel in channels:
         shown = shown_symbols(chain(*channel.parameters.values()))
@@ -75,9 +80,9 @@ class Comparison:
     def __init__(self, recordings: Iterable[ComparedRecording], names: Mapping[str, str]) -> None:
         self._names = names
         self._arrays = Arrays()
-        self._curves: list[dict[str, Any]] = []
-        self._datasheets: dict[str, dict[str, Any]] = {}
-        self._lines: dict[str, list[dict[str, Any]]] = {name: [] for name in QUANTITY_NAMES}
+        self._curves: list[Json] = []
+        self._datasheets: dict[str, Json] = {}
+        self._lines: dict[str, list[Json]] = {name: [] for name in QUANTITY_NAMES}
         self._symbols: dict[str, set[str]] = {name: set() for name in QUANTITY_NAMES}
         for recording in recordings:
             self._curves += [channel.among(self._arrays) for channel in recording.channels]
@@ -89,7 +94,7 @@ class Comparison:
                 self._symbols[quantity] |= recording.symbols[quantity]
 
     @property
-    def page(self) -> dict[str, Any]:
+    def page(self) -> Json:
         """The data of the figures of the page."""
         return {
             "channels": self._curves,
@@ -97,7 +102,7 @@ class Comparison:
             "arrays": self._arrays.texts,
         }
 
-    def tables(self) -> Iterator[dict[str, Any]]:
+    def tables(self) -> Iterator[Json]:
         """Yield a table per quantity, with the recommended method and the papers' model."""
         for quantity, title in QUANTITY_NAMES.items():
             lines = self._lines[quantity]

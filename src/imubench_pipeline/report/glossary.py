@@ -75,21 +75,14 @@ def glossary() -> dict[str, Term]:
 
 
 def term(value: str, kind: str = "") -> Term:
-    """Return the term of a value that a table holds.
+    """Return the term of a value of a table, such as ``not comparable (condition)``.
 
-    Parameters
-    ----------
-    value : str
-        As the table has it, such as ``not comparable (condition)``.
-    kind : str
-        What begins the key where the value alone says too little: ``verdict``, ``published``,
-        ``kind`` (of a printed figure, or a recording), ``line`` (its kind), ``axis``,
-        ``rate_from``, ``recording`` (its status).
+    ``kind`` begins the key of values that are ambiguous alone: ``verdict``, ``published``, ``kind``
+    (of a printed figure or recording), ``line``, ``axis``, ``rate_from``, ``recording`` (status).
 
     Raises
     ------
     UnknownTermError
         If the glossary does not have it.
     """
-    words = re.findall(r"\w+", f"{kind} {value}")
-    return glossary()["_".join(words)]
+    return glossary()["_".join(re.findall(r"\w+", f"{kind} {value}"))]

@@ -30,6 +30,7 @@ from imubench_pipeline.words.verdicts import (
 )
 
 Simulated = Mapping[tuple[str, str], bool]
+"""Whether a recording is simulated, by sensor and name."""
 
 _NAMES = {
     "attitude": "attitude (tilt)",
@@ -96,17 +97,7 @@ def rankings(
     simulated: Simulated,
     system: System,
 ) -> Iterator[Ranking]:
-    """Yield the ranking for each requirement.
-
-    Parameters
-    ----------
-    rows : sequence of RankingRow
-    requirements : mapping of str to mapping
-        As the plan wrote them.
-    simulated : mapping of (str, str) to bool
-        Whether a recording is simulated.
-    system : {'practical', 'si'}
-    """
+    """Yield the ranking for each requirement; ``requirements`` are as the plan wrote them."""
     for name, declared in requirements.items():
         by_sensor: dict[str, list[RankingRow]] = {}
         for row in rows:
@@ -122,10 +113,7 @@ def _group(limits: Sequence[RankingRow], simulated: Simulated, system: System) -
     used = {limit.recording for limit in limits}
     return Group(
         row,
-        simulated=all(
-            recording is not None and simulated.get((row.sensor, recording), False)
-            for recording in used
-        ),
+        simulated=all(simulated.get((row.sensor, name or ""), False) for name in used),
         rank=str(row.rank or NO_VALUE),
         verdict=VERDICT_WORDS[row.verdict],
         stated=stated_verdict(row),

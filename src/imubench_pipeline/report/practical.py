@@ -1,16 +1,17 @@
 """The units in which engineers state inertial errors, and numbers as they are printed.
 
-A page can show each quantity in several units and switch between them; `units_of_pages` is what
-it needs for that. The first choice is the practical one, the last is SI.
+A page can show each quantity in several units (`units_of_pages`). The first choice is the practical
+one, the last is SI.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import cache
-from typing import Literal, Protocol
+from typing import Literal
 
 from imubench_pipeline.estimators.dimensions import DIMENSIONS
+from imubench_pipeline.model.comparisons import DatasheetRow, RepeatabilityRow
 from imubench_pipeline.model.recordings import RecordingRow
 from imubench_pipeline.settings.sensor import QUANTITIES
 from imubench_pipeline.units import conversion
@@ -58,13 +59,18 @@ _SIGNS_OF_DIMENSIONS: dict[System, dict[str, str]] = {
 }
 
 
+_PREFIXED_DIMENSIONS = ("velocity", "length")
+_MIN_SIZE_OF_PREFIX = ((1e3, "k"), (0.1, ""), (1e-4, "m"), (0.0, "µ"))
+"""Smallest size in SI for each prefix."""
+
+
 def page_unit(quantity: str, symbol: str, system: System) -> Unit:
     """Return the unit in which a page first shows a figure of a quantity.
 
     The symbol is a parameter, or ``adev``, ``psd`` (root of a density) or ``signal`` (the log
     itself).
     """
-    return _find_unit(quantity, symbol, _choose_system(quantity, system))
+    return _find_unit(quantity, symbol, first_choices(system)[quantity])
 
 
 def units_of_pages() -> dict[str, dict[str, dict[str, Unit]]]:
@@ -80,12 +86,8 @@ def units_of_pages() -> dict[str, dict[str, dict[str, Unit]]]:
 
 def first_choices(system: System) -> Mapping[str, str]:
     """Return the name of the choice with which a page opens, by quantity."""
-    return {quantity: _choose_system(quantity, system) for quantity in _UNIT_CHOICES}
-
-
-def _choose_system(quantity: str, system: System) -> str:
-    names = list(_UNIT_CHOICES[quantity])
-    return names[0] if system == "practical" else names[-1]
+    place = 0 if system == "practical" else -1
+    return {quantity: list(choices)[place] for quantity, choices in _UNIT_CHOICES.items()}
 
 
 @cache
@@ -109,8 +111,7 @@ def unit_of(dimension: str, system: System, size: float | None = None) -> Unit:
     """
     if not size:
         return _make_unit(_SIGNS_OF_DIMENSIONS[system][dimension], dimension)
-    units = units_by_size(dimension, system)
-    return next(unit for least, unit in units if abs(size) >= least)
+    return next(unit for least, unit in units_by_size(dimension, system) if abs(size) >= least)
 
 
 def units_by_size(dimension: str, system: System) -> list[tuple[float, Unit]]:
@@ -119,11 +120,6 @@ def units_by_size(dimension: str, system: System) -> list[tuple[float, Unit]]:
     prefixed = system == "practical" and dimension in _PREFIXED_DIMENSIONS
     prefixes = _MIN_SIZE_OF_PREFIX if prefixed else ((0.0, ""),)
     return [(least, _make_unit(prefix + sign, dimension)) for least, prefix in prefixes]
-
-
-_PREFIXED_DIMENSIONS = ("velocity", "length")
-_MIN_SIZE_OF_PREFIX = ((1e3, "k"), (0.1, ""), (1e-4, "m"), (0.0, "µ"))
-"""Smallest size in SI for each prefix."""
 
 
 def _make_unit(sign: str, dimension: str) -> Unit:
@@ -139,20 +135,8 @@ def temperature_text(row: RecordingRow) -> str:
     return f"{low} to {high} °C"
 
 
-def printed_text(row: Printed) -> str:
+def printed_text(row: DatasheetRow | RepeatabilityRow) -> str:
     """Return the figure of a datasheet as it is printed; `NO_VALUE` where there is none."""
     if row.printed is None:
         return NO_VALUE
     return f"{row.printed:g} {row.unit or ''}".rstrip()
-
-
-class Printed(Protocol):
-    """A figure of a datasheet, as it is printed."""
-
-    @property
-    def printed(self) -> float | None:
-        """The number."""
-
-    @property
-    def unit(self) -> str | None:
-        """Its unit."""

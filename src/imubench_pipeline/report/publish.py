@@ -34,25 +34,9 @@ _REQUIRED_SETTINGS = {"report", "settings", "sensors", "boards", "requirements"}
 _PAGE_FOLDERS = ("recordings", "sensors", "devices")
 _STATIC_FOLDER = Path(__file__).with_name("static")
 _SCRIPT_NAMES = (
-    "address",
-    "numbers",
-    "terms",
-    "tables",
-    "tools",
-    "plot",
-    "sketch",
-    "overlay",
-    "ratios",
-    "comparison",
-    "side_by_side",
-    "tabs",
-    "search",
-    "channel",
-    "trend",
-    "start",
+    *("address", "numbers", "terms", "tables", "tools", "plot", "sketch", "overlay", "ratios"),
+    *("comparison", "side_by_side", "tabs", "search", "channel", "trend", "start"),
 )
-
-_STYLE_NAMES = ("report", "decisions")
 
 Progress = Callable[[str], None]
 
@@ -65,7 +49,9 @@ def publish(site: Site, folder: Path, say: Progress = lambda _: None) -> list[st
     written paths, below the folder.
     """
     written = []
-    for path, content in (_make_assets() | _make_search(site)).items():
+    # A page opened from disk may not read files, but it may run scripts.
+    search = {"assets/search.js": f"imubenchSearch({index(site)});\n"}
+    for path, content in (_make_assets() | search).items():
         written += _put(folder, path, content)
     every = list(pages(site))
     keys = {page.path: page.key for page in every}
@@ -89,8 +75,11 @@ def publish(site: Site, folder: Path, say: Progress = lambda _: None) -> list[st
             if page.path not in site.failed:
                 shown[page.path] = _make_key(page.key, rendered)
             written += _put(folder, page.path, rendered)
-    for path in _list_pages(site, folder) - keys.keys():
-        (folder / path).unlink()
+    existing = [file for of in _PAGE_FOLDERS for file in (folder / of).rglob("*.html")]
+    existing += [file for entry in site.entries if (file := folder / entry.file).is_file()]
+    for file in existing:
+        if file.relative_to(folder).as_posix() not in keys:
+            file.unlink()
     _put(folder, _SETTINGS_FILE, _format_json(site.settings))
     _put(folder, KEYS, _format_json(shown))
     write_failed_pages(site.failed, folder)
@@ -117,19 +106,9 @@ def _make_key(key: str, content: bytes) -> str:
 def _read_keys(path: Path) -> dict[str, str]:
     """Return the digests of the existing pages; empty if they are unknown."""
     try:
-        keys = read_json(path)
-    except (OSError, ValueError):
+        return {page: str(key) for page, key in read_json(path).items()}
+    except (OSError, ValueError, AttributeError):
         return {}
-    if not isinstance(keys, dict):
-        return {}
-    return {page: str(key) for page, key in keys.items()}
-
-
-def _list_pages(site: Site, folder: Path) -> set[str]:
-    """Return all pages in the folder, including obsolete ones."""
-    files = [path for of in _PAGE_FOLDERS for path in (folder / of).rglob("*.html")]
-    files += [path for entry in site.entries if (path := folder / entry.file).is_file()]
-    return {path.relative_to(folder).as_posix() for path in files}
 
 
 def _put(folder: Path, path: str, content: str | bytes) -> list[str]:
@@ -171,16 +150,12 @@ def _render(
 def _make_assets() -> dict[str, str]:
     return {
         "assets/report.css": "".join(
-            (_STATIC_FOLDER / f"{name}.css").read_text(encoding="utf-8") for name in _STYLE_NAMES
+            (_STATIC_FOLDER / name).read_text(encoding="utf-8")
+            for name in ("report.css", "decisions.css")
         ),
         "assets/report.js": _make_script(),
         "assets/plotly.min.js": plotting_script(),
     }
-
-
-def _make_search(site: Site) -> dict[str, str]:
-    # A page opened from disk may not read files, but it may run scripts.
-    return {"assets/search.js": f"imubenchSearch({index(site)});\n"}
 
 
 def _make_script() -> str:
@@ -206,25 +181,20 @@ def _make_script() -> str:
 def one_file(site: Site) -> str:
     """Return the whole report as one page that needs no other file."""
     templates = environment(site.system)
-    common = {"site": site.shown(alone=True), "path": "index.html", "root": ""}
     shown = [
         {"path": page.path, "content": _make_page(site, templates, page, "fragment.html.jinja")}
         for page in pages(site)
     ]
     assets = _make_assets()
-    scripts = [
-        assets[f"assets/{name}.js"].replace("</script", "<\\/script")
-        for name in ("report", "plotly.min")
-    ]
-    page = templates.get_template("one_file.html.jinja")
-    return page.render(
-        {
-            "pages": shown,
-            "css": assets["assets/report.css"],
-            "scripts": scripts,
-            "search": index(site).replace("<", "\\u003c"),
-            **common,
-        }
+    scripts = (assets[f"assets/{name}.js"] for name in ("report", "plotly.min"))
+    return templates.get_template("one_file.html.jinja").render(
+        pages=shown,
+        css=assets["assets/report.css"],
+        scripts=[script.replace("</script", "<\\/script") for script in scripts],
+        search=index(site).replace("<", "\\u003c"),
+        site=site.shown(alone=True),
+        path="index.html",
+        root="",
     )
 
 

@@ -1,4 +1,4 @@
-"""What a run says at its end: what became of the recordings, and which sensor suits what."""
+"""The summary of a run in the terminal: states of recordings, and the best sensors."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ _FAILED_GROUP = re.compile(
     r"^    message: Error in group .*\n(?:    log: (.+) \(check .*\n)?    jobs:\n((?: {8}.*\n)*)",
     re.MULTILINE,
 )
-"""Steps that are one job of a cluster, which failed: its log says which of them did."""
+"""Steps in one job of a cluster, which failed; its log names the step."""
 
 _JOB = re.compile(r"^ +jobid: (\d+)$", re.MULTILINE)
 _OUTPUT = re.compile(r"^ +output: (.+)$", re.MULTILINE)
@@ -38,7 +38,7 @@ _INTERRUPTED = "Terminating processes on user request"
 
 
 def summary(results: Path) -> str:
-    """Return what a finished run says; nothing where there are no tables."""
+    """Return the summary of a finished run; empty without tables."""
     paths = {name: results / f"tables/{name}.parquet" for name in _NEEDED}
     if not all(path.is_file() for path in paths.values()):
         return ""
@@ -76,10 +76,7 @@ def without_pages(results: Path) -> str:
 
 
 def failure(logs: Sequence[str], results: Path) -> str:
-    """Return what a run says that did not come to its end: what failed, and how to go on.
-
-    By the files that Snakemake logs to.
-    """
+    """Return the summary of a run that failed or was stopped, from the logs of Snakemake."""
     texts = [Path(log).read_text(encoding="utf-8", errors="replace") for log in logs]
     steps = dict.fromkeys(step for text in texts for step in _failed_steps(text, results))
     again = "run the same command again: it goes on where this run stopped"
@@ -154,13 +151,9 @@ def warnings(findings: Iterable[FindingRow]) -> Iterator[str]:
         name = f"{row.sensor}/{row.recording}"
         by_recording.setdefault(name, Counter())[row.finding.replace("_", " ")] += 1
         left_out[name] += row.severity == "fatal"
-    for name in sorted(
-        by_recording, key=lambda name: (-left_out[name], -by_recording[name].total())
-    ):
-        kinds = ", ".join(
-            kind + f" ({count})" * (count > 1) for kind, count in by_recording[name].most_common()
-        )
-        yield one_line(f"{name}: {counted(by_recording[name].total(), 'warning')}: {kinds}")
+    for name, of in sorted(by_recording.items(), key=lambda i: (-left_out[i[0]], -i[1].total())):
+        kinds = ", ".join(kind + f" ({n})" * (n > 1) for kind, n in of.most_common())
+        yield one_line(f"{name}: {counted(of.total(), 'warning')}: {kinds}")
 
 
 def serious(findings: Iterable[FindingRow]) -> Iterator[FindingRow]:
@@ -174,10 +167,8 @@ def leaders(ranking: Iterable[RankingRow], recordings: Iterable[RecordingRow]) -
     """Yield a line for each requirement: the best sensor, and whether it meets the limits."""
     deciding = [row for row in ranking if row.decides]
     simulated = {(row.sensor, row.recording) for row in recordings if row.simulated}
-    names = {
-        row.sensor: row.sensor + " (simulated)" * ((row.sensor, row.recording) in simulated)
-        for row in deciding
-    }
+    marks = {row.sensor: (row.sensor, row.recording) in simulated for row in deciding}
+    names = {sensor: sensor + " (simulated)" * mark for sensor, mark in marks.items()}
     for name in dict.fromkeys(row.requirement for row in deciding):
         own = [row for row in deciding if row.requirement == name]
         ranked = [row for row in own if row.rank is not None]
@@ -191,10 +182,7 @@ def leaders(ranking: Iterable[RankingRow], recordings: Iterable[RecordingRow]) -
 
 
 def one_line(text: str, longest: int = _MOST_LETTERS) -> str:
-    """Return a text on one line, without what a terminal takes for a command.
-
-    It may hold names and values as they stand in logs; beyond ``longest`` letters is an ellipsis.
-    """
+    """Return a text from logs on one line, without control characters, cut with an ellipsis."""
     shown = "".join(letter if letter.isprintable() else " " for letter in text)
     shown = " ".join(shown.split())
     return shown if len(shown) <= longest else shown[: longest - 1] + "…"

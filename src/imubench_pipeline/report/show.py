@@ -47,6 +47,7 @@ def run(arguments: argparse.Namespace) -> int:
     from rich.text import Text
 
     from imubench_pipeline.report.terminal import parts
+    from imubench_pipeline.tables import tables_folder
 
     try:
         tables = _load(arguments.results)
@@ -66,7 +67,10 @@ def run(arguments: argparse.Namespace) -> int:
             system=arguments.units,
             width=width,
         )
-        yield Text(_where(arguments.results), no_wrap=True, overflow="ignore")
+        page = tables_folder(arguments.results).parent / "report/index.html"
+        no_page = f"No report at {page}; `snakemake -c2` makes it"
+        text = f"Report: {page}" if page.is_file() else no_page
+        yield Text(text, no_wrap=True, overflow="ignore")
 
     show(shown, arguments.width)
     return 0
@@ -95,7 +99,7 @@ def show(parts: Callable[[int], Iterable[RenderableType]], width: int | None = N
 
 
 class _ShowError(ValueError):
-    """What was asked for is not there; the text says what is."""
+    """The results lack what was asked for."""
 
 
 def _load(results: Path) -> dict[str, pa.Table]:
@@ -109,15 +113,6 @@ def _load(results: Path) -> dict[str, pa.Table]:
         return {name: read(name, [path]) for name, path in paths.items()}
     except (OSError, ValueError) as error:
         raise _ShowError(f"{error}\n`snakemake -c2` makes the tables again") from error
-
-
-def _where(results: Path) -> str:
-    from imubench_pipeline.tables import tables_folder
-
-    page = tables_folder(results).parent / "report/index.html"
-    if page.is_file():
-        return f"Report: {page}"
-    return f"No report at {page}; `snakemake -c2` makes it"
 
 
 def _check(table: pa.Table, column: str, asked: str | None) -> None:

@@ -93,12 +93,9 @@ def summary(views: Sequence[RecordingView], several: bool = True) -> str:
     parts = [counted(len(views), "recording") + of]
     lasting = sum(view.row.duration or 0.0 for view in views)
     parts += [f"{duration_text(lasting)} of data" if lasting else "", dated(views)]
-    text = (
-        ", ".join(filter(None, parts))
-        + f": {len(views) - rejected - failed} analysed, {rejected} rejected"
-    )
-    text += f", {failed} failed." if failed else "."
-    return f"{text} {made(views)}".rstrip()
+    counts = f"{len(views) - rejected - failed} analysed, {rejected} rejected"
+    counts += f", {failed} failed" * bool(failed)
+    return f"{', '.join(filter(None, parts))}: {counts}. {made(views)}".rstrip()
 
 
 def dated(views: Sequence[RecordingView]) -> str:

@@ -69,14 +69,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def _make_list_reader(choices: Sequence[str]) -> Callable[[str], tuple[str, ...]]:
     """Return a reader of names with commas between them; ``all`` stands for every one."""
+    expected = f"expected all, or some of {', '.join(choices)}"
 
     def names(text: str) -> tuple[str, ...]:
         asked = [name.strip() for name in text.split(",")]
         for name in asked:
             if name not in choices and name != "all":
-                raise argparse.ArgumentTypeError(
-                    f"found {name!r}, expected all, or some of {', '.join(choices)}"
-                )
+                raise argparse.ArgumentTypeError(f"found {name!r}, {expected}")
         return tuple(choices) if "all" in asked else tuple(dict.fromkeys(asked))
 
     return names

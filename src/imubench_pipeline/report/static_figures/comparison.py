@@ -236,7 +236,15 @@ def forest_figure(
     first = panels[0]
     first.set_ylim(total, 0.0)
     first.set_yticks([(block.top + block.bottom) / 2.0 for block in blocks])
-    first.set_yticklabels([_name_block(figure, block) for block in blocks])
+    names = []
+    for block in blocks:
+        count, simulated = len(block.views), sum(view.simulated for view in block.views)
+        words = [f"n = {count}"] * (count > 1)
+        if simulated:
+            words.append("simulated" if simulated == count else f"{simulated} simulated")
+        about = f" ({', '.join(words)})" if words else ""
+        names.append(shortened(figure, block.sensor, 110.0) + about)
+    first.set_yticklabels(names)
     for panel in panels:
         panel.tick_params(axis="y", length=0, which="both")
         panel.grid(visible=False, axis="y")
@@ -247,11 +255,8 @@ def forest_figure(
 
 def _make_blocks(views: Sequence[ChannelView], sensors: Sequence[str]) -> list[_Block]:
     """Return the rows of the sensors; their height grows with the recordings, within a page."""
-    by_sensor = {
-        sensor: [view for view in views if view.sensor == sensor]
-        for sensor in sensors
-        if any(view.sensor == sensor for view in views)
-    }
+    by_sensor = {sensor: [view for view in views if view.sensor == sensor] for sensor in sensors}
+    by_sensor = {sensor: own for sensor, own in by_sensor.items() if own}
     slot = _SLOT_HEIGHT
     while True:
         heights = [max(_MIN_ROW_HEIGHT, slot * (len(each) + 0.5)) for each in by_sensor.values()]
@@ -259,22 +264,11 @@ def _make_blocks(views: Sequence[ChannelView], sensors: Sequence[str]) -> list[_
             break
         slot *= 0.95
     bottoms = np.cumsum(heights)
+    rows = zip(by_sensor.items(), heights, bottoms, strict=True)
     return [
-        _Block(sensor, of_sensor, float(bottom - height), float(bottom))
-        for (sensor, of_sensor), height, bottom in zip(
-            by_sensor.items(), heights, bottoms, strict=True
-        )
+        _Block(sensor, own, float(bottom - height), float(bottom))
+        for (sensor, own), height, bottom in rows
     ]
-
-
-def _name_block(figure: Figure, block: _Block) -> str:
-    count = len(block.views)
-    name = shortened(figure, block.sensor, 110.0)
-    simulated = sum(view.simulated for view in block.views)
-    if simulated not in (0, count):
-        return f"{name} (n = {count}, {simulated} simulated)"
-    words = [f"n = {count}"] * (count > 1) + ["simulated"] * (simulated > 0)
-    return f"{name} ({', '.join(words)})" if words else name
 
 
 def _draw_panel(
@@ -306,7 +300,21 @@ def _draw_panel(
         ]
         _draw_marks(axes, of_block, looks[block.sensor], unit.per_si, step)
         if not of_block:
-            _write_reason(axes, block, symbol)
+            statuses = {
+                status_text(row.status)
+                for view in block.views
+                if view.recommended in view.parameters
+                for row in view.named(view.recommended, symbol)
+            }
+            axes.annotate(
+                ", ".join(sorted(statuses)) or "not estimated",
+                (0.0, (block.top + block.bottom) / 2.0),
+                xycoords=("axes fraction", "data"),
+                xytext=(3.0, 0.0),
+                textcoords="offset points",
+                va="center",
+                color="0.4",
+            )
         drawn += of_block
     places, values = zip(*truths, strict=True) if truths else ((), ())
     if truths:
@@ -367,25 +375,6 @@ def _draw_marks(
             zorder=3.0,
             **dot,
         )
-
-
-def _write_reason(axes: Axes, block: _Block, symbol: str) -> None:
-    """Write why a row of a panel is empty."""
-    statuses = {
-        status_text(row.status)
-        for view in block.views
-        if view.recommended in view.parameters
-        for row in view.named(view.recommended, symbol)
-    }
-    axes.annotate(
-        ", ".join(sorted(statuses)) or "not estimated",
-        (0.0, (block.top + block.bottom) / 2.0),
-        xycoords=("axes fraction", "data"),
-        xytext=(3.0, 0.0),
-        textcoords="offset points",
-        va="center",
-        color="0.4",
-    )
 
 
 def _make_legend(kinds: set[str]) -> list[Line2D]:
