@@ -88,6 +88,7 @@ def environment(system: System) -> jinja2.Environment:
     templates.filters |= {"duration": duration_text, "number": number_text, "json": _make_json}
     templates.filters |= {"started": started_text, "symbol_text": symbol_text, "packed": packed}
     templates.filters |= {"attribute": _make_compact_json, "doubts": doubts_text}
+    templates.filters["status_text"] = status_text
     templates.tests["hidden_row"] = lambda row: row.partition(">")[0].endswith(" hidden")
     return templates
 

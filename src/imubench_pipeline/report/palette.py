@@ -29,6 +29,13 @@ _COLOURS = (
     ("#7A4B3A", "#C69A88"),
     ("#5B5FC7", "#A3A6F2"),
 )
+TERM_COLOURS = tuple(
+    {"light": light, "dark": dark}
+    for place, (light, dark) in enumerate(_COLOURS)
+    if place not in (2, 5)  # too close to the green of the best method, and to grey
+)
+"""Colours of the terms of a model and of the sources of an error, by their place."""
+
 _MARKERS = ("circle", "square", "diamond", "triangle-up", "triangle-down", "cross", "x")
 _DASHES = ("solid", "dash", "dot", "dashdot", "longdash")
 

@@ -12,11 +12,13 @@ from pathlib import Path
 import jinja2
 import pyarrow as pa
 
+from imubench_pipeline.estimators.estimate import SHOWN
 from imubench_pipeline.registry import files_of
 from imubench_pipeline.report.folder import KEYS, write_failed_pages
 from imubench_pipeline.report.glossary import glossary
 from imubench_pipeline.report.html import environment
 from imubench_pipeline.report.pages import ENTRIES, pages
+from imubench_pipeline.report.palette import TERM_COLOURS
 from imubench_pipeline.report.plotting import plotting_script
 from imubench_pipeline.report.practical import units_of_pages
 from imubench_pipeline.report.run_summary import one_line
@@ -26,7 +28,7 @@ from imubench_pipeline.tables import read, read_json, write_content
 from imubench_pipeline.tables.failures import describe_error
 from imubench_pipeline.tables.provenance import source_digest
 from imubench_pipeline.tables.schemas import OF_ONE_RECORDING, TABLES
-from imubench_pipeline.words.estimates import STATUS_WORDS
+from imubench_pipeline.words.estimates import STATUS_WORDS, symbol_text
 
 _SETTINGS_FILE = "settings.json"
 _REQUIRED_SETTINGS = {"report", "settings", "sensors", "boards", "requirements"}
@@ -173,7 +175,13 @@ def _make_script() -> str:
     terms = {key: entry.short for key, entry in glossary().items()}
     head = "".join(
         f"const {name} = {json.dumps(value, ensure_ascii=False)};\n"
-        for name, value in (("UNITS", units), ("STATUS_NAMES", STATUS_WORDS), ("TERMS", terms))
+        for name, value in (
+            ("UNITS", units),
+            ("STATUS_NAMES", STATUS_WORDS),
+            ("SYMBOL_TEXTS", {symbol: symbol_text(symbol) for symbol in SHOWN}),
+            ("TERMS", terms),
+            ("TERM_COLOURS", TERM_COLOURS),
+        )
     )
     return '(() => {\n"use strict";\n' + head + "\n".join(parts) + "})();\n"
 

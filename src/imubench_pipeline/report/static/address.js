@@ -16,9 +16,7 @@ function stateText(hash) {
   return last.includes("=") ? last : "";
 }
 
-function readState() {
-  state = new URLSearchParams(stateText(location.hash));
-}
+const readState = () => (state = new URLSearchParams(stateText(location.hash)));
 
 function keep(key, value) {
   if (value === null || value === "") state.delete(key);
@@ -45,13 +43,12 @@ async function copyText(text) {
 function startCopying() {
   const units = document.querySelector("header .units");
   if (!units) return;
-  const button = element("button", { type: "button", className: "copy", textContent: "Copy link" });
   const said = element("output");
-  button.addEventListener("click", async () => {
+  const copy = async () => {
     said.textContent = (await copyText(location.href)) ? "copied" : location.href;
     window.setTimeout(() => (said.textContent = ""), 3000);
-  });
-  units.append(button, said);
+  };
+  units.append(element("button", { type: "button", className: "copy", textContent: "Copy link", onclick: copy }), said);
   if (!inOneFile()) {
     window.addEventListener("hashchange", () => stateText(location.hash) && location.reload());
   }

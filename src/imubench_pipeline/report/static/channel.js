@@ -1,14 +1,9 @@
 // The figures of one channel: curve, spectrum, samples over time, histogram.
 
 const black = () => ({ light: inks().ink, dark: inks().ink });
-const PLACES = [
-  ["#0072B2", "#4DA3D9"], ["#D55E00", "#F08A3C"], ["#B3508C", "#DB8FBC"], ["#9A6B00", "#E0A82E"], ["#7A4B3A", "#C69A88"], ["#5B5FC7", "#A3A6F2"],
-];
 const TERM_DASHES = ["dash", "dot", "dashdot", "longdash"];
-const termLook = (place) => {
-  const [light, darkened] = PLACES[place % PLACES.length];
-  return { light, dark: darkened, dash: TERM_DASHES[place % TERM_DASHES.length], width: 1.4 };
-};
+const termLook = (place) => ({ ...TERM_COLOURS[place % TERM_COLOURS.length], dash: TERM_DASHES[place % TERM_DASHES.length], width: 1.4 });
+const MARKED = { light: "#B3001B", dark: "#FF8F8F" };
 
 // Samples and curves have the colour of the sensor on every page; the recommended model is black.
 function sensorLook(sensor) {
@@ -74,7 +69,7 @@ kinds.allan = (figure) => {
     );
   }
   view.datasheet.forEach((printed, place) => {
-    const sheet = { light: "#B3001B", dark: "#FF8F8F", dash: TERM_DASHES[place % 4], width: 1.6 };
+    const sheet = { ...MARKED, dash: TERM_DASHES[place % 4], width: 1.6 };
     traces.push(line(tau, printedLine(printed, tau, unit), sheet, {
       group: `datasheet ${place}`, hoverinfo: "name", name: `datasheet: ${printed.label}`,
     }));
@@ -121,7 +116,7 @@ kinds.spectrum = (figure) => {
   });
   const range = logRange(density, 0.3);
   if (spectrum.lines.length > 0) {
-    const own = { light: "#B3001B", dark: "#FF8F8F", dash: "dot", width: 1.2 };
+    const own = { ...MARKED, dash: "dot", width: 1.2 };
     for (const each of spectrum.lines) {
       traces.push(line([each.frequency, each.frequency], range.map((power) => 10 ** power), own, {
         group: "lines", hoverinfo: "text", text: `${each.kind}, ${numberText(each.frequency, 5)} Hz`,
@@ -191,7 +186,7 @@ kinds.series = (figure) => {
   if (below.length > 0) layout.xaxis.anchor = below.at(-1);
   const marked = pageData.findings.filter((finding) => finding.start !== null && (finding.channel === null || finding.channel === channel));
   if (marked.length > 0) {
-    groups.push({ key: "findings", label: "findings", on: true, look: { light: "#B3001B", dark: "#FF8F8F", filled: true } });
+    groups.push({ key: "findings", label: "findings", on: true, look: { ...MARKED, filled: true } });
     if (shown(figure, "findings")) {
       // Knocks are single events, so only the range from the first to the last is marked.
       layout.shapes = marked.map((finding) => ({

@@ -86,24 +86,21 @@ function drawPickers(pickers, axes) {
     const label = labelled(one.letter, select);
     label.prepend(signOf({ ...lookOfChosen(one), marker: lookOfChosen(one).plain ?? lookOfChosen(one).marker }));
     if (chosen.length < 3) return label;
-    const remove = element("button", { type: "button", textContent: "×", className: "remove" });
-    remove.setAttribute("aria-label", `Remove ${one.letter}`);
-    remove.addEventListener("click", () => {
+    const remove = element("button", { type: "button", textContent: "×", className: "remove", onclick: () => {
       chosen = chosenFrom(chosen.filter((other) => other !== one).map((other) => other.key));
       again("select");
-    });
+    } });
+    remove.setAttribute("aria-label", `Remove ${one.letter}`);
     return element("span", {}, label, remove);
   });
-  const more = element("button", { type: "button", textContent: "+ one more" });
-  more.hidden = chosen.length >= LETTERS.length || chosen.length >= pageData.recordings.length;
-  more.addEventListener("click", () => {
+  const more = element("button", { type: "button", textContent: "+ one more", hidden: chosen.length >= Math.min(LETTERS.length, pageData.recordings.length), onclick: () => {
     const used = new Set(chosen.map((one) => `${one.sensor}/${one.recording}`));
     const next = pageData.recordings.find((row) => !chosen.some((one) => one.sensor === row.sensor))
       ?? pageData.recordings.find((row) => !used.has(`${row.sensor}/${row.recording}`));
     const key = chosen.some((one) => one.sensor === next.sensor) ? `${next.sensor}/${next.recording}` : next.sensor;
     chosen = chosenFrom([...chosen.map((one) => one.key), key]);
     again(`select[data-letter=${LETTERS[chosen.length - 1]}]`);
-  });
+  } });
   pickers.replaceChildren(...selects, more, axisChooser("compared", axes, () => {
     startGrowth(root);
     compareChosen(root);

@@ -1,6 +1,6 @@
 // Numbers as they are printed, and the units that the reader chose.
-// UNITS: quantity -> choice -> symbol -> [sign, factor from SI]; STATUS_NAMES: status -> text; both
-// are written by the page builder.
+// Constants in capitals are written by `publish`: UNITS (quantity -> choice -> symbol -> [sign, factor
+// from SI]), STATUS_NAMES, SYMBOL_TEXTS, TERMS, and the colours of terms.
 
 const SUPERSCRIPTS = { "-": "⁻", 0: "⁰", 1: "¹", 2: "²", 3: "³", 4: "⁴", 5: "⁵", 6: "⁶", 7: "⁷", 8: "⁸", 9: "⁹" };
 
@@ -37,8 +37,6 @@ function digitsBy(value, lower, upper, otherwise = 3) {
 
 const chosenUnits = {};
 
-// How a parameter is written; the builder of the pages has the same names.
-const SYMBOL_TEXTS = { B_curve: "B (curve)", sigma_min: "σ_min", tau_min: "τ_min" };
 const symbolText = (symbol) => SYMBOL_TEXTS[symbol] ?? symbol;
 const statusText = (status) => STATUS_NAMES[status] ?? status.replaceAll("_", " ");
 const symbolMarkup = (symbol) => symbolText(symbol).replace(/_(\w+)/, "<sub>$1</sub>");

@@ -42,13 +42,12 @@ function startChooser(root) {
 
 function axisChooser(group, names, act) {
   return element("fieldset", {}, element("legend", { textContent: "Axis" }), ...names.map((name) => {
-    const radio = element("input", { type: "radio", name: group, value: name, checked: name === chosenChannel });
-    radio.addEventListener("change", () => {
+    const choose = () => {
       chosenChannel = name;
       keep("axis", name);
       act();
-    });
-    return element("label", {}, radio, ` ${CHANNEL_NAMES[name]}`);
+    };
+    return element("label", {}, element("input", { type: "radio", name: group, value: name, checked: name === chosenChannel, onchange: choose }), ` ${CHANNEL_NAMES[name]}`);
   }));
 }
 
@@ -126,12 +125,8 @@ kinds.overlay = (figure) => {
     x: logRange(here.flatMap((view) => array(view.tau)), 0.1), y: logRange(here.flatMap((view) => scaled(view.adev, unit.factor)), 0.4),
   };
   const slopes = slopeGuides(ranges.x, ranges.y);
-  const drawnSheets = new Set();
-  for (const view of here) {
-    if (drawnSheets.has(view.sensor)) continue;
-    drawnSheets.add(view.sensor);
-    const look = lookOf(view);
-    const tau = array(view.tau);
+  for (const view of here.filter(({ sensor }, i) => here.findIndex((other) => other.sensor === sensor) === i)) {
+    const [look, tau] = [lookOf(view), array(view.tau)];
     pageData.datasheets[view.sensor][chosenChannel].forEach((printed) => {
       traces.push(line(tau, printedLine(printed, tau, unit), { ...look, dash: "dot", width: 1.2 }, {
         group: [groupOf(view), "datasheet"], hoverinfo: "text", text: `${nameOf(view.sensor)}, datasheet: ${printed.label}`,
@@ -141,8 +136,7 @@ kinds.overlay = (figure) => {
   const { ink, soft } = inks();
   const plain = { light: ink, dark: ink };
   // Names stand at the ends of the curves, where there is room for them.
-  const named = new Map();
-  for (const view of here) if (shown(figure, groupOf(view)) && shown(figure, "measured")) named.set(groupOf(view), view);
+  const named = new Map(here.filter((view) => shown(figure, groupOf(view)) && shown(figure, "measured")).map((view) => [groupOf(view), view]));
   const roomy = !printing() && figure.clientWidth > 700 && named.size <= 12;
   const labels = roomy ? directLabels([...named].map(([key, view]) => ({
     y: Math.log10(scaled(view.adev, unit.factor).at(-1)), text: wrapped(nameOf(key)), colour: colourOf(lookOf(view)),
@@ -206,10 +200,7 @@ kinds.forest = (figure) => {
           color: identified ? colour : inks().paper, size: identified ? 9 : 8, line: { color: colour, width: identified ? 0 : 2 },
           symbol: identified ? look.marker : status === "absent" ? "triangle-left" : "circle",
         },
-        error_x: bounded ? {
-          type: "data", symmetric: false, array: [(upper - middle) * unit.factor], arrayminus: [(middle - lower) * unit.factor],
-          color: colour, thickness: 1.6, width: 4,
-        } : undefined,
+        error_x: bounded ? { type: "data", symmetric: false, array: [(upper - middle) * unit.factor], arrayminus: [(middle - lower) * unit.factor], color: colour, thickness: 1.6, width: 4 } : undefined,
         hovertemplate: `${name}<br>${symbolText(symbol)} ${words}${limits}<extra></extra>`,
       });
     }

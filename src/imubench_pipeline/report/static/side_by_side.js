@@ -212,7 +212,8 @@ const place = (values, wanted) => values.reduce((best, value, i) => (Math.abs(Ma
 // The nearest window and time of a recording to those that are chosen.
 function chosenPlace(one) {
   const [windows, times] = [array(one.row.growth.windows), array(one.row.growth.times)];
-  return { windows, times, window: place(windows, growthOf.window), time: place(times, growthOf.time) };
+  const [window, time] = [place(windows, growthOf.window), place(times, growthOf.time)];
+  return { windows, times, window, at: window * times.length + time };
 }
 
 function startGrowth(root) {
@@ -280,8 +281,7 @@ function drawErrors(root) {
       const own = chosen.map((one) => {
         const grown = errorsOf(one)[error];
         if (!grown) return null;
-        const { times, window, time } = chosenPlace(one);
-        const at = window * times.length + time;
+        const { at } = chosenPlace(one);
         const [value, lower, upper] = ["sigma", "lower", "upper"].map((name) => array(grown[name])[at]);
         return { value, lower, upper, status: "ok" };
       });
@@ -349,14 +349,10 @@ kinds.growth = () => {
 
 kinds.sources = (figure) => {
   const here = chosen.filter(grownOf).reverse();
-  const at = (one) => {
-    const { times, window, time } = chosenPlace(one);
-    return window * times.length + time;
-  };
-  const shares = here.map((one) => Object.entries(grownOf(one).sources).map(([source, of]) => [source, array(of)[at(one)]]));
+  const shares = here.map((one) => Object.entries(grownOf(one).sources).map(([source, of]) => [source, array(of)[chosenPlace(one).at]]));
   return stackedShares(
     here.map((one) => {
-      const [value, lower, upper] = ["sigma", "lower", "upper"].map((name) => array(grownOf(one)[name])[at(one)]);
+      const [value, lower, upper] = ["sigma", "lower", "upper"].map((name) => array(grownOf(one)[name])[chosenPlace(one).at]);
       return `${wrapped(shortName(one))}<br>${errorText(growthOf.error, { value, lower, upper })}`;
     }),
     shares, here.map(shortName), figure.clientWidth,
@@ -374,10 +370,7 @@ function stackedShares(rows, shares, titles, width) {
   });
   large.flat().forEach(([source, share]) => total.set(sourceKind(source), Math.max(total.get(sourceKind(source)) ?? 0, share)));
   const order = [...total].sort(([a, x], [b, y]) => (a === "others") - (b === "others") || y - x).map(([source]) => source);
-  const looks = order.map((source, number) => {
-    const [light, darkened] = source === "others" ? ["#8a9299", "#6b7680"] : PLACES[number % PLACES.length];
-    return { light, dark: darkened };
-  });
+  const looks = order.map((source, number) => (source === "others" ? { light: "#8a9299", dark: "#6b7680" } : TERM_COLOURS[number % TERM_COLOURS.length]));
   const traces = order.map((source, number) => {
     const own = large.map((parts) => parts.filter(([name]) => sourceKind(name) === source));
     const sums = own.map((parts) => parts.reduce((sum, [, share]) => sum + share, 0));

@@ -39,15 +39,13 @@ class LongTable {
     const columns = new Set();
     this.sorts = new Map();
     [...table.tHead.rows[0].cells].forEach((head, column) => this.addSort(head, column, columns));
-    this.bar = element("form", { className: "filters" });
-    this.bar.addEventListener("submit", (event) => event.preventDefault());
+    this.bar = element("form", { className: "filters", onsubmit: (event) => event.preventDefault() });
     this.count = element("output");
-    this.more = element("button", { type: "button", hidden: true });
-    this.more.addEventListener("click", () => {
+    this.more = element("button", { type: "button", hidden: true, onclick: () => {
       this.all = true;
       this.note("rows", "all");
       this.show();
-    });
+    } });
     if (table.dataset.filters !== undefined) this.addFilters(JSON.parse(table.dataset.filters));
     if (this.further) {
       this.count.textContent = `the first ${this.rows.filter((row) => !row.hidden).length} rows`;
@@ -124,14 +122,12 @@ class LongTable {
   }
 
   addFilters(filters) {
-    const search = element("input", { type: "search" });
-    this.search = search;
-    search.addEventListener("input", () => {
-      this.asked.text = search.value.trim().toLowerCase();
-      this.note("find", search.value.trim());
+    this.search = element("input", { type: "search", oninput: () => {
+      this.asked.text = this.search.value.trim().toLowerCase();
+      this.note("find", this.search.value.trim());
       this.show();
-    });
-    this.bar.append(labelled("Find", search));
+    } });
+    this.bar.append(labelled("Find", this.search));
     for (const [key, values] of Object.entries(filters)) {
       if (values.length < 2) continue;
       const first = this.table.dataset[`first${capital(key)}`] ?? "";
@@ -145,17 +141,16 @@ class LongTable {
       this.selects.set(key, select);
       this.bar.append(labelled(capital(key), select));
     }
-    this.clear = element("button", { type: "button", hidden: true, textContent: "clear the filters" });
-    this.clear.addEventListener("click", () => {
+    this.clear = element("button", { type: "button", hidden: true, textContent: "clear the filters", onclick: () => {
       for (const key of Object.keys(this.asked)) this.asked[key] = "";
-      search.value = "";
+      this.search.value = "";
       this.note("find", null);
       this.selects.forEach((each, key) => {
         each.value = "";
         this.note(key, this.table.dataset[`first${capital(key)}`] ? "all" : null);
       });
       this.show();
-    });
+    } });
     this.bar.append(this.count, this.more, this.clear);
   }
 

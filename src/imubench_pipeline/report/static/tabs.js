@@ -12,13 +12,16 @@ function startTabs(root) {
   const tabs = panels.map((panel) => {
     panel.id = `channel-${nameOfPanel(panel)}`;
     panel.setAttribute("role", "tabpanel");
-    const tab = element("button", { type: "button", textContent: panel.querySelector("h2").textContent });
+    const tab = element("button", { type: "button", textContent: panel.querySelector("h2").textContent, onclick: () => select(panel) });
     tab.setAttribute("role", "tab");
     tab.setAttribute("aria-controls", panel.id);
-    tab.addEventListener("click", () => select(panel));
     return tab;
   });
-  const all = element("button", { type: "button", textContent: "all channels" });
+  const showAll = () => {
+    put(panels);
+    keep("channel", "all");
+  };
+  const all = element("button", { type: "button", textContent: "all channels", onclick: showAll });
   const put = (shownPanels) => {
     panels.forEach((panel, place) => {
       const here = shownPanels.includes(panel);
@@ -34,10 +37,6 @@ function startTabs(root) {
     put([panel]);
     keep("channel", panel === panels[0] ? null : nameOfPanel(panel));
   };
-  all.addEventListener("click", () => {
-    put(panels);
-    keep("channel", "all");
-  });
   list.addEventListener("keydown", (event) => {
     const at = tabs.indexOf(document.activeElement);
     const to = { ArrowRight: at + 1, ArrowLeft: at - 1, Home: 0, End: tabs.length - 1 }[event.key];
