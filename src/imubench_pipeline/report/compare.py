@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from imubench_pipeline.estimators.estimate import COMPARED
+from imubench_pipeline.report.comparison import Comparison
 from imubench_pipeline.report.glossary import term
 from imubench_pipeline.report.payload import Arrays, Json, looks
 from imubench_pipeline.report.practical import temperature_text, unit_of, units_by_size
@@ -31,22 +32,17 @@ _MAX_DETAILED_RECORDINGS = 100
 
 
 def _make_context(site: Site) -> Mapping[str, object]:
-    arrays = Arrays()
     views = _select_recordings(site)
-    budget = site.settings["settings"]["error_budget"]
-    channels: list[Json] = []
-    datasheets: dict[str, Json] = {}
-    recordings = []
+    together = Comparison(site.compared(views), site.names)
+    arrays, channels = together.arrays, together.channels
     few = len(views) > _MAX_DETAILED_RECORDINGS
-    for recording in site.compared(views):
-        view = recording.view
+    recordings = []
+    for view in views:
         kept = {table: _read_columns(_make_path(site, view, table)) for table in KEPT}
         drawn = dict(_pack_draws(kept["drawn_deviations"], arrays, few=few))
-        for channel in recording.channels:
-            channels.append(channel.among(arrays) | {"drawn": drawn.get(channel.about["channel"])})
-        own = datasheets.setdefault(view.sensor, {})
-        for name, lines in recording.datasheet.items():
-            own.setdefault(name, lines)
+        for channel in channels:
+            if (channel["sensor"], channel["recording"]) == view.full_name:
+                channel["drawn"] = drawn.get(channel["channel"])
         growth = _pack_growth(kept["error_growth"], arrays, few=few)
         recordings.append(
             _describe_recording(view) | {"sold": site.is_sold(view.sensor), "growth": growth}
@@ -55,6 +51,7 @@ def _make_context(site: Site) -> Mapping[str, object]:
         (name, Requirement.model_validate(declared))
         for name, declared in site.settings["requirements"].items()
     ]
+    window = site.settings["settings"]["error_budget"]["static_window"]
     errors = {}
     for error in _COMPARED_ERRORS:
         # The unit of an axis, and the units of numbers: smallest size in SI, sign, factor.
@@ -69,11 +66,9 @@ def _make_context(site: Site) -> Mapping[str, object]:
             "looks": looks({view.sensor: site.looks[view.sensor] for view in views}),
             "names": site.names,
             "compared": COMPARED,
-            "channels": channels,
-            "datasheets": datasheets,
             "recordings": recordings,
             "errors": errors,
-            "window": quantity_to_si(budget["static_window"], "time"),
+            "window": quantity_to_si(window, "time"),
             "limits": [  # as 1 sigma
                 {
                     "requirement": name,
@@ -86,7 +81,7 @@ def _make_context(site: Site) -> Mapping[str, object]:
                 for limit in requirement.limits
                 if limit.error in _COMPARED_ERRORS
             ],
-            "arrays": arrays.texts,
+            **together.page,
         },
     }
 

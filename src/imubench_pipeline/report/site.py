@@ -27,6 +27,7 @@ from imubench_pipeline.report.view import Name, RecordingView, recording_views
 from imubench_pipeline.tables.schemas import OF_ONE_RECORDING, TABLES
 
 _CHANNEL_ORDER = ("gyro_x", "gyro_y", "gyro_z", "accel_x", "accel_y", "accel_z")
+_PACKAGE = "imubench_pipeline"
 _FIRST_ROWS = 100
 """Rows of a long table that are shown at first."""
 _PLAIN_ROWS = 30
@@ -242,16 +243,13 @@ class Site:
     @cached_property
     def common(self) -> str:
         """Digest of the common content of all pages: settings, names, code."""
-        return _make_digest(self.settings, self.names, self.navigation, self.code, self.version)
+        return _make_digest(
+            self.settings, self.names, self.navigation, self.code, version(_PACKAGE)
+        )
 
     def key_of(self, *parts: object) -> str:
         """Return the digest of the content of a page."""
         return _make_digest(self.common, *parts)
-
-    @property
-    def version(self) -> str:
-        """Version of this package."""
-        return version("imubench_pipeline")
 
     def shown(self, *, alone: bool = False) -> Mapping[str, object]:
         """Return the data of the site for all templates.
@@ -266,15 +264,11 @@ class Site:
             "names": self.names,
             "tables": [] if alone else sorted(set(TABLES) - set(OF_ONE_RECORDING)),
             "alone": alone,
-            "version": self.version,
+            "version": version(_PACKAGE),
             "first_rows": _FIRST_ROWS,
             "plain_rows": _PLAIN_ROWS,
             "kinds": {kind: page.words for kind, page in RECORDING_PAGES.by_key().items()},
         }
-
-
-RecordingContext = Callable[[Site, RecordingView, Path], Mapping[str, object]]
-"""Returns the context of the template for a recording, by its folder, too."""
 
 
 @dataclass(frozen=True)
@@ -282,7 +276,8 @@ class RecordingPage:
     """The page of a recording of a kind."""
 
     template: str
-    context: RecordingContext
+    # returns the context of the template, by the folder of the recording, too
+    context: Callable[[Site, RecordingView, Path], Mapping[str, object]]
     words: str = ""  # of the kind, in lists of recordings
 
 
@@ -293,12 +288,10 @@ RECORDING_PAGES: Hook[RecordingPage] = Hook("recording_pages")
 def _make_digest(*parts: object) -> str:
     digest = hashlib.sha256()
     for part in parts:
-        data = (
-            hashlib.sha256(part).digest()
-            if isinstance(part, bytes)
-            else json.dumps(part, sort_keys=True, default=str).encode()
-        )
-        digest.update(data + b"\0")
+        if isinstance(part, bytes):
+            digest.update(hashlib.sha256(part).digest() + b"\0")
+        else:
+            digest.update(json.dumps(part, sort_keys=True, default=str).encode() + b"\0")
     return digest.hexdigest()
 
 
@@ -307,15 +300,9 @@ def sensor_names(
 ) -> dict[str, str]:
     """Return vendor and model of each sensor, with the name of its file if two are equal.
 
-    Of those described, which have a file.
+    A sensor that is not described has the name of its file.
     """
-    plain = {
-        sensor: f"{described[sensor]['vendor']} {described[sensor]['model']}"
-        if sensor in described
-        else sensor
-        for sensor in sensors
-    }
-    times = Counter(plain.values())
-    return {
-        sensor: f"{name} ({sensor})" if times[name] > 1 else name for sensor, name in plain.items()
-    }
+    names = {sensor: sensor for sensor in sensors}
+    names |= {of: f"{x['vendor']} {x['model']}" for of, x in described.items() if of in names}
+    times = Counter(names.values())
+    return {of: f"{name} ({of})" if times[name] > 1 else name for of, name in names.items()}

@@ -20,6 +20,9 @@ from imubench_pipeline.noise import PARAMETERS, TERMS
 from imubench_pipeline.report.palette import Appearance
 from imubench_pipeline.report.view import QUANTITY_NAMES, ChannelView
 
+Look = dict[str, Any]
+"""Keyword arguments of Matplotlib for the look of a line or marker."""
+
 SINGLE, DOUBLE = 88.0, 180.0
 """Widths of one and of two columns of a journal, mm."""
 
@@ -93,7 +96,7 @@ _DASHES: dict[str, str | tuple[float, tuple[float, ...]]] = {
 _MARKERS = {"circle": "o", "square": "s", "diamond": "D", "triangle-up": "^", "triangle-down": "v"}
 _MARKERS |= {"cross": "P", "x": "X"}
 
-TERM_LOOKS: dict[str, dict[str, Any]] = {
+TERM_LOOKS: dict[str, Look] = {
     "Q": {"color": "#9A6B00", "linestyle": (0, (1, 1.4))},
     "N": {"color": "#0072B2", "linestyle": (0, (4, 2))},
     "F": {"color": "#D55E00", "linestyle": (0, (5, 1.5, 1, 1.5))},
@@ -104,7 +107,7 @@ TERM_LOOKS: dict[str, dict[str, Any]] = {
 }
 """Colour and dash of each term, the same in every figure."""
 
-SUM_LOOK: dict[str, Any] = {"color": "#008F6B", "linestyle": "-", "linewidth": 1.2}
+SUM_LOOK: Look = {"color": "#008F6B", "linestyle": "-", "linewidth": 1.2}
 
 _QUANTITY_WORDS = {
     "gyro": {"signal": "rate", "integral": "angle"},
@@ -153,12 +156,12 @@ def style() -> Iterator[None]:
         yield
 
 
-def line_look(look: Appearance) -> dict[str, Any]:
+def line_look(look: Appearance) -> Look:
     """Return colour and dash of an appearance as Matplotlib names them."""
     return {"color": look.light, "linestyle": _DASHES[look.dash]}
 
 
-def marker_look(look: Appearance, *, hollow: bool = False) -> dict[str, Any]:
+def marker_look(look: Appearance, *, hollow: bool = False) -> Look:
     """Return the marker of an appearance as Matplotlib names it."""
     return {
         "marker": _MARKERS[look.marker],
