@@ -126,7 +126,7 @@ def _describe_recording(view: RecordingView) -> Json:
 def _pack_draws(
     kept: Mapping[str, Any], arrays: Arrays, *, few: bool
 ) -> Iterator[tuple[str, Json]]:
-    """Yield the Allan deviation of each channel at some tau, and those of drawn models, sorted."""
+    """Yield the Allan deviation of each channel and of its drawn models at some tau, sorted."""
     if not kept:
         return
     of_draw = np.isfinite(np.asarray(kept["draw"], dtype=np.float64))  # null: the estimate itself

@@ -32,7 +32,7 @@ class ComparedRecording:
 
 
 def compared_recording(view: RecordingView, system: System) -> ComparedRecording:
-    """Gather the compared data of a recording; ``system`` is that of its numbers."""
+    """Gather the compared data of a recording; ``system`` has the units of its numbers."""
     channels = view.channels()
     lines: dict[str, list[Json]] = {name: [] for name in QUANTITY_NAMES}
     for channel in channels:
@@ -60,7 +60,7 @@ def compared_recording(view: RecordingView, system: System) -> ComparedRecording
 
 
 class Comparison:
-    """The compared data of recordings; ``names`` are those of the sensors, as they are shown."""
+    """The compared data of recordings; ``names`` are the names of sensors on the pages."""
 
     def __init__(self, recordings: Iterable[ComparedRecording], names: Mapping[str, str]) -> None:
         self._names = names

@@ -52,7 +52,7 @@ class Scale:
         return cls(max(low, -_MAX_BAR_DECADES) - 0.08, min(high, _MAX_BAR_DECADES) + 0.08)
 
     def place(self, value: float) -> float:
-        """Return where a margin is drawn, % of the width; at an end what lies beyond it."""
+        """Return where a margin is drawn, % of the width, within the scale."""
         log = math.log10(value) if value > 0.0 else -math.inf
         share = (min(max(log, self.low), self.high) - self.low) / (self.high - self.low)
         return round(100.0 * share, 2)
@@ -71,7 +71,6 @@ class Cell:
     requirement: str
     sensor: str
     verdict: Verdict
-    word: str  # verdict in words
     conditions: int  # unknown figures on which the verdict depends
     margin: tuple[SourcedNumber, SourcedNumber, SourcedNumber] | None  # with its 95 % limits
     bar: tuple[float, float, float] | None  # of these, the places
@@ -82,9 +81,9 @@ class Cell:
     order: float  # larger is better
 
     @property
-    def judged(self) -> bool:
-        """Whether it has a margin."""
-        return self.margin is not None
+    def word(self) -> str:
+        """The verdict in words."""
+        return SHORT_VERDICTS[self.verdict]
 
     @property
     def hatched(self) -> bool:
@@ -124,13 +123,11 @@ def matrix(site: Site) -> Matrix | None:
     rows = {(row.requirement, row.sensor): row for row in site.rows(RankingRow) if row.decides}
     if not rows:
         return None
-    drawn = [
-        value
-        for row in rows.values()
-        for value in (row.logged_margin, row.corrected_margin, row.margin, *margin_limits(row))
-        if value is not None
-    ]
-    scale = Scale.of(drawn)
+    drawn: list[float | None] = []
+    for deciding in rows.values():
+        drawn += [deciding.logged_margin, deciding.corrected_margin, deciding.margin]
+        drawn += margin_limits(deciding) if deciding.margin is not None else ()
+    scale = Scale.of(value for value in drawn if value is not None)
     # A sensor that cannot be bought is not compared with others.
     apart = {sensor: "not sold" for sensor in site.sensors if not site.is_sold(sensor)}
     lines = {
@@ -144,14 +141,14 @@ def matrix(site: Site) -> Matrix | None:
 
     def order(sensor: str) -> tuple[object, ...]:
         """Put first the sensor that meets most limits, and so on."""
-        judged = Counter(cell.verdict for cell in lines[sensor] if cell.judged)
-        counts = [-judged[verdict] for verdict in _VERDICTS]
+        met = Counter(cell.verdict for cell in lines[sensor] if cell.margin)
+        counts = [-met[verdict] for verdict in _VERDICTS]
         return (*counts, -sum(cell.order for cell in lines[sensor]), site.names[sensor])
 
     columns = []
     for place, (name, declared) in enumerate(requirements.items()):
         cells = [cells[place] for cells in lines.values()]
-        judged = sorted((cell for cell in cells if cell.judged), key=lambda cell: -cell.order)
+        judged = sorted((cell for cell in cells if cell.margin), key=lambda cell: -cell.order)
         best = [rows[name, cell.sensor] for cell in judged]
         excluded = sum(cell.verdict == "excluded" for cell in cells)
         answer = answer_text(best, site.names, len(cells), excluded)
@@ -181,10 +178,8 @@ def unranked(own: Iterable[RecordingView]) -> str:
 def _empty(site: Site, requirement: str, sensor: str) -> Cell:
     """Return the cell of a sensor that is in no ranking."""
     reason = unranked(view for view in site.views if view.sensor == sensor)
-    word = SHORT_VERDICTS["not_enough_data"]
-    return Cell(
-        requirement, sensor, "not_enough_data", word, 0, None, None, "", "", reason, (), -math.inf
-    )
+    verdict: Verdict = "not_enough_data"
+    return Cell(requirement, sensor, verdict, 0, None, None, "", "", reason, (), -math.inf)
 
 
 def _cell(row: RankingRow, scale: Scale) -> Cell:
@@ -218,7 +213,6 @@ def _cell(row: RankingRow, scale: Scale) -> Cell:
         row.requirement,
         row.sensor,
         row.verdict,
-        SHORT_VERDICTS[row.verdict],
         len(row.conditions) if judged else 0,
         margin(row) if judged else None,
         bar,

@@ -25,7 +25,7 @@ def drop_zone_lines(results: Path) -> list[str]:
     try:
         files = FileRow.rows_of(read("files", [results / "tables/files.parquet"]))
     except (OSError, ValueError):
-        return []  # what is missing or damaged is reported elsewhere
+        return []  # missing and damaged files are reported elsewhere
     logs = drop_zone_of(results)
     if logs is None:
         return [*balance(files), *(["the drop zone of the run is not known"] if files else [])]

@@ -34,9 +34,9 @@ class Term:
 
     key: str
     name: str  # as it is shown
-    short: str  # one plain sentence: what it is, and why it matters
+    short: str  # one plain sentence: definition and relevance
     section: str  # anchor on the theory page
-    action: str | None = None  # what to do; of a finding alone
+    action: str | None = None  # advice, of a finding alone
 
 
 class UnknownTermError(KeyError):
@@ -62,7 +62,7 @@ def glossary() -> dict[str, Term]:
     Raises
     ------
     ConfigError
-        If the file cannot be used, or a key stands in two sections.
+        If the file cannot be used, or a key is in two sections.
     """
     terms = _Glossary()
     for section, entries in parse(_Sections, read_yaml(_FILE), str(_FILE)).root.items():

@@ -127,7 +127,7 @@ def _explain_term(key: str, text: str | None = None) -> Markup:
 
 
 def _make_json(value: Any) -> Markup:
-    """Return JSON that can stand inside a script element."""
+    """Return JSON for the inside of a script element."""
     return Markup(_make_compact_json(value).replace("<", "\\u003c"))
 
 

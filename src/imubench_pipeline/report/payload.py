@@ -48,7 +48,7 @@ def packed_log(values: ArrayLike) -> Packed:
 
 
 def _quantise(values: NDArray[np.float64], levels: int) -> tuple[float, float, NDArray[np.float64]]:
-    """Return begin and step of the codes of numbers, and the codes; 0 stands for none."""
+    """Return begin and step of the codes of numbers, and the codes; 0 means no number."""
     finite = np.isfinite(values)
     present = values[finite]
     low, high = (float(present.min()), float(present.max())) if len(present) else (0.0, 0.0)
@@ -59,15 +59,15 @@ def _quantise(values: NDArray[np.float64], levels: int) -> tuple[float, float, N
 class Arrays:
     """Arrays of a page: each is stored once, as base64 of its codes.
 
-    ``levels``: 0 stands for no value, the others divide the range evenly, or its logarithm. Those
-    of a logarithm are kept as differences modulo 65536, all low bytes before all high ones.
+    Code 0 means no value; the others divide the range evenly, or its logarithm. Codes of a
+    logarithm are stored as differences modulo 65536, all low bytes before all high ones.
     """
 
     def __init__(self) -> None:
         self._places: dict[Packed, int] = {}
 
     def exact(self, values: ArrayLike) -> int:
-        """Return the place of an array that is kept as float32."""
+        """Return the place of an array that is stored as float32."""
         return self.place(("f", 0.0, 0.0, np.asarray(values, dtype="<f4").tobytes()))
 
     def log(self, values: ArrayLike) -> int:
@@ -105,14 +105,14 @@ def looks(sensors: Mapping[str, Appearance]) -> Json:
 
 @dataclass(frozen=True)
 class ComparedChannel:
-    """The data of a channel in a comparison, small enough to keep those of all recordings."""
+    """The data of a channel in a comparison, small enough to hold all recordings in memory."""
 
     about: Mapping[str, Any]  # names, recommended method, parameters by method
     curve: Mapping[str, Packed]
     models: Mapping[str, tuple[Packed, Packed]]  # tau and deviation, by method
 
     def among(self, arrays: Arrays) -> Json:
-        """Return it with the places of its arrays in those of a page."""
+        """Return it with the places of its arrays among the arrays of a page."""
         return {
             **self.about,
             **{name: arrays.place(packed) for name, packed in self.curve.items()},

@@ -23,7 +23,7 @@ System = Literal["practical", "si"]
 def _make_signs(
     level: str, *, Q: str, N: str, K: str, R: str, psd: str, signal: str | None = None
 ) -> dict[str, str]:
-    """Return the signs of all symbols; ``level`` is that of B and of the Allan deviation."""
+    """Return the signs of all symbols; ``level`` is the sign of B and of the Allan deviation."""
     return {
         **{"Q": Q, "N": N, "N_sensor": N, "B": level, "B_curve": level, "sigma_min": level},
         **{"T_B": "s", "tau_min": "s", "K": K, "R": R},
@@ -99,7 +99,7 @@ def _find_unit(quantity: str, symbol: str, choice: str) -> Unit:
         "quadratic": f"{quantity}_temperature_curvature",
     }.get(symbol, QUANTITIES[quantity])
     signs = _UNIT_CHOICES[quantity][choice]
-    # A parameter without its own unit uses that of the first parameter of its dimension.
+    # A parameter without its own unit has the unit of the first parameter of its dimension.
     alike = next((other for other in signs if dimensions.get(other) == dimension), symbol)
     return _make_unit(signs.get(symbol) or signs[alike], dimension)
 
@@ -107,7 +107,7 @@ def _find_unit(quantity: str, symbol: str, choice: str) -> Unit:
 def unit_of(dimension: str, system: System, size: float | None = None) -> Unit:
     """Return the unit in which a page shows an angle, a velocity or a length.
 
-    ``size``, SI: of what is shown, for which a prefix is chosen; SI has none.
+    A prefix is chosen for ``size`` (SI) in practical units.
     """
     if not size:
         return _make_unit(_SIGNS_OF_DIMENSIONS[system][dimension], dimension)

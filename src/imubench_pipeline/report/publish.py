@@ -212,14 +212,14 @@ def site_of(tables: Mapping[str, pa.Table], settings: str, results: Path) -> Sit
 
 
 def published(results: Path) -> Site:
-    """Return the site of a finished run, from what it left.
+    """Return the site of a finished run, from its files.
 
     Raises
     ------
     FileNotFoundError
         If there is no report.
     ValueError
-        If it is damaged, or that of another version.
+        If it is damaged, or from another version.
     """
     path = results / "report" / _SETTINGS_FILE
     settings = path.read_text(encoding="utf-8")
@@ -235,6 +235,6 @@ def published(results: Path) -> Site:
     names = sorted(set(TABLES) - set(OF_ONE_RECORDING))
     paths = {name: results / f"tables/{name}.parquet" for name in names}
     for path in paths.values():
-        path.stat()  # the error of this says which file is missing, that of Parquet does not
+        path.stat()  # its error names the missing file, unlike the error of Parquet
     tables = {name: read(name, [path]) for name, path in paths.items()}
     return site_of(tables, settings, results)

@@ -57,7 +57,7 @@ _RATE_FROM = {"stamps": "from the time stamps", "stated": "as stated"}
 
 
 Section = Callable[[Site, RecordingView], tuple[str, Any] | None]
-"""Returns the template of a section of a static recording, and what it is given as `section`."""
+"""Returns the template of a section of a static recording, and its variable `section`."""
 
 _SECTIONS: Hook[Section] = Hook("recording_sections")
 
@@ -291,7 +291,7 @@ def about_of(
 
 
 def metadata_of(folder: Path) -> Mapping[str, Any]:
-    """Return the metadata of the log in a folder of a recording; nothing where none was kept.
+    """Return the metadata of the log in a folder of a recording; empty without them.
 
     Raises
     ------

@@ -45,7 +45,7 @@ def summary(results: Path) -> str:
     try:
         tables = {name: read(name, [path]) for name, path in paths.items()}
     except (OSError, ValueError) as error:
-        # A run for one file alone may stand beside older tables: it succeeded all the same.
+        # A run for one file alone succeeds even if older tables cannot be read.
         return one_line(f"no summary: {error}")
     recordings = RecordingRow.rows_of(tables["recordings"])
     rejected = list(rejections(recordings))
@@ -91,7 +91,7 @@ def failure(logs: Sequence[str], results: Path) -> str:
 
 
 def _failed_steps(log: str, results: Path) -> Iterator[str]:
-    """Yield step and recording of what failed, by a log of Snakemake, each time it was tried."""
+    """Yield step and recording of each failed attempt, from a log of Snakemake."""
     of_one = re.compile(rf"{re.escape(str(results))}/(?:recordings|simulated)/([^/]+/[^/,]+)")
     done = set(_DONE.findall(log))
 
@@ -137,14 +137,14 @@ class Failed(Protocol):
 
 
 def left_out(failures: Iterable[Failed]) -> Iterator[str]:
-    """Yield a line for each step that failed: what is left out for it, and why."""
+    """Yield a line for each step that failed, with the lost recording and the reason."""
     for row in failures:
         of = f"{row.sensor}/{row.recording}" if row.recording else row.sensor
         yield one_line(f"{of}: {row.reason}")
 
 
 def warnings(findings: Iterable[FindingRow]) -> Iterator[str]:
-    """Yield a line for each recording that has warnings, the one with the worst first."""
+    """Yield a line for each recording that has warnings, the worst first."""
     by_recording: dict[str, Counter[str]] = {}
     left_out: Counter[str] = Counter()
     for row in serious(findings):

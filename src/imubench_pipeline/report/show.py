@@ -43,7 +43,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Print the comparison; return the exit status."""
-    # Only what draws loads this: the other commands answer at once.
+    # Loaded here, so that other commands answer at once.
     from rich.text import Text
 
     from imubench_pipeline.report.terminal import parts
@@ -77,7 +77,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def show(parts: Callable[[int], Iterable[RenderableType]], width: int | None = None) -> None:
-    """Print what a function makes for so many columns; by default those of the terminal."""
+    """Print the result of a function of the width, by default the width of the terminal."""
     from rich.console import Console
     from rich.text import Text
 

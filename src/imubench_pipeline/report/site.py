@@ -41,7 +41,7 @@ class Page:
 
     path: str  # below the folder of the report
     template: str
-    key: str  # digest of what it shows: the page is written again only if it changes
+    key: str  # digest of its content: the page is written again only if it changes
     context: Callable[[], Mapping[str, object]]  # of the template
 
     @property
@@ -55,13 +55,13 @@ class Entry:
     """A page that a report has once, as declared in the module of its content."""
 
     file: str  # its name; its template is called so, too, with ``.jinja``
-    title: str  # what the navigation calls it
+    title: str  # its name in the navigation
     context: Callable[[Site], Mapping[str, object]]  # of the template
     # the joined tables that it shows: it is written again if one of them changes
     tables: tuple[str, ...] = ()
     # returns the recordings that it shows: likewise if any of their rows change
     views: Callable[[Site], Sequence[RecordingView]] = lambda _: ()
-    # the files kept with recordings that it shows, where they are there: likewise
+    # returns the files of recordings that it shows: likewise
     files: Callable[[Site], Iterable[Path]] = lambda _: ()
     exists: Callable[[Site], bool] = lambda _: True  # tells whether a report has it
     place: int = 0  # in the navigation, among the pages of extensions
@@ -73,7 +73,7 @@ class Entry:
 
     @property
     def shown_tables(self) -> set[str]:
-        """The joined tables that it shows, those of its sections included."""
+        """The joined tables that it shows, including its sections."""
         return {*self.tables, *chain.from_iterable(section.tables for section in self.sections)}
 
     def page(self, site: Site) -> Page:
@@ -94,9 +94,9 @@ class Section:
     """A part of a page that an extension adds."""
 
     page: str  # the file of its `Entry`
-    template: str  # is given as `section` what `context` returns
+    template: str  # gets the result of `context` as `section`
     context: Callable[[Site], Any]  # returns None where the section is left out
-    tables: tuple[str, ...] = ()  # the joined tables that it shows, beside those of the page
+    tables: tuple[str, ...] = ()  # further joined tables that it shows
 
 
 _SECTIONS: Hook[Section] = Hook("sections")
@@ -109,7 +109,7 @@ class Site:
     tables: Mapping[str, pa.Table]  # all joined tables
     settings: Mapping[str, Any]  # as `imubench_pipeline.run.plan.Plan.report_settings` gives them
     results: Path  # folder of the results, for the tables of each recording
-    entries: Sequence[Entry]  # the pages that there is one of, in the order of the navigation
+    entries: Sequence[Entry]  # pages that exist once, in the order of the navigation
     code: str = ""  # digest of the code that makes the pages
     failed: dict[str, str] = field(default_factory=dict)  # pages that could not be made, and why
     _rows: dict[str, list[Any]] = field(default_factory=dict, init=False)

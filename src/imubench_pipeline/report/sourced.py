@@ -15,7 +15,7 @@ class SourcedNumber(str):
 
     ``source`` is ``ranking/<requirement>/<sensor>/<error>/<time>/<column>``, or that of a total of
     ``error_budget``, with the recording after the sensor; two columns with a colon between them are
-    a ratio. ``unit`` is that of the number.
+    a ratio. ``unit`` is the unit of the number.
     """
 
     __slots__ = ("source", "unit")
@@ -73,11 +73,9 @@ def margin(row: RankingRow) -> tuple[SourcedNumber, SourcedNumber, SourcedNumber
 
 def margin_limits(row: RankingRow) -> tuple[float | None, float | None]:
     """Return the 95 % limits of the margin of a row of the table ``ranking`` that has one."""
-    return _over(row.limit, row.upper), _over(row.limit, row.lower)
-
-
-def _over(limit: float | None, error: float | None) -> float | None:
-    """Return a limit over an error; infinite where the error is zero, None where one is unknown."""
-    if limit is None or error is None:
-        return None
-    return limit / error if error else math.inf
+    # Infinite where the error is zero, None where it is unknown.
+    low, high = (
+        None if row.limit is None or error is None else row.limit / error if error else math.inf
+        for error in (row.upper, row.lower)
+    )
+    return low, high

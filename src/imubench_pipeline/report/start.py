@@ -147,7 +147,7 @@ class _Answer:
     asked: str
     answer: str
     details: Sequence[str]
-    tied: Mapping[str, Sequence[str]]  # by sensor, the names of those that are not worse
+    tied: Mapping[str, Sequence[str]]  # by sensor, names of equally good ones
 
 
 def _list_rankings(site: Site) -> Iterator[_Answer]:

@@ -48,7 +48,7 @@ _STYLES: Mapping[Verdict, str] = {
 _LONGEST_FINDING = 400
 _STEPS = 3
 _BESIDE = 34
-"""Columns of what stands below a verdict."""
+"""Columns of the remarks below a verdict."""
 
 
 def parts(
@@ -234,7 +234,7 @@ def _ranking_lines(group: Group, *, every: bool) -> Iterator[list[str | Text]]:
         f"doubts: {group.doubts}" * bool(group.doubts),
         group.corrected,
     ):
-        # The names have what the other columns leave.
+        # The column of names gets the rest of the width.
         wrapped = wrap(one_line(line, _LONGEST_FINDING), _BESIDE)
         verdict.append("".join(f"\n{part}" for part in wrapped), style="yellow")
     first: list[str | Text] = [group.rank, sensor, verdict]
@@ -258,7 +258,7 @@ def _parameter_lines(
         name = (row.sensor, row.recording, row.channel)
         by_channel.setdefault(name, []).append(row)
     lines: list[list[str | Text]] = []
-    alone = len(about) == 1  # its name stands above
+    alone = len(about) == 1  # its name is above
     for (sensor, recording, channel), own in by_channel.items():
         log = about[sensor, recording]
         badge = " (simulated)" * log.simulated

@@ -94,7 +94,7 @@ def answer(channel: ChannelView, system: System) -> list[str]:
 
 
 def _describe_reduction(channel: ChannelView) -> str:
-    """Return by which factors compensation lowers the Allan deviation, as a sentence."""
+    """Return the factors by which compensation lowers the Allan deviation, as a sentence."""
     left = channel.compensated
     if not left:
         return ""

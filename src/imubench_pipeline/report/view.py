@@ -142,7 +142,7 @@ class RecordingView:
     """All data of one recording from the tables.
 
     The channels of a thousand recordings do not fit into memory at once: they are made when they
-    are asked for, and are not kept.
+    are asked for, and are not stored.
     """
 
     row: RecordingRow  # of the table ``recordings``
@@ -150,7 +150,7 @@ class RecordingView:
     # returns the digests of all recordings, by sensor and name
     keys: Callable[[], Mapping[Name, str]]
     page: str = ""  # its page
-    # that of its device, where the device has a name of its own or several recordings
+    # the page of its device, if the device has a name of its own or several recordings
     device_page: str | None = None
 
     @property

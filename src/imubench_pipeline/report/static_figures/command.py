@@ -31,7 +31,7 @@ _KIND_NEEDS = {
     "datasheet": "a printed figure of the channel that is comparable",
     "spectrum": "the spectrum of the channel",
 }
-"""What each kind needs besides the curve of a channel."""
+"""Requirements of each kind besides the curve of a channel."""
 
 _FILE_FORMATS = ("svg", "pdf")
 
@@ -118,7 +118,7 @@ def select(
     Raises
     ------
     SelectionError
-        If there is no such curve; it says what there is.
+        If there is no such curve; it lists the choices.
     """
     chosen = dict(tables)
     for column, asked in (("sensor", sensor), ("recording", recording), ("channel", channel)):
@@ -155,7 +155,7 @@ def _write(
     tables: Mapping[str, pa.Table], chosen: Mapping[str, pa.Table], arguments: argparse.Namespace
 ) -> int:
     """Write the figures, and say which; return how many files."""
-    # Matplotlib is loaded when it is sure that there is something to draw.
+    # Matplotlib is loaded only if there is something to draw.
     with extra("workflow", "draw figures"):
         from imubench_pipeline.report.static_figures.files import save
 
@@ -198,7 +198,7 @@ def _list_figures(
     views = []
     if cross or of_channel:
         views = [view for recording in recording_views(chosen) for view in recording.channels()]
-    # What shows only a part must not take the place of the figure of all sensors.
+    # A figure of some sensors must not replace the figure of all sensors.
     part = "".join(f"{name}/" for name in (arguments.sensor, arguments.recording) if name)
     for name, make in cross_figures(views, arguments.units, sensors=sensors, kinds=cross):
         yield part + name, make

@@ -49,7 +49,7 @@ Kind = Literal["estimate", "not identified", "limit"]
 
 _SLOT_HEIGHT = 2.6  # mm, of a recording where there is room
 _MIN_ROW_HEIGHT = 4.2  # mm, of a sensor: its name must fit
-_MAX_HEIGHT = 205.0  # mm, of all sensors: the figure stands on one page
+_MAX_HEIGHT = 205.0  # mm, of all sensors: the figure fits on one page
 _FRAME_HEIGHT = 16.0  # mm, title and axis
 _MAX_INTERVAL_DECADES = 1.5
 """Maximum length of an interval beyond all values, decades."""
@@ -344,7 +344,7 @@ def _set_limits(
 def _draw_marks(
     axes: Axes, of_block: Sequence[Mark], look: Appearance, scale: float, step: float
 ) -> None:
-    """Draw the marks of one sensor; they are smaller where recordings stand close."""
+    """Draw the marks of one sensor; they are smaller where recordings are close."""
     size = float(np.clip(step * 72.0 / 25.4 * 0.8, 1.2, 4.0))
     width = min(1.0, 0.3 * size)
     dots: dict[Kind, dict[str, Any]] = {

@@ -60,7 +60,7 @@ def cross_figures(
 ) -> Iterator[tuple[str, Callable[[], Figure]]]:
     """Yield the name of each figure of all sensors, and its maker.
 
-    The looks are those of all sensors of the run, or else of those of the views.
+    The looks follow from all sensors of the run, or else from the sensors of the views.
     """
     every = sorted({view.sensor for view in views}) if sensors is None else list(sensors)
     for channel in dict.fromkeys(view.channel for view in views):
@@ -84,9 +84,9 @@ def channel_figures(
 
 
 def draw_comparison(tables: Mapping[str, pa.Table], system: System, folder: Path) -> None:
-    """Write the figures of each channel of all sensors, as SVG and PDF.
+    """Write the figures of each channel of all sensors from joined tables, as SVG and PDF.
 
-    Of joined tables; those of recordings that are left out count as empty.
+    Missing tables of recordings count as empty.
     """
     for draw in figures_of(tables, system, folder):
         draw()
