@@ -164,7 +164,7 @@ kinds.series = (figure) => {
   };
   if (shown(figure, "drift")) {
     const step = 10 ** Math.floor(Math.log10(Math.max(...mean.map((each) => Math.abs(each - whole)).filter(Number.isFinite), 1e-300)) + 0.3);
-    const [small, power] = step < 1e-2 ? [step, `10${[...String(Math.round(Math.log10(step)))].map((sign) => SUPERSCRIPTS[sign]).join("")} `] : [1, ""];
+    const [small, power] = step < 1e-2 ? [step, `${powerText(Math.round(Math.log10(step)))} `] : [1, ""];
     traces.push({
       ...line(x, mean.map((each) => (each - whole) / small), { ...look, width: 1.4 }), group: "drift", name: "drift", meta: { of: `drift (${power}${unit.sign})` }, yaxis: panel(`drift (${power}${unit.sign})`), hoverinfo: "text",
       text: x.map((t, i) => `${numberText(t, 4)} ${scale.name}: ${numberText(mean[i] - whole, 3)} ${unit.sign} from the mean`),
@@ -202,18 +202,16 @@ kinds.series = (figure) => {
   return { traces, groups, layout };
 };
 
-const comparedLooks = () => ({
-  log: { ...sensorLook(pageData.channels[0]?.sensor), marker: undefined, dash: "solid" },
-  before: { light: inks().soft, dark: inks().soft, dash: "dot" },
-  after: { ...black(), dash: "dash" },
-});
-
 kinds.compared = (figure) => {
   const channel = figure.dataset.channel;
   const drawn = pageData.of_models[channel];
   const unit = unitOf(quantityOf(channel), "signal");
   const overTime = figure.dataset.over === "envelope";
-  const looks = comparedLooks();
+  const looks = {
+    log: { ...sensorLook(pageData.channels[0]?.sensor), marker: undefined, dash: "solid" },
+    before: { light: inks().soft, dark: inks().soft, dash: "dot" },
+    after: { ...black(), dash: "dash" },
+  };
   const named = Object.keys(looks).filter((of) => drawn[of]);
   const end = drawn.log[overTime ? "end" : "stretch_end"];
   const scale = timeScale(end);

@@ -177,8 +177,8 @@ function ownCell(one, unit, digitsFor = digitsOf) {
   const [value, lower, upper] = [one.value, one.lower, one.upper].map((number) => (number === null ? null : number * factor));
   const bounded = lower !== null && upper !== null;
   const digits = digitsFor(value, lower, upper);
-  if (value !== null) cell.append(`${numberText(value, digits)} ${sign}`);
-  else cell.append(one.status === "absent" && upper !== null ? `below ${numberText(upper, 2)} ${sign}` : statusText(one.status));
+  const bound = one.status === "absent" && upper !== null ? `below ${numberText(upper, 2)} ${sign}` : statusText(one.status);
+  cell.append(value !== null ? `${numberText(value, digits)} ${sign}` : bound);
   if (bounded && value !== null) {
     cell.append(element("br"), element("small", { textContent: `${numberText(lower, digits)} to ${numberText(upper, digits)}` }));
   }

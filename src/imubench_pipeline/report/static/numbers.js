@@ -8,16 +8,12 @@ function numberText(value, digits) {
   if (Number.isNaN(value)) return "–";
   if (!Number.isFinite(value)) return value > 0 ? "∞" : "−∞";
   const rounded = Number(value.toPrecision(digits));
-  let text;
-  if (rounded === 0 || (Math.abs(rounded) >= 1e-4 && Math.abs(rounded) < 1e6)) {
-    text = String(rounded);
-  } else {
-    const [mantissa, exponent] = rounded.toExponential().split("e");
-    const power = [...exponent.replace("+", "")].map((sign) => SUPERSCRIPTS[sign]).join("");
-    text = `${mantissa}×10${power}`;
-  }
-  return text.replaceAll("-", "−");
+  if (rounded === 0 || (Math.abs(rounded) >= 1e-4 && Math.abs(rounded) < 1e6)) return String(rounded).replaceAll("-", "−");
+  const [mantissa, exponent] = rounded.toExponential().split("e");
+  return `${mantissa.replaceAll("-", "−")}×${powerText(exponent)}`;
 }
+
+const powerText = (exponent) => `10${[...String(exponent).replace("+", "")].map((sign) => SUPERSCRIPTS[sign]).join("")}`;
 
 // Digits of limits that differ in print; as `limit_digits` of imubench_pipeline.words.numbers.
 function limitDigits(lower, upper, least = 3) {
@@ -64,8 +60,7 @@ function remember(key, value) {
 
 function startUnits(first) {
   for (const [quantity, choices] of Object.entries(UNITS)) {
-    const linked = Object.keys(choices)[Number(state.get(quantity) ?? -1)];
-    const before = linked ?? remembered(`imubench ${quantity}`);
+    const before = Object.keys(choices)[Number(state.get(quantity) ?? -1)] ?? remembered(`imubench ${quantity}`);
     chosenUnits[quantity] = before in choices ? before : first[quantity];
   }
   document.querySelectorAll("select[data-quantity]").forEach((select) => {
@@ -94,6 +89,4 @@ function showUnits(root) {
   });
 }
 
-function unitOfColumn(cell) {
-  return cell.closest("table").tHead.rows[0].cells[cell.cellIndex].dataset.unit;
-}
+const unitOfColumn = (cell) => cell.closest("table").tHead.rows[0].cells[cell.cellIndex].dataset.unit;

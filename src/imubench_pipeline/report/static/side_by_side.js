@@ -201,9 +201,8 @@ kinds.dumbbells = (figure) => {
 // Errors of the worst axis of a recording, or of the chosen axis.
 function errorsOf(one) {
   const { growth } = one.row;
-  if (!growth) return {};
-  const own = growthOf.axes === "worst" ? "worst" : growth.axes[chosenChannel.at(-1)];
-  return own === "worst" ? growth.errors : own ?? {};
+  const own = growthOf.axes === "worst" ? "worst" : growth?.axes[chosenChannel.at(-1)];
+  return (own === "worst" ? growth?.errors : own) ?? {};
 }
 const grownOf = (one) => errorsOf(one)[growthOf.error] ?? null;
 const axesText = () => (growthOf.axes === "worst" ? "the worst axis" : `axis ${chosenChannel.at(-1)}`);
@@ -264,11 +263,6 @@ function startGrowth(root) {
 function errorUnit(error, size) {
   const [, sign, factor] = pageData.errors[error].sized.find(([least]) => size >= least);
   return { sign, factor };
-}
-
-function errorText(error, { value, lower, upper }) {
-  const { sign, factor } = errorUnit(error, value);
-  return `${numberText(value * factor, digitsBy(value * factor, lower * factor, upper * factor))} ${sign}`;
 }
 
 const timeText = (seconds) => (seconds >= 120 ? `${numberText(seconds / 60, 3)} min` : `${numberText(seconds, 3)} s`);
@@ -352,8 +346,9 @@ kinds.sources = (figure) => {
   const shares = here.map((one) => Object.entries(grownOf(one).sources).map(([source, of]) => [source, array(of)[chosenPlace(one).at]]));
   return stackedShares(
     here.map((one) => {
-      const [value, lower, upper] = ["sigma", "lower", "upper"].map((name) => array(grownOf(one)[name])[chosenPlace(one).at]);
-      return `${wrapped(shortName(one))}<br>${errorText(growthOf.error, { value, lower, upper })}`;
+      const ends = ["sigma", "lower", "upper"].map((name) => array(grownOf(one)[name])[chosenPlace(one).at]);
+      const { sign, factor } = errorUnit(growthOf.error, ends[0]);
+      return `${wrapped(shortName(one))}<br>${numberText(ends[0] * factor, digitsBy(...ends.map((end) => end * factor)))} ${sign}`;
     }),
     shares, here.map(shortName), figure.clientWidth,
   );

@@ -20,8 +20,8 @@ function zoomIn(figure, layout) {
     const axis = layout[name];
     if (!axis || axis.title?.text !== title) delete zoom[name];
     else {
-      layout[name] = { ...axis, range, autorange: false };
-      if (axis.type === "log") Object.assign(layout[name], { tickvals: logTicks(...range).tickvals, ticktext: logTicks(...range).ticktext });
+      const { tickvals, ticktext } = axis.type === "log" ? logTicks(...range) : axis;
+      layout[name] = { ...axis, range, autorange: false, tickvals, ticktext };
     }
   }
 }
@@ -49,15 +49,7 @@ function showZoom(figure) {
   if (button) button.hidden = text === "";
 }
 
-function keepIfOther(key, text) {
-  if ((state.get(key) ?? "") !== text) keep(key, text);
-}
-
-function wholeAgain(figure) {
-  zooms.set(figure, {});
-  showZoom(figure);
-  drawFigure(figure);
-}
+const keepIfOther = (key, text) => (state.get(key) ?? "") !== text && keep(key, text);
 
 const slug = (text) => text.toLowerCase().replace(/[^a-z0-9]+/g, "-").replace(/^-|-$/g, "").slice(0, 80);
 const fileName = (figure, ending) => `${slug(`${document.querySelector("main h1")?.textContent ?? ""} ${figure.dataset.kind} ${figure.dataset.channel ?? figure.dataset.symbol ?? ""}`)}.${ending}`;
@@ -93,8 +85,7 @@ function valuesOf(figure) {
   for (const trace of canvas.data) {
     if (!trace.name || trace.meta?.guide) continue;
     const y = trace.yaxis ? title(trace.yaxis.replace("y", "yaxis"), "y") : title("yaxis", "");
-    const categories = canvas.layout.yaxis.ticktext;
-    const places = canvas.layout.yaxis.tickvals;
+    const { ticktext: categories, tickvals: places } = canvas.layout.yaxis;
     trace.x.forEach((x, i) => {
       if (trace.x[i] === null || trace.y[i] === null || Number.isNaN(trace.y[i])) return;
       const flat = Boolean(trace.error_x) || trace.meta?.flat;
@@ -150,13 +141,17 @@ function drawTools(figure) {
   if (figure.querySelector(".tools")) return;
   const bar = element("div", { className: "tools" });
   const add = (text, name, act, more = {}) => {
-    const button = element("button", { type: "button", textContent: text, title: name, ...more });
+    const button = element("button", { type: "button", textContent: text, title: name, onclick: () => act(button), ...more });
     button.setAttribute("aria-label", name);
-    button.addEventListener("click", () => act(button));
     bar.append(button);
     return button;
   };
-  add("Reset zoom", "Reset the zoom", () => wholeAgain(figure), { className: "whole", hidden: true });
+  const reset = () => {
+    zooms.set(figure, {});
+    showZoom(figure);
+    drawFigure(figure);
+  };
+  add("Reset zoom", "Reset the zoom", reset, { className: "whole", hidden: true });
   add("Values", "Values of the figure as a table", (button) => showValues(figure, button)).setAttribute("aria-expanded", "false");
   add("CSV", "Save the values as CSV", () => saveValues(figure));
   add("PNG", "Save the figure as PNG", () => saveImage(figure, "png"));
