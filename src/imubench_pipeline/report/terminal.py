@@ -81,11 +81,10 @@ def parts(
     yield from _listed("Failed", left_out(FailureRow.rows_of(tables["failures"])))
     yield from _listed("Rejected", rejections(recordings))
     findings = FindingRow.rows_of(tables["findings"])
-    warnings = (
-        f"{' '.join(filter(None, (f'{row.sensor}/{row.recording}', row.channel)))} "
-        f"({row.finding.replace('_', ' ')}): {row.detail}"
-        for row in serious(findings)
-    )
+    warnings = []
+    for row in serious(findings):
+        place = " ".join(filter(None, (f"{row.sensor}/{row.recording}", row.channel)))
+        warnings.append(f"{place} ({row.finding.replace('_', ' ')}): {row.detail}")
     yield from _listed("Warnings", warnings, cut=True)
     steps = NextStepRow.rows_of(tables["next_steps"].slice(0, _STEPS))
     texts = (f"{row.sensor}: {row.text} ({', '.join(row.requirements)})" for row in steps)
@@ -93,10 +92,10 @@ def parts(
     ranking = RankingRow.rows_of(tables["ranking"])
     yield from _ranking_tables(ranking, requirement, about, system, width)
     chosen = [
-        row
-        for row in ParameterRow.rows_of(tables["parameters"])
-        if (row.recommended if method is None else row.method == method)
-        and channel in (None, row.channel)
+        each
+        for each in ParameterRow.rows_of(tables["parameters"])
+        if (each.recommended if method is None else each.method == method)
+        and channel in (None, each.channel)
     ]
     which = f"method {method}" if method else "the recommended method"
     yield from _parameter_tables(chosen, f"{which}, with 95 % intervals", about, system, width)
@@ -119,11 +118,10 @@ def logs(tables: Mapping[str, pa.Table], system: System, width: int) -> Iterator
             yield Text(f"  {row.status}: {one_line(row.reason or '', _LONGEST_FINDING)}\n")
             continue
         yield from _listed("Warnings", map(_of_log, serious(findings)))
-        doubts = (
-            f"{' '.join(filter(None, (each.channel, ', '.join(each.parameters)))) or 'all'}: "
-            f"{each.reason}"
-            for each in _of(row, every_doubt)
-        )
+        doubts = []
+        for doubt in _of(row, every_doubt):
+            of = " ".join(filter(None, (doubt.channel, ", ".join(doubt.parameters)))) or "all"
+            doubts.append(f"{of}: {doubt.reason}")
         yield from _listed("In doubt", doubts)
         notes = [line for line in findings if line.severity == "note"]
         yield from _listed("Notes", map(_of_log, notes), cut=True)
