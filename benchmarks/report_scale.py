@@ -30,7 +30,7 @@ from imubench_pipeline.model.recordings import RecordingRow
 from imubench_pipeline.navigation.drift import drift_rows
 from imubench_pipeline.report.compare import KEPT as COMPARED
 from imubench_pipeline.report.publish import publish, site_of
-from imubench_pipeline.report.static_figures.of_run import draw_comparison
+from imubench_pipeline.report.static_figures.files import draw_comparison
 from imubench_pipeline.tables import build, read, write_arrow
 from imubench_pipeline.tables.schemas import OF_ONE_RECORDING, TABLES
 from resident import peak_memory

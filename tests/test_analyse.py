@@ -13,7 +13,7 @@ import pytest
 import yaml
 
 from imubench_pipeline.report import publish
-from imubench_pipeline.report.static_figures import of_run
+from imubench_pipeline.report.static_figures import files as static_files
 from imubench_pipeline.run.analysis import chain, compilation
 from imubench_pipeline.run.analysis.project import Stated, UnfilledError, lay_out
 from imubench_pipeline.run.cli import main
@@ -165,7 +165,7 @@ def test_a_step_that_fails_leaves_its_log_out_and_no_number_waits_for_the_pages(
         monkeypatch.setattr(publish, "site_of", lambda *given: asked.update(page=given[0]))
         monkeypatch.setattr(publish, "one_file", lambda site: "a page")
         monkeypatch.setattr(
-            of_run, "figures_of", lambda *given, kinds: asked.update(kinds=kinds) or []
+            static_files, "figures_of", lambda *given, kinds: asked.update(kinds=kinds) or []
         )
     for name in ("whole", "unread", "unrebuilt"):
         path = tmp_path / f"{name}.csv"

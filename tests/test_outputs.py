@@ -18,7 +18,7 @@ from pathlib import Path
 import pytest
 
 from imubench_pipeline.report.publish import publish
-from imubench_pipeline.report.static_figures import of_run
+from imubench_pipeline.report.static_figures import files as static_files
 from imubench_pipeline.run import cli
 from imubench_pipeline.run.cli import main
 from imubench_pipeline.settings.command_line import named_path
@@ -326,7 +326,7 @@ def test_an_earlier_report_is_replaced_and_nothing_beside_it(
     lab: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     # Seconds: the figures are drawn in the test of all outputs, before a release.
-    monkeypatch.setattr(of_run, "draw_comparison", lambda *_: None)
+    monkeypatch.setattr(static_files, "draw_comparison", lambda *_: None)
     case = ("report", "output")
     assert call(case, "site") == 0
     made = lab / "site"

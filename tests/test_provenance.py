@@ -85,7 +85,7 @@ def test_the_report_is_made_again_when_its_texts_change(
     file: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     path = provenance._PACKAGE / "report" / file
-    of_figures = "report.static_figures.of_run"
+    of_figures = "report.static_figures.files"
     before = source_digest("report.publish"), source_digest("allan", of_figures)
     whole = Path.read_bytes
     monkeypatch.setattr(Path, "read_bytes", lambda one: whole(one) + b" " * (one == path))

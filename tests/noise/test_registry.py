@@ -27,8 +27,7 @@ from imubench_pipeline.noise import (
 )
 from imubench_pipeline.noise.terms.registry import register_terms
 from imubench_pipeline.report.practical import page_unit
-from imubench_pipeline.report.static_figures.names import SYMBOLS, TERM_NAMES
-from imubench_pipeline.report.static_figures.terms import TERM_LOOKS
+from imubench_pipeline.report.static_figures.style import SYMBOLS, TERM_LOOKS, TERM_NAMES
 from imubench_pipeline.settings.simulated_sensor import AxisSettings
 from imubench_pipeline.simulate.model import SensorModel
 from imubench_pipeline.words.findings import FINDINGS
@@ -124,7 +123,7 @@ def test_a_model_holds_it_once(kind: type[Term]) -> None:
 
 @pytest.mark.parametrize("kind", TERMS)
 def test_pages_know_it(kind: type[Term]) -> None:
-    assert kind.symbol in TERM_LOOKS, f"TERM_LOOKS of report/static_figures/terms.py lacks {kind}"
+    assert kind.symbol in TERM_LOOKS, f"TERM_LOOKS of report/static_figures/style.py lacks {kind}"
     for quantity in ("gyro", "accel"):
         assert "{" not in TERM_NAMES[quantity][kind.symbol]
     symbols = [one.symbol for one in kind.parameters]

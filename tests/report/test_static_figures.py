@@ -19,13 +19,19 @@ from imubench_pipeline.estimators.rows import parameter_rows
 from imubench_pipeline.noise import FLOOR, PEAK_TAU, NoiseModel
 from imubench_pipeline.report.practical import page_unit
 from imubench_pipeline.report.static_figures.command import add_arguments, run
-from imubench_pipeline.report.static_figures.comparison import comparison_figure
-from imubench_pipeline.report.static_figures.curves import allan_figure, methods_figure
-from imubench_pipeline.report.static_figures.datasheet import datasheet_figure
+from imubench_pipeline.report.static_figures.comparison import (
+    comparison_figure,
+    forest_figure,
+    marks,
+)
+from imubench_pipeline.report.static_figures.curves import (
+    allan_figure,
+    datasheet_figure,
+    methods_figure,
+    terms_figure,
+)
 from imubench_pipeline.report.static_figures.files import channel_figures, cross_figures, save
-from imubench_pipeline.report.static_figures.forest import forest_figure, marks
 from imubench_pipeline.report.static_figures.spectrum import spectrum_figure
-from imubench_pipeline.report.static_figures.terms import terms_figure
 from imubench_pipeline.report.static_figures.theory import CHARACTERISTIC, theory_figure
 from imubench_pipeline.report.view import ChannelView, recording_views
 from imubench_pipeline.tables import write

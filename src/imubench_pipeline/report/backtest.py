@@ -14,34 +14,36 @@ from imubench_pipeline.words.numbers import duration_text, number_text
 
 def backtest_lines(
     rows: Sequence[BacktestRow], requirements: Mapping[str, Any], system: System
-) -> list[dict[str, Any]]:
+) -> list[Mapping[str, object]]:
     """Return the lines of a recording's back-test, from rows of ``backtest``."""
-    lines = []
+    lines: list[Mapping[str, object]] = []
     for row in rows:
         unit = unit_of(DIMENSIONS[row.error], system)
-        has_ratio = row.ratio is not None
-        lines.append(
-            {
-                "requirement": requirements.get(row.requirement, {}).get("title")
-                or row.requirement,
-                "channel": row.channel.replace("_", " "),
-                "error": f"{row.error}, {duration_text(row.time)}",
-                "window": duration_text(row.window) if row.window is not None else "–",
-                "measured": f"{unit.text(row.measured, 3)} {unit.sign}" if has_ratio else "–",
-                "predicted": f"{unit.text(row.predicted, 3)} {unit.sign}"
-                if row.predicted is not None
-                else "–",
-                "ratio": number_text(row.ratio, 3) if has_ratio else "–",
-                "range": range_text(row.ratio_lower, row.ratio_upper) if has_ratio else "",
-                "windows": f"{number_text(row.windows, 9)} "
-                f"({number_text(row.independent, 2)} independent)"
-                if has_ratio
-                else "–",
-                "verdict": row.verdict,
-                "contradicted": row.contradicted,
-                "why": row.reason or _describe_removed(row),
-            }
-        )
+        line: dict[str, object] = {
+            "requirement": requirements.get(row.requirement, {}).get("title") or row.requirement,
+            "channel": row.channel.replace("_", " "),
+            "error": f"{row.error}, {duration_text(row.time)}",
+            "window": duration_text(row.window) if row.window is not None else "–",
+            "measured": "–",
+            "predicted": "–",
+            "ratio": "–",
+            "range": "",
+            "windows": "–",
+            "verdict": row.verdict,
+            "contradicted": row.contradicted,
+            "why": row.reason or "",
+        }
+        if row.predicted is not None:
+            line["predicted"] = f"{unit.text(row.predicted, 3)} {unit.sign}"
+        if row.ratio is not None:
+            line["measured"] = f"{unit.text(row.measured, 3)} {unit.sign}"
+            line["ratio"] = number_text(row.ratio, 3)
+            line["range"] = range_text(row.ratio_lower, row.ratio_upper)
+            independent = f"({number_text(row.independent, 2)} independent)"
+            line["windows"] = f"{number_text(row.windows, 9)} {independent}"
+        if row.taken_out and not row.reason:
+            line["why"] = f"in the log, not in the model: {row.taken_out.replace('_', ' ')}"
+        lines.append(line)
     return lines
 
 
@@ -63,10 +65,3 @@ def standing_text(row: RankingRow) -> str:
         f"observed / predicted {row.error} of {channel} after {duration_text(row.time)}: "
         f"{number_text(row.backtest_ratio, 3)} (expected {range_text(lower, upper)}){place}"
     )
-
-
-def _describe_removed(row: BacktestRow) -> str:
-    """Return which signals the log contains and the noise model does not."""
-    if not row.taken_out:
-        return ""
-    return f"in the log, not in the model: {row.taken_out.replace('_', ' ')}"

@@ -62,24 +62,27 @@ def run(arguments: argparse.Namespace) -> int:
         )
         return 2
     try:
-        return _write(site, arguments)
+        _write(site, arguments)
     except RecordingError as error:
         print(error, file=sys.stderr)
         return 2
+    for path, reason in site.failed.items():
+        print(f"{path}: could not be made: {reason}", file=sys.stderr)
+    return int(bool(site.failed))
 
 
-def _write(site: Site, arguments: argparse.Namespace) -> int:
+def _write(site: Site, arguments: argparse.Namespace) -> None:
     """Write the pages of a site to the selected place."""
     from imubench_pipeline.report.publish import one_file, publish, remove_old_pages
-    from imubench_pipeline.report.static_figures.of_run import draw_comparison
+    from imubench_pipeline.report.static_figures.files import draw_comparison
     from imubench_pipeline.tables.seals import seal_again
 
     if arguments.one_file is not None:
         page = one_file(site).encode()
         arguments.one_file.write(page)
         print(f"{arguments.one_file}: {len(page) / 1e6:.1f} MB")
-        return _report_failures(site)
-    say = _print_progress if sys.stderr.isatty() else lambda _: None
+        return
+    say = partial(print, file=sys.stderr) if sys.stderr.isatty() else lambda _: None
     output: OutputFolder | None = arguments.output
     if output is None:
         folder = arguments.results / "report"
@@ -92,15 +95,3 @@ def _write(site: Site, arguments: argparse.Namespace) -> int:
             draw_comparison(site.tables, site.system, made / "figures")
             remove_old_pages(folder, made)
     print(f"{folder / 'index.html'}: {len(written)} files written")
-    return _report_failures(site)
-
-
-def _report_failures(site: Site) -> int:
-    """Print the pages that could not be made; return the exit status, 1 if there are any."""
-    for path, reason in site.failed.items():
-        print(f"{path}: could not be made: {reason}", file=sys.stderr)
-    return int(bool(site.failed))
-
-
-def _print_progress(path: str) -> None:
-    print(path, file=sys.stderr)

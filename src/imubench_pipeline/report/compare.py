@@ -12,9 +12,10 @@ from typing import Any
 import numpy as np
 
 from imubench_pipeline.estimators.estimate import COMPARED
+from imubench_pipeline.report.comparison import Comparison
 from imubench_pipeline.report.glossary import term
-from imubench_pipeline.report.payload import Arrays, looks
-from imubench_pipeline.report.practical import unit_of, units_by_size
+from imubench_pipeline.report.payload import Arrays, Json, looks
+from imubench_pipeline.report.practical import temperature_text, unit_of, units_by_size
 from imubench_pipeline.report.site import Entry, Site
 from imubench_pipeline.report.view import RecordingView
 from imubench_pipeline.settings.requirements import DIMENSIONS, Requirement
@@ -30,27 +31,34 @@ _MAX_DETAILED_RECORDINGS = 100
 """With more recordings, draws are at whole decades of tau, and errors of worst axes only."""
 
 
-def _make_context(site: Site) -> dict[str, Any]:
-    arrays = Arrays()
+def _make_context(site: Site) -> Mapping[str, object]:
     views = _select_recordings(site)
-    budget = site.settings["settings"]["error_budget"]
-    channels: list[dict[str, Any]] = []
-    datasheets: dict[str, dict[str, Any]] = {}
-    recordings = []
+    together = Comparison(site.compared(views), site.names)
+    arrays, channels = together.arrays, together.channels
     few = len(views) > _MAX_DETAILED_RECORDINGS
-    for recording in site.compared(views):
-        view = recording.view
-        kept = {table: _read_columns(site, view, table) for table in KEPT}
+    recordings = []
+    for view in views:
+        kept = {table: _read_columns(_make_path(site, view, table)) for table in KEPT}
         drawn = dict(_pack_draws(kept["drawn_deviations"], arrays, few=few))
-        for channel in recording.channels:
-            channels.append(channel.among(arrays) | {"drawn": drawn.get(channel.about["channel"])})
-        own = datasheets.setdefault(view.sensor, {})
-        for name, lines in recording.datasheet.items():
-            own.setdefault(name, lines)
+        for channel in channels:
+            if (channel["sensor"], channel["recording"]) == view.full_name:
+                channel["drawn"] = drawn.get(channel["channel"])
         growth = _pack_growth(kept["error_growth"], arrays, few=few)
         recordings.append(
             _describe_recording(view) | {"sold": site.is_sold(view.sensor), "growth": growth}
         )
+    requirements = [
+        (name, Requirement.model_validate(declared))
+        for name, declared in site.settings["requirements"].items()
+    ]
+    window = site.settings["settings"]["error_budget"]["static_window"]
+    errors = {}
+    for error in _COMPARED_ERRORS:
+        # The unit of an axis, and the units of numbers: smallest size in SI, sign, factor.
+        axis = unit_of(DIMENSIONS[error], site.system)
+        sized = units_by_size(DIMENSIONS[error], site.system)
+        units = [[least, unit.sign, unit.per_si] for least, unit in sized]
+        errors[error] = {"axis": [axis.sign, axis.per_si], "sized": units}
     return {
         "several": len(views) > 1,
         "page": {
@@ -58,13 +66,22 @@ def _make_context(site: Site) -> dict[str, Any]:
             "looks": looks({view.sensor: site.looks[view.sensor] for view in views}),
             "names": site.names,
             "compared": COMPARED,
-            "channels": channels,
-            "datasheets": datasheets,
             "recordings": recordings,
-            "errors": {error: _describe_units(site, error) for error in _COMPARED_ERRORS},
-            "window": quantity_to_si(budget["static_window"], "time"),
-            "limits": list(_list_limits(site)),
-            "arrays": arrays.texts,
+            "errors": errors,
+            "window": quantity_to_si(window, "time"),
+            "limits": [  # as 1 sigma
+                {
+                    "requirement": name,
+                    "title": requirement.title,
+                    "error": limit.error,
+                    "time": limit.seconds,
+                    "limit": limit.size / requirement.sigmas,
+                }
+                for name, requirement in requirements
+                for limit in requirement.limits
+                if limit.error in _COMPARED_ERRORS
+            ],
+            **together.page,
         },
     }
 
@@ -74,36 +91,21 @@ def _select_recordings(site: Site) -> list[RecordingView]:
     return [view for view in site.views if view.static]
 
 
-def _list_files(site: Site) -> Iterator[Path]:
-    """Yield the files of each recording that the page shows."""
-    for view in _select_recordings(site):
-        for table in KEPT:
-            yield _make_path(site, view, table)
-
-
 def _make_path(site: Site, view: RecordingView, table: str) -> Path:
     return site.results / "recordings" / view.sensor / view.name / f"{table}.parquet"
 
 
-def _read_columns(site: Site, view: RecordingView, table: str) -> Mapping[str, Any]:
+def _read_columns(path: Path) -> Mapping[str, Any]:
     """Return the columns of a table of a recording; empty if the file is missing."""
-    path = _make_path(site, view, table)
     if not path.is_file():
         return {}
-    rows = read(table, [path])
-    return {
-        name: rows[name].to_numpy()
-        for name in rows.column_names
-        if name not in ("sensor", "recording", "unit")
-    }
+    rows = read(path.stem, [path])
+    names = set(rows.column_names) - {"sensor", "recording", "unit"}
+    return {name: rows[name].to_numpy() for name in names}
 
 
-def _describe_recording(view: RecordingView) -> dict[str, Any]:
+def _describe_recording(view: RecordingView) -> Json:
     row = view.row
-    temperature = None
-    if row.temperature_min is not None:
-        low, high = (number_text(end, 3) for end in (row.temperature_min, row.temperature_max))
-        temperature = f"{low} to {high} °C"
     findings = dict.fromkeys(finding.finding for finding in view.warnings)
     return {
         "sensor": view.sensor,
@@ -115,42 +117,16 @@ def _describe_recording(view: RecordingView) -> dict[str, Any]:
         "duration": duration_text(row.duration),
         "rate": number_text(row.rate),
         "started": row.started,
-        "temperature": temperature,
+        "temperature": temperature_text(row) or None,
         "decides": row.decides is not False,
         "doubts": [term(name).name for name in findings],
     }
 
 
-def _describe_units(site: Site, error: str) -> dict[str, Any]:
-    """Return the unit of an axis, and the units of numbers: smallest size in SI, sign, factor."""
-    dimension = DIMENSIONS[error]
-    axis = unit_of(dimension, site.system)
-    sized = units_by_size(dimension, site.system)
-    return {
-        "axis": [axis.sign, axis.per_si],
-        "sized": [[least, unit.sign, unit.per_si] for least, unit in sized],
-    }
-
-
-def _list_limits(site: Site) -> Iterator[dict[str, Any]]:
-    """Yield the limits of requirements, as 1 sigma."""
-    for name, declared in site.settings["requirements"].items():
-        requirement = Requirement.model_validate(declared)
-        for limit in requirement.limits:
-            if limit.error in _COMPARED_ERRORS:
-                yield {
-                    "requirement": name,
-                    "title": requirement.title,
-                    "error": limit.error,
-                    "time": limit.seconds,
-                    "limit": limit.size / requirement.sigmas,
-                }
-
-
 def _pack_draws(
     kept: Mapping[str, Any], arrays: Arrays, *, few: bool
-) -> Iterator[tuple[str, dict[str, Any]]]:
-    """Yield the Allan deviation of each channel at some tau, and those of drawn models, sorted."""
+) -> Iterator[tuple[str, Json]]:
+    """Yield the Allan deviation of each channel and of its drawn models at some tau, sorted."""
     if not kept:
         return
     of_draw = np.isfinite(np.asarray(kept["draw"], dtype=np.float64))  # null: the estimate itself
@@ -160,18 +136,16 @@ def _pack_draws(
         own = (kept["channel"] == channel) & wanted
         best = own & ~of_draw
         unknown = kept["unknown"][best].tolist()
-        yield (
-            channel,
-            {
-                "tau": arrays.exact(kept["tau"][best]),
-                "adev": arrays.exact(kept["adev"][best]),
-                "drawn": arrays.log(kept["adev"][own & of_draw]),
-                "unknown": {place: text for place, text in enumerate(unknown) if text},
-            },
-        )
+        drawn = {
+            "tau": arrays.exact(kept["tau"][best]),
+            "adev": arrays.exact(kept["adev"][best]),
+            "drawn": arrays.log(kept["adev"][own & of_draw]),
+            "unknown": {place: text for place, text in enumerate(unknown) if text},
+        }
+        yield channel, drawn
 
 
-def _pack_growth(kept: Mapping[str, Any], arrays: Arrays, *, few: bool) -> dict[str, Any] | None:
+def _pack_growth(kept: Mapping[str, Any], arrays: Arrays, *, few: bool) -> Json | None:
     """Return the growth of errors of the worst axes and of each axis."""
     if not kept or not len(kept["error"]):
         return None
@@ -191,24 +165,20 @@ def _pack_growth(kept: Mapping[str, Any], arrays: Arrays, *, few: bool) -> dict[
     }
 
 
-def _pack_errors(kept: Mapping[str, Any], of_axis: Any, arrays: Arrays) -> dict[str, Any]:
+def _pack_errors(kept: Mapping[str, Any], of_axis: Any, arrays: Arrays) -> Json:
     """Return the totals of each error with limits, and the shares of the variance by source."""
     errors = {}
     for error in dict.fromkeys(kept["error"][of_axis].tolist()):
         own = of_axis & (kept["error"] == error)
         total = own & (kept["source"] == "total")
         variance = kept["sigma"][total] ** 2
+        columns = (kept[name][total].tolist() for name in ("window", "time"))
+        places = {key: place for place, key in enumerate(zip(*columns, strict=True))}
+        rest = own & ~total
         sources = {
             source: np.zeros(len(variance))
-            for source in dict.fromkeys(kept["source"][own & ~total].tolist())
+            for source in dict.fromkeys(kept["source"][rest].tolist())
         }
-        places = {
-            key: place
-            for place, key in enumerate(
-                zip(kept["window"][total].tolist(), kept["time"][total].tolist(), strict=True)
-            )
-        }
-        rest = own & ~total
         columns = (kept[name][rest].tolist() for name in ("window", "time", "source", "sigma"))
         for window, time, source, sigma in zip(*columns, strict=True):
             place = places[window, time]
@@ -237,7 +207,9 @@ COMPARE = Entry(
     title="Side by side",
     context=_make_context,
     views=_select_recordings,
-    files=_list_files,
+    files=lambda site: (
+        _make_path(site, view, table) for view in _select_recordings(site) for table in KEPT
+    ),
     exists=lambda site: bool(_select_recordings(site)),
 )
 """The page that compares two or more sensors or recordings that the reader chooses."""

@@ -5,11 +5,16 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from itertools import chain
-from typing import Any
 
 from imubench_pipeline.estimators.estimate import SHOWN
 from imubench_pipeline.report.parameters import cell, model_words, shown_symbols
-from imubench_pipeline.report.payload import Arrays, ComparedChannel, compared, datasheet_lines
+from imubench_pipeline.report.payload import (
+    Arrays,
+    ComparedChannel,
+    Json,
+    compared,
+    datasheet_lines,
+)
 from imubench_pipeline.report.practical import System
 from imubench_pipeline.report.view import QUANTITY_NAMES, RecordingView
 
@@ -22,19 +27,16 @@ class ComparedRecording:
 
     view: RecordingView
     channels: list[ComparedChannel]
-    datasheet: Mapping[str, list[dict[str, Any]]]  # its lines, by channel
-    lines: Mapping[str, list[dict[str, Any]]]  # of the tables of parameters, by quantity
-    symbols: Mapping[str, set[str]]  # that the lines have, by quantity
+    datasheet: Mapping[str, list[Json]]  # its lines, by channel
+    lines: Mapping[str, list[Json]]  # of the tables of parameters, by quantity
 
 
 def compared_recording(view: RecordingView, system: System) -> ComparedRecording:
-    """Gather the compared data of a recording; ``system`` is that of its numbers."""
+    """Gather the compared data of a recording; ``system`` has the units of its numbers."""
     channels = view.channels()
-    lines: dict[str, list[dict[str, Any]]] = {name: [] for name in QUANTITY_NAMES}
-    symbols: dict[str, set[str]] = {name: set() for name in QUANTITY_NAMES}
+    lines: dict[str, list[Json]] = {name: [] for name in QUANTITY_NAMES}
     for channel in channels:
         shown = shown_symbols(chain(*channel.parameters.values()))
-        symbols[channel.quantity].update(shown)
         methods = {channel.recommended: "recommended"}
         if _PAPERS_METHOD in channel.parameters:
             methods.setdefault(_PAPERS_METHOD, "papers' model")
@@ -53,61 +55,47 @@ def compared_recording(view: RecordingView, system: System) -> ComparedRecording
             }
             for method, asked in methods.items()
         ]
-    return ComparedRecording(
-        view,
-        [compared(channel) for channel in channels],
-        {channel.channel: datasheet_lines(channel) for channel in channels},
-        lines,
-        symbols,
-    )
+    datasheet = {channel.channel: datasheet_lines(channel) for channel in channels}
+    return ComparedRecording(view, [compared(channel) for channel in channels], datasheet, lines)
 
 
 class Comparison:
-    """The compared data of recordings.
-
-    Parameters
-    ----------
-    recordings : iterable of ComparedRecording
-    names : mapping
-        Of the sensors, as they are shown.
-    """
+    """The compared data of recordings; ``names`` are the names of sensors on the pages."""
 
     def __init__(self, recordings: Iterable[ComparedRecording], names: Mapping[str, str]) -> None:
         self._names = names
-        self._arrays = Arrays()
-        self._curves: list[dict[str, Any]] = []
-        self._datasheets: dict[str, dict[str, Any]] = {}
-        self._lines: dict[str, list[dict[str, Any]]] = {name: [] for name in QUANTITY_NAMES}
-        self._symbols: dict[str, set[str]] = {name: set() for name in QUANTITY_NAMES}
+        self.arrays = Arrays()
+        self.channels: list[Json] = []
+        self._datasheets: dict[str, Json] = {}
+        self._lines: dict[str, list[Json]] = {name: [] for name in QUANTITY_NAMES}
         for recording in recordings:
-            self._curves += [channel.among(self._arrays) for channel in recording.channels]
+            self.channels += [channel.among(self.arrays) for channel in recording.channels]
             for channel, lines in recording.datasheet.items():
                 own = self._datasheets.setdefault(recording.view.sensor, {})
                 own.setdefault(channel, lines)
             for quantity in QUANTITY_NAMES:
                 self._lines[quantity] += recording.lines[quantity]
-                self._symbols[quantity] |= recording.symbols[quantity]
 
     @property
-    def page(self) -> dict[str, Any]:
+    def page(self) -> Json:
         """The data of the figures of the page."""
         return {
-            "channels": self._curves,
+            "channels": self.channels,
             "datasheets": self._datasheets,
-            "arrays": self._arrays.texts,
+            "arrays": self.arrays.texts,
         }
 
-    def tables(self) -> Iterator[dict[str, Any]]:
+    def tables(self) -> Iterator[Json]:
         """Yield a table per quantity, with the recommended method and the papers' model."""
-        for quantity, title in QUANTITY_NAMES.items():
-            lines = self._lines[quantity]
+        for quantity, lines in self._lines.items():
             if not lines:
                 continue
             sensors = dict.fromkeys(line["view"].sensor for line in lines)
+            symbols = {symbol for line in lines for symbol in line["cells"]}
             yield {
                 "quantity": quantity,
-                "title": title,
-                "symbols": [s for s in SHOWN if s in self._symbols[quantity]],
+                "title": QUANTITY_NAMES[quantity],
+                "symbols": [symbol for symbol in SHOWN if symbol in symbols],
                 "lines": lines,
                 "filters": {
                     "axis": sorted({line["axis"] for line in lines}),

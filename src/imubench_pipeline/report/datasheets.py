@@ -5,21 +5,17 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from statistics import median
-from typing import Any
 
 from imubench_pipeline.model.comparisons import CoverageRow, DatasheetRow, RepeatabilityRow
+from imubench_pipeline.report.payload import Json
 from imubench_pipeline.report.practical import System, page_unit, printed_text
 from imubench_pipeline.report.view import ChannelView, RecordingView
 from imubench_pipeline.settings.sensor import quantity_of
 from imubench_pipeline.words.numbers import NO_VALUE, Unit
 
-_STATISTIC_NAMES = {
-    "N": "N",
-    "adev_minimum": "bias instability",
-    "plateau": "bias instability",
-    "K": "K",
-    "T_B": "T_B",
-}
+_STATISTIC_NAMES = dict.fromkeys(("adev_minimum", "plateau"), "bias instability")
+_STATISTIC_NAMES |= {"N": "N", "K": "K", "T_B": "T_B"}
+_STATISTIC_TEXTS = {"adev_minimum": "lowest point of the curve", "plateau": "0.664 B alone"}
 _UNIT_SYMBOLS = {
     "N": "N",
     "K": "K",
@@ -40,7 +36,7 @@ _COVERAGE_SIGNS = {"yes": "yes", "no": "no", "other convention": "other", "not l
 
 def delta_rows(
     view: ChannelView, coverage: Mapping[tuple[str, str, str], str], system: System
-) -> Iterator[dict[str, Any]]:
+) -> Iterator[Json]:
     """Yield each figure of the datasheet with all its readings, the measured value and a verdict.
 
     ``coverage`` has the publication status by sensor, quantity and figure.
@@ -51,29 +47,27 @@ def delta_rows(
         published = first.printed is not None
         figure = "B" if first.quantity == "bias_instability" else first.quantity
         verdict, why = one_verdict(rows)
+        unit = page_unit(view.quantity, _UNIT_SYMBOLS.get(first.quantity, "B"), system)
         yield {
             "quantity": _name_figure(first),
             "published": published,
             "coverage": coverage.get((view.sensor, view.quantity, figure), "not looked up"),
             "printed": printed_text(first),
             "about": ", ".join(filter(None, (first.kind, first.condition))),
-            "readings": [_describe_reading(row, view.quantity, system) for row in rows],
+            "readings": [
+                {
+                    "as": _name_reading(row),
+                    "comparable": unit.text(row.comparable),
+                    "measured": _format_measured(row, unit),
+                    "unit": "" if row.comparable is None and row.measured is None else unit.sign,
+                    "delta": _format_difference(row),
+                    "value": row.delta,
+                }
+                for row in rows
+            ],
             "verdict": verdict,
             "reason": why if published else "",
         }
-
-
-def _describe_reading(row: DatasheetRow, quantity: str, system: System) -> dict[str, Any]:
-    """Return one reading of a printed figure, with the measured value."""
-    unit = page_unit(quantity, _UNIT_SYMBOLS.get(row.quantity, "B"), system)
-    return {
-        "as": _name_reading(row),
-        "comparable": unit.text(row.comparable),
-        "measured": _format_measured(row, unit),
-        "unit": "" if row.comparable is None and row.measured is None else unit.sign,
-        "delta": _format_difference(row),
-        "value": row.delta,
-    }
 
 
 _Figure = tuple[str, str, float | None, str | None, str | None, str | None]
@@ -108,7 +102,7 @@ DEPENDS = "depends on sidedness"
 """The verdict where the readings of a density differ."""
 
 
-def deltas_of_sensors(views: Sequence[RecordingView], system: System) -> Iterator[dict[str, Any]]:
+def deltas_of_sensors(views: Sequence[RecordingView], system: System) -> Iterator[Json]:
     """Yield each printed figure of a channel against all recordings of the sensor."""
     groups: dict[tuple[str, bool, _Figure], list[list[DatasheetRow]]] = {}
     for view in views:
@@ -124,10 +118,22 @@ def deltas_of_sensors(views: Sequence[RecordingView], system: System) -> Iterato
         first = group[0][0]
         unit = page_unit(quantity_of(channel), _UNIT_SYMBOLS.get(first.quantity, "B"), system)
         verdicts = Counter(one_verdict(rows)[0] for rows in group)
-        readings = [
-            [row for rows in group for row in rows if _name_reading(row) == name]
-            for name in dict.fromkeys(_name_reading(row) for rows in group for row in rows)
-        ]
+        by_reading: dict[str, list[DatasheetRow]] = {}
+        for row in (row for rows in group for row in rows):
+            by_reading.setdefault(_name_reading(row), []).append(row)
+        readings = []
+        for name, rows in by_reading.items():
+            measured = sorted(row.measured for row in rows if row.measured is not None)
+            ends = (measured[0], measured[-1]) if measured else (None, None)
+            deltas = _list_deltas(rows)
+            readings.append(
+                {
+                    "as": name,
+                    "comparable": unit.text(rows[0].comparable),
+                    "measured": _format_range([unit.text(value, 3) for value in ends]),
+                    "difference": _format_range([*map(_format_percent, (deltas[0], deltas[-1]))]),
+                }
+            )
         yield {
             "sensor": sensor,
             "simulated": simulated,
@@ -136,8 +142,8 @@ def deltas_of_sensors(views: Sequence[RecordingView], system: System) -> Iterato
             "printed": printed_text(first),
             "about": first.kind or "",
             "unit": unit.sign,
-            "readings": [_compare_recordings(rows, unit) for rows in readings],
-            "delta": median(_list_deltas(readings[0])),
+            "readings": readings,
+            "delta": median(_list_deltas(next(iter(by_reading.values())))),
             "recordings": len(group),
             "verdicts": ", ".join(
                 verdict if len(group) == 1 else f"{verdict} ({count})"
@@ -147,25 +153,12 @@ def deltas_of_sensors(views: Sequence[RecordingView], system: System) -> Iterato
 
 
 def _list_deltas(rows: Iterable[DatasheetRow]) -> list[float]:
-    return [row.delta for row in rows if row.delta is not None]
-
-
-def _compare_recordings(rows: Sequence[DatasheetRow], unit: Unit) -> dict[str, Any]:
-    """Return one reading of a printed figure, compared with all recordings of a sensor."""
-    deltas = sorted(_list_deltas(rows))
-    measured = sorted(row.measured for row in rows if row.measured is not None)
-    ends = (measured[0], measured[-1]) if measured else (None, None)
-    return {
-        "as": _name_reading(rows[0]),
-        "comparable": unit.text(rows[0].comparable),
-        "measured": _format_range([unit.text(value, 3) for value in ends]),
-        "difference": _format_range([_format_percent(value) for value in (deltas[0], deltas[-1])]),
-    }
+    return sorted(row.delta for row in rows if row.delta is not None)
 
 
 def repeatability_lines(
     rows: Sequence[RepeatabilityRow], sensor: str, system: System
-) -> Iterator[dict[str, Any]]:
+) -> Iterator[Json]:
     """Yield the scatter of the fixed biases of each device of a sensor, and the printed figure.
 
     ``rows`` are those of the table ``repeatability``.
@@ -198,9 +191,6 @@ def _name_reading(row: DatasheetRow) -> str:
     if row.sidedness:
         return f"read as {row.sidedness}"
     return _STATISTIC_TEXTS.get(row.statistic, "")
-
-
-_STATISTIC_TEXTS = {"adev_minimum": "lowest point of the curve", "plateau": "0.664 B alone"}
 
 
 def _format_range(ends: Sequence[str]) -> str:
@@ -238,12 +228,12 @@ def _format_difference(row: DatasheetRow) -> list[str]:
     return [_format_percent(row.delta), f"{_format_percent(lower)} to {_format_percent(upper)}"]
 
 
-def coverage_tables(rows: Sequence[CoverageRow]) -> Iterator[dict[str, Any]]:
+def coverage_tables(rows: Sequence[CoverageRow]) -> Iterator[Json]:
     """Yield a table per quantity with a line per sensor and a column per figure."""
     for quantity, title in _COVERAGE_TITLES.items():
         own = [row for row in rows if row.quantity == quantity]
         figures = list(dict.fromkeys(row.figure for row in own))
-        lines: dict[str, dict[str, Any]] = {}
+        lines: dict[str, Json] = {}
         for row in own:
             name = f"{row.vendor} {row.model}"
             line = lines.setdefault(
@@ -256,9 +246,12 @@ def coverage_tables(rows: Sequence[CoverageRow]) -> Iterator[dict[str, Any]]:
             }
         if not lines:
             continue
-        published = {
-            figure: Counter(r.published for r in own if r.figure == figure) for figure in figures
-        }
+        counts = []
+        for figure in figures:
+            published = Counter(row.published for row in own if row.figure == figure)
+            unknown = published["not looked up"]
+            text = f"{published['yes']} of {published.total() - unknown} looked up"
+            counts.append(f"{text}; {unknown} not looked up" if unknown else text)
         yield {
             "title": title,
             "figures": [
@@ -268,12 +261,5 @@ def coverage_tables(rows: Sequence[CoverageRow]) -> Iterator[dict[str, Any]]:
                 line | {"cells": [line["cells"][figure] for figure in figures]}
                 for line in sorted(lines.values(), key=lambda line: str(line["name"]))
             ],
-            "counts": [_count(published[figure]) for figure in figures],
+            "counts": counts,
         }
-
-
-def _count(published: Counter[str]) -> str:
-    """Return how many vendors publish a figure, and how many have not been looked up."""
-    unknown = published["not looked up"]
-    text = f"{published['yes']} of {published.total() - unknown} looked up"
-    return f"{text}; {unknown} not looked up" if unknown else text

@@ -6,14 +6,15 @@ It shows the deciding rows of the table ``ranking``.
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, get_args
+from typing import get_args
 
 from imubench_pipeline.model.comparisons import RankingRow
 from imubench_pipeline.model.states import Verdict
 from imubench_pipeline.report.site import Site
-from imubench_pipeline.report.sourced import SourcedNumber, margin, margin_limits, of_ranking
+from imubench_pipeline.report.sourced import SourcedNumber, margin, margin_limits, of_row
 from imubench_pipeline.report.view import RecordingView
 from imubench_pipeline.settings.requirements import Requirement
 from imubench_pipeline.words.numbers import counted, duration_text, number_text
@@ -51,7 +52,7 @@ class Scale:
         return cls(max(low, -_MAX_BAR_DECADES) - 0.08, min(high, _MAX_BAR_DECADES) + 0.08)
 
     def place(self, value: float) -> float:
-        """Return where a margin is drawn, % of the width; at an end what lies beyond it."""
+        """Return where a margin is drawn, % of the width, within the scale."""
         log = math.log10(value) if value > 0.0 else -math.inf
         share = (min(max(log, self.low), self.high) - self.low) / (self.high - self.low)
         return round(100.0 * share, 2)
@@ -70,7 +71,6 @@ class Cell:
     requirement: str
     sensor: str
     verdict: Verdict
-    word: str  # verdict in words
     conditions: int  # unknown figures on which the verdict depends
     margin: tuple[SourcedNumber, SourcedNumber, SourcedNumber] | None  # with its 95 % limits
     bar: tuple[float, float, float] | None  # of these, the places
@@ -81,9 +81,9 @@ class Cell:
     order: float  # larger is better
 
     @property
-    def judged(self) -> bool:
-        """Whether it has a margin."""
-        return self.margin is not None
+    def word(self) -> str:
+        """The verdict in words."""
+        return SHORT_VERDICTS[self.verdict]
 
     @property
     def hatched(self) -> bool:
@@ -97,9 +97,13 @@ class Column:
 
     name: str
     title: str
-    short: str
     limits: Sequence[str]
     answer: str
+
+    @property
+    def short(self) -> str:
+        """The name in words."""
+        return self.name.replace("_", " ").capitalize()
 
 
 @dataclass(frozen=True)
@@ -119,7 +123,11 @@ def matrix(site: Site) -> Matrix | None:
     rows = {(row.requirement, row.sensor): row for row in site.rows(RankingRow) if row.decides}
     if not rows:
         return None
-    scale = Scale.of(value for row in rows.values() for value in _drawn(row))
+    drawn: list[float | None] = []
+    for deciding in rows.values():
+        drawn += [deciding.logged_margin, deciding.corrected_margin, deciding.margin]
+        drawn += margin_limits(deciding) if deciding.margin is not None else ()
+    scale = Scale.of(value for value in drawn if value is not None)
     # A sensor that cannot be bought is not compared with others.
     apart = {sensor: "not sold" for sensor in site.sensors if not site.is_sold(sensor)}
     lines = {
@@ -130,48 +138,33 @@ def matrix(site: Site) -> Matrix | None:
         for sensor in site.sensors
         if sensor not in apart
     }
-    order = sorted(lines, key=lambda sensor: (_merit(lines[sensor]), site.names[sensor]))
+
+    def order(sensor: str) -> tuple[object, ...]:
+        """Put first the sensor that meets most limits, and so on."""
+        met = Counter(cell.verdict for cell in lines[sensor] if cell.margin)
+        counts = [-met[verdict] for verdict in _VERDICTS]
+        return (*counts, -sum(cell.order for cell in lines[sensor]), site.names[sensor])
+
     columns = []
     for place, (name, declared) in enumerate(requirements.items()):
         cells = [cells[place] for cells in lines.values()]
-        judged = sorted((cell for cell in cells if cell.judged), key=lambda cell: -cell.order)
+        judged = sorted((cell for cell in cells if cell.margin), key=lambda cell: -cell.order)
         best = [rows[name, cell.sensor] for cell in judged]
         excluded = sum(cell.verdict == "excluded" for cell in cells)
         answer = answer_text(best, site.names, len(cells), excluded)
-        columns.append(_column(name, declared, answer))
+        requirement = Requirement.model_validate(declared)
+        limits = [
+            f"{x.error} {x.at_most} in {x.after or f'{x.outage} without GNSS'}"
+            for x in requirement.limits
+        ]
+        columns.append(Column(name, requirement.title, limits, answer))
     return Matrix(
         columns,
-        [(sensor, lines[sensor]) for sensor in order],
+        sorted(lines.items(), key=lambda line: order(line[0])),
         apart,
         scale,
         [(verdict, SHORT_VERDICTS[verdict], VERDICT_MEANINGS[verdict]) for verdict in _VERDICTS],
     )
-
-
-def _merit(cells: Sequence[Cell]) -> tuple[float, ...]:
-    """Return a key that puts first the sensor with the most met limits, and so on."""
-    counts = [
-        -sum(cell.judged and cell.verdict == verdict for cell in cells) for verdict in _VERDICTS
-    ]
-    return (*counts, -sum(cell.order for cell in cells))
-
-
-def _column(name: str, declared: Mapping[str, Any], answer: str) -> Column:
-    requirement = Requirement.model_validate(declared)
-    short = name.replace("_", " ").capitalize()
-    limits = [
-        f"{x.error} {x.at_most} in {x.after or f'{x.outage} without GNSS'}"
-        for x in requirement.limits
-    ]
-    return Column(name, requirement.title, short, limits, answer)
-
-
-def _drawn(row: RankingRow) -> list[float]:
-    """Return the margins of a row that are drawn."""
-    known = [size for size in (row.logged_margin, row.corrected_margin) if size is not None]
-    if row.margin is None:
-        return known
-    return [row.margin, *(limit for limit in margin_limits(row) if limit is not None)]
 
 
 def unranked(own: Iterable[RecordingView]) -> str:
@@ -185,79 +178,69 @@ def unranked(own: Iterable[RecordingView]) -> str:
 def _empty(site: Site, requirement: str, sensor: str) -> Cell:
     """Return the cell of a sensor that is in no ranking."""
     reason = unranked(view for view in site.views if view.sensor == sensor)
-    word = SHORT_VERDICTS["not_enough_data"]
-    return Cell(
-        requirement, sensor, "not_enough_data", word, 0, None, None, "", "", reason, (), -math.inf
-    )
+    verdict: Verdict = "not_enough_data"
+    return Cell(requirement, sensor, verdict, 0, None, None, "", "", reason, (), -math.inf)
 
 
 def _cell(row: RankingRow, scale: Scale) -> Cell:
     judged = row.margin is not None and row.verdict != "excluded"
     low, high = margin_limits(row) if judged else (None, None)
-    bar = None
+    bar, order = None, -math.inf
     if row.margin is not None and low is not None and high is not None:
         bar = (scale.place(row.margin), scale.place(low), scale.place(high))
-    place = len(_VERDICTS) - _VERDICTS.index(row.verdict)
+    if judged:
+        log = math.log10(row.margin) if row.margin else -_MAX_ORDER_DECADES
+        place = len(_VERDICTS) - _VERDICTS.index(row.verdict)
+        log = min(max(log, -_MAX_ORDER_DECADES), _MAX_ORDER_DECADES)
+        order = round(10.0 * place + log, 4)
+        reason = ""
+    elif row.verdict == "excluded":
+        reason = "; ".join(map(shortfall_text, row.shortfalls))
+    elif row.left_out:
+        reason = doubts_text(row.left_out[:1])
+    else:
+        reason = row.reason or "too little is known"
+    # Margins with the recordings that are not used, and with corrected units.
+    alternatives = [
+        (words, of_row(row, name, number_text(size, 2)), scale.place(size))
+        for words, name, size in (
+            ("as logged", "logged_margin", row.logged_margin),
+            ("if corrected", "corrected_margin", row.corrected_margin),
+        )
+        if size is not None and not judged
+    ]
     return Cell(
         row.requirement,
         row.sensor,
         row.verdict,
-        SHORT_VERDICTS[row.verdict],
         len(row.conditions) if judged else 0,
         margin(row) if judged else None,
         bar,
         evidence_text(row) if judged else "",
         used_doubts_text(row),
-        "" if judged else _explain(row),
-        [] if judged else _alternatives(row, scale),
-        _order(place, row.margin) if judged else -math.inf,
+        reason,
+        alternatives,
+        order,
     )
 
 
-def _order(place: int, size: float | None) -> float:
-    log = math.log10(size) if size else -_MAX_ORDER_DECADES
-    return round(10.0 * place + min(max(log, -_MAX_ORDER_DECADES), _MAX_ORDER_DECADES), 4)
-
-
-def _explain(row: RankingRow) -> str:
-    """Return why a sensor is not judged."""
-    if row.verdict == "excluded":
-        return "; ".join(map(shortfall_text, row.shortfalls))
-    if row.left_out:
-        return doubts_text(row.left_out[:1])
-    return row.reason or "too little is known"
-
-
-def _alternatives(row: RankingRow, scale: Scale) -> list[tuple[str, SourcedNumber, float]]:
-    """Return the margins with the recordings that are not used, and with corrected units."""
-    named = (
-        ("as logged", "logged_margin", row.logged_margin),
-        ("if corrected", "corrected_margin", row.corrected_margin),
-    )
-    return [
-        (words, of_ranking(row, name, number_text(size, 2)), scale.place(size))
-        for words, name, size in named
-        if size is not None
-    ]
-
-
-def strip(site: Site) -> list[dict[str, Any]]:
-    """Return what the report is of, in numbers: each with its words, and where it leads."""
+def strip(site: Site) -> list[dict[str, object]]:
+    """Return the content of the report in numbers: each with its words and its link."""
     views = site.views
     rejected = sum(view.rejected for view in views)
     failed = sum(view.left_out for view in views) - rejected
     seconds = sum(view.row.duration or 0.0 for view in views)
     doubted = sum(bool(view.warnings) for view in views)
     parts = [
-        (len(site.sensors), counted(len(site.sensors), "sensor"), "#sensors"),
-        (len(views), counted(len(views), "recording"), "recordings.html"),
-        (seconds, f"{duration_text(seconds)} of data", "recordings.html"),
-        (rejected, f"{rejected} rejected", "#rejected" if rejected else "recordings.html"),
-        (doubted, f"{doubted} in doubt", "#warnings" if doubted else "recordings.html"),
+        (counted(len(site.sensors), "sensor"), "#sensors", 0),
+        (counted(len(views), "recording"), "recordings.html", 0),
+        (f"{duration_text(seconds)} of data", "recordings.html", 0),
+        (f"{rejected} rejected", "#rejected" if rejected else "recordings.html", rejected),
+        (f"{doubted} in doubt", "#warnings" if doubted else "recordings.html", doubted),
+        *([(f"{failed} failed", "#failed", failed)] if failed else []),
     ]
-    if failed:
-        parts.append((failed, f"{failed} failed", "#failed"))
     return [
-        {"number": text.split(" ")[0], "words": text.split(" ", 1)[1], "to": to, "bad": bad}
-        for bad, (_, text, to) in zip((0, 0, 0, rejected, doubted, failed), parts, strict=False)
+        {"number": number, "words": words, "to": to, "bad": bad}
+        for text, to, bad in parts
+        for number, words in [text.split(" ", 1)]
     ]

@@ -21,17 +21,11 @@ _MAX_NAMES = 5
 
 
 def drop_zone_lines(results: Path) -> list[str]:
-    """Return the balance of the last run, and the changes in the drop zone since, as lines.
-
-    Parameters
-    ----------
-    results : Path
-        Folder of the results of runs.
-    """
+    """Return the balance of the last run, and the changes in the drop zone since, as lines."""
     try:
         files = FileRow.rows_of(read("files", [results / "tables/files.parquet"]))
     except (OSError, ValueError):
-        return []  # what is missing or damaged is reported elsewhere
+        return []  # missing and damaged files are reported elsewhere
     logs = drop_zone_of(results)
     if logs is None:
         return [*balance(files), *(["the drop zone of the run is not known"] if files else [])]
@@ -42,13 +36,7 @@ def drop_zone_lines(results: Path) -> list[str]:
 
 
 def balance(files: Sequence[FileRow]) -> Iterator[str]:
-    """Yield how many files were analysed, rejected and skipped, and why files were skipped.
-
-    Parameters
-    ----------
-    files : sequence of FileRow
-        Rows of the table ``files``.
-    """
+    """Yield how many files were analysed, rejected and skipped, and why files were skipped."""
     if not files:
         return
     counts = Counter(row.status for row in files)

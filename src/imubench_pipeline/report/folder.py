@@ -49,21 +49,14 @@ def is_report(folder: Path) -> bool:
 
 def files_of_report(folder: Path) -> list[Path]:
     """Return the files and folders of the report, without its figures, which another step draws."""
-    return [
-        path
-        for path in sorted(folder.iterdir())
-        if path.name != "figures" and not path.name.startswith(".")
-    ]
+    names = sorted(path.name for path in folder.iterdir() if not path.name.startswith("."))
+    return [folder / name for name in names if name != "figures"]
 
 
 def drop_zone_of(results: Path) -> Path | None:
-    """Return the drop zone of the last run, as its report says; None where that is not known.
+    """Return the drop zone of the last run by the settings in its report; None if not known.
 
-    Parameters
-    ----------
-    results : Path
-        Folder of the results of runs. Paths that were given from the folder of the run are taken
-        from there, as far as the results have the name that they had.
+    Relative paths count from the folder of the run, if ``results`` has its name of that time.
     """
     try:
         settings = json.loads((results / "report/settings.json").read_text("utf-8"))

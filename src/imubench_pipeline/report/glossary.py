@@ -34,9 +34,9 @@ class Term:
 
     key: str
     name: str  # as it is shown
-    short: str  # one plain sentence: what it is, and why it matters
+    short: str  # one plain sentence: definition and relevance
     section: str  # anchor on the theory page
-    action: str | None = None  # what to do; of a finding alone
+    action: str | None = None  # advice, of a finding alone
 
 
 class UnknownTermError(KeyError):
@@ -62,7 +62,7 @@ def glossary() -> dict[str, Term]:
     Raises
     ------
     ConfigError
-        If the file cannot be used, or a key stands in two sections.
+        If the file cannot be used, or a key is in two sections.
     """
     terms = _Glossary()
     for section, entries in parse(_Sections, read_yaml(_FILE), str(_FILE)).root.items():
@@ -75,21 +75,14 @@ def glossary() -> dict[str, Term]:
 
 
 def term(value: str, kind: str = "") -> Term:
-    """Return the term of a value that a table holds.
+    """Return the term of a value of a table, such as ``not comparable (condition)``.
 
-    Parameters
-    ----------
-    value : str
-        As the table has it, such as ``not comparable (condition)``.
-    kind : str
-        What begins the key where the value alone says too little: ``verdict``, ``published``,
-        ``kind`` (of a printed figure, or a recording), ``line`` (its kind), ``axis``,
-        ``rate_from``, ``recording`` (its status).
+    ``kind`` begins the key of values that are ambiguous alone: ``verdict``, ``published``, ``kind``
+    (of a printed figure or recording), ``line``, ``axis``, ``rate_from``, ``recording`` (status).
 
     Raises
     ------
     UnknownTermError
         If the glossary does not have it.
     """
-    words = re.findall(r"\w+", f"{kind} {value}")
-    return glossary()["_".join(words)]
+    return glossary()["_".join(re.findall(r"\w+", f"{kind} {value}"))]

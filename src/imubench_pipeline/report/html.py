@@ -33,7 +33,7 @@ def environment(system: System) -> jinja2.Environment:
         ),
         autoescape=True,
         undefined=jinja2.StrictUndefined,
-        finalize=_format_missing,
+        finalize=lambda value: NO_VALUE if value is None else value,
         trim_blocks=True,
         lstrip_blocks=True,
     )
@@ -61,9 +61,8 @@ def environment(system: System) -> jinja2.Environment:
             if value is None:
                 text = f"{_explain_term(status)}"
             else:
-                text = f"{number(value)}" + (
-                    f' <span class="status">{status_text(status)}</span>' if status else ""
-                )
+                mark = f' <span class="status">{status_text(status)}</span>' if status else ""
+                text = f"{number(value)}{mark}"
             if upper is not None:
                 limits = f"{number(lower)} to" if lower is not None else "below"
                 text += f"<br><small>{limits} {number(upper)}</small>"
@@ -78,7 +77,7 @@ def environment(system: System) -> jinja2.Environment:
         return Markup('<span data-sign="{}">{}</span>').format(unit, _find_unit(unit, system).sign)
 
     templates.globals |= {
-        "action": _find_action,
+        "action": lambda key: term(key).action or "",  # of a finding
         "si": si,
         "sign": sign,
         "parameter_cell": parameter_cell,
@@ -87,18 +86,11 @@ def environment(system: System) -> jinja2.Environment:
         "to": _link_to,
     }
     templates.filters |= {"duration": duration_text, "number": number_text, "json": _make_json}
-    templates.filters |= {"started": started_text, "symbol_text": symbol_text}
-    templates.filters["attribute"] = _make_compact_json
+    templates.filters |= {"started": started_text, "symbol_text": symbol_text, "packed": packed}
+    templates.filters |= {"attribute": _make_compact_json, "doubts": doubts_text}
     templates.filters["status_text"] = status_text
-    templates.filters["doubts"] = doubts_text
-    templates.filters["packed"] = packed
-    templates.tests["hidden_row"] = _is_hidden
+    templates.tests["hidden_row"] = lambda row: row.partition(">")[0].endswith(" hidden")
     return templates
-
-
-def _format_missing(value: Any) -> Any:
-    """Return a value, or a dash if it is missing."""
-    return NO_VALUE if value is None else value
 
 
 @cache
@@ -134,24 +126,14 @@ def _explain_term(key: str, text: str | None = None) -> Markup:
     return Markup('<i data-term="{}">{}</i>').format(entry.key, escape(text or entry.name))
 
 
-def _find_action(key: str) -> str:
-    """Return the advice for a finding."""
-    return term(key).action or ""
-
-
 def _make_json(value: Any) -> Markup:
-    """Return JSON that can stand inside a script element."""
+    """Return JSON for the inside of a script element."""
     return Markup(_make_compact_json(value).replace("<", "\\u003c"))
 
 
 def packed(text: str) -> Markup:
     """Return a compressed text, which a script unpacks when the page opens."""
     return Markup(base64.b64encode(zlib.compress(text.encode(), 6)).decode())
-
-
-def _is_hidden(row: str) -> bool:
-    """Tell whether a row of a table is hidden at first."""
-    return row.partition(">")[0].endswith(" hidden")
 
 
 def _make_compact_json(value: Any) -> str:

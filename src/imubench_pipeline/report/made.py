@@ -3,23 +3,14 @@
 from __future__ import annotations
 
 import platform
+from collections.abc import Mapping
 from importlib.metadata import version
-from typing import Any
 
 from imubench_pipeline.report.plotting import plotting_version
 from imubench_pipeline.report.shell import imubench
 from imubench_pipeline.report.site import Entry, Site
 
-_LIBRARIES = (
-    "imubench_pipeline",
-    "numpy",
-    "scipy",
-    "numba",
-    "pyarrow",
-    "matplotlib",
-    "snakemake",
-)
-
+_LIBRARIES = ("numpy", "scipy", "numba", "pyarrow", "matplotlib", "snakemake")
 _RUN_COMMAND = (
     "snakemake -c2",
     "runs everything; later only the steps that new logs or changed settings affect. "
@@ -38,20 +29,17 @@ _COMMANDS: tuple[tuple[str, dict[str, str], str], ...] = (
 """Commands of `imubench` for the results, their options, and their effect."""
 
 
-def _make_context(site: Site) -> dict[str, Any]:
+def _make_context(site: Site) -> Mapping[str, object]:
+    commands = [_RUN_COMMAND]
+    for name, options, words in _COMMANDS:
+        commands.append((imubench(name, site.results_name, options), words))
+    if site.at_once:
+        commands = [(site.at_once, "writes these pages again")]
     return {
-        "commands": [(site.at_once, "writes these pages again")]
-        if site.at_once
-        else [
-            _RUN_COMMAND,
-            *(
-                (imubench(name, site.results_name, options), words)
-                for name, options, words in _COMMANDS
-            ),
-        ],
+        "commands": commands,
         "versions": {
             "python": platform.python_version(),
-            **{name: version(name) for name in _LIBRARIES},
+            **{name: version(name) for name in ("imubench_pipeline", *_LIBRARIES)},
             "plotly.js": plotting_version(),
         },
         "settings": {

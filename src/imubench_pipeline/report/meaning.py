@@ -10,13 +10,13 @@ from typing import Any
 from imubench_pipeline.model.comparisons import ErrorBudgetRow, RankingRow
 from imubench_pipeline.navigation.suitability.conditions import shares_of
 from imubench_pipeline.report.backtest import standing_text
+from imubench_pipeline.report.payload import Json
 from imubench_pipeline.report.practical import System, unit_of
 from imubench_pipeline.report.sourced import (
     SourcedInterval,
     SourcedNumber,
     margin,
-    of_budget,
-    of_ranking,
+    of_row,
 )
 from imubench_pipeline.settings.requirements import DIMENSIONS, Requirement
 from imubench_pipeline.words.numbers import NO_VALUE, Unit, duration_text, interval_text
@@ -30,6 +30,7 @@ from imubench_pipeline.words.verdicts import (
 )
 
 Simulated = Mapping[tuple[str, str], bool]
+"""Whether a recording is simulated, by sensor and name."""
 
 _NAMES = {
     "attitude": "attitude (tilt)",
@@ -96,24 +97,14 @@ def rankings(
     simulated: Simulated,
     system: System,
 ) -> Iterator[Ranking]:
-    """Yield the ranking for each requirement.
-
-    Parameters
-    ----------
-    rows : sequence of RankingRow
-    requirements : mapping of str to mapping
-        As the plan wrote them.
-    simulated : mapping of (str, str) to bool
-        Whether a recording is simulated.
-    system : {'practical', 'si'}
-    """
+    """Yield the ranking for each requirement; ``requirements`` are as the plan wrote them."""
     for name, declared in requirements.items():
-        own = [row for row in rows if row.requirement == name]
-        sensors = sorted(dict.fromkeys(row.sensor for row in own), key=_order(own))
-        groups = [
-            _group([row for row in own if row.sensor == sensor], simulated, system)
-            for sensor in sensors
-        ]
+        by_sensor: dict[str, list[RankingRow]] = {}
+        for row in rows:
+            if row.requirement == name:
+                by_sensor.setdefault(row.sensor, []).append(row)
+        groups = [_group(limits, simulated, system) for limits in by_sensor.values()]
+        groups.sort(key=lambda group: _order(group.row))
         yield Ranking(name, Requirement.model_validate(declared), groups)
 
 
@@ -122,10 +113,7 @@ def _group(limits: Sequence[RankingRow], simulated: Simulated, system: System) -
     used = {limit.recording for limit in limits}
     return Group(
         row,
-        simulated=all(
-            recording is not None and simulated.get((row.sensor, recording), False)
-            for recording in used
-        ),
+        simulated=all(simulated.get((row.sensor, name or ""), False) for name in used),
         rank=str(row.rank or NO_VALUE),
         verdict=VERDICT_WORDS[row.verdict],
         stated=stated_verdict(row),
@@ -136,27 +124,22 @@ def _group(limits: Sequence[RankingRow], simulated: Simulated, system: System) -
     )
 
 
-def _order(rows: Sequence[RankingRow]) -> Any:
-    """Return a key that sorts by rank, and equal ranks by conditions and margin.
+def _order(row: RankingRow) -> tuple[int, int, float]:
+    """Sort by rank, and equal ranks by conditions and margin.
 
     A sensor with unknown figures has a large margin, and conditions.
     """
-    places: dict[str, tuple[int, int, float]] = {}
-    for row in rows:
-        if row.decides:
-            rank, margin = row.rank or 10**6, row.margin or 0.0
-            meets = row.verdict in ("meets", "likely_meets")
-            place = (1 if row.conditions else 0) if meets else 2
-            places[row.sensor] = (rank, place, -margin)
-    return places.__getitem__
+    meets = row.verdict in ("meets", "likely_meets")
+    return row.rank or 10**6, int(bool(row.conditions)) if meets else 2, -(row.margin or 0.0)
 
 
 def _limit(row: RankingRow, system: System) -> LimitLine:
     size = margin(row)
-    chance = "–" if row.sigma is None else of_ranking(row, "chance", _percent(row.chance), "%")
+    chance = "–" if row.sigma is None else of_row(row, "chance", _percent(row.chance), "%")
+    unit = unit_of(DIMENSIONS[row.error], system, row.limit)
     return LimitLine(
         limit=limit_words(row),
-        allowed=_allowed(row, system),
+        allowed=of_row(row, "limit", f"{unit.text(row.limit, 3)} {unit.sign}", unit.sign),
         sigma=_expected(row, system),
         interval=_interval(row, system),
         margin=size[0] if size else NO_VALUE,
@@ -171,20 +154,8 @@ def _limit(row: RankingRow, system: System) -> LimitLine:
     )
 
 
-def _allowed(row: RankingRow, system: System) -> SourcedNumber:
-    unit = unit_of(DIMENSIONS[row.error], system, row.limit)
-    return of_ranking(row, "limit", f"{unit.text(row.limit, 3)} {unit.sign}", unit.sign)
-
-
 ErrorRow = RankingRow | ErrorBudgetRow
 """A row of an error after a time."""
-
-
-def _place(row: ErrorRow, column: str, text: str, unit: str) -> SourcedNumber:
-    """Return a number of a row with its place in the tables."""
-    if isinstance(row, RankingRow):
-        return of_ranking(row, column, text, unit)
-    return of_budget(row, column, text, unit)
 
 
 def _expected(row: ErrorRow, system: System) -> str:
@@ -192,20 +163,20 @@ def _expected(row: ErrorRow, system: System) -> str:
     if row.sigma is None:
         return NO_VALUE
     unit = unit_of(DIMENSIONS[row.error], system, row.sigma)
-    text = _shown(row, row.sigma, unit)
-    return _place(row, "sigma", text, unit.sign) if _sensible(row, row.sigma) else text
+    text = _format_error(row, row.sigma, unit)
+    return of_row(row, "sigma", text, unit.sign) if _is_sensible(row, row.sigma) else text
 
 
 def _interval(row: ErrorRow, system: System) -> str:
     """Return the limits of the error of a row, in the unit of the error."""
     if row.sigma is None or row.lower is None or row.upper is None:
         return NO_VALUE
-    if not _sensible(row, row.sigma):
+    if not _is_sensible(row, row.sigma):
         return NO_VALUE
     unit = unit_of(DIMENSIONS[row.error], system, row.sigma)
     digits = unit.digits(row.sigma, row.lower, row.upper)
     lower, upper = (
-        _place(row, name, unit.text(value, digits), unit.sign)
+        of_row(row, name, unit.text(value, digits), unit.sign)
         for name, value in (("lower", row.lower), ("upper", row.upper))
     )
     return SourcedInterval(lower, upper)
@@ -226,17 +197,16 @@ def limit_words(row: RankingRow) -> str:
 
 def budget_tables(
     rows: Sequence[ErrorBudgetRow], simulated: Simulated, system: System
-) -> Iterator[dict[str, Any]]:
+) -> Iterator[Json]:
     """Yield the error budget of each recording: a line an error and axis, a column a time.
 
-    Of the table ``error_budget``, less what requirements ask for, and which recordings are
-    simulated.
+    ``rows`` are those of ``error_budget``; errors that requirements ask for are left out.
     """
     own = [row for row in rows if row.requirement is None]
     for key in dict.fromkeys((row.sensor, row.recording) for row in own):
         parts = [row for row in own if (row.sensor, row.recording) == key]
         times = list(dict.fromkeys(row.time for row in parts))
-        lines: dict[tuple[str, tuple[float | None, ...]], dict[str, Any]] = {}
+        lines: dict[tuple[str, tuple[float | None, ...]], Json] = {}
         missing: dict[str, None] = {}
         for error, axis in dict.fromkeys((row.error, row.axis) for row in parts):
             chosen = [row for row in parts if (row.error, row.axis) == (error, axis)]
@@ -249,6 +219,10 @@ def budget_tables(
             else:
                 cells = [_cell([r for r in chosen if r.time == t], system) for t in times]
                 lines[error, sigmas] = {"error": _NAMES[error], "axis": axis, "cells": cells}
+        notes: dict[str, dict[str, None]] = {}  # the errors of each note
+        for line in lines.values():
+            for note in (cell["note"] for cell in line["cells"] if cell["note"]):
+                notes.setdefault(note, {})[line["error"].split(" (")[0]] = None
         yield {
             "sensor": key[0],
             "recording": key[1],
@@ -256,39 +230,33 @@ def budget_tables(
             "times": [duration_text(time) for time in times],
             "lines": list(lines.values()),
             "missing": "; ".join(missing),
-            "notes": list(_notes(lines.values())),
+            "notes": [f"{', '.join(of).capitalize()}: {note}" for note, of in notes.items()],
         }
 
 
-def budget_bars(rows: Sequence[ErrorBudgetRow], system: System) -> list[dict[str, Any]]:
+def budget_bars(rows: Sequence[ErrorBudgetRow], system: System) -> list[Json]:
     """Return a bar for each error and time of the worst axes: the parts of its variance.
 
     Of the rows of the table ``error_budget`` of one recording.
     """
     own = [row for row in rows if row.requirement is None]
-    worst = [row for row in own if row.axis == own[0].axis]
     groups: dict[tuple[str, float], list[ErrorBudgetRow]] = {}
-    for row in worst:
-        groups.setdefault((row.error, row.time), []).append(row)
-    bars = []
-    for (error, time), parts in sorted(
-        groups.items(), key=lambda group: _ERRORS.index(group[0][0])
-    ):
+    for row in own:
+        if row.axis == own[0].axis:
+            groups.setdefault((row.error, row.time), []).append(row)
+    bars: list[Json] = []
+    for (error, time), parts in sorted(groups.items(), key=lambda of: _ERRORS.index(of[0][0])):
         total = _total(parts)
         sigma = total.sigma if total else None
         if not total or not sigma:
             continue
-        size = _shown(total, sigma, unit_of(DIMENSIONS[error], system, sigma))
-        bars.append(
-            {
-                "label": f"{error} {duration_text(time)}: {size}",
-                "shares": [
-                    [row.source, float(f"{(row.sigma / sigma) ** 2:.3g}")]
-                    for row in parts
-                    if row.source != "total" and row.sigma
-                ],
-            }
-        )
+        size = _format_error(total, sigma, unit_of(DIMENSIONS[error], system, sigma))
+        shares = [
+            (row.source, float(f"{(row.sigma / sigma) ** 2:.3g}"))
+            for row in parts
+            if row.source != "total" and row.sigma
+        ]
+        bars.append({"label": f"{error} {duration_text(time)}: {size}", "shares": shares})
     return bars
 
 
@@ -297,42 +265,30 @@ def _total(rows: Iterable[ErrorBudgetRow]) -> ErrorBudgetRow | None:
     return next((row for row in rows if row.source == "total"), None)
 
 
-def _notes(lines: Iterable[Mapping[str, Any]]) -> Iterator[str]:
-    """Yield what is said of the cells of a budget, each thing once, with the errors it is about."""
-    by_note: dict[str, dict[str, None]] = {}
-    for line in lines:
-        for cell in line["cells"]:
-            if cell["note"]:
-                by_note.setdefault(cell["note"], {})[line["error"].split(" (")[0]] = None
-    for note, errors in by_note.items():
-        yield f"{', '.join(errors).capitalize()}: {note}"
-
-
-def _cell(rows: Sequence[ErrorBudgetRow], system: System) -> dict[str, Any]:
-    """Return an error with its interval, and what it comes of."""
+def _cell(rows: Sequence[ErrorBudgetRow], system: System) -> Json:
+    """Return an error with its interval and its sources."""
     total = _total(rows)
     if total is None or total.sigma is None:
-        reason = total.reason if total else None
-        return {"lines": [NO_VALUE], "note": reason or "", "class": "number none"}
+        return {"lines": [NO_VALUE], "note": (total and total.reason) or "", "known": False}
     unit = unit_of(DIMENSIONS[total.error], system, total.sigma)
-    lines = [_shown(total, total.sigma, unit)]
-    if _sensible(total, total.sigma):
+    lines = [_format_error(total, total.sigma, unit)]
+    if _is_sensible(total, total.sigma):
         digits = unit.digits(total.sigma, total.lower, total.upper)
         lines.append(interval_text(total.lower, total.upper, unit, digits))
     sources = [row for row in rows if row.source != "total"]
     if total.sigma > 0.0:
         lines += [share_text(share) for share in shares_of(total.sigma, sources)] or [""]
-    return {"lines": lines, "note": total.reason or "", "class": "number"}
+    return {"lines": lines, "note": total.reason or "", "known": True}
 
 
-def _sensible(row: ErrorRow, sigma: float) -> bool:
+def _is_sensible(row: ErrorRow, sigma: float) -> bool:
     """Tell whether an error is below a quarter turn, beyond which an angle means nothing."""
     return DIMENSIONS[row.error] != "angle" or sigma <= _QUARTER_TURN
 
 
-def _shown(row: ErrorRow, sigma: float, unit: Unit) -> str:
+def _format_error(row: ErrorRow, sigma: float, unit: Unit) -> str:
     """Return the error of a row with its unit, with the digits that its limits leave."""
-    if not _sensible(row, sigma):
+    if not _is_sensible(row, sigma):
         north = row.error == "north"
         return "not to be found" if north else f"over {unit.text(_QUARTER_TURN, 3)} {unit.sign}"
     digits = unit.digits(sigma, row.lower, row.upper)
@@ -344,7 +300,7 @@ def _percent(share: float | None) -> str:
 
 
 def budget_words(settings: Mapping[str, Any]) -> str:
-    """Return what the errors of a budget mean, by the section ``error_budget`` of the settings."""
+    """Return the meaning of a budget, by the section ``error_budget`` of the settings."""
     return (
         "Errors that the noise causes in dead reckoning, with 95 % intervals and the parts of the "
         f"variance of 1 % or more. Biases and tilt are taken over {settings['static_window']} at "

@@ -1,4 +1,4 @@
-"""The pages of a report: those that there is one of, and those of each recording and sensor."""
+"""The pages of a report: single ones, and one for each recording, sensor and device."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ ENTRIES: Sequence[Entry] = (
     theory.THEORY,
     made.MADE,
 )
-"""The pages that there is one of, in the order of the navigation; the first is the start page."""
+"""The pages that exist once, in the order of the navigation; the first is the start page."""
 
 
 def pages(site: Site) -> Iterator[Page]:
-    """Yield the pages of the report, the start page last: it stands for the finished report."""
+    """Yield the pages of the report, the start page last: it marks a finished report."""
     for view in site.views:
         kind = "" if view.left_out else view.row.kind
         yield recording.page_of(site, view, RECORDING_PAGES.by_key().get(kind, recording.STATIC))

@@ -13,13 +13,10 @@ from dataclasses import dataclass
 class Appearance:
     """The appearance of a line."""
 
-    # light, dark: colour on a light and on a dark background
-    light: str
-    dark: str
-    # ``solid``, ``dash``, ``dot``, ``dashdot``, ``longdash``, ``longdashdot``, or lengths
-    dash: str
-    # ``circle``, ``square``, ``diamond``, ``triangle-up``, ``triangle-down``, ``cross``, ``x``
-    marker: str
+    light: str  # colour on a light background
+    dark: str  # colour on a dark background
+    dash: str  # as Plotly names it, or lengths
+    marker: str  # as Plotly names it
 
 
 _COLOURS = (
@@ -32,8 +29,20 @@ _COLOURS = (
     ("#7A4B3A", "#C69A88"),
     ("#5B5FC7", "#A3A6F2"),
 )
+TERM_COLOURS = tuple(
+    {"light": light, "dark": dark}
+    for place, (light, dark) in enumerate(_COLOURS)
+    if place not in (2, 5)  # too close to the green of the best method, and to grey
+)
+"""Colours of the terms of a model and of the sources of an error, by their place."""
+
 _MARKERS = ("circle", "square", "diamond", "triangle-up", "triangle-down", "cross", "x")
 _DASHES = ("solid", "dash", "dot", "dashdot", "longdash")
+
+_INK_COLOURS = ("#1b1b1b", "#e8e8e8")
+_INK_SHARES = (0.0, 0.5, 0.25, 0.75)
+_STYLES_PER_DASH = len(_INK_SHARES) * len(_MARKERS)
+"""Recordings with the same dash."""
 
 _METHOD_STYLES = {
     "likelihood": Appearance("#008F6B", "#2EC4A0", "solid", "diamond"),
@@ -82,12 +91,6 @@ def recording_styles(sensor_style: Appearance) -> list[Appearance]:
         )
         for place in range(2 * _STYLES_PER_DASH)
     ]
-
-
-_INK_COLOURS = ("#1b1b1b", "#e8e8e8")
-_INK_SHARES = (0.0, 0.5, 0.25, 0.75)
-_STYLES_PER_DASH = len(_INK_SHARES) * len(_MARKERS)
-"""Recordings with the same dash."""
 
 
 def _mix_colours(colour: str, ink: str, share: float) -> str:

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from itertools import chain
-from typing import Any
 
 import numpy as np
 
 from imubench_pipeline.estimators.estimate import PARAMETERS, SENSOR, SHOWN
 from imubench_pipeline.estimators.model_choice import MIN_AKAIKE_WEIGHT, information_weights
-from imubench_pipeline.model.estimates import ParameterRow, SimulatedTruthRow
+from imubench_pipeline.model.estimates import ParameterRow
+from imubench_pipeline.report.payload import Json
 from imubench_pipeline.report.practical import System, page_unit
 from imubench_pipeline.report.view import ChannelView
 from imubench_pipeline.words.estimates import estimate_text, model_text
@@ -28,10 +28,10 @@ def shown_symbols(rows: Iterable[ParameterRow]) -> list[str]:
 
 def methods_table(
     channel: ChannelView, duration: float | None, system: System
-) -> tuple[list[str], list[dict[str, Any]]]:
+) -> tuple[list[str], list[Json]]:
     """Return the symbols, and one line per method; of a simulation also the true parameters."""
     symbols = shown_symbols(chain(*channel.parameters.values()))
-    lines: list[dict[str, Any]] = [
+    lines: list[Json] = [
         {
             "method": method,
             "recommended": method == channel.recommended,
@@ -41,7 +41,11 @@ def methods_table(
         for method in channel.parameters
     ]
     if channel.true_components:
-        cells = [_describe_truth(channel.true_components.get(symbol, [])) for symbol in symbols]
+        cells = []
+        for rows in (channel.true_components.get(symbol, []) for symbol in symbols):
+            parts = [_part(row.value, None, None, "assumed" if row.assumed else "") for row in rows]
+            source = rows[0].source if rows else "Not simulated."
+            cells.append(_cell(parts, source, 3))
         lines.append({"method": None, "recommended": False, "model": "", "cells": cells})
     return symbols, lines
 
@@ -67,27 +71,31 @@ def model_words(channel: ChannelView, method: str) -> str:
 
 def cell(
     channel: ChannelView, method: str, symbol: str, duration: float | None, system: System
-) -> dict[str, Any]:
+) -> Json:
     """Return a cell with a part for each component: its value, interval and status."""
     unit = page_unit(channel.quantity, symbol, system)
     rows = channel.named(method, symbol)
     parts = [
-        {
-            "value": row.value,
-            "lower": None if row.status == "absent" else row.lower,
-            "upper": row.upper,
-            "status": "" if row.status == "ok" else row.status,
-        }
+        _part(
+            row.value,
+            None if row.status == "absent" else row.lower,
+            row.upper,
+            "" if row.status == "ok" else row.status,
+        )
         for row in rows
     ]
     digits = max((digits_of(unit, row.value, row.lower, row.upper) for row in rows), default=3)
     words = [sentence for row in rows if (sentence := estimate_text(row, unit, duration))]
-    return {
-        "parts": parts,
-        "words": " ".join(words),
-        "value": rows[0].value if rows else None,
-        "digits": digits,
-    }
+    return _cell(parts, " ".join(words), digits)
+
+
+def _part(value: float | None, lower: float | None, upper: float | None, status: str) -> Json:
+    return {"value": value, "lower": lower, "upper": upper, "status": status}
+
+
+def _cell(parts: Sequence[Json], words: str, digits: int) -> Json:
+    value = parts[0]["value"] if parts else None
+    return {"parts": parts, "words": words, "value": value, "digits": digits}
 
 
 def digits_of(unit: Unit, value: float | None, lower: float | None, upper: float | None) -> int:
@@ -98,18 +106,3 @@ def digits_of(unit: Unit, value: float | None, lower: float | None, upper: float
     if value is None or lower is None or upper is None:
         return limit_digits(lower, upper)
     return max(unit.digits(value, lower, upper), limit_digits(lower, upper, 2))
-
-
-def _describe_truth(rows: Sequence[SimulatedTruthRow]) -> dict[str, Any]:
-    if not rows:
-        return {"parts": [], "words": "Not simulated.", "value": None, "digits": 3}
-    parts = [
-        {
-            "value": row.value,
-            "lower": None,
-            "upper": None,
-            "status": "assumed" if row.assumed else "",
-        }
-        for row in rows
-    ]
-    return {"parts": parts, "words": rows[0].source, "value": rows[0].value, "digits": 3}

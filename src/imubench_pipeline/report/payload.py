@@ -9,15 +9,17 @@ from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.special import chdtri
 
 from imubench_pipeline.estimators.estimate import COMPARED
-from imubench_pipeline.model.estimates import EnvelopeRow, HistogramRow
+from imubench_pipeline.model.estimates import EnvelopeRow, HistogramRow, ModelSampleRow
 from imubench_pipeline.model.table import ChannelRow
 from imubench_pipeline.noise import NoiseModel, Term
 from imubench_pipeline.report.palette import Appearance, method_appearance
 from imubench_pipeline.report.practical import printed_text
 from imubench_pipeline.report.view import METHOD_NAMES, ChannelView
+
+Json = dict[str, Any]
+"""Data of a page for its scripts."""
 
 FOREST = (*COMPARED, "B", "T_B")
 """The parameters that are drawn across sensors."""
@@ -46,12 +48,8 @@ def packed_log(values: ArrayLike) -> Packed:
 
 
 def _quantise(values: NDArray[np.float64], levels: int) -> tuple[float, float, NDArray[np.float64]]:
-    """Return begin and step of the codes of numbers, and the codes; 0 stands for none."""
+    """Return begin and step of the codes of numbers, and the codes; 0 means no number."""
     finite = np.isfinite(values)
-    if finite.all():
-        low, high = (float(values.min()), float(values.max())) if len(values) else (0.0, 0.0)
-        step = (high - low) / levels or 1.0
-        return low, step, 1.0 + np.rint((values - low) / step)
     present = values[finite]
     low, high = (float(present.min()), float(present.max())) if len(present) else (0.0, 0.0)
     step = (high - low) / levels or 1.0
@@ -61,15 +59,15 @@ def _quantise(values: NDArray[np.float64], levels: int) -> tuple[float, float, N
 class Arrays:
     """Arrays of a page: each is stored once, as base64 of its codes.
 
-    ``levels``: 0 stands for no value, the others divide the range evenly, or its logarithm. Those
-    of a logarithm are kept as differences modulo 65536, all low bytes before all high ones.
+    Code 0 means no value; the others divide the range evenly, or its logarithm. Codes of a
+    logarithm are stored as differences modulo 65536, all low bytes before all high ones.
     """
 
     def __init__(self) -> None:
         self._places: dict[Packed, int] = {}
 
     def exact(self, values: ArrayLike) -> int:
-        """Return the place of an array that is kept as float32."""
+        """Return the place of an array that is stored as float32."""
         return self.place(("f", 0.0, 0.0, np.asarray(values, dtype="<f4").tobytes()))
 
     def log(self, values: ArrayLike) -> int:
@@ -94,7 +92,7 @@ class Arrays:
         ]
 
 
-def looks(sensors: Mapping[str, Appearance]) -> dict[str, Any]:
+def looks(sensors: Mapping[str, Appearance]) -> Json:
     """Return the appearance of sensors and methods."""
     return {
         "sensors": {name: asdict(look) for name, look in sensors.items()},
@@ -107,14 +105,14 @@ def looks(sensors: Mapping[str, Appearance]) -> dict[str, Any]:
 
 @dataclass(frozen=True)
 class ComparedChannel:
-    """The data of a channel in a comparison, small enough to keep those of all recordings."""
+    """The data of a channel in a comparison, small enough to hold all recordings in memory."""
 
     about: Mapping[str, Any]  # names, recommended method, parameters by method
     curve: Mapping[str, Packed]
     models: Mapping[str, tuple[Packed, Packed]]  # tau and deviation, by method
 
-    def among(self, arrays: Arrays) -> dict[str, Any]:
-        """Return it with the places of its arrays in those of a page."""
+    def among(self, arrays: Arrays) -> Json:
+        """Return it with the places of its arrays among the arrays of a page."""
         return {
             **self.about,
             **{name: arrays.place(packed) for name, packed in self.curve.items()},
@@ -127,39 +125,42 @@ class ComparedChannel:
 
 def compared(view: ChannelView) -> ComparedChannel:
     """Return the data of a channel in a comparison: curve, models, parameters."""
+    parameters: dict[str, dict[str, list[list[object]]]] = {}
+    for method in (view.recommended, "likelihood_gm"):
+        if method in view.parameters:
+            # Value, limits and status of each component, with the digits of `report.html`.
+            parameters[method] = {
+                symbol: [[*map(_round, (r.value, r.lower, r.upper)), r.status] for r in rows]
+                for symbol in FOREST
+                if (rows := view.named(method, symbol))
+            }
+    models = {}
+    for method in view.parameters:
+        model, tau = view.model(method), view.tau
+        if not model.sinusoids:  # it is smooth
+            tau = np.geomspace(tau[0], tau[-1], _COMPARED_MODEL_POINTS)
+        models[method] = packed_log(tau), packed_log(_compute_curve(model, tau))
+    about = ("sensor", "recording", "channel", "simulated", "recommended")
+    curve = ("tau", "adev", "lower", "upper")
     return ComparedChannel(
-        about={
-            "sensor": view.sensor,
-            "recording": view.recording,
-            "channel": view.channel,
-            "simulated": view.simulated,
-            "recommended": view.recommended,
-            "parameters": {
-                method: _list_estimates(view, method)
-                for method in dict.fromkeys((view.recommended, "likelihood_gm"))
-                if method in view.parameters
-            },
-        },
-        curve={
-            "tau": packed_log(view.tau),
-            "adev": packed_log(view.adev),
-            "lower": packed_log(view.lower),
-            "upper": packed_log(view.upper),
-        },
-        models={method: _pack_model(view.model(method), view.tau) for method in view.parameters},
+        {name: getattr(view, name) for name in about} | {"parameters": parameters},
+        {name: packed_log(getattr(view, name)) for name in curve},
+        models,
     )
 
 
-def _pack_model(model: NoiseModel, tau: NDArray[np.float64]) -> tuple[Packed, Packed]:
-    """Return the curve of a model, on few points where it is smooth."""
-    if not model.sinusoids:
-        tau = np.geomspace(tau[0], tau[-1], _COMPARED_MODEL_POINTS)
-    return packed_log(tau), packed_log(_compute_curve(model, tau))
+def _round(value: float | None) -> float | None:
+    return None if value is None else float(f"{value:.7g}")
 
 
-def channel_payload(view: ChannelView, rate: float | None, arrays: Arrays) -> dict[str, Any]:
-    """Return the data of all figures of a channel, except samples; ``rate`` is in Hz."""
+def channel_payload(view: ChannelView, arrays: Arrays) -> Json:
+    """Return the data of all figures of a channel, except samples."""
     model = view.model(view.recommended)
+    band = ("lower", "upper", "reconstructed")
+    terms: list[tuple[str, Term | NoiseModel]] = [*_name_terms(model)]
+    if count := len(model.sinusoids):
+        name = "line" if count == 1 else f"{count} lines"
+        terms.append((name, NoiseModel(sinusoids=model.sinusoids)))
     return {
         "channel": view.channel,
         "sensor": view.sensor,
@@ -171,35 +172,24 @@ def channel_payload(view: ChannelView, rate: float | None, arrays: Arrays) -> di
         "lower": arrays.log(view.lower),
         "upper": arrays.log(view.upper),
         "methods": {
-            method: _pack_method(view, method, curve, arrays)
+            method: {
+                "tau": arrays.log(curve["tau"]),
+                "model": arrays.log(_compute_curve(view.model(method), curve["tau"])),
+                **{name: arrays.log(curve[name]) for name in band if method == view.recommended},
+            }
             for method, curve in view.reconstruction.items()
         },
         "terms": [
-            {
-                "name": name,
-                "adev": arrays.log(np.sqrt(term.allan_variance(view.tau))),
-            }
-            for name, term in [*_name_terms(model), *_merge_lines(model)]
+            {"name": name, "adev": arrays.log(_compute_curve(term, view.tau))}
+            for name, term in terms
         ],
         "compensated": {name: arrays.log(values) for name, values in view.compensated.items()},
         "datasheet": datasheet_lines(view),
-        "spectrum": _pack_spectrum(view, model, rate, arrays),
+        "spectrum": _pack_spectrum(view, model, arrays) if view.spectrum else None,
     }
 
 
-def _pack_method(
-    view: ChannelView, method: str, curve: Mapping[str, Any], arrays: Arrays
-) -> dict[str, Any]:
-    curves = {
-        "tau": arrays.log(curve["tau"]),
-        "model": arrays.log(_compute_curve(view.model(method), curve["tau"])),
-    }
-    if method == view.recommended:
-        curves |= {name: arrays.log(curve[name]) for name in ("lower", "upper", "reconstructed")}
-    return curves
-
-
-def _compute_curve(model: NoiseModel, tau: Any) -> Any:
+def _compute_curve(model: NoiseModel | Term, tau: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.sqrt(model.allan_variance(tau))
 
 
@@ -212,73 +202,40 @@ def _name_terms(model: NoiseModel) -> list[tuple[str, Term]]:
     ]
 
 
-def _merge_lines(model: NoiseModel) -> list[tuple[str, Any]]:
-    """Return the spectral lines of a model as one term."""
-    count = len(model.sinusoids)
-    if count == 0:
-        return []
-    return [("line" if count == 1 else f"{count} lines", NoiseModel(sinusoids=model.sinusoids))]
+def datasheet_lines(view: ChannelView) -> list[Json]:
+    """Return the lines of the datasheet that can be drawn beside the curve of a channel.
 
-
-def datasheet_lines(view: ChannelView) -> list[dict[str, Any]]:
-    """Return the lines of the datasheet that can be drawn beside the curve of a channel."""
+    Each is the power ``slope`` of tau, with the value at 1 s.
+    """
     lines = []
+    names = {"N": ("noise density", -0.5), "adev_minimum": ("bias instability", 0.0)}
     for row in view.datasheet:
-        if row.method != view.recommended or row.comparable is None:
+        if row.method != view.recommended or row.comparable is None or row.statistic not in names:
             continue
-        if row.statistic not in ("N", "adev_minimum"):
-            continue
-        name = {"N": "noise density", "adev_minimum": "bias instability"}[row.statistic]
+        name, slope = names[row.statistic]
         reading = f"read as {row.sidedness}" if row.sidedness else ""
-        about = filter(None, (row.kind, reading))
-        lines.append(
-            {
-                "of": row.statistic,
-                "value": row.comparable,
-                "label": f"{name} {printed_text(row)} ({', '.join(about)})",
-            }
-        )
+        label = f"{name} {printed_text(row)} ({', '.join(filter(None, (row.kind, reading)))})"
+        lines.append({"slope": slope, "value": row.comparable, "label": label})
     return lines
 
 
-def _list_estimates(view: ChannelView, method: str) -> dict[str, Any]:
-    """Return value, limits and status of each component of the parameters that are compared."""
-    by_symbol: dict[str, list[list[Any]]] = {}
-    for symbol in FOREST:
-        for row in view.named(method, symbol):
-            numbers = (_round_value(number) for number in (row.value, row.lower, row.upper))
-            by_symbol.setdefault(symbol, []).append([*numbers, row.status])
-    return by_symbol
-
-
-def _pack_spectrum(
-    view: ChannelView, model: NoiseModel, rate: float | None, arrays: Arrays
-) -> dict[str, Any] | None:
-    if not view.spectrum:
-        return None
+def _pack_spectrum(view: ChannelView, model: NoiseModel, arrays: Arrays) -> Json:
     spectrum = view.spectrum
     frequency = spectrum["frequency"]
     smooth = np.geomspace(frequency[0], frequency[-1], _SPECTRUM_POINTS)
     # Fewer points than bins suffice for a line.
     some = np.unique(np.linspace(0, len(frequency) - 1, _SPECTRUM_POINTS).round().astype(int))
-    fitted, freedom = (np.take(spectrum[name], some) for name in ("fitted", "ordinates"))
+    fit = zip(("fitted", "lower", "upper"), (spectrum["fitted"], *view.bin_limits()), strict=True)
     return {
         "frequency": arrays.log(frequency),
         "density": arrays.log(np.sqrt(spectrum["density"])),
         "left": np.flatnonzero(spectrum["used"] == 0).tolist(),
         "fit_frequency": arrays.log(np.take(frequency, some)),
-        "fitted": arrays.log(np.sqrt(fitted)),
-        # A bin scatters about the fit as chi squared of its degrees of freedom over these.
-        **{
-            name: arrays.log(np.sqrt(fitted * chdtri(freedom, beyond) / freedom))
-            for name, beyond in (("lower", 0.975), ("upper", 0.025))
-        },
+        **{name: arrays.log(np.sqrt(np.take(density, some))) for name, density in fit},
         "model": next((row.model for row in view.models if row.chosen), ""),
         "smooth": arrays.log(smooth),
-        "terms": []
-        if not rate
-        else [
-            {"name": name, "density": arrays.log(np.sqrt(term.psd(smooth, 1.0 / rate)))}
+        "terms": [
+            {"name": name, "density": arrays.log(np.sqrt(term.psd(smooth, 1.0 / view.rate)))}
             for name, term in _name_terms(model)
         ],
         "lines": [
@@ -290,23 +247,55 @@ def _pack_spectrum(
 
 def samples_payload(
     envelope: Sequence[EnvelopeRow], histogram: Sequence[HistogramRow], arrays: Arrays
-) -> dict[str, Any]:
+) -> Json:
     """Return the envelope of the samples of a recording and their histogram, by channel."""
-    payload: dict[str, Any] = {"envelope": {}, "histogram": {}}
-    for channel, rows in _group_by_channel(envelope).items():
-        payload["envelope"][channel] = {
-            "start": rows[0].start,
-            "end": rows[-1].end,
-            "low": arrays.even(numbers(row.low for row in rows)),
-            "high": arrays.even(numbers(row.high for row in rows)),
-            "mean": arrays.even(numbers(row.mean for row in rows)),
-        }
-    for channel, bins in _group_by_channel(histogram).items():
-        payload["histogram"][channel] = {
-            "edges": arrays.exact([bins[0].lower, *(row.upper for row in bins)]),
-            "count": arrays.log([row.count for row in bins]),
-        }
-    return payload
+    return {
+        "envelope": {
+            channel: {"start": rows[0].start, "end": rows[-1].end, **_pack_envelope(rows, arrays)}
+            for channel, rows in _group_by_channel(envelope).items()
+        },
+        "histogram": {
+            channel: {
+                "edges": arrays.exact([bins[0].lower, *(row.upper for row in bins)]),
+                "count": arrays.log([row.count for row in bins]),
+            }
+            for channel, bins in _group_by_channel(histogram).items()
+        },
+    }
+
+
+MODEL_SAMPLE_NAMES = {
+    "log": "log",
+    "before": "model before the fit",
+    "after": "model after the fit",
+}
+
+
+def model_samples_payload(rows: Sequence[ModelSampleRow], arrays: Arrays) -> Json:
+    """Return the samples of a log and of logs simulated from its models, by channel."""
+    drawn: Json = {}
+    for channel, of_channel in _group_by_channel(rows).items():
+        drawn[channel] = {}
+        for of, name in MODEL_SAMPLE_NAMES.items():
+            envelope = [row for row in of_channel if (row.of, row.what) == (of, "envelope")]
+            stretch = [row for row in of_channel if (row.of, row.what) == (of, "stretch")]
+            if envelope:
+                drawn[channel][of] = {
+                    "name": name,
+                    "end": envelope[-1].end,
+                    **_pack_envelope(envelope, arrays),
+                    "stretch": arrays.even(numbers(row.mean for row in stretch)),
+                    "stretch_end": stretch[-1].end,
+                }
+    return drawn
+
+
+def _pack_envelope(rows: Sequence[EnvelopeRow | ModelSampleRow], arrays: Arrays) -> dict[str, int]:
+    return {
+        "low": arrays.even(numbers(row.low for row in rows)),
+        "high": arrays.even(numbers(row.high for row in rows)),
+        "mean": arrays.even(numbers(row.mean for row in rows)),
+    }
 
 
 _OfChannel = TypeVar("_OfChannel", bound=ChannelRow)
@@ -317,11 +306,6 @@ def _group_by_channel(rows: Sequence[_OfChannel]) -> dict[str, list[_OfChannel]]
     for row in rows:
         channels.setdefault(row.channel, []).append(row)
     return channels
-
-
-def _round_value(value: float | None) -> float | None:
-    # As in `report.html`, so that both print the same digits.
-    return None if value is None else float(f"{value:.7g}")
 
 
 def numbers(values: Iterable[float | None]) -> list[float]:

@@ -38,7 +38,7 @@ def plotting_version() -> str:
 
 
 def _find_script() -> Path:
-    """Return the file in the wheel, or in a checkout that of the Python package plotly."""
+    """Return the file in the wheel, or in a checkout the file of the package plotly."""
     if _SHIPPED_SCRIPT.is_file():
         return _SHIPPED_SCRIPT
     return Path(str(distribution("plotly").locate_file("plotly/package_data/plotly.min.js")))

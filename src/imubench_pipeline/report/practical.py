@@ -1,19 +1,21 @@
 """The units in which engineers state inertial errors, and numbers as they are printed.
 
-A page can show each quantity in several units and switch between them; `units_of_pages` is what
-it needs for that. The first choice is the practical one, the last is SI.
+A page can show each quantity in several units (`units_of_pages`). The first choice is the practical
+one, the last is SI.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import cache
-from typing import Literal, Protocol
+from typing import Literal
 
 from imubench_pipeline.estimators.dimensions import DIMENSIONS
+from imubench_pipeline.model.comparisons import DatasheetRow, RepeatabilityRow
+from imubench_pipeline.model.recordings import RecordingRow
 from imubench_pipeline.settings.sensor import QUANTITIES
 from imubench_pipeline.units import conversion
-from imubench_pipeline.words.numbers import NO_VALUE, Unit
+from imubench_pipeline.words.numbers import NO_VALUE, Unit, number_text
 
 System = Literal["practical", "si"]
 
@@ -21,7 +23,7 @@ System = Literal["practical", "si"]
 def _make_signs(
     level: str, *, Q: str, N: str, K: str, R: str, psd: str, signal: str | None = None
 ) -> dict[str, str]:
-    """Return the signs of all symbols; ``level`` is that of B and of the Allan deviation."""
+    """Return the signs of all symbols; ``level`` is the sign of B and of the Allan deviation."""
     return {
         **{"Q": Q, "N": N, "N_sensor": N, "B": level, "B_curve": level, "sigma_min": level},
         **{"T_B": "s", "tau_min": "s", "K": K, "R": R},
@@ -57,13 +59,18 @@ _SIGNS_OF_DIMENSIONS: dict[System, dict[str, str]] = {
 }
 
 
+_PREFIXED_DIMENSIONS = ("velocity", "length")
+_MIN_SIZE_OF_PREFIX = ((1e3, "k"), (0.1, ""), (1e-4, "m"), (0.0, "µ"))
+"""Smallest size in SI for each prefix."""
+
+
 def page_unit(quantity: str, symbol: str, system: System) -> Unit:
     """Return the unit in which a page first shows a figure of a quantity.
 
     The symbol is a parameter, or ``adev``, ``psd`` (root of a density) or ``signal`` (the log
     itself).
     """
-    return _find_unit(quantity, symbol, _choose_system(quantity, system))
+    return _find_unit(quantity, symbol, first_choices(system)[quantity])
 
 
 def units_of_pages() -> dict[str, dict[str, dict[str, Unit]]]:
@@ -79,12 +86,8 @@ def units_of_pages() -> dict[str, dict[str, dict[str, Unit]]]:
 
 def first_choices(system: System) -> Mapping[str, str]:
     """Return the name of the choice with which a page opens, by quantity."""
-    return {quantity: _choose_system(quantity, system) for quantity in _UNIT_CHOICES}
-
-
-def _choose_system(quantity: str, system: System) -> str:
-    names = list(_UNIT_CHOICES[quantity])
-    return names[0] if system == "practical" else names[-1]
+    place = 0 if system == "practical" else -1
+    return {quantity: list(choices)[place] for quantity, choices in _UNIT_CHOICES.items()}
 
 
 @cache
@@ -96,7 +99,7 @@ def _find_unit(quantity: str, symbol: str, choice: str) -> Unit:
         "quadratic": f"{quantity}_temperature_curvature",
     }.get(symbol, QUANTITIES[quantity])
     signs = _UNIT_CHOICES[quantity][choice]
-    # A parameter without its own unit uses that of the first parameter of its dimension.
+    # A parameter without its own unit has the unit of the first parameter of its dimension.
     alike = next((other for other in signs if dimensions.get(other) == dimension), symbol)
     return _make_unit(signs.get(symbol) or signs[alike], dimension)
 
@@ -104,12 +107,11 @@ def _find_unit(quantity: str, symbol: str, choice: str) -> Unit:
 def unit_of(dimension: str, system: System, size: float | None = None) -> Unit:
     """Return the unit in which a page shows an angle, a velocity or a length.
 
-    ``size``, SI: of what is shown, for which a prefix is chosen; SI has none.
+    A prefix is chosen for ``size`` (SI) in practical units.
     """
     if not size:
         return _make_unit(_SIGNS_OF_DIMENSIONS[system][dimension], dimension)
-    units = units_by_size(dimension, system)
-    return next(unit for least, unit in units if abs(size) >= least)
+    return next(unit for least, unit in units_by_size(dimension, system) if abs(size) >= least)
 
 
 def units_by_size(dimension: str, system: System) -> list[tuple[float, Unit]]:
@@ -120,30 +122,21 @@ def units_by_size(dimension: str, system: System) -> list[tuple[float, Unit]]:
     return [(least, _make_unit(prefix + sign, dimension)) for least, prefix in prefixes]
 
 
-_PREFIXED_DIMENSIONS = ("velocity", "length")
-_MIN_SIZE_OF_PREFIX = ((1e3, "k"), (0.1, ""), (1e-4, "m"), (0.0, "µ"))
-"""Smallest size in SI for each prefix."""
-
-
 def _make_unit(sign: str, dimension: str) -> Unit:
     factor, _ = conversion(sign, dimension)
     return Unit(sign, 1.0 / factor)
 
 
-def printed_text(row: Printed) -> str:
+def temperature_text(row: RecordingRow) -> str:
+    """Return the range of the temperature of a recording; empty if it is not known."""
+    if row.temperature_min is None:
+        return ""
+    low, high = (number_text(end, 3) for end in (row.temperature_min, row.temperature_max))
+    return f"{low} to {high} °C"
+
+
+def printed_text(row: DatasheetRow | RepeatabilityRow) -> str:
     """Return the figure of a datasheet as it is printed; `NO_VALUE` where there is none."""
     if row.printed is None:
         return NO_VALUE
     return f"{row.printed:g} {row.unit or ''}".rstrip()
-
-
-class Printed(Protocol):
-    """A figure of a datasheet, as it is printed."""
-
-    @property
-    def printed(self) -> float | None:
-        """The number."""
-
-    @property
-    def unit(self) -> str | None:
-        """Its unit."""

@@ -12,11 +12,13 @@ from pathlib import Path
 import jinja2
 import pyarrow as pa
 
+from imubench_pipeline.estimators.estimate import SHOWN
 from imubench_pipeline.registry import files_of
 from imubench_pipeline.report.folder import KEYS, write_failed_pages
 from imubench_pipeline.report.glossary import glossary
 from imubench_pipeline.report.html import environment
 from imubench_pipeline.report.pages import ENTRIES, pages
+from imubench_pipeline.report.palette import TERM_COLOURS
 from imubench_pipeline.report.plotting import plotting_script
 from imubench_pipeline.report.practical import units_of_pages
 from imubench_pipeline.report.run_summary import one_line
@@ -26,7 +28,7 @@ from imubench_pipeline.tables import read, read_json, write_content
 from imubench_pipeline.tables.failures import describe_error
 from imubench_pipeline.tables.provenance import source_digest
 from imubench_pipeline.tables.schemas import OF_ONE_RECORDING, TABLES
-from imubench_pipeline.words.estimates import STATUS_WORDS
+from imubench_pipeline.words.estimates import STATUS_WORDS, symbol_text
 
 _SETTINGS_FILE = "settings.json"
 _REQUIRED_SETTINGS = {"report", "settings", "sensors", "boards", "requirements"}
@@ -34,25 +36,9 @@ _REQUIRED_SETTINGS = {"report", "settings", "sensors", "boards", "requirements"}
 _PAGE_FOLDERS = ("recordings", "sensors", "devices")
 _STATIC_FOLDER = Path(__file__).with_name("static")
 _SCRIPT_NAMES = (
-    "address",
-    "numbers",
-    "terms",
-    "tables",
-    "tools",
-    "plot",
-    "sketch",
-    "overlay",
-    "ratios",
-    "comparison",
-    "side_by_side",
-    "tabs",
-    "search",
-    "channel",
-    "trend",
-    "start",
+    *("address", "numbers", "terms", "tables", "tools", "plot", "sketch", "overlay", "ratios"),
+    *("comparison", "side_by_side", "tabs", "search", "channel", "trend", "start"),
 )
-
-_STYLE_NAMES = ("report", "decisions")
 
 Progress = Callable[[str], None]
 
@@ -65,7 +51,9 @@ def publish(site: Site, folder: Path, say: Progress = lambda _: None) -> list[st
     written paths, below the folder.
     """
     written = []
-    for path, content in (_make_assets() | _make_search(site)).items():
+    # A page opened from disk may not read files, but it may run scripts.
+    search = {"assets/search.js": f"imubenchSearch({index(site)});\n"}
+    for path, content in (_make_assets() | search).items():
         written += _put(folder, path, content)
     every = list(pages(site))
     keys = {page.path: page.key for page in every}
@@ -89,8 +77,11 @@ def publish(site: Site, folder: Path, say: Progress = lambda _: None) -> list[st
             if page.path not in site.failed:
                 shown[page.path] = _make_key(page.key, rendered)
             written += _put(folder, page.path, rendered)
-    for path in _list_pages(site, folder) - keys.keys():
-        (folder / path).unlink()
+    existing = [file for of in _PAGE_FOLDERS for file in (folder / of).rglob("*.html")]
+    existing += [file for entry in site.entries if (file := folder / entry.file).is_file()]
+    for file in existing:
+        if file.relative_to(folder).as_posix() not in keys:
+            file.unlink()
     _put(folder, _SETTINGS_FILE, _format_json(site.settings))
     _put(folder, KEYS, _format_json(shown))
     write_failed_pages(site.failed, folder)
@@ -117,19 +108,9 @@ def _make_key(key: str, content: bytes) -> str:
 def _read_keys(path: Path) -> dict[str, str]:
     """Return the digests of the existing pages; empty if they are unknown."""
     try:
-        keys = read_json(path)
-    except (OSError, ValueError):
+        return {page: str(key) for page, key in read_json(path).items()}
+    except (OSError, ValueError, AttributeError):
         return {}
-    if not isinstance(keys, dict):
-        return {}
-    return {page: str(key) for page, key in keys.items()}
-
-
-def _list_pages(site: Site, folder: Path) -> set[str]:
-    """Return all pages in the folder, including obsolete ones."""
-    files = [path for of in _PAGE_FOLDERS for path in (folder / of).rglob("*.html")]
-    files += [path for entry in site.entries if (path := folder / entry.file).is_file()]
-    return {path.relative_to(folder).as_posix() for path in files}
 
 
 def _put(folder: Path, path: str, content: str | bytes) -> list[str]:
@@ -171,16 +152,12 @@ def _render(
 def _make_assets() -> dict[str, str]:
     return {
         "assets/report.css": "".join(
-            (_STATIC_FOLDER / f"{name}.css").read_text(encoding="utf-8") for name in _STYLE_NAMES
+            (_STATIC_FOLDER / name).read_text(encoding="utf-8")
+            for name in ("report.css", "decisions.css")
         ),
         "assets/report.js": _make_script(),
         "assets/plotly.min.js": plotting_script(),
     }
-
-
-def _make_search(site: Site) -> dict[str, str]:
-    # A page opened from disk may not read files, but it may run scripts.
-    return {"assets/search.js": f"imubenchSearch({index(site)});\n"}
 
 
 def _make_script() -> str:
@@ -198,7 +175,13 @@ def _make_script() -> str:
     terms = {key: entry.short for key, entry in glossary().items()}
     head = "".join(
         f"const {name} = {json.dumps(value, ensure_ascii=False)};\n"
-        for name, value in (("UNITS", units), ("STATUS_NAMES", STATUS_WORDS), ("TERMS", terms))
+        for name, value in (
+            ("UNITS", units),
+            ("STATUS_NAMES", STATUS_WORDS),
+            ("SYMBOL_TEXTS", {symbol: symbol_text(symbol) for symbol in SHOWN}),
+            ("TERMS", terms),
+            ("TERM_COLOURS", TERM_COLOURS),
+        )
     )
     return '(() => {\n"use strict";\n' + head + "\n".join(parts) + "})();\n"
 
@@ -206,25 +189,20 @@ def _make_script() -> str:
 def one_file(site: Site) -> str:
     """Return the whole report as one page that needs no other file."""
     templates = environment(site.system)
-    common = {"site": site.shown(alone=True), "path": "index.html", "root": ""}
     shown = [
         {"path": page.path, "content": _make_page(site, templates, page, "fragment.html.jinja")}
         for page in pages(site)
     ]
     assets = _make_assets()
-    scripts = [
-        assets[f"assets/{name}.js"].replace("</script", "<\\/script")
-        for name in ("report", "plotly.min")
-    ]
-    page = templates.get_template("one_file.html.jinja")
-    return page.render(
-        {
-            "pages": shown,
-            "css": assets["assets/report.css"],
-            "scripts": scripts,
-            "search": index(site).replace("<", "\\u003c"),
-            **common,
-        }
+    scripts = (assets[f"assets/{name}.js"] for name in ("report", "plotly.min"))
+    return templates.get_template("one_file.html.jinja").render(
+        pages=shown,
+        css=assets["assets/report.css"],
+        scripts=[script.replace("</script", "<\\/script") for script in scripts],
+        search=index(site).replace("<", "\\u003c"),
+        site=site.shown(alone=True),
+        path="index.html",
+        root="",
     )
 
 
@@ -234,14 +212,14 @@ def site_of(tables: Mapping[str, pa.Table], settings: str, results: Path) -> Sit
 
 
 def published(results: Path) -> Site:
-    """Return the site of a finished run, from what it left.
+    """Return the site of a finished run, from its files.
 
     Raises
     ------
     FileNotFoundError
         If there is no report.
     ValueError
-        If it is damaged, or that of another version.
+        If it is damaged, or from another version.
     """
     path = results / "report" / _SETTINGS_FILE
     settings = path.read_text(encoding="utf-8")
@@ -257,6 +235,6 @@ def published(results: Path) -> Site:
     names = sorted(set(TABLES) - set(OF_ONE_RECORDING))
     paths = {name: results / f"tables/{name}.parquet" for name in names}
     for path in paths.values():
-        path.stat()  # the error of this says which file is missing, that of Parquet does not
+        path.stat()  # its error names the missing file, unlike the error of Parquet
     tables = {name: read(name, [path]) for name, path in paths.items()}
     return site_of(tables, settings, results)

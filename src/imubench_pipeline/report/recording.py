@@ -11,21 +11,25 @@ from imubench_pipeline.model.estimates import (
     BacktestRow,
     EnvelopeRow,
     HistogramRow,
-    ModelRow,
     ModelSampleRow,
-    ScoreRow,
 )
 from imubench_pipeline.model.table import R
 from imubench_pipeline.recordings.kept import Quality
 from imubench_pipeline.recordings.recording import log_paths, read_metadata
 from imubench_pipeline.registry import Hook
-from imubench_pipeline.report import compared_samples, thermal
+from imubench_pipeline.report import thermal
 from imubench_pipeline.report.backtest import backtest_lines
 from imubench_pipeline.report.datasheets import curve_distances, delta_rows
 from imubench_pipeline.report.meaning import budget_bars, budget_tables, budget_words
 from imubench_pipeline.report.parameters import digits_of, methods_table
-from imubench_pipeline.report.payload import Arrays, channel_payload, looks, samples_payload
-from imubench_pipeline.report.practical import System, page_unit
+from imubench_pipeline.report.payload import (
+    Arrays,
+    channel_payload,
+    looks,
+    model_samples_payload,
+    samples_payload,
+)
+from imubench_pipeline.report.practical import System, page_unit, temperature_text
 from imubench_pipeline.report.shell import imubench
 from imubench_pipeline.report.site import Page, RecordingPage, Site
 from imubench_pipeline.report.view import ChannelView, RecordingView
@@ -46,13 +50,14 @@ _MAX_HIDDEN_RATE_ERROR = 1e-9
 """Relative error of a rate up to which the page does not state it."""
 
 _SHOWN_MODELS = 4
-"""Models with the lowest BIC that the page lists."""
+"""Models with the lowest BIC that the page lists, besides the model of the papers."""
 
+_SEVERITIES = ("fatal", "warning", "note")
 _RATE_FROM = {"stamps": "from the time stamps", "stated": "as stated"}
 
 
 Section = Callable[[Site, RecordingView], tuple[str, Any] | None]
-"""Returns the template of a section of a static recording, and what it is given as `section`."""
+"""Returns the template of a section of a static recording, and its variable `section`."""
 
 _SECTIONS: Hook[Section] = Hook("recording_sections")
 
@@ -65,7 +70,7 @@ def page_of(site: Site, view: RecordingView, of: RecordingPage) -> Page:
 
 
 def recording_key(site: Site, view: RecordingView, folder: Path) -> str:
-    """Return the digest of what the page of a recording shows; ``folder`` is the recording's."""
+    """Return the digest of the data of a recording's page; ``folder`` is the recording's."""
     shown = ("envelope", "histogram", "samples_of_models")
     samples = [folder / f"{table}.parquet" for table in shown]
     own = [path.read_bytes() for path in samples if path.is_file()]
@@ -80,17 +85,17 @@ def rows_of_samples(folder: Path, of: type[R]) -> list[R]:
     return of.rows_of(read(of.table, [path])) if path.is_file() else []
 
 
-def context(site: Site, view: RecordingView, folder: Path) -> dict[str, Any]:
-    """Return what the template needs; ``folder`` is the recording's."""
+def context(site: Site, view: RecordingView, folder: Path) -> Mapping[str, object]:
+    """Return the context of the template; ``folder`` is the recording's."""
     arrays = Arrays()
     envelope = rows_of_samples(folder, EnvelopeRow)
     histogram = rows_of_samples(folder, HistogramRow)
-    order = {"fatal": 0, "warning": 1, "note": 2}
     channels = view.channels()
     names = {channel.channel for channel in channels}
+    sorted_findings = sorted(view.findings, key=lambda row: _SEVERITIES.index(row.severity))
     numbered = [
         {**row.columns(), "number": i, "linked": row.channel in names}
-        for i, row in enumerate(sorted(view.findings, key=lambda r: order[r.severity]), start=1)
+        for i, row in enumerate(sorted_findings, start=1)
     ]
     samples = samples_payload(envelope, histogram, arrays)
     of_models = rows_of_samples(folder, ModelSampleRow)
@@ -112,7 +117,7 @@ def context(site: Site, view: RecordingView, folder: Path) -> dict[str, Any]:
         ),
         "budget_words": budget_words(site.settings["settings"]["error_budget"]),
         "command": site.again(view, "scores"),
-        # Of one that is left out there is nothing to draw.
+        # A recording that is left out has no figures.
         "figures_command": None
         if view.left_out or site.at_once
         else imubench(
@@ -120,9 +125,9 @@ def context(site: Site, view: RecordingView, folder: Path) -> dict[str, Any]:
         ),
         "page": {
             "looks": looks({view.sensor: site.looks[view.sensor]}),
-            "channels": [channel_payload(channel, channel.rate, arrays) for channel in channels],
+            "channels": [channel_payload(channel, arrays) for channel in channels],
             "samples": samples,
-            "of_models": compared_samples.payload(of_models, arrays),
+            "of_models": model_samples_payload(of_models, arrays),
             "budgets": [budget_bars(view.budget, site.system)] if budgets else [],
             "findings": [
                 {name: row[name] for name in ("number", "finding", "channel", "start", "end")}
@@ -141,29 +146,10 @@ def _summarise(view: RecordingView, channels: int) -> str:
     if view.left_out:
         why = "was rejected" if view.rejected else "could not be analysed, because a step failed"
         return f"This recording {why}; the comparison does not include it."
-    row, parts = view.row, []
-    if row.started:
-        parts.append(f"from {started_text(row.started)}")
-    if row.temperature_min is not None:
-        low, high = (number_text(end, 3) for end in (row.temperature_min, row.temperature_max))
-        parts.append(f"{low} to {high} °C")
-    parts.append(counted(channels, "channel"))
-    warnings = len(view.warnings)
-    parts.append(counted(warnings, "warning") if warnings else "no warnings")
-    return summary_words(view, parts)
-
-
-def _format_inside(score: ScoreRow) -> str:
-    """Return the part of the curve inside the band of one reconstruction."""
-    inside = score.inside_band
-    return NO_VALUE if inside is None else f"{100 * inside:.0f} %"
-
-
-def _format_score(score: ScoreRow) -> tuple[str, str]:
-    """Return the score of one reconstruction and its range, in decades."""
-    ends = (score.drawn_log10_lower, score.drawn_log10_upper)
-    low, high = (number_text(end, 2) for end in ends)
-    return number_text(score.drawn_log10, 2), f"{low} to {high}"
+    started = f"from {started_text(view.row.started)}" if view.row.started else ""
+    warnings = counted(len(view.warnings), "warning") if view.warnings else "no warnings"
+    parts = (started, temperature_text(view.row), counted(channels, "channel"), warnings)
+    return summary_words(view, [part for part in parts if part])
 
 
 def summary_words(view: RecordingView, parts: Sequence[str]) -> str:
@@ -184,11 +170,15 @@ def _describe_channel(
     symbols, lines = methods_table(channel, view.row.duration, site.system)
     used = next(line for line in lines if line["recommended"])
     for line in lines:
+        line |= {"score": "–", "drawn": ("–", ""), "inside": "–"}
         score = channel.scores.get(line["method"] or "")
-        scored = score is not None and score.rms_log10 is not None
-        line["score"] = number_text(score.rms_log10, 2) if scored and score else "–"
-        line["drawn"] = _format_score(score) if scored and score else ("–", "")
-        line["inside"] = _format_inside(score) if scored and score else "–"
+        if score is not None and score.rms_log10 is not None:
+            ends = (score.drawn_log10_lower, score.drawn_log10_upper)
+            low, high = (number_text(end, 2) for end in ends)
+            inside = score.inside_band
+            line["score"] = number_text(score.rms_log10, 2)
+            line["drawn"] = number_text(score.drawn_log10, 2), f"{low} to {high}"
+            line["inside"] = NO_VALUE if inside is None else f"{100 * inside:.0f} %"
     best = channel.models[0] if channel.models else None
     return {
         "view": channel,
@@ -198,7 +188,7 @@ def _describe_channel(
         "lines": lines,
         "has_spectrum": bool(channel.spectrum),
         "has_samples": channel.channel in samples["envelope"],
-        "of_models": compared_samples.words(of_models, channel.channel),
+        "of_models": _compare_deviations(of_models, channel.channel),
         "model": _describe_model(channel),
         "models": [
             {
@@ -208,7 +198,8 @@ def _describe_channel(
                 "deviance": number_text(row.deviance, 3),
                 "verdict": row.verdict,
             }
-            for row in _select_models(channel.models)
+            for place, row in enumerate(channel.models)
+            if place < _SHOWN_MODELS or row.model == "N+GM+K"
         ],
         "spectral_lines": channel.lines,
         "thermal": thermal.answer(channel, site.system),
@@ -220,30 +211,25 @@ def _describe_channel(
 
 
 def _describe_missing(symbols: Sequence[str], cells: Sequence[Mapping[str, Any]]) -> Iterator[str]:
-    """Yield what the log does not tell."""
+    """Yield why parameters have no plain value; the same reason once for sigma_min and tau_min."""
     of = dict(zip(symbols, cells, strict=True))
     statuses = {symbol: {part["status"] for part in cell["parts"]} for symbol, cell in of.items()}
     words, of_time = (
         of[symbol]["words"] if symbol in of else "" for symbol in ("sigma_min", "tau_min")
     )
-    together = _merge_lowest_point(words, of_time)
+    lowest, time = (symbol_text(symbol) for symbol in ("sigma_min", "tau_min"))
+    reason = words.removeprefix(f"{lowest}: ")
+    same = reason not in ("", words) and of_time == f"{time}: {reason}"
+    together = f"{lowest} and {time}: {reason}" if same else ""
     for symbol, cell in of.items():
         if symbol == "T_B" and statuses["T_B"] == {"absent"}:
-            # Where B is absent, that says it.
+            # The sentence on an absent B includes this.
             if statuses["B"] != {"absent"}:
                 yield "B is flicker noise, which has no correlation time T_B."
         elif symbol == "sigma_min" and together:
             yield together
         elif cell["words"] and not (symbol == "tau_min" and together):
             yield cell["words"]
-
-
-def _merge_lowest_point(words: str, of_time: str) -> str:
-    """Return what is said of the lowest point and of its time, if that is the same."""
-    lowest, time = (symbol_text(symbol) for symbol in ("sigma_min", "tau_min"))
-    reason = words.removeprefix(f"{lowest}: ")
-    same = reason not in ("", words) and of_time == f"{time}: {reason}"
-    return f"{lowest} and {time}: {reason}" if same else ""
 
 
 def _describe_values(channel: ChannelView, system: System) -> str:
@@ -264,9 +250,19 @@ def _describe_values(channel: ChannelView, system: System) -> str:
     return "; ".join(parts) + "."
 
 
-def _select_models(models: Sequence[ModelRow]) -> Sequence[ModelRow]:
-    """Return the models that come close, and that of the papers."""
-    return [row for i, row in enumerate(models) if i < _SHOWN_MODELS or row.model == "N+GM+K"]
+def _compare_deviations(rows: Sequence[ModelSampleRow], channel: str) -> str:
+    """Return the standard deviations of the simulated samples relative to the log, as a sentence.
+
+    ``rows`` are those of ``samples_of_models`` of a recording; empty without such rows.
+    """
+    own = {row.of: row for row in rows if row.channel == channel and row.what == "deviation"}
+    log = own.get("log")
+    widths = [(of, own[of].mean) for of in ("before", "after") if of in own]
+    if log is None or not log.mean:
+        return ""
+    ratios = [f"{number_text(w / log.mean, 4)} {of} the fit" for of, w in widths if w is not None]
+    length = f"Standard deviation relative to that of the log ({duration_text(log.end)})"
+    return f"{length}: {', '.join(ratios)}." if ratios else ""
 
 
 def _describe_model(channel: ChannelView) -> str:
@@ -282,8 +278,8 @@ def _describe_model(channel: ChannelView) -> str:
 
 def about_of(
     site: Site, view: RecordingView, channels: Sequence[ChannelView], folder: Path
-) -> dict[str, Any]:
-    """Return what the page of a recording of any kind says; ``folder`` is the recording's."""
+) -> Mapping[str, object]:
+    """Return the common context of the pages of recordings; ``folder`` is the recording's."""
     return {
         "view": view,
         "name": site.names[view.sensor],
@@ -295,7 +291,7 @@ def about_of(
 
 
 def metadata_of(folder: Path) -> Mapping[str, Any]:
-    """Return the metadata of the log in a folder of a recording; nothing where none was kept.
+    """Return the metadata of the log in a folder of a recording; empty without them.
 
     Raises
     ------
@@ -312,7 +308,7 @@ def metadata_of(folder: Path) -> Mapping[str, Any]:
 def _list_provenance(
     view: RecordingView, channels: Sequence[ChannelView], folder: Path
 ) -> Iterator[tuple[str, str]]:
-    """Yield where a recording comes from, as names and texts; ``folder`` is the recording's."""
+    """Yield the origin of a recording, as names and texts; ``folder`` is the recording's."""
     row, metadata = view.row, metadata_of(folder)
     yield "Recording", f"{row.sensor} / {row.recording}"
     yield "Device", str(row.device)
@@ -324,17 +320,14 @@ def _list_provenance(
         error = ""
         if row.rate_error is not None and row.rate_error > _MAX_HIDDEN_RATE_ERROR * row.rate:
             error = f" ± {number_text(row.rate_error, 2)} Hz"
-        yield (
-            "Rate",
-            f"{number_text(row.rate, 7)} Hz{error}, {_RATE_FROM.get(row.rate_from or '', '')}",
-        )
+        source = _RATE_FROM.get(row.rate_from or "", "")
+        yield "Rate", f"{number_text(row.rate, 7)} Hz{error}, {source}"
         rates = {channel.channel: number_text(channel.rate, 6) for channel in channels}
         if len(set(rates.values())) > 1:
             yield "Rate per channel", ", ".join(f"{name} {rate} Hz" for name, rate in rates.items())
     if row.samples is not None:
         yield "Samples", f"{row.samples:,}".replace(",", " ")
-    segments: Sequence[Any] = metadata.get("segments", [])
-    if len(segments) > 1:
-        yield "Segments", str(len(segments))
+    if (segments := len(metadata.get("segments", []))) > 1:
+        yield "Segments", str(segments)
     for truth in {parameter.source for channel in channels for parameter in channel.truth.values()}:
         yield "Simulated from", truth

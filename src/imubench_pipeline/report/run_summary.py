@@ -1,4 +1,4 @@
-"""What a run says at its end: what became of the recordings, and which sensor suits what."""
+"""The summary of a run in the terminal: states of recordings, and the best sensors."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ _FAILED_GROUP = re.compile(
     r"^    message: Error in group .*\n(?:    log: (.+) \(check .*\n)?    jobs:\n((?: {8}.*\n)*)",
     re.MULTILINE,
 )
-"""Steps that are one job of a cluster, which failed: its log says which of them did."""
+"""Steps in one job of a cluster, which failed; its log names the step."""
 
 _JOB = re.compile(r"^ +jobid: (\d+)$", re.MULTILINE)
 _OUTPUT = re.compile(r"^ +output: (.+)$", re.MULTILINE)
@@ -38,14 +38,14 @@ _INTERRUPTED = "Terminating processes on user request"
 
 
 def summary(results: Path) -> str:
-    """Return what a finished run says; nothing where there are no tables."""
+    """Return the summary of a finished run; empty without tables."""
     paths = {name: results / f"tables/{name}.parquet" for name in _NEEDED}
     if not all(path.is_file() for path in paths.values()):
         return ""
     try:
         tables = {name: read(name, [path]) for name, path in paths.items()}
     except (OSError, ValueError) as error:
-        # A run for one file alone may stand beside older tables: it succeeded all the same.
+        # A run for one file alone succeeds even if older tables cannot be read.
         return one_line(f"no summary: {error}")
     recordings = RecordingRow.rows_of(tables["recordings"])
     rejected = list(rejections(recordings))
@@ -76,10 +76,7 @@ def without_pages(results: Path) -> str:
 
 
 def failure(logs: Sequence[str], results: Path) -> str:
-    """Return what a run says that did not come to its end: what failed, and how to go on.
-
-    By the files that Snakemake logs to.
-    """
+    """Return the summary of a run that failed or was stopped, from the logs of Snakemake."""
     texts = [Path(log).read_text(encoding="utf-8", errors="replace") for log in logs]
     steps = dict.fromkeys(step for text in texts for step in _failed_steps(text, results))
     again = "run the same command again: it goes on where this run stopped"
@@ -94,7 +91,7 @@ def failure(logs: Sequence[str], results: Path) -> str:
 
 
 def _failed_steps(log: str, results: Path) -> Iterator[str]:
-    """Yield step and recording of what failed, by a log of Snakemake, each time it was tried."""
+    """Yield step and recording of each failed attempt, from a log of Snakemake."""
     of_one = re.compile(rf"{re.escape(str(results))}/(?:recordings|simulated)/([^/]+/[^/,]+)")
     done = set(_DONE.findall(log))
 
@@ -140,27 +137,23 @@ class Failed(Protocol):
 
 
 def left_out(failures: Iterable[Failed]) -> Iterator[str]:
-    """Yield a line for each step that failed: what is left out for it, and why."""
+    """Yield a line for each step that failed, with the lost recording and the reason."""
     for row in failures:
         of = f"{row.sensor}/{row.recording}" if row.recording else row.sensor
         yield one_line(f"{of}: {row.reason}")
 
 
 def warnings(findings: Iterable[FindingRow]) -> Iterator[str]:
-    """Yield a line for each recording that has warnings, the one with the worst first."""
+    """Yield a line for each recording that has warnings, the worst first."""
     by_recording: dict[str, Counter[str]] = {}
     left_out: Counter[str] = Counter()
     for row in serious(findings):
         name = f"{row.sensor}/{row.recording}"
         by_recording.setdefault(name, Counter())[row.finding.replace("_", " ")] += 1
         left_out[name] += row.severity == "fatal"
-    for name in sorted(
-        by_recording, key=lambda name: (-left_out[name], -by_recording[name].total())
-    ):
-        kinds = ", ".join(
-            kind + f" ({count})" * (count > 1) for kind, count in by_recording[name].most_common()
-        )
-        yield one_line(f"{name}: {counted(by_recording[name].total(), 'warning')}: {kinds}")
+    for name, of in sorted(by_recording.items(), key=lambda i: (-left_out[i[0]], -i[1].total())):
+        kinds = ", ".join(kind + f" ({n})" * (n > 1) for kind, n in of.most_common())
+        yield one_line(f"{name}: {counted(of.total(), 'warning')}: {kinds}")
 
 
 def serious(findings: Iterable[FindingRow]) -> Iterator[FindingRow]:
@@ -174,10 +167,8 @@ def leaders(ranking: Iterable[RankingRow], recordings: Iterable[RecordingRow]) -
     """Yield a line for each requirement: the best sensor, and whether it meets the limits."""
     deciding = [row for row in ranking if row.decides]
     simulated = {(row.sensor, row.recording) for row in recordings if row.simulated}
-    names = {
-        row.sensor: row.sensor + " (simulated)" * ((row.sensor, row.recording) in simulated)
-        for row in deciding
-    }
+    marks = {row.sensor: (row.sensor, row.recording) in simulated for row in deciding}
+    names = {sensor: sensor + " (simulated)" * mark for sensor, mark in marks.items()}
     for name in dict.fromkeys(row.requirement for row in deciding):
         own = [row for row in deciding if row.requirement == name]
         ranked = [row for row in own if row.rank is not None]
@@ -191,10 +182,7 @@ def leaders(ranking: Iterable[RankingRow], recordings: Iterable[RecordingRow]) -
 
 
 def one_line(text: str, longest: int = _MOST_LETTERS) -> str:
-    """Return a text on one line, without what a terminal takes for a command.
-
-    It may hold names and values as they stand in logs; beyond ``longest`` letters is an ellipsis.
-    """
+    """Return a text from logs on one line, without control characters, cut with an ellipsis."""
     shown = "".join(letter if letter.isprintable() else " " for letter in text)
     shown = " ".join(shown.split())
     return shown if len(shown) <= longest else shown[: longest - 1] + "…"

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
+from functools import partial
 from typing import Any
 from urllib.parse import urlencode
 
@@ -24,9 +25,12 @@ from imubench_pipeline.report.payload import FOREST, looks
 from imubench_pipeline.report.site import Page, Site
 from imubench_pipeline.report.start import summary
 from imubench_pipeline.report.view import QUANTITY_NAMES, RecordingView
+from imubench_pipeline.settings.sensor import quantity_of
 from imubench_pipeline.words.estimates import symbol_text
 from imubench_pipeline.words.numbers import counted, limit_digits
 
+_TREND_COLUMNS = ("value", "lower", "upper", "expected_lower", "expected_upper", "verdict")
+_UNIT_SYMBOLS = {"bias": "signal"}
 _MAX_DETAILED_RECORDINGS = 12
 """With more recordings the page of a sensor has no budgets and no comparison with the datasheet."""
 
@@ -43,26 +47,47 @@ def sensor_page(site: Site, sensor: str) -> Page:
         [row for row in site.rows(CoverageRow) if row.sensor == sensor],
         site.looks[sensor],
     )
-    return Page(
-        site.sensor_page(sensor),
-        "sensor.html.jinja",
-        key,
-        lambda: _make_sensor_context(site, sensor, own),
-    )
+    context = partial(_make_sensor_context, site, sensor, own)
+    return Page(site.sensor_page(sensor), "sensor.html.jinja", key, context)
 
 
-def _make_sensor_context(site: Site, sensor: str, own: Sequence[RecordingView]) -> dict[str, Any]:
+def _make_sensor_context(
+    site: Site, sensor: str, own: Sequence[RecordingView]
+) -> Mapping[str, object]:
     together = Comparison(site.compared(own), site.names)
-    pooled = [_format_pooled(row) for row in site.rows(PooledRow) if row.sensor == sensor]
+    pooled = [
+        row.columns()
+        | {
+            "axis": row.channel.replace("_", " "),
+            "digits": limit_digits(row.lower, row.upper, 4),
+            "ref": f"{quantity_of(row.channel)}.{_UNIT_SYMBOLS.get(row.parameter, row.parameter)}",
+            "name": symbol_text(row.parameter),
+        }
+        for row in site.rows(PooledRow)
+        if row.sensor == sensor
+    ]
     shown = own if len(own) <= _MAX_DETAILED_RECORDINGS else []
+    deltas = []
+    for channel in (channel for view in shown for channel in view.channels()):
+        rows = list(delta_rows(channel, site.coverage, site.system))
+        if any(row["published"] for row in rows):
+            deltas.append({"view": channel, "rows": rows})
+    by_device: dict[tuple[str, str | None], list[RecordingView]] = {}
+    for view in own:
+        by_device.setdefault((view.row.device, view.device_page), []).append(view)
+    price_class = site.settings["sensors"].get(sensor, {}).get("price_class")
     simulated = {view.full_name: view.simulated for view in own}
     budget = [row for view in shown for row in view.budget]
     return {
         "name": site.names[sensor],
-        "summary": _describe_price_class(site, sensor) + summary(own, several=False),
+        "summary": (f"Price class: {price_class}. " if price_class else "")
+        + summary(own, several=False),
         "verdicts": list(evidence(site, sensor, own)),
         "beside": urlencode({"a": sensor}) if any(view.static for view in own) else "",
-        "devices": list(_list_devices(own)),
+        "devices": [
+            {"name": name, "page": page, "views": of, "count": counted(len(of), "recording")}
+            for (name, page), of in by_device.items()
+        ],
         "forest": FOREST,
         "several": sum(view.static for view in own) > 1,
         "parameter_tables": list(together.tables()),
@@ -74,7 +99,7 @@ def _make_sensor_context(site: Site, sensor: str, own: Sequence[RecordingView]) 
         "budgets": list(budget_tables(budget, simulated, site.system)),
         "budget_words": budget_words(site.settings["settings"]["error_budget"]),
         "too_many": len(own) > _MAX_DETAILED_RECORDINGS,
-        "deltas": list(_list_deltas(site, shown)),
+        "deltas": deltas,
         "repeated": list(repeatability_lines(site.rows(RepeatabilityRow), sensor, site.system)),
         "page": {
             "grouped": "recording",
@@ -88,74 +113,36 @@ def _make_sensor_context(site: Site, sensor: str, own: Sequence[RecordingView]) 
     }
 
 
-def _list_deltas(site: Site, views: Sequence[RecordingView]) -> Iterator[dict[str, Any]]:
-    """Yield the comparison of each channel with the figures of the datasheet, if there are any."""
-    for view in views:
-        for channel in view.channels():
-            rows = list(delta_rows(channel, site.coverage, site.system))
-            if any(row["published"] for row in rows):
-                yield {"view": channel, "rows": rows}
-
-
-def _describe_price_class(site: Site, sensor: str) -> str:
-    price_class = site.settings["sensors"].get(sensor, {}).get("price_class")
-    return f"Price class: {price_class}. " if price_class else ""
-
-
-def _list_devices(own: Sequence[RecordingView]) -> Iterator[dict[str, Any]]:
-    for device in dict.fromkeys((view.row.device, view.device_page) for view in own):
-        views = [view for view in own if (view.row.device, view.device_page) == device]
-        count = counted(len(views), "recording")
-        yield {"name": device[0], "page": device[1], "views": views, "count": count}
-
-
-def _format_pooled(row: PooledRow) -> dict[str, Any]:
-    quantity = row.channel.split("_", maxsplit=1)[0]
-    symbol = "signal" if row.parameter == "bias" else row.parameter
-    return row.columns() | {
-        "axis": row.channel.replace("_", " "),
-        "digits": limit_digits(row.lower, row.upper, 4),
-        "ref": f"{quantity}.{symbol}",
-        "name": symbol_text(row.parameter),
-    }
-
-
 def device_page(site: Site, page: str) -> Page:
     """Return the page of a device: its recordings over time."""
     own = [view for view in site.views if view.device_page == page]
-    rows = [row for row in site.rows(DriftRow) if site.device_page_of(row) == page]
-    key = site.key_of(*(view.key for view in own), rows)
-    return Page(page, "device.html.jinja", key, lambda: _make_device_context(site, own, rows))
-
-
-def _make_device_context(
-    site: Site, own: Sequence[RecordingView], rows: Sequence[DriftRow]
-) -> dict[str, Any]:
-    sensor, device = own[0].sensor, own[0].row.device
     named = {view.full_name for view in own}
-    rows = [row for row in rows if (row.sensor, row.recording) in named]
-    # As in `navigation.drift.order_of`: equal time stamps give no order.
-    stamps = {row.started for row in rows}
-    dated = None not in stamps and len(stamps) > 1
-    trends, payload = _list_trends(rows, dated=dated, simulated=own[0].simulated)
-    return {
-        "sensor_page": site.sensor_page(sensor),
-        "name": site.names[sensor],
-        "device": device,
-        "views": own,
-        "summary": summary(own, several=False),
-        "changes": [
-            change_words(row, simulated=own[0].simulated)
-            for row in rows
-            if row.verdict == "changed"
-        ],
-        "order": "Recordings are plotted at their start times."
-        if dated
-        else "Some logs have no start time, so the recordings are plotted in the order of their "
-        "names.",
-        "trends": list(trends.items()),
-        "page": {"trends": payload, "arrays": []},
-    }
+    rows = [row for row in site.rows(DriftRow) if (row.sensor, row.recording) in named]
+    key = site.key_of(*(view.key for view in own), rows)
+
+    def make_context() -> Mapping[str, object]:
+        sensor, simulated = own[0].sensor, own[0].simulated
+        # As in `navigation.drift.order_of`: equal time stamps give no order.
+        stamps = {row.started for row in rows}
+        dated = None not in stamps and len(stamps) > 1
+        trends, payload = _list_trends(rows, dated=dated, simulated=simulated)
+        changed = [row for row in rows if row.verdict == "changed"]
+        return {
+            "sensor_page": site.sensor_page(sensor),
+            "name": site.names[sensor],
+            "device": own[0].row.device,
+            "views": own,
+            "summary": summary(own, several=False),
+            "changes": [change_words(row, simulated=simulated) for row in changed],
+            "order": "Recordings are plotted at their start times."
+            if dated
+            else "Some logs have no start time, so the recordings are plotted in the order of "
+            "their names.",
+            "trends": list(trends.items()),
+            "page": {"trends": payload, "arrays": []},
+        }
+
+    return Page(page, "device.html.jinja", key, make_context)
 
 
 def _list_trends(
@@ -176,19 +163,22 @@ def _list_trends(
         title = f"{QUANTITY_NAMES[quantity]} {axis}"
         name = symbol_text(parameter)
         changes = [row.recording + mark for row in series if row.verdict == "changed"]
-        outside = [
+        words = f"changed in {', '.join(changes)}." if changes else "no change."
+        if outside := [
             row.recording + mark
             for row in series
             if row.verdict == "as before"
             and row.p_value is not None
             and row.p_value < SIGNIFICANCE_LEVEL
-        ]
+        ]:
+            lie = f"{', '.join(outside)} {'lies' if len(outside) == 1 else 'lie'}"
+            words += f" {lie} outside the band, which may be chance among so many parameters."
         trends.setdefault(channel, []).append(
             {
                 "title": title,
                 "number": len(payload),
                 "label": f"{name} of {title} in {counted(len(series), 'recording')}",
-                "caption": f"{name}: {_describe_trend(changes, outside)}",
+                "caption": f"{name}: {words}",
             }
         )
         payload.append(
@@ -198,33 +188,16 @@ def _list_trends(
                 "dated": dated,
                 "started": [row.started for row in series],
                 "recordings": [row.recording for row in series],
-                "value": [row.value for row in series],
-                "lower": [row.lower for row in series],
-                "upper": [row.upper for row in series],
-                "expected_lower": [row.expected_lower for row in series],
-                "expected_upper": [row.expected_upper for row in series],
-                "verdict": [row.verdict for row in series],
+                **{name: [getattr(row, name) for row in series] for name in _TREND_COLUMNS},
             }
         )
     return trends, payload
 
 
-def _describe_trend(changes: Sequence[str], outside: Sequence[str]) -> str:
-    """Return which recordings have changed, and which lie outside the band without significance."""
-    words = f"changed in {', '.join(changes)}." if changes else "no change."
-    if outside:
-        lie = "lies" if len(outside) == 1 else "lie"
-        names = ", ".join(outside)
-        words += f" {names} {lie} outside the band, which may be chance among so many parameters."
-    return words
-
-
 def change_words(row: DriftRow, *, simulated: bool) -> str:
     """Return a change of a device in words."""
     name = symbol_text(row.parameter)
-    by = ""
-    if row.change is not None:
-        by = f" by {100 * row.change:+.0f} %".replace("-", "−")
+    by = "" if row.change is None else f" by {100 * row.change:+.0f} %".replace("-", "−")
     chance = f"{row.p_value:.1g}" if row.p_value is not None else "–"
     where = row.channel.replace("_", " ")
     recording = row.recording + (" (simulated)" if simulated else "")

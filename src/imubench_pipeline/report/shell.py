@@ -11,8 +11,10 @@ def imubench(name: str, results: str, options: Mapping[str, str] | None = None) 
 
     ``options`` has the values of options such as ``--sensor``; a word in capitals is a placeholder.
     """
-    asked = [word for key, value in (options or {}).items() for word in _make_option(key, value)]
-    return shlex.join(["imubench", name, _protect_path(results), *asked])
+    words = ["imubench", name, f"./{results}" if results.startswith("-") else results]
+    for key, value in (options or {}).items():
+        words += [f"{key}={value}"] if value.startswith("-") else [key, value]
+    return shlex.join(words)
 
 
 def made_again(target: str, overrides: Sequence[str] = ()) -> str:
@@ -23,12 +25,3 @@ def made_again(target: str, overrides: Sequence[str] = ()) -> str:
     stated = ["--config", *overrides] if overrides else []
     # After the two dashes, nothing is read as an option.
     return shlex.join(["snakemake", "-c2", *stated, "--forcerun", "ingest", "--", target])
-
-
-def _make_option(key: str, value: str) -> list[str]:
-    """Return an option as words; a value with a leading dash is joined by an equals sign."""
-    return [f"{key}={value}"] if value.startswith("-") else [key, value]
-
-
-def _protect_path(path: str) -> str:
-    return f"./{path}" if path.startswith("-") else path

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from typing import Any
+from collections.abc import Iterator, Mapping, Sequence
 
 from imubench_pipeline.model.comparisons import ShortlistRow
 from imubench_pipeline.report.site import Entry, Site
@@ -11,17 +10,29 @@ from imubench_pipeline.words.numbers import number_text
 from imubench_pipeline.words.verdicts import SHORT_VERDICTS, SHORTLIST_WORDS, shortfall_text
 
 
-def _make_context(site: Site) -> dict[str, Any]:
-    rows = site.rows(ShortlistRow)
+def _make_context(site: Site) -> Mapping[str, object]:
     asked = site.settings["requirements"]
+    boards: dict[str, list[Mapping[str, object]]] = {}
+    for row in site.rows(ShortlistRow):
+        sensor, verdict, best, worst, measured, _ = cells(row)
+        line = row.columns() | {
+            "code": row.verdict,
+            "shortfalls": list(map(shortfall_text, row.shortfalls)),
+            "measured_verdict": SHORT_VERDICTS[row.measured_verdict]
+            if row.measured_verdict
+            else "",
+            "name": site.names.get(row.sensor, sensor),
+            "logged": row.sensor in site.sensors,
+            "verdict": verdict,
+            "best": best,
+            "worst": worst,
+            "measured": measured,
+        }
+        boards.setdefault(row.requirement, []).append(line)
     return {
         "boards": [
-            {
-                "title": asked[name]["title"],
-                "note": asked[name].get("note"),
-                "rows": [_format_line(site, row) for row in rows if row.requirement == name],
-            }
-            for name in dict.fromkeys(row.requirement for row in rows)
+            {"title": asked[name]["title"], "note": asked[name].get("note"), "rows": lines}
+            for name, lines in boards.items()
         ]
     }
 
@@ -30,22 +41,6 @@ SHORTLIST = Entry(
     file="shortlist.html", title="Before buying", context=_make_context, tables=("shortlist",)
 )
 """The page of all sensors of the catalogue, for every requirement."""
-
-
-def _format_line(site: Site, row: ShortlistRow) -> dict[str, Any]:
-    sensor, verdict, best, worst, measured, _ = cells(row)
-    return {
-        **row.columns(),
-        "code": row.verdict,
-        "shortfalls": list(map(shortfall_text, row.shortfalls)),
-        "measured_verdict": SHORT_VERDICTS[row.measured_verdict] if row.measured_verdict else "",
-        "name": site.names.get(row.sensor, sensor),
-        "logged": row.sensor in site.sensors,
-        "verdict": verdict,
-        "best": best,
-        "worst": worst,
-        "measured": measured,
-    }
 
 
 def cells(row: ShortlistRow) -> list[str]:

@@ -43,10 +43,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Print the comparison; return the exit status."""
-    # Only what draws loads this: the other commands answer at once.
+    # Loaded here, so that other commands answer at once.
     from rich.text import Text
 
     from imubench_pipeline.report.terminal import parts
+    from imubench_pipeline.tables import tables_folder
 
     try:
         tables = _load(arguments.results)
@@ -66,14 +67,17 @@ def run(arguments: argparse.Namespace) -> int:
             system=arguments.units,
             width=width,
         )
-        yield Text(_where(arguments.results), no_wrap=True, overflow="ignore")
+        page = tables_folder(arguments.results).parent / "report/index.html"
+        no_page = f"No report at {page}; `snakemake -c2` makes it"
+        text = f"Report: {page}" if page.is_file() else no_page
+        yield Text(text, no_wrap=True, overflow="ignore")
 
     show(shown, arguments.width)
     return 0
 
 
 def show(parts: Callable[[int], Iterable[RenderableType]], width: int | None = None) -> None:
-    """Print what a function makes for so many columns; by default those of the terminal."""
+    """Print the result of a function of the width, by default the width of the terminal."""
     from rich.console import Console
     from rich.text import Text
 
@@ -95,7 +99,7 @@ def show(parts: Callable[[int], Iterable[RenderableType]], width: int | None = N
 
 
 class _ShowError(ValueError):
-    """What was asked for is not there; the text says what is."""
+    """The results lack what was asked for."""
 
 
 def _load(results: Path) -> dict[str, pa.Table]:
@@ -109,15 +113,6 @@ def _load(results: Path) -> dict[str, pa.Table]:
         return {name: read(name, [path]) for name, path in paths.items()}
     except (OSError, ValueError) as error:
         raise _ShowError(f"{error}\n`snakemake -c2` makes the tables again") from error
-
-
-def _where(results: Path) -> str:
-    from imubench_pipeline.tables import tables_folder
-
-    page = tables_folder(results).parent / "report/index.html"
-    if page.is_file():
-        return f"Report: {page}"
-    return f"No report at {page}; `snakemake -c2` makes it"
 
 
 def _check(table: pa.Table, column: str, asked: str | None) -> None:

@@ -27,6 +27,7 @@ from imubench_pipeline.report.view import Name, RecordingView, recording_views
 from imubench_pipeline.tables.schemas import OF_ONE_RECORDING, TABLES
 
 _CHANNEL_ORDER = ("gyro_x", "gyro_y", "gyro_z", "accel_x", "accel_y", "accel_z")
+_PACKAGE = "imubench_pipeline"
 _FIRST_ROWS = 100
 """Rows of a long table that are shown at first."""
 _PLAIN_ROWS = 30
@@ -40,8 +41,8 @@ class Page:
 
     path: str  # below the folder of the report
     template: str
-    key: str  # digest of what it shows: the page is written again only if it changes
-    context: Callable[[], Mapping[str, Any]]  # returns what the template is given
+    key: str  # digest of its content: the page is written again only if it changes
+    context: Callable[[], Mapping[str, object]]  # of the template
 
     @property
     def root(self) -> str:
@@ -54,13 +55,13 @@ class Entry:
     """A page that a report has once, as declared in the module of its content."""
 
     file: str  # its name; its template is called so, too, with ``.jinja``
-    title: str  # what the navigation calls it
-    context: Callable[[Site], Mapping[str, Any]]  # returns what the template is given
+    title: str  # its name in the navigation
+    context: Callable[[Site], Mapping[str, object]]  # of the template
     # the joined tables that it shows: it is written again if one of them changes
     tables: tuple[str, ...] = ()
-    # returns the recordings that it shows: likewise, whatever any table says of them alone
+    # returns the recordings that it shows: likewise if any of their rows change
     views: Callable[[Site], Sequence[RecordingView]] = lambda _: ()
-    # the files kept with recordings that it shows, where they are there: likewise
+    # returns the files of recordings that it shows: likewise
     files: Callable[[Site], Iterable[Path]] = lambda _: ()
     exists: Callable[[Site], bool] = lambda _: True  # tells whether a report has it
     place: int = 0  # in the navigation, among the pages of extensions
@@ -72,7 +73,7 @@ class Entry:
 
     @property
     def shown_tables(self) -> set[str]:
-        """The joined tables that it shows, those of its sections included."""
+        """The joined tables that it shows, including its sections."""
         return {*self.tables, *chain.from_iterable(section.tables for section in self.sections)}
 
     def page(self, site: Site) -> Page:
@@ -81,7 +82,7 @@ class Entry:
         kept = (path.read_bytes() for path in self.files(site) if path.is_file())
         key = site.key_of([view.key for view in self.views(site)], *shown, *kept)
 
-        def context() -> Mapping[str, Any]:
+        def context() -> Mapping[str, object]:
             made = ((section.template, section.context(site)) for section in self.sections)
             return {**self.context(site), "sections": [one for one in made if one[1] is not None]}
 
@@ -93,9 +94,9 @@ class Section:
     """A part of a page that an extension adds."""
 
     page: str  # the file of its `Entry`
-    template: str  # is given as `section` what `context` returns
+    template: str  # gets the result of `context` as `section`
     context: Callable[[Site], Any]  # returns None where the section is left out
-    tables: tuple[str, ...] = ()  # the joined tables that it shows, beside those of the page
+    tables: tuple[str, ...] = ()  # further joined tables that it shows
 
 
 _SECTIONS: Hook[Section] = Hook("sections")
@@ -107,8 +108,8 @@ class Site:
 
     tables: Mapping[str, pa.Table]  # all joined tables
     settings: Mapping[str, Any]  # as `imubench_pipeline.run.plan.Plan.report_settings` gives them
-    results: Path  # folder of the results, for what is kept of each recording alone
-    entries: Sequence[Entry]  # the pages that there is one of, in the order of the navigation
+    results: Path  # folder of the results, for the tables of each recording
+    entries: Sequence[Entry]  # pages that exist once, in the order of the navigation
     code: str = ""  # digest of the code that makes the pages
     failed: dict[str, str] = field(default_factory=dict)  # pages that could not be made, and why
     _rows: dict[str, list[Any]] = field(default_factory=dict, init=False)
@@ -151,15 +152,16 @@ class Site:
     def views(self) -> list[RecordingView]:
         """The recordings, with the pages that they have."""
         views = recording_views(self.tables)
-        together: dict[tuple[str, str, bool], int] = {}
-        for view in views:
-            device = (view.sensor, view.row.device, view.simulated)
-            together[device] = together.get(device, 0) + 1
+        together = Counter((view.sensor, view.row.device, view.simulated) for view in views)
         for view in views:
             view.page = f"recordings/{view.sensor}/{view.name}.html"
-            device = (view.sensor, view.row.device, view.simulated)
-            if together[device] > 1 or view.row.device != view.name:
-                view.device_page = _make_device_path(*device)
+            device = view.row.device
+            if together[view.sensor, device, view.simulated] > 1 or device != view.name:
+                safe = _NOT_IN_NAMES.sub("_", device)[:60]  # a file name cannot have all characters
+                if safe != device:
+                    safe += "-" + hashlib.sha256(device.encode()).hexdigest()[:8]
+                folder = f"devices/{view.sensor}/{'simulated/' if view.simulated else ''}"
+                view.device_page = f"{folder}{safe}.html"
         return views
 
     def compared(self, views: Iterable[RecordingView]) -> Iterator[ComparedRecording]:
@@ -172,14 +174,6 @@ class Site:
     def named_in(self, of: type[OfRecordingRow]) -> set[Name]:
         """Return sensor and name of the recordings that have rows of a class."""
         return {(row.sensor, row.recording) for row in self.rows(of)}
-
-    def device_page_of(self, row: DriftRow) -> str | None:
-        """Return the page of the device of a row that names a recording."""
-        return self._device_pages.get((row.sensor, row.recording))
-
-    @cached_property
-    def _device_pages(self) -> dict[tuple[str, str], str | None]:
-        return {view.full_name: view.device_page for view in self.views}
 
     @cached_property
     def navigation(self) -> list[tuple[str, str]]:
@@ -228,45 +222,36 @@ class Site:
         rows = self.rows(CoverageRow)
         return {(row.sensor, row.quantity, row.figure): row.published for row in rows}
 
-    def changed_devices(self) -> list[dict[str, Any]]:
+    def changed_devices(self) -> list[Mapping[str, object]]:
         """Return the recordings that show a change of their device, with the changed parameters."""
-        devices: dict[tuple[str, str], dict[str, Any]] = {}
+        devices: dict[Name, tuple[DriftRow, list[str]]] = {}
         for row in self.rows(DriftRow):
             if row.verdict != "changed":
                 continue
-            device = devices.setdefault(
-                (row.sensor, row.recording),
-                {
-                    "sensor": row.sensor,
-                    "device": row.device,
-                    "recording": row.recording,
-                    "page": self.device_page_of(row),
-                    "what": [],
-                },
-            )
             name = "fixed bias" if row.parameter == "bias" else row.parameter
-            device["what"].append(f"{name} of {row.channel.replace('_', ' ')}")
-        simulated = {view.full_name: view.simulated for view in self.views}
+            devices.setdefault((row.sensor, row.recording), (row, []))[1].append(
+                f"{name} of {row.channel.replace('_', ' ')}"
+            )
+        views = {view.full_name: view for view in self.views}
         return [
-            device | {"channels": ", ".join(device["what"]), "simulated": simulated[key]}
-            for key, device in devices.items()
+            row.columns()
+            | {"channels": ", ".join(what), "simulated": views[name].simulated}
+            | {"page": views[name].device_page}
+            for name, (row, what) in devices.items()
         ]
 
     @cached_property
     def common(self) -> str:
         """Digest of the common content of all pages: settings, names, code."""
-        return _make_digest(self.settings, self.names, self.navigation, self.code, self.version)
+        return _make_digest(
+            self.settings, self.names, self.navigation, self.code, version(_PACKAGE)
+        )
 
     def key_of(self, *parts: object) -> str:
         """Return the digest of the content of a page."""
         return _make_digest(self.common, *parts)
 
-    @property
-    def version(self) -> str:
-        """Version of this package."""
-        return version("imubench_pipeline")
-
-    def shown(self, *, alone: bool = False) -> dict[str, Any]:
+    def shown(self, *, alone: bool = False) -> Mapping[str, object]:
         """Return the data of the site for all templates.
 
         ``alone``: no other file lies beside the report.
@@ -279,15 +264,11 @@ class Site:
             "names": self.names,
             "tables": [] if alone else sorted(set(TABLES) - set(OF_ONE_RECORDING)),
             "alone": alone,
-            "version": self.version,
+            "version": version(_PACKAGE),
             "first_rows": _FIRST_ROWS,
             "plain_rows": _PLAIN_ROWS,
             "kinds": {kind: page.words for kind, page in RECORDING_PAGES.by_key().items()},
         }
-
-
-RecordingContext = Callable[[Site, RecordingView, Path], dict[str, Any]]
-"""Returns what a template needs of a recording, from its folder, too."""
 
 
 @dataclass(frozen=True)
@@ -295,35 +276,23 @@ class RecordingPage:
     """The page of a recording of a kind."""
 
     template: str
-    context: RecordingContext
-    words: str = ""  # what lists of recordings say of the kind
+    # returns the context of the template, by the folder of the recording, too
+    context: Callable[[Site, RecordingView, Path], Mapping[str, object]]
+    words: str = ""  # of the kind, in lists of recordings
 
 
 RECORDING_PAGES: Hook[RecordingPage] = Hook("recording_pages")
 """The pages of recordings that are not static, by their kind."""
 
 
-def _make_device_path(sensor: str, device: str, simulated: bool) -> str:
-    """Return the path of the page of a device, without characters that a file name cannot have."""
-    safe = _NOT_IN_NAMES.sub("_", device)[:60]
-    if safe != device:
-        safe += "-" + hashlib.sha256(device.encode()).hexdigest()[:8]
-    return f"devices/{sensor}/{'simulated/' if simulated else ''}{safe}.html"
-
-
 def _make_digest(*parts: object) -> str:
     digest = hashlib.sha256()
-    for part in _encode(parts):
-        digest.update(part + b"\0")
-    return digest.hexdigest()
-
-
-def _encode(parts: Iterable[object]) -> Iterable[bytes]:
     for part in parts:
         if isinstance(part, bytes):
-            yield hashlib.sha256(part).digest()
+            digest.update(hashlib.sha256(part).digest() + b"\0")
         else:
-            yield json.dumps(part, sort_keys=True, default=str).encode()
+            digest.update(json.dumps(part, sort_keys=True, default=str).encode() + b"\0")
+    return digest.hexdigest()
 
 
 def sensor_names(
@@ -331,15 +300,9 @@ def sensor_names(
 ) -> dict[str, str]:
     """Return vendor and model of each sensor, with the name of its file if two are equal.
 
-    Of those described, which have a file.
+    A sensor that is not described has the name of its file.
     """
-    plain = {
-        sensor: f"{described[sensor]['vendor']} {described[sensor]['model']}"
-        if sensor in described
-        else sensor
-        for sensor in sensors
-    }
-    times = Counter(plain.values())
-    return {
-        sensor: f"{name} ({sensor})" if times[name] > 1 else name for sensor, name in plain.items()
-    }
+    names = {sensor: sensor for sensor in sensors}
+    names |= {of: f"{x['vendor']} {x['model']}" for of, x in described.items() if of in names}
+    times = Counter(names.values())
+    return {of: f"{name} ({of})" if times[name] > 1 else name for of, name in names.items()}

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
 
 from markupsafe import Markup
 
@@ -16,7 +15,7 @@ class SourcedNumber(str):
 
     ``source`` is ``ranking/<requirement>/<sensor>/<error>/<time>/<column>``, or that of a total of
     ``error_budget``, with the recording after the sensor; two columns with a colon between them are
-    a ratio. ``unit`` is that of the number.
+    a ratio. ``unit`` is the unit of the number.
     """
 
     __slots__ = ("source", "unit")
@@ -52,23 +51,13 @@ class SourcedInterval(str):
         return Markup("{} to {}").format(*self.ends)
 
 
-def of_ranking(row: RankingRow, column: str, text: str, unit: str = "") -> SourcedNumber:
-    """Return a number of a row of the table ``ranking``."""
-    return _make(row, (row.requirement, row.sensor), column, text, unit)
-
-
-def of_budget(row: ErrorBudgetRow, column: str, text: str, unit: str = "") -> SourcedNumber:
-    """Return a number of a total of the table ``error_budget``, of a requirement."""
-    names = (row.requirement or "", row.sensor, row.recording)
-    return _make(row, names, column, text, unit)
-
-
-def _make(
-    row: RankingRow | ErrorBudgetRow, names: Iterable[str], column: str, text: str, unit: str
+def of_row(
+    row: RankingRow | ErrorBudgetRow, column: str, text: str, unit: str = ""
 ) -> SourcedNumber:
-    return SourcedNumber(
-        text, "/".join([row.table, *names, row.error, f"{row.time:g}", column]), unit
-    )
+    """Return a number of a row of ``ranking``, or of a total of ``error_budget``."""
+    names = [row.table, row.requirement or "", row.sensor]
+    names += [row.recording] if isinstance(row, ErrorBudgetRow) else []
+    return SourcedNumber(text, "/".join([*names, row.error, f"{row.time:g}", column]), unit)
 
 
 def margin(row: RankingRow) -> tuple[SourcedNumber, SourcedNumber, SourcedNumber] | None:
@@ -78,17 +67,15 @@ def margin(row: RankingRow) -> tuple[SourcedNumber, SourcedNumber, SourcedNumber
     low, high = margin_limits(row)
     digits = digits_by(row.margin, low, high)
     named = (("margin", row.margin), ("limit:upper", low), ("limit:lower", high))
-    first, lower, upper = (of_ranking(row, name, number_text(x, digits)) for name, x in named)
+    first, lower, upper = (of_row(row, name, number_text(x, digits)) for name, x in named)
     return first, lower, upper
 
 
 def margin_limits(row: RankingRow) -> tuple[float | None, float | None]:
     """Return the 95 % limits of the margin of a row of the table ``ranking`` that has one."""
-    return _over(row.limit, row.upper), _over(row.limit, row.lower)
-
-
-def _over(limit: float | None, error: float | None) -> float | None:
-    """Return a limit over an error; infinite where the error is zero, None where one is unknown."""
-    if limit is None or error is None:
-        return None
-    return limit / error if error else math.inf
+    # Infinite where the error is zero, None where it is unknown.
+    low, high = (
+        None if row.limit is None or error is None else row.limit / error if error else math.inf
+        for error in (row.upper, row.lower)
+    )
+    return low, high

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 from markupsafe import Markup
 
@@ -30,19 +29,32 @@ from imubench_pipeline.words.verdicts import (
 )
 
 _STEPS = 3
-"""What is to do next that the start page names; the table has all."""
+"""Next steps on the start page; the table has all."""
+
+_LINE = 100
+"""Characters of a reason that fit on one line."""
 
 
-def _start(site: Site) -> dict[str, Any]:
+def _start(site: Site) -> Mapping[str, object]:
     views = site.views
-    ranked = list(_rankings(site))
     together = Comparison(site.compared(views), site.names)
     warned = [view for view in views if view.warnings]
+    by_name = {view.full_name: view for view in views}
+    # Of the recordings in doubt, those with a warning that nobody expects.
+    unexpected = sum(
+        any(row.finding not in site.on_purpose(view) for row in view.warnings) for view in warned
+    )
+    in_doubt = f"{counted(len(warned), 'recording')} in doubt"
+    if unexpected < len(warned):
+        in_doubt += f", all{f' but {unexpected}' if unexpected else ''} simulated to show it"
     return {
         "strip": strip(site),
         "about": " ".join(filter(None, (dated(views), made(views)))),
         "matrix": matrix(site),
-        "failures": list(_failures(site)),
+        "failures": [
+            {**row.columns(), "view": by_name.get((row.sensor, row.recording or ""))}
+            for row in site.rows(FailureRow)
+        ],
         "rejected": [
             {"view": view, "reason": folded(view.row.reason)} for view in views if view.rejected
         ],
@@ -50,19 +62,19 @@ def _start(site: Site) -> dict[str, Any]:
         "warned": [
             {
                 "view": view,
-                "findings": _grouped(view.warnings),
+                "findings": _group_findings(view.warnings),
                 "on_purpose": list(dict.fromkeys(site.on_purpose(view).values())),
             }
             for view in warned
         ],
-        "in_doubt": _in_doubt(site, warned),
+        "in_doubt": in_doubt,
         "changed": site.changed_devices(),
-        "rankings": ranked,
-        "next_steps": list(_next_steps(site)),
+        "rankings": list(_list_rankings(site)),
+        "next_steps": list(_list_next_steps(site)),
         "forest": FOREST,
         "twins": [(name, name.replace("_", " ")) for name in site.channel_names],
         "parameter_tables": list(together.tables()),
-        "sensors": {name: _sensor(site, name) for name in site.sensors},
+        "sensors": {name: _describe_sensor(site, name) for name in site.sensors},
         "page": {
             "grouped": "sensor",
             "looks": looks(site.looks),
@@ -72,40 +84,18 @@ def _start(site: Site) -> dict[str, Any]:
     }
 
 
-def _in_doubt(site: Site, warned: Sequence[RecordingView]) -> str:
-    """Return how many recordings have warnings, and how many have some that nobody expects."""
-    unexpected = sum(
-        any(row.finding not in site.on_purpose(view) for row in view.warnings) for view in warned
-    )
-    text = f"{counted(len(warned), 'recording')} in doubt"
-    if unexpected == len(warned):
-        return text
-    others = f"all but {unexpected}" if unexpected else "all"
-    return f"{text}, {others} simulated to show it"
-
-
-def _failures(site: Site) -> Iterator[dict[str, Any]]:
-    """Yield the steps that failed, with the recording that is left out for it."""
-    views = {view.full_name: view for view in site.views}
-    for row in site.rows(FailureRow):
-        yield {**row.columns(), "view": views.get((row.sensor, row.recording or ""))}
-
-
 def summary(views: Sequence[RecordingView], several: bool = True) -> str:
-    """Return what was compared: how many recordings, of when, how long, and how many are real."""
+    """Return a sentence with number, length, dates and states of recordings."""
     sensors = {view.sensor for view in views}
     rejected = sum(view.rejected for view in views)
     failed = sum(view.left_out for view in views) - rejected
     of = f" of {counted(len(sensors), 'sensor')}" if several else ""
     parts = [counted(len(views), "recording") + of]
     lasting = sum(view.row.duration or 0.0 for view in views)
-    if lasting:
-        parts.append(f"{duration_text(lasting)} of data")
-    if recorded := dated(views):
-        parts.append(recorded)
-    text = ", ".join(parts) + f": {len(views) - rejected - failed} analysed, {rejected} rejected"
-    text += f", {failed} failed." if failed else "."
-    return f"{text} {made(views)}".rstrip()
+    parts += [f"{duration_text(lasting)} of data" if lasting else "", dated(views)]
+    counts = f"{len(views) - rejected - failed} analysed, {rejected} rejected"
+    counts += f", {failed} failed" * bool(failed)
+    return f"{', '.join(filter(None, parts))}: {counts}. {made(views)}".rstrip()
 
 
 def dated(views: Sequence[RecordingView]) -> str:
@@ -113,9 +103,8 @@ def dated(views: Sequence[RecordingView]) -> str:
     started = sorted(view.row.started[:10] for view in views if view.row.started)
     if not started:
         return ""
-    text = f"recorded from {started[0]} to {started[-1]}"
-    if started[0] == started[-1]:
-        text = f"recorded on {started[0]}"
+    same = started[0] == started[-1]
+    text = f"recorded on {started[0]}" if same else f"recorded from {started[0]} to {started[-1]}"
     if any(not view.row.started and not view.left_out for view in views):
         text += f" ({len(started)} of {len(views)} say when)"
     return text
@@ -127,8 +116,7 @@ def made(views: Sequence[RecordingView]) -> str:
     if not number:
         return ""
     of_them = f"{number} of them {'is' if number == 1 else 'are'}"
-    whole = number == len(views)
-    return f"{'All are' if whole else of_them} simulated, not measured."
+    return f"{'All are' if number == len(views) else of_them} simulated, not measured."
 
 
 def folded(reason: str | None) -> tuple[str, str]:
@@ -139,11 +127,7 @@ def folded(reason: str | None) -> tuple[str, str]:
     return f"{begin[: begin.rfind(' ')].rstrip(',;:')} …", reason
 
 
-_LINE = 100
-"""Characters of a reason that stand on one line."""
-
-
-def _grouped(rows: Sequence[FindingRow]) -> list[tuple[str, str]]:
+def _group_findings(rows: Sequence[FindingRow]) -> list[tuple[str, str]]:
     """Return each finding once, with its channels."""
     grouped: dict[str, dict[str, None]] = {}
     for row in rows:
@@ -163,10 +147,10 @@ class _Answer:
     asked: str
     answer: str
     details: Sequence[str]
-    tied: Mapping[str, Sequence[str]]  # by sensor, the names of those that are not worse
+    tied: Mapping[str, Sequence[str]]  # by sensor, names of equally good ones
 
 
-def _rankings(site: Site) -> Iterator[_Answer]:
+def _list_rankings(site: Site) -> Iterator[_Answer]:
     simulated = {view.full_name: view.simulated for view in site.views}
     rows = site.rows(RankingRow)
     for ranking in rankings(rows, site.settings["requirements"], simulated, site.system):
@@ -179,23 +163,20 @@ def _rankings(site: Site) -> Iterator[_Answer]:
             requirement_text(ranking.requirement),
             _answer(site, groups, ranked),
             list(_details(site, groups, ranked)),
-            {
-                group.sensor: [site.names.get(name, name) for name in group.row.tied_with]
-                for group in groups
-            },
+            {group.sensor: _name_tied(site, group) for group in groups},
         )
+
+
+def _name_tied(site: Site, group: Group) -> list[str]:
+    return [site.names.get(name, name) for name in group.row.tied_with]
 
 
 def _answer(site: Site, groups: Sequence[Group], ranked: Sequence[Group]) -> str:
     """Return which sensor to choose; a simulated one is marked."""
-    simulated = {
-        group.sensor: f"{site.names[group.sensor]} (simulated)"
-        for group in ranked
-        if group.simulated
-    }
+    marked = {g.sensor: f"{site.names[g.sensor]} (simulated)" for g in ranked if g.simulated}
     excluded = sum(group.row.verdict == "excluded" for group in groups)
     rows = [group.row for group in ranked]
-    return answer_text(rows, {**site.names, **simulated}, len(groups), excluded)
+    return answer_text(rows, {**site.names, **marked}, len(groups), excluded)
 
 
 def _details(site: Site, groups: Sequence[Group], ranked: Sequence[Group]) -> Iterator[str]:
@@ -210,7 +191,7 @@ def _details(site: Site, groups: Sequence[Group], ranked: Sequence[Group]) -> It
         yield text + f" {_describe_data(site, group.row)}"  # still markup
         if conditions := group.row.conditions:
             yield f"Conditions: {'; '.join(map(condition_text, conditions))}."
-        if tied := [site.names.get(name, name) for name in group.row.tied_with]:
+        if tied := _name_tied(site, group):
             yield f"The difference from {join_names(tied)} is not statistically significant."
     yield from list_others((group.row for group in groups if group not in ranked[:1]), site.names)
     for group in groups:
@@ -218,22 +199,19 @@ def _details(site: Site, groups: Sequence[Group], ranked: Sequence[Group]) -> It
             yield f"{site.names[group.sensor]}: {group.corrected}."
 
 
-def _next_steps(site: Site) -> Iterator[dict[str, Any]]:
+def _list_next_steps(site: Site) -> Iterator[Mapping[str, object]]:
     """Yield the steps that can change most verdicts."""
-    titles = {
-        name: requirement["title"] for name, requirement in site.settings["requirements"].items()
-    }
+    asked = site.settings["requirements"]
     for row in site.rows(NextStepRow)[:_STEPS]:
-        own = [
-            view.simulated
-            for view in site.views
-            if view.sensor == row.sensor and row.recording in (None, view.name)
-        ]
         yield {
             "sensor": row.sensor,
-            "simulated": all(own),
+            "simulated": all(
+                view.simulated
+                for view in site.views
+                if view.sensor == row.sensor and row.recording in (None, view.name)
+            ),
             "text": sentence(row.text),
-            "about": "; ".join(titles[name] for name in row.requirements),
+            "about": "; ".join(asked[name]["title"] for name in row.requirements),
         }
 
 
@@ -258,24 +236,22 @@ def _describe_data(site: Site, row: RankingRow) -> str:
     return text + left_out
 
 
-def _sensor(site: Site, name: str) -> dict[str, Any]:
+def _describe_sensor(site: Site, name: str) -> Mapping[str, object]:
     own = [view for view in site.views if view.sensor == name]
-    counts = counted(len(own), "recording")
+    counts = [counted(len(own), "recording")]
     for status in ("rejected", "failed"):
         number = sum(view.row.status == status for view in own)
-        counts += f", {number} {status}" if number else ""
+        counts += [f"{number} {status}"] * bool(number)
     simulated = all(view.simulated for view in own)
-    if simulated:
-        counts += ", simulated"
     return {
         "name": name,
         "price_class": site.settings["sensors"].get(name, {}).get("price_class"),
-        "counts": counts,
+        "counts": ", ".join(counts + ["simulated"] * simulated),
         "simulated": simulated,
     }
 
 
-def _recordings(site: Site) -> dict[str, Any]:
+def _recordings(site: Site) -> Mapping[str, object]:
     filters = {
         "status": list(dict.fromkeys(view.row.status for view in site.views)),
         "sensor": [site.names[sensor] for sensor in site.sensors],
@@ -283,7 +259,7 @@ def _recordings(site: Site) -> dict[str, Any]:
     return {"views": site.views, "summary": summary(site.views), "filters": filters}
 
 
-def _datasheets(site: Site) -> dict[str, Any]:
+def _datasheets(site: Site) -> Mapping[str, object]:
     lines = list(deltas_of_sensors(site.views, site.system))
     filters = {
         "figure": list(dict.fromkeys(line["quantity"] for line in lines)),
@@ -300,7 +276,7 @@ START = Entry(
     tables=("failures", "files", "pooled", "ranking", "next_steps", "drift", "coverage"),
     views=lambda site: site.views,
 )
-"""The page that says which sensor to buy, how sure that is, and what is wrong."""
+"""The page with the choice of a sensor, its evidence, and the problems of the recordings."""
 
 RECORDINGS = Entry(
     file="recordings.html",
@@ -317,4 +293,4 @@ DATASHEETS = Entry(
     tables=("coverage",),
     views=lambda site: site.views,
 )
-"""The page of all comparisons with datasheets, and of who publishes what."""
+"""The page of all comparisons with datasheets, and of the figures that vendors publish."""

@@ -17,7 +17,7 @@ from imubench_pipeline.model.states import Verdict
 from imubench_pipeline.model.table import OfRecordingRow
 from imubench_pipeline.report.meaning import Group, rankings
 from imubench_pipeline.report.parameters import shown_symbols
-from imubench_pipeline.report.practical import System, page_unit
+from imubench_pipeline.report.practical import System, page_unit, temperature_text
 from imubench_pipeline.report.run_summary import left_out, one_line, rejections, serious
 from imubench_pipeline.report.terminal_table import fitting
 from imubench_pipeline.settings.requirements import Requirement
@@ -28,7 +28,6 @@ from imubench_pipeline.words.numbers import (
     Unit,
     counted,
     duration_text,
-    number_text,
     rates_text,
 )
 
@@ -49,7 +48,7 @@ _STYLES: Mapping[Verdict, str] = {
 _LONGEST_FINDING = 400
 _STEPS = 3
 _BESIDE = 34
-"""Columns of what stands below a verdict."""
+"""Columns of the remarks below a verdict."""
 
 
 def parts(
@@ -61,7 +60,7 @@ def parts(
     system: System,
     width: int,
 ) -> Iterator[RenderableType]:
-    """Yield what is shown, from top to bottom.
+    """Yield the parts of the comparison, from top to bottom.
 
     The ranking is for one requirement alone, with every limit, or for all, with the limit that
     decides; parameters are of one channel or all, by one method or the recommended one. The width
@@ -69,27 +68,41 @@ def parts(
     """
     recordings = RecordingRow.rows_of(tables["recordings"])
     about = {(row.sensor, row.recording): row for row in recordings}
-    yield _compared(recordings)
+    rejected, failed = (
+        sum(row.status == status for row in recordings) for status in ("rejected", "failed")
+    )
+    simulated = sum(row.simulated for row in recordings)
+    yield Text(
+        f"Recordings: {len(recordings)} of {len({row.sensor for row in recordings})} sensors; "
+        f"{len(recordings) - rejected - failed} analysed, {rejected} rejected"
+        + f", {failed} failed" * bool(failed)
+        + f"; {simulated} simulated, not measured\n"
+    )
     yield from _listed("Failed", left_out(FailureRow.rows_of(tables["failures"])))
     yield from _listed("Rejected", rejections(recordings))
     findings = FindingRow.rows_of(tables["findings"])
-    yield from _listed("Warnings", map(_finding, serious(findings)), cut=True)
+    warnings = []
+    for row in serious(findings):
+        place = " ".join(filter(None, (f"{row.sensor}/{row.recording}", row.channel)))
+        warnings.append(f"{place} ({row.finding.replace('_', ' ')}): {row.detail}")
+    yield from _listed("Warnings", warnings, cut=True)
     steps = NextStepRow.rows_of(tables["next_steps"].slice(0, _STEPS))
-    yield from _listed("What to do next", map(_next_step, steps))
+    texts = (f"{row.sensor}: {row.text} ({', '.join(row.requirements)})" for row in steps)
+    yield from _listed("What to do next", texts)
     ranking = RankingRow.rows_of(tables["ranking"])
     yield from _ranking_tables(ranking, requirement, about, system, width)
     chosen = [
-        row
-        for row in ParameterRow.rows_of(tables["parameters"])
-        if (row.recommended if method is None else row.method == method)
-        and channel in (None, row.channel)
+        each
+        for each in ParameterRow.rows_of(tables["parameters"])
+        if (each.recommended if method is None else each.method == method)
+        and channel in (None, each.channel)
     ]
     which = f"method {method}" if method else "the recommended method"
     yield from _parameter_tables(chosen, f"{which}, with 95 % intervals", about, system, width)
 
 
 def logs(tables: Mapping[str, pa.Table], system: System, width: int) -> Iterator[RenderableType]:
-    """Yield what a few logs tell, one after the other: what they are, what is wrong, parameters.
+    """Yield properties, findings and parameters of each of a few logs.
 
     The width is in columns of the terminal.
     """
@@ -105,19 +118,19 @@ def logs(tables: Mapping[str, pa.Table], system: System, width: int) -> Iterator
             yield Text(f"  {row.status}: {one_line(row.reason or '', _LONGEST_FINDING)}\n")
             continue
         yield from _listed("Warnings", map(_of_log, serious(findings)))
-        yield from _listed("In doubt", map(_doubt, _of(row, every_doubt)))
+        doubts = []
+        for doubt in _of(row, every_doubt):
+            of = " ".join(filter(None, (doubt.channel, ", ".join(doubt.parameters)))) or "all"
+            doubts.append(f"{of}: {doubt.reason}")
+        yield from _listed("In doubt", doubts)
         notes = [line for line in findings if line.severity == "note"]
         yield from _listed("Notes", map(_of_log, notes), cut=True)
         about = {(row.sensor, row.recording): row}
         recommended = [line for line in parameters if line.recommended]
         yield from _parameter_tables(recommended, "95 % intervals below", about, system, width)
         if not parameters:
-            static = row.kind == "static"
-            why = (
-                "no channel can be analysed"
-                if static
-                else "no noise is estimated of a turned sensor"
-            )
+            why = "no noise is estimated of a turned sensor"
+            why = "no channel can be analysed" if row.kind == "static" else why
             yield Text(f"  {row.kind.replace('_', ' ')}: {why}\n")
 
 
@@ -130,28 +143,21 @@ def _of(recording: RecordingRow, rows: Iterable[R]) -> list[R]:
 def _length(
     row: RecordingRow, parameters: Sequence[ParameterRow], allan: Sequence[AllanRow]
 ) -> str:
-    """Return how long a log is, and of what."""
+    """Return length, rate and channels of a log."""
     if row.duration is None:
         return ""
     channels = len({line.channel for line in parameters})
     rates = [line.cluster_size / line.tau for line in allan]
     words = [f"{duration_text(row.duration)} at {rates_text(row.rate, rates)}"]
     words += [counted(channels, "channel")]
-    if row.temperature_min is not None:
-        low, high = (number_text(end, 3) for end in (row.temperature_min, row.temperature_max))
-        words.append(f"{low} to {high} °C")
+    words += [text] if (text := temperature_text(row)) else []
     return ": " + ", ".join(words) + ", simulated" * row.simulated
 
 
 def _of_log(row: FindingRow) -> str:
     name = row.finding.replace("_", " ")
     place = f"{row.channel} ({name})" if row.channel else name
-    return one_line(f"{place}: {row.detail}", _LONGEST_FINDING)
-
-
-def _doubt(row: DoubtRow) -> str:
-    about = " ".join(filter(None, (row.channel, ", ".join(row.parameters)))) or "all"
-    return one_line(f"{about}: {row.reason}", _LONGEST_FINDING)
+    return f"{place}: {row.detail}"
 
 
 def _parameter_tables(
@@ -163,33 +169,15 @@ def _parameter_tables(
         if own:
             heads, lines = _parameter_lines(quantity, own, about, system)
             yield fitting(f"{title}: {which}", heads, lines, width, names=0)
-            yield from map(Text, _remarks(own))
+            # The reasons of values without a doubt, each remark once.
+            channels: dict[str, dict[str, None]] = {}
+            for row in own:
+                if row.status == "ok" and row.reason:
+                    remark = f"{symbol_text(row.parameter)}: {row.reason}"
+                    channels.setdefault(remark, {})[row.channel] = None
+            for remark, of in channels.items():
+                yield Text(one_line(f"{', '.join(of)}: {remark}", _LONGEST_FINDING))
             yield Text()
-
-
-def _remarks(rows: Iterable[ParameterRow]) -> Iterator[str]:
-    """Yield what values without a doubt are of, where that is said: each remark once."""
-    channels: dict[str, dict[str, None]] = {}
-    for row in rows:
-        if row.status == "ok" and row.reason:
-            remark = f"{symbol_text(row.parameter)}: {row.reason}"
-            channels.setdefault(remark, {})[row.channel] = None
-    for remark, of in channels.items():
-        yield one_line(f"{', '.join(of)}: {remark}", _LONGEST_FINDING)
-
-
-def _compared(recordings: Sequence[RecordingRow]) -> Text:
-    rejected, failed = (
-        sum(row.status == status for row in recordings) for status in ("rejected", "failed")
-    )
-    simulated = sum(row.simulated for row in recordings)
-    sensors = len({row.sensor for row in recordings})
-    return Text(
-        f"Recordings: {len(recordings)} of {sensors} sensors; "
-        f"{len(recordings) - rejected - failed} analysed, {rejected} rejected"
-        + f", {failed} failed" * bool(failed)
-        + f"; {simulated} simulated, not measured\n"
-    )
 
 
 def _listed(title: str, lines: Iterable[str], *, cut: bool = False) -> Iterator[Text]:
@@ -198,18 +186,9 @@ def _listed(title: str, lines: Iterable[str], *, cut: bool = False) -> Iterator[
     if listed:
         yield Text(f"{title}: {len(listed)}", style="bold")
         for line in listed:
-            yield Text(f"  {line}", no_wrap=cut, overflow="ellipsis")
+            text = one_line(line, _LONGEST_FINDING)
+            yield Text(f"  {text}", no_wrap=cut, overflow="ellipsis")
         yield Text()
-
-
-def _finding(row: FindingRow) -> str:
-    place = " ".join(filter(None, (f"{row.sensor}/{row.recording}", row.channel)))
-    name = row.finding.replace("_", " ")
-    return one_line(f"{place} ({name}): {row.detail}", _LONGEST_FINDING)
-
-
-def _next_step(row: NextStepRow) -> str:
-    return one_line(f"{row.sensor}: {row.text} ({', '.join(row.requirements)})", _LONGEST_FINDING)
 
 
 def _ranking_tables(
@@ -253,16 +232,14 @@ def _ranking_lines(group: Group, *, every: bool) -> Iterator[list[str | Text]]:
         f"doubts: {group.doubts}" * bool(group.doubts),
         group.corrected,
     ):
-        # The names have what the other columns leave.
+        # The column of names gets the rest of the width.
         wrapped = wrap(one_line(line, _LONGEST_FINDING), _BESIDE)
         verdict.append("".join(f"\n{part}" for part in wrapped), style="yellow")
     first: list[str | Text] = [group.rank, sensor, verdict]
     for limit in group.limits:
         if every or limit.decides:
-            shown = limit.reason
-            if limit.sigma != NO_VALUE:
-                shown = f"{limit.sigma} of {limit.allowed}"
-                shown += f"\n{limit.interval}"
+            known = f"{limit.sigma} of {limit.allowed}\n{limit.interval}"
+            shown = known if limit.sigma != NO_VALUE else limit.reason
             error, _, after = limit.limit.rpartition(", ")
             yield [*first, shown, f"{error}\nafter {after}", limit.margin]
             first = ["", "", ""]
@@ -279,17 +256,13 @@ def _parameter_lines(
         name = (row.sensor, row.recording, row.channel)
         by_channel.setdefault(name, []).append(row)
     lines: list[list[str | Text]] = []
-    alone = len(about) == 1  # its name stands above
+    alone = len(about) == 1  # its name is above
     for (sensor, recording, channel), own in by_channel.items():
         log = about[sensor, recording]
         badge = " (simulated)" * log.simulated
         shown = channel if alone else f"{sensor} / {recording} {channel}{badge}"
         cells = (
-            _cell(
-                [estimate for estimate in own if estimate.parameter == symbol],
-                unit,
-                log.duration,
-            )
+            _cell([each for each in own if each.parameter == symbol], unit, log.duration)
             for symbol, unit in units.items()
         )
         lines.append([one_line(shown), *cells])

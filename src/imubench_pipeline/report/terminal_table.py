@@ -38,7 +38,7 @@ def fitting(
     spare = width - sum(widths[:shown]) - _GAP * (shown - 1)
     while spare > 0:
         lacking = [i for i in range(shown) if widths[i] < wanted[i]]
-        # Names can be broken: what is left is theirs.
+        # Names can be broken, so they get the rest.
         lacking = [i for i in lacking if i != names] or lacking
         if not lacking:
             break

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Mapping
 
 from imubench_pipeline.report.glossary import glossary
 from imubench_pipeline.report.site import Entry, Site
@@ -10,11 +10,8 @@ from imubench_pipeline.report.static_figures.files import figure_text
 from imubench_pipeline.report.static_figures.theory import theory_figure
 
 
-def _make_context(site: Site) -> dict[str, Any]:
-    return {
-        "figure": figure_text(theory_figure(site.system)),
-        "terms": glossary(),
-    }
+def _make_context(site: Site) -> Mapping[str, object]:
+    return {"figure": figure_text(theory_figure(site.system)), "terms": glossary()}
 
 
 THEORY = Entry(file="theory.html", title="Theory", context=_make_context)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import Any
 
 import numpy as np
 
@@ -20,13 +19,8 @@ _TEMPERATURE_TERMS = (
     ("bias", "bias_at_reference", "bias at T₀"),
 )
 _LOW_PASS_TERMS = (("cutoff", "cutoff", "cut-off"), (SENSOR, SENSOR, "N before the low-pass"))
-_TRUTH_NAMES = {"bias": None}
-_UNIT_SYMBOLS = {
-    "sensitivity": "sensitivity",
-    "quadratic": "quadratic",
-    "bias": "signal",
-    SENSOR: "N",
-}
+_UNIT_SYMBOLS = {"sensitivity": "sensitivity", "quadratic": "quadratic"}
+_UNIT_SYMBOLS |= {"bias": "signal", SENSOR: "N"}
 """Symbol of the unit, for quantities whose unit the reader can choose."""
 
 _Figure = TemperatureRow | LowPassRow | ParameterRow
@@ -43,7 +37,7 @@ _MIN_SHOWN_RATIO = 1.05
 """Ratio of Allan deviations without and with compensation from which it is stated."""
 
 
-def figures(channel: ChannelView) -> Iterator[dict[str, Any]]:
+def figures(channel: ChannelView) -> Iterator[Mapping[str, object]]:
     """Yield the lines of the table: temperature effect, where it was fitted, and low-pass."""
     estimated = channel.parameters.get("likelihood", ())
     before = {row.parameter: row for row in estimated if row.parameter == SENSOR}
@@ -56,7 +50,7 @@ def figures(channel: ChannelView) -> Iterator[dict[str, Any]]:
         row = rows.get(name)
         if row is None or row.status == "absent":
             continue
-        truth = channel.truth.get(_TRUTH_NAMES.get(name, name) or "")
+        truth = channel.truth.get(name) if name != "bias" else None
         yield {
             "term": term,
             "words": words,
@@ -80,28 +74,27 @@ def answer(channel: ChannelView, system: System) -> list[str]:
         sensitivity = temperature["sensitivity"]
         if sensitivity.compensated:
             unit = page_unit(channel.quantity, "sensitivity", system)
-            lines.append(
-                f"The bias changes with temperature by {unit.text(sensitivity.value, 3)} "
-                f"{unit.sign}.{_describe_reduction(channel)}"
-            )
-            lines.append(_NOT_COMPENSATED)
+            size = f"{unit.text(sensitivity.value, 3)} {unit.sign}"
+            change = f"The bias changes with temperature by {size}."
+            lines += [change + _describe_reduction(channel), _NOT_COMPENSATED]
         else:
             lines.append(f"The temperature effect is not removed: {sensitivity.reason}.")
         lines.append(f"The mean temperature T₀ is {number_text(temperature['T_0'].value)} °C.")
     if low_pass and low_pass["cutoff"].status == "absent":
         lines.append("The spectrum shows no low-pass of the sensor.")
     elif low_pass:
-        order = low_pass["cutoff"].order
+        cutoff, order = low_pass["cutoff"].value, low_pass["cutoff"].order
         kind = "first order" if order == 1 else "Butterworth"
         kind += f", order {order}" if order not in (None, 1) else ""
-        if low_pass["cutoff"].value is not None:
-            cutoff = number_text(low_pass["cutoff"].value)
-            lines.append(f"The sensor's own low-pass has its cut-off at {cutoff} Hz ({kind}).")
+        if cutoff is not None:
+            lines.append(
+                f"The sensor's own low-pass has its cut-off at {number_text(cutoff)} Hz ({kind})."
+            )
     return lines
 
 
 def _describe_reduction(channel: ChannelView) -> str:
-    """Return by which factors compensation lowers the Allan deviation, as a sentence."""
+    """Return the factors by which compensation lowers the Allan deviation, as a sentence."""
     left = channel.compensated
     if not left:
         return ""

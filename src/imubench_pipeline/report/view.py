@@ -13,6 +13,7 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 from pandas.util import hash_array
+from scipy.special import chdtri
 
 from imubench_pipeline.estimators.rows import estimate_of
 from imubench_pipeline.model.comparisons import DatasheetCurveRow, DatasheetRow, ErrorBudgetRow
@@ -28,7 +29,7 @@ from imubench_pipeline.model.estimates import (
     TemperatureRow,
 )
 from imubench_pipeline.model.recordings import FindingRow, RecordingRow
-from imubench_pipeline.model.table import ChannelRow, R
+from imubench_pipeline.model.table import R
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.settings.experiments import AT_REST
 from imubench_pipeline.tables.findings import LEFT_OUT
@@ -36,6 +37,8 @@ from imubench_pipeline.tables.schemas import BY_RECORDING
 
 Name = tuple[str, str]
 """Sensor and recording."""
+
+_ROWS_OF_CHANNELS = (ModelRow, LineRow, DeterministicRow, DatasheetRow, DatasheetCurveRow)
 
 METHOD_NAMES = {
     "likelihood": "likelihood",
@@ -46,6 +49,7 @@ METHOD_NAMES = {
     "weighted": "fit, correct weights",
     "authors": "read by the authors",
 }
+_CURVE_COLUMNS = ("tau", "adev", "lower", "upper")
 QUANTITY_NAMES = {"gyro": "Gyroscope", "accel": "Accelerometer"}
 
 
@@ -113,6 +117,15 @@ class ChannelView:
         """Sensor and recording, and whether it is simulated."""
         return f"{self.sensor} / {self.recording}" + " (simulated)" * self.simulated
 
+    def bin_limits(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return the 95 % limits of the density of the bins, if the fit of the spectrum is right.
+
+        A bin scatters as chi squared of its degrees of freedom over their number.
+        """
+        fitted, freedom = self.spectrum["fitted"], self.spectrum["ordinates"]
+        lower, upper = (fitted * chdtri(freedom, tail) / freedom for tail in (0.975, 0.025))
+        return lower, upper
+
     def model(self, method: str) -> NoiseModel:
         """Return the noise model that a method estimated."""
         if method not in self._models:
@@ -129,7 +142,7 @@ class RecordingView:
     """All data of one recording from the tables.
 
     The channels of a thousand recordings do not fit into memory at once: they are made when they
-    are asked for, and are not kept.
+    are asked for, and are not stored.
     """
 
     row: RecordingRow  # of the table ``recordings``
@@ -137,7 +150,7 @@ class RecordingView:
     # returns the digests of all recordings, by sensor and name
     keys: Callable[[], Mapping[Name, str]]
     page: str = ""  # its page
-    # that of its device, where the device has a name of its own or several recordings
+    # the page of its device, if the device has a name of its own or several recordings
     device_page: str | None = None
 
     @property
@@ -214,7 +227,44 @@ class RecordingView:
 
     def channels(self) -> list[ChannelView]:
         """Return its channels, made anew."""
-        return _make_channels(self)
+        channels = {}
+        for (name,), part in _divide(self.parts["allan"], "channel").items():
+            named = (self.sensor, self.name, name, self.simulated)
+            tau, adev, lower, upper = _read_floats(part, *_CURVE_COLUMNS).values()
+            rate = float(part["cluster_size"][0].as_py() / tau[0])
+            channels[name] = ChannelView(*named, tau, adev, lower, upper, rate)
+        for row in self.rows(ParameterRow):
+            channel = channels[row.channel]
+            channel.parameters.setdefault(row.method, []).append(row)
+            if row.recommended:
+                channel.recommended = row.method
+        reconstruction = _divide(self.parts["reconstruction"], "channel", "method")
+        for (name, method), part in reconstruction.items():
+            curve = _read_floats(part, *_CURVE_COLUMNS, "reconstructed")
+            channels[name].reconstruction[method] = curve
+        for of in _ROWS_OF_CHANNELS:
+            for one in self.rows(of):
+                getattr(channels[one.channel], of.table).append(one)
+        for (name,), part in _divide(self.parts["spectrum"], "channel").items():
+            columns = ("frequency", "ordinates", "density", "fitted", "used")
+            channels[name].spectrum = _read_floats(part, *columns)
+        for (name,), part in _divide(self.parts["allan_compensated"], "channel").items():
+            channels[name].compensated = _read_floats(part, *_CURVE_COLUMNS)
+        for score in self.rows(ScoreRow):
+            channels[score.channel].scores[score.method] = score
+        for thermal in self.rows(TemperatureRow):
+            channels[thermal.channel].temperature[thermal.parameter] = thermal
+        for low_pass in self.rows(LowPassRow):
+            channels[low_pass.channel].low_pass[low_pass.parameter] = low_pass
+        for bias in self.rows(FixedBiasRow):
+            channels[bias.channel].fixed_bias = bias.value
+        for truth in self.rows(SimulatedTruthRow):
+            if truth.channel in channels:
+                components = channels[truth.channel].true_components
+                components.setdefault(truth.parameter, []).append(truth)
+        for name, channel in channels.items():
+            channel.findings = [row for row in self.findings if row.channel in (None, name)]
+        return list(channels.values())
 
 
 def recording_views(tables: Mapping[str, pa.Table]) -> list[RecordingView]:
@@ -230,55 +280,6 @@ def recording_views(tables: Mapping[str, pa.Table]) -> list[RecordingView]:
         }
         views.append(RecordingView(row, parts, keys))
     return views
-
-
-_CURVE_COLUMNS = ("tau", "adev", "lower", "upper")
-
-
-def _make_channels(view: RecordingView) -> list[ChannelView]:
-    channels = {}
-    for (name,), part in _divide(view.parts["allan"], "channel").items():
-        named = (view.sensor, view.name, name, view.simulated)
-        tau, adev, lower, upper = _read_floats(part, *_CURVE_COLUMNS).values()
-        rate = float(part["cluster_size"][0].as_py() / tau[0])
-        channels[name] = ChannelView(*named, tau, adev, lower, upper, rate)
-    for row in view.rows(ParameterRow):
-        channel = channels[row.channel]
-        channel.parameters.setdefault(row.method, []).append(row)
-        if row.recommended:
-            channel.recommended = row.method
-    for (name, method), part in _divide(view.parts["reconstruction"], "channel", "method").items():
-        channels[name].reconstruction[method] = _read_floats(part, *_CURVE_COLUMNS, "reconstructed")
-    of_channel: tuple[type[ChannelRow], ...] = (
-        ModelRow,
-        LineRow,
-        DeterministicRow,
-        DatasheetRow,
-        DatasheetCurveRow,
-    )
-    for of in of_channel:
-        for one in view.rows(of):
-            getattr(channels[one.channel], of.table).append(one)
-    for (name,), part in _divide(view.parts["spectrum"], "channel").items():
-        columns = ("frequency", "ordinates", "density", "fitted", "used")
-        channels[name].spectrum = _read_floats(part, *columns)
-    for (name,), part in _divide(view.parts["allan_compensated"], "channel").items():
-        channels[name].compensated = _read_floats(part, *_CURVE_COLUMNS)
-    for score in view.rows(ScoreRow):
-        channels[score.channel].scores[score.method] = score
-    for thermal in view.rows(TemperatureRow):
-        channels[thermal.channel].temperature[thermal.parameter] = thermal
-    for low_pass in view.rows(LowPassRow):
-        channels[low_pass.channel].low_pass[low_pass.parameter] = low_pass
-    for bias in view.rows(FixedBiasRow):
-        channels[bias.channel].fixed_bias = bias.value
-    for truth in view.rows(SimulatedTruthRow):
-        if truth.channel in channels:
-            components = channels[truth.channel].true_components
-            components.setdefault(truth.parameter, []).append(truth)
-    for name, channel in channels.items():
-        channel.findings = [finding for finding in view.findings if finding.channel in (None, name)]
-    return list(channels.values())
 
 
 def _make_keys(tables: Mapping[str, pa.Table]) -> dict[Name, str]:

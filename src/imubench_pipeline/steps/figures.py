@@ -6,7 +6,7 @@ import json
 from collections.abc import Iterable
 from pathlib import Path
 
-from imubench_pipeline.report.static_figures.of_run import draw_comparison
+from imubench_pipeline.report.static_figures.files import draw_comparison
 from imubench_pipeline.tables import making, read
 
 

@@ -30,7 +30,7 @@ def _make_context(site: Site) -> dict[str, Any]:
             rows = view.rows(PublishedFigureRow)
             channels = []
             for channel in view.channels():
-                payloads.append(channel_payload(channel, channel.rate, arrays))
+                payloads.append(channel_payload(channel, arrays))
                 own = (row for row in rows if row.channel == channel.channel)
                 channels.append(
                     {

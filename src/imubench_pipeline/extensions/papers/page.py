@@ -21,7 +21,7 @@ def _make_context(site: Site) -> dict[str, Any]:
     rows = site.rows(PublishedRow)
     arrays = Arrays()
     drawn = _select_curves(site)
-    payloads = [channel_payload(channel, channel.rate, arrays) for _, _, channel in drawn]
+    payloads = [channel_payload(channel, arrays) for _, _, channel in drawn]
     used = {channel["sensor"]: site.looks[channel["sensor"]] for channel in payloads}
     return {
         "bases": read_terms().bases,

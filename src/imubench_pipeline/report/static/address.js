@@ -3,6 +3,12 @@
 
 let state = new URLSearchParams();
 
+function element(name, properties = {}, ...inside) {
+  const made = Object.assign(document.createElement(name), properties);
+  made.append(...inside);
+  return made;
+}
+
 const inOneFile = () => document.body.dataset.oneFile === "yes";
 
 function stateText(hash) {
@@ -10,9 +16,7 @@ function stateText(hash) {
   return last.includes("=") ? last : "";
 }
 
-function readState() {
-  state = new URLSearchParams(stateText(location.hash));
-}
+const readState = () => (state = new URLSearchParams(stateText(location.hash)));
 
 function keep(key, value) {
   if (value === null || value === "") state.delete(key);
@@ -27,7 +31,7 @@ async function copyText(text) {
     await navigator.clipboard.writeText(text);
     return true;
   } catch {
-    const field = Object.assign(document.createElement("textarea"), { value: text });
+    const field = element("textarea", { value: text });
     document.body.append(field);
     field.select();
     const copied = document.execCommand("copy");
@@ -39,13 +43,12 @@ async function copyText(text) {
 function startCopying() {
   const units = document.querySelector("header .units");
   if (!units) return;
-  const button = Object.assign(document.createElement("button"), { type: "button", className: "copy", textContent: "Copy link" });
-  const said = document.createElement("output");
-  button.addEventListener("click", async () => {
+  const said = element("output");
+  const copy = async () => {
     said.textContent = (await copyText(location.href)) ? "copied" : location.href;
     window.setTimeout(() => (said.textContent = ""), 3000);
-  });
-  units.append(button, said);
+  };
+  units.append(element("button", { type: "button", className: "copy", textContent: "Copy link", onclick: copy }), said);
   if (!inOneFile()) {
     window.addEventListener("hashchange", () => stateText(location.hash) && location.reload());
   }

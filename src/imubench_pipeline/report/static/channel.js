@@ -1,14 +1,9 @@
 // The figures of one channel: curve, spectrum, samples over time, histogram.
 
 const black = () => ({ light: inks().ink, dark: inks().ink });
-const PLACES = [
-  ["#0072B2", "#4DA3D9"], ["#D55E00", "#F08A3C"], ["#B3508C", "#DB8FBC"], ["#9A6B00", "#E0A82E"], ["#7A4B3A", "#C69A88"], ["#5B5FC7", "#A3A6F2"],
-];
 const TERM_DASHES = ["dash", "dot", "dashdot", "longdash"];
-const termLook = (place) => {
-  const [light, darkened] = PLACES[place % PLACES.length];
-  return { light, dark: darkened, dash: TERM_DASHES[place % TERM_DASHES.length], width: 1.4 };
-};
+const termLook = (place) => ({ ...TERM_COLOURS[place % TERM_COLOURS.length], dash: TERM_DASHES[place % TERM_DASHES.length], width: 1.4 });
+const MARKED = { light: "#B3001B", dark: "#FF8F8F" };
 
 // Samples and curves have the colour of the sensor on every page; the recommended model is black.
 function sensorLook(sensor) {
@@ -28,43 +23,30 @@ kinds.allan = (figure) => {
   const view = channelOf(figure);
   const unit = unitOf(quantityOf(view.channel), "adev");
   const tau = array(view.tau);
-  const [y, low, high] = [view.adev, view.lower, view.upper].map((place) => scaled(place, unit.factor));
+  const y = scaled(view.adev, unit.factor);
   const what = view.simulated ? "simulated log" : "measured";
   const best = view.methods[view.recommended];
   const own = { ...sensorLook(view.sensor), dash: "solid" };
   const look = { ...pageData.looks.methods, [view.recommended]: { ...pageData.looks.methods[view.recommended], ...black() } };
-  const traces = [
-    ...band(tau, low, high, own, 0.22).map((trace) => ({ ...trace, group: "limits" })),
-  ];
+  const traces = limitsOf(view, unit, own, 0.22, "limits");
   const groups = [
     { key: "measured", label: what, on: true, look: own },
     { key: "limits", label: "95 % limits", on: true, look: { ...own, marker: undefined, filled: true } },
   ];
   if (best) {
     const times = array(best.tau);
-    traces.push(...band(times, scaled(best.lower, unit.factor), scaled(best.upper, unit.factor), look[view.recommended], 0.12)
-      .map((trace) => ({ ...trace, group: "band" })));
-    traces.push({
+    traces.push(...band(times, scaled(best.lower, unit.factor), scaled(best.upper, unit.factor), look[view.recommended], 0.12, { group: "band" }), {
       group: "reconstructed", type: "scatter", mode: "markers", x: times, y: scaled(best.reconstructed, unit.factor), hoverinfo: "skip",
       marker: { color: colourOf(look[view.recommended]), symbol: "x-thin-open", size: 6 },
     });
   }
-  traces.push({
-    group: "measured", type: "scatter", mode: "lines+markers", x: tau, y, name: what, meta: { low, high },
-    line: { color: colourOf(own), width: 1.4 }, marker: { color: colourOf(own), symbol: own.marker, size: 5 },
-    text: tau.map((t, i) => `τ ${numberText(t, 3)} s: <b>${numberText(y[i], 3)} ${unit.sign}</b><br>95 %: ${interval(low[i], high[i])} ${unit.sign}`),
-    hovertemplate: `${what}<br>%{text}<extra></extra>`,
-  });
+  traces.push(curveOf(view, unit, what, {
+    group: "measured", line: { color: colourOf(own), width: 1.4 }, marker: { color: colourOf(own), symbol: own.marker, size: 5 },
+  }));
   if ("tau" in view.compensated) {
     const without = look.compensated;
-    const times = array(view.compensated.tau);
-    const [left, least, most] = ["adev", "lower", "upper"].map((name) => scaled(view.compensated[name], unit.factor));
-    traces.push({
-      group: "compensated", type: "scatter", mode: "lines+markers", x: times, y: left, name: "temperature compensated", meta: { low: least, high: most },
-      line: { color: colourOf(without), width: 1.2 }, marker: { size: 4, color: colourOf(without) },
-      text: times.map((t, i) => `τ ${numberText(t, 3)} s: <b>${numberText(left[i], 3)} ${unit.sign}</b><br>95 %: ${interval(least[i], most[i])} ${unit.sign}`),
-      hovertemplate: "temperature compensated<br>%{text}<extra></extra>",
-    });
+    const colour = colourOf(without);
+    traces.push(curveOf(view.compensated, unit, "temperature compensated", { group: "compensated", line: { color: colour, width: 1.2 }, marker: { size: 4, color: colour } }));
     groups.push({ key: "compensated", label: `${what}, temperature compensated`, on: true, look: without });
   }
   for (const [method, curve] of Object.entries(view.methods)) {
@@ -87,9 +69,8 @@ kinds.allan = (figure) => {
     );
   }
   view.datasheet.forEach((printed, place) => {
-    const value = printed.value * unit.factor;
-    const sheet = { light: "#B3001B", dark: "#FF8F8F", dash: TERM_DASHES[place % 4], width: 1.6 };
-    traces.push(line(tau, printed.of === "N" ? tau.map((t) => value / Math.sqrt(t)) : tau.map(() => value), sheet, {
+    const sheet = { ...MARKED, dash: TERM_DASHES[place % 4], width: 1.6 };
+    traces.push(line(tau, printedLine(printed, tau, unit), sheet, {
       group: `datasheet ${place}`, hoverinfo: "name", name: `datasheet: ${printed.label}`,
     }));
     groups.push({ key: `datasheet ${place}`, label: `datasheet: ${printed.label}`, on: true, look: sheet });
@@ -97,13 +78,8 @@ kinds.allan = (figure) => {
   const ranges = { x: logRange(tau, 0.1), y: logRange(y, 0.7, 0.25) };
   const slopes = slopeGuides(ranges.x, ranges.y);
   groups.push({ key: "slopes", label: "slopes", on: true, look: { light: inks().soft, dark: inks().soft } });
-  return {
-    traces, groups,
-    layout: {
-      xaxis: logAxis("averaging time τ (s)", ranges.x), yaxis: logAxis(`Allan deviation (${unit.sign})`, ranges.y),
-      ...(shown(figure, "slopes") ? slopes : {}),
-    },
-  };
+  const axes = { xaxis: logAxis("averaging time τ (s)", ranges.x), yaxis: logAxis(`Allan deviation (${unit.sign})`, ranges.y) };
+  return { traces, groups, layout: { ...axes, ...(shown(figure, "slopes") ? slopes : {}) } };
 };
 
 kinds.spectrum = (figure) => {
@@ -130,7 +106,7 @@ kinds.spectrum = (figure) => {
     { key: "left", label: "bins excluded", on: true, look: { light: inks().soft, dark: inks().soft, line: false, marker: "x" }, absent: left.size === 0 },
   ];
   const [least, most] = ["lower", "upper"].map((of) => scaled(spectrum[of], unit.factor));
-  traces.unshift(...band(array(spectrum.fit_frequency), least, most, look, 0.2).map((trace) => ({ ...trace, group: "scatter" })));
+  traces.unshift(...band(array(spectrum.fit_frequency), least, most, look, 0.2, { group: "scatter" }));
   traces.push(line(array(spectrum.fit_frequency), scaled(spectrum.fitted, unit.factor), { ...look, width: 2.2 }, { group: "fit", name: `fit ${spectrum.model}`, meta: { low: least, high: most } }));
   groups.push({ key: "fit", label: `fit ${spectrum.model}`, on: true, look: { ...look, marker: undefined } });
   groups.push({ key: "scatter", label: "95 % band of the bins if the model is right", on: true, look: { ...look, marker: undefined, filled: true } });
@@ -140,7 +116,7 @@ kinds.spectrum = (figure) => {
   });
   const range = logRange(density, 0.3);
   if (spectrum.lines.length > 0) {
-    const own = { light: "#B3001B", dark: "#FF8F8F", dash: "dot", width: 1.2 };
+    const own = { ...MARKED, dash: "dot", width: 1.2 };
     for (const each of spectrum.lines) {
       traces.push(line([each.frequency, each.frequency], range.map((power) => 10 ** power), own, {
         group: "lines", hoverinfo: "text", text: `${each.kind}, ${numberText(each.frequency, 5)} Hz`,
@@ -148,13 +124,8 @@ kinds.spectrum = (figure) => {
     }
     groups.push({ key: "lines", label: spectrum.lines.length === 1 ? "line" : "lines", on: true, look: own });
   }
-  return {
-    traces, groups,
-    layout: {
-      xaxis: logAxis("frequency f (Hz)", logRange(f, 0.1)),
-      yaxis: logAxis(`√PSD, two-sided (${unit.sign})`, range),
-    },
-  };
+  const layout = { xaxis: logAxis("frequency f (Hz)", logRange(f, 0.1)), yaxis: logAxis(`√PSD, two-sided (${unit.sign})`, range) };
+  return { traces, groups, layout };
 };
 
 function timeScale(longest) {
@@ -168,16 +139,11 @@ kinds.series = (figure) => {
   const warmth = pageData.samples.envelope.temperature;
   const unit = unitOf(quantityOf(channel), "signal");
   const scale = timeScale(envelope.end);
-  const middle = (of) => {
-    const count = array(of.mean).length;
-    return array(of.mean).map((_, i) => (of.start + ((i + 0.5) * (of.end - of.start)) / count) / scale.size);
-  };
+  const middle = (of) => array(of.mean).map((_, i, every) => (of.start + ((i + 0.5) * (of.end - of.start)) / every.length) / scale.size);
   const x = middle(envelope);
   const look = { ...sensorLook(pageData.channels[0]?.sensor), marker: undefined, dash: "solid" };
-  const low = scaled(envelope.low, unit.factor);
-  const high = scaled(envelope.high, unit.factor);
-  const mean = scaled(envelope.mean, unit.factor);
-  const traces = band(x, low, high, look, 0.35).map((trace) => ({ ...trace, group: "envelope" }));
+  const [low, high, mean] = ["low", "high", "mean"].map((name) => scaled(envelope[name], unit.factor));
+  const traces = band(x, low, high, look, 0.35, { group: "envelope" });
   const whole = mean.filter(Number.isFinite).reduce((sum, each, _, all) => sum + each / all.length, 0);
   traces.push({
     ...line(x, mean, black()), group: "mean", hoverinfo: "text", name: "mean", meta: { low, high },
@@ -198,7 +164,7 @@ kinds.series = (figure) => {
   };
   if (shown(figure, "drift")) {
     const step = 10 ** Math.floor(Math.log10(Math.max(...mean.map((each) => Math.abs(each - whole)).filter(Number.isFinite), 1e-300)) + 0.3);
-    const [small, power] = step < 1e-2 ? [step, `10${[...String(Math.round(Math.log10(step)))].map((sign) => SUPERSCRIPTS[sign]).join("")} `] : [1, ""];
+    const [small, power] = step < 1e-2 ? [step, `${powerText(Math.round(Math.log10(step)))} `] : [1, ""];
     traces.push({
       ...line(x, mean.map((each) => (each - whole) / small), { ...look, width: 1.4 }), group: "drift", name: "drift", meta: { of: `drift (${power}${unit.sign})` }, yaxis: panel(`drift (${power}${unit.sign})`), hoverinfo: "text",
       text: x.map((t, i) => `${numberText(t, 4)} ${scale.name}: ${numberText(mean[i] - whole, 3)} ${unit.sign} from the mean`),
@@ -220,7 +186,7 @@ kinds.series = (figure) => {
   if (below.length > 0) layout.xaxis.anchor = below.at(-1);
   const marked = pageData.findings.filter((finding) => finding.start !== null && (finding.channel === null || finding.channel === channel));
   if (marked.length > 0) {
-    groups.push({ key: "findings", label: "findings", on: true, look: { light: "#B3001B", dark: "#FF8F8F", filled: true } });
+    groups.push({ key: "findings", label: "findings", on: true, look: { ...MARKED, filled: true } });
     if (shown(figure, "findings")) {
       // Knocks are single events, so only the range from the first to the last is marked.
       layout.shapes = marked.map((finding) => ({
@@ -236,18 +202,16 @@ kinds.series = (figure) => {
   return { traces, groups, layout };
 };
 
-const comparedLooks = () => ({
-  log: { ...sensorLook(pageData.channels[0]?.sensor), marker: undefined, dash: "solid" },
-  before: { light: inks().soft, dark: inks().soft, dash: "dot" },
-  after: { ...black(), dash: "dash" },
-});
-
 kinds.compared = (figure) => {
   const channel = figure.dataset.channel;
   const drawn = pageData.of_models[channel];
   const unit = unitOf(quantityOf(channel), "signal");
   const overTime = figure.dataset.over === "envelope";
-  const looks = comparedLooks();
+  const looks = {
+    log: { ...sensorLook(pageData.channels[0]?.sensor), marker: undefined, dash: "solid" },
+    before: { light: inks().soft, dark: inks().soft, dash: "dot" },
+    after: { ...black(), dash: "dash" },
+  };
   const named = Object.keys(looks).filter((of) => drawn[of]);
   const end = drawn.log[overTime ? "end" : "stretch_end"];
   const scale = timeScale(end);
@@ -257,7 +221,7 @@ kinds.compared = (figure) => {
     const mean = scaled(overTime ? drawn[of].mean : drawn[of].stretch, unit.factor);
     const x = mean.map((_, i) => ((i + 0.5) * end) / mean.length / scale.size);
     if (overTime) {
-      traces.push(...band(x, scaled(drawn[of].low, unit.factor), scaled(drawn[of].high, unit.factor), look, 0.18).map((trace) => ({ ...trace, group: of })));
+      traces.push(...band(x, scaled(drawn[of].low, unit.factor), scaled(drawn[of].high, unit.factor), look, 0.18, { group: of }));
     }
     traces.push({
       ...line(x, mean, { ...look, width: 1 }), group: of, name: drawn[of].name, hoverinfo: "text",

@@ -54,6 +54,8 @@ function startComparison(root) {
   compareChosen(root);
 }
 
+const signOf = (look) => element("span", { className: "sign", innerHTML: swatch(look) });
+
 function drawPickers(pickers, axes) {
   const root = pickers.closest("main");
   const again = (focus) => {
@@ -64,13 +66,12 @@ function drawPickers(pickers, axes) {
     redrawAll();
   };
   const selects = chosen.map((one, place) => {
-    const select = document.createElement("select");
+    const select = element("select");
     select.dataset.letter = LETTERS[place];
     for (const sensor of new Set(pageData.recordings.map((row) => row.sensor))) {
       const own = pageData.recordings.filter((row) => row.sensor === sensor);
       const name = `${nameOf(sensor)}${own.every((row) => row.sold) ? "" : " (not sold)"}`;
-      const group = Object.assign(document.createElement("optgroup"), { label: name });
-      group.append(new Option(own.length > 1 ? `${name}: ${recordingOf(sensor).recording} (default)` : name, sensor));
+      const group = element("optgroup", { label: name }, new Option(own.length > 1 ? `${name}: ${recordingOf(sensor).recording} (default)` : name, sensor));
       if (own.length > 1) own.filter((row) => row !== recordingOf(sensor)).forEach((row) => group.append(new Option(`${name}: ${row.recording}`, `${sensor}/${row.recording}`)));
       select.append(group);
     }
@@ -83,45 +84,28 @@ function drawPickers(pickers, axes) {
       again(`select[data-letter=${LETTERS[place]}]`);
     });
     const label = labelled(one.letter, select);
-    const sign = Object.assign(document.createElement("span"), { className: "sign", innerHTML: swatch({ ...lookOfChosen(one), marker: lookOfChosen(one).plain ?? lookOfChosen(one).marker }) });
-    label.prepend(sign);
+    label.prepend(signOf({ ...lookOfChosen(one), marker: lookOfChosen(one).plain ?? lookOfChosen(one).marker }));
     if (chosen.length < 3) return label;
-    const remove = Object.assign(document.createElement("button"), { type: "button", textContent: "×", className: "remove" });
-    remove.setAttribute("aria-label", `Remove ${one.letter}`);
-    remove.addEventListener("click", () => {
+    const remove = element("button", { type: "button", textContent: "×", className: "remove", onclick: () => {
       chosen = chosenFrom(chosen.filter((other) => other !== one).map((other) => other.key));
       again("select");
-    });
-    const both = document.createElement("span");
-    both.append(label, remove);
-    return both;
+    } });
+    remove.setAttribute("aria-label", `Remove ${one.letter}`);
+    return element("span", {}, label, remove);
   });
-  const more = Object.assign(document.createElement("button"), { type: "button", textContent: "+ one more" });
-  more.hidden = chosen.length >= LETTERS.length || chosen.length >= pageData.recordings.length;
-  more.addEventListener("click", () => {
+  const more = element("button", { type: "button", textContent: "+ one more", hidden: chosen.length >= Math.min(LETTERS.length, pageData.recordings.length), onclick: () => {
     const used = new Set(chosen.map((one) => `${one.sensor}/${one.recording}`));
     const next = pageData.recordings.find((row) => !chosen.some((one) => one.sensor === row.sensor))
       ?? pageData.recordings.find((row) => !used.has(`${row.sensor}/${row.recording}`));
     const key = chosen.some((one) => one.sensor === next.sensor) ? `${next.sensor}/${next.recording}` : next.sensor;
     chosen = chosenFrom([...chosen.map((one) => one.key), key]);
     again(`select[data-letter=${LETTERS[chosen.length - 1]}]`);
-  });
-  const set = document.createElement("fieldset");
-  set.append(Object.assign(document.createElement("legend"), { textContent: "Axis" }));
-  for (const name of axes) {
-    const radio = Object.assign(document.createElement("input"), { type: "radio", name: "compared", value: name, checked: name === chosenChannel });
-    radio.addEventListener("change", () => {
-      chosenChannel = name;
-      keep("axis", name);
-      startGrowth(root);
-      compareChosen(root);
-      redrawAll();
-    });
-    const label = document.createElement("label");
-    label.append(radio, ` ${CHANNEL_NAMES[name]}`);
-    set.append(label);
-  }
-  pickers.replaceChildren(...selects, more, set);
+  } });
+  pickers.replaceChildren(...selects, more, axisChooser("compared", axes, () => {
+    startGrowth(root);
+    compareChosen(root);
+    redrawAll();
+  }));
 }
 
 // Each figure of the chosen channels: its name, the value of each recording, and the ratio of the
@@ -162,23 +146,20 @@ function verdictOf(ratio, first, second) {
 }
 
 function compareChosen(root) {
-  const figures = comparedFigures();
-  drawVerdicts(root, figures);
+  drawVerdicts(root, comparedFigures());
   drawEvidence(root);
   drawErrors(root);
 }
 
-function cellOf(text, more = {}) {
-  return Object.assign(document.createElement("td"), { textContent: text, ...more });
-}
+const cellOf = (text, more = {}, ...inside) => element("td", { textContent: text, ...more }, ...inside);
 
 function verdictCell(ratio, first, second) {
   const { text, kind, letter } = verdictOf(ratio, first, second);
   const cell = cellOf("", { className: `judged ${kind}` });
   const better = chosen.find((one) => one.letter === letter);
-  if (better) cell.append(Object.assign(document.createElement("span"), { className: "sign", innerHTML: swatch({ ...pageData.looks.sensors[better.sensor], line: false }) }));
+  if (better) cell.append(signOf({ ...pageData.looks.sensors[better.sensor], line: false }));
   cell.append(text);
-  if (ratio.reason) cell.append(" ", Object.assign(document.createElement("span"), { className: "why", textContent: ratio.reason }));
+  if (ratio.reason) cell.append(" ", element("span", { className: "why", textContent: ratio.reason }));
   return cell;
 }
 
@@ -186,8 +167,7 @@ function ratioCell(ratio) {
   const cell = cellOf("", { className: "number ratio" });
   Object.assign(cell.dataset, { ratio: ratio.value ?? "", lower: ratio.lower ?? "", upper: ratio.upper ?? "" });
   const digits = digitsOf(ratio.value, ratio.lower, ratio.upper);
-  cell.append(Object.assign(document.createElement("strong"), { textContent: ratio.value === null ? "–" : numberText(ratio.value, digits) }));
-  cell.append(document.createElement("br"), Object.assign(document.createElement("small"), { textContent: ratioText(ratio) }));
+  cell.append(element("strong", { textContent: ratio.value === null ? "–" : numberText(ratio.value, digits) }), element("br"), element("small", { textContent: ratioText(ratio) }));
   return cell;
 }
 
@@ -197,31 +177,23 @@ function ownCell(one, unit, digitsFor = digitsOf) {
   const [value, lower, upper] = [one.value, one.lower, one.upper].map((number) => (number === null ? null : number * factor));
   const bounded = lower !== null && upper !== null;
   const digits = digitsFor(value, lower, upper);
-  if (value !== null) cell.append(`${numberText(value, digits)} ${sign}`);
-  else cell.append(one.status === "absent" && upper !== null ? `below ${numberText(upper, 2)} ${sign}` : statusText(one.status));
+  const bound = one.status === "absent" && upper !== null ? `below ${numberText(upper, 2)} ${sign}` : statusText(one.status);
+  cell.append(value !== null ? `${numberText(value, digits)} ${sign}` : bound);
   if (bounded && value !== null) {
-    cell.append(document.createElement("br"), Object.assign(document.createElement("small"), { textContent: `${numberText(lower, digits)} to ${numberText(upper, digits)}` }));
+    cell.append(element("br"), element("small", { textContent: `${numberText(lower, digits)} to ${numberText(upper, digits)}` }));
   }
   return cell;
 }
 
-function headOf(...texts) {
-  const row = document.createElement("tr");
-  row.append(...texts.map((text) => Object.assign(document.createElement("th"), { scope: "col", textContent: text })));
-  return row;
-}
+const headOf = (...texts) => element("tr", {}, ...texts.map((text) => element("th", { scope: "col", textContent: text })));
 
 function linesOf(figures) {
   return figures.map((figure) => {
-    const row = document.createElement("tr");
-    row.dataset.figure = figure.tau ? `adev ${figure.tau}` : figure.symbol;
-    const head = Object.assign(document.createElement("th"), { scope: "row" });
-    const name = Object.assign(document.createElement(figure.term ? "i" : "span"), { textContent: figure.label });
+    const name = element(figure.term ? "i" : "span", { textContent: figure.label });
     if (figure.term) name.dataset.term = figure.term;
-    head.append(name);
-    row.append(head);
-    figure.ratios.forEach((ratio, place) => row.append(verdictCell(ratio, chosen[0], chosen[place + 1]), ratioCell(ratio)));
-    row.append(...figure.own.map((one) => ownCell(one, figure.unit, figure.digits)));
+    const judged = figure.ratios.flatMap((ratio, place) => [verdictCell(ratio, chosen[0], chosen[place + 1]), ratioCell(ratio)]);
+    const row = element("tr", {}, element("th", { scope: "row" }, name), ...judged, ...figure.own.map((one) => ownCell(one, figure.unit, figure.digits)));
+    row.dataset.figure = figure.tau ? `adev ${figure.tau}` : figure.symbol;
     return row;
   });
 }
@@ -268,16 +240,13 @@ function drawEvidence(root) {
   table.tHead.replaceChildren(headOf("Compared", "Recording", "Hours", "Units of the sensor", "Temperature", "Rate", "Warnings"));
   table.tBodies[0].replaceChildren(...chosen.map((one) => {
     const { row } = one;
-    const line = document.createElement("tr");
     const own = pageData.recordings.filter((other) => other.sensor === one.sensor);
-    const named = cellOf("");
-    named.append(Object.assign(document.createElement("a"), { href: row.page.split("/").map(encodeURIComponent).join("/"), textContent: row.recording }));
-    if (row.simulated) named.append(" ", Object.assign(document.createElement("span"), { className: "badge", textContent: "simulated" }));
+    const named = cellOf("", {}, element("a", { href: row.page.split("/").map(encodeURIComponent).join("/"), textContent: row.recording }));
+    if (row.simulated) named.append(" ", element("span", { className: "badge", textContent: "simulated" }));
     if (own.length > 1 && !one.key.includes("/")) named.append(` (longest of ${own.length})`);
     const specimens = new Set(own.map((other) => other.device)).size;
-    line.append(Object.assign(document.createElement("th"), { scope: "row", textContent: shortName(one) }), named,
+    return element("tr", {}, element("th", { scope: "row", textContent: shortName(one) }), named,
       cellOf(numberText(row.seconds / 3600, 3), { className: "number" }), cellOf(`${specimens}, in ${own.length} ${own.length === 1 ? "recording" : "recordings"}`),
       cellOf(row.temperature ?? "not logged"), cellOf(`${row.rate} Hz`, { className: "number" }), cellOf(doubtsOf(one).join(", ") || "none", { className: "words" }));
-    return line;
   }));
 }

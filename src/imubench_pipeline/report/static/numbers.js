@@ -1,6 +1,6 @@
 // Numbers as they are printed, and the units that the reader chose.
-// UNITS: quantity -> choice -> symbol -> [sign, factor from SI]; STATUS_NAMES: status -> text; both
-// are written by the page builder.
+// Constants in capitals are written by `publish`: UNITS (quantity -> choice -> symbol -> [sign, factor
+// from SI]), STATUS_NAMES, SYMBOL_TEXTS, TERMS, and the colours of terms.
 
 const SUPERSCRIPTS = { "-": "⁻", 0: "⁰", 1: "¹", 2: "²", 3: "³", 4: "⁴", 5: "⁵", 6: "⁶", 7: "⁷", 8: "⁸", 9: "⁹" };
 
@@ -8,16 +8,12 @@ function numberText(value, digits) {
   if (Number.isNaN(value)) return "–";
   if (!Number.isFinite(value)) return value > 0 ? "∞" : "−∞";
   const rounded = Number(value.toPrecision(digits));
-  let text;
-  if (rounded === 0 || (Math.abs(rounded) >= 1e-4 && Math.abs(rounded) < 1e6)) {
-    text = String(rounded);
-  } else {
-    const [mantissa, exponent] = rounded.toExponential().split("e");
-    const power = [...exponent.replace("+", "")].map((sign) => SUPERSCRIPTS[sign]).join("");
-    text = `${mantissa}×10${power}`;
-  }
-  return text.replaceAll("-", "−");
+  if (rounded === 0 || (Math.abs(rounded) >= 1e-4 && Math.abs(rounded) < 1e6)) return String(rounded).replaceAll("-", "−");
+  const [mantissa, exponent] = rounded.toExponential().split("e");
+  return `${mantissa.replaceAll("-", "−")}×${powerText(exponent)}`;
 }
+
+const powerText = (exponent) => `10${[...String(exponent).replace("+", "")].map((sign) => SUPERSCRIPTS[sign]).join("")}`;
 
 // Digits of limits that differ in print; as `limit_digits` of imubench_pipeline.words.numbers.
 function limitDigits(lower, upper, least = 3) {
@@ -37,8 +33,6 @@ function digitsBy(value, lower, upper, otherwise = 3) {
 
 const chosenUnits = {};
 
-// How a parameter is written; the builder of the pages has the same names.
-const SYMBOL_TEXTS = { B_curve: "B (curve)", sigma_min: "σ_min", tau_min: "τ_min" };
 const symbolText = (symbol) => SYMBOL_TEXTS[symbol] ?? symbol;
 const statusText = (status) => STATUS_NAMES[status] ?? status.replaceAll("_", " ");
 const symbolMarkup = (symbol) => symbolText(symbol).replace(/_(\w+)/, "<sub>$1</sub>");
@@ -66,8 +60,7 @@ function remember(key, value) {
 
 function startUnits(first) {
   for (const [quantity, choices] of Object.entries(UNITS)) {
-    const linked = Object.keys(choices)[Number(state.get(quantity) ?? -1)];
-    const before = linked ?? remembered(`imubench ${quantity}`);
+    const before = Object.keys(choices)[Number(state.get(quantity) ?? -1)] ?? remembered(`imubench ${quantity}`);
     chosenUnits[quantity] = before in choices ? before : first[quantity];
   }
   document.querySelectorAll("select[data-quantity]").forEach((select) => {
@@ -96,6 +89,4 @@ function showUnits(root) {
   });
 }
 
-function unitOfColumn(cell) {
-  return cell.closest("table").tHead.rows[0].cells[cell.cellIndex].dataset.unit;
-}
+const unitOfColumn = (cell) => cell.closest("table").tHead.rows[0].cells[cell.cellIndex].dataset.unit;

@@ -1,8 +1,6 @@
 // Allan deviations of several sensors, or of several recordings of one sensor, in one figure.
 
-const CHANNEL_NAMES = {
-  gyro_x: "gyro x", gyro_y: "gyro y", gyro_z: "gyro z", accel_x: "accel x", accel_y: "accel y", accel_z: "accel z",
-};
+const CHANNEL_NAMES = Object.fromEntries(["gyro_x", "gyro_y", "gyro_z", "accel_x", "accel_y", "accel_z"].map((name) => [name, name.replace("_", " ")]));
 const MANY = 40; // curves beyond which only one recording per sensor is shown at first
 let chosenChannel = null;
 let chosenMethod = "recommended";
@@ -19,25 +17,8 @@ function startChooser(root) {
   const most = Math.max(0, ...present.map((name) => pageData.channels.filter((view) => view.channel === name).length));
   everyRecording = most <= MANY || pageData.grouped === "recording";
   if (state.has("recordings")) everyRecording = state.get("recordings") === "all";
-  const set = document.createElement("fieldset");
-  set.append(Object.assign(document.createElement("legend"), { textContent: "Axis" }));
-  for (const name of present) {
-    const radio = Object.assign(document.createElement("input"), {
-      type: "radio", name: "channel", value: name, checked: name === chosenChannel,
-    });
-    radio.addEventListener("change", () => {
-      chosenChannel = name;
-      keep("axis", name);
-      redrawAll();
-    });
-    const label = document.createElement("label");
-    label.append(radio, ` ${CHANNEL_NAMES[name]}`);
-    set.append(label);
-  }
-  const method = document.createElement("select");
-  method.append(new Option("recommended", "recommended"),
-    ...Object.entries(pageData.looks.methods)
-      .filter(([key]) => pageData.channels.some((view) => key in view.models)).map(([key, look]) => new Option(look.name, key)));
+  const drawable = Object.entries(pageData.looks.methods).filter(([key]) => pageData.channels.some((view) => key in view.models));
+  const method = element("select", {}, new Option("recommended", "recommended"), ...drawable.map(([key, look]) => new Option(look.name, key)));
   if (state.has("method")) chosenMethod = state.get("method");
   method.value = chosenMethod;
   if (method.selectedIndex < 0) method.value = chosenMethod = "recommended";
@@ -46,10 +27,9 @@ function startChooser(root) {
     keep("method", chosenMethod === "recommended" ? null : chosenMethod);
     redrawAll();
   });
-  chooser.append(set, labelled("Model drawn", method));
+  chooser.append(axisChooser("channel", present, redrawAll), labelled("Model drawn", method));
   if (pageData.grouped === "sensor" && new Set(pageData.channels.map((view) => view.recording)).size > 1) {
-    const which = document.createElement("select");
-    which.append(new Option("all", "all"), new Option("last of each sensor", "last"));
+    const which = element("select", {}, new Option("all", "all"), new Option("last of each sensor", "last"));
     which.value = everyRecording ? "all" : "last";
     which.addEventListener("change", () => {
       everyRecording = which.value === "all";
@@ -58,6 +38,17 @@ function startChooser(root) {
     });
     chooser.append(labelled("Recordings", which));
   }
+}
+
+function axisChooser(group, names, act) {
+  return element("fieldset", {}, element("legend", { textContent: "Axis" }), ...names.map((name) => {
+    const choose = () => {
+      chosenChannel = name;
+      keep("axis", name);
+      act();
+    };
+    return element("label", {}, element("input", { type: "radio", name: group, value: name, checked: name === chosenChannel, onchange: choose }), ` ${CHANNEL_NAMES[name]}`);
+  }));
 }
 
 function comparedChannels(channel) {
@@ -74,20 +65,33 @@ function lookOf(view) {
   return pageData.looks.places[place % pageData.looks.places.length];
 }
 
-function groupOf(view) {
-  return pageData.grouped === "sensor" ? view.sensor : view.recording;
-}
-
-function nameOf(key) {
-  return pageData.names[key] ?? key;
-}
+const groupOf = (view) => (pageData.grouped === "sensor" ? view.sensor : view.recording);
+const nameOf = (key) => pageData.names[key] ?? key;
 
 function interval(low, high) {
   return Number.isFinite(low) && Number.isFinite(high) ? `${numberText(low, 3)} to ${numberText(high, 3)}` : "not known";
 }
 
-function spread(count, places) {
-  return Array.from({ length: places }, (_, i) => Math.round(((i + 0.5) * count) / places));
+// A printed figure is a power of tau.
+const printedLine = (printed, tau, unit) => tau.map((t) => printed.value * unit.factor * t ** printed.slope);
+
+const titleOfView = (view) => `${nameOf(view.sensor)}${view.simulated ? " (simulated)" : ""}, ${view.recording}`;
+const curvesOf = (view, unit) => [view.adev, view.lower, view.upper].map((place) => scaled(place, unit.factor));
+
+// A measured curve, its limits on hover.
+function curveOf(view, unit, name, more) {
+  const [y, low, high] = curvesOf(view, unit);
+  const x = array(view.tau);
+  return {
+    type: "scatter", mode: "lines+markers", x, y, name, meta: { low, high },
+    text: x.map((t, i) => `τ ${numberText(t, 3)} s: <b>${numberText(y[i], 3)} ${unit.sign}</b><br>95 %: ${interval(low[i], high[i])} ${unit.sign}`),
+    hovertemplate: `${name}<br>%{text}<extra></extra>`, ...more,
+  };
+}
+
+function limitsOf(view, unit, look, opacity, group) {
+  const [, low, high] = curvesOf(view, unit);
+  return band(array(view.tau), low, high, look, opacity, { group });
 }
 
 kinds.overlay = (figure) => {
@@ -107,17 +111,10 @@ kinds.overlay = (figure) => {
     groups.get(key).absent = false;
     const look = lookOf(view);
     const colour = colourOf(look);
-    const tau = array(view.tau);
-    const [y, low, high] = [view.adev, view.lower, view.upper].map((place) => scaled(place, unit.factor));
-    traces.push(...band(tau, low, high, look).map((trace) => ({ ...trace, group: [key, "limits"] })));
-    const title = `${nameOf(view.sensor)}${view.simulated ? " (simulated)" : ""}, ${view.recording}`;
-    traces.push({
-      group: [key, "measured"], type: "scatter", mode: "lines+markers", x: tau, y, name: title, meta: { low, high },
-      line: { color: colour, dash: look.dash, width: 1.6 },
-      marker: { color: colour, symbol: look.marker, size: tau.map((_, i) => (i % 8 === 4 ? 7 : 0.1)) },
-      text: tau.map((t, i) => `τ ${numberText(t, 3)} s: <b>${numberText(y[i], 3)} ${unit.sign}</b><br>95 %: ${interval(low[i], high[i])} ${unit.sign}`),
-      hovertemplate: `${title}<br>%{text}<extra></extra>`,
-    });
+    traces.push(...limitsOf(view, unit, look, 0.18, [key, "limits"]), curveOf(view, unit, titleOfView(view), {
+      group: [key, "measured"], line: { color: colour, dash: look.dash, width: 1.6 },
+      marker: { color: colour, symbol: look.marker, size: array(view.tau).map((_, i) => (i % 8 === 4 ? 7 : 0.1)) },
+    }));
     const method = chosenMethod === "recommended" ? view.recommended : chosenMethod;
     if (view.models[method] !== undefined) {
       const [times, curve] = view.models[method];
@@ -128,25 +125,18 @@ kinds.overlay = (figure) => {
     x: logRange(here.flatMap((view) => array(view.tau)), 0.1), y: logRange(here.flatMap((view) => scaled(view.adev, unit.factor)), 0.4),
   };
   const slopes = slopeGuides(ranges.x, ranges.y);
-  const drawnSheets = new Set();
-  for (const view of here) {
-    if (drawnSheets.has(view.sensor)) continue;
-    drawnSheets.add(view.sensor);
-    const look = lookOf(view);
-    const tau = array(view.tau);
+  for (const view of here.filter(({ sensor }, i) => here.findIndex((other) => other.sensor === sensor) === i)) {
+    const [look, tau] = [lookOf(view), array(view.tau)];
     pageData.datasheets[view.sensor][chosenChannel].forEach((printed) => {
-      const value = printed.value * unit.factor;
-      traces.push(line(tau, printed.of === "N" ? tau.map((t) => value / Math.sqrt(t)) : tau.map(() => value),
-        { ...look, dash: "dot", width: 1.2 }, {
-          group: [groupOf(view), "datasheet"], hoverinfo: "text", text: `${nameOf(view.sensor)}, datasheet: ${printed.label}`,
-        }));
+      traces.push(line(tau, printedLine(printed, tau, unit), { ...look, dash: "dot", width: 1.2 }, {
+        group: [groupOf(view), "datasheet"], hoverinfo: "text", text: `${nameOf(view.sensor)}, datasheet: ${printed.label}`,
+      }));
     });
   }
   const { ink, soft } = inks();
   const plain = { light: ink, dark: ink };
   // Names stand at the ends of the curves, where there is room for them.
-  const named = new Map();
-  for (const view of here) if (shown(figure, groupOf(view)) && shown(figure, "measured")) named.set(groupOf(view), view);
+  const named = new Map(here.filter((view) => shown(figure, groupOf(view)) && shown(figure, "measured")).map((view) => [groupOf(view), view]));
   const roomy = !printing() && figure.clientWidth > 700 && named.size <= 12;
   const labels = roomy ? directLabels([...named].map(([key, view]) => ({
     y: Math.log10(scaled(view.adev, unit.factor).at(-1)), text: wrapped(nameOf(key)), colour: colourOf(lookOf(view)),
@@ -183,7 +173,7 @@ kinds.forest = (figure) => {
   const names = [...new Set(here.map(groupOf))].reverse();
   const traces = [];
   const counts = new Map();
-  for (const view of here) counts.set(groupOf(view), (counts.get(groupOf(view)) ?? 0) + 1);
+  here.map(groupOf).forEach((key) => counts.set(key, (counts.get(key) ?? 0) + 1));
   const seen = new Map();
   const extent = [];
   for (const view of here) {
@@ -192,7 +182,7 @@ kinds.forest = (figure) => {
     seen.set(key, number + 1);
     const method = chosenMethod === "recommended" || !view.parameters[chosenMethod] ? view.recommended : chosenMethod;
     const place = names.indexOf(key) + ((number + 1) / (counts.get(key) + 1) - 0.5) * -0.7;
-    const name = `${nameOf(view.sensor)}${view.simulated ? " (simulated)" : ""}, ${view.recording}`;
+    const name = titleOfView(view);
     for (const [value, lower, upper, status] of view.parameters[method]?.[symbol] ?? []) {
       const identified = value !== null && status === "ok";
       const bounded = lower !== null && lower > 0 && upper !== null;
@@ -210,10 +200,7 @@ kinds.forest = (figure) => {
           color: identified ? colour : inks().paper, size: identified ? 9 : 8, line: { color: colour, width: identified ? 0 : 2 },
           symbol: identified ? look.marker : status === "absent" ? "triangle-left" : "circle",
         },
-        error_x: bounded ? {
-          type: "data", symmetric: false, array: [(upper - middle) * unit.factor], arrayminus: [(middle - lower) * unit.factor],
-          color: colour, thickness: 1.6, width: 4,
-        } : undefined,
+        error_x: bounded ? { type: "data", symmetric: false, array: [(upper - middle) * unit.factor], arrayminus: [(middle - lower) * unit.factor], color: colour, thickness: 1.6, width: 4 } : undefined,
         hovertemplate: `${name}<br>${symbolText(symbol)} ${words}${limits}<extra></extra>`,
       });
     }

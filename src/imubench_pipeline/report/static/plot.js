@@ -8,24 +8,18 @@ const drawn = new Set();
 let pageData = null;
 let decoded = [];
 
+const array = (place) => (decoded[place] ??= decode(...pageData.arrays[place]));
+
 // Kinds of arrays: f, float32 as they are; l and e, levels of a logarithm and even ones, of which
 // 0 stands for no value.
-function array(place) {
-  if (decoded[place] === undefined) {
-    const [kind, low, step, text] = pageData.arrays[place];
-    const bytes = Uint8Array.from(atob(text), (sign) => sign.charCodeAt(0));
-    if (kind === "f") {
-      decoded[place] = [...new Float32Array(bytes.buffer)];
-    } else {
-      const levels = kind === "e" ? bytes : summed(bytes);
-      decoded[place] = Array.from(levels, (level) => {
-        if (level === 0) return NaN;
-        const value = low + (level - 1) * step;
-        return kind === "l" ? 10 ** value : value;
-      });
-    }
-  }
-  return decoded[place];
+function decode(kind, low, step, text) {
+  const bytes = Uint8Array.from(atob(text), (sign) => sign.charCodeAt(0));
+  if (kind === "f") return [...new Float32Array(bytes.buffer)];
+  return Array.from(kind === "e" ? bytes : summed(bytes), (level) => {
+    if (level === 0) return NaN;
+    const value = low + (level - 1) * step;
+    return kind === "l" ? 10 ** value : value;
+  });
 }
 
 // Differences modulo 65536, all low bytes before all high ones.
@@ -39,17 +33,9 @@ function summed(bytes) {
   return levels;
 }
 
-function scaled(place, factor) {
-  return array(place).map((value) => value * factor);
-}
-
-function printing() {
-  return window.matchMedia("print").matches || document.documentElement.dataset.printing === "yes";
-}
-
-function dark() {
-  return !printing() && window.matchMedia("(prefers-color-scheme: dark)").matches;
-}
+const scaled = (place, factor) => array(place).map((value) => value * factor);
+const printing = () => window.matchMedia("print").matches || document.documentElement.dataset.printing === "yes";
+const dark = () => !printing() && window.matchMedia("(prefers-color-scheme: dark)").matches;
 
 function inks() {
   return dark()
@@ -57,9 +43,7 @@ function inks() {
     : { ink: "#1b1b1b", soft: "#5a636b", grid: "#dfe3e6", paper: "#ffffff", mark: "#b3001b" };
 }
 
-function colourOf(look) {
-  return dark() ? look.dark : look.light;
-}
+const colourOf = (look) => (dark() ? look.dark : look.light);
 
 function faint(colour, opacity) {
   const parts = [1, 3, 5].map((at) => parseInt(colour.slice(at, at + 2), 16));
@@ -67,16 +51,12 @@ function faint(colour, opacity) {
 }
 
 function line(x, y, look, more = {}) {
-  const colour = colourOf(look);
-  return {
-    type: "scatter", mode: "lines", x, y, hoverinfo: "skip",
-    line: { color: colour, dash: look.dash ?? "solid", width: look.width ?? 1.8 },
-    ...more,
-  };
+  const style = { color: colourOf(look), dash: look.dash ?? "solid", width: look.width ?? 1.8 };
+  return { type: "scatter", mode: "lines", x, y, hoverinfo: "skip", line: style, ...more };
 }
 
-function band(x, low, high, look, opacity = 0.18) {
-  const edge = { type: "scatter", mode: "lines", x, hoverinfo: "skip", line: { width: 0, color: colourOf(look) } };
+function band(x, low, high, look, opacity = 0.18, more = {}) {
+  const edge = { type: "scatter", mode: "lines", x, hoverinfo: "skip", line: { width: 0, color: colourOf(look) }, ...more };
   const fillcolor = faint(colourOf(look), opacity);
   const present = x.map((_, i) => Number.isFinite(low[i]) && Number.isFinite(high[i]));
   const stretches = present.filter((inside, i) => inside && !present[i - 1]).length;
@@ -95,9 +75,7 @@ function band(x, low, high, look, opacity = 0.18) {
   return [{ ...edge, ...shapes, fill: "toself", fillcolor }];
 }
 
-function tickText(value) {
-  return (value >= 1e-3 && value < 1e5 ? numberText(value, 3) : numberText(value, 3).replace(/^1×/, ""));
-}
+const tickText = (value) => (value >= 1e-3 && value < 1e5 ? numberText(value, 3) : numberText(value, 3).replace(/^1×/, ""));
 
 // Labels at decades, at 1, 2, 5 or at even steps, as many as can be read; lines at all multiples.
 function logTicks(low, high) {
@@ -121,13 +99,16 @@ function logTicks(low, high) {
   return { tickvals, ticktext: tickvals.map(tickText), minor: every };
 }
 
-function logAxis(title, range) {
+function linearAxis(title) {
   const { ink, grid } = inks();
+  return { title: { text: title, standoff: 8 }, color: ink, gridcolor: grid, zeroline: false, automargin: true };
+}
+
+function logAxis(title, range) {
   const { tickvals, ticktext, minor } = logTicks(...range);
   return {
-    type: "log", title: { text: title, standoff: 8 }, color: ink, gridcolor: grid, zeroline: false, automargin: true,
-    range, tickmode: "array", tickvals, ticktext, tickangle: 0,
-    minor: { tickmode: "array", tickvals: minor, showgrid: true, gridcolor: faint(grid, 0.55), ticks: "" },
+    ...linearAxis(title), type: "log", range, tickmode: "array", tickvals, ticktext, tickangle: 0,
+    minor: { tickmode: "array", tickvals: minor, showgrid: true, gridcolor: faint(inks().grid, 0.55), ticks: "" },
   };
 }
 
@@ -156,11 +137,6 @@ function followZoom(figure, canvas) {
   });
 }
 
-function linearAxis(title) {
-  const { ink, grid } = inks();
-  return { title: { text: title, standoff: 8 }, color: ink, gridcolor: grid, zeroline: false, automargin: true };
-}
-
 function baseLayout() {
   const { ink, paper } = inks();
   return {
@@ -171,8 +147,14 @@ function baseLayout() {
   };
 }
 
-function shown(figure, group) {
-  return choices.get(figure)?.get(group) ?? true;
+const shown = (figure, group) => choices.get(figure)?.get(group) ?? true;
+
+const isOn = (trace, on) => [trace.group].flat().every((group) => !group || on(group));
+
+// Groups that are on when the page opens, by its address.
+function openingChoices(figure, groups) {
+  const other = new Set((state.get(`g${numberOf(figure)}`) ?? "").split("~"));
+  return new Map(groups.map((group) => [group.key, group.on !== other.has(group.key)]));
 }
 
 function drawFigure(figure) {
@@ -180,15 +162,15 @@ function drawFigure(figure) {
   const own = choices.get(figure) ?? new Map();
   const fresh = made.groups.filter((group) => !own.has(group.key));
   if (fresh.length > 0 || !choices.has(figure)) {
-    const other = new Set((state.get(`g${numberOf(figure)}`) ?? "").split("~"));
-    fresh.forEach((group) => own.set(group.key, group.on !== other.has(group.key)));
+    openingChoices(figure, fresh).forEach((on, key) => own.set(key, on));
     choices.set(figure, own);
     drawControls(figure, fresh);
     return drawFigure(figure);
   }
   syncControls(figure, made.groups);
-  keepChoices(figure, made.groups);
-  const traces = made.traces.filter((trace) => [trace.group].flat().every((group) => !group || shown(figure, group)));
+  // The choices that differ from those with which the page opens.
+  keepIfOther(`g${numberOf(figure)}`, made.groups.filter((group) => own.get(group.key) !== group.on).map((group) => group.key).join("~"));
+  const traces = made.traces.filter((trace) => isOn(trace, (group) => shown(figure, group)));
   const canvas = figure.querySelector(".canvas");
   canvas.classList.toggle("empty", traces.length === 0);
   const layout = { ...baseLayout(), ...made.layout, datarevision: Math.random() };
@@ -214,13 +196,6 @@ function drawFigure(figure) {
   showZoom(figure);
 }
 
-// The choices that differ from those with which the page opens.
-function keepChoices(figure, groups) {
-  const shownGroups = choices.get(figure);
-  const other = groups.filter((group) => shownGroups.get(group.key) !== group.on).map((group) => group.key);
-  keepIfOther(`g${numberOf(figure)}`, other.join("~"));
-}
-
 const DASHES = { solid: "", dash: "6 4", dot: "2 3", dashdot: "7 3 2 3", longdash: "11 4", longdashdot: "11 3 2 3", "7px,3px,2px,3px,2px,3px": "7 3 2 3 2 3" };
 const SHAPES = {
   circle: '<circle cx="14" cy="7" r="4"/>', square: '<rect x="10" y="3" width="8" height="8"/>',
@@ -242,43 +217,29 @@ function drawControls(figure, groups) {
   const controls = figure.querySelector(".controls");
   if (!controls) return;
   for (const group of groups) {
-    const label = document.createElement("label");
-    label.className = "toggle";
-    label.dataset.group = group.key;
-    const box = document.createElement("input");
-    box.type = "checkbox";
-    box.checked = shown(figure, group.key);
-    box.addEventListener("change", () => {
+    const box = element("input", { type: "checkbox", checked: shown(figure, group.key), onchange: () => {
       choices.get(figure).set(group.key, box.checked);
       redrawChosen(figure);
-    });
-    const sign = document.createElement("span");
-    label.append(box, sign, ` ${group.label}`);
+    } });
+    const label = element("label", { className: "toggle" }, box, element("span"), ` ${group.label}`);
+    label.dataset.group = group.key;
     controls.append(label);
   }
   if (groups.length > 8) controls.append(allOrNone(figure, groups, true), allOrNone(figure, groups, false));
 }
 
 // The choice of curves also applies to the other figures of the page.
-function redrawChosen(figure) {
-  if (figure.dataset.kind === "overlay") redrawAll();
-  else drawFigure(figure);
-}
+const redrawChosen = (figure) => (figure.dataset.kind === "overlay" ? redrawAll() : drawFigure(figure));
 
 // Layers, such as the curves themselves, stay on: without them no curve would be visible.
 function allOrNone(figure, groups, on) {
-  const button = document.createElement("button");
-  button.type = "button";
-  button.textContent = on ? "all on" : "all off";
-  button.addEventListener("click", () => {
-    for (const { key, layer } of groups) {
-      if (layer) continue;
+  return element("button", { type: "button", textContent: on ? "all on" : "all off", onclick: () => {
+    for (const { key } of groups.filter(({ layer }) => !layer)) {
       choices.get(figure).set(key, on);
       figure.querySelector(`.controls [data-group="${CSS.escape(key)}"] input`).checked = on;
     }
     redrawChosen(figure);
-  });
-  return button;
+  } });
 }
 
 // Colours follow the theme; groups without data are hidden.
@@ -307,14 +268,8 @@ let plotting = null;
 function loadPlotting() {
   plotting ??= window.Plotly ? Promise.resolve() : new Promise((loaded) => {
     const place = document.body.dataset.plotting;
-    if (!place) {
-      window.addEventListener("load", loaded, { once: true });
-      return;
-    }
-    const script = document.createElement("script");
-    script.src = place;
-    script.addEventListener("load", loaded, { once: true });
-    document.head.append(script);
+    if (place) document.head.append(element("script", { src: place, onload: loaded }));
+    else window.addEventListener("load", loaded, { once: true });
   });
   return plotting;
 }
@@ -341,15 +296,11 @@ function afterPaint(act) {
   window.setTimeout(once, 300);
 }
 
-function redrawAll() {
-  [...drawn].filter((figure) => figure.isConnected).forEach(drawFigure);
-}
+const redrawAll = () => [...drawn].filter((figure) => figure.isConnected).forEach(drawFigure);
 
 // Figures do not learn the width of a printed page in time, so it is fixed. Those of a channel are
 // printed in pairs.
-function onPaper(figure) {
-  return figure.matches("section.channel .figures > *") ? { width: 330, height: 200 } : { width: 660, height: 240 };
-}
+const onPaper = (figure) => (figure.matches("section.channel .figures > *") ? { width: 330, height: 200 } : { width: 660, height: 240 });
 
 function startPrinting() {
   const everyFigure = () => document.querySelectorAll("figure[data-kind]:not(.on-screen *)");

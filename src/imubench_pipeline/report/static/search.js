@@ -9,9 +9,7 @@ function loadSearch() {
     const own = document.getElementById("search-index");
     if (own) return found(JSON.parse(own.textContent));
     window.imubenchSearch = found;
-    const script = document.createElement("script");
-    script.src = document.body.dataset.plotting.replace("plotly.min.js", "search.js");
-    document.head.append(script);
+    document.head.append(element("script", { src: document.body.dataset.plotting.replace("plotly.min.js", "search.js") }));
   });
   return searched;
 }
@@ -33,24 +31,20 @@ function startSearch() {
   const units = document.querySelector("header .units");
   if (!units) return;
   const root = (document.body.dataset.plotting ?? "").replace("assets/plotly.min.js", "");
-  const form = Object.assign(document.createElement("form"), { className: "search" });
+  const form = element("form", { className: "search" });
   form.setAttribute("role", "search");
-  const field = Object.assign(document.createElement("input"), { type: "search", placeholder: "Search everything", autocomplete: "off" });
+  const field = element("input", { type: "search", placeholder: "Search everything", autocomplete: "off" });
   field.setAttribute("aria-label", "Search everything");
-  const said = document.createElement("output");
-  const list = document.createElement("ul");
-  list.hidden = true;
+  const said = element("output");
+  const list = element("ul", { hidden: true });
   const show = async () => {
     const text = field.value.trim();
     const found = text ? searchFor(text, await loadSearch()) : [];
     if (field.value.trim() !== text) return;
     list.hidden = found.length === 0;
     list.replaceChildren(...found.slice(0, MOST_FOUND).map(([kind, title, path]) => {
-      const link = Object.assign(document.createElement("a"), { href: root + path, textContent: title });
-      link.append(" ", Object.assign(document.createElement("span"), { className: "badge", textContent: kind }));
-      const line = document.createElement("li");
-      line.append(link);
-      return line;
+      const badge = element("span", { className: "badge", textContent: kind });
+      return element("li", {}, element("a", { href: root + path, textContent: title }, " ", badge));
     }));
     said.textContent = text === "" ? "" : found.length > MOST_FOUND ? `the first ${MOST_FOUND} of ${found.length}` : `${found.length} found`;
   };

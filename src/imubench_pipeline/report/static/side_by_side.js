@@ -47,8 +47,8 @@ kinds.pair = (figure) => {
   for (const each of here) {
     const { view, look, one } = each;
     const tau = array(view.tau);
-    const [y, low, high] = [view.adev, view.lower, view.upper].map((place) => scaled(place, unit.factor));
-    traces.push(...band(tau, low, high, look, 0.16).map((trace) => ({ ...trace, group: "limits" })));
+    const [y, low, high] = curvesOf(view, unit);
+    traces.push(...band(tau, low, high, look, 0.16, { group: "limits" }));
     traces.push({
       type: "scatter", mode: "lines+markers", x: tau, y, name: name(each), meta: { low, high }, line: lineOf(look),
       marker: { color: colourOf(look), symbol: look.marker, size: tau.map((_, i) => (i % 8 === 4 ? 7 : 0.1)) },
@@ -59,11 +59,10 @@ kinds.pair = (figure) => {
     const model = view.models[view.recommended];
     if (model) traces.push(line(array(model[0]), scaled(model[1], unit.factor), { ...look, width: 1 }, { group: "model", name: `${name(each)}, model`, opacity: 0.8 }));
     for (const printed of pageData.datasheets[one.sensor][chosenChannel] ?? []) {
-      const value = printed.value * unit.factor;
-      const at = printed.of === "N" ? [1 / 3, 1, 3] : [tau.at(-1) / 10, tau.at(-1) / 3, tau.at(-1)];
+      const at = printed.slope !== 0 ? [1 / 3, 1, 3] : [tau.at(-1) / 10, tau.at(-1) / 3, tau.at(-1)];
       traces.push({
         group: "datasheet", type: "scatter", mode: "lines+markers", name: `${one.letter} datasheet: ${printed.label}`, x: at,
-        y: at.map((t) => (printed.of === "N" ? value / Math.sqrt(t) : value)), line: { color: colourOf(look), width: 1.2, dash: "dot" },
+        y: printedLine(printed, at, unit), line: { color: colourOf(look), width: 1.2, dash: "dot" },
         marker: { color: inks().paper, symbol: "diamond", size: [0.1, 10, 0.1], line: { color: colourOf(look), width: 1.6 } },
         hoverinfo: ["skip", "text", "skip"], text: `${one.letter} datasheet: ${printed.label}`,
       });
@@ -77,7 +76,7 @@ kinds.pair = (figure) => {
     const [x, low, high] = ["tau", "lower", "upper"].map((of) => ratios.map((ratio) => ratio[of]));
     const y = ratios.map(({ value, values }) => value ?? values[0] / values[1]);
     extent.push(...low, ...high);
-    traces.push(...band(x, low, high, other.look, 0.22).map((trace) => ({ ...trace, yaxis: "y2", group: "ratio" })));
+    traces.push(...band(x, low, high, other.look, 0.22, { yaxis: "y2", group: "ratio" }));
     const label = `${chosen[0].letter} / ${other.one.letter}`;
     traces.push({
       group: "ratio", yaxis: "y2", type: "scatter", mode: "lines+markers", x, y, name: label, meta: { low, high, of: "ratio" },
@@ -120,10 +119,10 @@ kinds.pair = (figure) => {
 
 // One crosshair through both panels: it follows the pointer, and a slider for the keyboard.
 kinds.pair.started = (figure, canvas) => {
-  const form = Object.assign(document.createElement("form"), { className: "chooser crosshair" });
+  const form = element("form", { className: "chooser crosshair" });
   form.addEventListener("submit", (event) => event.preventDefault());
-  const slider = Object.assign(document.createElement("input"), { type: "range", step: "0.1", autocomplete: "off" });
-  const said = document.createElement("output");
+  const slider = element("input", { type: "range", step: "0.1", autocomplete: "off" });
+  const said = element("output");
   form.append(labelled("Crosshair at τ", slider), said);
   figure.querySelector(".controls").after(form);
   const put = (tau) => {
@@ -202,9 +201,8 @@ kinds.dumbbells = (figure) => {
 // Errors of the worst axis of a recording, or of the chosen axis.
 function errorsOf(one) {
   const { growth } = one.row;
-  if (!growth) return {};
-  const own = growthOf.axes === "worst" ? "worst" : growth.axes[chosenChannel.at(-1)];
-  return own === "worst" ? growth.errors : own ?? {};
+  const own = growthOf.axes === "worst" ? "worst" : growth?.axes[chosenChannel.at(-1)];
+  return (own === "worst" ? growth?.errors : own) ?? {};
 }
 const grownOf = (one) => errorsOf(one)[growthOf.error] ?? null;
 const axesText = () => (growthOf.axes === "worst" ? "the worst axis" : `axis ${chosenChannel.at(-1)}`);
@@ -213,7 +211,8 @@ const place = (values, wanted) => values.reduce((best, value, i) => (Math.abs(Ma
 // The nearest window and time of a recording to those that are chosen.
 function chosenPlace(one) {
   const [windows, times] = [array(one.row.growth.windows), array(one.row.growth.times)];
-  return { windows, times, window: place(windows, growthOf.window), time: place(times, growthOf.time) };
+  const [window, time] = [place(windows, growthOf.window), place(times, growthOf.time)];
+  return { windows, times, window, at: window * times.length + time };
 }
 
 function startGrowth(root) {
@@ -227,13 +226,12 @@ function startGrowth(root) {
   const alone = pageData.recordings.some((row) => row.growth && Object.keys(row.growth.axes).length > 0);
   const of = ["worst", "axis"].includes(state.get("of")) ? state.get("of") : state.has("axis") ? "axis" : "worst";
   growthOf = { axes: alone ? of : "worst", error: state.get("error") in pageData.errors ? state.get("error") : "heading", window: stated("window", pageData.window), time: stated("time", times.at(-1)) };
-  const select = document.createElement("select");
-  select.append(...Object.keys(pageData.errors).map((error) => new Option(error, error)));
+  const select = element("select", {}, ...Object.keys(pageData.errors).map((error) => new Option(error, error)));
   select.value = growthOf.error;
   const slider = (key, values, text) => {
-    const input = Object.assign(document.createElement("input"), { type: "range", min: "0", max: String(values.length - 1), step: "1", autocomplete: "off" });
+    const input = element("input", { type: "range", min: "0", max: String(values.length - 1), step: "1", autocomplete: "off" });
     input.value = String(place(values, growthOf[key]));
-    const said = document.createElement("output");
+    const said = element("output");
     const show = () => {
       said.textContent = timeText(values[Number(input.value)]);
       input.setAttribute("aria-valuetext", said.textContent);
@@ -246,37 +244,25 @@ function startGrowth(root) {
       redrawAll();
     });
     show();
-    const label = labelled(text, input);
-    label.append(" ", said);
-    return label;
+    return labelled(text, input, " ", said);
   };
-  select.addEventListener("change", () => {
-    growthOf.error = select.value;
-    keep("error", select.value);
-    drawErrors(root);
-    redrawAll();
-  });
-  const axes = document.createElement("select");
-  axes.append(new Option("worst axis", "worst"));
+  const axes = element("select", {}, new Option("worst axis", "worst"));
   if (alone) axes.append(new Option(`axis ${chosenChannel.at(-1)}: its gyro and its accelerometer`, "axis"));
   axes.value = growthOf.axes;
-  axes.addEventListener("change", () => {
-    growthOf.axes = axes.value;
-    keep("of", axes.value);
-    drawErrors(root);
-    redrawAll();
-  });
+  for (const [control, own, key] of [[select, "error", "error"], [axes, "axes", "of"]]) {
+    control.addEventListener("change", () => {
+      growthOf[own] = control.value;
+      keep(key, control.value);
+      drawErrors(root);
+      redrawAll();
+    });
+  }
   form.replaceChildren(labelled("Error", select), labelled("Axes", axes), slider("window", windows, "At rest before"), slider("time", times, "After"));
 }
 
 function errorUnit(error, size) {
   const [, sign, factor] = pageData.errors[error].sized.find(([least]) => size >= least);
   return { sign, factor };
-}
-
-function errorText(error, { value, lower, upper }) {
-  const { sign, factor } = errorUnit(error, value);
-  return `${numberText(value * factor, digitsBy(value * factor, lower * factor, upper * factor))} ${sign}`;
 }
 
 const timeText = (seconds) => (seconds >= 120 ? `${numberText(seconds / 60, 3)} min` : `${numberText(seconds, 3)} s`);
@@ -289,8 +275,7 @@ function drawErrors(root) {
       const own = chosen.map((one) => {
         const grown = errorsOf(one)[error];
         if (!grown) return null;
-        const { times, window, time } = chosenPlace(one);
-        const at = window * times.length + time;
+        const { at } = chosenPlace(one);
         const [value, lower, upper] = ["sigma", "lower", "upper"].map((name) => array(grown[name])[at]);
         return { value, lower, upper, status: "ok" };
       });
@@ -319,7 +304,7 @@ kinds.growth = () => {
     const [y, low, high] = ["sigma", "lower", "upper"].map(cut);
     every.push(...times);
     extent.push(...low, ...high);
-    traces.push(...band(times, low, high, look).map((trace) => ({ ...trace, group: "limits" })));
+    traces.push(...band(times, low, high, look, 0.18, { group: "limits" }));
     const axes = [grown.gyro, grown.accel].map((channels) => channels[channels.length > 1 ? window * times.length + times.length - 1 : 0]).filter(Boolean);
     traces.push({
       type: "scatter", mode: "lines+markers", x: times, y, name: shortName(one), meta: { low, high }, line: lineOf(look),
@@ -358,15 +343,12 @@ kinds.growth = () => {
 
 kinds.sources = (figure) => {
   const here = chosen.filter(grownOf).reverse();
-  const at = (one) => {
-    const { times, window, time } = chosenPlace(one);
-    return window * times.length + time;
-  };
-  const shares = here.map((one) => Object.entries(grownOf(one).sources).map(([source, of]) => [source, array(of)[at(one)]]));
+  const shares = here.map((one) => Object.entries(grownOf(one).sources).map(([source, of]) => [source, array(of)[chosenPlace(one).at]]));
   return stackedShares(
     here.map((one) => {
-      const [value, lower, upper] = ["sigma", "lower", "upper"].map((name) => array(grownOf(one)[name])[at(one)]);
-      return `${wrapped(shortName(one))}<br>${errorText(growthOf.error, { value, lower, upper })}`;
+      const ends = ["sigma", "lower", "upper"].map((name) => array(grownOf(one)[name])[chosenPlace(one).at]);
+      const { sign, factor } = errorUnit(growthOf.error, ends[0]);
+      return `${wrapped(shortName(one))}<br>${numberText(ends[0] * factor, digitsBy(...ends.map((end) => end * factor)))} ${sign}`;
     }),
     shares, here.map(shortName), figure.clientWidth,
   );
@@ -383,13 +365,13 @@ function stackedShares(rows, shares, titles, width) {
   });
   large.flat().forEach(([source, share]) => total.set(sourceKind(source), Math.max(total.get(sourceKind(source)) ?? 0, share)));
   const order = [...total].sort(([a, x], [b, y]) => (a === "others") - (b === "others") || y - x).map(([source]) => source);
+  const looks = order.map((source, number) => (source === "others" ? { light: "#8a9299", dark: "#6b7680" } : TERM_COLOURS[number % TERM_COLOURS.length]));
   const traces = order.map((source, number) => {
-    const look = source === "others" ? { light: "#8a9299", dark: "#6b7680" } : { light: PLACES[number % PLACES.length][0], dark: PLACES[number % PLACES.length][1] };
     const own = large.map((parts) => parts.filter(([name]) => sourceKind(name) === source));
     const sums = own.map((parts) => parts.reduce((sum, [, share]) => sum + share, 0));
     return {
       group: `source ${source}`, type: "bar", orientation: "h", name: source, x: sums.map((share) => 100 * share), y: rows.map((_, i) => i), meta: { flat: true },
-      marker: { color: faint(colourOf(look), 0.55), line: { color: inks().paper, width: 1 }, pattern: { fillmode: "overlay", shape: ["", "/", ".", "x", "-", "\\"][number % 6], fgcolor: inks().paper, size: 7 } },
+      marker: { color: faint(colourOf(looks[number]), 0.55), line: { color: inks().paper, width: 1 }, pattern: { fillmode: "overlay", shape: ["", "/", ".", "x", "-", "\\"][number % 6], fgcolor: inks().paper, size: 7 } },
       text: sums.map((share) => {
         const percent = `${numberText(100 * share, 2)} %`;
         return [`${source} ${percent}`, percent].find((words) => 7 * words.length < share * inner) ?? "";
@@ -400,7 +382,7 @@ function stackedShares(rows, shares, titles, width) {
   });
   return {
     traces,
-    groups: order.map((source, number) => ({ key: `source ${source}`, label: source, on: true, look: { light: source === "others" ? "#8a9299" : PLACES[number % PLACES.length][0], dark: source === "others" ? "#6b7680" : PLACES[number % PLACES.length][1], filled: true } })),
+    groups: order.map((source, number) => ({ key: `source ${source}`, label: source, on: true, look: { ...looks[number], filled: true } })),
     height: 90 + (rows.length > 6 ? (printing() ? 15 : 26) : 64) * Math.max(rows.length, 1),
     layout: {
       barmode: "stack", bargap: 0.3, margin: { l: 10, r: 14, t: 8, b: 46 },

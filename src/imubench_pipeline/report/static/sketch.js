@@ -15,15 +15,14 @@ function sketchFigures(figures) {
 
 function sketchFigure(figure) {
   const made = kinds[figure.dataset.kind](figure);
-  const other = new Set((state.get(`g${numberOf(figure)}`) ?? "").split("~"));
-  const on = new Map(made.groups.map((group) => [group.key, group.on !== other.has(group.key)]));
+  const on = openingChoices(figure, made.groups);
   const layout = { ...baseLayout(), ...made.layout };
   const named = axesOf(layout).some((name) => layout[name].type !== "log" && layout[name].ticktext);
   if (named || made.traces.some((trace) => trace.orientation === "h")) return; // the left margin depends on the names of the rows
   zoomIn(figure, layout);
   const canvas = figure.querySelector(".canvas");
   if (made.height) canvas.style.height = `${made.height}px`;
-  const traces = made.traces.filter((trace) => [trace.group].flat().every((group) => !group || (on.get(group) ?? true)));
+  const traces = made.traces.filter((trace) => isOn(trace, (group) => on.get(group) ?? true));
   const drawing = new Sketch(canvas.clientWidth, canvas.clientHeight, layout, traces);
   canvas.replaceChildren(drawing.svg);
   figure.dataset.sketched = "yes";
@@ -114,10 +113,10 @@ class Sketch {
   }
 
   area(points, fill) {
-    const known = points.filter(([x, y]) => Number.isFinite(x + y));
-    if (known.length === 0) return;
-    if (known.length === points.length) this.inside.append(svg("path", { d: `${pathOf(points)}Z`, fill }));
-    else this.inside.append(svg("path", { d: pathOf(points).replaceAll("M", "ZM").replace("Z", ""), fill }));
+    const known = points.filter(([x, y]) => Number.isFinite(x + y)).length;
+    if (known === 0) return;
+    const path = pathOf(points);
+    this.inside.append(svg("path", { d: known === points.length ? `${path}Z` : path.replaceAll("M", "ZM").replace("Z", ""), fill }));
   }
 
   // On a logarithmic axis, shapes have values and annotations have logarithms.

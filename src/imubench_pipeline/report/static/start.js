@@ -44,7 +44,7 @@ function showPlain(main) {
   main.querySelectorAll("figure[data-kind]").forEach((figure) => figure.remove());
   main.querySelectorAll("noscript").forEach((note) => (note.outerHTML = note.textContent));
   showUnits(main);
-  const note = Object.assign(document.createElement("p"), {
+  const note = element("p", {
     className: "warnings",
     textContent: "This browser shows a part of this report: no figures, and only the first rows and sections. Use Chrome or Edge 92, Firefox 113, Safari 16.4, or a later version.",
   });

@@ -21,7 +21,7 @@ function unused(name, names) {
   return free;
 }
 
-const warned = (text) => Object.assign(document.createElement("p"), { className: "unfound", textContent: text });
+const warned = (text) => element("p", { className: "unfound", textContent: text });
 
 class LongTable {
   constructor(table, name) {
@@ -39,16 +39,13 @@ class LongTable {
     const columns = new Set();
     this.sorts = new Map();
     [...table.tHead.rows[0].cells].forEach((head, column) => this.addSort(head, column, columns));
-    this.bar = document.createElement("form");
-    this.bar.className = "filters";
-    this.bar.addEventListener("submit", (event) => event.preventDefault());
-    this.count = document.createElement("output");
-    this.more = Object.assign(document.createElement("button"), { type: "button", hidden: true });
-    this.more.addEventListener("click", () => {
+    this.bar = element("form", { className: "filters", onsubmit: (event) => event.preventDefault() });
+    this.count = element("output");
+    this.more = element("button", { type: "button", hidden: true, onclick: () => {
       this.all = true;
       this.note("rows", "all");
       this.show();
-    });
+    } });
     if (table.dataset.filters !== undefined) this.addFilters(JSON.parse(table.dataset.filters));
     if (this.further) {
       this.count.textContent = `the first ${this.rows.filter((row) => !row.hidden).length} rows`;
@@ -93,10 +90,8 @@ class LongTable {
   // All rows, including those that were not in the page yet.
   get every() {
     if (this.further) {
-      const holder = document.createElement("template");
-      holder.innerHTML = `<table><tbody>${this.further.textContent}</tbody></table>`;
-      const made = [...holder.content.querySelectorAll("tr")];
-      this.rows.push(...made);
+      const holder = element("template", { innerHTML: `<table><tbody>${this.further.textContent}</tbody></table>` });
+      this.rows.push(...holder.content.querySelectorAll("tr"));
       this.further.remove();
       this.further = null;
     }
@@ -112,9 +107,7 @@ class LongTable {
       this.order = { column, direction, kind: head.dataset.sort };
     };
     this.sorts.set(name, sort);
-    const button = document.createElement("button");
-    button.type = "button";
-    button.className = "sort";
+    const button = element("button", { type: "button", className: "sort" });
     button.setAttribute("aria-label", `Sort by ${head.dataset.name ?? head.textContent.trim()}`);
     button.addEventListener("click", () => {
       // The largest value comes first if it is the best.
@@ -129,22 +122,17 @@ class LongTable {
   }
 
   addFilters(filters) {
-    const search = document.createElement("input");
-    search.type = "search";
-    this.search = search;
-    search.addEventListener("input", () => {
-      this.asked.text = search.value.trim().toLowerCase();
-      this.note("find", search.value.trim());
+    this.search = element("input", { type: "search", oninput: () => {
+      this.asked.text = this.search.value.trim().toLowerCase();
+      this.note("find", this.search.value.trim());
       this.show();
-    });
-    this.bar.append(labelled("Find", search));
+    } });
+    this.bar.append(labelled("Find", this.search));
     for (const [key, values] of Object.entries(filters)) {
       if (values.length < 2) continue;
-      const select = document.createElement("select");
       const first = this.table.dataset[`first${capital(key)}`] ?? "";
-      select.append(new Option("all", ""), ...values.map((value) => new Option(value, value)));
-      select.value = first;
-      this.asked[key] = first;
+      const select = element("select", {}, new Option("all", ""), ...values.map((value) => new Option(value, value)));
+      select.value = this.asked[key] = first;
       select.addEventListener("change", () => {
         this.asked[key] = select.value;
         this.note(key, select.value === first ? null : select.value || "all");
@@ -153,17 +141,16 @@ class LongTable {
       this.selects.set(key, select);
       this.bar.append(labelled(capital(key), select));
     }
-    this.clear = Object.assign(document.createElement("button"), { type: "button", hidden: true, textContent: "clear the filters" });
-    this.clear.addEventListener("click", () => {
+    this.clear = element("button", { type: "button", hidden: true, textContent: "clear the filters", onclick: () => {
       for (const key of Object.keys(this.asked)) this.asked[key] = "";
-      search.value = "";
+      this.search.value = "";
       this.note("find", null);
       this.selects.forEach((each, key) => {
         each.value = "";
         this.note(key, this.table.dataset[`first${capital(key)}`] ? "all" : null);
       });
       this.show();
-    });
+    } });
     this.bar.append(this.count, this.more, this.clear);
   }
 
@@ -223,12 +210,6 @@ function sortKey(row, column, kind) {
   return text === "" || Number.isNaN(Number(text)) ? null : Number(text);
 }
 
-function capital(text) {
-  return text[0].toUpperCase() + text.slice(1);
-}
+const capital = (text) => text[0].toUpperCase() + text.slice(1);
 
-function labelled(text, control) {
-  const label = document.createElement("label");
-  label.append(`${text} `, control);
-  return label;
-}
+const labelled = (text, ...inside) => element("label", {}, `${text} `, ...inside);

@@ -5,21 +5,23 @@ function startTabs(root) {
   const jump = root.querySelector("p.jump");
   const panels = [...root.querySelectorAll("section.channel")];
   if (!jump || panels.length < 2) return;
-  const bar = Object.assign(document.createElement("div"), { className: "tabs" });
-  const list = document.createElement("div");
+  const list = element("div");
   list.setAttribute("role", "tablist");
   list.setAttribute("aria-label", "Channels");
   const nameOfPanel = (panel) => panel.getAttribute("aria-labelledby");
   const tabs = panels.map((panel) => {
     panel.id = `channel-${nameOfPanel(panel)}`;
     panel.setAttribute("role", "tabpanel");
-    const tab = Object.assign(document.createElement("button"), { type: "button", textContent: panel.querySelector("h2").textContent });
+    const tab = element("button", { type: "button", textContent: panel.querySelector("h2").textContent, onclick: () => select(panel) });
     tab.setAttribute("role", "tab");
     tab.setAttribute("aria-controls", panel.id);
-    tab.addEventListener("click", () => select(panel));
     return tab;
   });
-  const all = Object.assign(document.createElement("button"), { type: "button", textContent: "all channels" });
+  const showAll = () => {
+    put(panels);
+    keep("channel", "all");
+  };
+  const all = element("button", { type: "button", textContent: "all channels", onclick: showAll });
   const put = (shownPanels) => {
     panels.forEach((panel, place) => {
       const here = shownPanels.includes(panel);
@@ -35,10 +37,6 @@ function startTabs(root) {
     put([panel]);
     keep("channel", panel === panels[0] ? null : nameOfPanel(panel));
   };
-  all.addEventListener("click", () => {
-    put(panels);
-    keep("channel", "all");
-  });
   list.addEventListener("keydown", (event) => {
     const at = tabs.indexOf(document.activeElement);
     const to = { ArrowRight: at + 1, ArrowLeft: at - 1, Home: 0, End: tabs.length - 1 }[event.key];
@@ -57,8 +55,7 @@ function startTabs(root) {
     if (panel?.hidden) put([panel]);
   });
   list.append(...tabs);
-  bar.append(list, all);
-  jump.replaceWith(bar);
+  jump.replaceWith(element("div", { className: "tabs" }, list, all));
   const section = decodeURIComponent(location.hash.split("#").at(-1));
   const first = panelOf(section) ?? panels.find((panel) => nameOfPanel(panel) === state.get("channel")) ?? panels[0];
   put(state.get("channel") === "all" && !panelOf(section) ? panels : [first]);
@@ -68,17 +65,14 @@ function startTabs(root) {
 function startMatrices(root) {
   const matrices = [...root.querySelectorAll("[data-matrix]")];
   if (matrices.length < 2) return;
-  const form = Object.assign(document.createElement("form"), { className: "chooser" });
-  const select = document.createElement("select");
-  select.append(...matrices.map((one, place) => new Option(one.dataset.matrix, String(place))));
+  const select = element("select", {}, ...matrices.map((one, place) => new Option(one.dataset.matrix, String(place))));
   const put = () => matrices.forEach((one, place) => (one.hidden = place !== Number(select.value)));
   select.value = String(Math.max(0, matrices.findIndex((one) => one.dataset.matrix === state.get("matrix"))));
   select.addEventListener("change", () => {
     put();
     keep("matrix", matrices[Number(select.value)].dataset.matrix);
   });
-  form.append(labelled("Quantity and averaging time", select));
-  matrices[0].before(form);
+  matrices[0].before(element("form", { className: "chooser" }, labelled("Quantity and averaging time", select)));
   put();
 }
 

@@ -1,10 +1,8 @@
 // A short explanation of a term, on hover and on focus; Escape closes it.
 // TERMS: key -> explanation; written by the page builder.
 
-const tip = document.createElement("div");
-tip.id = "tip";
+const tip = element("div", { id: "tip", hidden: true });
 tip.setAttribute("role", "tooltip");
-tip.hidden = true;
 
 function showTip(term) {
   if (tip.parentNode !== document.body) document.body.append(tip);

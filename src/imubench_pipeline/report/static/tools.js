@@ -20,8 +20,8 @@ function zoomIn(figure, layout) {
     const axis = layout[name];
     if (!axis || axis.title?.text !== title) delete zoom[name];
     else {
-      layout[name] = { ...axis, range, autorange: false };
-      if (axis.type === "log") Object.assign(layout[name], { tickvals: logTicks(...range).tickvals, ticktext: logTicks(...range).ticktext });
+      const { tickvals, ticktext } = axis.type === "log" ? logTicks(...range) : axis;
+      layout[name] = { ...axis, range, autorange: false, tickvals, ticktext };
     }
   }
 }
@@ -49,21 +49,13 @@ function showZoom(figure) {
   if (button) button.hidden = text === "";
 }
 
-function keepIfOther(key, text) {
-  if ((state.get(key) ?? "") !== text) keep(key, text);
-}
-
-function wholeAgain(figure) {
-  zooms.set(figure, {});
-  showZoom(figure);
-  drawFigure(figure);
-}
+const keepIfOther = (key, text) => (state.get(key) ?? "") !== text && keep(key, text);
 
 const slug = (text) => text.toLowerCase().replace(/[^a-z0-9]+/g, "-").replace(/^-|-$/g, "").slice(0, 80);
 const fileName = (figure, ending) => `${slug(`${document.querySelector("main h1")?.textContent ?? ""} ${figure.dataset.kind} ${figure.dataset.channel ?? figure.dataset.symbol ?? ""}`)}.${ending}`;
 
 function save(address, name) {
-  const link = Object.assign(document.createElement("a"), { href: address, download: name });
+  const link = element("a", { href: address, download: name });
   document.body.append(link);
   link.click();
   link.remove();
@@ -93,8 +85,7 @@ function valuesOf(figure) {
   for (const trace of canvas.data) {
     if (!trace.name || trace.meta?.guide) continue;
     const y = trace.yaxis ? title(trace.yaxis.replace("y", "yaxis"), "y") : title("yaxis", "");
-    const categories = canvas.layout.yaxis.ticktext;
-    const places = canvas.layout.yaxis.tickvals;
+    const { ticktext: categories, tickvals: places } = canvas.layout.yaxis;
     trace.x.forEach((x, i) => {
       if (trace.x[i] === null || trace.y[i] === null || Number.isNaN(trace.y[i])) return;
       const flat = Boolean(trace.error_x) || trace.meta?.flat;
@@ -108,9 +99,7 @@ function valuesOf(figure) {
 }
 
 function plainText(markup) {
-  const holder = document.createElement("template");
-  holder.innerHTML = markup.replaceAll("<br>", " ");
-  return holder.content.textContent.trim();
+  return element("template", { innerHTML: markup.replaceAll("<br>", " ") }).content.textContent.trim();
 }
 
 function saveValues(figure) {
@@ -129,24 +118,19 @@ function showValues(figure, button) {
   button.setAttribute("aria-expanded", String(!before));
   if (before) return before.remove();
   const { heads, rows } = valuesOf(figure);
-  const region = Object.assign(document.createElement("div"), { className: "scroll values", tabIndex: 0 });
+  const region = element("div", { className: "scroll values", tabIndex: 0 });
   region.setAttribute("role", "region");
   region.setAttribute("aria-label", `Values of ${figure.querySelector(".canvas").getAttribute("aria-label")}`);
-  const table = document.createElement("table");
   const used = heads.map((_, column) => rows.some((row) => row[column] !== null && row[column] !== ""));
   const cells = (row, tag) => row.filter((_, column) => used[column]).map((value) => {
-    const cell = Object.assign(document.createElement(tag), { textContent: typeof value === "number" ? numberText(value, 4) : value ?? "–" });
+    const cell = element(tag, { textContent: typeof value === "number" ? numberText(value, 4) : value ?? "–" });
     if (tag === "th") cell.scope = "col";
     else if (typeof value === "number") cell.className = "number";
     return cell;
   });
-  const line = (row, tag) => {
-    const made = document.createElement("tr");
-    made.append(...cells(row, tag));
-    return made;
-  };
+  const line = (row, tag) => element("tr", {}, ...cells(row, tag));
   const more = rows.length > SHOWN_VALUES ? `; first ${SHOWN_VALUES} of ${rows.length} (all in the CSV)` : "";
-  table.append(Object.assign(document.createElement("caption"), { textContent: `Values of the figure${more}` }));
+  const table = element("table", {}, element("caption", { textContent: `Values of the figure${more}` }));
   table.createTHead().append(line(heads, "th"));
   table.createTBody().append(...rows.slice(0, SHOWN_VALUES).map((row) => line(row, "td")));
   region.append(table);
@@ -155,15 +139,19 @@ function showValues(figure, button) {
 
 function drawTools(figure) {
   if (figure.querySelector(".tools")) return;
-  const bar = Object.assign(document.createElement("div"), { className: "tools" });
+  const bar = element("div", { className: "tools" });
   const add = (text, name, act, more = {}) => {
-    const button = Object.assign(document.createElement("button"), { type: "button", textContent: text, title: name, ...more });
+    const button = element("button", { type: "button", textContent: text, title: name, onclick: () => act(button), ...more });
     button.setAttribute("aria-label", name);
-    button.addEventListener("click", () => act(button));
     bar.append(button);
     return button;
   };
-  add("Reset zoom", "Reset the zoom", () => wholeAgain(figure), { className: "whole", hidden: true });
+  const reset = () => {
+    zooms.set(figure, {});
+    showZoom(figure);
+    drawFigure(figure);
+  };
+  add("Reset zoom", "Reset the zoom", reset, { className: "whole", hidden: true });
   add("Values", "Values of the figure as a table", (button) => showValues(figure, button)).setAttribute("aria-expanded", "false");
   add("CSV", "Save the values as CSV", () => saveValues(figure));
   add("PNG", "Save the figure as PNG", () => saveImage(figure, "png"));

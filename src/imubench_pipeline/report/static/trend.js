@@ -11,7 +11,7 @@ kinds.trend = (figure) => {
   const { ink, mark } = inks();
   const changed = trend.verdict.map((word) => word === "changed");
   const traces = [
-    ...band(x, expectedLow, expectedHigh, look, 0.2).map((trace) => ({ ...trace, group: "expected" })),
+    ...band(x, expectedLow, expectedHigh, look, 0.2, { group: "expected" }),
     {
       group: "value", type: "scatter", mode: "lines+markers", x, y: value, connectgaps: false,
       line: { color: faint(colourOf(black()), 0.35), width: 1 },

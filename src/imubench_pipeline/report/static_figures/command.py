@@ -31,7 +31,7 @@ _KIND_NEEDS = {
     "datasheet": "a printed figure of the channel that is comparable",
     "spectrum": "the spectrum of the channel",
 }
-"""What each kind needs besides the curve of a channel."""
+"""Requirements of each kind besides the curve of a channel."""
 
 _FILE_FORMATS = ("svg", "pdf")
 
@@ -69,14 +69,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def _make_list_reader(choices: Sequence[str]) -> Callable[[str], tuple[str, ...]]:
     """Return a reader of names with commas between them; ``all`` stands for every one."""
+    expected = f"expected all, or some of {', '.join(choices)}"
 
     def names(text: str) -> tuple[str, ...]:
         asked = [name.strip() for name in text.split(",")]
         for name in asked:
             if name not in choices and name != "all":
-                raise argparse.ArgumentTypeError(
-                    f"found {name!r}, expected all, or some of {', '.join(choices)}"
-                )
+                raise argparse.ArgumentTypeError(f"found {name!r}, {expected}")
         return tuple(choices) if "all" in asked else tuple(dict.fromkeys(asked))
 
     return names
@@ -119,7 +118,7 @@ def select(
     Raises
     ------
     SelectionError
-        If there is no such curve; it says what there is.
+        If there is no such curve; it lists the choices.
     """
     chosen = dict(tables)
     for column, asked in (("sensor", sensor), ("recording", recording), ("channel", channel)):
@@ -127,9 +126,16 @@ def select(
             continue
         existing = chosen["allan"][column].unique().to_pylist()
         if asked not in existing:
-            reason = _explain_missing(chosen["recordings"], column, asked)
+            # A recording, or all recordings of a sensor, may have no curve for a reason.
+            named = _select_rows(chosen["recordings"], column, asked)
+            reasons = [
+                f" but a {row.status} one ({row.reason})"
+                for row in RecordingRow.rows_of(named)
+                if row.status != "ok" and column != "channel"
+            ]
             raise SelectionError(
-                f"found no {column} {asked!r}{reason}; there are: {', '.join(sorted(existing))}"
+                f"found no {column} {asked!r}{''.join(reasons[:1])}; there are: "
+                f"{', '.join(sorted(existing))}"
             )
         chosen = {name: _select_rows(table, column, asked) for name, table in chosen.items()}
     if not chosen["allan"].num_rows:
@@ -145,23 +151,11 @@ def _select_rows(table: pa.Table, column: str, asked: str) -> pa.Table:
     return table.filter(pc.fill_null(mask, True) if column == "channel" else mask)
 
 
-def _explain_missing(recordings: pa.Table, column: str, asked: str) -> str:
-    """Return why a recording, or all recordings of a sensor, have no curve."""
-    if column == "channel":
-        return ""
-    reasons = [
-        f"{row.status} one ({row.reason})"
-        for row in RecordingRow.rows_of(_select_rows(recordings, column, asked))
-        if row.status != "ok"
-    ]
-    return f" but a {reasons[0]}" if reasons else ""
-
-
 def _write(
     tables: Mapping[str, pa.Table], chosen: Mapping[str, pa.Table], arguments: argparse.Namespace
 ) -> int:
     """Write the figures, and say which; return how many files."""
-    # Matplotlib is loaded when it is sure that there is something to draw.
+    # Matplotlib is loaded only if there is something to draw.
     with extra("workflow", "draw figures"):
         from imubench_pipeline.report.static_figures.files import save
 
@@ -204,7 +198,7 @@ def _list_figures(
     views = []
     if cross or of_channel:
         views = [view for recording in recording_views(chosen) for view in recording.channels()]
-    # What shows only a part must not take the place of the figure of all sensors.
+    # A figure of some sensors must not replace the figure of all sensors.
     part = "".join(f"{name}/" for name in (arguments.sensor, arguments.recording) if name)
     for name, make in cross_figures(views, arguments.units, sensors=sensors, kinds=cross):
         yield part + name, make

@@ -1,34 +1,39 @@
-"""The curves of one axis of all sensors (Maia et al., Figures 6 and 7)."""
+"""One channel of all sensors: the curves, and the parameters with their intervals."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any, Literal
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from matplotlib.path import Path
 
+from imubench_pipeline.estimators.estimate import COMPARED
 from imubench_pipeline.report.palette import Appearance, sensor_appearances
 from imubench_pipeline.report.practical import System, page_unit
-from imubench_pipeline.report.static_figures.names import channel_name
 from imubench_pipeline.report.static_figures.style import (
     DOUBLE,
     SINGLE,
+    SYMBOLS,
+    channel_name,
     extent,
     legend_below,
     line_look,
-    log_x,
-    log_y,
     marker_look,
     new_figure,
+    set_log_axis,
     settled,
     shortened,
     style,
 )
 from imubench_pipeline.report.view import ChannelView
+from imubench_pipeline.words.estimates import status_text
 
 _MOST_BANDS = 8
 _MAX_SENSORS_IN_COLUMN = 6  # sensors, in a figure one column wide
@@ -40,12 +45,28 @@ _MARKERS_PER_SENSOR = 9  # on the curves of a sensor
 _THIN_WIDTH, _PALE_OPACITY = 0.4, 0.45  # width in pt and opacity of a curve among many
 _MAX_NAME_WIDTH = 200.0  # pt
 
+Kind = Literal["estimate", "not identified", "limit"]
+
+_SLOT_HEIGHT = 2.6  # mm, of a recording where there is room
+_MIN_ROW_HEIGHT = 4.2  # mm, of a sensor: its name must fit
+_MAX_HEIGHT = 205.0  # mm, of all sensors: the figure fits on one page
+_FRAME_HEIGHT = 16.0  # mm, title and axis
+_MAX_INTERVAL_DECADES = 1.5
+"""Maximum length of an interval beyond all values, decades."""
+
+# A bar at the limit and an arrow to the left of it, in units of the bar.
+_ARROW_MARKER = Path(
+    [(0, -0.3), (0, 0.3), (0, 0), (-1, 0), (-0.75, 0.2), (-1, 0), (-0.75, -0.2)],
+    [Path.MOVETO, Path.LINETO, Path.MOVETO, Path.LINETO, Path.MOVETO, Path.LINETO, Path.LINETO],
+)
+_ARROW_SIZE = 4.5  # of a dot
+
 
 @style()
 def comparison_figure(
     views: Sequence[ChannelView], sensors: Sequence[str], system: System = "practical"
 ) -> Figure:
-    """Draw the Allan deviation of one channel of several sensors.
+    """Draw the Allan deviation of one channel of several sensors (Maia et al., Figures 6 and 7).
 
     A sensor has the same colour, dash and marker in every figure, by its place among all sensors of
     the run; a marker of a simulated log is hollow.
@@ -64,26 +85,20 @@ def comparison_figure(
     handles = []
     for place, (sensor, simulated) in enumerate(ordered):
         of_group = groups[sensor, simulated]
-        _draw(axes, of_group, looks[sensor], unit.per_si, place, bands=len(views) <= _MOST_BANDS)
-        label = shortened(figure, sensor, _MAX_NAME_WIDTH) + _format_remarks(
-            len(of_group), simulated
-        )
+        bands = len(views) <= _MOST_BANDS
+        _draw_sensor(axes, of_group, looks[sensor], unit.per_si, place, bands=bands)
+        recordings = len(of_group)
+        words = [f"{recordings} recordings"] * (recordings > 1) + ["simulated"] * simulated
+        label = shortened(figure, sensor, _MAX_NAME_WIDTH)
+        label += f" ({', '.join(words)})" if words else ""
         look = line_look(looks[sensor]) | marker_look(looks[sensor], hollow=simulated)
         handles.append(Line2D([], [], label=label, **look))
     if any(len(each) > _MAX_EQUAL_RECORDINGS for each in groups.values()):
-        handles += [
-            Line2D([], [], color="black", label="median of several recordings"),
-            Line2D(
-                [],
-                [],
-                color="black",
-                alpha=_PALE_OPACITY,
-                linewidth=_THIN_WIDTH,
-                label="other recordings",
-            ),
-        ]
-    log_x(axes, extent(*(view.tau for view in views)))
-    log_y(axes, extent(*(view.adev * unit.per_si for view in views), margin=1.5))
+        handles.append(Line2D([], [], color="black", label="median of several recordings"))
+        pale: dict[str, Any] = {"alpha": _PALE_OPACITY, "linewidth": _THIN_WIDTH}
+        handles.append(Line2D([], [], color="black", label="other recordings", **pale))
+    set_log_axis(axes, "x", extent(*(view.tau for view in views)))
+    set_log_axis(axes, "y", extent(*(view.adev * unit.per_si for view in views), margin=1.5))
     axes.set_xlabel("averaging time τ (s)")
     axes.set_ylabel(f"Allan deviation ({unit.sign})")
     axes.set_title(name, loc="left")
@@ -91,7 +106,7 @@ def comparison_figure(
     return settled(figure)
 
 
-def _draw(
+def _draw_sensor(
     axes: Axes,
     views: Sequence[ChannelView],
     look: Appearance,
@@ -104,8 +119,11 @@ def _draw(
     lines = line_look(look)
     marked = views
     if len(views) > _MAX_EQUAL_RECORDINGS:
-        middle = _find_middle(views)
-        marked = [views[middle]]
+        # Its level is the median at the middle of the common averaging times.
+        first, last = max(view.tau[0] for view in views), min(view.tau[-1] for view in views)
+        amid = math.sqrt(first * last)
+        levels = [np.interp(amid, view.tau, view.adev) for view in views]
+        marked = [views[int(np.argsort(levels, kind="stable")[len(levels) // 2])]]
         curves = [np.column_stack((view.tau, view.adev * scale)) for view in views]
         axes.add_collection(
             LineCollection(
@@ -136,14 +154,243 @@ def _draw(
         )
 
 
-def _find_middle(views: Sequence[ChannelView]) -> int:
-    """Return the index of the recording with the median level over the common averaging times."""
-    first, last = max(view.tau[0] for view in views), min(view.tau[-1] for view in views)
-    amid = math.sqrt(first * last)
-    levels = [np.interp(amid, view.tau, view.adev) for view in views]
-    return int(np.argsort(levels, kind="stable")[len(levels) // 2])
+@dataclass(frozen=True)
+class Mark:
+    """The mark of one estimate."""
+
+    place: float  # distance from the top, mm
+    kind: Kind
+    value: float | None  # or the limit, or the fitted value that is not identified
+    lower: float | None = None  # 95 % limits
+    upper: float | None = None
 
 
-def _format_remarks(recordings: int, simulated: bool) -> str:
-    words = [f"{recordings} recordings"] * (recordings > 1) + ["simulated"] * simulated
-    return f" ({', '.join(words)})" if words else ""
+def marks(view: ChannelView, symbol: str, place: float, spread: float = 0.0) -> Iterator[Mark]:
+    """Yield a mark for each component of a parameter of the model.
+
+    ``spread`` is the height for these about the place of the recording, in the same unit.
+    """
+    if view.recommended not in view.parameters:
+        return
+    rows = view.named(view.recommended, symbol)
+    rows = [row for row in rows if row.value is not None or row.upper]
+    for number, row in enumerate(rows):
+        at = place + spread * ((number + 0.5) / len(rows) - 0.5)
+        lower, upper = row.lower, row.upper
+        if lower is not None and lower < 0.0:
+            # A ramp has a sign, and a logarithmic axis shows its size.
+            if upper is None:
+                lower = None
+            else:
+                lower, upper = (-upper, -lower) if upper <= 0.0 else (None, max(-lower, upper))
+        if row.value is not None:
+            yield Mark(at, "estimate", abs(row.value), lower, upper)
+        elif not lower:
+            yield Mark(at, "limit", upper)
+        else:
+            fitted = None if row.fitted is None else abs(row.fitted)
+            yield Mark(at, "not identified", fitted, lower, upper)
+
+
+@dataclass(frozen=True)
+class _Block:
+    """The row of one sensor: its recordings and where they stand, mm from the top."""
+
+    sensor: str
+    views: Sequence[ChannelView]
+    top: float
+    bottom: float
+
+    @property
+    def places(self) -> list[float]:
+        step = (self.bottom - self.top) / (len(self.views) + 0.5)
+        return [self.top + step * (number + 0.75) for number in range(len(self.views))]
+
+
+@style()
+def forest_figure(
+    views: Sequence[ChannelView],
+    sensors: Sequence[str],
+    symbol: str | Sequence[str] = COMPARED,
+    system: System = "practical",
+) -> Figure:
+    """Draw parameters of one channel across sensors, with their 95 % limits.
+
+    A panel each; the look is by the place among all sensors of the run.
+    """
+    symbols = [symbol] if isinstance(symbol, str) else list(symbol)
+    looks = sensor_appearances(list(sensors))
+    blocks = _make_blocks(views, sensors)
+    total = blocks[-1].bottom
+    name = channel_name(views[0].channel)
+    figure = new_figure(
+        SINGLE if len(symbols) == 1 else DOUBLE,
+        total + _FRAME_HEIGHT,
+        f"{name}: {', '.join(symbols)} of all sensors",
+    )
+    panels = figure.subplots(1, len(symbols), sharey=True, squeeze=False)[0]
+    kinds: set[str] = set()
+    for panel, each in zip(panels, symbols, strict=True):
+        ticks = 7 if len(symbols) == 1 else 4
+        kinds |= _draw_panel(panel, blocks, looks, each, system, ticks=ticks)
+    first = panels[0]
+    first.set_ylim(total, 0.0)
+    first.set_yticks([(block.top + block.bottom) / 2.0 for block in blocks])
+    names = []
+    for block in blocks:
+        count, simulated = len(block.views), sum(view.simulated for view in block.views)
+        words = [f"n = {count}"] * (count > 1)
+        if simulated:
+            words.append("simulated" if simulated == count else f"{simulated} simulated")
+        about = f" ({', '.join(words)})" if words else ""
+        names.append(shortened(figure, block.sensor, 110.0) + about)
+    first.set_yticklabels(names)
+    for panel in panels:
+        panel.tick_params(axis="y", length=0, which="both")
+        panel.grid(visible=False, axis="y")
+    first.set_title(name, loc="left")
+    legend_below(figure, _make_legend(kinds))
+    return settled(figure)
+
+
+def _make_blocks(views: Sequence[ChannelView], sensors: Sequence[str]) -> list[_Block]:
+    """Return the rows of the sensors; their height grows with the recordings, within a page."""
+    by_sensor = {sensor: [view for view in views if view.sensor == sensor] for sensor in sensors}
+    by_sensor = {sensor: own for sensor, own in by_sensor.items() if own}
+    slot = _SLOT_HEIGHT
+    while True:
+        heights = [max(_MIN_ROW_HEIGHT, slot * (len(each) + 0.5)) for each in by_sensor.values()]
+        if sum(heights) <= max(_MAX_HEIGHT, _MIN_ROW_HEIGHT * len(heights)):
+            break
+        slot *= 0.95
+    bottoms = np.cumsum(heights)
+    rows = zip(by_sensor.items(), heights, bottoms, strict=True)
+    return [
+        _Block(sensor, own, float(bottom - height), float(bottom))
+        for (sensor, own), height, bottom in rows
+    ]
+
+
+def _draw_panel(
+    axes: Axes,
+    blocks: Sequence[_Block],
+    looks: dict[str, Appearance],
+    symbol: str,
+    system: System,
+    *,
+    ticks: int,
+) -> set[str]:
+    """Draw one parameter of all sensors; return the kinds of marks there are."""
+    unit = page_unit(blocks[0].views[0].quantity, symbol, system)
+    drawn: list[Mark] = []
+    truths: list[tuple[float, float]] = []
+    for number, block in enumerate(blocks):
+        if number % 2:
+            axes.axhspan(block.top, block.bottom, color="0.955", lw=0, zorder=0.0)
+        step = block.places[1] - block.places[0] if len(block.views) > 1 else _SLOT_HEIGHT
+        of_block = [
+            mark
+            for view, place in zip(block.views, block.places, strict=True)
+            for mark in marks(view, symbol, place, 0.8 * step)
+        ]
+        truths += [
+            (place, view.truth[symbol].value * unit.per_si)
+            for view, place in zip(block.views, block.places, strict=True)
+            if symbol in view.truth and view.truth[symbol].value > 0.0
+        ]
+        _draw_marks(axes, of_block, looks[block.sensor], unit.per_si, step)
+        if not of_block:
+            statuses = {
+                status_text(row.status)
+                for view in block.views
+                if view.recommended in view.parameters
+                for row in view.named(view.recommended, symbol)
+            }
+            axes.annotate(
+                ", ".join(sorted(statuses)) or "not estimated",
+                (0.0, (block.top + block.bottom) / 2.0),
+                xycoords=("axes fraction", "data"),
+                xytext=(3.0, 0.0),
+                textcoords="offset points",
+                va="center",
+                color="0.4",
+            )
+        drawn += of_block
+    places, values = zip(*truths, strict=True) if truths else ((), ())
+    if truths:
+        axes.plot(values, places, marker="|", ms=6.0, mew=0.8, ls="none", color="black", zorder=3.5)
+    _set_limits(axes, drawn, values, unit.per_si, ticks)
+    axes.set_xlabel(f"{SYMBOLS[symbol]} ({unit.sign})")
+    return {mark.kind for mark in drawn} | ({"truth"} if truths else set())
+
+
+def _set_limits(
+    axes: Axes, drawn: Sequence[Mark], truths: Sequence[float], scale: float, ticks: int
+) -> None:
+    """Set axis limits for all values and, within bounds, their intervals."""
+    values = [mark.value * scale for mark in drawn if mark.value] + list(truths)
+    # The arrow of a limit needs room at its left.
+    values += [mark.value * scale / 2.5 for mark in drawn if mark.value and mark.kind == "limit"]
+    ends = [end * scale for mark in drawn for end in (mark.lower, mark.upper) if end]
+    values = values or ends
+    if not values:
+        axes.set_xticks([])
+        return
+    reach = 10.0**_MAX_INTERVAL_DECADES
+    near = np.clip(ends, min(values) / reach, max(values) * reach)
+    set_log_axis(axes, "x", extent(values, near, margin=1.6), ticks=ticks)
+
+
+def _draw_marks(
+    axes: Axes, of_block: Sequence[Mark], look: Appearance, scale: float, step: float
+) -> None:
+    """Draw the marks of one sensor; they are smaller where recordings are close."""
+    size = float(np.clip(step * 72.0 / 25.4 * 0.8, 1.2, 4.0))
+    width = min(1.0, 0.3 * size)
+    dots: dict[Kind, dict[str, Any]] = {
+        "estimate": marker_look(look),
+        "not identified": marker_look(look, hollow=True),
+        "limit": marker_look(look) | {"marker": _ARROW_MARKER, "markerfacecolor": "none"},
+    }
+    for kind, dot in dots.items():
+        chosen = [mark for mark in of_block if mark.kind == kind]
+        if not chosen:
+            continue
+        if ranges := [mark for mark in chosen if mark.lower and mark.upper]:
+            axes.hlines(
+                [mark.place for mark in ranges],
+                [mark.lower * scale for mark in ranges if mark.lower],
+                [mark.upper * scale for mark in ranges if mark.upper],
+                color=look.light,
+                lw=width,
+                ls="-" if kind == "estimate" else (0, (2, 1)),
+            )
+        shown = [mark for mark in chosen if mark.value]
+        axes.plot(
+            [mark.value * scale for mark in shown if mark.value],
+            [mark.place for mark in shown],
+            ls="none",
+            ms=_ARROW_SIZE * size if kind == "limit" else size,
+            markeredgewidth=width,
+            zorder=3.0,
+            **dot,
+        )
+
+
+def _make_legend(kinds: set[str]) -> list[Line2D]:
+    """Return the legend of the marks, in black, because colour identifies the sensor."""
+    dot: dict[str, Any] = {"marker": "o", "markersize": 4.0}
+    open_dot = dot | {"markerfacecolor": "white", "ls": (0, (2, 1))}
+    arrow = {"marker": _ARROW_MARKER, "markersize": _ARROW_SIZE * 4.0, "markerfacecolor": "none"}
+    samples: dict[str, tuple[str, dict[str, Any]]] = {
+        "estimate": ("estimate, 95 % limits", dot),
+        "not identified": ("not determined: fitted value, 95 % limits", open_dot),
+        "limit": ("upper 95 % limit", arrow | {"ls": "none"}),
+        "truth": ("truth of the simulation", {"marker": "|", "ms": 6.0, "ls": "none"}),
+    }
+    shown = [
+        Line2D([], [], color="black", label=label, **look)
+        for kind, (label, look) in samples.items()
+        if kind in kinds
+    ]
+    return shown or [Line2D([], [], ls="none", label="no recording has a value")]

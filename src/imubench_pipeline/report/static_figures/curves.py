@@ -1,44 +1,71 @@
-"""The Allan deviation of one channel: alone, and with the models of the methods."""
+"""The Allan deviation of one channel: alone, with models, terms and the lines of its datasheet."""
 
 from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
-from imubench_pipeline.noise import NoiseModel
+from imubench_pipeline.model.comparisons import DatasheetRow
+from imubench_pipeline.noise import NoiseModel, Term
 from imubench_pipeline.report.palette import method_appearance
 from imubench_pipeline.report.practical import System, page_unit
-from imubench_pipeline.report.static_figures.names import entitled, log_name
 from imubench_pipeline.report.static_figures.style import (
     MEASURED,
     SINGLE,
-    entitle,
+    SUM_LOOK,
+    SYMBOLS,
+    TERM_LOOKS,
+    TERM_NAMES,
+    channel_name,
     extent,
     legend_below,
     line_look,
-    log_x,
-    log_y,
+    log_name,
     new_figure,
+    set_log_axis,
     settled,
     style,
+    write_title,
 )
 from imubench_pipeline.report.view import METHOD_NAMES, ChannelView
+from imubench_pipeline.words.estimates import status_text
+from imubench_pipeline.words.numbers import NO_VALUE
 
 _MAX_RATIO = 4.0
 """Largest ratio of model and measurement in the lower panel."""
+
+_WRITTEN_BELOW = frozenset({"F", "K"})
+"""Terms whose parameter is written below its point: the curve of the sum is above."""
+
+_REPEATED_DASHES = ((0, (3, 1, 1, 1, 1, 1)), (0, (1, 1)))
+_MAX_POINT_RATIO = 300.0
+"""Maximum ratio of the curve to a point below it; more would compress the curve."""
+
+_END_SHARE = 0.15
+"""Share of the axis of tau at its end, in which a text is written to the left of its point."""
+
+_FIGURE_NAMES = {"N": "$N$", "adev_minimum": "bias instability", "K": "$K$"}
+_KIND_TEXTS: Mapping[str | None, str | None] = {"typ": None, "1sigma": "1σ"}
+_LINE_DASHES = ((0, (4, 2)), (0, (1, 1.4)), (0, (5, 1.5, 1, 1.5)), (0, (8, 2)))
+_UNIT_SIGNS = {"deg": "°", "sqrt(Hz)": "√Hz", "sqrt(h)": "√h", "sqrt(s)": "√s", "ug": "µg"}
 
 
 def channel_axes(view: ChannelView, system: System, what: str) -> tuple[Figure, Axes, float]:
     """Return a figure of a channel, its axes, and the factor from SI to their unit."""
     unit = page_unit(view.quantity, "adev", system)
-    name, rest = entitled(view)
+    name, of = f"{view.sensor} / {view.recording}", channel_name(view.channel)
+    rest = " (simulated)" * view.simulated + f": {of[0].lower()}{of[1:]}"
     figure = new_figure(SINGLE, 68.0, f"{name}{rest}: {what}")
     axes = figure.add_subplot()
     axes.set_xlabel("averaging time τ (s)")
     axes.set_ylabel(f"Allan deviation ({unit.sign})")
-    entitle(figure, name, rest)
+    write_title(figure, name, rest)
     return figure, axes, unit.per_si
 
 
@@ -62,12 +89,10 @@ def draw_measured(axes: Axes, view: ChannelView, scale: float, *, limits: bool =
 
 def finish(figure: Figure, axes: Axes, view: ChannelView, scale: float, *more: float) -> Figure:
     """Set axis limits for the curve, further levels and, within bounds, the 95 % limits."""
-    near = [
-        np.clip(limit, view.adev / 2.0, view.adev * 2.0) * scale
-        for limit in (view.lower, view.upper)
-    ]
-    log_x(axes, extent(view.tau))
-    log_y(axes, extent(view.adev * scale, *near, list(more), margin=1.4))
+    limits = (view.lower, view.upper)
+    near = [np.clip(limit, view.adev / 2.0, view.adev * 2.0) * scale for limit in limits]
+    set_log_axis(axes, "x", extent(view.tau))
+    set_log_axis(axes, "y", extent(view.adev * scale, *near, list(more), margin=1.4))
     legend_below(figure, axes.get_legend_handles_labels()[0])
     return settled(figure)
 
@@ -92,38 +117,31 @@ def methods_figure(view: ChannelView, system: System = "practical") -> Figure | 
     if not models:
         return None
     figure, axes, scale = channel_axes(view, system, "models of the methods")
+    label = axes.get_ylabel()
     axes.remove()
     figure.set_figheight(92.0 / 25.4)
     axes, ratio = figure.subplots(2, 1, sharex=True, gridspec_kw={"height_ratios": [2.6, 1.0]})
-    axes.set_ylabel(f"Allan deviation ({page_unit(view.quantity, 'adev', system).sign})")
+    axes.set_ylabel(label)
     ratio.set_xlabel("averaging time τ (s)")
     ratio.set_ylabel("ratio to log")
     draw_measured(axes, view, scale)
     ratio.fill_between(view.tau, view.lower / view.adev, view.upper / view.adev, color="0.8", lw=0)
     ratio.axhline(1.0, color=MEASURED, lw=0.6)
     _draw_reconstruction(axes, ratio, view, scale)
-    deviations = [
-        _draw_model(axes, ratio, view, method, model, scale) for method, model in models.items()
-    ]
-    relative = np.clip([each / view.adev for each in deviations], 1 / _MAX_RATIO, _MAX_RATIO)
-    log_y(ratio, extent(relative, view.lower / view.adev, margin=1.1), ticks=5)
+    relative = []
+    for method, model in models.items():
+        deviation = np.sqrt(model.allan_variance(view.tau))
+        best = method == view.recommended
+        width, order = (1.3, 3.0) if best else (0.9, 2.8)
+        look = line_look(method_appearance(method)) | {"linewidth": width, "zorder": order}
+        label = METHOD_NAMES[method] + " (recommended)" * best
+        axes.plot(view.tau, deviation * scale, label=label, **look)
+        ratio.plot(view.tau, deviation / view.adev, **look)
+        relative.append(deviation / view.adev)
+    near = np.clip(relative, 1 / _MAX_RATIO, _MAX_RATIO)
+    set_log_axis(ratio, "y", extent(near, view.lower / view.adev, margin=1.1), ticks=5)
     figure.align_ylabels()
     return finish(figure, axes, view, scale)
-
-
-def _draw_model(
-    axes: Axes, ratio: Axes, view: ChannelView, method: str, model: NoiseModel, scale: float
-) -> NDArray[np.float64]:
-    deviation = np.sqrt(model.allan_variance(view.tau))
-    best = method == view.recommended
-    look = line_look(method_appearance(method)) | {
-        "linewidth": 1.3 if best else 0.9,
-        "zorder": 3.0 if best else 2.8,
-    }
-    label = METHOD_NAMES[method] + " (recommended)" * best
-    axes.plot(view.tau, deviation * scale, label=label, **look)
-    ratio.plot(view.tau, deviation / view.adev, **look)
-    return deviation
 
 
 def _draw_reconstruction(axes: Axes, ratio: Axes, view: ChannelView, scale: float) -> None:
@@ -156,3 +174,140 @@ def _draw_reconstruction(axes: Axes, ratio: Axes, view: ChannelView, scale: floa
             markeredgewidth=0.5,
             label="reconstruction" if name else None,
         )
+
+
+@style()
+def terms_figure(view: ChannelView, system: System = "practical") -> Figure | None:
+    """Draw every term of the recommended model, their sum, and where N, B and K are read.
+
+    N is the white noise at tau = 1 s, 0.664 B the plateau of flicker noise or the peak of a
+    Gauss-Markov process, K the random walk at tau = 3 s (Maia et al., Figure 1; Silva et al.,
+    Figure 3). None if there is no model.
+    """
+    if view.recommended not in view.parameters:
+        return None
+    model = view.model(view.recommended)
+    if not model.terms:
+        return None
+    figure, axes, scale = channel_axes(view, system, "terms of the noise model")
+    draw_measured(axes, view, scale, limits=False)
+    # Lines fold at the averaging times of the curve; between them they would be a smear.
+    tau = view.tau if model.sinusoids else np.geomspace(view.tau[0], view.tau[-1], 200)
+    smooth = [term for term in model.terms if term not in model.sinusoids]
+    drawn: Counter[str] = Counter()
+    for term in smooth:
+        look = TERM_LOOKS[term.symbol]
+        if repeated := min(drawn[term.symbol], len(_REPEATED_DASHES)):
+            look = look | {"linestyle": _REPEATED_DASHES[repeated - 1]}
+        drawn[term.symbol] += 1
+        deviation = np.sqrt(term.allan_variance(tau)) * scale
+        axes.plot(tau, deviation, label=_label_term(view, term, system), **look)
+    name = "+".join(term.symbol for term in smooth)
+    if model.sinusoids:
+        lines = np.sqrt(NoiseModel(sinusoids=model.sinusoids).allan_variance(tau)) * scale
+        label = f"{TERM_NAMES[view.quantity]['S']} ({len(model.sinusoids)})"
+        axes.plot(tau, lines, label=label, **TERM_LOOKS["S"])
+        name += " and lines"
+    total = np.sqrt(model.allan_variance(tau)) * scale
+    axes.plot(tau, total, label=f"sum: {name}", zorder=2.8, **SUM_LOOK)
+    levels = []
+    end = tau[-1] * (tau[0] / tau[-1]) ** _END_SHARE
+    for term in smooth:
+        reading = term.reading(float(tau[np.argmin(total)]))
+        if reading is None:
+            continue
+        level, below = reading.level * scale, term.symbol in _WRITTEN_BELOW
+        levels.append(level * (0.6 if below else 1.6))
+        if reading.peak:
+            axes.axhline(level, color=TERM_LOOKS[term.symbol]["color"], lw=0.5, ls=(0, (1, 2)))
+        factor = "" if reading.factor == 1.0 else f"{reading.factor:.3f} "
+        offset = (-5.0 if reading.tau > end else 5.0, -8.0 if below else 4.0)
+        text = f"{factor}{SYMBOLS[reading.symbol]}"
+        mark_point(axes, term.symbol, (reading.tau, level), text, offset, zorder=3.3)
+    lowest = float(total.min()) / _MAX_POINT_RATIO
+    return finish(figure, axes, view, scale, *(level for level in levels if level > lowest))
+
+
+def mark_point(
+    axes: Axes,
+    symbol: str,
+    point: tuple[float, float],
+    text: str,
+    offset: tuple[float, float],
+    **look: Any,
+) -> None:
+    """Draw the point at which the parameter of a term is read, and a text at an offset in pt."""
+    colour = TERM_LOOKS[symbol]["color"]
+    edge = {"markeredgecolor": colour, "markeredgewidth": 0.9, "markerfacecolor": "white"}
+    axes.plot(*point, ls="none", marker="o", markersize=4.0, zorder=3.2, **edge)
+    side = "right" if offset[0] < 0.0 else "left"
+    look = {"xytext": offset, "textcoords": "offset points", "color": colour, "ha": side} | look
+    axes.annotate(text, look.pop("beside", point), **look)
+
+
+def _label_term(view: ChannelView, term: Term, system: System) -> str:
+    """Return the name of a term with its parameters, and their status if not estimated."""
+    values = ", ".join(
+        f"{SYMBOLS[symbol]} = {unit.text(abs(value), 3)} {unit.sign}"
+        for symbol, value in term.values.items()
+        for unit in [page_unit(view.quantity, symbol, system)]
+    )
+    doubts = {
+        status_text(row.status)
+        for symbol, value in term.values.items()
+        for row in view.named(view.recommended, symbol)
+        if row.value is None and row.fitted is not None
+        if math.isclose(row.fitted, value)
+    }
+    return f"{TERM_NAMES[view.quantity][term.symbol]}, {values}" + "".join(
+        f" ({doubt})" for doubt in sorted(doubts)
+    )
+
+
+@style()
+def datasheet_figure(view: ChannelView, system: System = "practical") -> Figure | None:
+    """Draw the curve and the recommended model with the lines that the datasheet prints.
+
+    N is a line of slope -1/2, K one of +1/2; a bias instability is the level of the minimum, as
+    vendors mean it. None where the datasheet has no such figure.
+    """
+    # Each reading once, with its value in SI.
+    printed = {
+        (row.statistic, row.comparable, row.sidedness, row.kind): row
+        for row in view.datasheet
+        if row.method == view.recommended and row.comparable and row.statistic in _FIGURE_NAMES
+    }
+    if not printed:
+        return None
+    figure, axes, scale = channel_axes(view, system, "with the datasheet")
+    draw_measured(axes, view, scale)
+    model = view.model(view.recommended)
+    if model.terms:
+        look = line_look(method_appearance(view.recommended)) | {"zorder": 2.8}
+        deviation = np.sqrt(model.allan_variance(view.tau)) * scale
+        axes.plot(view.tau, deviation, label=METHOD_NAMES[view.recommended], **look)
+    levels = []
+    drawn: Counter[str] = Counter()
+    for row in printed.values():
+        dash = _LINE_DASHES[drawn[row.statistic] % len(_LINE_DASHES)]
+        drawn[row.statistic] += 1
+        line = np.full_like(view.tau, (row.comparable or 0.0) * scale)
+        if row.statistic == "N":
+            line /= np.sqrt(view.tau)
+        elif row.statistic == "K":
+            line *= np.sqrt(view.tau / 3.0)
+        levels += [float(line.min()), float(line.max())]
+        colour = TERM_LOOKS["F" if row.statistic == "adev_minimum" else row.statistic]["color"]
+        axes.plot(view.tau, line, color=colour, ls=dash, label=_label_printed(row))
+    return finish(figure, axes, view, scale, *levels)
+
+
+def _label_printed(row: DatasheetRow) -> str:
+    unit = row.unit or ""
+    for written, sign in _UNIT_SIGNS.items():
+        unit = unit.replace(written, sign)
+    reading = f"read as {row.sidedness}" if row.sidedness else None
+    about = ", ".join(filter(None, [_KIND_TEXTS.get(row.kind, row.kind), reading]))
+    number = NO_VALUE if row.printed is None else f"{row.printed:g}"
+    text = f"datasheet {_FIGURE_NAMES[row.statistic]}: {number} {unit}"
+    return f"{text} ({about})" if about else text

@@ -1,26 +1,30 @@
-"""The figures of a run, their names, and their files."""
+"""The figures of channels and of all sensors, their names, and their files."""
 
 from __future__ import annotations
 
 import base64
 import io
 import re
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 
+import pyarrow as pa
 from matplotlib.figure import Figure
 
 from imubench_pipeline.report.practical import System
-from imubench_pipeline.report.static_figures.comparison import comparison_figure
-from imubench_pipeline.report.static_figures.curves import allan_figure, methods_figure
-from imubench_pipeline.report.static_figures.datasheet import datasheet_figure
-from imubench_pipeline.report.static_figures.forest import forest_figure
+from imubench_pipeline.report.static_figures.comparison import comparison_figure, forest_figure
+from imubench_pipeline.report.static_figures.curves import (
+    allan_figure,
+    datasheet_figure,
+    methods_figure,
+    terms_figure,
+)
 from imubench_pipeline.report.static_figures.spectrum import spectrum_figure
 from imubench_pipeline.report.static_figures.style import style
-from imubench_pipeline.report.static_figures.terms import terms_figure
-from imubench_pipeline.report.view import ChannelView
-from imubench_pipeline.tables import replacing
+from imubench_pipeline.report.view import ChannelView, recording_views
+from imubench_pipeline.tables import replacing, schema
+from imubench_pipeline.tables.schemas import BY_RECORDING
 
 Make = Callable[[], Figure | None]
 
@@ -39,9 +43,6 @@ CHANNEL_KINDS: dict[str, Callable[[ChannelView, System], Figure | None]] = {
 }
 """Figures of one channel of one recording; None where there is nothing to show."""
 
-_CROSS_NAMES = {"comparison": "allan", "forest": "forest"}
-
-
 _COORDINATE_PATTERN = re.compile(rb' (?:d|x|y|points|transform)="[^"]*"')
 _DECIMALS_PATTERN = re.compile(rb"(\.\d\d)\d+")
 _MARKS_PATTERN = re.compile(
@@ -59,16 +60,14 @@ def cross_figures(
 ) -> Iterator[tuple[str, Callable[[], Figure]]]:
     """Yield the name of each figure of all sensors, and its maker.
 
-    The looks are those of all sensors of the run, or else of those of the views.
+    The looks follow from all sensors of the run, or else from the sensors of the views.
     """
     every = sorted({view.sensor for view in views}) if sensors is None else list(sensors)
     for channel in dict.fromkeys(view.channel for view in views):
         chosen = [view for view in views if view.channel == channel]
         for kind in kinds:
-            yield (
-                f"{_CROSS_NAMES[kind]}_{channel}",
-                partial(CROSS_KINDS[kind], chosen, every, system),
-            )
+            name = "allan" if kind == "comparison" else kind
+            yield f"{name}_{channel}", partial(CROSS_KINDS[kind], chosen, every, system)
 
 
 def channel_figures(
@@ -82,6 +81,40 @@ def channel_figures(
         # A folder a recording: joined by any sign, two names could make the same one.
         name = f"{view.sensor}/{view.recording}/{view.channel}_{kind}"
         yield name, partial(CHANNEL_KINDS[kind], view, system)
+
+
+def draw_comparison(tables: Mapping[str, pa.Table], system: System, folder: Path) -> None:
+    """Write the figures of each channel of all sensors from joined tables, as SVG and PDF.
+
+    Missing tables of recordings count as empty.
+    """
+    for draw in figures_of(tables, system, folder):
+        draw()
+
+
+def figures_of(
+    tables: Mapping[str, pa.Table],
+    system: System,
+    folder: Path,
+    *,
+    kinds: Sequence[str] = tuple(CROSS_KINDS),
+) -> Sequence[Callable[[], None]]:
+    """Return a function for each figure of all sensors that writes it."""
+    folder.mkdir(parents=True, exist_ok=True)
+    unused = {name: schema(name).empty_table() for name in BY_RECORDING}
+    views = recording_views(unused | dict(tables))
+    channels = [channel for view in views for channel in view.channels()]
+    sensors = sorted({view.sensor for view in views})
+
+    def draw(make: Callable[[], Figure], path: Path) -> None:
+        figure = make()
+        for kind in ("svg", "pdf"):
+            save(figure, path.with_name(f"{path.name}.{kind}"))
+
+    return [
+        partial(draw, make, folder / name)
+        for name, make in cross_figures(channels, system, sensors=sensors, kinds=kinds)
+    ]
 
 
 def save(figure: Figure, path: Path) -> None:
@@ -106,16 +139,12 @@ def _write_bytes(figure: Figure, kind: str) -> bytes:
     data = buffer.getvalue()
     if kind != "svg":
         return data
+
+    def move_style_to_group(match: re.Match[bytes]) -> bytes:
+        group, marks, looks = match.groups()
+        attribute = b' style="' + looks + b'"'
+        return group + attribute + b">" + marks.replace(attribute, b"")
+
     # Half the size: coordinates to a hundredth of a point, a style once for all of its marks.
-    data = _MARKS_PATTERN.sub(_move_style_to_group, _COORDINATE_PATTERN.sub(_shorten_number, data))
-    return _LEADING_SPACE_PATTERN.sub(b"\n", data)
-
-
-def _move_style_to_group(match: re.Match[bytes]) -> bytes:
-    group, marks, looks = match.groups()
-    attribute = b' style="' + looks + b'"'
-    return group + attribute + b">" + marks.replace(attribute, b"")
-
-
-def _shorten_number(match: re.Match[bytes]) -> bytes:
-    return _DECIMALS_PATTERN.sub(rb"\1", match[0])
+    data = _COORDINATE_PATTERN.sub(lambda match: _DECIMALS_PATTERN.sub(rb"\1", match[0]), data)
+    return _LEADING_SPACE_PATTERN.sub(b"\n", _MARKS_PATTERN.sub(move_style_to_group, data))

@@ -2,26 +2,26 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
-from scipy.special import chdtri
 
 from imubench_pipeline.report.practical import System, page_unit
 from imubench_pipeline.report.static_figures.curves import channel_axes
-from imubench_pipeline.report.static_figures.names import TERM_NAMES, log_name
 from imubench_pipeline.report.static_figures.style import (
-    GREY,
     MEASURED,
+    SUM_LOOK,
+    TERM_LOOKS,
+    TERM_NAMES,
     extent,
     legend_below,
-    log_x,
-    log_y,
+    log_name,
+    set_log_axis,
     settled,
     style,
 )
-from imubench_pipeline.report.static_figures.terms import SUM_LOOK, TERM_LOOKS
 from imubench_pipeline.report.view import ChannelView
 
 _SPECTRUM_METHOD = "likelihood"
@@ -46,70 +46,43 @@ def spectrum_figure(view: ChannelView, system: System = "practical") -> Figure |
     axes.set_ylabel(f"root of the two-sided density ({unit.sign})")
     spectrum = view.spectrum
     frequency = spectrum["frequency"]
-    level = np.sqrt(spectrum["density"]) * unit.per_si
-    fitted = np.sqrt(spectrum["fitted"]) * unit.per_si
-    _draw_bins(axes, view, level, fitted)
+    level, fitted, lower, upper = (
+        np.sqrt(density) * unit.per_si
+        for density in (spectrum["density"], spectrum["fitted"], *view.bin_limits())
+    )
+    is_fitted = bool(np.isfinite(fitted).any())
+    if is_fitted:
+        band = "95 % of bins by the fit"
+        axes.fill_between(frequency, lower, upper, color="0.87", lw=0, label=band)
+    used = spectrum["used"] > 0
+    dot = {"ls": "none", "marker": "o", "markersize": 1.8, "markeredgewidth": 0.4, "zorder": 2.4}
+    for chosen, face, edge, label in (
+        (used, MEASURED, MEASURED, f"{log_name(view)}, bins used"),
+        (~used, "white", "0.6", "bins left out"),
+    ):
+        if chosen.any():
+            look: dict[str, Any] = dot | {"markerfacecolor": face, "markeredgecolor": edge}
+            axes.plot(frequency[chosen], level[chosen], label=label, **look)
     if _SPECTRUM_METHOD in view.parameters:
-        _draw_terms(axes, view, unit.per_si)
-    if np.isfinite(fitted).any():
+        grid = np.geomspace(frequency[0], frequency[-1], _TERM_POINTS)
+        interval = view.tau[0]  # the first cluster is one sample
+        for term in view.model(_SPECTRUM_METHOD).terms:
+            # As sampled, so that the terms add up to the fit.
+            density = term.sampled_spectrum(2.0 * np.pi * grid * interval, interval) * interval
+            if density.any():
+                label, look = TERM_NAMES[view.quantity][term.symbol], TERM_LOOKS[term.symbol]
+                root = np.sqrt(density) * unit.per_si
+                axes.plot(grid, root, lw=0.8, label=label, zorder=2.8, **look)
+    if is_fitted:
         name = next((f": {row.model}" for row in view.models if row.chosen), "")
         axes.plot(frequency, fitted, label=f"fit by likelihood{name}", zorder=3.0, **SUM_LOOK)
     _draw_lines(axes, view)
-    log_x(axes, extent(frequency))
+    set_log_axis(axes, "x", extent(frequency))
     # Single ordinates scatter to almost 0; limits for them would hide the rest.
     low, high = np.nanquantile(level, [0.01, 1.0])
-    log_y(axes, extent([low, high], fitted, margin=1.6))
+    set_log_axis(axes, "y", extent([low, high], fitted, margin=1.6))
     legend_below(figure, axes.get_legend_handles_labels()[0])
     return settled(figure)
-
-
-def _draw_bins(
-    axes: Axes, view: ChannelView, level: NDArray[np.float64], fitted: NDArray[np.float64]
-) -> None:
-    """Draw the bins, and their 95 % band if the model is right."""
-    spectrum = view.spectrum
-    used = spectrum["used"] > 0
-    nu = spectrum["ordinates"]
-    lower, upper = (fitted * np.sqrt(chdtri(nu, tail) / nu) for tail in (0.975, 0.025))
-    if np.isfinite(fitted).any():
-        axes.fill_between(
-            spectrum["frequency"], lower, upper, color="0.87", lw=0, label="95 % of bins by the fit"
-        )
-    for chosen, face, edge, label in (
-        (used, MEASURED, MEASURED, f"{log_name(view)}, bins used"),
-        (~used, "white", GREY, "bins left out"),
-    ):
-        if chosen.any():
-            axes.plot(
-                spectrum["frequency"][chosen],
-                level[chosen],
-                ls="none",
-                marker="o",
-                markersize=1.8,
-                markerfacecolor=face,
-                markeredgecolor=edge,
-                markeredgewidth=0.4,
-                label=label,
-                zorder=2.4,
-            )
-
-
-def _draw_terms(axes: Axes, view: ChannelView, scale: float) -> None:
-    """Draw each term as sampled, so that the terms add up to the fit."""
-    frequency = view.spectrum["frequency"]
-    grid = np.geomspace(frequency[0], frequency[-1], _TERM_POINTS)
-    interval = view.tau[0]  # the first cluster is one sample
-    for term in view.model(_SPECTRUM_METHOD).terms:
-        density = term.sampled_spectrum(2.0 * np.pi * grid * interval, interval) * interval
-        if density.any():
-            axes.plot(
-                grid,
-                np.sqrt(density) * scale,
-                lw=0.8,
-                label=TERM_NAMES[view.quantity][term.symbol],
-                zorder=2.8,
-                **TERM_LOOKS[term.symbol],
-            )
 
 
 def _draw_lines(axes: Axes, view: ChannelView) -> None:

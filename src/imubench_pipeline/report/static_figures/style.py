@@ -1,24 +1,27 @@
-"""The look of the static figures: sizes, fonts, logarithmic axes and legends of a journal."""
+"""The look of the static figures: sizes, fonts, names, logarithmic axes and legends."""
 
 from __future__ import annotations
 
 import contextlib
 import math
 from collections.abc import Iterator, Sequence
-from functools import partial
-from typing import Any
+from typing import Any, Literal
 
 import matplotlib as mpl
 import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
-from matplotlib.axis import Axis
 from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 from numpy.typing import ArrayLike
 
+from imubench_pipeline.noise import PARAMETERS, TERMS
 from imubench_pipeline.report.palette import Appearance
+from imubench_pipeline.report.view import QUANTITY_NAMES, ChannelView
+
+Look = dict[str, Any]
+"""Keyword arguments of Matplotlib for the look of a line or marker."""
 
 SINGLE, DOUBLE = 88.0, 180.0
 """Widths of one and of two columns of a journal, mm."""
@@ -90,15 +93,58 @@ _DASHES: dict[str, str | tuple[float, tuple[float, ...]]] = {
     "longdashdot": (0.0, (8.0, 2.0, 1.0, 2.0)),
     "7px,3px,2px,3px,2px,3px": (0.0, (5.0, 1.5, 1.0, 1.5, 1.0, 1.5)),
 }
-_MARKERS = {
-    "circle": "o",
-    "square": "s",
-    "diamond": "D",
-    "triangle-up": "^",
-    "triangle-down": "v",
-    "cross": "P",
-    "x": "X",
+_MARKERS = {"circle": "o", "square": "s", "diamond": "D", "triangle-up": "^", "triangle-down": "v"}
+_MARKERS |= {"cross": "P", "x": "X"}
+
+TERM_LOOKS: dict[str, Look] = {
+    "Q": {"color": "#9A6B00", "linestyle": (0, (1, 1.4))},
+    "N": {"color": "#0072B2", "linestyle": (0, (4, 2))},
+    "F": {"color": "#D55E00", "linestyle": (0, (5, 1.5, 1, 1.5))},
+    "GM": {"color": "#D55E00", "linestyle": (0, (5, 1.5))},
+    "K": {"color": "#B3508C", "linestyle": (0, (8, 2))},
+    "R": {"color": "#7A4B3A", "linestyle": (0, (8, 2, 1, 2))},
+    "S": {"color": "#5B5FC7", "linestyle": (0, (2, 1))},
 }
+"""Colour and dash of each term, the same in every figure."""
+
+SUM_LOOK: Look = {"color": "#008F6B", "linestyle": "-", "linewidth": 1.2}
+
+_QUANTITY_WORDS = {
+    "gyro": {"signal": "rate", "integral": "angle"},
+    "accel": {"signal": "acceleration", "integral": "velocity"},
+}
+TERM_NAMES = {
+    quantity: {kind.symbol: kind.standard_name.format(**words) for kind in TERMS}
+    for quantity, words in _QUANTITY_WORDS.items()
+}
+"""Standard names of the terms, by quantity and symbol of the term."""
+
+
+def _set(symbol: str) -> str:
+    """Return a symbol in TeX notation."""
+    letter, _, index = symbol.partition("_")
+    letter = f"\\{letter}" if letter in ("beta", "omega", "sigma", "tau") else letter
+    return letter + (f"_{index}" if len(index) < 2 else f"_{{{index}}}") * bool(index)
+
+
+SYMBOLS = {
+    symbol: f"$|{_set(symbol)}|$" if parameter.signed else f"${_set(symbol)}$"
+    for symbol, parameter in PARAMETERS.items()
+}
+SYMBOLS |= {"B_curve": "$B$ of the curve", "sigma_min": r"$\sigma_\mathrm{min}$"}
+SYMBOLS |= {"tau_min": r"$\tau_\mathrm{min}$"}
+"""The parameters as they are set; a logarithmic axis has no sign of R."""
+
+
+def channel_name(channel: str) -> str:
+    """Return a channel in words, such as ``Gyroscope, x axis``."""
+    quantity, axis = channel.split("_", maxsplit=1)
+    return f"{QUANTITY_NAMES[quantity]}, {axis} axis"
+
+
+def log_name(view: ChannelView) -> str:
+    """Return the name of the curve of a log: measured or simulated."""
+    return "simulated log" if view.simulated else "measured"
 
 
 @contextlib.contextmanager
@@ -110,12 +156,12 @@ def style() -> Iterator[None]:
         yield
 
 
-def line_look(look: Appearance) -> dict[str, Any]:
+def line_look(look: Appearance) -> Look:
     """Return colour and dash of an appearance as Matplotlib names them."""
     return {"color": look.light, "linestyle": _DASHES[look.dash]}
 
 
-def marker_look(look: Appearance, *, hollow: bool = False) -> dict[str, Any]:
+def marker_look(look: Appearance, *, hollow: bool = False) -> Look:
     """Return the marker of an appearance as Matplotlib names it."""
     return {
         "marker": _MARKERS[look.marker],
@@ -125,23 +171,13 @@ def marker_look(look: Appearance, *, hollow: bool = False) -> dict[str, Any]:
 
 
 def new_figure(width: float, height: float, title: str) -> Figure:
-    """Return an empty figure.
+    """Return an empty figure, its sides in mm; a legend adds to the height.
 
-    Parameters
-    ----------
-    width, height : float
-        mm; a legend adds to the height.
-    title : str
-        What the figure shows, for the metadata of its files.
+    The title is for the metadata of its files.
     """
     figure = Figure(figsize=(width / 25.4, height / 25.4))
     figure.set_label(title)
     return figure
-
-
-def plain(text: str) -> str:
-    """Return a name of the user, escaped so that Matplotlib reads no formula in it."""
-    return text.replace("$", r"\$")
 
 
 def text_width(figure: Figure, text: str) -> float:
@@ -153,17 +189,17 @@ def text_width(figure: Figure, text: str) -> float:
 
 
 def shortened(figure: Figure, name: str, width: float) -> str:
-    """Return a name, shortened in the middle if it is wider than ``width`` pt."""
-    text, length = name, len(name)
-    while length > 2 and (excess := text_width(figure, plain(text)) / width) > 1.0:
+    """Return a name as plain text, shortened in the middle if it is wider than ``width`` pt."""
+    text, length = name.replace("$", r"\$"), len(name)
+    while length > 2 and (excess := text_width(figure, text) / width) > 1.0:
         length = min(length - 1, int(length / excess))
         half = length // 2
-        text = f"{name[: length - half]}…{name[len(name) - half :]}"
-    return plain(text)
+        text = f"{name[: length - half]}…{name[len(name) - half :]}".replace("$", r"\$")
+    return text
 
 
-def entitle(figure: Figure, name: str, rest: str) -> None:
-    """Write a name of the user, and what is shown of it, above all axes."""
+def write_title(figure: Figure, name: str, rest: str) -> None:
+    """Write a name of the user and the rest of the title above all axes."""
     width = figure.get_figwidth() * 72.0
     enlarged = _TITLE_SIZE / FONT_SIZE
     room = (width - 2.0 * _EDGE_WIDTH) / enlarged - text_width(figure, rest)
@@ -176,32 +212,23 @@ def legend_below(figure: Figure, handles: Sequence[Artist]) -> None:
     """Name lines below the axes, in as many columns as fit; the figure grows by the rows."""
     width, height = figure.get_size_inches()
     room = width * 72.0 - 2.0 * _EDGE_WIDTH
-    labels = [
-        _break_label(figure, str(handle.get_label()), room - _HANDLE_WIDTH) for handle in handles
-    ]
+    labels = []
+    for label in (str(handle.get_label()) for handle in handles):
+        head, bracket, remark = label.rpartition(" (")
+        fits = not bracket or text_width(figure, label) <= room - _HANDLE_WIDTH
+        labels.append(label if fits else f"{head}\n({remark}")
     widths = [text_width(figure, label) + _HANDLE_WIDTH for label in labels]
-    columns = len(handles)
-    while columns > 1 and _measure_legend(widths, columns) > room:
-        columns -= 1
+    for columns in range(len(handles), 0, -1):
+        # Matplotlib fills a legend column by column.
+        parts = np.array_split(np.asarray(widths), columns)
+        if sum(float(part.max()) for part in parts) + _COLUMN_GAP * (columns - 1) <= room:
+            break
     rows = math.ceil(len(handles) / columns)
     # As many rows as before, but filled evenly.
     columns = math.ceil(len(handles) / rows)
     rows += sum(label.count("\n") for label in labels)
     figure.set_size_inches(width, height + rows * _LEGEND_ROW_HEIGHT / 25.4)
     figure.legend(handles, labels, loc="outside lower center", ncols=columns)
-
-
-def _break_label(figure: Figure, label: str, width: float) -> str:
-    """Return a label, with its last remark on a new line if it is too wide."""
-    head, bracket, remark = label.rpartition(" (")
-    fits = not bracket or text_width(figure, label) <= width
-    return label if fits else f"{head}\n({remark}"
-
-
-def _measure_legend(widths: Sequence[float], columns: int) -> float:
-    """Return the width of a legend in pt; Matplotlib fills it column by column."""
-    parts = np.array_split(np.asarray(widths), columns)
-    return sum(float(part.max()) for part in parts) + _COLUMN_GAP * (columns - 1)
 
 
 def settled(figure: Figure) -> Figure:
@@ -220,22 +247,15 @@ def extent(*values: ArrayLike, margin: float = 1.25) -> tuple[float, float]:
     return float(low / margin / 10.0**missing), float(high * margin * 10.0**missing)
 
 
-def log_x(axes: Axes, limits: tuple[float, float], *, ticks: int = 8) -> None:
-    """Make the x axis logarithmic, with at most about so many labels."""
-    axes.set_xscale("log")
-    axes.set_xlim(*limits)
-    _label_decades(axes.xaxis, limits, ticks)
+def set_log_axis(
+    axes: Axes, name: Literal["x", "y"], limits: tuple[float, float], *, ticks: int = 8
+) -> None:
+    """Make an axis logarithmic, with about ``ticks`` labels at most.
 
-
-def log_y(axes: Axes, limits: tuple[float, float], *, ticks: int = 8) -> None:
-    """Make the y axis logarithmic, with at most about so many labels."""
-    axes.set_yscale("log")
-    axes.set_ylim(*limits)
-    _label_decades(axes.yaxis, limits, ticks)
-
-
-def _label_decades(axis: Axis, limits: tuple[float, float], ticks: int) -> None:
-    """Label the decades, and ticks between them if there are few decades."""
+    Decades are labelled, and ticks between them if there are few decades.
+    """
+    axes.set(**{f"{name}scale": "log", f"{name}lim": limits})
+    axis = axes.xaxis if name == "x" else axes.yaxis
     low, high = limits
     span = math.log10(high / low)
     decades = math.floor(math.log10(high)) - math.ceil(math.log10(low)) + 1
@@ -246,18 +266,16 @@ def _label_decades(axis: Axis, limits: tuple[float, float], ticks: int) -> None:
     # A power of ten is wide; between two of them there is no room for others.
     if (decades > 1 and span > 1.3) or (decades > 0 and not ordinary):
         axis.set_minor_formatter(NullFormatter())
-    else:
-        labelled = (2, 3, 5) if span < 1.0 and ordinary else (2, 5)
-        axis.set_minor_formatter(FuncFormatter(partial(_list_between, labelled, ordinary)))
+        return
+    labelled = (2, 3, 5) if span < 1.0 and ordinary else (2, 5)
 
+    def format_between(value: float, _: int | None = None) -> str:
+        factor = round(value / 10.0 ** _find_exponent(value))
+        if factor not in labelled:
+            return ""
+        return _format_number(value) if ordinary else f"{factor}×{_format_power(value)}"
 
-def _list_between(
-    labelled: Sequence[int], ordinary: bool, value: float, _: int | None = None
-) -> str:
-    factor = round(value / 10.0 ** _find_exponent(value))
-    if factor not in labelled:
-        return ""
-    return _format_number(value) if ordinary else f"{factor}×{_format_power(value)}"
+    axis.set_minor_formatter(FuncFormatter(format_between))
 
 
 def _find_exponent(value: float) -> int:

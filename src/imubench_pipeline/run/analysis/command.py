@@ -148,7 +148,7 @@ def _say(text: str) -> None:
 def _write(plan: Plan, tables: Mapping[str, pa.Table], arguments: argparse.Namespace) -> None:
     """Write the page, the figures and the tables."""
     from imubench_pipeline.report.publish import one_file, site_of
-    from imubench_pipeline.report.static_figures.of_run import figures_of
+    from imubench_pipeline.report.static_figures.files import figures_of
     from imubench_pipeline.tables import write_arrow, write_content
 
     output: OutputFolder = arguments.output
