@@ -246,7 +246,7 @@ def test_without_a_static_recording_the_turns_are_found_and_nothing_is_estimated
 ) -> None:
     found = briefly(put(tmp_path / "a", turned_log()), [])
     assert {row["status"] for row in found["earth_rate"]} == {"no_model"}
-    assert "add a static log of this sensor" in found["earth_rate"][0]["reason"]
+    assert "Add a static log of this sensor" in found["earth_rate"][0]["reason"]
     assert sum(row["what"] == "turn" for row in found["turning"]) == 19
     assert found["earth_rate_prediction"] == []
 
@@ -257,7 +257,7 @@ def test_the_datasheet_answers_where_no_static_recording_does(tmp_path: Path) ->
     row = by_method(found["earth_rate"])["filter"]
     assert row["status"] == "ok" and row["model"] == "N"
     assert row["model_from"].startswith(
-        "typical figures of the datasheet of s: sheet 1, not measured"
+        "typical figures of the data sheet of s: sheet 1, not measured"
     )
     assert by_method(found["earth_rate"])["known_rate"]["status"] == "given"
 
@@ -287,7 +287,7 @@ def test_the_device_itself_answers_before_others_and_long_logs_before_short(
         "static recording other, of another device, 8; method likelihood",
     )
     assert chosen(made)[1] == "static recording sim_x, simulated; method likelihood"
-    assert "of its gyro_y, as gyro_x has no estimate there" in chosen(axis, bad)[1]
+    assert "of its gyro y, as gyro x has no estimate there" in chosen(axis, bad)[1]
     assert from_static([bad, accel], OWN, "gyro_x") is None
 
 
