@@ -82,7 +82,7 @@ def test_an_extension_without_one_that_it_needs_is_left_out(
     ("step", "file"),
     [
         ("steps.ranking", "aided/limits.py"),
-        ("steps.simulate", "earth_rate/simulated.py"),
+        ("steps.simulate", "earth_rate/simulation.py"),
         ("steps.sensor_tables", "fusion/published_figures.py"),
         ("settings.config", "aided/settings.py"),
         ("settings.simulated_recordings", "fusion/settings.py"),
