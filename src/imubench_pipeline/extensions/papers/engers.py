@@ -27,8 +27,7 @@ _MIN_TAU_ABOVE_LOW_PASS = 0.1
 """Cluster time above which the low-passes of these sensors have no effect, s."""
 
 _MIN_PERCENT_IN_BAND = 80.0
-"""Least share of a curve, in per cent, within a pointwise band of 95 %. By chance, one curve in
-twenty is below."""
+"""Least share of a curve within its 95 % band, %. By chance, one curve in twenty is below."""
 
 _MAX_DEVIATION_DIFFERENCE = 0.05
 """Largest relative difference of two deviations of samples that look alike."""

@@ -103,10 +103,7 @@ def read_curve(run: Evidence, key: str, symbol: str) -> Result:
 
 
 def find_lowest_of_table_1(_: Evidence, key: str, quantity: str) -> Result:
-    """Return tau (s) or deviation of the lowest point of Table 1, with 1.89 T_B or 0.664 B.
-
-    The share is the part of the process in that deviation, over 0.664 B, %.
-    """
+    """Return tau or deviation of the lowest point of Table 1, with 1.89 T_B or 0.664 B, SI."""
     model = CHANNELS[key].table_1
     assert model.T_B is not None
     tau, level = lowest_point(model)
@@ -117,7 +114,7 @@ def find_lowest_of_table_1(_: Evidence, key: str, quantity: str) -> Result:
         "peak": peak,
         "floor": _format_power(floor, 2).replace(".", ","),
         "side": "before" if tau < PEAK_TAU * model.T_B else "past",
-        "share": 100.0 * process / floor,
+        "share": 100.0 * process / floor,  # of the process in that deviation, %
     }
     value, printed = (tau, peak) if quantity == "tau" else (level, floor)
     return Result(value=value, printed=printed, fields=fields)

@@ -76,10 +76,7 @@ def get_estimate_at_rest(run: Evidence, name: str, method: str) -> Result | None
 
 
 def find_lowest_point(_: Evidence, quantity: str) -> Result:
-    """Return tau (s), deviation (rad/s) or T_B (s) at the lowest point of the printed curve.
-
-    With tau and deviation go 1.89 T_B and 0.664 B.
-    """
+    """Return tau, deviation or T_B at the lowest point of the printed curve, SI."""
     tau = np.geomspace(1.0, 1e4, 40_001)
     variance = PAPER_MODEL.allan_variance(tau)
     place = int(np.argmin(variance))
