@@ -7,7 +7,7 @@ import pytest
 from scipy import signal
 
 from imubench_pipeline.allan import allan_variance
-from imubench_pipeline.extensions.papers.engers import AXES, DEGREE, cutoff_of_bandwidth
+from imubench_pipeline.extensions.papers.engers import AXES, DEGREE, compute_cutoff
 from imubench_pipeline.extensions.papers.evidence import Evidence
 from imubench_pipeline.extensions.papers.papers import rows_of
 from imubench_pipeline.extensions.papers.printed import read_paper
@@ -109,7 +109,7 @@ def test_one_curve_in_twenty_is_less_in_its_band() -> None:
 
 def test_a_first_order_of_120_hz_passes_the_noise_of_188_hz() -> None:
     # White noise through a digital low-pass of first order, far below the rate, by its variance.
-    rate, cutoff = 100_000.0, cutoff_of_bandwidth(Evidence(), "188")
+    rate, cutoff = 100_000.0, compute_cutoff(Evidence(), "188")
     assert cutoff == pytest.approx(119.7, abs=0.05)
     filters = signal.butter(1, cutoff, fs=rate)
     log = signal.lfilter(*filters, np.random.default_rng(1).standard_normal(4_000_000))

@@ -58,7 +58,7 @@ def test_a_week_shows_k_by_reading_and_two_days_seldom_do() -> None:
 
 
 def test_a_filter_improves_the_pairs_by_a_per_cent() -> None:
-    gains = silva.gain_of_filter(Evidence()).fields
+    gains = silva.compute_filter_gain(Evidence()).fields
     assert 0.3 < gains["least"] and gains["most"] < 1.35
     assert ROWS["Section 8", "what a Kalman filter improves"]["found_words"] == (
         "σ is 0.4 to 1.2 % less than that of the mean over pairs"
@@ -112,9 +112,9 @@ def runs(request: pytest.FixtureRequest) -> Iterator[int]:
     """The number of simulated runs: less than what the page has, every day."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(silva, "RUNS", request.param)
-        silva.settling_times.cache_clear()
+        silva.simulate_settling_times.cache_clear()
         yield request.param
-    silva.settling_times.cache_clear()
+    silva.simulate_settling_times.cache_clear()
 
 
 @pytest.mark.release
@@ -122,7 +122,7 @@ def test_runs_settle_after_minutes_and_not_by_the_unit_of_the_start(runs: int) -
     for run, minutes in PAPER_MINUTES.items():
         if "," in run:
             continue
-        times = silva.settling_times(run)
+        times = silva.simulate_settling_times(run)
         degrees, radians = (np.minimum(times[unit], 60.0 * minutes) for unit in times)
         assert len(degrees) == runs
         # Tenfold the 30 to 60 s that are printed, or more, in the middle of the runs.
@@ -131,7 +131,7 @@ def test_runs_settle_after_minutes_and_not_by_the_unit_of_the_start(runs: int) -
     # White noise alone: the mean of 12 min is beyond a tenth of the rate by chance in as many.
     sigma = 0.0122 / math.sqrt(12 * 56.0) / 0.1 / 0.0041781
     beyond = math.erfc(1.0 / sigma / math.sqrt(2.0))
-    unsettled = np.mean(np.isinf(silva.settling_times("2")["degrees"]))
+    unsettled = np.mean(np.isinf(silva.simulate_settling_times("2")["degrees"]))
     assert unsettled == pytest.approx(beyond, abs=2.0 / math.sqrt(runs))
 
 
@@ -159,7 +159,7 @@ def test_the_median_of_many_runs_stands_beside_what_is_printed() -> None:
     evidence = Evidence({"recordings": build("recordings", runs)})
     lines = {row["place"]: row for row in rows_of(read_paper("silva"), evidence)}
     for figure, run in (("10", "1"), ("11", "2"), ("12", "3"), ("13", "4")):
-        line, times = lines[f"Figure {figure}"], silva.settling_times(run)["degrees"]
+        line, times = lines[f"Figure {figure}"], silva.simulate_settling_times(run)["degrees"]
         assert line["verdict"] == "differs"
         never = 100.0 * sum(map(math.isinf, times)) / len(times)
         assert f"{never:.0f} % not in its" in line["found_words"]

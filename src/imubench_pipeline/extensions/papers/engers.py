@@ -27,8 +27,7 @@ _MIN_TAU_ABOVE_LOW_PASS = 0.1
 """Cluster time above which the low-passes of these sensors have no effect, s."""
 
 _MIN_PERCENT_IN_BAND = 80.0
-"""Least share of a curve, in per cent, within a pointwise band of 95 %. By chance, one curve in
-twenty is below."""
+"""Least share of a curve within its 95 % band, %. By chance, one curve in twenty is below."""
 
 _MAX_DEVIATION_DIFFERENCE = 0.05
 """Largest relative difference of two deviations of samples that look alike."""
@@ -74,7 +73,7 @@ AXES = {
 """The axes by sensor and axis."""
 
 
-def cutoff_of_bandwidth(_: Evidence, bandwidth: str) -> float:
+def compute_cutoff(_: Evidence, bandwidth: str) -> float:
     """Return the cut-off of a low-pass of first order with this noise bandwidth, Hz.
 
     White noise passes it as it passes a filter of this width with steep edges: pi/2 times the
@@ -83,7 +82,7 @@ def cutoff_of_bandwidth(_: Evidence, bandwidth: str) -> float:
     return 2.0 / math.pi * float(bandwidth)
 
 
-def published_figure(run: Evidence, sensor: str, axis: str, parameter: str) -> Result | None:
+def get_published_figure(run: Evidence, sensor: str, axis: str, parameter: str) -> Result | None:
     """Return the estimate of a printed figure: bias, the -1/2 line at 1 h (N), or the floor (B)."""
     one = AXES[sensor, axis]
     place = one.drift if parameter == "bias" else one.noise
@@ -132,7 +131,7 @@ def compare_axes(_: Evidence, sensor: str) -> Result:
     return Result(fields=over_x | {f"sheet_{one.axis}": one.density / one.sheet for one in axes})
 
 
-def share_in_band(run: Evidence, sensor: str, axis: str) -> Result | None:
+def compute_share_in_band(run: Evidence, sensor: str, axis: str) -> Result | None:
     """Return the share of the curve within the band of logs of its estimate, %."""
     log = AXES[sensor, axis].log
     for method in ("compensated", "likelihood"):
@@ -165,7 +164,7 @@ def _get_sample_deviations(run: Evidence, sensor: str) -> dict[tuple[str, str], 
     return {(row.channel, row.of): row.mean for row in rows if row.mean is not None}
 
 
-def sample_deviations(run: Evidence, sensor: str, if_alike: Verdict) -> Result | None:
+def compare_sample_deviations(run: Evidence, sensor: str, if_alike: Verdict) -> Result | None:
     """Return the deviations of samples of the fitted model over those of the log."""
     by = _get_sample_deviations(run, sensor)
     ratios = [value / by[channel, "log"] for (channel, of), value in by.items() if of == "after"]
@@ -178,7 +177,7 @@ def sample_deviations(run: Evidence, sensor: str, if_alike: Verdict) -> Result |
     )
 
 
-def deviations_over_x(run: Evidence, sensor: str) -> Result | None:
+def compare_deviations_with_x(run: Evidence, sensor: str) -> Result | None:
     """Return the deviations of samples of y and z over that of x, of log and fitted model."""
     by = _get_sample_deviations(run, sensor)
     if not by:
@@ -195,7 +194,7 @@ def deviations_over_x(run: Evidence, sensor: str) -> Result | None:
     return Result(verdict="agrees" if alike else "differs", fields=ratios)
 
 
-def adjacent_samples(run: Evidence, sensor: str, of: str) -> Result | None:
+def correlate_adjacent_samples(run: Evidence, sensor: str, of: str) -> Result | None:
     """Return the correlation of adjacent samples, of log and model."""
     rows = run.rows(
         ModelSampleRow, sensor=sensor, recording=RECORDING, channel="gyro_x", what="stretch"
@@ -247,7 +246,7 @@ def _format_count(row: GradeRow | None) -> str:
     return f"{most}{max(math.ceil(row.n_upper if row.n is None else row.n), 1)}"
 
 
-def fused_noise(run: Evidence) -> Result | None:
+def get_fused_noise(run: Evidence) -> Result | None:
     """Return N of the fused log, with the expectation from the log of one sensor, deg/sqrt(h)."""
     one, fused = (
         next(iter(run.rows(GradeRow, sensor=sensor, quantity="gyro", statistic="N")), None)

@@ -74,7 +74,7 @@ def _describe(row: ParameterRow | None, what: str) -> str:
     return f"{what}: {told}"
 
 
-def optimised_estimate(run: Evidence, key: str, symbol: str) -> Result | None:
+def get_optimised_estimate(run: Evidence, key: str, symbol: str) -> Result | None:
     """Return the result of the optimisation in the simulated log, with that of the likelihood."""
     log = CHANNELS[key].log
     row = run.parameter(log, symbol, "paper")
@@ -102,11 +102,8 @@ def read_curve(run: Evidence, key: str, symbol: str) -> Result:
     return Result(value=read, lower=lower, upper=upper, fields={"simulated": simulated})
 
 
-def lowest_of_table_1(_: Evidence, key: str, quantity: str) -> Result:
-    """Return tau (s) or deviation of the lowest point of Table 1, with 1.89 T_B or 0.664 B.
-
-    The share is the part of the process in that deviation, over 0.664 B, %.
-    """
+def find_lowest_of_table_1(_: Evidence, key: str, quantity: str) -> Result:
+    """Return tau or deviation of the lowest point of Table 1, with 1.89 T_B or 0.664 B, SI."""
     model = CHANNELS[key].table_1
     assert model.T_B is not None
     tau, level = lowest_point(model)
@@ -117,13 +114,13 @@ def lowest_of_table_1(_: Evidence, key: str, quantity: str) -> Result:
         "peak": peak,
         "floor": _format_power(floor, 2).replace(".", ","),
         "side": "before" if tau < PEAK_TAU * model.T_B else "past",
-        "share": 100.0 * process / floor,
+        "share": 100.0 * process / floor,  # of the process in that deviation, %
     }
     value, printed = (tau, peak) if quantity == "tau" else (level, floor)
     return Result(value=value, printed=printed, fields=fields)
 
 
-def error_in_use(_: Evidence, key: str, quantity: Quantity) -> Result:
+def compute_error_in_use(_: Evidence, key: str, quantity: Quantity) -> Result:
     """Return the error of dead reckoning by the noise of one channel alone, with Table 2's."""
     channel = CHANNELS[key]
     quiet = NoiseModel()
@@ -146,7 +143,7 @@ def error_in_use(_: Evidence, key: str, quantity: Quantity) -> Result:
     )
 
 
-def rms_of_draws(_: Evidence, key: str, table: str, grid: Grid) -> Result:
+def summarise_draws(_: Evidence, key: str, table: str, grid: Grid) -> Result:
     """Return the median and 90 % range of the RMS of single reconstructions."""
     spread = lottery(CHANNELS[key], grid)
     place = ("table_1", "table_2").index(table)
@@ -177,7 +174,7 @@ def _count_in_range() -> dict[str, int]:
     return inside
 
 
-def chance_of_order(_: Evidence, key: str) -> Result:
+def compute_chance_of_order(_: Evidence, key: str) -> Result:
     """Return the chance that a reconstruction by Table 1 has the lower RMS."""
     steps, every = (lottery(CHANNELS[key], grid) for grid in GRIDS)
     return Result(
@@ -187,7 +184,7 @@ def chance_of_order(_: Evidence, key: str) -> Result:
     )
 
 
-def weighted_rms(run: Evidence, key: str, method: str) -> Result | None:
+def get_weighted_rms(run: Evidence, key: str, method: str) -> Result | None:
     """Return the weighted RMS of the curve of a model, with that of single reconstructions."""
     rows = run.of_log(ScoreRow, CHANNELS[key].log, method=method)
     if not rows or rows[0].rms is None:
@@ -199,15 +196,15 @@ def weighted_rms(run: Evidence, key: str, method: str) -> Result | None:
     )
 
 
-def vendor_figure(_: Evidence, symbol: str, key: str) -> float:
+def convert_vendor_figure(_: Evidence, symbol: str, key: str) -> float:
     """Return the figure of the vendor behind one of Table 4, SI."""
     row = _TABLE_4[symbol][key]
     return to_si(float(row["vendor"]), row["in"], row["dimension"])
 
 
-def over_vendor(run: Evidence, symbol: str, key: str, table: str) -> Result:
+def compare_with_vendor(run: Evidence, symbol: str, key: str, table: str) -> Result:
     """Return N, or the lowest point (B), over the vendor's figure; N or B over Table 4."""
-    channel, vendor = CHANNELS[key], vendor_figure(run, symbol, key)
+    channel, vendor = CHANNELS[key], convert_vendor_figure(run, symbol, key)
     model = channel.table_1 if table == "table_1" else channel.table_2
     if symbol == "N":
         value = model.N / (vendor / math.sqrt(2.0))
@@ -218,7 +215,7 @@ def over_vendor(run: Evidence, symbol: str, key: str, table: str) -> Result:
     return Result(value=value, printed=printed, fields={"own": own})
 
 
-def slopes(_: Evidence) -> Result:
+def compute_slopes(_: Evidence) -> Result:
     """Return the slopes of the Allan deviation of three terms."""
     tau = np.array([10.0, 1000.0])
     models = {"white": NoiseModel(N=1.0), "flicker": NoiseModel(B=1.0), "walk": NoiseModel(K=1.0)}
@@ -230,7 +227,7 @@ def slopes(_: Evidence) -> Result:
     return Result(verdict="agrees" if right else "differs", fields=shown)
 
 
-def nearer_curve(run: Evidence, key: str) -> Result | None:
+def compare_distances(run: Evidence, key: str) -> Result | None:
     """Return the distance of two curves from that of the log, decades."""
     scores = {row.method: row.rms_log10 for row in run.of_log(ScoreRow, CHANNELS[key].log)}
     authors, optimised = scores.get("authors"), scores.get("paper")
@@ -242,7 +239,7 @@ def nearer_curve(run: Evidence, key: str) -> Result | None:
     )
 
 
-def largest_ratio(_: Evidence, better: str, worse: str) -> Result:
+def find_largest_ratio(_: Evidence, better: str, worse: str) -> Result:
     """Return the largest ratio of two curves of Table 2, and where it is."""
     one, other = CHANNELS[better].table_2, CHANNELS[worse].table_2
     tau = np.geomspace(1.0, DURATION / 2.0, 1000)
@@ -259,14 +256,14 @@ def largest_ratio(_: Evidence, better: str, worse: str) -> Result:
     )
 
 
-def datasheet_line(_: Evidence, key: str) -> Result:
+def compute_datasheet_line(_: Evidence, key: str) -> Result:
     """Return the line N / sqrt(tau) of the datasheet at 1 s over the optimised curve."""
     curve = math.sqrt(float(CHANNELS[key].table_2.allan_variance(1.0)))
     ratio = read_manufacturer("N", key) / curve
     return Result(value=ratio, fields={"one_sided": ratio / math.sqrt(2.0)})
 
 
-def datasheet_floor(_: Evidence, key: str) -> Result:
+def compute_datasheet_floor(_: Evidence, key: str) -> Result:
     """Return the lowest point of the optimised curve, with 0.664 B of the datasheet."""
     floor = FLOOR * read_manufacturer("B", key)
     shown = _format_power(floor, 2).replace(".", ",")
@@ -315,7 +312,7 @@ def compute_weight_ratios(tau: float) -> tuple[float, float]:
     return spread / meant, spread / (meant / math.sqrt(variance))
 
 
-def equation(_: Evidence, number: str) -> Result:
+def evaluate_equation(_: Evidence, number: str) -> Result:
     """Return the result of an equation, with the printed one where it follows from Table 2."""
     return _evaluate_equations()[number]
 
@@ -347,12 +344,12 @@ def _evaluate_equations() -> dict[str, Result]:
     }
 
 
-def spread_over_weight(_: Evidence) -> Result:
+def compute_spread_over_weight(_: Evidence) -> Result:
     """Return the spread of the Allan variance over the one that the intended weight assumes."""
     return Result(fields={f"at_{tau:.0f}": compute_weight_ratios(tau)[0] for tau in WEIGHED_AT})
 
 
-def sign_of_exponent(_: Evidence) -> Result:
+def evaluate_sign(_: Evidence) -> Result:
     """Return the error of equation 26 as meant, and the ratio as printed, against the density."""
     truth = integrate_density(_MODEL, _DEFAULT_TAU)
     ours = abs(float(_MODEL.allan_variance(_DEFAULT_TAU)) / truth - 1.0)

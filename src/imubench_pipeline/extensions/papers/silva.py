@@ -58,13 +58,13 @@ _DESIGN = RunDesign(PAPER_PERIOD, ASSUMED_TURNING, PAPER_RATE, ASSUMED_LATITUDE)
 _Z_95 = 1.96
 
 
-def covariance_as_printed(_: Evidence) -> Result:
+def count_covariance_steps(_: Evidence) -> Result:
     """Count the samples after which the covariance of equation 13 as printed overflows."""
     sigmas = as_printed(PAPER_MODEL, PAPER_RATE, 20, STARTS["degrees"])
     return Result(fields={"steps": int(np.isfinite(sigmas).sum())})
 
 
-def estimate_at_rest(run: Evidence, name: str, method: str) -> Result | None:
+def get_estimate_at_rest(run: Evidence, name: str, method: str) -> Result | None:
     """Return an estimate of the log at rest."""
     row = run.parameter(AT_REST, name, method)
     if row is None:
@@ -75,11 +75,8 @@ def estimate_at_rest(run: Evidence, name: str, method: str) -> Result | None:
     return Result(value=row.value, lower=row.lower, upper=row.upper)
 
 
-def lowest_point(_: Evidence, quantity: str) -> Result:
-    """Return tau (s), deviation (rad/s) or T_B (s) at the lowest point of the printed curve.
-
-    With tau and deviation go 1.89 T_B and 0.664 B.
-    """
+def find_lowest_point(_: Evidence, quantity: str) -> Result:
+    """Return tau, deviation or T_B at the lowest point of the printed curve, SI."""
     tau = np.geomspace(1.0, 1e4, 40_001)
     variance = PAPER_MODEL.allan_variance(tau)
     place = int(np.argmin(variance))
@@ -102,7 +99,7 @@ def count_turns(evidence: Evidence, run: str) -> float | None:
 
 
 @cache
-def printed_run(run: str) -> PrintedRun:
+def make_printed_run(run: str) -> PrintedRun:
     """Return a run as printed, with the sigma that the printed noise gives the mean over pairs."""
     duration = 60.0 * PAPER_MINUTES[run]
     sigma = allowed_sigmas(_DESIGN, duration, PAPER_MODEL)["sigma"]
@@ -114,26 +111,26 @@ def _off(run: PrintedRun) -> float:
     return run.value - EARTH_RATE
 
 
-def error_in_sigma(_: Evidence, run: str) -> Result:
+def compute_error_in_sigma(_: Evidence, run: str) -> Result:
     """Return the error of a printed estimate over the noise of the mean over pairs."""
-    return Result(fields={"off": _off(printed_run(run)) / printed_run(run).sigma})
+    return Result(fields={"off": _off(make_printed_run(run)) / make_printed_run(run).sigma})
 
 
-def allowed_rates(evidence: Evidence, run: str) -> Result:
+def compute_allowed_rates(evidence: Evidence, run: str) -> Result:
     """Return the Earth's rate, and the 95 % range of estimates with the printed noise, rad/s."""
-    half = _Z_95 * printed_run(run).sigma
+    half = _Z_95 * make_printed_run(run).sigma
     return Result(
         value=EARTH_RATE,
         lower=EARTH_RATE - half,
         upper=EARTH_RATE + half,
-        fields=error_in_sigma(evidence, run).fields,
+        fields=compute_error_in_sigma(evidence, run).fields,
     )
 
 
 def explain_errors(_: Evidence) -> Result:
     """Return the size of each cause that would explain runs 2, 3 and 4, and the limits of it."""
-    runs = {run: printed_run(run) for run in "234"}
-    last = printed_run("4, last 13 min")
+    runs = {run: make_printed_run(run) for run in "234"}
+    last = make_printed_run("4, last 13 min")
     first = runs["4"].without(last)
 
     def drift(run: PrintedRun) -> float:
@@ -167,7 +164,7 @@ def explain_errors(_: Evidence) -> Result:
 
 
 @cache
-def settling_times(run: str) -> Mapping[str, tuple[float, ...]]:
+def simulate_settling_times(run: str) -> Mapping[str, tuple[float, ...]]:
     """Return the settling time of each simulated run, s, by the unit of P_0; inf: not settled."""
     design = paper_run(PAPER_MINUTES[run])
     model = SensorModel(noise=PAPER_MODEL, bias=_ASSUMED_BIAS)
@@ -181,11 +178,11 @@ def settling_times(run: str) -> Mapping[str, tuple[float, ...]]:
     return {name: tuple(values) for name, values in times.items()}
 
 
-def settling_time(evidence: Evidence, run: str) -> Result | None:
+def summarise_settling(evidence: Evidence, run: str) -> Result | None:
     """Return the median settling time of the simulated runs, s."""
     if not evidence.has(SENSOR, f"sim_run_{run}"):
         return None
-    times = {name: np.array(values) for name, values in settling_times(run).items()}
+    times = {name: np.array(values) for name, values in simulate_settling_times(run).items()}
     own = times["degrees"]
     # The settling time of an unsettled run is only known to exceed its duration.
     early, median = np.percentile(own, [5.0, 50.0], method="higher")
@@ -228,7 +225,7 @@ def read_weeks(run: Evidence, name: str) -> Result | None:
     return Result(value=median, lower=lower, upper=upper, fields=fields)
 
 
-def error_of_mean(_: Evidence) -> Result:
+def compute_error_of_mean(_: Evidence) -> Result:
     """Return errors of the Earth's rate, deg/h: of 1000 samples by the start, and of one pair."""
     hour = DEGREE / 3600.0
     along_axis = {
@@ -240,7 +237,7 @@ def error_of_mean(_: Evidence) -> Result:
     return Result(fields=errors | {"rate": EARTH_RATE / hour, "pair": pair / hour})
 
 
-def gain_of_filter(_: Evidence) -> Result:
+def compute_filter_gain(_: Evidence) -> Result:
     """Return the least and greatest reduction of sigma by a filter with unknown rate, %."""
     gains = []
     for run in PRINTED:
@@ -249,7 +246,7 @@ def gain_of_filter(_: Evidence) -> Result:
     return Result(fields={"least": min(gains), "most": max(gains)})
 
 
-def aligned_heading(run: Evidence) -> Result | None:
+def get_aligned_heading(run: Evidence) -> Result | None:
     """Return the heading of the triad, with the half of its interval and the truth, degrees."""
     rows = run.rows(
         CalibrationRow, sensor=f"{SENSOR}_triad", recording="sim_aligned", parameter="heading"
