@@ -181,7 +181,7 @@ def test_a_bend_that_is_no_filter_of_these_is_not_identified():
     found = cutoff_of(white, 100.0)
     assert found.frequency.status == found.N.status == "not_identified"
     assert found.frequency.value is None and found.N.value is None
-    assert "but not as behind any of 9 filters" in found.frequency.reason
+    assert "but like none of the 9 filters" in found.frequency.reason
     assert found.frequency.fitted is not None and found.N.fitted is not None
 
 
@@ -271,7 +271,7 @@ def test_bins_that_a_line_touches_would_move_the_cutoff():
 def test_a_spectrum_of_few_bins_shows_nothing():
     found = cutoff_of(np.random.default_rng(12).standard_normal(20), 100.0)
     assert found.frequency.status == found.N.status == "not_shown"
-    assert "bins only" in found.frequency.reason
+    assert "24 are needed" in found.frequency.reason
 
 
 @pytest.mark.release
@@ -289,7 +289,7 @@ def test_quantization_noise_is_no_low_pass(part, status):
     assert found.frequency.status == status
     assert found.or_quantization == (status == "not_identified")
     if found.or_quantization:
-        assert "quantization noise as well" in found.frequency.reason
+        assert "Quantization noise explains it as well" in found.frequency.reason
 
 
 @pytest.mark.release  # test_where_folds_of_other_filters_look_alike has such an interval every day

@@ -158,12 +158,7 @@ def gauss_markov_process(B: float, T_B: float) -> str:
 
 
 def terms_replaced(
-    terms: str,
-    by: str,
-    horizon: float,
-    half: float,
-    twice: float,
-    worst: tuple[float, float],
+    terms: str, by: str, horizon: float, half: float, twice: float, worst: tuple[float, float]
 ) -> str:
     """Return by what terms are replaced, and the relative errors of the Allan deviation.
 
@@ -199,11 +194,7 @@ def fitted_terms(terms: str) -> str:
 
 
 def overbound_used(
-    family: str,
-    longest: float,
-    band: tuple[float, float],
-    horizon: float,
-    excess: float,
+    family: str, longest: float, band: tuple[float, float], horizon: float, excess: float
 ) -> str:
     """Return what an overbound is above: times in s, frequencies in Hz.
 
