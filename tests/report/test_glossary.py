@@ -19,7 +19,6 @@ from scipy.stats import t as student
 
 from imubench_pipeline.allan.confidence import equivalent_degrees
 from imubench_pipeline.datasheets import coverage
-from imubench_pipeline.datasheets import deltas as datasheet
 from imubench_pipeline.earth import EARTH_RATE
 from imubench_pipeline.estimators import estimate, lines
 from imubench_pipeline.estimators.identifiability import bounds_of
@@ -45,6 +44,7 @@ from imubench_pipeline.tables import findings
 from imubench_pipeline.units import from_si, to_si
 from imubench_pipeline.words.estimates import STATUS_WORDS
 from imubench_pipeline.words.findings import FINDINGS
+from imubench_pipeline.words.reasons.datasheets import DELTA_MEANINGS
 from tests.conftest import PROJECT
 
 SOURCE = PROJECT / "src/imubench_pipeline"
@@ -292,7 +292,7 @@ def values_in_tables() -> Iterator[tuple[str, str]]:
     for severity in get_args(findings.Severity):
         yield severity, ""
     for verdict in [
-        *datasheet.VERDICTS,
+        *DELTA_MEANINGS,
         *get_args(pooled.Verdict),
         *get_args(comparison.Verdict),
     ]:

@@ -86,7 +86,7 @@ def test_a_budget_names_its_sources_and_what_is_missing() -> None:
     assert [line["error"] for line in tables[2]["lines"]] == [
         "heading", "north, found at rest",
     ]  # fmt: skip
-    assert "velocity, one axis: no accelerometer in the recording" in tables[2]["missing"]
+    assert "velocity, one axis: the recording has no accelerometer" in tables[2]["missing"]
 
 
 def budget(**changes: Any) -> list[dict[str, Any]]:
