@@ -23,7 +23,7 @@ from pathlib import Path
 import pyarrow.parquet as pq
 
 import imubench_pipeline as imu
-from imubench_pipeline.estimators.rows import recommended_estimates
+from imubench_pipeline.estimators.rows import read_recommended_estimates
 from imubench_pipeline.run.cli import main as imubench
 
 NAMES = ("N", "B", "K")
@@ -152,7 +152,7 @@ def main(results: Path, logs: list[str]) -> int:
     for sensor, recording, name in values:
         channel = (sensor, recording, name)
         folder = results / "recordings" / sensor / recording
-        model = recommended_estimates(folder / "parameters.parquet")[name].model
+        model = read_recommended_estimates(folder / "parameters.parquet")[name].model
         if (sensor, recording) not in pages:
             page = pages[sensor, recording] = Page()
             page.feed(unfolded(results / f"report/recordings/{sensor}/{recording}.html"))

@@ -26,10 +26,10 @@ from imubench_pipeline.allan import allan_variance
 from imubench_pipeline.estimators import curve as reading
 from imubench_pipeline.estimators import least_squares
 from imubench_pipeline.estimators.estimate import PARAMETERS, Estimate, Parameter
-from imubench_pipeline.estimators.identifiability import bounds_of
+from imubench_pipeline.estimators.identifiability import compute_cramer_rao_bounds
 from imubench_pipeline.estimators.likelihood import fit
 from imubench_pipeline.estimators.model_choice import PAPERS_MODEL
-from imubench_pipeline.estimators.whittle import whittle_of
+from imubench_pipeline.estimators.whittle import make_whittle
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.simulate import simulate
 from peers import PEERS
@@ -65,7 +65,7 @@ def of_log(case: Case, others: int, number: int) -> tuple[Found, str, float]:
     found: Found = {estimate.method: dict(estimate.parameters) for estimate in result.estimates}
     if number < others:
         limit = _LIMITED * case.rate
-        whittle = whittle_of(spectrum.select(spectrum.upper <= limit), limit)
+        whittle = make_whittle(spectrum.select(spectrum.upper <= limit), limit)
         best = whittle.maximum(PAPERS_MODEL)
         values = [best.parameter("N"), float(best.biases[0]), float(best.times[0])]
         values.append(best.parameter("K"))
@@ -88,8 +88,8 @@ def table(case: Case, found: list[tuple[Found, str, float]]) -> Iterator[str]:
     """Yield the lines of a table."""
     duration = case.hours * 3600.0
     bands = [band for *_, band in found]
-    whole = bounds_of(case.model, case.rate, duration, 0.5 * case.rate)
-    limited = bounds_of(case.model, case.rate, duration, _LIMITED * case.rate)
+    whole = compute_cramer_rao_bounds(case.model, case.rate, duration, 0.5 * case.rate)
+    limited = compute_cramer_rao_bounds(case.model, case.rate, duration, _LIMITED * case.rate)
     over_bands = bounds_over(case.model, case.rate, duration, bands)
     yield f"{case.name}, {len(found)} simulated logs of {case.hours:g} h"
     yield "Cramér-Rao bound up to Nyquist: " + ", ".join(

@@ -24,8 +24,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from imubench_pipeline.allan import allan_variance
-from imubench_pipeline.allan.phase import presence
-from imubench_pipeline.estimators.curve_limits import with_fitted_limits
+from imubench_pipeline.allan.phase import count_presence
+from imubench_pipeline.estimators.curve_limits import add_fitted_limits
 from imubench_pipeline.estimators.likelihood import fit
 
 Array = NDArray[np.float64]
@@ -208,8 +208,8 @@ def of_log(case: Case, number: int) -> Held:
     curve = allan_variance(log, case.rate, overlap="octave")
     found = fit(log, case.rate, rng=rng)
     holes = bool(np.isnan(log).any())
-    there = presence([log], len(log)) if holes else None
-    fitted = with_fitted_limits(curve, found, None, there)
+    there = count_presence([log], len(log)) if holes else None
+    fitted = add_fitted_limits(curve, found, None, there)
     true = np.sqrt(_truths(case, tuple(curve.cluster_size), tuple(curve.averaged)))
     rows = []
     for one in (fitted, curve):

@@ -35,10 +35,10 @@ from numpy.typing import NDArray
 
 import simulators
 from imubench_pipeline.allan import cluster_sizes, of_blocks
-from imubench_pipeline.estimators.rows import recommended_estimates
+from imubench_pipeline.estimators.rows import read_recommended_estimates
 from imubench_pipeline.model.estimates import BacktestRow
-from imubench_pipeline.navigation.backtest.of_recording import backtest_rows
-from imubench_pipeline.recordings.recording import LogWriter, channel_logs
+from imubench_pipeline.navigation.backtest.of_recording import list_backtest_rows
+from imubench_pipeline.recordings.recording import LogWriter, open_channel_logs
 from imubench_pipeline.settings.config import ErrorBudgetSettings, EstimateSettings
 from imubench_pipeline.settings.requirements import read_requirements
 from imubench_pipeline.steps.estimate import Estimation, estimate_channel
@@ -143,7 +143,7 @@ def tested(log: Simulated, number: int, folder: Path) -> list[Row]:
                 "unusable": [],
             }
         )
-    logs = channel_logs(folder)
+    logs = open_channel_logs(folder)
     channel = logs[CHANNEL]
     sizes = cluster_sizes(len(samples), per_decade=10, longest=0.5)
     curve = of_blocks(
@@ -154,9 +154,9 @@ def tested(log: Simulated, number: int, folder: Path) -> list[Row]:
     estimate_channel(key, channel, curve, EstimateSettings(methods=("likelihood",)), None, rows)
     write("parameters", rows.parameters, folder / "parameters.parquet")
     write("draws", rows.draws, folder / "draws.parquet")
-    estimates = recommended_estimates(folder / "parameters.parquet", folder / "draws.parquet")
+    estimates = read_recommended_estimates(folder / "parameters.parquet", folder / "draws.parquet")
     how, names = ErrorBudgetSettings(), {"sensor": "own", "recording": f"{number}"}
-    found = backtest_rows(
+    found = list_backtest_rows(
         names, logs, estimates, REQUIREMENTS, rows.deterministic, draws=how.draws, seed=how.seed
     )
     made: list[Row] = build("backtest", found).to_pylist()

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from imubench_pipeline.estimators.identifiability import bounds_of
+from imubench_pipeline.estimators.identifiability import compute_cramer_rao_bounds
 from imubench_pipeline.estimators.likelihood import Likelihood
 from imubench_pipeline.noise import NoiseModel
 
@@ -62,7 +62,7 @@ def bounds_over(
     """
     places = [round(_FINE * math.log2(2.0 * band / rate)) for band in bands]
     known = {
-        place: bounds_of(model, rate, duration, 0.5 * rate * 2.0 ** (place / _FINE))
+        place: compute_cramer_rao_bounds(model, rate, duration, 0.5 * rate * 2.0 ** (place / _FINE))
         for place in set(places)
     }
     names = dict.fromkeys(name for bounds in known.values() for name in bounds)

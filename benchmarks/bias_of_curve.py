@@ -20,7 +20,7 @@ from functools import partial
 import numpy as np
 
 from bands import bounds_over, highest, what_is_cut
-from imubench_pipeline.estimators.curve_bias import averaging_times, of_model
+from imubench_pipeline.estimators.curve_bias import compute_curve_figures, make_averaging_times
 from imubench_pipeline.estimators.estimate import Parameter
 from imubench_pipeline.estimators.likelihood import fit
 from imubench_pipeline.noise import NoiseModel
@@ -80,7 +80,7 @@ def of_log(case: Case, number: int) -> Found:
 
 def table(case: Case, found: Sequence[Found]) -> Iterator[str]:
     """Yield the lines of a table."""
-    true = of_model(case.model, averaging_times(case.rate, case.duration))
+    true = compute_curve_figures(case.model, make_averaging_times(case.rate, case.duration))
     truths = {name: one.value for name, one in true.items()} | {"B": case.B, "K": case.K}
     bounds = bounds_over(case.model, case.rate, case.duration, [one.band for one in found])
     yield f"{case.name}, {len(found)} simulated logs of {case.hours:g} h"

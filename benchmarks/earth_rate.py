@@ -25,7 +25,10 @@ from scipy.stats import chi2
 from imubench_pipeline.earth import EARTH_RATE
 from imubench_pipeline.extensions.calibration.experiment import Experiment
 from imubench_pipeline.extensions.calibration.kalman import Filtered, RateFilter
-from imubench_pipeline.extensions.earth_rate.bound import block_length, cramer_rao
+from imubench_pipeline.extensions.earth_rate.bound import (
+    choose_block_length,
+    compute_cramer_rao_bounds,
+)
 from imubench_pipeline.extensions.earth_rate.known_rate import STARTS, mean_sigma, settled, track
 from imubench_pipeline.extensions.earth_rate.pairs import by_pairs, by_triples
 from imubench_pipeline.extensions.earth_rate.prediction import Outlook
@@ -36,7 +39,7 @@ from imubench_pipeline.extensions.earth_rate.simulation import (
     PAPER_MODEL,
     PAPER_PERIOD,
     PAPER_RATE,
-    paper_run,
+    design_paper_run,
     simulate_log,
     simulate_runs,
 )
@@ -160,8 +163,8 @@ def of_part(found: Filtered, states: Array) -> dict[str, Array]:
 
 def of_model(name: str, model: NoiseModel, given: argparse.Namespace) -> Iterator[bool]:
     """Print what is asked of a model and what is found, and yield whether it is fulfilled."""
-    design = paper_run(given.minutes)
-    longest = block_length(design, model)
+    design = design_paper_run(given.minutes)
+    longest = choose_block_length(design, model)
     blocks = design.blocks(longest)
     one = RateFilter(blocks, model, turn_on_bias=BIAS)
     # From the second block of the second dwell on.
@@ -203,7 +206,7 @@ def of_model(name: str, model: NoiseModel, given: argparse.Namespace) -> Iterato
     fine = design.blocks(max(longest // 2, 1))
     if len(fine) > MOST_BLOCKS:
         fine = blocks
-    bound = float(cramer_rao(fine, model, BIAS)[-1])
+    bound = float(compute_cramer_rao_bounds(fine, model, BIAS)[-1])
     ratio_to_bound = float(one.rate_sigma[-1]) / bound
     yield asked(
         f"sigma of the filter over the Cramér-Rao bound ({len(fine)} blocks)",
@@ -251,8 +254,8 @@ def samples_against_blocks() -> Iterator[bool]:
     """Print what block means lose against samples, in a run of 12 min."""
     print("\nblock means against samples, 12 min at 32 Hz")
     for name in ("paper", "K strong", "flicker", "GM 15 s"):
-        design, model = paper_run(12.0), MODELS[name]
-        longest = block_length(design, model)
+        design, model = design_paper_run(12.0), MODELS[name]
+        longest = choose_block_length(design, model)
         of_means = RateFilter(design.blocks(longest), model).rate_sigma[-1]
         of_samples = RateFilter(design.blocks(1), model).rate_sigma[-1]
         loss = float(of_means / of_samples) - 1.0
@@ -277,7 +280,9 @@ def published() -> None:
         "off, in sigma of the pairs (filter), of white noise"
     )
     for run, minutes in PAPER_MINUTES.items():
-        blocks = paper_run(minutes).blocks(block_length(paper_run(minutes), PAPER_MODEL))
+        blocks = design_paper_run(minutes).blocks(
+            choose_block_length(design_paper_run(minutes), PAPER_MODEL)
+        )
         nothing = np.zeros((1, len(blocks)))
         sigmas = [
             N / math.sqrt(blocks.time_in_blocks) / math.cos(ASSUMED_LATITUDE),
@@ -298,7 +303,7 @@ def published() -> None:
         scale = math.cos(math.radians(degrees)) / math.cos(ASSUMED_LATITUDE)
         offs = []
         for run, minutes in PAPER_MINUTES.items():
-            blocks = paper_run(minutes).blocks(896)
+            blocks = design_paper_run(minutes).blocks(896)
             sigma = by_pairs(np.zeros((1, len(blocks))), blocks, PAPER_MODEL).sigma[-1] / scale
             offs.append((math.radians(PUBLISHED[run]) - EARTH_RATE) / sigma)
         print(f"  latitude {degrees:4.1f} deg: " + ", ".join(f"{off:+.1f}" for off in offs))
@@ -335,7 +340,7 @@ def circular() -> None:
     print(
         "\nBias tracking with known rate (003 eq. 15, 16), a simulated run of 12 min, true rate 1"
     )
-    design = paper_run(12.0)
+    design = design_paper_run(12.0)
     model = SensorModel(noise=PAPER_MODEL, bias=BIAS)
     log = simulate_log(
         model, design, earth_rate=EARTH_RATE, transient=0.0, rng=np.random.default_rng(1)
@@ -357,7 +362,7 @@ def settling(runs: int = 100) -> None:
     )
     model = SensorModel(noise=PAPER_MODEL, bias=BIAS)
     for run in ("2", "3", "4", "1"):
-        design = paper_run(PAPER_MINUTES[run])
+        design = design_paper_run(PAPER_MINUTES[run])
         rng = np.random.default_rng(int(run))
         logs = [
             simulate_log(model, design, earth_rate=EARTH_RATE, transient=0.0, rng=rng)

@@ -20,11 +20,11 @@ import numpy as np
 from imubench_pipeline.datasheets.plausibility import implausible
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.simulate import simulate
-from imubench_pipeline.recordings.quality.columns import column_findings
-from imubench_pipeline.recordings.quality.copies import copied_channels
-from imubench_pipeline.recordings.quality.knocks import suspects
-from imubench_pipeline.recordings.quality.levels import kept_level, quantisation
-from imubench_pipeline.recordings.quality.rotation import gravity_turn
+from imubench_pipeline.recordings.quality.columns import check_columns
+from imubench_pipeline.recordings.quality.copies import find_copied_channels
+from imubench_pipeline.recordings.quality.knocks import find_outlier_blocks
+from imubench_pipeline.recordings.quality.levels import detect_quantisation, summarise_level
+from imubench_pipeline.recordings.quality.rotation import detect_gravity_turn
 from imubench_pipeline.recordings.quality.summary import ColumnSummary
 from imubench_pipeline.settings.quality import QualitySettings
 from imubench_pipeline.tables.findings import Finding
@@ -69,14 +69,20 @@ def of_log(number: int) -> list[Finding]:
             log = np.round(log / (digits * step)) * (digits * step) if digits else log
         columns[name] = ColumnSummary()
         columns[name].add(log)
-        steps = quantisation(columns[name])
-        if len(suspects(columns[name].blocks(), settings.knock, steps.step if steps else None)[0]):
+        steps = detect_quantisation(columns[name])
+        if len(
+            find_outlier_blocks(
+                columns[name].blocks(), settings.knock, steps.step if steps else None
+            )[0]
+        ):
             found.append(Finding("knocks", "warning", f"{name}, {rate} Hz", 1, name))
-    levels = {name: kept_level(column, rate, UNITS[name[:4]]) for name, column in columns.items()}
-    turn = gravity_turn([columns[f"accel_{axis}"].blocks() for axis in "xyz"], rate)
+    levels = {
+        name: summarise_level(column, rate, UNITS[name[:4]]) for name, column in columns.items()
+    }
+    turn = detect_gravity_turn([columns[f"accel_{axis}"].blocks() for axis in "xyz"], rate)
     found += implausible(levels, turn, None)
-    found += column_findings(columns, rate, settings)
-    found += copied_channels(columns)
+    found += check_columns(columns, rate, settings)
+    found += find_copied_channels(columns)
     of_register = {"coarse", "stuck"} if coarse >= 1.0 else set()
     return [f if f.finding not in of_register else replace(f, severity="note") for f in found]
 

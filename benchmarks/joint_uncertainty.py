@@ -38,17 +38,22 @@ from scipy.stats import binomtest
 from imubench_pipeline.allan import cluster_sizes, of_blocks
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
 from imubench_pipeline.estimators.posterior import draw_jointly, sample
-from imubench_pipeline.estimators.rows import recommended_estimates
-from imubench_pipeline.estimators.spectrum import spectra
-from imubench_pipeline.estimators.whittle import Terms, model_of, whittle_of
-from imubench_pipeline.navigation.expected_errors import AxisErrors, Question, error_rows, standard
+from imubench_pipeline.estimators.rows import read_recommended_estimates
+from imubench_pipeline.estimators.spectrum import compute_spectra
+from imubench_pipeline.estimators.whittle import Terms, make_noise_model, make_whittle
+from imubench_pipeline.navigation.expected_errors import (
+    AxisErrors,
+    Question,
+    list_error_rows,
+    list_standard_questions,
+)
 from imubench_pipeline.noise import NoiseModel
-from imubench_pipeline.recordings.recording import LogWriter, channel_logs
+from imubench_pipeline.recordings.recording import LogWriter, open_channel_logs
 from imubench_pipeline.settings.config import ErrorBudgetSettings, EstimateSettings
 from imubench_pipeline.steps.estimate import Estimation, estimate_channel
 from imubench_pipeline.tables import write
 from imubench_pipeline.tables.keys import Key
-from imubench_pipeline.units import quantity_to_si
+from imubench_pipeline.units import parse_quantity
 
 Array = NDArray[np.float64]
 
@@ -114,7 +119,7 @@ def estimated(case: Case, log: Array, number: int, folder: Path) -> Estimate:
                 "unusable": [],
             }
         )
-    channel = channel_logs(folder)[CHANNEL]
+    channel = open_channel_logs(folder)[CHANNEL]
     sizes = cluster_sizes(len(log), per_decade=10, longest=0.5)
     curve = of_blocks(
         channel.blocks(), len(log), case.rate, sizes, holes=False, segments=channel.segments
@@ -123,13 +128,15 @@ def estimated(case: Case, log: Array, number: int, folder: Path) -> Estimate:
     estimate_channel(Key("own", f"{number}", CHANNEL), channel, curve, settings, None, rows)
     write("parameters", rows.parameters, folder / "parameters.parquet")
     write("draws", rows.draws, folder / "draws.parquet")
-    return recommended_estimates(folder / "parameters.parquet", folder / "draws.parquet")[CHANNEL]
+    return read_recommended_estimates(folder / "parameters.parquet", folder / "draws.parquet")[
+        CHANNEL
+    ]
 
 
 def of_known_terms(case: Case, log: Array) -> Estimate:
     """Return the fit and the draws of the model that has the terms of a case, and no other."""
-    spectrum, _ = spectra([log], len(log), case.rate)
-    whittle = whittle_of(spectrum, 0.5 * case.rate)
+    spectrum, _ = compute_spectra([log], len(log), case.rate)
+    whittle = make_whittle(spectrum, 0.5 * case.rate)
     letters = "NK" if case.model.K > 0.0 else "N"
     flicker = case.model.B > 0.0 and case.model.T_B is None
     terms = Terms(
@@ -137,7 +144,7 @@ def of_known_terms(case: Case, log: Array) -> Estimate:
     )
     found = whittle.maximum(terms)
     posterior = sample(whittle, found, np.random.default_rng(0), _DRAWN)
-    model = model_of(found)
+    model = make_noise_model(found)
     values = {"N": model.N, "B": model.B, "T_B": model.T_B, "K": model.K}
     return Estimate(
         "likelihood",
@@ -148,10 +155,10 @@ def of_known_terms(case: Case, log: Array) -> Estimate:
 
 def questions(how: ErrorBudgetSettings) -> Iterator[Question]:
     """Yield what a gyro alone answers, with the default settings."""
-    times = [quantity_to_si(one, "time") for one in how.times]
-    window = quantity_to_si(how.static_window, "time")
-    latitude = quantity_to_si(how.latitude, "angle")
-    for question in standard(times, window, latitude, ["worst"]):
+    times = [parse_quantity(one, "time") for one in how.times]
+    window = parse_quantity(how.static_window, "time")
+    latitude = parse_quantity(how.latitude, "angle")
+    for question in list_standard_questions(times, window, latitude, ["worst"]):
         if question.error in ("heading", "north"):
             yield question
 
@@ -159,7 +166,9 @@ def questions(how: ErrorBudgetSettings) -> Iterator[Question]:
 def limits(estimate: Estimate, how: ErrorBudgetSettings) -> dict[Place, Array]:
     """Return total, lower and upper limit of each error, as the table ``error_budget`` has them."""
     names = {"sensor": "own", "recording": "log"}
-    rows = error_rows(names, {CHANNEL: estimate}, questions(how), draws=how.draws, seed=how.seed)
+    rows = list_error_rows(
+        names, {CHANNEL: estimate}, questions(how), draws=how.draws, seed=how.seed
+    )
     return {
         (row.error, row.time): np.array([row.sigma, row.lower, row.upper], dtype=float)
         for row in rows

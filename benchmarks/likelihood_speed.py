@@ -17,8 +17,8 @@ import scipy.fft
 from imubench_pipeline.estimators.likelihood import fit
 from imubench_pipeline.estimators.model_choice import PAPERS_MODEL, compare_models
 from imubench_pipeline.estimators.posterior import sample
-from imubench_pipeline.estimators.spectrum import spectra
-from imubench_pipeline.estimators.whittle import whittle_of
+from imubench_pipeline.estimators.spectrum import compute_spectra
+from imubench_pipeline.estimators.whittle import make_whittle
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.simulate import simulate
 
@@ -52,8 +52,8 @@ def main() -> None:
             return taken.setdefault(name, [])
 
         timed(lambda: scipy.fft.dct(log, norm="ortho"), of("DCT of the log, scipy"))
-        spectrum, _ = timed(lambda: spectra([log], len(log), RATE), of("spectra"))
-        whittle = whittle_of(spectrum, 0.5 * RATE)
+        spectrum, _ = timed(lambda: compute_spectra([log], len(log), RATE), of("spectra"))
+        whittle = make_whittle(spectrum, 0.5 * RATE)
         best = timed(partial(whittle.maximum, PAPERS_MODEL), of("fit of the papers' model"))
         timed(partial(compare_models, whittle, quantization=True), of("fits of all models"))
         timed(partial(sample, whittle, best, rng), of("posterior of a model"))

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from imubench_pipeline.estimators.frame import select_for_fit
 from imubench_pipeline.estimators.lines import Line
-from imubench_pipeline.estimators.spectrum import spectra
+from imubench_pipeline.estimators.spectrum import compute_spectra
 from imubench_pipeline.noise import NoiseModel, Sinusoid
 from imubench_pipeline.noise.simulate import simulate
 
@@ -43,12 +43,12 @@ def without(name: str, number: int) -> bool:
 
 def found_in(log: NDArray[np.float64]) -> list[Line]:
     """Return the lines that the likelihood leaves out."""
-    return list(select_for_fit(*spectra([log], len(log), RATE)).lines)
+    return list(select_for_fit(*compute_spectra([log], len(log), RATE)).lines)
 
 
 def bin_width(frequency: float) -> float:
     """Return the distance of the bins of the spectrum in which a frequency is looked for, Hz."""
-    spectrum, lines = spectra([np.zeros(SAMPLES) + np.arange(SAMPLES) % 2], SAMPLES, RATE)
+    spectrum, lines = compute_spectra([np.zeros(SAMPLES) + np.arange(SAMPLES) % 2], SAMPLES, RATE)
     low = spectrum.block > 1
     crossover = float(spectrum.upper[low].max()) if low.any() else 0.0
     chosen = min(lines, key=lambda line: (line.block > 1) != (frequency < crossover))

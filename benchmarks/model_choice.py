@@ -26,7 +26,7 @@ from imubench_pipeline.estimators.estimate import PARAMETERS, Parameter
 from imubench_pipeline.estimators.likelihood import Likelihood, fit
 from imubench_pipeline.noise import GaussMarkov, NoiseModel
 from imubench_pipeline.noise.simulate import simulate
-from imubench_pipeline.noise.terms.flicker import ripple
+from imubench_pipeline.noise.terms.flicker import compute_bank_ripple
 
 RATE = 20.0
 DURATION = 36_000.0
@@ -156,7 +156,7 @@ def main() -> None:
     parser.add_argument("--case", action="append", choices=names, help="default: all")
     given = parser.parse_args()
     for rate, hours in ((100.0, 10.0), (20.0, 10.0), (500.0, 5.0), (32.0, 168.0)):
-        variance, density = ripple(1.0 / rate, hours * 3600.0)
+        variance, density = compute_bank_ripple(1.0 / rate, hours * 3600.0)
         print(
             f"bank of Gauss-Markov processes, {rate:g} Hz, {hours:g} h: its Allan variance within "
             f"{100 * variance:.4f} % of the samples' flicker noise, its spectrum within "

@@ -33,18 +33,18 @@ import numpy as np
 
 from imubench_pipeline.earth import STANDARD_GRAVITY
 from imubench_pipeline.extensions.aided import navigate
-from imubench_pipeline.extensions.aided.axis_states import AxisStates, axis_states
+from imubench_pipeline.extensions.aided.axis_states import AxisStates, make_axis_states
 from imubench_pipeline.extensions.aided.error_state import GROUPS
 from imubench_pipeline.extensions.aided.measures import (
-    inside,
-    root_mean_square,
-    squares,
+    compute_mean_squares,
+    compute_nees_share,
+    compute_root_mean_square,
 )
-from imubench_pipeline.extensions.aided.plan import navigate_settings
-from imubench_pipeline.extensions.aided.runs import FIX_INTERVAL, Drive, Outage, schedule
+from imubench_pipeline.extensions.aided.plan import dump_navigate_settings
+from imubench_pipeline.extensions.aided.runs import FIX_INTERVAL, Drive, Outage, schedule_outages
 from imubench_pipeline.extensions.aided.settings import NavigateSettings
-from imubench_pipeline.extensions.aided.signals import Signals, Spreads, signals
-from imubench_pipeline.extensions.aided.trajectories import TRAJECTORY_NAMES, trajectory
+from imubench_pipeline.extensions.aided.signals import Signals, Spreads, simulate_signals
+from imubench_pipeline.extensions.aided.trajectories import TRAJECTORY_NAMES, simulate_trajectory
 from imubench_pipeline.model.table import TableRow
 from imubench_pipeline.navigation.error_budget import Start, Uncalibrated, budget
 from imubench_pipeline.noise import GaussMarkov, NoiseModel
@@ -73,7 +73,7 @@ def models(*, flicker: bool = False) -> dict[str, NoiseModel]:
 def states(noise: dict[str, NoiseModel], shortest: float = FIX_INTERVAL) -> list[AxisStates]:
     """Return the states of a filter with the true model."""
     return [
-        axis_states(
+        make_axis_states(
             noise[channel],
             RATE,
             turn_on=SPREADS.bias(channel),
@@ -87,7 +87,7 @@ def states(noise: dict[str, NoiseModel], shortest: float = FIX_INTERVAL) -> list
 def of_run(drive: Drive, noise: dict[str, NoiseModel], name: str, number: int) -> Signals:
     """Return the signals of a run."""
     axes = {channel: SensorModel(noise=model) for channel, model in noise.items()}
-    return signals(drive.trajectory, axes, SPREADS, drive.every, 1, (name, str(number)))
+    return simulate_signals(drive.trajectory, axes, SPREADS, drive.every, 1, (name, str(number)))
 
 
 def consistency(runs: int) -> int:
@@ -98,12 +98,14 @@ def consistency(runs: int) -> int:
     for name in TRAJECTORY_NAMES:
         for flicker in (False, True):
             noise = models(flicker=flicker)
-            drive = Drive(trajectory(name, DURATION, RATE), schedule(DURATION, LENGTHS))
+            drive = Drive(
+                simulate_trajectory(name, DURATION, RATE), schedule_outages(DURATION, LENGTHS)
+            )
             # Biases are those of a bank: the states of flicker noise follow it to the sample.
             tuned = {"true": states(noise, 1.0 / RATE if flicker else FIX_INTERVAL)}
             outcome = drive.repeat(tuned, partial(of_run, drive, noise, name), runs, CORES)["true"]
             for length in (None, *LENGTHS):
-                shares = [inside(drive, outcome, group, length) for group in GROUPS]
+                shares = [compute_nees_share(drive, outcome, group, length) for group in GROUPS]
                 told = [share for share in shares if share is not None]
                 failed += sum(not 0.93 <= share.value <= 0.97 for share in told)
                 cells = [f"{100 * s.value:.1f} ± {100 * s.error:.1f}" if s else "–" for s in shares]
@@ -118,7 +120,9 @@ def speed() -> int:
     """Print the time of 100 runs."""
     for flicker in (False, True):
         noise = models(flicker=flicker)
-        drive = Drive(trajectory("field", DURATION, RATE), schedule(DURATION, LENGTHS))
+        drive = Drive(
+            simulate_trajectory("field", DURATION, RATE), schedule_outages(DURATION, LENGTHS)
+        )
         tuned = {"true": states(noise)}
         drive.repeat(tuned, partial(of_run, drive, noise, "field"), 1)
         begun, cpu = time.perf_counter(), time.process_time()
@@ -188,11 +192,13 @@ def of_budget(runs: int) -> int:
     )
     print("|---" * 7 + "|")
     for length in LENGTHS:
-        drive = Drive(trajectory("rest", begin + length, RATE), [Outage(begin, length)])
+        drive = Drive(simulate_trajectory("rest", begin + length, RATE), [Outage(begin, length)])
         outcome = drive.repeat(
             {"true": states(noise)}, partial(of_run, drive, noise, "rest"), runs, CORES
         )["true"]
-        size = root_mean_square(squares(drive, outcome, "position", length)).value
+        size = compute_root_mean_square(
+            compute_mean_squares(drive, outcome, "position", length)
+        ).value
         expected = math.sqrt(float(np.mean(outcome.variances[:, -1, :2].sum(axis=1))))
         started = predicted_by_filter(drive, noise, begin, length)
         window = (
@@ -220,7 +226,7 @@ def claim(results: Path, sensors: list[str], how: NavigateSettings, simulated: s
             for folder in (results / "recordings" / sensor).iterdir()
             if (folder / "parameters.parquet").is_file()
         )
-        sections = json.loads(navigate_settings(plan, sensor))
+        sections = json.loads(dump_navigate_settings(plan, sensor))
         sections |= {"navigate": how.model_dump(mode="json", exclude={"of"}), "asked": []}
         print(f"\n### {sensor}\n")
         print(

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.simulate import simulate
-from imubench_pipeline.recordings.quality.columns import repeats_beyond_chance
+from imubench_pipeline.recordings.quality.columns import estimate_excess_repeats
 from imubench_pipeline.recordings.quality.summary import ColumnSummary
 from imubench_pipeline.settings.quality import QualitySettings
 
@@ -55,7 +55,7 @@ def found(log: Array, step: float, rng: np.random.Generator) -> bool:
     """Tell whether repeated samples are found in a log that is rounded at a random place."""
     column = ColumnSummary()
     column.add(np.round(log / step + rng.uniform()) * step)
-    return repeats_beyond_chance(column)[0] > QualitySettings().repeated
+    return estimate_excess_repeats(column)[0] > QualitySettings().repeated
 
 
 def main() -> None:

@@ -29,7 +29,7 @@ from imubench_pipeline.model.estimates import FixedBiasRow, ParameterRow
 from imubench_pipeline.model.recordings import RecordingRow
 from imubench_pipeline.navigation.drift import drift_rows
 from imubench_pipeline.report.compare import KEPT as COMPARED
-from imubench_pipeline.report.publish import publish, site_of
+from imubench_pipeline.report.publish import make_site, publish
 from imubench_pipeline.report.static_figures.files import draw_comparison
 from imubench_pipeline.tables import build, read, write_arrow
 from imubench_pipeline.tables.schemas import OF_ONE_RECORDING, TABLES
@@ -196,7 +196,7 @@ def main() -> None:
 
         def timed(what: str) -> None:
             start = time.perf_counter()
-            written = publish(site_of(tables, settings, results), report)
+            written = publish(make_site(tables, settings, results), report)
             print(f"{what}: {time.perf_counter() - start:.1f} s, {len(written)} files written")
 
         timed(f"{given.recordings} recordings x {len(CHANNELS)} channels")

@@ -28,10 +28,10 @@ from scipy.stats import binomtest
 
 from imubench_pipeline.allan import AllanCurve, cluster_sizes, of_blocks
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
-from imubench_pipeline.estimators.rows import estimate_of
+from imubench_pipeline.estimators.rows import make_estimate
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.low_pass import LowPass
-from imubench_pipeline.recordings.recording import ChannelLog, LogWriter, channel_logs
+from imubench_pipeline.recordings.recording import ChannelLog, LogWriter, open_channel_logs
 from imubench_pipeline.settings.config import EstimateSettings
 from imubench_pipeline.settings.sensor import TEMPERATURE
 from imubench_pipeline.simulate.imu import ImuModel, simulate_imu
@@ -198,7 +198,7 @@ def simulated(made: Case, model: SensorModel, seed: int, folder: Path) -> Channe
                 "unusable": [],
             }
         )
-    return channel_logs(folder)[made.channel]
+    return open_channel_logs(folder)[made.channel]
 
 
 def curve_of(log: ChannelLog, longest: float = 0.5) -> AllanCurve:
@@ -275,7 +275,7 @@ def estimated(made: Case, log: ChannelLog) -> Found:
     method = "compensated" if "compensated" in methods else "likelihood"
     own = [row for row in rows.parameters if row.method == method]
     return Found(
-        estimate_of(method, own),
+        make_estimate(method, own),
         {row.parameter: _parameter(row) for row in rows.temperature},
         {row.parameter: _parameter(row) for row in rows.low_pass},
         rows.low_pass[0].order,

@@ -23,7 +23,7 @@ from scipy.signal import lfilter
 
 from imubench_pipeline.allan import allan_variance
 from imubench_pipeline.estimators.thermal.fit import fit_temperature
-from imubench_pipeline.estimators.thermal.path import temperature_path
+from imubench_pipeline.estimators.thermal.path import estimate_temperature_path
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.simulate import simulate
 
@@ -122,7 +122,7 @@ def of_log(number: int) -> dict[str, object]:
     """Return what the fit makes of a random log."""
     made = case(number)
     rng = np.random.default_rng([number, 9])
-    path = temperature_path([made.readings], [(0, len(made.log))], rng)
+    path = estimate_temperature_path([made.readings], [(0, len(made.log))], rng)
     fit = fit_temperature(lambda: [made.log], len(made.log), made.rate, path, rng=rng)
     s, lag, bias = fit.sensitivity, fit.lag, fit.bias
     value = s.in_model
@@ -207,7 +207,7 @@ def real(path: Path) -> None:
     log = pd.read_csv(path)
     rng = np.random.default_rng(1)
     readings = log.temperature_degC.to_numpy()
-    course = temperature_path([readings], [(0, len(readings))], rng)
+    course = estimate_temperature_path([readings], [(0, len(readings))], rng)
     for axis in "xyz":
         values = log[f"gyro_{axis}_mrad_s"].to_numpy() * 1e-3
         fit = fit_temperature(lambda v=values: [v], len(values), 1.0, course, rng=rng)  # type: ignore[misc]  # mypy infers no type of a lambda's default

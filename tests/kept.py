@@ -9,7 +9,7 @@ import numpy as np
 import pyarrow as pa
 
 from imubench_pipeline.allan import AllanCurve, of_blocks
-from imubench_pipeline.recordings.recording import ChannelLog, LogWriter, channel_logs
+from imubench_pipeline.recordings.recording import ChannelLog, LogWriter, open_channel_logs
 
 _ROWS = 7001  # of a block: no divisor of anything
 
@@ -32,7 +32,7 @@ def kept(
                 "unusable": [],
             }
         )
-    return channel_logs(folder)
+    return open_channel_logs(folder)
 
 
 def curve_of(log: ChannelLog) -> AllanCurve:

@@ -7,9 +7,9 @@ from imubench_pipeline.model.comparisons import ErrorBudgetRow, RankingRow
 from imubench_pipeline.model.estimates import BacktestRow, ParameterRow
 from imubench_pipeline.model.recordings import DoubtRow, RecordingRow
 from imubench_pipeline.model.table import TableRow
-from imubench_pipeline.navigation.selection import ranked
+from imubench_pipeline.navigation.selection import rank_sensors
 from imubench_pipeline.navigation.verdicts.basis import Basis
-from imubench_pipeline.navigation.verdicts.judgement import judgements
+from imubench_pipeline.navigation.verdicts.judgement import judge_sensors
 from imubench_pipeline.settings.requirements import Requirement
 from tests.rows import typed
 
@@ -29,5 +29,5 @@ def ranking_rows(
         typed(ParameterRow, parameters),
         typed(BacktestRow, backtests),
     )
-    judged = judgements(typed(ErrorBudgetRow, errors), requirements, sensors, basis)
-    return ranked(list(judged), basis)
+    judged = judge_sensors(typed(ErrorBudgetRow, errors), requirements, sensors, basis)
+    return rank_sensors(list(judged), basis)

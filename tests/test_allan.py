@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from imubench_pipeline.allan import AllanCurve, allan_variance, cluster_sizes, of_phase
-from imubench_pipeline.allan.phase import gaps_of, integrate
+from imubench_pipeline.allan.phase import count_gaps, integrate
 
 
 def by_definition(samples: np.ndarray, n: int) -> float:
@@ -233,10 +233,10 @@ def test_a_curve_without_its_log_is_of_two_of_its_largest_clusters() -> None:
 def test_gaps_are_the_same_however_the_log_is_cut(rng: np.random.Generator) -> None:
     log = np.where(rng.random(5000) < 0.3, np.nan, 1.0)
     log[1000:1700] = np.nan
-    whole = gaps_of([log])
+    whole = count_gaps([log])
     assert whole.missing.sum() == np.isnan(log).sum()
     assert whole.missing[9] >= 700  # 512 to 1023 samples
-    parts = gaps_of(np.split(log, [1, 999, 1200, 1201, 4999]))
+    parts = count_gaps(np.split(log, [1, 999, 1200, 1201, 4999]))
     assert (parts.missing == whole.missing).all()
     # The long gap does not lower what a cluster of 100 needs; the short ones do.
     assert whole.enough(np.array([100]))[0] == pytest.approx(0.9 * 0.7 * 100, abs=3)

@@ -9,10 +9,14 @@ import pytest
 import yaml
 
 from imubench_pipeline.datasheets.suspicion import printed_figures, suspicious, usual_figures
-from imubench_pipeline.settings.conversions import noise_bandwidth, noise_of_density, noise_of_rms
+from imubench_pipeline.settings.conversions import (
+    compute_noise_bandwidth,
+    convert_density,
+    noise_of_rms,
+)
 from imubench_pipeline.settings.printed import FIGURE_DIMENSIONS, PrintedFigure
 from imubench_pipeline.settings.sensor import QUANTITIES, Sensor, read_sensors
-from imubench_pipeline.units import to_si
+from imubench_pipeline.units import convert_to_si
 from tests.conftest import PROJECT
 
 FOLDER = PROJECT / "config/sensors"
@@ -196,7 +200,7 @@ def test_a_side_is_stated_with_its_arithmetic(name: str) -> None:
         for axis in "xyz":
             density = figure.on_axis(axis)
             assert isinstance(density, float)
-            si = to_si(density, figure.unit or "", f"{quantity}_density")
+            si = convert_to_si(density, figure.unit or "", f"{quantity}_density")
             for other_quantity, other_key, other in listed:
                 value = other.on_axis(axis)
                 if (
@@ -206,14 +210,14 @@ def test_a_side_is_stated_with_its_arithmetic(name: str) -> None:
                 ):
                     continue
                 if other_key == "random_walk":
-                    N = to_si(value, other.unit or "", f"{quantity}_density")
+                    N = convert_to_si(value, other.unit or "", f"{quantity}_density")
                 elif other_key == "rms_noise" and other.bandwidth_hz:
-                    rms = to_si(value, other.unit or "", QUANTITIES[quantity])
-                    N = noise_of_rms(rms, noise_bandwidth(other.bandwidth_hz, other.filter))
+                    rms = convert_to_si(value, other.unit or "", QUANTITIES[quantity])
+                    N = noise_of_rms(rms, compute_noise_bandwidth(other.bandwidth_hz, other.filter))
                 else:
                     continue
                 for side in ("one-sided", "two-sided"):
-                    if noise_of_density(si, side) == pytest.approx(N, rel=0.05):
+                    if convert_density(si, side) == pytest.approx(N, rel=0.05):
                         sides.add(side)
         assert figure.sidedness in sides
 

@@ -18,7 +18,7 @@ import numpy as np
 import pytest
 import yaml
 
-from imubench_pipeline.run.cli import command_parser, main
+from imubench_pipeline.run.cli import main, make_parser
 from tests.conftest import PROJECT, few
 
 PAGES = [
@@ -288,7 +288,7 @@ OURS = [
 @pytest.mark.parametrize("command", OURS)
 def test_the_parser_knows_its_options(command: str) -> None:
     own = shlex.split(command)[1:]
-    given = command_parser().parse_args(own[: own.index("--")] if "--" in own else own)
+    given = make_parser().parse_args(own[: own.index("--")] if "--" in own else own)
     assert given.command == own[0]
 
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from imubench_pipeline.allan import allan_variance
-from imubench_pipeline.estimators.rows import estimates
+from imubench_pipeline.estimators.rows import read_estimates
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.simulate import simulate
 from imubench_pipeline.recordings.recording import ChannelLog
@@ -164,7 +164,7 @@ def test_the_tables_give_estimate_and_curve_back(
     write("allan_compensated", found.allan_compensated, tmp_path / "left.parquet")
     (back,) = (
         one
-        for one in estimates(tmp_path / "parameters.parquet")["gyro_x"]
+        for one in read_estimates(tmp_path / "parameters.parquet")["gyro_x"]
         if one.method == "compensated"
     )
     assert back.model.name == "N+K"

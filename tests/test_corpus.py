@@ -17,7 +17,7 @@ from imubench_pipeline.datasheets.plausibility import implausible_of
 from imubench_pipeline.recordings.ingest import ingest_as_planned
 from imubench_pipeline.recordings.kept import Quality
 from imubench_pipeline.recordings.known_logs import KNOWN
-from imubench_pipeline.recordings.recording import channel_logs, log_paths
+from imubench_pipeline.recordings.recording import list_log_files, open_channel_logs
 from imubench_pipeline.run.plan import Plan
 from imubench_pipeline.tables.findings import UnavailableError
 from tests.conftest import few
@@ -83,7 +83,7 @@ def check_accounts(quality: Quality, kept: Path) -> None:
     told = {
         (finding["finding"], finding["channel"]): finding["value"] for finding in quality.findings
     }
-    for name, log in channel_logs(kept).items():
+    for name, log in open_channel_logs(kept).items():
         counts = quality.channels[name]
         present = counts["used"] + counts["knocks"] + counts["repeated"]
         assert counts["present"] == present > 0, name
@@ -175,7 +175,7 @@ def test_entry(name: str, tmp_path: Path) -> None:
     assert sorted((tmp_path / "logs").rglob("*")) == before
     if (tmp_path / "kept").exists():
         kept = sorted(path for path in (tmp_path / "kept").iterdir() if path.name != KNOWN)
-        assert kept == log_paths(tmp_path / "kept")
+        assert kept == list_log_files(tmp_path / "kept")
 
 
 def check_outcome(entry: Entry, quality: Quality) -> None:

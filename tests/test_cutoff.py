@@ -8,7 +8,7 @@ from scipy.signal import butter, lfilter, sosfilt
 
 from imubench_pipeline.estimators.cutoff import find_cutoff
 from imubench_pipeline.estimators.low_pass import Filter, Frequencies
-from imubench_pipeline.estimators.spectrum import spectra
+from imubench_pipeline.estimators.spectrum import compute_spectra
 from imubench_pipeline.noise import GaussMarkov, NoiseModel
 from imubench_pipeline.noise.low_pass import LowPass
 from imubench_pipeline.noise.simulate import simulate
@@ -36,7 +36,7 @@ def butterworth(N, cutoff, order, rate, samples, rng, over=16):
 
 
 def cutoff_of(log, rate):
-    return find_cutoff(spectra([log], len(log), rate)[0])
+    return find_cutoff(compute_spectra([log], len(log), rate)[0])
 
 
 @pytest.mark.filterwarnings("ignore:The occurrence of roundoff")  # beyond the digits compared
@@ -145,7 +145,7 @@ def test_the_rounding_of_a_register_does_not_move_the_cutoff(known):
     rng = np.random.default_rng(5)
     log = first_order(1e-4, 7.5, 50.0, 250_000, rng)
     step = 0.5 * float(np.std(log))
-    spectrum, _ = spectra([np.round(log / step) * step], len(log), 50.0)
+    spectrum, _ = compute_spectra([np.round(log / step) * step], len(log), 50.0)
     found = find_cutoff(spectrum, resolution=step if known else 0.0)
     if not known:
         assert found.frequency.lower > 7.5  # what the rounding adds passes for a higher cut-off
@@ -252,7 +252,7 @@ def spectrum_with_a_line():
     samples = 50_000
     log = first_order(1e-3, 20.0, 100.0, samples, rng)
     log += 0.02 * np.sin(2.0 * np.pi * 30.0 * np.arange(samples) / 100.0)
-    spectrum = spectra([log], samples, 100.0)[0]
+    spectrum = compute_spectra([log], samples, 100.0)[0]
     return spectrum, (spectrum.upper < 29.0) | (spectrum.lower > 31.0)
 
 

@@ -8,11 +8,11 @@ import pytest
 import yaml
 
 from imubench_pipeline.allan import AllanCurve
-from imubench_pipeline.datasheets.comparable import comparables
+from imubench_pipeline.datasheets.comparable import read_comparables
 from imubench_pipeline.datasheets.deltas import Delta, bias_deltas, curve_rms, deltas
-from imubench_pipeline.datasheets.measured import fixed_bias, sensitivity
+from imubench_pipeline.datasheets.measured import compute_fixed_bias, compute_sensitivity
 from imubench_pipeline.estimators import curve as reading
-from imubench_pipeline.estimators.curve_bias import of_model
+from imubench_pipeline.estimators.curve_bias import compute_curve_figures
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
 from imubench_pipeline.model.estimates import TemperatureRow
 from imubench_pipeline.noise import FLOOR, NoiseModel
@@ -34,7 +34,7 @@ def sheet(**figures: dict[str, Any]) -> Datasheet:
 def estimate(**values: float | None) -> Estimate:
     parameters = dict.fromkeys(("N", "B", "T_B", "K"), Parameter(None, "absent", "no such term"))
     found = Estimate("weighted", parameters | {k: Parameter(v) for k, v in values.items()})
-    curve = of_model(found.model, TAU) | {"B_curve": found.parameters["B"]}
+    curve = compute_curve_figures(found.model, TAU) | {"B_curve": found.parameters["B"]}
     return replace(found, curve=curve)
 
 
@@ -443,7 +443,7 @@ def thermal(
 
 
 def coefficient(rows: list[TemperatureRow]) -> Delta:
-    found = sensitivity(rows, 21.0, 34.0)
+    found = compute_sensitivity(rows, 21.0, 34.0)
     (row,) = (
         r
         for r in bias_deltas(COEFFICIENT, "gyro_x", {"gyro_x": 0.0}, 0.1, found)
@@ -512,7 +512,7 @@ def test_gravity_tells_the_offset_of_a_vertical_axis_alone() -> None:
     ],
 )
 def test_where_gravity_does_not_tell_the_offset(means: dict[str, float], reason: str) -> None:
-    found = fixed_bias("accel_z", means)
+    found = compute_fixed_bias("accel_z", means)
     assert found.value is None and reason in (found.reason or "")
 
 
@@ -521,28 +521,28 @@ def test_the_distance_of_a_curve_from_the_lines_of_a_datasheet() -> None:
     sensor = sheet(noise_density=density, bias_instability={"value": 36, "unit": "deg/h"})
     tau = np.array([1.0, 4.0])
     line = np.array([math.sqrt(1e-4 + 1e-4), math.sqrt(0.25e-4 + 1e-4)]) * DEG
-    (found,) = curve_rms(list(comparables(sensor, "gyro_x")), tau, 10.0 * line)
+    (found,) = curve_rms(list(read_comparables(sensor, "gyro_x")), tau, 10.0 * line)
     assert found.rms_log10 == pytest.approx(1.0)
     # 9 times the line: 9 * √((2e-4 + 1.25e-4) / 2) = 0.114728 °/s
     assert found.rms == pytest.approx(0.114728 * DEG, rel=1e-5)
-    (same,) = curve_rms(list(comparables(sensor, "gyro_x")), tau, line)
+    (same,) = curve_rms(list(read_comparables(sensor, "gyro_x")), tau, line)
     assert same.rms == pytest.approx(0.0, abs=1e-15)
 
 
 def test_lines_that_a_datasheet_does_not_have() -> None:
     tau, adev = np.array([1.0, 100.0]), np.array([1.0, 1.0]) * DEG
     floor = sheet(bias_instability={"value": 3600, "unit": "deg/h"})
-    (found,) = curve_rms(list(comparables(floor, "gyro_x")), tau, adev)
+    (found,) = curve_rms(list(read_comparables(floor, "gyro_x")), tau, adev)
     assert found.noise is None and found.rms == pytest.approx(0.0, abs=1e-15)
     both_sides = sheet(noise_density={"value": math.sqrt(2), "unit": "deg/s/sqrt(Hz)"})
-    one, two = curve_rms(list(comparables(both_sides, "gyro_x")), tau[:1], adev[:1])
+    one, two = curve_rms(list(read_comparables(both_sides, "gyro_x")), tau[:1], adev[:1])
     assert (one.noise.sidedness, two.noise.sidedness) == ("one-sided", "two-sided")  # type: ignore[union-attr]  # both figures print a noise
     assert one.rms == pytest.approx(0.0, abs=1e-15)
     assert two.rms_log10 == pytest.approx(math.log10(2) / 2)
-    assert curve_rms(list(comparables(sheet(), "gyro_x")), tau, adev) == []
+    assert curve_rms(list(read_comparables(sheet(), "gyro_x")), tau, adev) == []
     for wrong in (adev[:1], 0 * adev):
         with pytest.raises(ValueError, match="expected as many, and deviations above 0"):
-            curve_rms(list(comparables(floor, "gyro_x")), tau, wrong)
+            curve_rms(list(read_comparables(floor, "gyro_x")), tau, wrong)
 
 
 def test_typical_figures_make_the_lines() -> None:
@@ -551,10 +551,12 @@ def test_typical_figures_make_the_lines() -> None:
         {"value": 60, "unit": "deg/sqrt(h)", "kind": "typ"},
     ]
     sensor = Datasheet.model_validate({"gyro": {"random_walk": walk}})
-    (found,) = curve_rms(list(comparables(sensor, "gyro_x")), np.array([1.0]), np.array([DEG]))
+    (found,) = curve_rms(list(read_comparables(sensor, "gyro_x")), np.array([1.0]), np.array([DEG]))
     assert found.noise is not None and found.noise.printed == 60.0
     largest = Datasheet.model_validate({"gyro": {"random_walk": walk[:1]}})
-    (found,) = curve_rms(list(comparables(largest, "gyro_x")), np.array([1.0]), np.array([DEG]))
+    (found,) = curve_rms(
+        list(read_comparables(largest, "gyro_x")), np.array([1.0]), np.array([DEG])
+    )
     assert found.noise is not None and found.noise.printed == 90.0
 
 

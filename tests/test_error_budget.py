@@ -23,8 +23,8 @@ from imubench_pipeline.navigation.error_budget import (
     Start,
     Uncalibrated,
     budget,
+    compute_interval,
     draw_models,
-    interval,
     time_until,
 )
 from imubench_pipeline.noise import GaussMarkov, NoiseModel, Sinusoid
@@ -388,10 +388,10 @@ def test_the_interval_of_a_budget() -> None:
     start = Start.calibrated(10.0)
     budgets = [budget("heading", 5.0, gyro=m, accel=NOTHING, start=start) for m in models]
     best = budget("heading", 5.0, gyro=estimate.model, accel=NOTHING, start=start).total
-    lower, upper = interval(budgets)
+    lower, upper = compute_interval(budgets)
     assert lower == pytest.approx(0.8 * best, rel=0.03)
     assert upper == pytest.approx(1.5 * best, rel=0.03)
-    narrow = interval(budgets, level=0.5)
+    narrow = compute_interval(budgets, level=0.5)
     assert all(a < b for a, b in pairwise((lower, *narrow, upper)))
 
 
@@ -400,6 +400,6 @@ def test_budgets_that_do_not_go_together_have_no_interval() -> None:
     other = Budget(1.0, "position", [Contribution("gyro N", 1.0)])
     for budgets in ([], [one, other]):
         with pytest.raises(ValueError, match="one quantity"):
-            interval(budgets)
+            compute_interval(budgets)
     with pytest.raises(ValueError, match="level"):
-        interval([one], level=1.0)
+        compute_interval([one], level=1.0)

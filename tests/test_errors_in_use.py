@@ -31,8 +31,8 @@ from imubench_pipeline.navigation.error_budget.in_use import (
 from imubench_pipeline.navigation.error_budget.parts import Quantity
 from imubench_pipeline.navigation.error_budget.printed_errors import (
     DATASHEET_KEY_OF_CAUSE,
-    in_use,
-    of_datasheet,
+    collect_figures_in_use,
+    read_datasheet_figures,
 )
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.growth import Calibrated, Uncalibrated
@@ -228,7 +228,9 @@ def sheet(**keys: Any) -> Datasheet:
 )
 def test_a_printed_figure_as_a_standard_deviation(printed: Any, sigma: float, kind: str) -> None:
     listed = printed if isinstance(printed, list) else [printed]
-    found = of_datasheet(sheet(offset=[one | {"unit": "deg/s"} for one in listed]), "gyro_z")
+    found = read_datasheet_figures(
+        sheet(offset=[one | {"unit": "deg/s"} for one in listed]), "gyro_z"
+    )
     figure = found["turn_on_bias"]
     assert figure.sigma == pytest.approx(sigma * DEGREE)
     assert (figure.origin, figure.kind) == ("datasheet", kind)
@@ -238,7 +240,9 @@ def test_a_printed_figure_as_a_standard_deviation(printed: Any, sigma: float, ki
 def test_what_is_not_printed_is_not_known_and_it_is_said_why() -> None:
     least = {"value": 1, "unit": "deg/s", "kind": "min"}
     option = {"value": 1, "unit": "deg/s/g", "kind": "typ", "option": "grade A"}
-    found = of_datasheet(sheet(offset=least, nonlinearity=None, g_sensitivity=option), "gyro_x")
+    found = read_datasheet_figures(
+        sheet(offset=least, nonlinearity=None, g_sensitivity=option), "gyro_x"
+    )
     assert {one.sigma for one in found.values()} == {None}
     reasons = {cause: one.reason or "" for cause, one in found.items()}
     assert "only a minimum" in reasons["turn_on_bias"]
@@ -254,7 +258,7 @@ def test_units_of_ratios_and_of_vibration() -> None:
         "nonlinearity": {"value": 100, "unit": "ppm of FS"},
         "vibration_rectification": {"value": 2, "unit": "deg/h/g^2"},
     }
-    found = of_datasheet(sheet(**keys), "gyro_x")
+    found = read_datasheet_figures(sheet(**keys), "gyro_x")
     assert found["scale_factor"].sigma == pytest.approx(1e-3)
     assert found["nonlinearity"].sigma == pytest.approx(1e-4)
     assert found["vibration_rectification"].sigma == pytest.approx(2 * DEGREE / 3600 / G**2)
@@ -269,7 +273,7 @@ def test_what_a_log_tells_of_temperature_stands_before_the_datasheet() -> None:
             ("sensitivity", "ok", -2e-4), ("quadratic", "absent", None), ("lag", "ok", 9.0),
         )
     ]  # fmt: skip
-    found = in_use(printed, ["gyro_x", "gyro_y"], typed(TemperatureRow, rows))
+    found = collect_figures_in_use(printed, ["gyro_x", "gyro_y"], typed(TemperatureRow, rows))
     measured = found["gyro_x"]["temperature"]
     assert (measured.sigma, measured.origin) == (2e-4, "measured")
     assert measured.spread == pytest.approx(1e-4 / 1.96)

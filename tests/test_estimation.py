@@ -7,14 +7,14 @@ import pytest
 from scipy.signal import lfilter
 
 from imubench_pipeline.allan import allan_variance
-from imubench_pipeline.estimators.curve_bias import averaging_times, of_model
+from imubench_pipeline.estimators.curve_bias import compute_curve_figures, make_averaging_times
 from imubench_pipeline.estimators.estimate import CURVE
-from imubench_pipeline.estimators.rows import estimates
+from imubench_pipeline.estimators.rows import read_estimates
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.simulate import channel_rng, simulate
 from imubench_pipeline.recordings.recording import ChannelLog
 from imubench_pipeline.settings.config import EstimateSettings, Method
-from imubench_pipeline.steps.estimate import Estimation, estimate_channel, resolution_of
+from imubench_pipeline.steps.estimate import Estimation, estimate_channel, estimate_register_step
 from imubench_pipeline.tables import build, write
 from imubench_pipeline.tables.keys import Key
 from tests.conftest import few
@@ -71,9 +71,9 @@ def test_the_step_of_a_register_is_read_from_the_samples(tmp_path: Path) -> None
     step = 1e-3
     rounded = {channel: np.round(values / step) * step for channel, values in fine.items()}
     for channel, log in recorded(tmp_path / "rounded", rounded).items():
-        assert resolution_of(log) == pytest.approx(step, rel=1e-6), channel
+        assert estimate_register_step(log) == pytest.approx(step, rel=1e-6), channel
     for channel, log in recorded(tmp_path / "fine", fine).items():
-        assert resolution_of(log) == 0.0, channel
+        assert estimate_register_step(log) == 0.0, channel
 
 
 @pytest.fixture(scope="module")
@@ -148,7 +148,7 @@ def test_the_estimates_are_those_of_the_simulation(
         if channel == "gyro_x" or method.startswith("likelihood"):  # a line bends the curve
             assert row["value"] == pytest.approx(truth.N, rel=0.03), method
     names = ("B", "T_B", "B_curve") if channel == "gyro_x" else ("K", "sigma_min", "tau_min")
-    of_curve = of_model(truth, averaging_times(RATE, SAMPLES / RATE))
+    of_curve = compute_curve_figures(truth, make_averaging_times(RATE, SAMPLES / RATE))
     for name in names:
         (row,) = of(found.parameters, channel, method="likelihood", parameter=name)
         # Of a walk beside a line the limits are more than four times apart: no value is given.
@@ -238,7 +238,7 @@ def test_the_table_of_parameters_gives_the_estimates_back(
     found: Estimation, tmp_path: Path
 ) -> None:
     write("parameters", found.parameters, tmp_path / "parameters.parquet")
-    for channel, back in estimates(tmp_path / "parameters.parquet").items():
+    for channel, back in read_estimates(tmp_path / "parameters.parquet").items():
         assert [estimate.method for estimate in back] == list(ALL)
         for estimate in back:
             (name,) = {r["model"] for r in of(found.parameters, channel, method=estimate.method)}
@@ -248,7 +248,7 @@ def test_the_table_of_parameters_gives_the_estimates_back(
 def test_the_table_of_draws_gives_the_noise_models_back(found: Estimation, tmp_path: Path) -> None:
     write("parameters", found.parameters, tmp_path / "parameters.parquet")
     write("draws", found.draws, tmp_path / "draws.parquet")
-    for channel, back in estimates(
+    for channel, back in read_estimates(
         tmp_path / "parameters.parquet", tmp_path / "draws.parquet"
     ).items():
         for estimate in back:

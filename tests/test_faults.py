@@ -8,9 +8,9 @@ from imubench_pipeline.run.faults import TOLD, Faults
 from imubench_pipeline.tables import build, read, write
 from imubench_pipeline.tables.failures import (
     Failure,
-    failure_of,
+    mark_failures,
+    read_failure,
     read_with_failures,
-    with_failures,
     write_empty,
 )
 from imubench_pipeline.tables.schemas import PARTS_OF, TABLES
@@ -66,14 +66,14 @@ def test_a_run_says_what_is_left_out_unless_its_caller_looks_itself(
 def test_any_table_can_be_empty_and_say_why(table: str, tmp_path: Path) -> None:
     path = tmp_path / f"{table}.parquet"
     write_empty([path], FAILURE)
-    assert failure_of(path) == FAILURE
+    assert read_failure(path) == FAILURE
     assert read(table, [path]).num_rows == 0
     assert read_with_failures(table, [path])[1] == [FAILURE]
 
 
 def test_a_table_of_a_step_that_did_its_work_tells_nothing(tmp_path: Path) -> None:
     write("fixed_bias", [], tmp_path / "fixed_bias.parquet")
-    assert failure_of(tmp_path / "fixed_bias.parquet") is None
+    assert read_failure(tmp_path / "fixed_bias.parquet") is None
 
 
 def tables(kind: str = "static") -> dict:
@@ -88,27 +88,27 @@ def tables(kind: str = "static") -> dict:
 
 
 def test_a_recording_of_which_a_step_failed_is_left_out_with_the_reason() -> None:
-    found = with_failures(tables(), [FAILURE])
+    found = mark_failures(tables(), [FAILURE])
     status = {row["recording"]: row["status"] for row in found["recordings"].to_pylist()}
     assert status == {"a": "failed", "b": "ok"}
     assert found["fixed_bias"]["recording"].to_pylist() == ["b"]
     (finding,) = found["findings"].to_pylist()
     assert (finding["finding"], finding["severity"]) == ("failed", "fatal")
     assert finding["detail"].startswith(FAILURE.reason)
-    again = with_failures(found, [FAILURE])
+    again = mark_failures(found, [FAILURE])
     assert all(again[name].equals(found[name]) for name in found)
 
 
 @pytest.mark.parametrize(("kind", "status"), [("static", "ok"), ("rate_table", "failed")])
 def test_a_static_log_stands_without_its_calibration(kind: str, status: str) -> None:
     failure = Failure("s", "a", "calibration", "time", "the step calibration ran for longer")
-    found = with_failures(tables(kind), [failure])
+    found = mark_failures(tables(kind), [failure])
     assert found["recordings"]["status"].to_pylist()[0] == status
     assert found["findings"]["finding"].to_pylist() == ["failed"]
 
 
 def test_a_sensor_of_which_a_step_failed_leaves_out_no_recording() -> None:
     failure = Failure("s", None, "outlook", "error", "the step outlook failed")
-    found = with_failures(tables(), [failure])
+    found = mark_failures(tables(), [failure])
     assert found["recordings"]["status"].to_pylist() == ["ok", "ok"]
     assert found["failures"].to_pylist()[0]["recording"] is None

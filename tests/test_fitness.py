@@ -11,17 +11,17 @@ from imubench_pipeline.model.comparisons import ErrorBudgetRow, PooledRow
 from imubench_pipeline.model.estimates import ModelRow, ParameterRow
 from imubench_pipeline.model.recordings import FindingRow, RecordingRow
 from imubench_pipeline.model.verdicts import DoubtMark
-from imubench_pipeline.navigation.pooled import pooled_rows
+from imubench_pipeline.navigation.pooled import list_pooled_rows
 from imubench_pipeline.recordings.fitness import (
     Doubt,
-    doubts,
-    fitness,
-    judged,
-    left_out,
-    not_sold,
-    undecided,
-    with_doubts,
-    with_doubts_of_all,
+    attach_doubts,
+    attach_doubts_to_pools,
+    derive_doubts,
+    doubt_unsold_sensors,
+    judge_fitness,
+    judge_recordings,
+    list_excluded,
+    mask_excluded,
 )
 from imubench_pipeline.settings.requirements import Requirement
 from imubench_pipeline.tables import build
@@ -36,10 +36,10 @@ KEY = {"sensor": "s", "recording": "a", "channel": "gyro_x"}
 
 
 def test_what_is_not_sold_decides_nothing() -> None:
-    (doubt,) = not_sold(typed(RecordingRow, [ABOUT, OTHER]), {"s"})
+    (doubt,) = doubt_unsold_sensors(typed(RecordingRow, [ABOUT, OTHER]), {"s"})
     row = verdict([doubt])
     assert (row.fitness, row.decides, row.doubts) == ("unfit", False, (DoubtMark("a", "not_sold"),))
-    assert left_out([row]) == {("s", "a"): row.doubts}
+    assert list_excluded([row]) == {("s", "a"): row.doubts}
 
 
 def marked(*codes: str, recording: str = "a") -> tuple[DoubtMark, ...]:
@@ -47,7 +47,7 @@ def marked(*codes: str, recording: str = "a") -> tuple[DoubtMark, ...]:
 
 
 def verdict(found: Iterable[Doubt], include: Sequence[str] = (), **changes: Any) -> RecordingRow:
-    (row,) = judged(typed(RecordingRow, [ABOUT | changes]), found, include)
+    (row,) = judge_recordings(typed(RecordingRow, [ABOUT | changes]), found, include)
     return row
 
 
@@ -69,10 +69,12 @@ def parameter(status: str) -> ParameterRow:
 
 def test_a_log_of_which_nothing_is_found_is_fit() -> None:
     found = list(
-        doubts([finding("lines", "note")], [parameter("not_identified")], [model("explained")])
+        derive_doubts(
+            [finding("lines", "note")], [parameter("not_identified")], [model("explained")]
+        )
     )
     assert found == []
-    assert fitness(found) == "fit"
+    assert judge_fitness(found) == "fit"
     row = verdict(found)
     assert (row.fitness, row.decides, row.doubts) == ("fit", True, ())
 
@@ -80,18 +82,20 @@ def test_a_log_of_which_nothing_is_found_is_fit() -> None:
 @pytest.mark.parametrize("name", sorted(code for code, kind in FINDINGS.items() if kind.unfit))
 def test_what_need_not_be_a_sensor_at_rest_in_its_unit_does_not_decide(name: str) -> None:
     severity = "fatal" if name == "stuck" else "warning"
-    found = list(doubts([finding("noise_grows"), finding(name, severity)], [], []))
+    found = list(derive_doubts([finding("noise_grows"), finding(name, severity)], [], []))
     row = verdict(found)
     assert (row.fitness, row.decides) == ("unfit", False)
     assert row.doubts == marked(name, "noise_grows")
-    assert left_out([row]) == {("s", "a"): row.doubts}
+    assert list_excluded([row]) == {("s", "a"): row.doubts}
     asked_for = verdict(found, ["s/a"])
     assert (asked_for.fitness, asked_for.decides) == ("unfit", True)
-    assert left_out([asked_for]) == {}
+    assert list_excluded([asked_for]) == {}
 
 
 def test_other_doubts_leave_the_figures_and_are_said() -> None:
-    found = list(doubts([finding("bias_step")], [], [model("not explained"), model("x", False)]))
+    found = list(
+        derive_doubts([finding("bias_step")], [], [model("not explained"), model("x", False)])
+    )
     row = verdict(found)
     assert (row.fitness, row.decides) == ("fit with doubts", True)
     assert row.doubts == marked("bias_step", "not_explained")
@@ -101,35 +105,35 @@ def test_other_doubts_leave_the_figures_and_are_said() -> None:
 
 
 def test_a_doubtful_parameter_is_no_doubt_of_the_log() -> None:
-    (one,) = doubts([], [parameter("doubtful")], [])
+    (one,) = derive_doubts([], [parameter("doubtful")], [])
     assert one.row().parameters == ("K",)
     assert one.reason == "drift"
-    assert fitness([one]) == "fit"
+    assert judge_fitness([one]) == "fit"
 
 
 def test_a_unit_mixed_up_has_its_factor() -> None:
-    (one,) = doubts([finding("suspicious_unit", value=57.29577951)], [], [])
+    (one,) = derive_doubts([finding("suspicious_unit", value=57.29577951)], [], [])
     assert one.factor == 57.29577951
     assert "T_B" not in one.parameters and "N" in one.parameters
 
 
 def test_a_unit_of_time_mixed_up_has_a_factor_for_each_parameter() -> None:
-    found = list(doubts([finding("rate_implausible", value=1e-6)], [], []))
+    found = list(derive_doubts([finding("rate_implausible", value=1e-6)], [], []))
     assert {one.parameters: one.factor for one in found} == {
         ("N",): pytest.approx(1e-3),
         ("Q", "T_B", "tau_min"): pytest.approx(1e-6),
         ("K",): pytest.approx(1e3),
         ("R",): pytest.approx(1e6),
     }
-    assert fitness(found) == "unfit"
+    assert judge_fitness(found) == "unfit"
     assert verdict(found).doubts == marked("rate_implausible")
 
 
 def test_a_recording_that_was_not_analysed_does_not_decide() -> None:
     for status in ("rejected", "failed"):
-        row = verdict(doubts([finding("rejected", "fatal")], [], []), status=status)
+        row = verdict(derive_doubts([finding("rejected", "fatal")], [], []), status=status)
         assert (row.fitness, row.decides, row.doubts) == (None, False, ())
-        assert left_out([row]) == {}  # that is told as rejected
+        assert list_excluded([row]) == {}  # that is told as rejected
 
 
 def test_pools_are_those_without_the_unfit_recording_and_count_it() -> None:
@@ -140,8 +144,8 @@ def test_pools_are_those_without_the_unfit_recording_and_count_it() -> None:
 
     rows = typed(ParameterRow, [row("a", 1.0), row("b", 1.01), row("c", 57.3)])
     apart = {("s", "c"): marked("motion", recording="c")}
-    (pooled,) = pooled_rows(undecided(rows, apart), [], {})
-    (without,) = pooled_rows(rows[:2], [], {})
+    (pooled,) = list_pooled_rows(mask_excluded(rows, apart), [], {})
+    (without,) = list_pooled_rows(rows[:2], [], {})
     assert pooled["value"] == without["value"]
     assert (pooled["recordings"], pooled["left_out"]) == (2, 1)
     assert "1 recording not used (the recording is in doubt)" in pooled["reason"]
@@ -158,12 +162,12 @@ def test_rows_carry_the_doubts_of_what_they_stand_on() -> None:
         ],
     )
     rows = typed(ErrorBudgetRow, [{"sensor": "s", "recording": name} for name in "ab"])
-    assert [row.doubts for row in with_doubts(rows, about)] == [("lines",), ()]
+    assert [row.doubts for row in attach_doubts(rows, about)] == [("lines",), ()]
     pair = {"sensor": "s", "recording": "b", "other": "s", "other_recording": "a"}
     pairs = typed(FusionRow, [pair])
-    assert [row.doubts for row in with_doubts(pairs, about, RECORDINGS_OF_A_PAIR)] == [("lines",)]
+    assert [row.doubts for row in attach_doubts(pairs, about, RECORDINGS_OF_A_PAIR)] == [("lines",)]
     pools = typed(PooledRow, [{"sensor": "s", "device": device} for device in (None, "one", "two")])
-    said = [row.doubts for row in with_doubts_of_all(pools, about)]
+    said = [row.doubts for row in attach_doubts_to_pools(pools, about)]
     assert said == [marked("lines"), marked("lines"), ()]
 
 

@@ -5,38 +5,40 @@ import numpy as np
 import pytest
 
 from imubench_pipeline.noise import FLOOR, Flicker, NoiseModel
-from imubench_pipeline.noise.terms.flicker import bank, ripple
+from imubench_pipeline.noise.terms.flicker import compute_bank_ripple, fit_flicker_bank
 
 
 @pytest.mark.parametrize("band", [(0.01, 36_000.0), (0.02, 20.0), (1.0, 1e7)])
 def test_the_bank_is_flicker_within_two_per_cent_of_the_plateau(band: tuple[float, float]) -> None:
     n = np.unique(np.rint(np.geomspace(8, band[1] / band[0], 300)))
-    terms = bank(3.0, *band)
+    terms = fit_flicker_bank(3.0, *band)
     variance = np.sum([term.sampled_allan_variance(n, band[0]) for term in terms], axis=0)
     np.testing.assert_allclose(variance, FLOOR**2 * 9.0, rtol=0.02)
 
 
 @pytest.mark.parametrize("band", [(0.01, 36_000.0), (0.02, 20.0), (1.0, 1e7)])
 def test_the_ripple_is_as_stated(band: tuple[float, float]) -> None:
-    variance, density = ripple(*band)
+    variance, density = compute_bank_ripple(*band)
     assert variance < 5e-3
     assert density < 2e-2
     omega = np.geomspace(np.pi * band[0] / band[1], np.pi, 400)
-    found = np.sum([term.sampled_spectrum(omega, band[0]) for term in bank(1.0, *band)], axis=0)
+    found = np.sum(
+        [term.sampled_spectrum(omega, band[0]) for term in fit_flicker_bank(1.0, *band)], axis=0
+    )
     error = np.max(np.abs(found * 2 * np.sin(omega / 2) - 1))
     assert error < 1.1 * density + 1e-3
 
 
 def test_a_state_space_has_the_bank_in_it() -> None:
     space = NoiseModel(N=1.0, B=2.0, K=0.1).state_space(100.0, longest=1000.0)
-    processes = [term for term in bank(2.0, 0.01, 1000.0) if term.symbol == "GM"]
+    processes = [term for term in fit_flicker_bank(2.0, 0.01, 1000.0) if term.symbol == "GM"]
     assert len(space.output) == len(processes) + 1
     assert space.transition[-1, -1] == 1.0
 
 
 def test_an_empty_band_is_refused() -> None:
     with pytest.raises(ValueError, match="empty"):
-        bank(1.0, 10.0, 10.0)
+        fit_flicker_bank(1.0, 10.0, 10.0)
 
 
 @pytest.mark.parametrize("lag", [0, 1, 2, 99, 100, 101, 3000])

@@ -8,9 +8,9 @@ import pytest
 from imubench_pipeline.estimators.estimate import Estimate, JointDraws, Parameter
 from imubench_pipeline.model.estimates import ErrorGrowthRow
 from imubench_pipeline.navigation.compared import ComparedChannel
-from imubench_pipeline.navigation.error_growth import growth_rows
-from imubench_pipeline.navigation.expected_errors import error_rows, standard
-from imubench_pipeline.navigation.ratios import deviation_rows, ratio_of_deviations
+from imubench_pipeline.navigation.error_growth import list_growth_rows
+from imubench_pipeline.navigation.expected_errors import list_error_rows, list_standard_questions
+from imubench_pipeline.navigation.ratios import compare_deviations, list_deviation_rows
 
 NAMES = {"sensor": "alpha", "recording": "night"}
 DRAWS = 9
@@ -41,15 +41,15 @@ HOW = {"draws": DRAWS, "seed": 7}
 
 @cache
 def grown() -> list[ErrorGrowthRow]:
-    return list(growth_rows(NAMES, ESTIMATES, times=[10.0, 45.0], window=90.0, **HOW))
+    return list(list_growth_rows(NAMES, ESTIMATES, times=[10.0, 45.0], window=90.0, **HOW))
 
 
 @pytest.mark.release
 def test_errors_that_grow_are_those_of_the_budget() -> None:
-    questions = list(standard([10.0, 45.0], 90.0, 0.8, ["worst"]))
+    questions = list(list_standard_questions([10.0, 45.0], 90.0, 0.8, ["worst"]))
     asked = {
         (row["error"], row["time"], row["source"]): row
-        for row in error_rows(NAMES, ESTIMATES, questions, **HOW)
+        for row in list_error_rows(NAMES, ESTIMATES, questions, **HOW)
         if row["error"] != "north"
     }
     of_table = [
@@ -74,7 +74,7 @@ def test_an_axis_alone_is_as_if_its_log_had_no_other(letters: str) -> None:
     assert {row["axis"] for row in rows} == {"worst", "x", "y"}  # z has no gyro
     for letter in letters:
         alone = {channel: one for channel, one in ESTIMATES.items() if channel.endswith(letter)}
-        expected = [row | {"axis": letter} for row in growth_rows(NAMES, alone, **how)]
+        expected = [row | {"axis": letter} for row in list_growth_rows(NAMES, alone, **how)]
         assert [row for row in rows if row["axis"] == letter] == expected
 
 
@@ -96,7 +96,7 @@ def test_a_ratio_follows_from_what_is_kept_of_each_channel() -> None:
         for n in (1, 2)
     )
     how = {"longest": 1 / 9, "draws": DRAWS, "seed": 3}
-    kept = [list(deviation_rows(one, 100.0, **how)) for one in (a, b)]
+    kept = [list(list_deviation_rows(one, 100.0, **how)) for one in (a, b)]
     taus = sorted({row["tau"] for row in kept[0]})
     np.testing.assert_allclose(np.log10(taus), np.arange(-2.0, 2.6, 0.5), atol=1e-12)
     for tau in taus:
@@ -105,7 +105,7 @@ def test_a_ratio_follows_from_what_is_kept_of_each_channel() -> None:
             for rows in kept
         )
         assert len(own) == DRAWS and (np.diff(own) >= 0).all()
-        ratio = ratio_of_deviations(a, b, tau, **how)
+        ratio = compare_deviations(a, b, tau, **how)
         limits = np.quantile(own[:, None] / other, [0.025, 0.975], method="inverted_cdf")
         np.testing.assert_allclose([ratio.lower, ratio.upper], limits, rtol=1e-12)
         values = [r["adev"] for rows in kept for r in rows if r["tau"] == tau and r.draw is None]
@@ -115,5 +115,5 @@ def test_a_ratio_follows_from_what_is_kept_of_each_channel() -> None:
 def test_nothing_is_kept_of_a_channel_without_noise() -> None:
     nothing = Estimate("likelihood", {"N": Parameter(None, "not_identified")})
     channel = ComparedChannel("s", "r", "gyro_x", True, 3600.0, nothing)
-    assert [*deviation_rows(channel, 100.0, longest=1 / 9, draws=9, seed=1)] == []
-    assert [*growth_rows(NAMES, {"gyro_x": nothing}, times=(), window=60.0, **HOW)] == []
+    assert [*list_deviation_rows(channel, 100.0, longest=1 / 9, draws=9, seed=1)] == []
+    assert [*list_growth_rows(NAMES, {"gyro_x": nothing}, times=(), window=60.0, **HOW)] == []

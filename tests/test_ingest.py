@@ -7,7 +7,7 @@ import pytest
 
 from imubench_pipeline.readers import RecordingError
 from imubench_pipeline.recordings.ingest import Ingested, ingest
-from imubench_pipeline.recordings.recording import channel_logs, log_paths, read_metadata
+from imubench_pipeline.recordings.recording import list_log_files, open_channel_logs, read_metadata
 from imubench_pipeline.settings.quality import QualitySettings
 from imubench_pipeline.settings.sensor import LogFormat, RecordingNotes
 
@@ -34,7 +34,8 @@ def kept(
     log = LogFormat.model_validate({"channels": channels or XY} | rate | keys)
     result = ingest(source, log, notes, QualitySettings(short=0), folder, {"simulated": False})
     values = {
-        name: np.concatenate(list(found.blocks())) for name, found in channel_logs(folder).items()
+        name: np.concatenate(list(found.blocks()))
+        for name, found in open_channel_logs(folder).items()
     }
     return result, values
 
@@ -112,7 +113,7 @@ def test_a_hole_beside_a_repeated_record_is_still_a_hole(tmp_path: Path) -> None
     source = write_csv(tmp_path / "a.csv", t=time, wx=1e-3 * np.sin(np.arange(1000.0)))
     result, values = kept(source, tmp_path / "out", {"gyro_x": XY["gyro_x"]}, time=TIME)
     assert np.isnan(values["gyro_x"]).sum() == 1
-    assert channel_logs(tmp_path / "out")["gyro_x"].holes
+    assert open_channel_logs(tmp_path / "out")["gyro_x"].holes
     assert result.summary["samples"] == 999
     found = {finding.finding: finding.value for finding in result.findings}
     assert found == {"missing_samples": 1, "repeated_stamps": 1}
@@ -137,7 +138,7 @@ def test_files_of_one_clock_are_one_log(tmp_path: Path, rng: np.random.Generator
     for axis, samples in zip("xyz", axes, strict=True):
         write_csv(tmp_path / f"r/{axis}.csv", w=samples)
     _, values = kept(tmp_path / "r", tmp_path / "out", PER_AXIS)
-    assert [path.name for path in log_paths(tmp_path / "out")] == ["log.parquet"]
+    assert [path.name for path in list_log_files(tmp_path / "out")] == ["log.parquet"]
     for axis, samples in zip("xyz", axes, strict=True):
         np.testing.assert_array_equal(values[f"gyro_{axis}"], samples)
 
@@ -152,7 +153,7 @@ def test_clocks_of_their_own_have_files_of_their_own(
     write_csv(tmp_path / "r/g.csv", t=np.arange(1000) / 100, w=1e-3 * rng.standard_normal(1000))
     write_csv(tmp_path / "r/a.csv", t=0.3 + np.arange(600) / 64, w=1e-3 * rng.standard_normal(600))
     result, values = kept(tmp_path / "r", tmp_path / "out", channels, time=TIME)
-    names = [path.name for path in log_paths(tmp_path / "out")]
+    names = [path.name for path in list_log_files(tmp_path / "out")]
     assert names == ["log.accel.parquet", "log.gyro.parquet"]
     assert result.channels["accel_x"]["rate"] == pytest.approx(64.0)
     assert result.channels["gyro_x"]["rate"] == pytest.approx(100.0)
@@ -220,7 +221,7 @@ def test_long_holes_are_read_in_bounded_blocks(tmp_path: Path) -> None:
     wx = 1e-3 * np.sin(np.arange(2000.0))
     source = write_csv(tmp_path / "a.csv", t=time, wx=wx)
     kept(source, tmp_path / "out", {"gyro_x": XY["gyro_x"]}, time=TIME)
-    log = channel_logs(tmp_path / "out")["gyro_x"]
+    log = open_channel_logs(tmp_path / "out")["gyro_x"]
     assert log.grid > 9_000_000
     blocks = list(log.blocks())
     assert max(map(len, blocks)) < 3 << 20

@@ -12,7 +12,7 @@ from imubench_pipeline.estimators.joint_cutoff import refine_cutoff
 from imubench_pipeline.estimators.likelihood import Likelihood, fit
 from imubench_pipeline.estimators.low_pass import Filter
 from imubench_pipeline.estimators.model_choice import PAPERS_MODEL, compare_models
-from imubench_pipeline.estimators.spectrum import spectra
+from imubench_pipeline.estimators.spectrum import compute_spectra
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.simulate import simulate
 from tests.conftest import few
@@ -112,7 +112,7 @@ def test_no_mean_is_shorter_than_of_two_samples(seed):
     log = simulate(
         NoiseModel(N=1e-4, B=3e-4, T_B=2.0), rate, samples + 1, np.random.default_rng(seed)
     )
-    spectrum, lines = spectra([0.5 * (log[1:] + log[:-1])], samples, rate)
+    spectrum, lines = compute_spectra([0.5 * (log[1:] + log[:-1])], samples, rate)
     frame = select_for_fit(spectrum, lines)
     means = [one for one in frame.low_pass.allowed if one.filter.kind == "boxcar"]
     assert means

@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 
 from imubench_pipeline.recordings.ingest import ingest
-from imubench_pipeline.recordings.kept import Quality, kept_logs, kept_static_logs
+from imubench_pipeline.recordings.kept import Quality, load_logs, load_static_logs
 from imubench_pipeline.run.faults import Faults
 from imubench_pipeline.settings.quality import QualitySettings
 from imubench_pipeline.settings.sensor import LogFormat, RecordingNotes
 from imubench_pipeline.tables import TableError, read, write
-from imubench_pipeline.tables.failures import Failure, failure_of
+from imubench_pipeline.tables.failures import Failure, read_failure
 from imubench_pipeline.tables.findings import RecordingError
 
 LOG = LogFormat.model_validate(
@@ -59,7 +59,7 @@ def flips(data: bytes, step: int) -> Iterator[bytes]:
 
 
 def samples(folder: Path) -> list[np.ndarray]:
-    return [np.concatenate(list(log.blocks())) for log in kept_static_logs(folder).values()]
+    return [np.concatenate(list(log.blocks())) for log in load_static_logs(folder).values()]
 
 
 def test_what_is_as_it_was_left_is_read(results: Path) -> None:
@@ -84,7 +84,7 @@ def test_a_file_that_is_lost_or_cut_is_named_and_made_again(results: Path, damag
             named = quality
             quality.write_text(quality.read_text().replace('"grid": 2000', '"grid": 2001'))
     with pytest.raises(RecordingError) as told:
-        kept_logs(folder)
+        load_logs(folder)
     assert str(told.value).startswith(f"{named}: ")
     assert "the next run reads" in str(told.value) or "is read again" in str(told.value)
     if damage == "another":
@@ -171,6 +171,6 @@ def test_no_bit_of_a_table_changes_unseen(tmp_path: Path) -> None:
             told += 1
     assert told > 0.8 * len(data) / 7
     path.write_bytes(data[:-9])
-    assert failure_of(path) is None
+    assert read_failure(path) is None
     with pytest.raises(TableError, match=r"scores\.parquet: is damaged .* remove it"):
         read("scores", [path])

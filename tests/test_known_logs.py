@@ -15,9 +15,9 @@ from hypothesis import strategies as st
 from imubench_pipeline.recordings import known_logs
 from imubench_pipeline.recordings.known_logs import (
     KNOWN,
+    identify_log_files,
     plan_versions,
     read_known,
-    read_log,
     write_known,
 )
 from imubench_pipeline.run.plan import Plan
@@ -39,7 +39,7 @@ def ingested(folder: Path) -> dict[str, str]:
     """Read the log as an ingest does; return what the plan called it."""
     log = folder / "log.bin"
     said = plan_versions(log, folder)
-    read = read_log(log)
+    read = identify_log_files(log)
     write_known(read, folder, said)
     (folder / "quality.json").touch()
     return said

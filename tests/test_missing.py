@@ -5,13 +5,13 @@ from scipy.linalg import solveh_banded
 from imubench_pipeline.estimators.missing import (
     BLOCK_SAMPLES,
     BlockMeans,
-    block_means,
+    average_blocks,
     draw_slow_part,
     fill_missing,
     split_at_gaps,
 )
 from imubench_pipeline.estimators.spectral_shapes import Shapes
-from imubench_pipeline.estimators.spectrum import spectra
+from imubench_pipeline.estimators.spectrum import compute_spectra
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.simulate import simulate
 
@@ -25,7 +25,7 @@ def complete(
     log: np.ndarray, model: NoiseModel, rng: np.random.Generator, segments=None
 ) -> np.ndarray:
     spans = segments or ((0, len(log)),)
-    means = block_means([log], spans)
+    means = average_blocks([log], spans)
     path = draw_slow_part(means, split_at_gaps(means, spans), model, RATE, rng)
     return np.concatenate(list(fill_missing([log], path, model, RATE, rng)))
 
@@ -66,7 +66,7 @@ def test_a_filled_log_has_the_spectrum_of_a_complete_one(rng, lose) -> None:
     for _ in range(logs):
         log = 2.0 + simulate(MODEL, RATE, samples, rng)
         log[lose(samples, rng)] = np.nan
-        spectrum = spectra([complete(log, MODEL, rng)], samples, RATE)[0]
+        spectrum = compute_spectra([complete(log, MODEL, rng)], samples, RATE)[0]
         total = total + spectrum.density / logs
     shapes = Shapes(spectrum)
     expected = MODEL.N**2 + MODEL.B**2 * shapes.gauss_markov(30.0)
@@ -99,8 +99,8 @@ def test_a_filled_log_does_not_depend_on_how_it_is_cut(rng) -> None:
     log = simulate(MODEL, RATE, 5000, rng)
     log[bursts(5000, rng)] = np.nan
     pieces = np.split(log, np.sort(rng.integers(0, 5000, 30)))
-    whole = block_means([log], [(0, 5000)])
-    cut = block_means(pieces, [(0, 5000)])
+    whole = average_blocks([log], [(0, 5000)])
+    cut = average_blocks(pieces, [(0, 5000)])
     np.testing.assert_array_equal(cut.count, whole.count)
     np.testing.assert_allclose(cut.mean, whole.mean, rtol=1e-9)
     path = draw_slow_part(whole, [(0, 5000)], MODEL, RATE, np.random.default_rng(1))
@@ -127,7 +127,7 @@ def test_block_means_are_those_of_the_samples_present(rng) -> None:
     log = rng.standard_normal(1000)
     log[rng.random(1000) < 0.3] = np.nan
     log[3 * BLOCK_SAMPLES : 5 * BLOCK_SAMPLES] = np.nan
-    means = block_means([log], [(0, 1000)])
+    means = average_blocks([log], [(0, 1000)])
     assert len(means.mean) == 16
     for k in range(16):
         part = log[k * BLOCK_SAMPLES : (k + 1) * BLOCK_SAMPLES]
@@ -143,7 +143,7 @@ def test_a_long_hole_divides_and_a_shorter_one_does_not() -> None:
         log = np.zeros(200_000)
         log[64_000 : 64_000 + hole] = np.nan
         spans = segments or ((0, 200_000),)
-        return split_at_gaps(block_means([log], spans), spans)
+        return split_at_gaps(average_blocks([log], spans), spans)
 
     assert parts(60_000) == ((0, 200_000),)
     # A hole of more than 1024 whole blocks; the ends go to the ends of blocks.
@@ -257,7 +257,7 @@ def test_a_model_without_slow_noise_is_filled_with_its_level(rng) -> None:
 def test_the_ends_of_a_long_hole_stay_at_the_level_of_the_log(rng) -> None:
     log = 9.81 + simulate(MODEL, RATE, 200_000, rng)
     log[50_010:130_030] = np.nan
-    parts = split_at_gaps(block_means([log], [(0, len(log))]), [(0, len(log))])
+    parts = split_at_gaps(average_blocks([log], [(0, len(log))]), [(0, len(log))])
     result = complete(log, MODEL, rng)
     for start, stop in parts:
         assert np.abs(result[start:stop] - 9.81).max() < 0.5

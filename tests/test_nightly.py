@@ -16,25 +16,30 @@ import yaml
 from imubench_pipeline.extensions.nightly.night import Night
 from imubench_pipeline.extensions.nightly.settling import (
     Skip,
-    complete_name,
-    look,
-    moved,
-    settled,
-    unsettled,
+    find_changed_logs,
+    find_complete_name,
+    find_settled_logs,
+    find_unsettled_logs,
+    scan_drop_zone,
 )
 from imubench_pipeline.extensions.nightly.state import (
     State,
     StateError,
     load_tables,
+    make_state,
     read_state,
-    state_of,
 )
-from imubench_pipeline.extensions.nightly.summary import STATUS, Summary, compared, in_words
+from imubench_pipeline.extensions.nightly.summary import (
+    STATUS,
+    Summary,
+    compare_states,
+    format_summary,
+)
 from imubench_pipeline.run import recovery
 from imubench_pipeline.run.lock import Lock, TakenError, read_note
 from imubench_pipeline.run.plan import Plan
 from imubench_pipeline.settings.validation import ConfigError
-from imubench_pipeline.tables import replacing, write
+from imubench_pipeline.tables import replace_file, write
 from tests.test_configuration import SENSOR
 
 NOW = datetime(2026, 10, 20, 1, 30, tzinfo=UTC)
@@ -130,7 +135,7 @@ def test_a_full_disk_takes_no_lock_away(tmp_path: Path, monkeypatch: pytest.Monk
     ],
 )
 def test_names_say_what_is_not_complete(name: str, complete: str | None) -> None:
-    assert complete_name(name) == complete
+    assert find_complete_name(name) == complete
 
 
 def put(logs: Path, name: str, age: float = 3600.0) -> Path:
@@ -143,16 +148,18 @@ def put(logs: Path, name: str, age: float = 3600.0) -> Path:
 
 
 def skips(logs: Path, settle: float = 10.0) -> dict[str, Skip]:
-    found = look(logs)
-    return {skip.recording: skip for skip in unsettled(found, found, settle, time.time(), {})}
+    found = scan_drop_zone(logs)
+    return {
+        skip.recording: skip for skip in find_unsettled_logs(found, found, settle, time.time(), {})
+    }
 
 
 def test_complete_logs_are_read(tmp_path: Path) -> None:
     for name in ("a.csv", "b.csv.gz", "c/x.csv", "c/.hidden.txt", "notes.md", ".DS_Store"):
         put(tmp_path, name)
-    assert list(look(tmp_path)) == ["s/a", "s/b", "s/c"]
+    assert list(scan_drop_zone(tmp_path)) == ["s/a", "s/b", "s/c"]
     assert skips(tmp_path) == {}
-    assert look(tmp_path / "nowhere") == {}
+    assert scan_drop_zone(tmp_path / "nowhere") == {}
 
 
 def test_a_partial_file_is_held_back(tmp_path: Path) -> None:
@@ -199,25 +206,25 @@ def test_a_folder_that_is_being_filled_is_held_back(tmp_path: Path) -> None:
 def test_what_moves_between_two_looks_is_held_back(tmp_path: Path) -> None:
     put(tmp_path, "same.csv")
     grows, gone = put(tmp_path, "grows.csv"), put(tmp_path, "gone.csv")
-    first = look(tmp_path)
+    first = scan_drop_zone(tmp_path)
     with grows.open("a") as log:
         log.write("3,4\n")
     os.utime(grows, (OLD, OLD))
     gone.unlink()
-    found = list(unsettled(first, look(tmp_path), 10.0, time.time(), {}))
+    found = list(find_unsettled_logs(first, scan_drop_zone(tmp_path), 10.0, time.time(), {}))
     said = "it changed while it was looked at"
     assert found == [Skip("s/gone", said), Skip("s/grows", said)]
-    assert moved(first, look(tmp_path)) == {"s/grows"}
+    assert find_changed_logs(first, scan_drop_zone(tmp_path)) == {"s/grows"}
 
 
 def test_what_is_open_for_writing_is_held_back(tmp_path: Path) -> None:
     path = put(tmp_path, "a.csv")
     with path.open("a"):
-        _, found = settled(tmp_path, 0.0, {})
+        _, found = find_settled_logs(tmp_path, 0.0, {})
     assert [skip.recording for skip in found] == ["s/a"]
     assert found[0].reason.startswith(f"process {os.getpid()} (")
     with path.open():
-        assert settled(tmp_path, 0.0, {})[1] == []
+        assert find_settled_logs(tmp_path, 0.0, {})[1] == []
 
 
 def test_logs_as_they_were_need_no_second_look(
@@ -226,9 +233,9 @@ def test_logs_as_they_were_need_no_second_look(
     waited: list[float] = []
     monkeypatch.setattr("imubench_pipeline.extensions.nightly.settling.time.sleep", waited.append)
     put(tmp_path, "a.csv")
-    found, _ = settled(tmp_path, 300.0, {})
+    found, _ = find_settled_logs(tmp_path, 300.0, {})
     assert waited == [10.0]
-    settled(tmp_path, 300.0, {name: one.files for name, one in found.items()})
+    find_settled_logs(tmp_path, 300.0, {name: one.files for name, one in found.items()})
     assert waited == [10.0]
 
 
@@ -295,7 +302,7 @@ def stamp(path: Path, when: float) -> Path:
 
 def test_old_temporary_files_of_ours_are_removed(tmp_path: Path) -> None:
     taken = time.time()
-    with pytest.raises(KeyboardInterrupt), replacing(tmp_path / "tables/a.csv") as temporary:
+    with pytest.raises(KeyboardInterrupt), replace_file(tmp_path / "tables/a.csv") as temporary:
         names = [temporary.name]
         raise KeyboardInterrupt
     gone = [
@@ -344,10 +351,10 @@ def test_what_was_on_its_way_when_the_power_went_is_made_again(tmp_path: Path) -
 
 def test_only_a_machine_that_was_restarted_lost_files() -> None:
     note = {"since": NOW.isoformat(), "host": platform.node()}
-    assert recovery.restarted(note, NOW.timestamp() + 60.0)
-    assert not recovery.restarted(note, NOW.timestamp() - 60.0)
-    assert not recovery.restarted(note | {"host": "another"}, NOW.timestamp() + 60.0)
-    assert not recovery.restarted({}, NOW.timestamp() + 60.0)
+    assert recovery.was_restarted(note, NOW.timestamp() + 60.0)
+    assert not recovery.was_restarted(note, NOW.timestamp() - 60.0)
+    assert not recovery.was_restarted(note | {"host": "another"}, NOW.timestamp() + 60.0)
+    assert not recovery.was_restarted({}, NOW.timestamp() + 60.0)
 
 
 def waiting(folder: Path, *words: str) -> subprocess.Popen[bytes]:
@@ -361,21 +368,21 @@ def test_a_lock_of_snakemake_is_stale_unless_its_process_lives(tmp_path: Path) -
     locks.mkdir(parents=True)
     (locks / "0.output.lock").write_text("results/tables/a.csv\nresults/report\n")
     (locks / "1.output.lock").write_text("other/tables/a.csv\nresults_2/x\n")
-    mine = recovery.snakemake_locks(tmp_path, results)
+    mine = recovery.find_snakemake_locks(tmp_path, results)
     os.utime(mine[0], (OLD, OLD))
     assert [path.name for path in mine] == ["0.output.lock"]
-    assert recovery.owner(mine, tmp_path, results) is None
+    assert recovery.find_lock_owner(mine, tmp_path, results) is None
     with (
         waiting(tmp_path, "snakemake") as by_hand,
         waiting(tmp_path, "snakemake", "results=other") as of_others,
     ):
         try:
-            assert recovery.owner(mine, tmp_path, results) is None  # it began later
+            assert recovery.find_lock_owner(mine, tmp_path, results) is None  # it began later
             os.utime(mine[0], (time.time() + 2.0,) * 2)
-            assert recovery.owner(mine, tmp_path, results) == by_hand.pid
+            assert recovery.find_lock_owner(mine, tmp_path, results) == by_hand.pid
             by_hand.kill()
             by_hand.wait()
-            assert recovery.owner(mine, tmp_path, results) is None
+            assert recovery.find_lock_owner(mine, tmp_path, results) is None
         finally:
             by_hand.kill()
             of_others.kill()
@@ -450,7 +457,7 @@ def state(
         write(name, rows.get(name, []), folder / f"tables/{name}.parquet")
     tables = load_tables(folder)
     signatures = {f"s/{name}": ((f"{name}.csv", size, 0),) for name, size in logs.items()}
-    return state_of(tables, NOW, signatures, {}), tables
+    return make_state(tables, NOW, signatures, {}), tables
 
 
 def summary(found: dict[str, Any]) -> Summary:
@@ -466,7 +473,7 @@ def test_at_the_first_run_all_is_new(tmp_path: Path) -> None:
         drift=[drift("a", "changed")],
         ranking=[standing("s")],
     )
-    found = summary(compared(None, after, tables, []))
+    found = summary(compare_states(None, after, tables, []))
     assert found.since is None and STATUS[found.outcome] == 1
     assert found.new == ["s/a", "s/b"]
     assert [one.finding for one in found.warnings] == ["knocks"]
@@ -487,11 +494,11 @@ def test_what_is_known_is_fine(tmp_path: Path) -> None:
     before.write(tmp_path / "state.json")
     assert read_state(tmp_path / "state.json") == before
     after, tables = state(tmp_path, {"a": 1, "b": 1}, **rows)
-    found = summary(compared(read_state(tmp_path / "state.json"), after, tables, []))
+    found = summary(compare_states(read_state(tmp_path / "state.json"), after, tables, []))
     assert STATUS[found.outcome] == 0
     assert [(one.recording, one.new) for one in found.rejected] == [("s/b", False)]
     assert not (found.new or found.changed or found.removed or found.warnings or found.first)
-    assert "rejected (none of them new):\n  s/b: empty\n" in in_words(found)
+    assert "rejected (none of them new):\n  s/b: empty\n" in format_summary(found)
 
 
 def test_what_changed_is_told_with_its_reason(tmp_path: Path) -> None:
@@ -510,13 +517,13 @@ def test_what_changed_is_told_with_its_reason(tmp_path: Path) -> None:
         fixed_bias=[bias("log", 2.0), bias("settings", 2.0), bias("same", 1.0), bias("new", 1.0)],
         ranking=[standing("t", "fails", 0.5), standing("u", "fails", 0.9)],
     )
-    found = summary(compared(before, after, tables, []))
+    found = summary(compare_states(before, after, tables, []))
     assert {one.recording: one.because for one in found.changed} == {
         "s/log": "its log changed",
         "s/settings": "settings, or the code of the analysis, changed",
     }
     assert (found.new, found.removed, STATUS[found.outcome]) == (["s/new"], ["s/gone"], 0)
-    text = in_words(found)
+    text = format_summary(found)
     assert "1 new, 2 analysed again, 1 removed, 0 skipped; 4 in all" in text
     assert "robot: No sensor meets the limits. u is closest, but fails." in text
     assert " (before: s)\n" in text
@@ -538,9 +545,9 @@ def test_what_somebody_should_look_at_is_flagged(
 ) -> None:
     before, _ = state(tmp_path, {"a": 1}, recordings=[rejected("a")], drift=[drift("a", None)])
     after, tables = state(tmp_path, {"a": 1}, **({"recordings": [rejected("a")]} | rows))
-    found = summary(compared(before, after, tables, []))
+    found = summary(compare_states(before, after, tables, []))
     assert STATUS[found.outcome] == 1
-    assert said in in_words(found)
+    assert said in format_summary(found)
 
 
 def test_of_a_log_written_to_during_the_run_nothing_is_said_yet(tmp_path: Path) -> None:
@@ -552,7 +559,7 @@ def test_of_a_log_written_to_during_the_run_nothing_is_said_yet(tmp_path: Path) 
         fixed_bias=[bias("a", 3.0)],
         findings=[finding("a", "knocks")],
     )
-    found = summary(compared(before, after, tables, ["s/a", "s/b"]))
+    found = summary(compare_states(before, after, tables, ["s/a", "s/b"]))
     assert STATUS[found.outcome] == 0
     assert not (found.new or found.changed or found.rejected or found.warnings)
     kept = after.without(["s/a", "s/b"], before)
@@ -574,11 +581,11 @@ def test_a_state_that_cannot_be_read_is_told(tmp_path: Path, text: str) -> None:
 
 def test_long_lists_end_with_how_many_more() -> None:
     found = summary({"outcome": "fine", "new": [f"s/{number}" for number in range(99)]})
-    assert "  s/19\n  and 79 more\n" in in_words(found)
+    assert "  s/19\n  and 79 more\n" in format_summary(found)
 
 
 def test_a_failed_run_says_why() -> None:
-    text = in_words(summary({"outcome": "failed", "failure": ["Error\x1b[31m in rule"]}))
+    text = format_summary(summary({"outcome": "failed", "failure": ["Error\x1b[31m in rule"]}))
     assert "why it failed:\n  Error [31m in rule\n" in text
     assert "took 1 min 1 s" in text
 

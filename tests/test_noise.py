@@ -17,9 +17,9 @@ from imubench_pipeline.noise import (
     Ramp,
     RandomWalk,
     WhiteNoise,
-    bias_instability,
-    driving_density,
-    sampled_gauss_markov_shape,
+    compute_bias_instability,
+    compute_driving_density,
+    evaluate_sampled_shape,
 )
 from tests.noise.test_terms import covariance_of_samples
 
@@ -50,7 +50,7 @@ def test_sampled_gauss_markov_is_the_sum_of_covariances(n: int, T_B: float) -> N
     lags = np.abs(np.subtract.outer(np.arange(2 * n), np.arange(2 * n)))
     expected = weights @ (variance * np.exp(-lags * interval / T_B)) @ weights / 2
     density = 2 * variance / T_B
-    found = density * sampled_gauss_markov_shape([n], interval, T_B)[0]
+    found = density * evaluate_sampled_shape([n], interval, T_B)[0]
     assert found == pytest.approx(expected, rel=1e-8)
 
 
@@ -75,7 +75,9 @@ def test_the_peak_of_gauss_markov_is_the_plateau_of_b() -> None:
 
 
 def test_b_and_its_driving_density_are_inverse() -> None:
-    assert bias_instability(driving_density(3e-5, 77.0), 77.0) == pytest.approx(3e-5)
+    assert compute_bias_instability(compute_driving_density(3e-5, 77.0), 77.0) == pytest.approx(
+        3e-5
+    )
 
 
 def test_state_space_is_exact() -> None:

@@ -8,7 +8,7 @@ from imubench_pipeline.allan.octave import (
     MIN_DECIMATED_SAMPLES,
     MIN_STARTS_PER_CLUSTER,
     SECTION_SAMPLES,
-    octave_sizes,
+    round_octave_sizes,
 )
 from tests.conftest import few
 
@@ -34,7 +34,7 @@ def make(rng: np.random.Generator, kind: str, samples: int) -> np.ndarray:
 def test_equal_to_full_overlap_within_a_tenth_of_its_error(rng, kind, samples, loss) -> None:
     log = make(rng, kind, samples)
     log[rng.random(samples) < loss] = np.nan
-    sizes = octave_sizes(cluster_sizes(samples))
+    sizes = round_octave_sizes(cluster_sizes(samples))
     full = allan_variance(log, 10.0, cluster_sizes=sizes)
     octave = allan_variance(log, 10.0, cluster_sizes=sizes, overlap="octave")
     together = min(len(full.tau), len(octave.tau))
@@ -134,14 +134,14 @@ def test_no_difference_spans_segments(rng: np.random.Generator) -> None:
 
 def test_sizes_are_rounded_to_the_stride_of_their_octave() -> None:
     sizes = cluster_sizes(10_000_000)
-    rounded = octave_sizes(sizes)
+    rounded = round_octave_sizes(sizes)
     assert np.isin(rounded, sizes)[rounded < 2 * MIN_STARTS_PER_CLUSTER].all()
     nearest = sizes[np.abs(np.log(sizes[:, None] / rounded)).argmin(axis=0)]
     assert (np.abs(rounded / nearest - 1) <= 0.5 / MIN_STARTS_PER_CLUSTER).all()
     for n in rounded:
         stride = 1 << max(0, int(np.log2(n / MIN_STARTS_PER_CLUSTER)))
         assert n % stride == 0
-    np.testing.assert_array_equal(octave_sizes(rounded), rounded)
+    np.testing.assert_array_equal(round_octave_sizes(rounded), rounded)
 
 
 def test_tau_is_that_of_the_size_really_used(rng: np.random.Generator) -> None:

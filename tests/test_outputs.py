@@ -21,12 +21,12 @@ from imubench_pipeline.report.publish import publish
 from imubench_pipeline.report.static_figures import files as static_files
 from imubench_pipeline.run import cli
 from imubench_pipeline.run.cli import main
-from imubench_pipeline.settings.command_line import named_path
+from imubench_pipeline.settings.command_line import parse_path
 from imubench_pipeline.tables.outputs import OutputFolder, StoreOutput
 from tests.conftest import PROJECT
 from tests.report.tables import joined, put_samples, put_tables, recording_rows, site
 
-PARSER = cli.command_parser()
+PARSER = cli.make_parser()
 LOG = "Time (s),Gyroscope X (deg/s)\n" + "".join(
     f"{n / 100},{(n * 7919) % 101 / 100}\n" for n in range(200)
 )
@@ -71,7 +71,7 @@ def actions() -> Iterator[tuple[str, argparse.Action]]:
 
 
 def test_every_option_with_a_path_is_an_output_with_a_case_or_an_input() -> None:
-    paths = [(name, action) for name, action in actions() if action.type is named_path]
+    paths = [(name, action) for name, action in actions() if action.type is parse_path]
     outputs = {(name, action.dest) for name, action in paths if isinstance(action, StoreOutput)}
     assert outputs == OUTPUTS.keys()
     inputs = {(name, action.dest) for name, action in paths if not isinstance(action, StoreOutput)}
@@ -123,7 +123,7 @@ def lab(whole: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     folder = Path(shutil.copytree(whole, tmp_path / "lab"))
     monkeypatch.chdir(folder)
     # The same parser each time: hundreds of commands are called.
-    monkeypatch.setattr(cli, "command_parser", lambda: PARSER)
+    monkeypatch.setattr(cli, "make_parser", lambda: PARSER)
     return folder
 
 

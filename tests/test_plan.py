@@ -8,8 +8,8 @@ from typing import Any
 import pytest
 import yaml
 
-from imubench_pipeline.report.pages import pages
-from imubench_pipeline.report.publish import site_of
+from imubench_pipeline.report.pages import list_pages
+from imubench_pipeline.report.publish import make_site
 from imubench_pipeline.run.plan import Plan
 from imubench_pipeline.settings.validation import ConfigError
 from imubench_pipeline.tables import build
@@ -246,9 +246,9 @@ def test_a_report_is_given_what_its_pages_show(project: dict[str, Any], tmp_path
     assert settings["requirements"]["robot"]["title"] == "a robot"
     assert {"tau", "common"} <= set(settings["settings"]["fusion"])
     assert {"static_window", "latitude"} <= set(settings["settings"]["error_budget"])
-    site = site_of({name: build(name, []) for name in TABLES}, plan.report_settings(), tmp_path)
+    site = make_site({name: build(name, []) for name in TABLES}, plan.report_settings(), tmp_path)
     assert site.title == settings["report"]["title"]
-    assert len(list(pages(site))) == 7
+    assert len(list(list_pages(site))) == 7
 
 
 def test_a_new_log_does_not_change_the_settings_of_the_report(project: dict[str, Any]) -> None:

@@ -8,7 +8,7 @@ from scipy.stats import f_oneway
 
 from imubench_pipeline.model.comparisons import PooledRow
 from imubench_pipeline.model.estimates import FixedBiasRow, ParameterRow
-from imubench_pipeline.navigation.pooled import Pool, pool, pooled_rows, turn_on_bias
+from imubench_pipeline.navigation.pooled import Pool, estimate_turn_on_bias, list_pooled_rows, pool
 from imubench_pipeline.words.numbers import number_text
 from tests.conftest import few
 
@@ -212,7 +212,9 @@ def test_skew_limits_of_few_degrees_of_freedom(rng: np.random.Generator) -> None
 
 def test_turn_on_bias_by_hand() -> None:
     # s = 2; chi-squared with 3 degrees of freedom: 0.2157953 and 9.348404; t = 3.182446.
-    found = turn_on_bias([-2.0, 2.0, -1.0 - np.sqrt(2), None, -1.0 + np.sqrt(2), float("nan")])
+    found = estimate_turn_on_bias(
+        [-2.0, 2.0, -1.0 - np.sqrt(2), None, -1.0 + np.sqrt(2), float("nan")]
+    )
     assert (found.recordings, found.left_out) == (4, 2)
     assert found.mean == pytest.approx(-0.5)
     squares = 1.5**2 + 2.5**2 + (0.5 + np.sqrt(2)) ** 2 + (0.5 - np.sqrt(2)) ** 2
@@ -223,9 +225,9 @@ def test_turn_on_bias_by_hand() -> None:
 
 
 def test_one_mean_has_no_deviation() -> None:
-    found = turn_on_bias([-0.3])
+    found = estimate_turn_on_bias([-0.3])
     assert (found.mean, found.deviation, found.upper) == (-0.3, None, None)
-    assert turn_on_bias([]).mean is None
+    assert estimate_turn_on_bias([]).mean is None
 
 
 def parameter(recording, name="N", value=1.0, status="ok", half=0.01, **more):
@@ -255,7 +257,7 @@ def test_rows_of_one_device() -> None:
     rows = [parameter(r, value=v) for r, v in (("a", 1.0), ("b", 1.005), ("c", 1.1))]
     rows.append(parameter("a", method="curve", recommended=False, value=9.0))
     rows.append(parameter("b", component=2, value=9.0))
-    found = by_key(pooled_rows(rows, [], {("S", r): "d" for r in "abc"}))
+    found = by_key(list_pooled_rows(rows, [], {("S", r): "d" for r in "abc"}))
     assert list(found) == [(None, "gyro_x", "N")]
     row = found[None, "gyro_x", "N"]
     alone = pool(*([row[k] for row in rows[:3]] for k in ("value", "lower", "upper")))
@@ -272,7 +274,7 @@ def test_devices_that_differ_are_told_from_recordings_that_do(rng: np.random.Gen
     level = {"x": 0.0, "y": 0.3, "z": 0.6}
     apart, alike = (
         by_key(
-            pooled_rows(
+            list_pooled_rows(
                 [
                     parameter(n, value=np.exp(rng.normal(factor * level[n[0]], spread)))
                     for n in names
@@ -296,14 +298,14 @@ def test_devices_are_compared_by_analysis_of_variance(rng: np.random.Generator) 
     groups = [rng.normal(0.3 * size, 0.2, size) for size in (2, 3, 4)]
     names = [(f"{i}-{j}", str(i), y) for i, group in enumerate(groups) for j, y in enumerate(group)]
     rows = [parameter(name, value=float(np.exp(y))) for name, _, y in names]
-    found = by_key(pooled_rows(rows, [], {("S", name): device for name, device, _ in names}))
+    found = by_key(list_pooled_rows(rows, [], {("S", name): device for name, device, _ in names}))
     expected = f_oneway(*groups).pvalue
     assert f"(p = {number_text(expected, 2)})" in found[None, "gyro_x", "N"]["reason"]
 
 
 def test_one_recording_a_device_cannot_tell_which() -> None:
     rows = [parameter("a"), parameter("b", value=2.0)]
-    found = by_key(pooled_rows(rows, [], {}))
+    found = by_key(list_pooled_rows(rows, [], {}))
     assert list(found) == [(None, "gyro_x", "N")]
     reason = found[None, "gyro_x", "N"]["reason"]
     assert reason == "the recordings differ: the devices differ, or the sensor is not stationary"
@@ -316,7 +318,7 @@ def test_a_term_absent_in_some_is_no_agreement() -> None:
     rows += [parameter(r, "T_B", 100.0, half=0.3) for r in "ab"]
     rows += [parameter(r, "T_B", None, "absent") for r in "cd"]
     rows += [parameter(r, "Q", None, "absent") for r in "abcd"]
-    found = by_key(pooled_rows(rows, [], {("S", r): "d" for r in "abcd"}))
+    found = by_key(list_pooled_rows(rows, [], {("S", r): "d" for r in "abcd"}))
     assert set(key[2] for key in found) == {"N", "K", "T_B"}
     walk = found[None, "gyro_x", "K"]
     assert (walk["recordings"], walk["left_out"], walk["verdict"]) == (2, 2, None)
@@ -329,7 +331,7 @@ def test_reasons_say_what_is_left_out() -> None:
     rows = [parameter(r) for r in "ab"]
     rows += [parameter("c", value=None, status="not_identified", lower=1e-9, upper=0.5)]
     rows += [parameter("d", value=7.0, status="at_bound"), parameter("e", lower=None)]
-    row = by_key(pooled_rows(rows, [], {}))[None, "gyro_x", "N"]
+    row = by_key(list_pooled_rows(rows, [], {}))[None, "gyro_x", "N"]
     assert (row["recordings"], row["left_out"]) == (2, 3)
     for why in ("not determined", "bounded", "no 95 % limits"):
         assert f"1 recording not used ({why})" in row["reason"]
@@ -338,7 +340,7 @@ def test_reasons_say_what_is_left_out() -> None:
 
 def test_none_identified_gives_a_row_without_a_value() -> None:
     rows = [parameter(r, "B", None, "not_identified") for r in "ab"]
-    row = by_key(pooled_rows(rows, [], {}))[None, "gyro_x", "B"]
+    row = by_key(list_pooled_rows(rows, [], {}))[None, "gyro_x", "B"]
     assert (row["recordings"], row["left_out"], row["value"], row["spread"]) == (0, 2, None, None)
     assert row["reason"] == "2 recordings not used (not determined)"
 
@@ -346,7 +348,7 @@ def test_none_identified_gives_a_row_without_a_value() -> None:
 def test_biases() -> None:
     given_biases = [bias("a", -1e-3), bias("b", 1e-3), bias("c", np.nan)]
     given_biases += [bias(r, 9.8, "accel_z") for r in "ab"]
-    found = by_key(pooled_rows([], given_biases, {("S", r): "d" for r in "abc"}))
+    found = by_key(list_pooled_rows([], given_biases, {("S", r): "d" for r in "abc"}))
     row = found[None, "gyro_x", "bias"]
     assert (row["recordings"], row["left_out"], row["unit"]) == (2, 1, "rad/s")
     assert row["spread"] == pytest.approx(np.sqrt(2) * 1e-3)
@@ -366,6 +368,6 @@ def test_time_is_linear(rng: np.random.Generator, repeats: int) -> None:
         for term in ("N", "B", "K")
     ]
     start = time.process_time()
-    found = list(pooled_rows(rows, [], devices))
+    found = list(list_pooled_rows(rows, [], devices))
     assert len(found) == 18 * (1 + (1500 if repeats == 2 else 0))
     assert time.process_time() - start < 10.0

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from imubench_pipeline.allan import cluster_sizes
-from imubench_pipeline.allan.phase import presence
+from imubench_pipeline.allan.phase import count_presence
 from tests.test_allan import needed_in_cluster
 
 
@@ -27,7 +27,7 @@ def test_differences_are_there_by_definition(n: int, spans: list[tuple[int, int]
     log[rng.random(3000) < 0.05] = np.nan
     log[1800:1950] = np.nan
     blocks = [log[:700], log[700:701], log[701:-1], log[-1:]]
-    found = presence(blocks, len(log), spans).differences(n)
+    found = count_presence(blocks, len(log), spans).differences(n)
     assert found is not None
     there, stride = found
     begin = stride * np.arange(len(there))
@@ -38,7 +38,7 @@ def test_differences_are_there_by_definition(n: int, spans: list[tuple[int, int]
 def test_a_long_log_is_counted_at_a_stride() -> None:
     log = np.zeros(300_000)
     log[100_000:160_000] = np.nan
-    found = presence([log[:77_777], log[77_777:]], len(log))
+    found = count_presence([log[:77_777], log[77_777:]], len(log))
     assert found.stride == 16
     assert found.coarse[-1] == 240_000 and found.coarse[6_250] == 100_000
     there, stride = found.differences(20_000) or (np.empty(0), 1)
@@ -50,7 +50,7 @@ def test_a_long_log_is_counted_at_a_stride() -> None:
 
 def test_no_difference_crosses_from_one_segment_to_the_next_in_a_long_log() -> None:
     log, n = np.zeros(300_000), 20_000
-    found = presence([log], len(log), [(0, 120_000), (120_000, 300_000)])
+    found = count_presence([log], len(log), [(0, 120_000), (120_000, 300_000)])
     there, stride = found.differences(n) or (np.empty(0), 1)
     assert found.stride == 16 and stride > 16
     gone = stride * np.flatnonzero(~there)
@@ -61,7 +61,7 @@ def test_no_difference_crosses_from_one_segment_to_the_next_in_a_long_log() -> N
 
 def test_no_answer_rather_than_one_of_few_clusters() -> None:
     length = 8 << 20
-    found = presence([np.zeros(1 << 20)] * 8, length)
+    found = count_presence([np.zeros(1 << 20)] * 8, length)
     told = []
     for n in cluster_sizes(length):
         answer = found.differences(n)

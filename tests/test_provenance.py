@@ -4,7 +4,7 @@ from pathlib import Path
 import pytest
 
 from imubench_pipeline.tables import provenance
-from imubench_pipeline.tables.provenance import source_digest
+from imubench_pipeline.tables.provenance import digest_sources
 
 
 @pytest.fixture
@@ -33,14 +33,14 @@ def package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
 
 
 def test_a_digest_follows_imports(package: Path) -> None:
-    before = source_digest("a")
+    before = digest_sources("a")
     (package / "c.py").write_text("x = 2\n")
     (package / "sub/unused.py").write_text("h = 2\n")
-    assert source_digest("a") == before
+    assert digest_sources("a") == before
     (package / "sub/d.py").write_text("g = 2\n")
-    assert source_digest("a") != before
+    assert digest_sources("a") != before
     with pytest.raises(ValueError, match="no module 'e'"):
-        source_digest("e")
+        digest_sources("e")
 
 
 @pytest.mark.parametrize(("file", "known"), [("sub/texts/page.html", True), ("late.py", True),
@@ -51,30 +51,30 @@ def test_a_digest_follows_imports(package: Path) -> None:
 def test_a_digest_knows_what_the_texts_of_a_module_name(
     package: Path, file: str, known: bool
 ) -> None:
-    of_a, of_c = source_digest("a"), source_digest("c")
+    of_a, of_c = digest_sources("a"), digest_sources("c")
     (package / file).write_text("z = 1")
-    assert (source_digest("a") != of_a) == known
-    assert source_digest("c") == of_c
+    assert (digest_sources("a") != of_a) == known
+    assert digest_sources("c") == of_c
 
 
 def test_a_digest_is_the_same_wherever_the_package_lies(
     package: Path, tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    before = source_digest("a", "c")
+    before = digest_sources("a", "c")
     moved = tmp_path_factory.mktemp("elsewhere") / "pack"
     package.rename(moved)
     monkeypatch.setattr(provenance, "_PACKAGE", moved)
-    assert source_digest("c", "a") == before
+    assert digest_sources("c", "a") == before
 
 
 def test_logs_are_read_again_when_a_format_of_any_changes(monkeypatch: pytest.MonkeyPatch) -> None:
     packed = provenance._PACKAGE / "readers"
     files = [*packed.glob("formats/*.py"), packed / "ubx.py", packed / "arrays/hdf5.py"]
-    before, whole = source_digest("steps.ingest"), Path.read_bytes
+    before, whole = digest_sources("steps.ingest"), Path.read_bytes
     for path in files:
         with monkeypatch.context() as patch:
             patch.setattr(Path, "read_bytes", lambda one, of=path: whole(one) + b" " * (one == of))
-            assert source_digest("steps.ingest") != before, path.name
+            assert digest_sources("steps.ingest") != before, path.name
 
 
 @pytest.mark.parametrize(
@@ -86,8 +86,8 @@ def test_the_report_is_made_again_when_its_texts_change(
 ) -> None:
     path = provenance._PACKAGE / "report" / file
     of_figures = "report.static_figures.files"
-    before = source_digest("report.publish"), source_digest("allan", of_figures)
+    before = digest_sources("report.publish"), digest_sources("allan", of_figures)
     whole = Path.read_bytes
     monkeypatch.setattr(Path, "read_bytes", lambda one: whole(one) + b" " * (one == path))
-    assert source_digest("report.publish") != before[0]
-    assert source_digest("allan", of_figures) == before[1]
+    assert digest_sources("report.publish") != before[0]
+    assert digest_sources("allan", of_figures) == before[1]

@@ -9,13 +9,13 @@ import pyarrow as pa
 import pytest
 
 from imubench_pipeline.datasheets.deltas import bias_deltas, deltas
-from imubench_pipeline.datasheets.measured import sensitivity
+from imubench_pipeline.datasheets.measured import compute_sensitivity
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
-from imubench_pipeline.estimators.rows import parameter_rows
-from imubench_pipeline.extensions.fusion.published_figures import published_rows
+from imubench_pipeline.estimators.rows import make_parameter_rows
+from imubench_pipeline.extensions.fusion.published_figures import yield_published_figures
 from imubench_pipeline.model.estimates import TemperatureRow
 from imubench_pipeline.settings.printed import Datasheet
-from imubench_pipeline.steps.sensor_tables import truth_rows
+from imubench_pipeline.steps.sensor_tables import list_true_parameters
 from imubench_pipeline.tables import build
 from imubench_pipeline.tables.keys import Key
 from tests.rows import typed
@@ -106,7 +106,7 @@ def tables(
         for one in (curve, best)
         for delta in deltas(datasheet, "gyro_x", one, tau, 0.1)
     ]
-    warm = sensitivity(typed(TemperatureRow, temperature), None, None)
+    warm = compute_sensitivity(typed(TemperatureRow, temperature), None, None)
     compared += [
         NAMES | {"method": "mean"} | asdict(delta)
         for delta in bias_deltas(datasheet, "gyro_x", {"gyro_x": bias}, 0.1, warm)
@@ -122,9 +122,9 @@ def tables(
         "allan": falling,
         "recordings": [told | {"simulated": True}],
         "parameters": [
-            *parameter_rows(KEY, curve, recommended=False),
-            *parameter_rows(KEY, best, recommended=True),
-            *parameter_rows(KEY, estimate("compensated", (1.0, 1.0)), recommended=False),
+            *make_parameter_rows(KEY, curve, recommended=False),
+            *make_parameter_rows(KEY, best, recommended=True),
+            *make_parameter_rows(KEY, estimate("compensated", (1.0, 1.0)), recommended=False),
         ],
         "fixed_bias": [NAMES | {"value": bias, "unit": "rad/s"}],
         "temperature": [*temperature],
@@ -149,7 +149,7 @@ WARM = [thermal("T_0", 25.0, "degC"), thermal("sensitivity", 0.019 * DEGREE, "ra
 def rows(given: Mapping[str, pa.Table], said: str | None = None) -> list[dict[str, Any]]:
     """The rows of the table, as it is written."""
     said = said or truths()
-    made = published_rows(said, list(truth_rows(said)), given)
+    made = yield_published_figures(said, list(list_true_parameters(said)), given)
     found: list[dict[str, Any]] = build("published_figures", made).to_pylist()
     return found
 

@@ -14,9 +14,9 @@ from imubench_pipeline.recordings.ingest import ingest_as_planned
 from imubench_pipeline.recordings.recording import read_metadata
 from imubench_pipeline.run.plan import Plan
 from imubench_pipeline.settings.config import AllanSettings, ReconstructionSettings
-from imubench_pipeline.steps.allan import curves
-from imubench_pipeline.steps.estimate import estimation
-from imubench_pipeline.steps.reconstruct import reconstruct, reconstruction_rows
+from imubench_pipeline.steps.allan import yield_allan_rows
+from imubench_pipeline.steps.estimate import estimate_recording
+from imubench_pipeline.steps.reconstruct import reconstruct, reconstruct_recording
 from imubench_pipeline.tables import build, write
 from imubench_pipeline.tables.keys import Key
 
@@ -105,16 +105,16 @@ def test_what_authors_read_is_reconstructed_and_scored_beside_the_methods(rng, t
     ingest_as_planned(plan.recordings[names].path, settings, *names, folder).write(
         folder / "quality.json"
     )
-    write("allan", curves(folder, *names, AllanSettings()), folder / "curve.parquet")
+    write("allan", yield_allan_rows(folder, *names, AllanSettings()), folder / "curve.parquet")
     # Twice the noise that the log has, and no B: what the source does not print is no value.
     asked = json.loads(plan.estimate_settings(*names)) | {"authors": {"gyro_x": {"N": 2e-3}}}
-    into = estimation(folder, *names, json.dumps(asked))
+    into = estimate_recording(folder, *names, json.dumps(asked))
     read = {row["parameter"]: row for row in into.parameters if row["method"] == "authors"}
     assert read["N"]["value"] == 2e-3 and read["B"]["status"] == "not_shown"
     assert not any(row["recommended"] for row in read.values())
     for table in ("allan", "parameters", "allan_compensated"):
         write(table, getattr(into, table), folder / f"{table}.parquet")
-    rows = reconstruction_rows(folder, ReconstructionSettings())
+    rows = reconstruct_recording(folder, ReconstructionSettings())
     scores = {row["method"]: row for row in rows.scores}
     assert scores["authors"]["rms_log10"] == pytest.approx(np.log10(2.0), abs=0.02)
     assert scores["curve"]["rms_log10"] < 0.05

@@ -15,7 +15,7 @@ from imubench_pipeline.report.site import Entry, RecordingPage, Section
 from imubench_pipeline.settings.command_line import Command
 from imubench_pipeline.settings.validation import Strict
 from imubench_pipeline.simulate.models import Simulation
-from imubench_pipeline.tables.provenance import source_digest
+from imubench_pipeline.tables.provenance import digest_sources
 
 EXTENSIONS = installed_extensions()
 HOOKS: dict[str, type | None] = {  # None: a function
@@ -94,10 +94,10 @@ def test_an_extension_without_one_that_it_needs_is_left_out(
 def test_code_that_an_extension_adds_is_of_the_step(
     step: str, file: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    before, whole = source_digest(step), Path.read_bytes
-    of_allan = source_digest("steps.allan")
+    before, whole = digest_sources(step), Path.read_bytes
+    of_allan = digest_sources("steps.allan")
     changed = FOLDER / file
     monkeypatch.setattr(Path, "read_bytes", lambda one: whole(one) + b" " * (one == changed))
-    assert source_digest(step) != before
+    assert digest_sources(step) != before
     if file.endswith(("limits.py", "jinja", "js", "pages.py")):
-        assert source_digest("steps.allan") == of_allan
+        assert digest_sources("steps.allan") == of_allan

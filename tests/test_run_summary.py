@@ -7,7 +7,13 @@ import pytest
 
 from imubench_pipeline.model.comparisons import RankingRow
 from imubench_pipeline.model.recordings import FindingRow, RecordingRow
-from imubench_pipeline.report.run_summary import failure, leaders, one_line, summary, warnings
+from imubench_pipeline.report.run_summary import (
+    describe_failure,
+    fold_text,
+    list_best_sensors,
+    list_warnings,
+    summarise_run,
+)
 from imubench_pipeline.tables import write
 
 
@@ -33,7 +39,7 @@ def standing(sensor: str, **values: object) -> dict[str, Any]:
 def said(folder: Path, **rows: list[dict[str, Any]]) -> list[str]:
     for name in ("recordings", "findings", "ranking", "failures"):
         write(name, rows.get(name, []), folder / f"tables/{name}.parquet")
-    return summary(folder).splitlines()
+    return summarise_run(folder).splitlines()
 
 
 def test_a_run_says_what_became_of_the_recordings(tmp_path: Path) -> None:
@@ -73,7 +79,7 @@ def test_the_recording_with_the_worst_warnings_comes_first() -> None:
         finding("broken", "saturated", "fatal"),
         finding("rejected", "rejected", "fatal"),
     ]
-    assert list(warnings([FindingRow(**row) for row in rows])) == [
+    assert list(list_warnings([FindingRow(**row) for row in rows])) == [
         "broken/run: 1 warning: saturated",
         "many/run: 4 warnings: knock (2), gap, warm up",
         "few/run: 1 warning: gap",
@@ -92,7 +98,7 @@ def test_a_line_says_which_sensor_leads_a_requirement() -> None:
     ranking = [RankingRow(**row) for row in rows]
     recordings = [RecordingRow(**recording("best")),
                   RecordingRow(**recording("made", simulated=True))]  # fmt: skip
-    assert list(leaders(ranking, recordings)) == [
+    assert list(list_best_sensors(ranking, recordings)) == [
         "robot: best meets the limits. Best of 2 sensors (weak evidence: one unit). "
         "The difference from other is not significant.",
         "hard: No sensor meets the limits. made (simulated) is closest, but fails. "
@@ -104,19 +110,19 @@ def test_a_line_says_which_sensor_leads_a_requirement() -> None:
 
 
 def test_nothing_is_said_without_tables(tmp_path: Path) -> None:
-    assert summary(tmp_path) == ""
+    assert summarise_run(tmp_path) == ""
 
 
 def test_tables_of_another_form_make_no_run_fail(tmp_path: Path) -> None:
     said(tmp_path, recordings=[recording("a")])
     write("recordings", [recording("a")], tmp_path / "tables/ranking.parquet")
     expected = f"no summary: {tmp_path / 'tables/ranking.parquet'}: was made by another version"
-    assert summary(tmp_path).startswith(expected)
+    assert summarise_run(tmp_path).startswith(expected)
 
 
 def test_a_line_is_one_line_and_no_command_to_the_terminal() -> None:
-    assert one_line("a\r\n\x1b[31mb\t c") == "a [31mb c"
-    assert one_line("x" * 200, 10) == "x" * 9 + "…"
+    assert fold_text("a\r\n\x1b[31mb\t c") == "a [31mb c"
+    assert fold_text("x" * 200, 10) == "x" * 9 + "…"
 
 
 WORKFLOW = """
@@ -189,7 +195,7 @@ def test_a_log_of_a_run_that_was_interrupted_is_understood(tmp_path: Path) -> No
         "Terminating processes on user request, this might take some time.\n"
         "Error in rule allan:\n    jobid: 4\n    output: out/recordings/a/r/allan.parquet\n"
     )
-    first, last = failure([str(log)], Path("out")).splitlines()
+    first, last = describe_failure([str(log)], Path("out")).splitlines()
     assert first.startswith("stopped before its end; to go on, run the same command again")
     assert last == f"log: {log}"
 
@@ -200,11 +206,11 @@ def test_a_step_that_was_tried_again_is_named_once(tmp_path: Path) -> None:
         "Error in rule allan:\n    message: None\n    jobid: 4\n"
         "    output: out/recordings/a, b/r (1)/allan.parquet, x\n" * 2
     )
-    lines = failure([str(log)], Path("out")).splitlines()
+    lines = describe_failure([str(log)], Path("out")).splitlines()
     assert lines[:2] == ["1 step failed; why stands above", "  allan of a, b/r (1)"]
     with log.open("a") as file:
         file.write("Finished jobid: 4 (Rule: allan)\n")
-    assert failure([str(log)], Path("out")).startswith("a step failed; why stands above\n")
+    assert describe_failure([str(log)], Path("out")).startswith("a step failed; why stands above\n")
 
 
 def test_a_job_of_several_steps_is_named_with_its_last_log(tmp_path: Path) -> None:
@@ -219,5 +225,5 @@ def test_a_job_of_several_steps_is_named_with_its_last_log(tmp_path: Path) -> No
             for one in (1, 2)
         )
     )
-    lines = failure([str(log)], Path("out")).splitlines()
+    lines = describe_failure([str(log)], Path("out")).splitlines()
     assert lines[:2] == ["1 step failed; why stands above", "  ranking or report (2.log)"]

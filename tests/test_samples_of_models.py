@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
-from imubench_pipeline.estimators.rows import parameter_rows
-from imubench_pipeline.recordings.kept import Quality, identified
-from imubench_pipeline.recordings.recording import log_paths
-from imubench_pipeline.steps.samples_of_models import STRETCH, samples_of_models
+from imubench_pipeline.estimators.rows import make_parameter_rows
+from imubench_pipeline.recordings.kept import Quality, identify_files
+from imubench_pipeline.recordings.recording import list_log_files
+from imubench_pipeline.steps.samples_of_models import STRETCH, simulate_samples_of_models
 from imubench_pipeline.tables import build, write
 from imubench_pipeline.tables.keys import Key
 from tests.kept import kept
@@ -29,18 +29,18 @@ def rows(tmp_path_factory: pytest.TempPathFactory) -> list[dict]:
     log[5] = np.nan
     kept(folder, {"gyro_x": log}, RATE, holes=True)
     about = asdict(KEY) | {"status": "ok"}
-    Quality(about, [], {}, identified(log_paths(folder))).write(folder / "quality.json")
+    Quality(about, [], {}, identify_files(list_log_files(folder))).write(folder / "quality.json")
     absent = Parameter(None, "absent", "not asked for")
     parameters = []
     for method, value in (("curve", N / 2.0), ("likelihood", N)):
         estimate = Estimate(method, {"N": Parameter(value), "B": absent, "K": absent})
-        parameters += parameter_rows(KEY, estimate, recommended=method == "likelihood")
+        parameters += make_parameter_rows(KEY, estimate, recommended=method == "likelihood")
     write("parameters", parameters, folder / "parameters.parquet")
     for table in ("low_pass", "temperature"):
         write(table, [], folder / f"{table}.parquet")
     bias = asdict(KEY) | {"value": 0.01, "unit": "rad/s"}
     write("fixed_bias", [bias], folder / "fixed_bias.parquet")
-    made = samples_of_models(folder, KEY.sensor, KEY.recording, 7)
+    made = simulate_samples_of_models(folder, KEY.sensor, KEY.recording, 7)
     found: list[dict] = build("samples_of_models", made).to_pylist()
     return found
 

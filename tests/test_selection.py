@@ -6,7 +6,11 @@ import numpy as np
 import pytest
 
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
-from imubench_pipeline.navigation.expected_errors import error_rows, of_requirement, standard
+from imubench_pipeline.navigation.expected_errors import (
+    list_error_rows,
+    list_requirement_questions,
+    list_standard_questions,
+)
 from imubench_pipeline.settings.requirements import Requirement
 from imubench_pipeline.tables import build
 from tests.ranking import ranking_rows
@@ -34,10 +38,10 @@ def requirement(*limits: tuple[str, str, str], **keys: Any) -> Requirement:
 def errors_of(
     sensors: dict[str, dict[str, Estimate]], asked: dict[str, Requirement]
 ) -> Iterator[Any]:
-    questions = [q for name, one in asked.items() for q in of_requirement(name, one)]
+    questions = [q for name, one in asked.items() for q in list_requirement_questions(name, one)]
     for sensor, estimates in sensors.items():
         names = {"sensor": sensor, "recording": "r"}
-        rows = error_rows(names, estimates, questions, draws=200, seed=1)
+        rows = list_error_rows(names, estimates, questions, draws=200, seed=1)
         yield from build("error_budget", rows).to_pylist()
 
 
@@ -54,8 +58,8 @@ def ranking(
 def test_white_noise_grows_as_it_must() -> None:
     """The MTi-7: 5.1 m from the gyros' white noise after a minute, 0.26 m from the others'."""
     estimates = {"gyro_x": white(8.4e-5), "accel_x": white(98e-6 * G)}
-    questions = list(standard([60.0], 1e9, math.pi / 4, ["worst"]))
-    rows = build("error_budget", error_rows(NAMES, estimates, questions, draws=50, seed=1))
+    questions = list(list_standard_questions([60.0], 1e9, math.pi / 4, ["worst"]))
+    rows = build("error_budget", list_error_rows(NAMES, estimates, questions, draws=50, seed=1))
     found = {(r["error"], r["source"]): r["sigma"] for r in rows.to_pylist()}
     assert found["heading", "total"] == pytest.approx(8.4e-5 * math.sqrt(60), rel=1e-3)
     assert found["position", "gyro N"] == pytest.approx(5.14, abs=0.01)
@@ -69,16 +73,22 @@ def test_the_worst_and_the_median_axis_answer() -> None:
     estimates = {
         f"gyro_{axis}": white(N) for axis, N in zip("xyz", (2e-4, 1e-4, 3e-4), strict=True)
     }
-    questions = [q for q in standard([1.0], 1e9, 0.0, ["worst", "median"]) if q.error == "heading"]
-    rows = list(error_rows(NAMES, estimates, questions, draws=20, seed=1))
+    questions = [
+        q
+        for q in list_standard_questions([1.0], 1e9, 0.0, ["worst", "median"])
+        if q.error == "heading"
+    ]
+    rows = list(list_error_rows(NAMES, estimates, questions, draws=20, seed=1))
     totals = {row["axis"]: row for row in rows if row["source"] == "total"}
     assert (totals["worst"]["gyro"], totals["median"]["gyro"]) == ("gyro_z", "gyro_x")
     assert totals["worst"]["sigma"] == pytest.approx(3e-4, rel=1e-3)
 
 
 def test_intervals_are_those_of_the_estimates() -> None:
-    questions = [q for q in standard([1.0], 1e9, 0.0, ["worst"]) if q.error == "heading"]
-    rows = list(error_rows(NAMES, {"gyro_x": white(1e-4, 0.3)}, questions, draws=4000, seed=1))
+    questions = [
+        q for q in list_standard_questions([1.0], 1e9, 0.0, ["worst"]) if q.error == "heading"
+    ]
+    rows = list(list_error_rows(NAMES, {"gyro_x": white(1e-4, 0.3)}, questions, draws=4000, seed=1))
     assert rows[0]["lower"] == pytest.approx(0.7e-4, rel=0.02)
     assert rows[0]["upper"] == pytest.approx(1.3e-4, rel=0.02)
 

@@ -11,10 +11,10 @@ import pytest
 
 from imubench_pipeline.run.cli import COMMANDS, main
 from imubench_pipeline.run.plan import Plan
-from imubench_pipeline.run.project import snakefile_of
+from imubench_pipeline.run.project import find_snakefile
 from imubench_pipeline.run.verification.results import Results
 from imubench_pipeline.settings.config import Run, read_run
-from imubench_pipeline.settings.shipped import folders, project
+from imubench_pipeline.settings.shipped import find_project, list_folders
 from imubench_pipeline.settings.validation import ConfigError
 from tests.conftest import PROJECT
 from tests.workflow.project import put_sensor
@@ -29,8 +29,8 @@ def lab(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 def test_in_a_checkout_the_catalogue_is_its_own_folder(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(PROJECT)
-    assert project() == PROJECT
-    assert folders(Run().sensors, "sensors") == [Path("config/sensors")]
+    assert find_project() == PROJECT
+    assert list_folders(Run().sensors, "sensors") == [Path("config/sensors")]
     assert len(Plan({}).sensors) == len(list(Path("config/sensors").glob("*.yaml")))
 
 
@@ -69,12 +69,12 @@ def test_a_folder_without_logs_says_what_it_expects(lab: Path) -> None:
 
 
 def test_a_folder_has_the_workflow_of_the_package_unless_it_has_its_own(lab: Path) -> None:
-    assert snakefile_of(lab) == PROJECT / "Snakefile"
+    assert find_snakefile(lab) == PROJECT / "Snakefile"
     (lab / "workflow").mkdir()
     (lab / "workflow/Snakefile").touch()
-    assert snakefile_of(lab) == lab / "workflow/Snakefile"
+    assert find_snakefile(lab) == lab / "workflow/Snakefile"
     with pytest.raises(ConfigError, match=r"found no config/config.yaml and no Snakefile"):
-        snakefile_of(lab / "logs")
+        find_snakefile(lab / "logs")
 
 
 # Every day: that such a run of tests/workflow/test_nightly.py ends so, and `run` without Snakemake

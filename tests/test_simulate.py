@@ -13,7 +13,7 @@ from imubench_pipeline.noise.simulate import (
     simulate,
     simulate_blocks,
 )
-from imubench_pipeline.noise.variance_covariance import variance_covariance
+from imubench_pipeline.noise.variance_covariance import compute_variance_covariance
 from tests.conftest import few
 from tests.noise.examples import example, model_of
 
@@ -166,7 +166,7 @@ def test_the_ensemble_has_the_mean_and_the_scatter_of_the_model(rng) -> None:
     sizes = cluster_sizes(length, per_decade=4, longest=1 / 9)
     drawn = ensemble(MODEL, RATE, length, sizes, members, rng)
     expected = MODEL.allan_variance(sizes / RATE, RATE)
-    scatter = np.sqrt(np.diag(variance_covariance(MODEL, RATE, length, sizes)))
+    scatter = np.sqrt(np.diag(compute_variance_covariance(MODEL, RATE, length, sizes)))
     error = np.abs(drawn.mean(axis=0) - expected) / scatter * np.sqrt(members)
     assert (error < 4.5).all()
     np.testing.assert_allclose(drawn.std(axis=0) / scatter, 1.0, atol=0.15)
@@ -181,6 +181,6 @@ def test_the_shortest_clusters_of_a_short_log_are_single_samples(rng) -> None:
 def test_neighbouring_taus_go_together_in_the_ensemble(rng) -> None:
     sizes = np.array([2, 3, 4, 8])
     full = np.array([reconstructed_variance(MODEL, RATE, 4000, sizes, rng) for _ in range(3000)])
-    expected = variance_covariance(MODEL, RATE, 4000, sizes)
+    expected = compute_variance_covariance(MODEL, RATE, 4000, sizes)
     scale = np.sqrt(np.outer(np.diag(expected), np.diag(expected)))
     np.testing.assert_allclose(np.cov(full.T) / scale, expected / scale, atol=0.08)

@@ -16,10 +16,10 @@ from imubench_pipeline.model.recordings import RecordingRow
 from imubench_pipeline.model.table import TableRow
 from imubench_pipeline.readers import read
 from imubench_pipeline.readers.text.header import SIMULATED
-from imubench_pipeline.recordings.fitness import judged, simulated_beside_measured
+from imubench_pipeline.recordings.fitness import doubt_simulated_recordings, judge_recordings
 from imubench_pipeline.run.cli import main
 from imubench_pipeline.settings.sensor import LogFormat
-from imubench_pipeline.steps.tables import tables_of_all
+from imubench_pipeline.steps.tables import join_all_tables
 from imubench_pipeline.tables import build, write_arrow
 from tests.workflow.project import put_sensor
 
@@ -143,9 +143,9 @@ def joined(folder: Path, *rows: RecordingRow) -> dict[str, dict[str, Any]]:
     parts: dict[str, list[Path]] = {"recordings": [], "doubts": [], "findings": []}
     for sensor in sorted({row.sensor for row in rows}):
         own = [row for row in rows if row.sensor == sensor]
-        doubts = list(simulated_beside_measured(own))
+        doubts = list(doubt_simulated_recordings(own))
         own_tables: dict[str, Sequence[TableRow]] = {
-            "recordings": judged(own, doubts, ["one/sim", "two/sim"]),
+            "recordings": judge_recordings(own, doubts, ["one/sim", "two/sim"]),
             "doubts": [doubt.row() for doubt in doubts],
             "findings": [],
         }
@@ -153,7 +153,7 @@ def joined(folder: Path, *rows: RecordingRow) -> dict[str, dict[str, Any]]:
             path = folder / f"{sensor}.{name}.parquet"
             write_arrow(build(name, of_sensor), path)
             parts[name].append(path)
-    tables = tables_of_all(parts)
+    tables = join_all_tables(parts)
     doubted = {(d["sensor"], d["recording"]) for d in tables["doubts"].to_pylist()}
     recordings = tables["recordings"].to_pylist()
     assert doubted == {(r["sensor"], r["recording"]) for r in recordings if r["doubts"]}

@@ -21,9 +21,9 @@ from imubench_pipeline.settings.simulated_recordings import (
     read_simulated,
 )
 from imubench_pipeline.settings.validation import ConfigError, parse
-from imubench_pipeline.simulate.models import figures_of
+from imubench_pipeline.simulate.models import list_true_figures
 from imubench_pipeline.steps.simulate import write_simulated
-from imubench_pipeline.units import quantity_to_si
+from imubench_pipeline.units import parse_quantity
 from tests.conftest import PROJECT
 from tests.test_configuration import SENSOR
 
@@ -475,10 +475,10 @@ def test_n_in_the_log_of_the_shipped_board_is_sixty_times_what_the_paper_prints(
     }  # Engers, Tables 5 to 7, (°/s)/√Hz
     found = {}
     for recording in shipped():
-        rate = quantity_to_si(recording.rate, "frequency")
+        rate = parse_quantity(recording.rate, "frequency")
         for channel, axis in recording.channels.items():
             key = (recording.sensor, str(channel))
-            figures = {f.name: f.value for f in figures_of(axis, channel, rate)}
+            figures = {f.name: f.value for f in list_true_figures(axis, channel, rate)}
             found[key] = figures["N"]
             (density,) = (f for f in axis.published if f.figure == "PSD")
             assert float(density.printed.split()[0]) == printed[key]

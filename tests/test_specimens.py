@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 
 from imubench_pipeline.extensions.fusion.specimens import (
-    fused_blocks,
-    fused_model,
-    specimens_of,
-    weights_of,
+    fuse_models,
+    make_board,
+    make_specimens,
+    simulate_fused_blocks,
 )
 from imubench_pipeline.settings.simulated_recordings import SimulatedRecording
-from imubench_pipeline.steps.sensor_tables import truth_rows
+from imubench_pipeline.steps.sensor_tables import list_true_parameters
 
 DEGREE = math.pi / 180.0
 AXIS = {"N": "0.3 deg/sqrt(h)", "B": "10 deg/h", "T_B": "5 s", "K": "1 deg/h/sqrt(h)"}
@@ -30,31 +30,31 @@ def declared(number: int = 9, spread: float = 0.0, **axis: Any) -> SimulatedReco
 
 
 def test_alike_specimens_are_weighed_alike_and_have_a_root_of_their_number_less_noise() -> None:
-    models = [model.axes["gyro_x"].noise for model in specimens_of(declared())]
-    _, weights = weights_of(models, 20.0)
+    models = [model.axes["gyro_x"].noise for model in make_specimens(declared())]
+    _, weights = make_board(models, 20.0)
     assert weights.values == pytest.approx(np.full(9, 1 / 9))
-    fused = fused_model(models, weights)
+    fused = fuse_models(models, weights)
     for name in ("N", "B", "K"):
         assert getattr(fused, name) == pytest.approx(getattr(models[0], name) / 3.0)
     assert fused.T_B == models[0].T_B
 
 
 def test_specimens_that_differ_are_weighed_by_their_white_noise() -> None:
-    models = [model.axes["gyro_x"].noise for model in specimens_of(declared(spread=0.3))]
+    models = [model.axes["gyro_x"].noise for model in make_specimens(declared(spread=0.3))]
     noise = np.array([model.N for model in models])
     assert 0.1 < np.std(np.log(noise)) < 0.6
-    _, weights = weights_of(models, 20.0)
+    _, weights = make_board(models, 20.0)
     assert weights.values == pytest.approx(noise**-2 / np.sum(noise**-2))
-    assert fused_model(models, weights).N == pytest.approx(np.sum(noise**-2) ** -0.5)
+    assert fuse_models(models, weights).N == pytest.approx(np.sum(noise**-2) ** -0.5)
 
 
 def test_the_fused_log_has_the_noise_that_is_predicted() -> None:
     recording = declared(spread=0.3)
-    log = np.concatenate([block["gyro_x"] for block in fused_blocks(recording, {}, None)])
+    log = np.concatenate([block["gyro_x"] for block in simulate_fused_blocks(recording, {}, None)])
     assert len(log) == 40_000
     truth = {
         row["parameter"]: row["value"]
-        for row in truth_rows(f"[{recording.model_dump_json()}]")
+        for row in list_true_parameters(f"[{recording.model_dump_json()}]")
         if row["component"] == 1
     }
     # Means over 0.5 s: white noise alone, nearly, and the process at 9.45 s, its peak with N and K.

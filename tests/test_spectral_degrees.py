@@ -4,9 +4,9 @@ from scipy.stats import chi2
 
 from imubench_pipeline.allan import cluster_sizes
 from imubench_pipeline.allan.confidence import equivalent_degrees
-from imubench_pipeline.allan.phase import presence
+from imubench_pipeline.allan.phase import count_presence
 from imubench_pipeline.noise import GaussMarkov, NoiseModel
-from imubench_pipeline.noise.spectral_degrees import degrees_of_model
+from imubench_pipeline.noise.spectral_degrees import compute_degrees_of_freedom
 from tests.conftest import few
 from tests.test_variance_covariance import SHORT_LOG, exact, sample_covariance
 
@@ -18,7 +18,7 @@ SIZES = np.array([1, 2, 5, 10, 20, 50, 75, 100, 225, 300, 400, 450])
 def test_the_degrees_are_those_of_the_exact_double_sum(model: NoiseModel) -> None:
     variance = [exact(model, SAMPLES, np.array([n])).item() for n in SIZES]
     mean = model.allan_variance(SIZES, 1.0)
-    found = degrees_of_model(model, 1.0, SIZES, SAMPLES)
+    found = compute_degrees_of_freedom(model, 1.0, SIZES, SAMPLES)
     np.testing.assert_allclose(found.edf, 2.0 * mean**2 / variance, rtol=0.01)
     assert found.edf[-1] == found.upper[-1] == 1.0  # one difference is left
 
@@ -31,13 +31,13 @@ def test_power_laws_agree_with_greenhall_and_riley(model: NoiseModel, exponent: 
     sizes = cluster_sizes(samples)
     sizes = sizes[sizes > 20]  # flicker noise is sampled here, and continuous there
     expected = [equivalent_degrees(exponent, int(n), samples - 2 * int(n) + 1) for n in sizes]
-    found = degrees_of_model(model, 1.0, sizes, samples).edf
+    found = compute_degrees_of_freedom(model, 1.0, sizes, samples).edf
     np.testing.assert_allclose(found, expected, rtol=0.015)
 
 
 def test_the_unit_of_the_log_changes_no_degrees() -> None:
     one, other = (
-        degrees_of_model(
+        compute_degrees_of_freedom(
             NoiseModel(Q=3.0 * unit, N=unit, B=0.5 * unit, T_B=30.0, K=0.1 * unit),
             1.0,
             SIZES,
@@ -66,14 +66,14 @@ def masked_quadratic_form(
 def test_with_a_hole_the_differences_that_are_left_count(model: NoiseModel, n: int) -> None:
     log = np.zeros(SAMPLES)
     log[420:500] = np.nan
-    where = presence([log], SAMPLES)
+    where = count_presence([log], SAMPLES)
     begin = np.arange(SAMPLES - 2 * n + 1)
     missing = np.concatenate(([0], np.cumsum(np.isnan(log))))
     there = np.ones(len(begin), dtype=bool)
     for first in (begin, begin + n):
         there &= missing[first + n] - missing[first] <= n - np.ceil(0.9 * n)
     weights, _ = masked_quadratic_form(model, n, there)
-    found = degrees_of_model(
+    found = compute_degrees_of_freedom(
         model, 1.0, np.array([n]), SAMPLES, None, where, np.array([there.mean()])
     )
     expected = weights.sum() ** 2 / (weights @ weights)
@@ -92,7 +92,7 @@ def test_upper_limits_hold_where_few_differences_are_left(model: NoiseModel, par
     drawn = np.zeros(40_000)
     for weight in weights[weights > 1e-7]:
         drawn += weight * rng.standard_normal(len(drawn)) ** 2
-    degrees = degrees_of_model(model, 1.0, np.array([n]), 400)
+    degrees = compute_degrees_of_freedom(model, 1.0, np.array([n]), 400)
     edf, upper = degrees.edf[0], degrees.upper[0]
     below = np.mean(drawn < chi2.ppf(0.025, upper) / upper)
     above = np.mean(drawn > chi2.ppf(0.975, edf) / edf)
@@ -109,14 +109,17 @@ def test_a_ramp_and_a_line_leave_only_their_products_with_the_noise() -> None:
     sums = np.concatenate((np.zeros((4000, 1)), drawn.cumsum(axis=1)), axis=1)
     variance = np.mean((sums[:, 2 * n :] - 2 * sums[:, n:-n] + sums[:, : -2 * n]) ** 2, axis=1)
     expected = 2.0 * variance.mean() ** 2 / variance.var()
-    found = degrees_of_model(model, 1.0, np.array([n]), samples).edf[0]
+    found = compute_degrees_of_freedom(model, 1.0, np.array([n]), samples).edf[0]
     assert found == pytest.approx(expected, rel=0.08)
-    assert found > 2.0 * degrees_of_model(NoiseModel(N=1.0), 1.0, np.array([n]), samples).edf[0]
+    assert (
+        found
+        > 2.0 * compute_degrees_of_freedom(NoiseModel(N=1.0), 1.0, np.array([n]), samples).edf[0]
+    )
 
 
 def test_segments_add_up() -> None:
     model = NoiseModel(N=1.0, B=0.3, T_B=20.0, further=[GaussMarkov(0.2, 100.0)])
     sizes = np.array([1, 10, 50])
-    one = degrees_of_model(model, 1.0, sizes, 500).edf
-    two = degrees_of_model(model, 1.0, sizes, 1000, ((0, 500), (500, 1000))).edf
+    one = compute_degrees_of_freedom(model, 1.0, sizes, 500).edf
+    two = compute_degrees_of_freedom(model, 1.0, sizes, 1000, ((0, 500), (500, 1000))).edf
     np.testing.assert_allclose(two, 2.0 * one, rtol=1e-9)

@@ -6,8 +6,8 @@ import pytest
 import scipy.fft
 
 from imubench_pipeline.estimators.spectral_shapes import Shapes
-from imubench_pipeline.estimators.spectrum import SINGLE, Spectrum, spectra
-from imubench_pipeline.noise.terms.flicker import bank
+from imubench_pipeline.estimators.spectrum import SINGLE, Spectrum, compute_spectra
+from imubench_pipeline.noise.terms.flicker import fit_flicker_bank
 from tests.conftest import few
 
 RATE = 10.0
@@ -23,7 +23,7 @@ Covariance = Callable[[np.ndarray, np.ndarray], np.ndarray]
 def spectrum_of_block_means(block: int, number: int) -> Spectrum:
     """Its densities do not matter here; only where its bins are."""
     log = np.random.default_rng(0).standard_normal(number)
-    spectrum = spectra([log], number, RATE / block)[0]
+    spectrum = compute_spectra([log], number, RATE / block)[0]
     return replace(spectrum, rate=RATE, block=np.full(len(spectrum.frequency), block))
 
 
@@ -103,7 +103,7 @@ def test_flicker_noise_is_that_of_its_bank_of_gauss_markov_processes(
 ) -> None:
     interval = 1.0 / RATE
     expected = np.zeros(number - 1)
-    for term in bank(1.0, interval, 30.0 * block * number * interval):
+    for term in fit_flicker_bank(1.0, interval, 30.0 * block * number * interval):
         if term.symbol == "N":
             expected += term.N**2
             continue
@@ -136,7 +136,7 @@ def test_quantization_away_from_the_lowest_ordinates(block: int, number: int) ->
 
 
 def test_a_segment_of_the_log_sees_the_same_densities_as_the_whole(rng) -> None:
-    spectrum = spectra([rng.standard_normal(300_000)], 300_000, RATE)[0]
+    spectrum = compute_spectra([rng.standard_normal(300_000)], 300_000, RATE)[0]
     shapes = Shapes(spectrum)
     low, high = spectrum.block > 1, spectrum.block == 1
     assert low.any()

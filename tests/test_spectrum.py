@@ -10,8 +10,8 @@ from imubench_pipeline.estimators.spectrum import (
     SINGLE,
     LineSpectrum,
     Spectrum,
-    block_of,
-    spectra,
+    choose_block_size,
+    compute_spectra,
 )
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.simulate import simulate
@@ -22,7 +22,7 @@ LONG = 1 << 19
 
 
 def spectrum_of(log: np.ndarray, **options) -> Spectrum:
-    return spectra([log], len(log), RATE, **options)[0]
+    return compute_spectra([log], len(log), RATE, **options)[0]
 
 
 def whole_transform(log: np.ndarray, rate: float) -> tuple[np.ndarray, np.ndarray]:
@@ -85,9 +85,9 @@ def test_the_lowest_ordinates_stay_single_and_bins_are_five_per_cent_wide(rng) -
 @pytest.mark.parametrize("samples", [2000, 300_000])
 def test_the_spectrum_does_not_depend_on_how_the_log_is_cut(rng, samples: int) -> None:
     log = 9.81 + np.cumsum(rng.standard_normal(samples)) * 1e-2 + rng.standard_normal(samples)
-    whole, lines = spectra([log], samples, RATE)
+    whole, lines = compute_spectra([log], samples, RATE)
     cuts = np.sort(rng.integers(0, samples, 40))
-    pieces, lines_of_pieces = spectra(np.split(log, cuts), samples, RATE)
+    pieces, lines_of_pieces = compute_spectra(np.split(log, cuts), samples, RATE)
     for name in ("frequency", "lower", "upper", "ordinates", "density", "block", "cross"):
         np.testing.assert_allclose(getattr(pieces, name), getattr(whole, name), rtol=1e-6)
     assert pieces.mean == pytest.approx(whole.mean, rel=1e-12)
@@ -138,7 +138,7 @@ def test_a_jump_between_segments_is_in_no_spectrum(rng, length: int) -> None:
     log[length : length + 300] = np.nan
     log[2 * length + 50 :] = np.nan
     log[length + 300 :] += 1e4
-    spectrum, lines = spectra(np.array_split(log, 7), len(log), RATE, spans)
+    spectrum, lines = compute_spectra(np.array_split(log, 7), len(log), RATE, spans)
     level = np.average(spectrum.density, weights=spectrum.ordinates)
     assert level * RATE == pytest.approx(1.0, rel=4 * np.sqrt(2 / spectrum.ordinates.sum()))
     assert spectrum.density[:SINGLE].max() * RATE < 25
@@ -219,7 +219,7 @@ def test_a_long_log_is_never_held(rng) -> None:
 
     tracemalloc.start()
     try:
-        spectrum, lines = spectra(blocks(), samples, RATE)
+        spectrum, lines = compute_spectra(blocks(), samples, RATE)
         peak = tracemalloc.get_traced_memory()[1]
     finally:
         tracemalloc.stop()
@@ -240,7 +240,7 @@ def test_a_sinusoid_has_a_quarter_of_its_squared_amplitude_at_its_frequency(plac
     A, time = 3e-3, np.arange(1 << 19) / RATE
     fast, slow = 4.1 * place, 0.0204 * place
     both = A * np.cos(2 * np.pi * fast * time + 1) + 2 * A * np.sin(2 * np.pi * slow * time)
-    spectrum, (low, high) = spectra([both], len(both), RATE)
+    spectrum, (low, high) = compute_spectra([both], len(both), RATE)
     assert low.block == spectrum.block.max()
     assert high.block == 1
     assert 2 * (len(high.frequency) - 1) * high.segments == len(both)
@@ -252,7 +252,7 @@ def test_a_sinusoid_has_a_quarter_of_its_squared_amplitude_at_its_frequency(plac
 
 def test_the_spectrum_for_lines_has_the_level_of_white_noise(rng) -> None:
     N = 3e-3
-    _, lines = spectra([N * np.sqrt(RATE) * rng.standard_normal(LONG)], LONG, RATE)
+    _, lines = compute_spectra([N * np.sqrt(RATE) * rng.standard_normal(LONG)], LONG, RATE)
     for line in lines:
         inner = line.density[3:-3] / N**2
         # Neighbours under a Hann window are correlated: 1.94 times fewer are independent.
@@ -278,14 +278,18 @@ def test_the_spectrum_for_lines_has_the_level_of_white_noise(rng) -> None:
 def test_segments_are_as_long_as_they_leave_little_over(lengths: list[int], block: int) -> None:
     stops = np.cumsum(np.array(lengths) + 10)
     assert (
-        block_of([(int(stop) - n, int(stop)) for stop, n in zip(stops, lengths, strict=True)])
+        choose_block_size(
+            [(int(stop) - n, int(stop)) for stop, n in zip(stops, lengths, strict=True)]
+        )
         == block
     )
 
 
 def test_lines_are_looked_for_in_samples_and_in_means_of_blocks(rng) -> None:
     samples = 1 << 21
-    spectrum, (of_means, of_samples) = spectra([rng.standard_normal(samples)], samples, 50.0)
+    spectrum, (of_means, of_samples) = compute_spectra(
+        [rng.standard_normal(samples)], samples, 50.0
+    )
     block = int(spectrum.block.max())
     assert block > 1
     assert (of_samples.block, of_means.block) == (1, block)

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from imubench_pipeline.noise import Ramp
-from imubench_pipeline.noise.state_space import repeat_step, root_of
+from imubench_pipeline.noise.state_space import factor_covariance, repeat_step
 
 
 @pytest.mark.parametrize("times", [0, 1, 2, 7, 64, 100])
@@ -21,10 +21,10 @@ def test_the_root_of_a_covariance_in_which_something_does_not_vary():
     own = np.array([[2.0, -0.7], [-0.7, 1.0]])
     covariance = np.zeros((4, 4))
     covariance[np.ix_([0, 2], [0, 2])] = own
-    root = root_of(covariance)
+    root = factor_covariance(covariance)
     np.testing.assert_allclose(root @ root.T, covariance, atol=1e-15)
     assert (np.triu(root, 1) == 0.0).all()
-    assert root_of(np.zeros((0, 0))).shape == (0, 0)
+    assert factor_covariance(np.zeros((0, 0))).shape == (0, 0)
 
 
 def test_of_either_sign_the_mean_square_is_the_same():

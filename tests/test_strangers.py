@@ -18,8 +18,8 @@ import yaml
 from imubench_pipeline.readers import log_files
 from imubench_pipeline.readers.arrays import file as arrays
 from imubench_pipeline.readers.arrays import hdf5
-from imubench_pipeline.recordings.drop_zone import account_for, found_logs
-from imubench_pipeline.report.drop_zone import drop_zone_lines
+from imubench_pipeline.recordings.drop_zone import account_for, find_logs
+from imubench_pipeline.report.drop_zone import describe_drop_zone
 from imubench_pipeline.run.checking import check
 from imubench_pipeline.run.plan import Plan
 from imubench_pipeline.settings.sensor import RecordingNotes, Sensor
@@ -74,7 +74,7 @@ def test_what_would_take_the_square_as_a_number_is_a_text(
 )
 def test_a_name_that_a_run_cannot_bear_is_rejected_under_another(tmp_path: Path, name: str) -> None:
     put_log(tmp_path / f"logs/one/{name}.csv", 1, samples=10)
-    (log,) = found_logs(tmp_path / "logs")
+    (log,) = find_logs(tmp_path / "logs")
     assert log.error is not None and "rename the file" in log.error
     assert len(log.name.encode()) <= 160 and log.name != name
 
@@ -83,7 +83,7 @@ def test_a_file_of_no_text_for_a_name_is_rejected(tmp_path: Path) -> None:
     folder = tmp_path / "logs/one/run"
     folder.mkdir(parents=True)
     Path(f"{folder}/a\udcff.csv").write_text("1\n")
-    (log,) = found_logs(tmp_path / "logs")
+    (log,) = find_logs(tmp_path / "logs")
     assert log.error is not None and "a\\udcff.csv" in log.error
 
 
@@ -95,7 +95,7 @@ def test_a_link_to_a_folder_that_it_lies_in_is_one_rejected_file(
     for path in ("s/a.csv", "s/run/b.csv"):
         put_log(logs / path, 1, samples=10)
     (logs / "s/loop").symlink_to(target)
-    found = {log.name: log for log in found_logs(logs)}
+    found = {log.name: log for log in find_logs(logs)}
     assert found.keys() == {"a", "run", "loop"}
     assert "links to a folder that it lies in" in (found["loop"].error or "")
     files = {file.file: file.recording for file in account_for(logs, found.values())}
@@ -108,13 +108,13 @@ def test_odd_files_are_not_taken_for_changed(tmp_path: Path) -> None:
         put_log(logs / "s" / name, 1, samples=10)
     os.mkfifo(logs / "s/pipe.csv")
     (logs / "s/loop").symlink_to(".")
-    found = account_for(logs, found_logs(logs))
+    found = account_for(logs, find_logs(logs))
     rows = [{"file": file.file, "status": "rejected"} for file in found]
     write("files", rows, results / "tables/files.parquet")
     (results / "report").mkdir()
     told = {"results": str(results), "logs": str(logs)}
     (results / "report/settings.json").write_text(json.dumps(told))
-    assert drop_zone_lines(results) == ["5 files in the drop zone = 5 rejected"]
+    assert describe_drop_zone(results) == ["5 files in the drop zone = 5 rejected"]
 
 
 def test_two_logs_of_one_name_are_both_rejected_and_no_other(tmp_path: Path) -> None:

@@ -13,7 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from imubench_pipeline.tables import build, read, write_arrow
-from imubench_pipeline.tables.texts import as_cell, printable
+from imubench_pipeline.tables.texts import escape_cell, escape_invisible
 
 FORMULAS = ("=", "+", "-", "@", "\uff1d", "\uff0b", "\uff0d", "\uff20")
 SIGNS = st.sampled_from([*FORMULAS, *"';\" ,\t\r\n\x00\x1b\x7f\x85\u2028\u2029\u202e\u2066\ufeff"])
@@ -47,7 +47,7 @@ def test_no_cell_is_a_formula_and_each_text_can_be_told(
     assert len(rows) == len(given_rows)
     for row, (text, number) in zip(rows, given_rows, strict=True):
         held = dict(zip(head, row, strict=True))
-        assert of_cell(held["sensor"]) == of_cell(held["channel"]) == printable(text)
+        assert of_cell(held["sensor"]) == of_cell(held["channel"]) == escape_invisible(text)
         assert float(held["rms"]) == number  # a negative number has no apostrophe
         assert all(cell.isprintable() for cell in row)
         assert not held["sensor"].lstrip(' "').startswith(FORMULAS)
@@ -71,7 +71,7 @@ def test_what_a_text_is_changed_to(tmp_path: Path) -> None:
         ("a\u202e\x1b[2J", r"a\u202e\x1b[2J"),
         ("µ °C – 5", "µ °C – 5"),
     ):
-        assert (as_cell(text), of_cell(cell)) == (cell, printable(text))
+        assert (escape_cell(text), of_cell(cell)) == (cell, escape_invisible(text))
     # nulls stay empty, and a column that is no text stays as it is
     table = pa.table({"a": ["=1", None], "b": [-1.5, None], "c": [-3, None]})
     write_arrow(table, tmp_path / "t.csv")

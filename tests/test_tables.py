@@ -15,9 +15,9 @@ from imubench_pipeline.model.verdicts import DoubtMark, Share
 from imubench_pipeline.tables import (
     TableError,
     build,
-    making,
+    make_folder,
     read,
-    replacing,
+    replace_file,
     write,
     write_arrow,
     write_content,
@@ -148,7 +148,7 @@ def test_joining_refuses_another_table(tmp_path: Path) -> None:
 def test_a_write_that_fails_leaves_what_was_there(tmp_path: Path) -> None:
     path = tmp_path / "a.txt"
     path.write_text("old")
-    with pytest.raises(RuntimeError), replacing(path) as temporary:
+    with pytest.raises(RuntimeError), replace_file(path) as temporary:
         temporary.write_text("new")
         raise RuntimeError
     assert path.read_text() == "old"
@@ -157,12 +157,12 @@ def test_a_write_that_fails_leaves_what_was_there(tmp_path: Path) -> None:
 
 def test_a_folder_appears_with_all_that_is_in_it(tmp_path: Path) -> None:
     folder = tmp_path / "new/made"
-    with making(folder) as inside:
+    with make_folder(folder) as inside:
         write_content("a", inside / "of/a.txt")
         assert not folder.exists()
     assert [path.name for path in folder.rglob("*")] == ["of", "a.txt"]
     assert folder.stat().st_mode == folder.parent.stat().st_mode
-    with pytest.raises(RuntimeError), making(tmp_path / "new/other") as inside:
+    with pytest.raises(RuntimeError), make_folder(tmp_path / "new/other") as inside:
         write_content("a", inside / "a.txt")
         raise RuntimeError
     assert list(folder.parent.iterdir()) == [folder]

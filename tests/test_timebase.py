@@ -4,7 +4,12 @@ import numpy as np
 import pytest
 
 from imubench_pipeline.readers import RecordingError
-from imubench_pipeline.recordings.timebase import TimeBase, from_stamps, positions, without_stamps
+from imubench_pipeline.recordings.timebase import (
+    TimeBase,
+    assume_stated_rate,
+    fit_time_base,
+    locate_samples,
+)
 from imubench_pipeline.settings.quality import QualitySettings
 from imubench_pipeline.words.numbers import number_text
 
@@ -15,8 +20,8 @@ def found(stamps: np.ndarray, stated: float | None = None) -> tuple[TimeBase, np
     def blocks():
         yield from np.array_split(stamps, 7)
 
-    base = from_stamps(blocks, stated, SETTINGS)
-    return base, np.concatenate(list(positions(base, blocks, SETTINGS)))
+    base = fit_time_base(blocks, stated, SETTINGS)
+    return base, np.concatenate(list(locate_samples(base, blocks, SETTINGS)))
 
 
 def names(base: TimeBase) -> list[str]:
@@ -283,7 +288,7 @@ def test_stamps_that_do_not_advance() -> None:
 
 
 def test_no_stamps() -> None:
-    base = without_stamps(10, 5.0)
+    base = assume_stated_rate(10, 5.0)
     assert base.uniform and base.segments == ((0, 10),) and base.source == "stated"
 
 
@@ -386,7 +391,7 @@ def test_a_rate_above_the_resolution_of_the_stamps_loses_no_sample(
     true: float, rounded: Callable[[np.ndarray], np.ndarray]
 ) -> None:
     stamps = rounded(1000.0 * np.arange(20_000) / true) / 1000.0
-    base = from_stamps(lambda: iter([stamps]), None, QualitySettings())
+    base = fit_time_base(lambda: iter([stamps]), None, QualitySettings())
     assert base.rate == pytest.approx(true, rel=1e-3)
     assert base.samples >= 0.999 * len(stamps)
     assert any(found.severity == "warning" for found in base.findings)
@@ -394,5 +399,5 @@ def test_a_rate_above_the_resolution_of_the_stamps_loses_no_sample(
 
 def test_records_written_twice_at_regular_distances_are_left_out_where_the_rate_is_stated() -> None:
     stamps = np.sort(np.concatenate([np.arange(8000) / 100.0, np.arange(0, 8000, 8) / 100.0]))
-    base = from_stamps(lambda: iter([stamps]), 100.0, QualitySettings())
+    base = fit_time_base(lambda: iter([stamps]), 100.0, QualitySettings())
     assert base.rate == pytest.approx(100.0) and base.repeated == 1000

@@ -11,11 +11,11 @@ from hypothesis import strategies as st
 from imubench_pipeline.units import (
     SI_UNITS,
     UnitError,
-    conversion,
-    dimension_of,
-    from_si,
-    quantity_to_si,
-    to_si,
+    convert_from_si,
+    convert_to_si,
+    find_conversion,
+    find_dimension,
+    parse_quantity,
 )
 
 # value, unit, dimension, SI; computed by hand: 1 deg = 0.0174532925199 rad, 1 g = 9.80665 m/s²
@@ -103,19 +103,19 @@ KNOWN = [
 
 @pytest.mark.parametrize(("value", "unit", "dimension", "si"), KNOWN)
 def test_known_conversions(value: float, unit: str, dimension: str, si: float) -> None:
-    assert to_si(value, unit, dimension) == pytest.approx(si, rel=3e-9)
+    assert convert_to_si(value, unit, dimension) == pytest.approx(si, rel=3e-9)
 
 
 @pytest.mark.parametrize(("unit", "dimension"), sorted({(row[1], row[2]) for row in KNOWN}))
 @given(value=st.floats(-1e6, 1e6))
 def test_every_unit_goes_there_and_back(unit: str, dimension: str, value: float) -> None:
-    there = to_si(value, unit, dimension)
-    assert from_si(there, unit, dimension) == pytest.approx(value, rel=1e-12, abs=1e-9)
+    there = convert_to_si(value, unit, dimension)
+    assert convert_from_si(there, unit, dimension) == pytest.approx(value, rel=1e-12, abs=1e-9)
 
 
 @pytest.mark.parametrize("dimension", SI_UNITS)
 def test_si_units_are_their_own(dimension: str) -> None:
-    assert conversion(SI_UNITS[dimension], dimension) == (pytest.approx(1.0), 0.0)
+    assert find_conversion(SI_UNITS[dimension], dimension) == (pytest.approx(1.0), 0.0)
 
 
 # Each meaning of the collection of spellings: dimension, and the factor of its first spelling
@@ -180,12 +180,12 @@ def test_every_spelling_of_the_collection_is_read_or_explained(shared: Path) -> 
         for unit in entry["written"]:
             if EXPLAINED.search(unit):
                 with pytest.raises(UnitError, match=r"a sign was lost|a level in decibels"):
-                    dimension_of(unit, dimensions)
+                    find_dimension(unit, dimensions)
                 explained += 1
                 continue
             known = factors if isinstance(factors, dict) else {"": factors}
             factor = next(factor for start, factor in known.items() if unit.startswith(start))
-            found, offset = conversion(unit, dimension_of(unit, dimensions))
+            found, offset = find_conversion(unit, find_dimension(unit, dimensions))
             assert (found, offset) == (pytest.approx(factor, rel=3e-9), 0.0), unit
             read += 1
     assert (read, explained) == (82, 3)
@@ -208,7 +208,7 @@ def test_every_spelling_of_the_collection_is_read_or_explained(shared: Path) -> 
 )
 def test_wrong_units_are_named(unit: str, dimension: str) -> None:
     with pytest.raises(UnitError) as error:
-        conversion(unit, dimension)
+        find_conversion(unit, dimension)
     assert repr(unit) in str(error.value)
     assert "expected" in str(error.value)
 
@@ -227,7 +227,7 @@ def test_wrong_units_are_named(unit: str, dimension: str) -> None:
 )
 def test_both_dimensions_are_named(unit: str, dimension: str, said: str) -> None:
     with pytest.raises(UnitError, match=said):
-        conversion(unit, dimension)
+        find_conversion(unit, dimension)
 
 
 @pytest.mark.parametrize(
@@ -243,26 +243,26 @@ def test_both_dimensions_are_named(unit: str, dimension: str, said: str) -> None
 )
 def test_a_spelling_that_lost_a_sign_is_not_guessed(unit: str, dimension: str, said: str) -> None:
     with pytest.raises(UnitError) as error:
-        conversion(unit, dimension)
+        find_conversion(unit, dimension)
     assert said in str(error.value)
 
 
 def test_which_of_several_dimensions() -> None:
     noise = ("gyro_density", "gyro_power_density")
-    assert dimension_of("dps/√Hz", noise) == "gyro_density"
-    assert dimension_of("(dps)²/Hz", noise) == "gyro_power_density"
+    assert find_dimension("dps/√Hz", noise) == "gyro_density"
+    assert find_dimension("(dps)²/Hz", noise) == "gyro_power_density"
     with pytest.raises(UnitError, match="expected a unit of gyro density"):
-        dimension_of("g", noise)
+        find_dimension("g", noise)
 
 
 def test_quantity_with_its_unit() -> None:
-    assert quantity_to_si("100 Hz", "frequency") == 100.0
-    assert quantity_to_si("1.5e-1 kHz", "frequency") == 150.0
-    assert quantity_to_si("8.4e-5 rad/√s", "gyro_density") == 8.4e-5
+    assert parse_quantity("100 Hz", "frequency") == 100.0
+    assert parse_quantity("1.5e-1 kHz", "frequency") == 150.0
+    assert parse_quantity("8.4e-5 rad/√s", "gyro_density") == 8.4e-5
     with pytest.raises(UnitError, match="number with its unit"):
-        quantity_to_si("100", "frequency")
+        parse_quantity("100", "frequency")
     with pytest.raises(UnitError, match="no unit of frequency but of time"):
-        quantity_to_si("100 s", "frequency")
+        parse_quantity("100 s", "frequency")
 
 
 @pytest.mark.parametrize(
@@ -277,15 +277,17 @@ def test_quantity_with_its_unit() -> None:
 )
 def test_a_number_without_unit_is_told_how_it_is_written(dimension: str, said: str) -> None:
     with pytest.raises(UnitError) as error:
-        quantity_to_si("48", dimension)
+        parse_quantity("48", dimension)
     assert str(error.value).endswith(f"such as {said}")
-    assert quantity_to_si(said.split("'")[1], dimension) != 0.0
+    assert parse_quantity(said.split("'")[1], dimension) != 0.0
 
 
 def test_the_printed_pair_of_a_data_sheet() -> None:
     # ADIS16470: 0.008 °/s/√Hz, one-sided, and 0.34 °/√h
-    density = to_si(0.008, "°/s/√Hz", "gyro_density")
-    assert from_si(density / math.sqrt(2), "°/√h", "gyro_density") == pytest.approx(0.339, abs=5e-4)
+    density = convert_to_si(0.008, "°/s/√Hz", "gyro_density")
+    assert convert_from_si(density / math.sqrt(2), "°/√h", "gyro_density") == pytest.approx(
+        0.339, abs=5e-4
+    )
 
 
 @pytest.mark.parametrize(
@@ -299,14 +301,14 @@ def test_the_printed_pair_of_a_data_sheet() -> None:
 )  # fmt: skip
 def test_an_expression_is_no_unit_and_nothing_computes_it(text: str) -> None:
     with pytest.raises(UnitError) as caught:
-        to_si(1.0, text, "angular_rate")
+        convert_to_si(1.0, text, "angular_rate")
     assert len(str(caught.value)) < 300
 
 
 @given(st.text(max_size=60), st.sampled_from(sorted(SI_UNITS)))
 def test_any_text_is_a_unit_or_an_error_that_says_so(text: str, dimension: str) -> None:
     with contextlib.suppress(UnitError):
-        factor, offset = conversion(text, dimension)
+        factor, offset = find_conversion(text, dimension)
         assert math.isfinite(factor) and factor > 0.0 and math.isfinite(offset)
 
 
@@ -324,6 +326,6 @@ def test_any_text_is_a_unit_or_an_error_that_says_so(text: str, dimension: str) 
 def test_products_quotients_and_powers(written: str, factor: float | None) -> None:
     if factor is None:
         with pytest.raises(UnitError, match="no unit of velocity"):
-            conversion(written, "velocity")
+            find_conversion(written, "velocity")
     else:
-        assert conversion(written, "velocity")[0] == pytest.approx(factor, rel=1e-15)
+        assert find_conversion(written, "velocity")[0] == pytest.approx(factor, rel=1e-15)

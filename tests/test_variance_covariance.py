@@ -7,7 +7,7 @@ from imubench_pipeline.allan import allan_variance, cluster_sizes
 from imubench_pipeline.allan.confidence import equivalent_degrees
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.simulate import channel_rng, simulate
-from imubench_pipeline.noise.variance_covariance import variance_covariance
+from imubench_pipeline.noise.variance_covariance import compute_variance_covariance
 
 MTI_7 = NoiseModel(N=8.4e-5, B=6.7e-5, T_B=89.5, K=8.2e-7)
 
@@ -59,7 +59,7 @@ def test_the_covariance_is_the_exact_double_sum(model: NoiseModel) -> None:
     samples = 900
     sizes = np.array([1, 2, 5, 10, 20, 50, 75, 100, 225])
     expected = exact(model, samples, sizes)
-    found = variance_covariance(model, 1.0, samples, sizes)
+    found = compute_variance_covariance(model, 1.0, samples, sizes)
     spread = np.sqrt(np.diag(expected))
     ratio = np.sqrt(np.diag(found)) / spread
     ninth = sizes <= samples / 9
@@ -73,7 +73,7 @@ def test_the_covariance_is_the_exact_double_sum(model: NoiseModel) -> None:
 def test_the_differences_of_a_short_log_are_counted() -> None:
     sizes = np.array([1, 2, 4])
     expected = np.diag(exact(NoiseModel(N=1.0), 40, sizes))
-    found = np.diag(variance_covariance(NoiseModel(N=1.0), 1.0, 40, sizes))
+    found = np.diag(compute_variance_covariance(NoiseModel(N=1.0), 1.0, 40, sizes))
     # within 0.0021; one difference more or less is 0.0125
     np.testing.assert_allclose(np.sqrt(found / expected), 1.0, atol=0.004)
 
@@ -83,7 +83,9 @@ def test_white_noise_has_the_degrees_of_freedom_of_greenhall_and_riley() -> None
     sizes = cluster_sizes(samples, longest=1 / 9)
     variance = 0.01 / sizes
     expected = [2 / equivalent_degrees(0, int(n), samples - 2 * int(n) + 1) for n in sizes]
-    found = np.diag(variance_covariance(NoiseModel(N=0.1), 1.0, samples, sizes)) / variance**2
+    found = (
+        np.diag(compute_variance_covariance(NoiseModel(N=0.1), 1.0, samples, sizes)) / variance**2
+    )
     np.testing.assert_allclose(np.sqrt(found), np.sqrt(expected), rtol=0.005)
 
 
@@ -93,7 +95,9 @@ def test_random_walk_has_the_degrees_of_freedom_of_greenhall_and_riley() -> None
     sizes = cluster_sizes(samples, longest=1 / 9)[12:]
     variance = sizes / 3 * (1 + 0.5 / sizes**2)
     expected = [2 / equivalent_degrees(-2, int(n), samples - 2 * int(n) + 1) for n in sizes]
-    found = np.diag(variance_covariance(NoiseModel(K=1.0), 1.0, samples, sizes)) / variance**2
+    found = (
+        np.diag(compute_variance_covariance(NoiseModel(K=1.0), 1.0, samples, sizes)) / variance**2
+    )
     np.testing.assert_allclose(np.sqrt(found), np.sqrt(expected), rtol=0.015)
 
 
@@ -108,7 +112,7 @@ def test_the_covariance_is_that_of_simulated_logs(model: NoiseModel) -> None:
     rng = channel_rng(20260102, model.name)
     logs = (simulate(model, 1.0, samples, rng) for _ in range(members))
     found = np.array([allan_variance(log, 1.0, cluster_sizes=sizes).variance for log in logs])
-    expected = variance_covariance(model, 1.0, samples, sizes)
+    expected = compute_variance_covariance(model, 1.0, samples, sizes)
     spread = np.sqrt(np.diag(expected))
     # A standard deviation from 500 logs is itself known to 3 or, where the tail is long, 6 %.
     np.testing.assert_allclose(found.std(axis=0) / spread, 1.0, atol=0.15)
@@ -128,7 +132,7 @@ def test_the_integral_is_that_on_a_fine_grid() -> None:
     shaped = gain * MTI_7.sampled_spectrum(omega, 100.0)
     expected = shaped @ shaped.T / points / (2 * (samples - 1.5 * np.minimum.outer(sizes, sizes)))
     spread = np.sqrt(np.diag(expected))
-    found = variance_covariance(MTI_7, 100.0, samples, sizes)
+    found = compute_variance_covariance(MTI_7, 100.0, samples, sizes)
     np.testing.assert_allclose(
         found / np.outer(spread, spread), expected / np.outer(spread, spread), atol=1e-3
     )
@@ -136,8 +140,10 @@ def test_the_integral_is_that_on_a_fine_grid() -> None:
 
 def test_it_is_a_covariance_and_the_same_each_time() -> None:
     sizes = cluster_sizes(3_600_000)
-    found = variance_covariance(MTI_7, 100.0, 3_600_000, sizes)
-    np.testing.assert_array_equal(found, variance_covariance(MTI_7, 100.0, 3_600_000, sizes))
+    found = compute_variance_covariance(MTI_7, 100.0, 3_600_000, sizes)
+    np.testing.assert_array_equal(
+        found, compute_variance_covariance(MTI_7, 100.0, 3_600_000, sizes)
+    )
     np.testing.assert_array_equal(found, found.T)
     correlation = found / np.sqrt(np.outer(np.diag(found), np.diag(found)))
     assert np.linalg.eigvalsh(correlation).min() > -1e-9

@@ -5,12 +5,12 @@ from __future__ import annotations
 import argparse
 
 from extensions.markdown import cell, code, table
-from imubench_pipeline.run.cli import COMMANDS, command_parser
+from imubench_pipeline.run.cli import COMMANDS, make_parser
 
 
 def commands() -> str:
     """Return a section for every command."""
-    parser = command_parser()
+    parser = make_parser()
     (choice,) = (
         action for action in parser._actions if isinstance(action, argparse._SubParsersAction)
     )

@@ -10,8 +10,8 @@ from imubench_pipeline.export.targets import TARGETS
 from imubench_pipeline.model.table import TypedColumn
 from imubench_pipeline.noise.terms import TERMS
 from imubench_pipeline.readers.formats import FILE_FORMATS
-from imubench_pipeline.report.glossary import Term, glossary
-from imubench_pipeline.run.formats_command import Line, export_targets, log_formats
+from imubench_pipeline.report.glossary import Term, read_glossary
+from imubench_pipeline.run.formats_command import Line, list_export_targets, list_log_formats
 from imubench_pipeline.tables.schemas import TABLES
 
 
@@ -54,7 +54,7 @@ def findings() -> str:
     """Return what is found in logs, and what to do about it."""
     rows = (
         (code(term.key), cell(term.short), cell(term.action))
-        for term in glossary().values()
+        for term in read_glossary().values()
         if term.action
     )
     return table(("finding", "what it says", "what to do"), rows)
@@ -65,14 +65,14 @@ _STATUSES = ("ok", "doubtful", "not_shown", "at_bound", "not_identified", "absen
 
 def statuses() -> str:
     """Return what the status of an estimated figure says."""
-    terms = glossary()
+    terms = read_glossary()
     return table(("status", "what it says"), ((code(s), cell(terms[s].short)) for s in _STATUSES))
 
 
 def terms_of_the_report() -> str:
     """Return every word of the report, by the section that it stands in."""
     sections: dict[str, list[Term]] = {}
-    for term in glossary().values():
+    for term in read_glossary().values():
         if not term.action:
             sections.setdefault(term.section, []).append(term)
     return "\n".join(
@@ -84,12 +84,12 @@ def terms_of_the_report() -> str:
 
 def formats() -> str:
     """Return the logs that are read."""
-    return _of_lines(log_formats())
+    return _of_lines(list_log_formats())
 
 
 def targets() -> str:
     """Return the programs that files are written for."""
-    return _of_lines(export_targets())
+    return _of_lines(list_export_targets())
 
 
 def _of_lines(lines: Iterable[Line]) -> str:

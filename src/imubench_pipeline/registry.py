@@ -1,8 +1,9 @@
 """What the packages in `extensions/` add to the core, which imports none of them.
 
 Each declares one `Extension`, as ``EXTENSION``. What it adds is named by references, such as
-``"aided.limits:outage_rows"``: an object of a module in `extensions/`, imported when the core asks
-for it through a `Hook`, which states its type. So each process of a run imports only what it needs.
+``"aided.limits:yield_outage_rows"``: an object of a module in `extensions/`, imported when the core
+asks for it through a `Hook`, which states its type. So each process of a run imports only what it
+needs.
 """
 
 from __future__ import annotations

@@ -100,7 +100,7 @@ class UnitError(ValueError):
 
 
 @contextmanager
-def naming(key: str) -> Iterator[None]:
+def add_key_to_errors(key: str) -> Iterator[None]:
     """Put a key in front of the text of a UnitError."""
     try:
         yield
@@ -296,7 +296,7 @@ def _targets() -> dict[str, pint.Unit]:
 
 
 @lru_cache(maxsize=1024)
-def conversion(unit: str, dimension: str) -> tuple[float, float]:
+def find_conversion(unit: str, dimension: str) -> tuple[float, float]:
     """Return ``(factor, offset)`` with ``si = factor * value + offset``.
 
     Parameters
@@ -336,30 +336,30 @@ def conversion(unit: str, dimension: str) -> tuple[float, float]:
     return float(one - zero), float(zero)
 
 
-def dimension_of(unit: str, expected: tuple[str, ...]) -> str:
+def find_dimension(unit: str, expected: tuple[str, ...]) -> str:
     """Return the dimension of a unit among some keys of `SI_UNITS`, the usual one first.
 
     Raises a `UnitError` about the first one if it has none of them.
     """
     for dimension in expected[1:]:
         try:
-            conversion(unit, dimension)
+            find_conversion(unit, dimension)
         except UnitError:
             continue
         return dimension
-    conversion(unit, expected[0])
+    find_conversion(unit, expected[0])
     return expected[0]
 
 
-def to_si(value: float, unit: str, dimension: str) -> float:
-    """Convert one value to the SI unit of its dimension (see `conversion`)."""
-    factor, offset = conversion(unit, dimension)
+def convert_to_si(value: float, unit: str, dimension: str) -> float:
+    """Convert one value to the SI unit of its dimension (see `find_conversion`)."""
+    factor, offset = find_conversion(unit, dimension)
     return factor * value + offset
 
 
-def from_si(value: float, unit: str, dimension: str) -> float:
-    """Convert one SI value to ``unit`` (see `conversion`)."""
-    factor, offset = conversion(unit, dimension)
+def convert_from_si(value: float, unit: str, dimension: str) -> float:
+    """Convert one SI value to ``unit`` (see `find_conversion`)."""
+    factor, offset = find_conversion(unit, dimension)
     return (value - offset) / factor
 
 
@@ -371,7 +371,7 @@ def convert(value: Any, unit: str, to: str) -> Any:
     value : float or ndarray
         In ``unit``.
     unit, to : str
-        As vendors write them (see `conversion`).
+        As vendors write them (see `find_conversion`).
 
     Returns
     -------
@@ -392,17 +392,17 @@ def convert(value: Any, unit: str, to: str) -> Any:
     wrong = UnitError(f"{unit!r} is no unit of an inertial sensor; expected one such as deg/h")
     for dimension in reversed(SI_UNITS):
         try:
-            si = to_si(value, unit, dimension)
+            si = convert_to_si(value, unit, dimension)
         except UnitError:
             continue
         try:
-            return from_si(si, to, dimension)
+            return convert_from_si(si, to, dimension)
         except UnitError as error:  # g may be a mass
             wrong = error
     raise wrong
 
 
-def in_si(value: float | str, dimension: str, name: str) -> float:
+def parse_setting(value: float | str, dimension: str, name: str) -> float:
     """Return a setting above 0 in SI: a number is in SI, a text has its unit.
 
     Parameters
@@ -422,8 +422,8 @@ def in_si(value: float | str, dimension: str, name: str) -> float:
         If it is neither a number nor a text, or not above 0 and finite.
     """
     if isinstance(value, str):
-        with naming(f"{name}: "):
-            number = quantity_to_si(value, dimension)
+        with add_key_to_errors(f"{name}: "):
+            number = parse_quantity(value, dimension)
     else:
         try:
             number = math.nan if isinstance(value, bool) else float(value)
@@ -441,19 +441,19 @@ def in_si(value: float | str, dimension: str, name: str) -> float:
 _QUANTITY = re.compile(r"^\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*([^\d\s.].*)$")
 
 
-def quantity_to_si(text: str, dimension: str) -> float:
+def parse_quantity(text: str, dimension: str) -> float:
     """Read a number with its unit, such as ``100 Hz``, into SI.
 
     Raises a `UnitError` without a number or a unit, for another dimension, and beyond a float.
     """
     number, unit = _number_and_unit(text, dimension)
-    return _finite(to_si(number, unit, dimension), text)
+    return _finite(convert_to_si(number, unit, dimension), text)
 
 
-def difference_to_si(text: str, dimension: str) -> float:
-    """Read a difference with its unit into SI: 5 degC are 5 K, not 278 (see `quantity_to_si`)."""
+def parse_difference(text: str, dimension: str) -> float:
+    """Read a difference with its unit into SI: 5 degC are 5 K, not 278 (see `parse_quantity`)."""
     number, unit = _number_and_unit(text, dimension)
-    factor, _ = conversion(unit, dimension)
+    factor, _ = find_conversion(unit, dimension)
     return _finite(factor * number, text)
 
 

@@ -1,6 +1,6 @@
 import numpy as np
 
-from imubench_pipeline.extensions.aided.strapdown import step
+from imubench_pipeline.extensions.aided.strapdown import propagate_sample
 
 
 def mechanise(
@@ -16,7 +16,7 @@ def mechanise(
     p, v, C, room = p.copy(), v.copy(), C.copy(), np.empty((4, 3, 3))
     reached = [(p.copy(), v.copy(), C.copy())]
     for w, f in zip(rate, force, strict=True):
-        step(p, v, C, w, f, T, earth, room)
+        propagate_sample(p, v, C, w, f, T, earth, room)
         reached.append((p.copy(), v.copy(), C.copy()))
     positions, velocities, attitudes = (np.array(each) for each in zip(*reached, strict=True))
     return positions, velocities, attitudes

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from imubench_pipeline.extensions.aided.axis_states import axis_states, stack
+from imubench_pipeline.extensions.aided.axis_states import make_axis_states, stack_axes
 from imubench_pipeline.extensions.aided.runs import Drive
-from imubench_pipeline.extensions.aided.trajectories import trajectory
+from imubench_pipeline.extensions.aided.trajectories import simulate_trajectory
 from imubench_pipeline.noise import NoiseModel
 
 RATE, WIDTH, STEPS = 50.0, 5, 10
@@ -32,8 +32,8 @@ class Blocks:
 
 def sums(model: NoiseModel, steps: int) -> np.ndarray:
     """Covariance of the sums over steps of a filter that sees none of them, from its matrices."""
-    axis = axis_states(model, RATE, turn_on=0.0, shortest=1.0, longest=100.0)
-    one = stack([axis] * 6, RATE, WIDTH, steps)
+    axis = make_axis_states(model, RATE, turn_on=0.0, shortest=1.0, longest=100.0)
+    one = stack_axes([axis] * 6, RATE, WIDTH, steps)
     own = slice(one.first[2], one.first[3])
     powers = [np.linalg.matrix_power(one.step[own, own], k) for k in range(steps)]
     start, covariance = one.start[own, own], np.empty((steps, steps))
@@ -74,7 +74,7 @@ def test_sums_over_steps_have_the_covariance_of_the_terms(model: NoiseModel) -> 
 
 def test_the_bias_at_switch_on_is_the_start_of_a_walk_or_a_state() -> None:
     plain, walk = (
-        axis_states(model, RATE, turn_on=0.1, shortest=1.0, longest=100.0).space
+        make_axis_states(model, RATE, turn_on=0.1, shortest=1.0, longest=100.0).space
         for model in (NoiseModel(N=1e-3), NoiseModel(N=1e-3, K=1e-4))
     )
     for space in (plain, walk):
@@ -88,5 +88,5 @@ def test_the_bias_at_switch_on_is_the_start_of_a_walk_or_a_state() -> None:
     ("rate", "width", "steps"), [(100.0, 10, 10), (32.0, 4, 8), (7.0, 1, 7), (51.0, 3, 17)]
 )
 def test_steps_divide_the_time_between_fixes(rate: float, width: int, steps: int) -> None:
-    drive = Drive(trajectory("rest", 2.0, rate), [])
+    drive = Drive(simulate_trajectory("rest", 2.0, rate), [])
     assert (drive.width, drive.steps) == (width, steps)

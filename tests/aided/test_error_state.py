@@ -5,7 +5,7 @@ import pytest
 from scipy.linalg import block_diag
 from scipy.stats import chi2
 
-from imubench_pipeline.extensions.aided.axis_states import AxisStates, axis_states
+from imubench_pipeline.extensions.aided.axis_states import AxisStates, make_axis_states
 from imubench_pipeline.extensions.aided.error_state import DEGREES_OF_FREEDOM, GROUPS
 from imubench_pipeline.extensions.aided.runs import (
     INITIAL_HEADING_SIGMA,
@@ -14,11 +14,15 @@ from imubench_pipeline.extensions.aided.runs import (
     Drive,
     Outage,
     Outcome,
-    schedule,
+    schedule_outages,
 )
-from imubench_pipeline.extensions.aided.signals import Signals, Spreads, signals
-from imubench_pipeline.extensions.aided.strapdown import rotation, turn_between
-from imubench_pipeline.extensions.aided.trajectories import Trajectory, headings, trajectory
+from imubench_pipeline.extensions.aided.signals import Signals, Spreads, simulate_signals
+from imubench_pipeline.extensions.aided.strapdown import compute_rotation_vector, write_rotation
+from imubench_pipeline.extensions.aided.trajectories import (
+    Trajectory,
+    compute_headings,
+    simulate_trajectory,
+)
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.settings.sensor import CHANNELS
 from imubench_pipeline.simulate.model import SensorModel
@@ -40,7 +44,7 @@ Of 100 runs it is known to 0.6 %, that of the slow states of a run to 0.9 %.
 
 def tuned(gyro: NoiseModel, accel: NoiseModel, rate: float, scale: float = 0.0) -> list[AxisStates]:
     return [
-        axis_states(
+        make_axis_states(
             gyro if channel.startswith("gyro") else accel,
             rate,
             turn_on=SPREADS.bias(channel),
@@ -55,7 +59,7 @@ def tuned(gyro: NoiseModel, accel: NoiseModel, rate: float, scale: float = 0.0) 
 def of_step(way: Trajectory, k: int, by: np.ndarray) -> np.ndarray:
     """Errors after a sample, by errors before: navigation, then rates, then forces."""
     turn, off = np.empty((3, 3)), np.empty(3)
-    rotation(*by[6:9], turn)
+    write_rotation(*by[6:9], turn)
     p, v, C = mechanise(
         way.position[k] + by[:3],
         way.velocity[k] + by[3:6],
@@ -65,7 +69,7 @@ def of_step(way: Trajectory, k: int, by: np.ndarray) -> np.ndarray:
         1.0 / way.sampling,
         way.earth,
     )
-    turn_between(way.attitude[k + 1].T.copy(), C[1].T.copy(), off)
+    compute_rotation_vector(way.attitude[k + 1].T.copy(), C[1].T.copy(), off)
     return np.concatenate([p[1] - way.position[k + 1], v[1] - way.velocity[k + 1], -off])
 
 
@@ -115,14 +119,14 @@ def plain_variances(drive: Drive, axes: list[AxisStates]) -> np.ndarray:
     "gyro", few([NoiseModel(Q=2e-5, N=8.4e-5, B=6.7e-4)], [GYRO]), ids=lambda model: model.name
 )
 def test_the_covariance_is_that_of_a_filter_of_a_step_a_sample(gyro: NoiseModel) -> None:
-    way = trajectory("drone", 12.0, 50.0)
+    way = simulate_trajectory("drone", 12.0, 50.0)
     drive = Drive(way, [Outage(5.0, 5.0)])
     axes = tuned(gyro, ACCEL, 50.0, scale=3e-3)
     ideal = Signals(
         way.rate,
         way.force,
         np.column_stack([
-            way.position[drive.at], way.velocity[drive.at], headings(way.attitude[drive.at])
+            way.position[drive.at], way.velocity[drive.at], compute_headings(way.attitude[drive.at])
         ]),
         np.full((len(drive.at), 6), np.nan),
         np.zeros(9),
@@ -135,14 +139,14 @@ def test_the_covariance_is_that_of_a_filter_of_a_step_a_sample(gyro: NoiseModel)
 
 @pytest.fixture(scope="module", params=few([10], [30, 100]))
 def outcomes(request: pytest.FixtureRequest) -> dict:
-    way = trajectory("car", 600.0, 100.0)
-    drive = Drive(way, schedule(600.0, (10.0, 30.0, 60.0)))
+    way = simulate_trajectory("car", 600.0, 100.0)
+    drive = Drive(way, schedule_outages(600.0, (10.0, 30.0, 60.0)))
     axes = {c: SensorModel(noise=GYRO if c.startswith("gyro") else ACCEL) for c in CHANNELS}
     far = NoiseModel(N=GYRO.N / 3.0, K=GYRO.K)
     tunings = {"true": tuned(GYRO, ACCEL, 100.0), "wrong": tuned(far, ACCEL, 100.0)}
 
     def of_run(number: int) -> Signals:
-        return signals(way, axes, SPREADS, 100, 7, ("car", str(number)))
+        return simulate_signals(way, axes, SPREADS, 100, 7, ("car", str(number)))
 
     assert [outage.length for outage in drive.outages].count(60.0) == 2
     found = drive.repeat(tunings, of_run, request.param, threads=2)
@@ -186,7 +190,7 @@ def test_runs_are_the_same_again_and_each_is_another(outcomes: dict) -> None:
     way = outcomes["drive"].trajectory
     axes = {c: SensorModel(noise=GYRO if c.startswith("gyro") else ACCEL) for c in CHANNELS}
     first, again, other = (
-        signals(way, axes, SPREADS, 100, 7, ("car", number)).rate for number in "001"
+        simulate_signals(way, axes, SPREADS, 100, 7, ("car", number)).rate for number in "001"
     )
     np.testing.assert_array_equal(first, again)
     assert np.abs(first - other).max() > 1e-4

@@ -13,10 +13,14 @@ import pytest
 from imubench_pipeline.export.imu import AxisNoise, Imu
 from imubench_pipeline.export.matrices import FLICKER_TAU_OVER_HORIZON
 from imubench_pipeline.export.targets import TARGETS
-from imubench_pipeline.extensions.aided.axis_states import AxisStates, axis_states, with_turn_on
+from imubench_pipeline.extensions.aided.axis_states import (
+    AxisStates,
+    add_turn_on_bias,
+    make_axis_states,
+)
 from imubench_pipeline.extensions.aided.runs import Drive, Outage
-from imubench_pipeline.extensions.aided.signals import Spreads, signals
-from imubench_pipeline.extensions.aided.trajectories import trajectory
+from imubench_pipeline.extensions.aided.signals import Spreads, simulate_signals
+from imubench_pipeline.extensions.aided.trajectories import simulate_trajectory
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.state_space import StateSpace
 from imubench_pipeline.settings.sensor import CHANNELS
@@ -31,9 +35,9 @@ ACCEL = NoiseModel(N=9.6e-4, B=3.4e-4, T_B=38.3, K=1.7e-5)
 FLICKER = {"gyro": NoiseModel(N=8.4e-5, B=6.7e-5), "accel": NoiseModel(N=9.6e-4, B=3.4e-4)}
 PAPERS = {"gyro": GYRO, "accel": ACCEL}
 SPREADS = Spreads(1e-3, 0.02)
-WAY = trajectory("car", 100.0, RATE)
+WAY = simulate_trajectory("car", 100.0, RATE)
 DRIVE = Drive(WAY, [Outage(60.0, 30.0)])
-SIGNALS = signals(
+SIGNALS = simulate_signals(
     WAY,
     {c: SensorModel(noise=PAPERS[c.split("_")[0]]) for c in CHANNELS},
     SPREADS,
@@ -107,7 +111,7 @@ def exported(target: str, models: dict[str, NoiseModel]) -> list[AxisStates]:
     )
     content = TARGETS[target].write(imu)
     return [
-        AxisStates(with_turn_on(LOADED[target](content, c.split("_")[0]), SPREADS.bias(c)))
+        AxisStates(add_turn_on_bias(LOADED[target](content, c.split("_")[0]), SPREADS.bias(c)))
         for c in CHANNELS
     ]
 
@@ -125,7 +129,7 @@ def test_exported_matrices_navigate_as_the_model(
     target: str, models: dict[str, NoiseModel]
 ) -> None:
     own = [
-        axis_states(
+        make_axis_states(
             models[channel.split("_")[0]],
             RATE,
             turn_on=SPREADS.bias(channel),

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
-from imubench_pipeline.estimators.rows import parameter_rows
+from imubench_pipeline.estimators.rows import make_parameter_rows
 from imubench_pipeline.extensions.aided.measures import Share
 from imubench_pipeline.extensions.aided.navigate import _is_consistent, navigate
 from imubench_pipeline.extensions.aided.settings import NavigateSettings
-from imubench_pipeline.extensions.aided.tunings import scaled, tunings
+from imubench_pipeline.extensions.aided.tunings import collect_tunings, scale_model
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.simulate import simulate
 from imubench_pipeline.recordings.kept import Quality
@@ -75,8 +75,8 @@ def put(folder: Path, channels: tuple[str, ...], samples: int = 20_000) -> None:
         own = {name: Parameter(getattr(model, name)) for name in ("N", "B", "T_B", "K")}
         key = Key("imu", "a", channel)
         absent = dict.fromkeys(("B", "T_B", "K"), Parameter(None, "not_shown", "flat"))
-        rows += parameter_rows(key, Estimate("likelihood", own), recommended=True)
-        rows += parameter_rows(key, Estimate("curve", own | absent), recommended=False)
+        rows += make_parameter_rows(key, Estimate("likelihood", own), recommended=True)
+        rows += make_parameter_rows(key, Estimate("curve", own | absent), recommended=False)
         tau = np.geomspace(1.0 / RATE, 100.0, 25)
         for t in np.unique(np.rint(tau * RATE)) / RATE:
             level = math.sqrt(model.allan_variance([t], RATE)[0])
@@ -110,7 +110,7 @@ def run(folder: Path, asked: list[Any], sensor: Sensor | None = SENSOR) -> list[
 
 
 def test_tunings_are_what_is_known_of_the_sensor(folder: Path) -> None:
-    found, lacking = tunings(folder, "imu", SENSOR, 60.0, {})
+    found, lacking = collect_tunings(folder, "imu", SENSOR, 60.0, {})
     assert lacking == {}
     assert set(found) == {
         *("datasheet", "datasheet_misread", "times_ten", "overbound", "likelihood", "curve")
@@ -118,7 +118,7 @@ def test_tunings_are_what_is_known_of_the_sensor(folder: Path) -> None:
     gyro = MODELS["gyro"]
     assert found["likelihood"]["gyro_z"] == gyro
     assert found["curve"]["gyro_z"] == NoiseModel(N=gyro.N)
-    assert found["times_ten"]["gyro_z"] == scaled(gyro, 10.0)
+    assert found["times_ten"]["gyro_z"] == scale_model(gyro, 10.0)
     assert found["times_ten"]["gyro_z"].K == pytest.approx(10.0 * gyro.K)
     # 0.01 deg/s one-sided, 10 deg/h at the lowest point of the curve, that is 0.664 B.
     right, wrong = found["datasheet"]["gyro_x"], found["datasheet_misread"]["gyro_x"]

@@ -7,12 +7,12 @@ from typing import Any
 import pytest
 from pydantic import ValidationError
 
-from imubench_pipeline.extensions.aided.limits import outage_rows
+from imubench_pipeline.extensions.aided.limits import yield_outage_rows
 from imubench_pipeline.extensions.aided.trajectories import TRAJECTORY_NAMES
 from imubench_pipeline.model.recordings import RecordingRow
-from imubench_pipeline.navigation.selection import ranked
+from imubench_pipeline.navigation.selection import rank_sensors
 from imubench_pipeline.navigation.verdicts.basis import Basis
-from imubench_pipeline.navigation.verdicts.judgement import judgements
+from imubench_pipeline.navigation.verdicts.judgement import judge_sensors
 from imubench_pipeline.settings.requirements import Limit, Requirement, Trajectory
 from imubench_pipeline.tables import build
 from tests.report.tables import recording_rows
@@ -33,10 +33,10 @@ def verdict(size: float, half: float = 1.05, **changes: Any) -> dict[str, Any]:
     )
     about = RecordingRow.rows_of(build("recordings", recording_rows("imu")["recordings"]))
     runs = build("navigation", [run])
-    rows = outage_rows(runs, about, {"robot": OUTAGE})
+    rows = yield_outage_rows(runs, about, {"robot": OUTAGE})
     basis = Basis.of(about)
-    judged = list(judgements(rows, {"robot": OUTAGE}, {"imu": {"price_class": None}}, basis))
-    (row,) = build("ranking", ranked(judged, basis)).to_pylist()
+    judged = list(judge_sensors(rows, {"robot": OUTAGE}, {"imu": {"price_class": None}}, basis))
+    (row,) = build("ranking", rank_sensors(judged, basis)).to_pylist()
     return row
 
 

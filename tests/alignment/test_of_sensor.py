@@ -10,11 +10,15 @@ import pytest
 
 from imubench_pipeline.earth import EARTH_RATE
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
-from imubench_pipeline.estimators.rows import parameter_rows
+from imubench_pipeline.estimators.rows import make_parameter_rows
 from imubench_pipeline.extensions.calibration.alignment.accuracy import accuracies
 from imubench_pipeline.extensions.calibration.alignment.fine import UNIFORM_HEADING_SIGMA
 from imubench_pipeline.extensions.calibration.alignment.triad import Site, Triad
-from imubench_pipeline.extensions.earth_rate.outlook import TIMES, noise_at_rest, outlook_tables
+from imubench_pipeline.extensions.earth_rate.outlook import (
+    TIMES,
+    load_noise_at_rest,
+    make_outlook_tables,
+)
 from imubench_pipeline.extensions.earth_rate.settings import EarthRateSettings
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.tables import build, write
@@ -32,7 +36,7 @@ def put_triad(folder: Path, models: dict[str, NoiseModel], **about: Any) -> Path
     rows = [
         row
         for name, model in models.items()
-        for row in parameter_rows(
+        for row in make_parameter_rows(
             Key("s", folder.name, name),
             Estimate("likelihood", {"N": Parameter(model.N)}),
             recommended=True,
@@ -56,7 +60,7 @@ def outlook(
         "earth_rate": EarthRateSettings(**asked).model_dump(mode="json"),
         "datasheet": datasheet or {},
     }
-    found = outlook_tables(folders, "s", json.dumps(settings))
+    found = make_outlook_tables(folders, "s", json.dumps(settings))
     for table, rows in found.items():
         assert build(table, rows).num_rows == len(rows)
     return {name: [dict(row) for row in rows] for name, rows in found.items()}
@@ -141,7 +145,7 @@ def test_the_longest_measured_recording_answers_with_its_middle_gyro(tmp_path: P
         put_triad(tmp_path / "long", models),
         put_triad(tmp_path / "sim_longer", models, duration=1e5, simulated=True),
     ]
-    found = noise_at_rest(folders)
+    found = load_noise_at_rest(folders)
     assert found is not None and found.recording == "long"
     rows = outlook(folders)["earth_rate_prediction"]
     assert {(row["recording"], row["channel"]) for row in rows} == {("long", "gyro_y")}
@@ -160,4 +164,4 @@ def test_what_is_not_there_gives_no_rows(tmp_path: Path) -> None:
     accels = {name: model for name, model in six().items() if name.startswith("accel")}
     assert outlook([put_triad(tmp_path / "accels", accels)])["earth_rate_prediction"] == []
     rejected = put_triad(tmp_path / "rejected", six(), status="rejected")
-    assert noise_at_rest([rejected]) is None
+    assert load_noise_at_rest([rejected]) is None

@@ -10,11 +10,11 @@ import pytest
 
 from imubench_pipeline.extensions.calibration.alignment.attitude import matrix
 from imubench_pipeline.extensions.calibration.alignment.triad import Site
-from imubench_pipeline.extensions.calibration.calibration import calibration_tables
+from imubench_pipeline.extensions.calibration.calibration import make_calibration_tables
 from imubench_pipeline.extensions.calibration.settings import TRIAD, InPositions
-from imubench_pipeline.extensions.calibration.simulated import sensed
-from imubench_pipeline.recordings.kept import Quality, identified
-from imubench_pipeline.recordings.recording import log_paths
+from imubench_pipeline.extensions.calibration.simulated import compute_readings
+from imubench_pipeline.recordings.kept import Quality, identify_files
+from imubench_pipeline.recordings.recording import list_log_files
 from imubench_pipeline.settings.sensor import read_sensors
 from imubench_pipeline.settings.simulated_recordings import SimulatedRecording
 from imubench_pipeline.steps.simulate import _blocks
@@ -61,12 +61,12 @@ def by_hand(roll: float, pitch: float, heading: float, positions: int) -> dict[s
 def found(folder: Path, columns: dict[str, np.ndarray], **changes: Any) -> dict[str, Any]:
     kept(folder, columns, RATE)
     about = {"sensor": "s", "recording": folder.name, "status": "ok", "kind": "positions"}
-    Quality(about, [], {}, identified(log_paths(folder))).write(folder / "quality.json")
+    Quality(about, [], {}, identify_files(list_log_files(folder))).write(folder / "quality.json")
     settings = {
         "sensor": SENSOR.model_dump(mode="json", exclude_unset=True),
         "positions": DECLARED | changes,
     }
-    tables = calibration_tables(folder, [], "s", folder.name, json.dumps(settings))
+    tables = make_calibration_tables(folder, [], "s", folder.name, json.dumps(settings))
     rows = build("calibration", tables["calibration"]).to_pylist()
     return {row["parameter"]: row for row in rows}
 
@@ -105,7 +105,7 @@ def test_an_axis_that_is_missing_is_named(tmp_path: Path) -> None:
 def test_what_is_sensed_turns_with_the_triad() -> None:
     attitude = matrix(0.1, -0.2, 0.7)
     angle = np.array([0.0, math.pi, 2 * math.pi])
-    true = sensed(Site(latitude=0.6), attitude, angle, np.array([0.0, 1.0, 0.0]))
+    true = compute_readings(Site(latitude=0.6), attitude, angle, np.array([0.0, 1.0, 0.0]))
     assert true[0] == pytest.approx(true[2])
     assert true[1, [0, 1, 3, 4]] == pytest.approx(-true[0, [0, 1, 3, 4]])
     assert true[1, 2] == pytest.approx(true[0, 2] + 1.0)

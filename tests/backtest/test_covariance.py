@@ -4,7 +4,12 @@ import numpy as np
 import pytest
 
 from imubench_pipeline.navigation.backtest.covariance import WindowCovariance
-from imubench_pipeline.navigation.backtest.windows import Errors, Window, errors, window
+from imubench_pipeline.navigation.backtest.windows import (
+    Errors,
+    Window,
+    choose_window,
+    compute_window_errors,
+)
 from imubench_pipeline.navigation.error_budget import Calibrated
 from imubench_pipeline.navigation.error_budget.budget import of_sensor
 from imubench_pipeline.noise import GaussMarkov, NoiseModel, RandomWalk, Sinusoid
@@ -12,7 +17,7 @@ from imubench_pipeline.noise import GaussMarkov, NoiseModel, RandomWalk, Sinusoi
 
 def test_white_noise_has_its_closed_form() -> None:
     N, rest, time = 2e-4, 30.0, 600.0
-    cut = window(rest, time, 100.0)
+    cut = choose_window(rest, time, 100.0)
     assert cut is not None
     heading = WindowCovariance(cut, 0).of(NoiseModel(N=N))
     assert math.sqrt(heading[0]) == pytest.approx(N * math.sqrt(time + time**2 / rest), rel=1e-9)
@@ -39,7 +44,7 @@ MODELS = {
 def test_the_mean_square_is_that_of_the_error_budget(name: str, order: int) -> None:
     model = MODELS[name]
     for rest, time in ((30.0, 600.0), (5.0, 10.0), (60.0, 10.0)):
-        cut = window(rest, time, 100.0)
+        cut = choose_window(rest, time, 100.0)
         assert cut is not None
         spread = WindowCovariance(cut, order).spread(model, _one(cut))
         parts = of_sensor("", model, order, time, Calibrated(rest))
@@ -82,7 +87,9 @@ def test_the_scatter_of_the_mean_square_is_what_simulated_logs_show() -> None:
         (NoiseModel(N=1.0, K=0.05), white + 0.05 * walk),
         (NoiseModel(N=1.0, sinusoids=[Sinusoid(0.5, 0.01)]), white + 0.5 * wave),
     ):
-        found = [errors([means], covariance.weights, covariance.lags) for means in made]
+        found = [
+            compute_window_errors([means], covariance.weights, covariance.lags) for means in made
+        ]
         spread = covariance.spread(model, found[0])
         squares = np.array([one.mean_square for one in found])
         # Standard errors of mean and standard deviation of 400: about 1.5 and 5 %.

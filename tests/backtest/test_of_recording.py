@@ -12,10 +12,10 @@ from imubench_pipeline.model.estimates import BacktestRow, DeterministicRow
 from imubench_pipeline.model.recordings import RecordingRow
 from imubench_pipeline.model.verdicts import DoubtMark
 from imubench_pipeline.navigation.backtest.comparison import findings
-from imubench_pipeline.navigation.backtest.of_recording import backtest_rows
-from imubench_pipeline.navigation.expected_errors import error_rows, of_requirement
-from imubench_pipeline.recordings.fitness import doubts, judged
-from imubench_pipeline.recordings.recording import ChannelLog, LogWriter, channel_logs
+from imubench_pipeline.navigation.backtest.of_recording import list_backtest_rows
+from imubench_pipeline.navigation.expected_errors import list_error_rows, list_requirement_questions
+from imubench_pipeline.recordings.fitness import derive_doubts, judge_recordings
+from imubench_pipeline.recordings.recording import ChannelLog, LogWriter, open_channel_logs
 from imubench_pipeline.settings.requirements import Requirement
 from imubench_pipeline.tables import build
 from tests.ranking import ranking_rows
@@ -43,7 +43,7 @@ def kept(folder: Path, **columns: np.ndarray) -> dict[str, ChannelLog]:
         holes = {name: bool(np.isnan(values).any()) for name, values in columns.items()}
         writer.finish({"rate": RATE, "grid": samples, "segments": [[0, samples]],
                        "holes": holes, "unusable": []})  # fmt: skip
-    return channel_logs(folder)
+    return open_channel_logs(folder)
 
 
 def rows_of(
@@ -55,7 +55,7 @@ def rows_of(
     kinds = [{"channel": channel, "kind": kind} for channel, kind in taken_out.items()]
     apart = typed(DeterministicRow, kinds)
     asked = {"robot": requirement}
-    found = backtest_rows(NAMES, logs, estimates, asked, apart, draws=50, seed=1)
+    found = list_backtest_rows(NAMES, logs, estimates, asked, apart, draws=50, seed=1)
     return BacktestRow.rows_of(build("backtest", found))
 
 
@@ -102,7 +102,7 @@ def test_a_drift_that_no_model_has_is_a_doubt_and_stands_in_the_ranking(
     (finding,) = findings(rows)
     assert finding["channel"] == "gyro_x" and finding["value"] == heading["ratio"]
     assert "periodic drift" in finding["detail"] and "600 s" in finding["detail"]
-    (doubt,) = doubts([finding], [], [])
+    (doubt,) = derive_doubts([finding], [], [])
     assert not doubt.unfit and {"K", "B_curve"} <= set(doubt.parameters)
     about = RecordingRow(
         **NAMES,
@@ -112,10 +112,10 @@ def test_a_drift_that_no_model_has_is_a_doubt_and_stands_in_the_ranking(
         simulated=True,
         duration=SAMPLES / RATE,
     )
-    (told,) = judged([about], [doubt], ())
+    (told,) = judge_recordings([about], [doubt], ())
     assert told.doubts == (DoubtMark("r", "backtest_contradicts", ("gyro_x",)),)
-    questions = of_requirement("robot", ROBOT)
-    errors = error_rows(NAMES, estimates, questions, draws=20, seed=1)
+    questions = list_requirement_questions("robot", ROBOT)
+    errors = list_error_rows(NAMES, estimates, questions, draws=20, seed=1)
     ranking = build(
         "ranking",
         ranking_rows(

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from imubench_pipeline.earth import EARTH_RATE
-from imubench_pipeline.extensions.calibration.calibration import calibration_tables
+from imubench_pipeline.extensions.calibration.calibration import make_calibration_tables
 from imubench_pipeline.extensions.earth_rate.settings import EarthRateSettings
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.simulate import simulate
@@ -56,7 +56,7 @@ def run(
         "earth_rate": EarthRateSettings().model_dump(mode="json"),
         "sensor": SENSOR if sensor is None else sensor,
     } | declared
-    found = calibration_tables(folder, static, "s", folder.name, json.dumps(settings))
+    found = make_calibration_tables(folder, static, "s", folder.name, json.dumps(settings))
     return {name: [dict(row) for row in rows] for name, rows in found.items()}
 
 

@@ -10,8 +10,8 @@ from imubench_pipeline.extensions.calibration.experiment import Dwell, Experimen
 from imubench_pipeline.extensions.calibration.least_squares import (
     LeastSquares,
     NotObservableError,
-    block_length,
-    half_width,
+    choose_block_length,
+    compute_half_width,
 )
 from imubench_pipeline.extensions.earth_rate.simulation import simulate_runs
 from imubench_pipeline.noise import NoiseModel
@@ -88,13 +88,13 @@ def test_blocks_are_as_short_as_it_takes():
 
     run = Experiment((Dwell(0, 400, 1),), 4.0, 0.0)
     fast, slow = NoiseModel(N=0.1), NoiseModel(N=0.05, K=0.1)
-    assert block_length(run, fast, ones) == 400
-    longest = block_length(run, slow, ones)
+    assert choose_block_length(run, fast, ones) == 400
+    longest = choose_block_length(run, slow, ones)
     assert 1 <= longest < 100
     samples = LeastSquares(run.blocks(1), slow, ones(run.blocks(1))).sigma
     means = LeastSquares(run.blocks(longest), slow, ones(run.blocks(longest))).sigma
     assert 1.0 <= means / samples < 1.005
-    line = block_length(run, fast, lambda b: np.column_stack([np.ones(len(b)), b.middle]))
+    line = choose_block_length(run, fast, lambda b: np.column_stack([np.ones(len(b)), b.middle]))
     assert line < 400
 
 
@@ -120,4 +120,4 @@ def test_what_cannot_be_fitted_is_refused():
         squares.fit(np.full((1, len(blocks)), np.nan))
     for level in (0.0, 1.0, math.nan):
         with pytest.raises(ValueError, match="level"):
-            half_width(level)
+            compute_half_width(level)

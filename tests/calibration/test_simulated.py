@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from imubench_pipeline.extensions.calibration.calibration import calibration_tables
+from imubench_pipeline.extensions.calibration.calibration import make_calibration_tables
 from imubench_pipeline.recordings.ingest import ingest_as_planned
 from imubench_pipeline.settings.sensor import LogFormat
 from imubench_pipeline.settings.simulated_recordings import SimulatedRecording
@@ -40,7 +40,7 @@ def test_the_truth_lies_in_the_limits(
     quality = ingest_as_planned(folder, plan.ingest_settings("s", "sim_run"), "s", "sim_run", kept)
     quality.write(kept / "quality.json")
     settings = plan.experiment_settings("s", "sim_run")
-    found = calibration_tables(kept, [], "s", "sim_run", settings)["calibration"]
+    found = make_calibration_tables(kept, [], "s", "sim_run", settings)["calibration"]
     rows = by_parameter([dict(row) for row in found if row["status"] == "ok"])
     for name in told:
         assert rows[name]["lower"] < rows[name]["truth"] < rows[name]["upper"], name

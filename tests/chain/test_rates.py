@@ -9,7 +9,7 @@ import pytest
 
 import imubench_pipeline as imu
 from imubench_pipeline.library.logs import Log
-from imubench_pipeline.report.terminal import logs
+from imubench_pipeline.report.terminal import render_logs
 from imubench_pipeline.tables import build
 from tests.chain.logs import Table, analysed, checked, noise, project
 
@@ -290,5 +290,5 @@ def test_every_command_takes_both_sensors_at_their_rates(tmp_path: Path) -> None
     for name, sigma, rate in (("gyro_z", np.radians(0.1), 100.0), ("accel_z", 0.02, 50.0)):
         assert N[name]["lower"] < sigma / np.sqrt(rate) < N[name]["upper"]
     tables = {name: build(name, rows) for name, rows in found.items()}
-    head = str(next(iter(logs(tables, "practical", 200))))
+    head = str(next(iter(render_logs(tables, "practical", 200))))
     assert head == "log: 60 s at 100 and 50 Hz, 2 channels"

@@ -13,7 +13,7 @@ from imubench_pipeline.estimators.deterministic.courses import (
     _find_limits,
     _place_steps,
 )
-from imubench_pipeline.estimators.deterministic.means import Means, Part, block_means
+from imubench_pipeline.estimators.deterministic.means import Means, Part, average_blocks
 from imubench_pipeline.estimators.deterministic.ordinates import Fit, Ordinates, average_covariance
 from imubench_pipeline.estimators.deterministic.regressors import Regressor
 from imubench_pipeline.estimators.deterministic.search import SearchResult
@@ -41,10 +41,10 @@ def test_a_step_is_placed_to_the_sample_from_eight_errors_of_a_block_on(
 ) -> None:
     rng = np.random.default_rng(1)
     log = rng.standard_normal(40_000)
-    means = block_means([log], len(log), RATE)
+    means = average_blocks([log], len(log), RATE)
     white = np.sqrt(np.median(means.parts[0].power) / means.block)
     log += size * white * (np.arange(40_000) >= 20_003)
-    fit = Ordinates(block_means([log], len(log), RATE)).fit([Regressor("step", 0, 2000.0)])
+    fit = Ordinates(average_blocks([log], len(log), RATE)).fit([Regressor("step", 0, 2000.0)])
     fit = replace(fit, sizes=np.array([size * white]))
     (step,) = _place_steps(lambda: np.array_split(log, 7), means, fit)
     assert (step.where != 2000.0) is placed

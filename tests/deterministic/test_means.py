@@ -9,7 +9,7 @@ from imubench_pipeline.estimators.deterministic.means import (
     Part,
     Stationarity,
     assess_stationarity,
-    block_means,
+    average_blocks,
 )
 from tests.deterministic.logs import Array
 
@@ -30,7 +30,7 @@ def test_means_and_powers_are_those_of_each_block(rng, missing: bool) -> None:
     values = 5.0 + np.cumsum(rng.standard_normal(20_007)) + rng.standard_normal(20_007)
     if missing:
         values[rng.integers(0, len(values), 1500)] = np.nan
-    means = block_means(np.array_split(values, 13), len(values), RATE)
+    means = average_blocks(np.array_split(values, 13), len(values), RATE)
     (part,) = means.parts
     # 20,007 samples in blocks of 10, which are more than 512 and less than 16,384.
     assert (means.block, means.interval, part.start, part.pauses) == (10, 0.1, 0, ())
@@ -47,14 +47,14 @@ def test_means_and_powers_are_those_of_each_block(rng, missing: bool) -> None:
 def test_blocks_are_smaller_in_a_short_log_and_longer_in_a_long_one(
     samples: int, size: int
 ) -> None:
-    assert block_means([np.arange(float(samples))], samples, RATE).block == size
+    assert average_blocks([np.arange(float(samples))], samples, RATE).block == size
 
 
 def test_the_kurtosis_is_that_of_the_samples(rng) -> None:
     values = rng.laplace(size=400_000)
-    (part,) = block_means([values], len(values), RATE).parts
+    (part,) = average_blocks([values], len(values), RATE).parts
     assert part.kurtosis == pytest.approx(3.0, abs=0.4)
-    (part,) = block_means([rng.uniform(size=400_000)], 400_000, RATE).parts
+    (part,) = average_blocks([rng.uniform(size=400_000)], 400_000, RATE).parts
     assert part.kurtosis == pytest.approx(-1.2, abs=0.1)
 
 
@@ -62,7 +62,7 @@ def test_a_block_with_few_samples_has_none_of_its_own(rng) -> None:
     values = rng.standard_normal(10_000)
     values[5_001:5_007] = np.nan  # 4 of 10 are left
     values[6_001:6_006] = np.nan  # 5 of 10
-    (part,) = block_means([values], len(values), RATE).parts
+    (part,) = average_blocks([values], len(values), RATE).parts
     assert np.flatnonzero(np.isnan(part.power)).tolist() == [500]
     assert part.mean[600] == pytest.approx(np.nanmean(values[6_000:6_010]))
 
@@ -71,7 +71,7 @@ def test_a_long_hole_divides_a_segment_and_a_short_one_is_bridged(rng) -> None:
     values = np.where(np.arange(10_000) < 8_200, 2.0, 3.0) + 1e-3 * rng.standard_normal(10_000)
     values[3_000:5_010] = np.nan  # 201 blocks of 1000
     values[8_000:8_400] = np.nan  # 40 blocks: 4 s
-    means = block_means([values], len(values), RATE)
+    means = average_blocks([values], len(values), RATE)
     assert [part.start for part in means.parts] == [0, 5_010]
     assert [len(part.mean) for part in means.parts] == [300, 499]
     assert means.longest is means.parts[1]
@@ -90,13 +90,13 @@ def test_a_long_hole_divides_a_segment_and_a_short_one_is_bridged(rng) -> None:
 def test_a_hole_of_a_fifth_of_a_segment_does_not_divide_it(rng) -> None:
     values = rng.standard_normal(10_000)
     values[3_000:4_990] = np.nan
-    assert len(block_means([values], len(values), RATE).parts) == 1
+    assert len(average_blocks([values], len(values), RATE).parts) == 1
 
 
 def test_parts_of_few_blocks_are_left_out(rng) -> None:
     values = rng.standard_normal(10_000)
     spans = [(0, 630), (630, 1_270), (1_270, 10_000)]
-    means = block_means([values], len(values), RATE, spans)
+    means = average_blocks([values], len(values), RATE, spans)
     assert [(part.start, len(part.mean)) for part in means.parts] == [(630, 64), (1_270, 873)]
 
 
@@ -104,11 +104,11 @@ def test_pauses_are_holes_of_two_seconds_and_more_the_longest_of_them(rng) -> No
     values = rng.standard_normal(100_000)
     for place, blocks in ((2_000, 19), (5_000, 20), (9_000, 31)):
         values[place : place + 10 * blocks] = np.nan
-    (part,) = block_means([values], len(values), RATE).parts
+    (part,) = average_blocks([values], len(values), RATE).parts
     assert part.pauses == ((510.0, 20.0), (915.5, 31.0))
     for number in range(50):
         values[12_000 + 1_500 * number :][: 300 + 10 * number] = np.nan
-    (part,) = block_means([values], len(values), RATE).parts
+    (part,) = average_blocks([values], len(values), RATE).parts
     assert len(part.pauses) == 48
     assert min(length for _, length in part.pauses) == 32.0
     assert [middle for middle, _ in part.pauses] == sorted(middle for middle, _ in part.pauses)

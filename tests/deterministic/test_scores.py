@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from imubench_pipeline.estimators.deterministic.means import block_means
+from imubench_pipeline.estimators.deterministic.means import average_blocks
 from imubench_pipeline.estimators.deterministic.ordinates import Ordinates
 from imubench_pipeline.estimators.deterministic.regressors import Regressor
 from imubench_pipeline.estimators.deterministic.scores import (
@@ -18,7 +18,7 @@ from tests.deterministic.logs import RATE, SIGMA, static_log, times
 def test_the_best_step_of_the_transform_gains_what_least_squares_say() -> None:
     log = static_log(1, hours=0.5)
     log += 4.0 * SIGMA * (times(log) > 700.0)
-    ordinates = Ordinates(block_means([log], len(log), RATE))
+    ordinates = Ordinates(average_blocks([log], len(log), RATE))
     fit = ordinates.fit([Regressor("exponential", 0, 150.0)])
     step = next(
         score
@@ -41,7 +41,7 @@ def test_the_best_step_of_the_transform_gains_what_least_squares_say() -> None:
 @pytest.mark.parametrize("cycles", [0.3, 0.7, 2.4])
 def test_a_sinusoid_gains_what_least_squares_of_both_amplitudes_say(cycles: float) -> None:
     log = static_log(4, hours=0.5)
-    ordinates = Ordinates(block_means([log], len(log), RATE))
+    ordinates = Ordinates(average_blocks([log], len(log), RATE))
     fit = ordinates.fit([Regressor("step", 0, 100.0)])
     sinusoid = Regressor("sinusoid", 0, cycles / ordinates.sizes[0])
     scale = np.sqrt(ordinates.weights(fit.density))
@@ -54,7 +54,7 @@ def test_a_sinusoid_gains_what_least_squares_of_both_amplitudes_say(cycles: floa
 
 def test_leverages_sum_up_to_the_number_of_amplitudes() -> None:
     log = static_log(2, hours=0.5)
-    ordinates = Ordinates(block_means([log], len(log), RATE))
+    ordinates = Ordinates(average_blocks([log], len(log), RATE))
     regressors = [Regressor("step", 0, 300.0), Regressor("sinusoid", 0, 0.004)]
     assert ordinates.fit(regressors).leverage.sum() == pytest.approx(3.0)
 
@@ -62,7 +62,7 @@ def test_leverages_sum_up_to_the_number_of_amplitudes() -> None:
 @pytest.mark.release
 def test_the_threshold_of_a_step_counts_the_places_that_noise_tells_apart() -> None:
     log = static_log(3, hours=0.5)
-    ordinates = Ordinates(block_means([log], len(log), RATE))
+    ordinates = Ordinates(average_blocks([log], len(log), RATE))
     fit = ordinates.fit([])
     scores = find_best_scores(ordinates, fit, fit.density)
     step = next(score for score in scores if score.regressor.kind == "step")
@@ -89,7 +89,7 @@ def test_the_best_of_each_kind_gains_what_least_squares_say(kind: str) -> None:
         "pulse": 40.0 * SIGMA * (np.floor(t / 0.5) == 1234.0),
         "ramp": 6.0 * SIGMA * t / 1800.0,
     }[kind]
-    ordinates = Ordinates(block_means([log], len(log), RATE))
+    ordinates = Ordinates(average_blocks([log], len(log), RATE))
     fit = ordinates.fit([Regressor("step", 0, 2500.0)])
     (score,) = [
         x for x in find_best_scores(ordinates, fit, fit.density) if x.regressor.kind == kind
@@ -123,7 +123,7 @@ def test_thresholds_count_what_was_tried() -> None:
     log = static_log(3, hours=0.5)
     halves = [(0, len(log) // 2), (len(log) // 2, len(log))]
     for spans, parts in (([(0, len(log))], 1), (halves, 2)):
-        ordinates = Ordinates(block_means([log], len(log), RATE, spans))
+        ordinates = Ordinates(average_blocks([log], len(log), RATE, spans))
         fit = ordinates.fit([])
         found = list(find_best_scores(ordinates, fit, fit.density))
         assert len(found) == 5 * parts
@@ -145,7 +145,7 @@ def test_thresholds_count_what_was_tried() -> None:
 
 def test_what_others_explain_wholly_gains_nothing() -> None:
     log = static_log(3, hours=0.5)
-    ordinates = Ordinates(block_means([log], len(log), RATE))
+    ordinates = Ordinates(average_blocks([log], len(log), RATE))
     fit = ordinates.fit([Regressor("ramp", 0)])
     scores = {x.regressor.kind: x for x in find_best_scores(ordinates, fit, fit.density)}
     assert scores["ramp"].gain == 0.0
@@ -153,7 +153,7 @@ def test_what_others_explain_wholly_gains_nothing() -> None:
     n = ordinates.sizes[0]
     for level, where in ((2, 3.0), (n - 2, n - 3.0)):
         jump = log + 1.0 * (np.arange(len(log)) >= level * ordinates.means.block)
-        far = Ordinates(block_means([jump], len(jump), RATE))
+        far = Ordinates(average_blocks([jump], len(jump), RATE))
         (step,) = [
             x for x in find_best_scores(far, far.fit([]), fit.density) if x.regressor.kind == "step"
         ]

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from imubench_pipeline.estimators.deterministic.means import Means, Part, block_means
+from imubench_pipeline.estimators.deterministic.means import Means, Part, average_blocks
 from imubench_pipeline.estimators.deterministic.ordinates import Fit, Ordinates
 from imubench_pipeline.estimators.deterministic.regressors import Regressor
 from imubench_pipeline.estimators.deterministic.scores import Gain, Score
@@ -19,7 +19,7 @@ from imubench_pipeline.estimators.deterministic.search import (
     is_at_pause,
     list_restarts,
     polish,
-    search,
+    search_signals,
 )
 from imubench_pipeline.estimators.whittle import Terms
 from tests.deterministic.logs import RATE, SIGMA, static_log, times
@@ -31,11 +31,11 @@ def log() -> np.ndarray:
 
 
 def of(log: np.ndarray) -> Ordinates:
-    return Ordinates(block_means([log], len(log), RATE))
+    return Ordinates(average_blocks([log], len(log), RATE))
 
 
 def with_pauses(log: np.ndarray, pauses: tuple[tuple[float, float], ...]) -> Ordinates:
-    means = block_means([log], len(log), RATE)
+    means = average_blocks([log], len(log), RATE)
     part = replace(means.parts[0], pauses=pauses)
     return Ordinates(replace(means, parts=(part,)))
 
@@ -160,7 +160,7 @@ def test_each_regressor_that_is_kept_is_needed_beside_the_others(log: np.ndarray
     t = times(log)
     spoilt = log + 6.0 * SIGMA * (t >= 700.0) + 12.0 * SIGMA * np.exp(-t / 100.0)
     ordinates = of(spoilt)
-    found = search(ordinates)
+    found = search_signals(ordinates)
     kinds = sorted(x.kind for x in found.fit.regressors)
     assert kinds == ["exponential", "step"]
     for which, gain in enumerate(found.gains):

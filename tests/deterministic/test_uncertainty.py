@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from imubench_pipeline.estimators.deterministic.means import block_means
+from imubench_pipeline.estimators.deterministic.means import average_blocks
 from imubench_pipeline.estimators.deterministic.ordinates import Fit, Ordinates, average_covariance
 from imubench_pipeline.estimators.deterministic.regressors import Regressor
 from tests.deterministic.logs import RATE, static_log
@@ -11,7 +11,7 @@ from tests.deterministic.logs import RATE, static_log
 
 def fitted(seed: int, walk: float) -> tuple[Ordinates, Fit]:
     log = static_log(seed, walk=walk)
-    ordinates = Ordinates(block_means([log], len(log), RATE))
+    ordinates = Ordinates(average_blocks([log], len(log), RATE))
     return ordinates, ordinates.fit([Regressor("step", 0, 0.4 * ordinates.sizes[0])])
 
 

@@ -8,7 +8,7 @@ from imubench_pipeline.estimators.deterministic.means import Stationarity
 from imubench_pipeline.estimators.deterministic.verdict import (
     Verdict,
     assess_signals,
-    deterministic_rows,
+    tabulate_signals,
 )
 from imubench_pipeline.estimators.estimate import FAMILY, Estimate, JointDraws, Parameter, Status
 from imubench_pipeline.tables.schemas import TABLES
@@ -37,7 +37,7 @@ def test_a_step_is_a_finding_and_a_row() -> None:
     assert finding.finding == "bias_step"
     assert finding.value == pytest.approx(5.0 * SIGMA, rel=0.3)
     key = {"sensor": "s", "recording": "r", "channel": "gyro_x"}
-    (row,) = deterministic_rows(key, "rad/s", signals)
+    (row,) = tabulate_signals(key, "rad/s", signals)
     assert set(row) == {column.name for column in TABLES["deterministic"]}
 
 

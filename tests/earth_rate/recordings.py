@@ -8,12 +8,12 @@ import numpy as np
 import pyarrow as pa
 
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
-from imubench_pipeline.estimators.rows import parameter_rows
-from imubench_pipeline.extensions.earth_rate.earth_rotation import earth_rate_tables
+from imubench_pipeline.estimators.rows import make_parameter_rows
+from imubench_pipeline.extensions.earth_rate.earth_rotation import make_earth_rate_tables
 from imubench_pipeline.extensions.earth_rate.settings import EarthRateSettings
 from imubench_pipeline.noise import NoiseModel
-from imubench_pipeline.recordings.kept import Quality, identified
-from imubench_pipeline.recordings.recording import LogWriter, log_paths
+from imubench_pipeline.recordings.kept import Quality, identify_files
+from imubench_pipeline.recordings.recording import LogWriter, list_log_files
 from imubench_pipeline.tables import write
 from imubench_pipeline.tables.keys import Key
 from tests.earth_rate.runs import PAPER, RATE, turned
@@ -52,7 +52,7 @@ def put(folder: Path, columns: dict[str, np.ndarray], **about: Any) -> Path:
         )
     for name in ("segments", "begins"):
         row.pop(name, None)
-    kept = identified(log_paths(folder))
+    kept = identify_files(list_log_files(folder))
     Quality(row, [], {}, kept).write(folder / "quality.json")
     return folder
 
@@ -68,7 +68,9 @@ def put_at_rest(
     rows = [
         row
         for method in ("likelihood", "likelihood_gm")
-        for row in parameter_rows(key, Estimate(method, known), recommended=method == "likelihood")
+        for row in make_parameter_rows(
+            key, Estimate(method, known), recommended=method == "likelihood"
+        )
     ]
     write("parameters", rows, folder / "parameters.parquet")
     write("draws", [], folder / "draws.parquet")
@@ -89,7 +91,7 @@ def run(
         "sensor": SENSOR if sensor is None else sensor,
         "two_position": DECLARED | declared,
     }
-    found = earth_rate_tables(folder, static, "s", folder.name, json.dumps(settings))
+    found = make_earth_rate_tables(folder, static, "s", folder.name, json.dumps(settings))
     return {name: [dict(row) for row in rows] for name, rows in found.items()}
 
 

@@ -9,7 +9,7 @@ import yaml
 
 from imubench_pipeline.extensions.earth_rate.settings import TwoPosition
 from imubench_pipeline.recordings.ingest import ingest_as_planned
-from imubench_pipeline.recordings.recording import channel_logs, static_logs
+from imubench_pipeline.recordings.recording import open_channel_logs, open_static_logs
 from imubench_pipeline.run.plan import Plan
 from imubench_pipeline.settings.validation import ConfigError, parse
 from tests.earth_rate.recordings import SENSOR
@@ -124,8 +124,8 @@ def test_a_turned_log_is_read_with_its_position_and_keeps_its_turns(tmp_path: Pa
     plan = planned(tmp_path, notes, "\n".join(lines) + "\n", LOG)
     row = ingested(plan, tmp_path)
     assert (row["status"], row["kind"]) == ("ok", "two_position"), row["reason"]
-    log = channel_logs(tmp_path / "kept")["gyro_x"]
-    assert log.position and static_logs(tmp_path / "kept") == {}
+    log = open_channel_logs(tmp_path / "kept")["gyro_x"]
+    assert log.position and open_static_logs(tmp_path / "kept") == {}
     (samples,), (stood,) = list(log.blocks()), list(log.positions())
     assert samples.max() == pytest.approx(50 * 0.0174533, rel=1e-5)
     assert stood[:300].tolist() == [1.0] * 300 and stood[300] == -1.0

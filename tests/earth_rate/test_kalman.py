@@ -7,11 +7,14 @@ from hypothesis import strategies as st
 
 from imubench_pipeline.extensions.calibration.experiment import Dwell, Experiment, block_means
 from imubench_pipeline.extensions.calibration.kalman import RateFilter
-from imubench_pipeline.extensions.calibration.states import UNINFORMATIVE_SIGMA, block_states
-from imubench_pipeline.extensions.earth_rate.bound import block_length, cramer_rao
+from imubench_pipeline.extensions.calibration.states import UNINFORMATIVE_SIGMA, discretise_blocks
+from imubench_pipeline.extensions.earth_rate.bound import (
+    choose_block_length,
+    compute_cramer_rao_bounds,
+)
 from imubench_pipeline.extensions.earth_rate.simulation import (
     PAPER_MODEL,
-    paper_run,
+    design_paper_run,
     simulate_runs,
 )
 from imubench_pipeline.noise import NoiseModel, WhiteNoise
@@ -93,9 +96,9 @@ def test_no_knowledge_at_the_start_costs_no_digits(scale):
     # The paper's sensor, and one ten thousand times as good: 1 rad/s is wide beside both.
     p = PAPER_MODEL
     model = NoiseModel(N=p.N * scale, B=p.B * scale, T_B=p.T_B, K=p.K * scale)
-    blocks = paper_run(12.0).blocks(448)
+    blocks = design_paper_run(12.0).blocks(448)
     one = RateFilter(blocks, model)
-    bound = cramer_rao(blocks, model)
+    bound = compute_cramer_rao_bounds(blocks, model)
     assert one.rate_sigma[0] == pytest.approx(UNINFORMATIVE_SIGMA, rel=0.5)
     np.testing.assert_allclose(one.rate_sigma[4:], bound[4:], rtol=1e-6)
     smoothed = one.smooth(one.run(np.zeros((1, len(blocks)))))
@@ -105,7 +108,7 @@ def test_no_knowledge_at_the_start_costs_no_digits(scale):
 def test_block_means_tell_as_much_as_samples():
     model = NoiseModel(N=2e-4, B=1e-4, T_B=15.0, K=2e-5)
     design = Experiment.regular(dwell=20.0, turning=2.0, dwells=6, rate=4.0, latitude=-0.4)
-    longest = block_length(design, model)
+    longest = choose_block_length(design, model)
     assert 1 < longest < 80
     of_samples = RateFilter(design.blocks(1), model).rate_sigma[-1]
     of_means = RateFilter(design.blocks(longest), model).rate_sigma[-1]
@@ -166,7 +169,7 @@ def test_missing_samples_do_not_make_it_too_sure(name, tolerance):
 
 def test_states_have_names():
     model = NoiseModel(Q=1.0, N=1.0, B=1.0, T_B=5.0, K=1.0)
-    assert block_states(model, UNEVEN.blocks(9)).names == ("z_Q", "z_Q before", "z_G1", "z_K")
+    assert discretise_blocks(model, UNEVEN.blocks(9)).names == ("z_Q", "z_Q before", "z_G1", "z_K")
     assert RateFilter(UNEVEN.blocks(9), NoiseModel(N=1.0)).names == ("z_K",)
 
 

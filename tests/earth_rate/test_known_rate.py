@@ -12,11 +12,15 @@ from imubench_pipeline.extensions.earth_rate.known_rate import (
     settled,
     track,
 )
-from imubench_pipeline.extensions.earth_rate.simulation import PAPER_MODEL, paper_run, simulate_log
+from imubench_pipeline.extensions.earth_rate.simulation import (
+    PAPER_MODEL,
+    design_paper_run,
+    simulate_log,
+)
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.simulate.model import SensorModel
 
-DESIGN = paper_run(12.0)
+DESIGN = design_paper_run(12.0)
 
 
 def log_of(earth_rate):

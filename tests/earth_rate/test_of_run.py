@@ -12,9 +12,9 @@ import pytest
 from imubench_pipeline.extensions.earth_rate.tables import TURNED
 from imubench_pipeline.model.recordings import RecordingRow
 from imubench_pipeline.noise import NoiseModel
-from imubench_pipeline.recordings.kept import Quality, identified
-from imubench_pipeline.recordings.recording import log_paths
-from imubench_pipeline.steps.noise_source import from_static
+from imubench_pipeline.recordings.kept import Quality, identify_files
+from imubench_pipeline.recordings.recording import list_log_files
+from imubench_pipeline.steps.noise_source import take_static_noise
 from imubench_pipeline.tables import build
 from tests.earth_rate.recordings import (
     EVERY_30,
@@ -219,7 +219,7 @@ def test_a_position_on_another_clock_is_refused(tmp_path: Path, rest: Path) -> N
     other = put(tmp_path / "b", {"position": np.ones(9)})
     (other / "log.parquet").rename(folder / "log.position.parquet")
     path = folder / "quality.json"
-    replace(Quality.read(path), kept=identified(log_paths(folder))).write(path)
+    replace(Quality.read(path), kept=identify_files(list_log_files(folder))).write(path)
     assert "a clock of its own" in briefly(folder, [rest])["earth_rate"][0]["reason"]
 
 
@@ -277,7 +277,7 @@ def test_the_device_itself_answers_before_others_and_long_logs_before_short(
     axis = put_at_rest(tmp_path / "axis", NoiseModel(N=7e-4), channel="gyro_y", device="9")
 
     def chosen(*folders: Path) -> tuple[float, str]:
-        found = from_static(folders, OWN, "gyro_x")
+        found = take_static_noise(folders, OWN, "gyro_x")
         assert found is not None
         return found.model.N, found.words
 
@@ -288,7 +288,7 @@ def test_the_device_itself_answers_before_others_and_long_logs_before_short(
     )
     assert chosen(made)[1] == "static recording sim_x, simulated; method likelihood"
     assert "of its gyro y, as gyro x has no estimate there" in chosen(axis, bad)[1]
-    assert from_static([bad, accel], OWN, "gyro_x") is None
+    assert take_static_noise([bad, accel], OWN, "gyro_x") is None
 
 
 def test_what_it_takes(found: Found) -> None:

@@ -9,7 +9,7 @@ from imubench_pipeline.extensions.calibration.experiment import Dwell, Experimen
 from imubench_pipeline.extensions.earth_rate.pairs import by_pairs, by_triples
 from imubench_pipeline.extensions.earth_rate.simulation import (
     PAPER_MODEL,
-    paper_run,
+    design_paper_run,
     simulate_runs,
 )
 from imubench_pipeline.noise import NoiseModel, Ramp
@@ -37,7 +37,7 @@ def test_equation_14_by_hand():
 
 def test_white_noise_gives_its_textbook_error():
     # N / sqrt(seconds in dwells) / cos(latitude).
-    design = paper_run(12.0)
+    design = design_paper_run(12.0)
     found = by_pairs(np.zeros((1, 24)), design.blocks(1000), NoiseModel(N=PAPER_MODEL.N))
     seconds = 56.0 * np.arange(1, 13)
     expected = PAPER_MODEL.N / np.sqrt(seconds) / math.cos(design.latitude)
@@ -97,7 +97,7 @@ def test_triples_take_a_linear_drift_out(parts, slope):
 
 
 def test_pairs_keep_a_linear_drift():
-    blocks = paper_run(2.0).blocks(1000)
+    blocks = design_paper_run(2.0).blocks(1000)
     found = by_pairs(of_time(blocks, lambda t: 1e-3 * t), blocks, NoiseModel(N=1.0, R=1e-3))
     # North before south, 30 s apart: less by half of 30 ms.
     np.testing.assert_allclose(found.each, -0.015 / math.cos(blocks.latitude))
@@ -121,7 +121,7 @@ def test_a_missed_turn_and_a_first_dwell_south():
 @pytest.mark.parametrize("estimate", [by_pairs, by_triples])
 def test_errors_of_simulated_runs_are_as_large_as_stated(estimate):
     model = NoiseModel(N=PAPER_MODEL.N, B=PAPER_MODEL.B, T_B=60.0, K=5 * PAPER_MODEL.K)
-    blocks = paper_run(12.0).blocks(448)
+    blocks = design_paper_run(12.0).blocks(448)
     runs = simulate_runs(
         model, blocks, earth_rate=7e-5, turn_on_bias=1e-3, runs=4000, rng=np.random.default_rng(5)
     )

@@ -8,10 +8,14 @@ from hypothesis import strategies as st
 from imubench_pipeline.earth import EARTH_RATE
 from imubench_pipeline.extensions.calibration.experiment import Experiment
 from imubench_pipeline.extensions.calibration.kalman import RateFilter
-from imubench_pipeline.extensions.earth_rate.bound import block_length, cramer_rao, information
+from imubench_pipeline.extensions.earth_rate.bound import (
+    choose_block_length,
+    compute_cramer_rao_bounds,
+    compute_information,
+)
 from imubench_pipeline.extensions.earth_rate.pairs import by_pairs
 from imubench_pipeline.extensions.earth_rate.prediction import Outlook, prediction_rows
-from imubench_pipeline.extensions.earth_rate.simulation import PAPER_MODEL, paper_run
+from imubench_pipeline.extensions.earth_rate.simulation import PAPER_MODEL, design_paper_run
 from imubench_pipeline.navigation.error_budget import Gyrocompass
 from imubench_pipeline.noise import NoiseModel
 from tests.earth_rate.brute import MODELS
@@ -31,27 +35,27 @@ def test_nothing_is_better_than_white_noise_alone(experiment, model, bias):
     blocks = experiment.blocks(7)
     seconds = np.cumsum(blocks.count) / blocks.rate
     least = model.N / np.sqrt(seconds) / math.cos(blocks.latitude)
-    assert np.all(cramer_rao(blocks, model, bias) >= least * (1.0 - 1e-9))
+    assert np.all(compute_cramer_rao_bounds(blocks, model, bias) >= least * (1.0 - 1e-9))
 
 
 def test_white_noise_and_a_known_bias_reach_that():
-    blocks = paper_run(12.0).blocks(100)
+    blocks = design_paper_run(12.0).blocks(100)
     least = PAPER_MODEL.N / np.sqrt(blocks.time_in_blocks) / math.cos(LATITUDE)
-    assert cramer_rao(blocks, WHITE, 0.0)[-1] == pytest.approx(least, rel=1e-12)
+    assert compute_cramer_rao_bounds(blocks, WHITE, 0.0)[-1] == pytest.approx(least, rel=1e-12)
     # As many dwells north as south: the bias does not matter.
-    assert cramer_rao(blocks, WHITE)[-1] == pytest.approx(least, rel=1e-9)
+    assert compute_cramer_rao_bounds(blocks, WHITE)[-1] == pytest.approx(least, rel=1e-9)
 
 
 def test_one_position_tells_nothing_without_the_bias():
     blocks = Experiment.regular(dwell=60, turning=0, dwells=1, rate=4, latitude=0).blocks(40)
-    assert np.all(np.isinf(cramer_rao(blocks, PAPER_MODEL)))
-    assert cramer_rao(blocks, PAPER_MODEL, 1e-3)[-1] > 1e-3
+    assert np.all(np.isinf(compute_cramer_rao_bounds(blocks, PAPER_MODEL)))
+    assert compute_cramer_rao_bounds(blocks, PAPER_MODEL, 1e-3)[-1] > 1e-3
 
 
 def test_no_unbiased_weights_are_better():
-    model, blocks = MODELS["N+F+K"], paper_run(4.0).blocks(448)
+    model, blocks = MODELS["N+F+K"], design_paper_run(4.0).blocks(448)
     assert (
-        cramer_rao(blocks, model)[-1]
+        compute_cramer_rao_bounds(blocks, model)[-1]
         < by_pairs(np.zeros((1, len(blocks))), blocks, model).sigma[-1]
     )
 
@@ -59,9 +63,11 @@ def test_no_unbiased_weights_are_better():
 @pytest.mark.parametrize("bias", [1e-4, 1.0])
 def test_the_filter_reaches_the_bound(bias):
     model = NoiseModel(N=PAPER_MODEL.N, B=2 * PAPER_MODEL.B, K=8 * PAPER_MODEL.K)
-    blocks = paper_run(10.0).blocks(300)
+    blocks = design_paper_run(10.0).blocks(300)
     found = RateFilter(blocks, model, turn_on_bias=bias).rate_sigma
-    np.testing.assert_allclose(found[4:], cramer_rao(blocks, model, bias)[4:], rtol=1e-5)
+    np.testing.assert_allclose(
+        found[4:], compute_cramer_rao_bounds(blocks, model, bias)[4:], rtol=1e-5
+    )
 
 
 @pytest.mark.release
@@ -69,9 +75,11 @@ def test_a_longer_run_is_extrapolated_as_it_is():
     model = NoiseModel(N=PAPER_MODEL.N, B=PAPER_MODEL.B, T_B=238.1, K=10 * PAPER_MODEL.K)
     outlook = Outlook(model, LATITUDE, 2.0, 32.0)
     found = outlook.against_time(28.0, 299)
-    blocks = paper_run(150.0).blocks(block_length(paper_run(150.0), model))
+    blocks = design_paper_run(150.0).blocks(choose_block_length(design_paper_run(150.0), model))
     last = np.flatnonzero(np.diff(blocks.dwell, append=-1))
-    np.testing.assert_allclose(found.sigma, cramer_rao(blocks, model)[last][1:], rtol=2e-3)
+    np.testing.assert_allclose(
+        found.sigma, compute_cramer_rao_bounds(blocks, model)[last][1:], rtol=2e-3
+    )
     assert found.turns[-1] == 299
     assert found.time[-1] == pytest.approx(300 * 28 + 299 * 2)
 
@@ -147,14 +155,14 @@ def test_two_positions_of_white_noise_are_the_gyrocompass():
 
 @pytest.mark.release
 def test_longest_blocks_where_nothing_is_lost():
-    design = paper_run(12.0)
-    assert block_length(design, WHITE) == 896
+    design = design_paper_run(12.0)
+    assert choose_block_length(design, WHITE) == 896
     for fast in (NoiseModel(N=1e-4, B=1e-3, T_B=3.0), NoiseModel(N=1e-5, B=1e-3, T_B=3.0)):
         short = Experiment.regular(dwell=28.0, turning=2.0, dwells=4, rate=16.0, latitude=0.4)
-        longest = block_length(short, fast)
+        longest = choose_block_length(short, fast)
         assert longest < 448
-        assert cramer_rao(short.blocks(longest), fast)[-1] == pytest.approx(
-            cramer_rao(short.blocks(1), fast)[-1], rel=5e-3
+        assert compute_cramer_rao_bounds(short.blocks(longest), fast)[-1] == pytest.approx(
+            compute_cramer_rao_bounds(short.blocks(1), fast)[-1], rel=5e-3
         )
 
 
@@ -165,4 +173,4 @@ def test_what_cannot_be_is_refused():
     with pytest.raises(ValueError, match="do not hold two dwells"):
         outlook.over_dwell(2.0)
     with pytest.raises(ValueError, match="turn_on_bias"):
-        information(paper_run(1.0).blocks(9), WHITE, -1.0)
+        compute_information(design_paper_run(1.0).blocks(9), WHITE, -1.0)

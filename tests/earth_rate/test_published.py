@@ -7,8 +7,8 @@ import pytest
 from imubench_pipeline.extensions.earth_rate.courses import thin
 from imubench_pipeline.extensions.earth_rate.published import (
     RunDesign,
-    allowed_sigmas,
-    published_row,
+    compute_allowed_sigmas,
+    make_published_row,
 )
 from imubench_pipeline.extensions.earth_rate.simulation import (
     ASSUMED_LATITUDE,
@@ -28,13 +28,13 @@ PAPER = RunDesign(PAPER_PERIOD, ASSUMED_TURNING, PAPER_RATE, ASSUMED_LATITUDE)
      (13, 0.001132, -6.0)],
 )  # fmt: skip
 def test_the_runs_of_the_paper(minutes: float, published: float, off: float) -> None:
-    row = published_row(math.radians(published), PAPER, 60.0 * minutes, PAPER_MODEL)
+    row = make_published_row(math.radians(published), PAPER, 60.0 * minutes, PAPER_MODEL)
     assert row["off_sigma"] == pytest.approx(off, abs=0.06)
     assert row["verdict"] == ("within the noise" if minutes == 120 else "beyond the noise")
 
 
 def test_white_noise_is_the_least() -> None:
-    found = allowed_sigmas(PAPER, 720.0, PAPER_MODEL)
+    found = compute_allowed_sigmas(PAPER, 720.0, PAPER_MODEL)
     # 24 dwells of 28 s.
     white = math.radians(0.0122) / math.sqrt(24 * 28.0) / math.cos(ASSUMED_LATITUDE)
     assert found["white"] == pytest.approx(white)

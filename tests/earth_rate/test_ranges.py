@@ -7,11 +7,14 @@ import numpy as np
 import pytest
 
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
-from imubench_pipeline.estimators.rows import parameter_rows
+from imubench_pipeline.estimators.rows import make_parameter_rows
 from imubench_pipeline.extensions.calibration.experiment import Experiment
 from imubench_pipeline.extensions.calibration.kalman import RateFilter
-from imubench_pipeline.extensions.earth_rate.bound import bound, cramer_rao
-from imubench_pipeline.extensions.earth_rate.courses import sigma_ranges
+from imubench_pipeline.extensions.earth_rate.bound import (
+    compute_cramer_rao_bounds,
+    compute_final_bound,
+)
+from imubench_pipeline.extensions.earth_rate.courses import compute_sigma_ranges
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.tables import write
 from imubench_pipeline.tables.keys import Key
@@ -24,17 +27,19 @@ BLOCKS = RUN.blocks(224)
 
 @pytest.mark.parametrize("bias", [math.inf, 1e-4])
 def test_the_bound_is_that_of_all_blocks_and_of_the_filter(bias: float) -> None:
-    assert bound(BLOCKS, PAPER, bias) == pytest.approx(cramer_rao(BLOCKS, PAPER, bias)[-1])
+    assert compute_final_bound(BLOCKS, PAPER, bias) == pytest.approx(
+        compute_cramer_rao_bounds(BLOCKS, PAPER, bias)[-1]
+    )
     if math.isfinite(bias):
         filtered = RateFilter(BLOCKS, PAPER, turn_on_bias=bias).rate_sigma[-1]
-        assert bound(BLOCKS, PAPER, bias) == pytest.approx(filtered, rel=1e-6)
+        assert compute_final_bound(BLOCKS, PAPER, bias) == pytest.approx(filtered, rel=1e-6)
 
 
 def test_of_white_noise_sigma_goes_as_its_density() -> None:
     model = NoiseModel(N=2e-4)
     drawn = [NoiseModel(N=2e-4 * factor) for factor in np.linspace(0.8, 1.2, 41)]
-    for method, found in sigma_ranges(BLOCKS, model, drawn, None).items():
-        sigma = bound(BLOCKS, model)
+    for method, found in compute_sigma_ranges(BLOCKS, model, drawn, None).items():
+        sigma = compute_final_bound(BLOCKS, model)
         if method in ("filter", "smoother"):
             assert found["sigma_lower"] == pytest.approx(0.81 * sigma, rel=1e-6)
             assert found["sigma_upper"] == pytest.approx(1.19 * sigma, rel=1e-6)
@@ -43,9 +48,9 @@ def test_of_white_noise_sigma_goes_as_its_density() -> None:
 
 def test_two_dwells_have_no_triples() -> None:
     two = Experiment.regular(dwell=28.0, turning=2.0, dwells=2, rate=32.0, latitude=0.4)
-    found = sigma_ranges(two.blocks(224), PAPER, [PAPER], None)
+    found = compute_sigma_ranges(two.blocks(224), PAPER, [PAPER], None)
     assert set(found) == {"pairs", "filter", "smoother"}
-    assert sigma_ranges(BLOCKS, PAPER, [], None) == {}
+    assert compute_sigma_ranges(BLOCKS, PAPER, [], None) == {}
 
 
 def put_with_limits(folder: Path, spread: float) -> Path:
@@ -57,7 +62,7 @@ def put_with_limits(folder: Path, spread: float) -> Path:
         if (value := getattr(PAPER, name))
     }
     key = Key("s", folder.name, "gyro_x")
-    rows = list(parameter_rows(key, Estimate("likelihood", known), recommended=True))
+    rows = list(make_parameter_rows(key, Estimate("likelihood", known), recommended=True))
     write("parameters", rows, folder / "parameters.parquet")
     write("draws", [], folder / "draws.parquet")
     return folder

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 import yaml
 
-from imubench_pipeline.extensions.earth_rate.earth_rotation import earth_rate_tables
+from imubench_pipeline.extensions.earth_rate.earth_rotation import make_earth_rate_tables
 from imubench_pipeline.extensions.earth_rate.turning import find_turning
 from imubench_pipeline.recordings.ingest import ingest_as_planned
-from imubench_pipeline.recordings.recording import channel_logs
+from imubench_pipeline.recordings.recording import open_channel_logs
 from imubench_pipeline.run.plan import Plan
 from imubench_pipeline.settings.sensor import LogFormat
 from imubench_pipeline.settings.simulated_recordings import SimulatedRecording
@@ -71,7 +71,7 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> tuple[Plan, Path]:
 
 
 def test_it_is_turned_by_the_clock(made: tuple[Plan, Path]) -> None:
-    (log,) = channel_logs(made[1]).values()
+    (log,) = open_channel_logs(made[1]).values()
     samples = np.concatenate(list(log.blocks()))
     assert len(samples) == 720 * 32
     found = find_turning(samples, 32.0, 30.0, first_sense=-1)
@@ -87,7 +87,7 @@ def test_it_is_turned_by_the_clock(made: tuple[Plan, Path]) -> None:
 def test_what_is_published_stands_beside_what_noise_allows(made: tuple[Plan, Path]) -> None:
     plan, kept = made
     settings = plan.experiment_settings("s", "sim_run", "earth_rate")
-    found = earth_rate_tables(kept, [], "s", "sim_run", settings)
+    found = make_earth_rate_tables(kept, [], "s", "sim_run", settings)
     rate = {(row["part"], row["method"]): row["value"] for row in found["earth_rate"]}
     whole, last = found["earth_rate_published"]
     assert whole["published"] == pytest.approx(np.radians(0.0004846))

@@ -9,14 +9,14 @@ from imubench_pipeline.extensions.earth_rate.simulation import (
     PAPER_MINUTES,
     PAPER_MODEL,
     PAPER_RATE,
-    paper_run,
+    design_paper_run,
     simulate_log,
     simulate_runs,
 )
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.settings.yaml_files import read_yaml
 from imubench_pipeline.simulate.model import SensorModel
-from imubench_pipeline.units import quantity_to_si
+from imubench_pipeline.units import parse_quantity
 from tests.conftest import PROJECT
 from tests.earth_rate.brute import MODELS, of_blocks
 
@@ -100,11 +100,11 @@ def test_the_runs_of_the_paper():
     dimensions = {"N": "gyro_density", "B": "angular_rate", "T_B": "time", "K": "gyro_random_walk"}
     for name, text in printed.items():
         if name in dimensions:
-            si = quantity_to_si(text, dimensions[name])
+            si = parse_quantity(text, dimensions[name])
             assert getattr(PAPER_MODEL, name) == pytest.approx(si, rel=1e-12)
-    assert quantity_to_si(entry["rate"], "frequency") == PAPER_RATE
-    assert [len(paper_run(minutes).dwells) for minutes in PAPER_MINUTES.values()] == [
+    assert parse_quantity(entry["rate"], "frequency") == PAPER_RATE
+    assert [len(design_paper_run(minutes).dwells) for minutes in PAPER_MINUTES.values()] == [
         240, 24, 50, 120, 26]  # fmt: skip
-    design = paper_run(12.0)
+    design = design_paper_run(12.0)
     assert design.dwells[1].start == 30 * 32
     assert design.dwells[0].sense == 1

@@ -5,14 +5,18 @@ import pytest
 from scipy.signal import lfilter
 
 from imubench_pipeline.extensions.calibration.experiment import Dwell
-from imubench_pipeline.extensions.earth_rate.choice_of_turns import interval_density
+from imubench_pipeline.extensions.earth_rate.choice_of_turns import compute_interval_log_density
 from imubench_pipeline.extensions.earth_rate.transients import (
     CLEAR_LOG_LIKELIHOOD,
-    blocks_of,
-    transients,
+    average_log_blocks,
+    detect_transients,
 )
 from imubench_pipeline.extensions.earth_rate.turning import find_turning
-from imubench_pipeline.extensions.earth_rate.turns import Turning, alternation, split_at_turns
+from imubench_pipeline.extensions.earth_rate.turns import (
+    Turning,
+    estimate_alternation,
+    split_at_turns,
+)
 from imubench_pipeline.noise import NoiseModel
 from tests.conftest import few
 from tests.earth_rate.runs import DEGREE, EARTH, PAPER, RATE, TURN, bump, turned
@@ -307,7 +311,7 @@ def test_noise_has_no_handling_at_the_ends() -> None:
     noise = NoiseModel(N=PAPER.N)
     for seed in range(60):
         log = turned([], 300.0, noise=noise, seed=seed)
-        events = transients(blocks_of(log, RATE, 30.0, noise), log, RATE)
+        events = detect_transients(average_log_blocks(log, RATE, 30.0, noise), log, RATE)
         assert not [event for event in events if event.likelihood > CLEAR_LOG_LIKELIHOOD], seed
 
 
@@ -331,28 +335,30 @@ def test_an_odd_number_of_turns_too_many_is_a_doubt() -> None:
 
 def test_noise_alone_has_hardly_a_transient() -> None:
     log = turned([], 7200.0)
-    assert len(transients(blocks_of(log, RATE, 30.0), log, RATE)) < 25
+    assert len(detect_transients(average_log_blocks(log, RATE, 30.0), log, RATE)) < 25
     slow = lfilter([1.0], [1.0, -0.9], np.random.default_rng(1).standard_normal(len(log)))
-    found = transients(blocks_of(slow, RATE, 30.0), slow, RATE)
+    found = detect_transients(average_log_blocks(slow, RATE, 30.0), slow, RATE)
     assert sum(event.likelihood > CLEAR_LOG_LIKELIHOOD for event in found) < 15
     assert max(event.likelihood for event in found) < 2.0 * CLEAR_LOG_LIKELIHOOD
 
 
 def test_the_density_of_intervals_is_one_in_all() -> None:
     interval = np.arange(0.0, 3000.0, 0.01)
-    density = np.exp(interval_density(interval, 30.0, 3.0))
+    density = np.exp(compute_interval_log_density(interval, 30.0, 3.0))
     assert density.sum() * 0.01 == pytest.approx(1.0 - 0.07 + 0.07 / (1.0 - 0.35), rel=0.02)
 
 
 def test_hundreds_of_dwells_without_a_turn_are_none() -> None:
     with np.errstate(divide="raise"):
-        assert interval_density(np.array([10.0, 9000.0]), 10.0, 2.0)[1] == -math.inf
+        assert compute_interval_log_density(np.array([10.0, 9000.0]), 10.0, 2.0)[1] == -math.inf
 
 
 def test_the_alternation_is_that_of_the_level() -> None:
     log = turned(EVERY_30, 600.0, peak=0.0, noise=NoiseModel(N=1e-8))
     log += 1e-6 * np.arange(len(log)) / RATE
-    found = alternation(blocks_of(log, RATE, 30.0), split_at_turns(EVERY_30 + TURN / 2, 2.0, 600.0))
+    found = estimate_alternation(
+        average_log_blocks(log, RATE, 30.0), split_at_turns(EVERY_30 + TURN / 2, 2.0, 600.0)
+    )
     assert found.value == pytest.approx(EARTH, rel=1e-3)
 
 
@@ -363,5 +369,5 @@ def test_dwells_without_samples_leave_the_alternation_no_surer() -> None:
     for _ in range(200):
         log = rng.standard_normal(2400)
         log[8 * 90 :] = np.nan  # three of ten dwells are left
-        z.append(alternation(blocks_of(log, 8.0, 30.0), stretches).z)
+        z.append(estimate_alternation(average_log_blocks(log, 8.0, 30.0), stretches).z)
     assert np.std(z) == pytest.approx(1.0, abs=0.2)

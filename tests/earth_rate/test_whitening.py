@@ -6,7 +6,7 @@ from scipy.linalg import cholesky, solve_triangular
 
 from imubench_pipeline.extensions.calibration.experiment import block_mean_covariance
 from imubench_pipeline.extensions.earth_rate.bound import whiten
-from imubench_pipeline.extensions.earth_rate.simulation import PAPER_MODEL, paper_run
+from imubench_pipeline.extensions.earth_rate.simulation import PAPER_MODEL, design_paper_run
 from imubench_pipeline.noise import NoiseModel
 from tests.conftest import few
 from tests.earth_rate.brute import MODELS, of_blocks
@@ -34,7 +34,7 @@ def test_it_is_the_root_of_the_covariance_of_the_samples(name, experiment, longe
     ids=["GM", "flicker"],
 )
 def test_many_blocks_lose_no_digits(model):
-    blocks = paper_run(30.0).blocks(32)
+    blocks = design_paper_run(30.0).blocks(32)
     assert len(blocks) > 1600
     columns = np.column_stack([blocks.seen, np.ones(len(blocks))])
     root = cholesky(block_mean_covariance(model, blocks), lower=True)
@@ -45,6 +45,6 @@ def test_many_blocks_lose_no_digits(model):
 
 def test_a_mean_without_noise_is_refused():
     # The random walk is 0 at the first sample, and known from then on to the last that was seen.
-    blocks = paper_run(1.0).blocks(1)
+    blocks = design_paper_run(1.0).blocks(1)
     with pytest.raises(ValueError, match="without noise"):
         whiten(NoiseModel(K=1.0), blocks, np.ones((len(blocks), 1)))

@@ -1,6 +1,6 @@
 import pytest
 
-from imubench_pipeline.estimators.agreement import disagreements, doubt_contradicted
+from imubench_pipeline.estimators.agreement import doubt_contradicted, yield_disagreements
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
 from imubench_pipeline.words.numbers import number_text
 
@@ -71,9 +71,9 @@ def test_where_several_terms_make_the_bias_that_of_the_curve_is_compared() -> No
 
 def test_two_n_that_differ_beyond_their_intervals_are_a_finding() -> None:
     far = other(N=Parameter(1.1, lower=1.05, upper=1.15))
-    (found,) = disagreements("gyro_x", {"weighted": far, "likelihood": KNOWN})
+    (found,) = yield_disagreements("gyro_x", {"weighted": far, "likelihood": KNOWN})
     assert (found.finding, found.channel) == ("N_differs", "gyro_x")
     assert found.value == pytest.approx(1.1)
     near = other(N=Parameter(1.03, lower=1.01, upper=1.05))
-    assert not list(disagreements("gyro_x", {"weighted": near, "likelihood": KNOWN}))
-    assert not list(disagreements("gyro_x", {"weighted": far}))
+    assert not list(yield_disagreements("gyro_x", {"weighted": near, "likelihood": KNOWN}))
+    assert not list(yield_disagreements("gyro_x", {"weighted": far}))

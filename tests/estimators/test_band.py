@@ -5,11 +5,11 @@ import pytest
 from scipy import signal
 
 from imubench_pipeline.estimators.band import Band, find_band
-from imubench_pipeline.estimators.identifiability import ideal_spectrum
+from imubench_pipeline.estimators.identifiability import make_ideal_spectrum
 from imubench_pipeline.estimators.lines import find_lines, mask_lines
 from imubench_pipeline.estimators.spectral_shapes import Shapes
-from imubench_pipeline.estimators.spectrum import Spectrum, spectra
-from imubench_pipeline.estimators.whittle import Terms, whittle_of
+from imubench_pipeline.estimators.spectrum import Spectrum, compute_spectra
+from imubench_pipeline.estimators.whittle import Terms, make_whittle
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.simulate import simulate
 from tests.conftest import few
@@ -36,7 +36,7 @@ def filtered(log: np.ndarray, coefficients: Coefficients, settling: int = 1000) 
 
 
 def spectrum_of(log: np.ndarray) -> Spectrum:
-    return spectra([log], len(log), RATE)[0]
+    return compute_spectra([log], len(log), RATE)[0]
 
 
 def band_of(spectrum: Spectrum, **options: float) -> Band:
@@ -52,7 +52,7 @@ def lost_power(coefficients: Coefficients, highest: float) -> float:
 
 def fitted_n(spectrum: Spectrum, highest: float, terms: Terms) -> float:
     used = spectrum.select(spectrum.upper <= highest * (1 + 1e-9))
-    return whittle_of(used, highest).maximum(terms).parameter("N")
+    return make_whittle(used, highest).maximum(terms).parameter("N")
 
 
 @pytest.mark.parametrize(
@@ -158,7 +158,7 @@ def test_slow_noise_is_the_same_through_two_taps(rng) -> None:
         straight, bent = spectrum_of(log[1000:]), spectrum_of(filtered(log, TWO_TAPS))
         band = band_of(bent).highest
         used = [s.select(s.upper <= band) for s in (straight, bent)]
-        first, second = (whittle_of(s, band).maximum(terms) for s in used)
+        first, second = (make_whittle(s, band).maximum(terms) for s in used)
         assert second.parameter("K") == pytest.approx(first.parameter("K"), rel=0.02)
         assert second.parameter("N") == pytest.approx(first.parameter("N"), rel=0.01)
         assert second.parameter("N") == pytest.approx(N, rel=0.02)
@@ -217,7 +217,7 @@ def test_a_band_that_is_asked_for_is_taken_as_it_is(rng, asked: float, highest: 
 def test_a_line_is_no_bend(rng) -> None:
     log = simulate(WHITE, RATE, 300_000, rng)
     log += 1e-2 * np.cos(2 * np.pi * 20.0 * np.arange(300_000) / RATE)
-    spectrum, line_spectra = spectra([log], len(log), RATE)
+    spectrum, line_spectra = compute_spectra([log], len(log), RATE)
     low = spectrum.block > 1
     lines = find_lines(line_spectra, WHITE, RATE, float(spectrum.upper[low].max()))
     clear = mask_lines(spectrum, lines, np.full(len(low), N**2))
@@ -244,7 +244,7 @@ def test_a_log_too_short_to_tell_keeps_the_full_band(rng) -> None:
 @pytest.mark.parametrize("T_B", [0.2, 0.5])
 def test_a_process_beside_which_white_noise_shows_is_no_filter(T_B: float) -> None:
     # As dense as the white noise at low frequencies, and far less where the fit ends.
-    exact = ideal_spectrum(RATE, 20_000.0, NYQUIST)
+    exact = make_ideal_spectrum(RATE, 20_000.0, NYQUIST)
     shapes = Shapes(exact)
     process = shapes.gauss_markov(T_B)
     density = N**2 * (shapes.white() + process / process[0])

@@ -14,7 +14,7 @@ from imubench_pipeline.estimators.lines import (
     describe_grouping,
     select_sinusoids,
 )
-from imubench_pipeline.estimators.spectral_findings import line_findings
+from imubench_pipeline.estimators.spectral_findings import describe_lines
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.words.numbers import number_text, percent_text
 
@@ -38,7 +38,7 @@ def test_few_lines_are_carried_as_they_are() -> None:
     assert [one["frequency"].value for one in found] == [
         line.frequency for line in lines[:MAX_LINES]
     ]
-    assert line_findings("gyro_x", lines, None)[1:] == []
+    assert describe_lines("gyro_x", lines, None)[1:] == []
 
 
 @pytest.mark.parametrize("number", [MAX_LINES + 1, 363, 1000])
@@ -60,7 +60,7 @@ def test_many_lines_keep_their_power_and_that_of_their_integral(number: int) -> 
 
 def test_a_comb_is_a_warning_that_says_how_many_and_how_much_power() -> None:
     lines = comb(363)
-    note, warning = line_findings("gyro_x", lines, None)
+    note, warning = describe_lines("gyro_x", lines, None)
     assert (note.finding, warning.finding) == ("lines", "too_many_lines")
     assert warning.severity == "warning" and warning.value == 363
     powers = np.sort([0.5 * line.amplitude**2 for line in lines])
@@ -78,7 +78,7 @@ def test_a_line_that_integrates_to_as_much_as_the_noise_is_warned_of() -> None:
     for part, names in ((0.49, ["lines"]), (0.51, ["lines", "strong_line"])):
         amplitude = part * white * math.pi * frequency * math.sqrt(2.0)
         line = replace(one, amplitude=amplitude)
-        found = line_findings("gyro_x", [line], white)
+        found = describe_lines("gyro_x", [line], white)
         assert [finding.finding for finding in found] == names
-        assert len(line_findings("gyro_x", [line], None)) == 1
+        assert len(describe_lines("gyro_x", [line], None)) == 1
     assert found[1].value == pytest.approx(0.51)

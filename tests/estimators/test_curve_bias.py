@@ -7,22 +7,22 @@ import pytest
 from imubench_pipeline.estimators.curve_bias import (
     Models,
     add_curve_figures,
-    allan_variance,
-    averaging_times,
-    bias_of_curve,
-    lowest_point,
-    models_of,
-    of_model,
+    compute_allan_variances,
+    compute_curve_bias,
+    compute_curve_figures,
+    convert_noise_model,
+    find_lowest_point,
+    make_averaging_times,
 )
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
 from imubench_pipeline.estimators.goodness import Goodness
 from imubench_pipeline.estimators.model_choice import Candidate
 from imubench_pipeline.estimators.posterior import Posterior
-from imubench_pipeline.estimators.whittle import Maximum, Terms, model_of
+from imubench_pipeline.estimators.whittle import Maximum, Terms, make_noise_model
 from imubench_pipeline.noise import FLOOR, GaussMarkov, NoiseModel
 
 FINE = np.geomspace(0.01, 4000.0, 20_001)
-TAU = averaging_times(100.0, 36_000.0)
+TAU = make_averaging_times(100.0, 36_000.0)
 
 
 def hump(model: NoiseModel, longest: float = 4000.0) -> float:
@@ -45,20 +45,22 @@ def hump(model: NoiseModel, longest: float = 4000.0) -> float:
     ids=lambda model: model.name,
 )
 def test_it_is_the_highest_point_of_flicker_and_processes_together(model: NoiseModel) -> None:
-    bias, at = bias_of_curve(models_of(model), 4000.0)
+    bias, at = compute_curve_bias(convert_noise_model(model), 4000.0)
     assert bias[0] == pytest.approx(hump(model), rel=2e-3)
     assert 0.0 < at[0] <= 4000.0
 
 
 @pytest.mark.parametrize("T_B", [None, 0.3, 100.0])
 def test_of_a_single_term_it_is_b(T_B: float | None) -> None:
-    bias, _ = bias_of_curve(models_of(NoiseModel(N=1e-3, B=7e-5, T_B=T_B, K=1e-5)), 4000.0)
+    bias, _ = compute_curve_bias(
+        convert_noise_model(NoiseModel(N=1e-3, B=7e-5, T_B=T_B, K=1e-5)), 4000.0
+    )
     assert bias[0] == pytest.approx(7e-5, rel=1e-12)
 
 
 def test_a_process_that_still_rises_counts_as_far_as_the_log_shows_it() -> None:
     slow = NoiseModel(N=1e-4, B=1e-4, T_B=30_000.0)
-    bias, at = bias_of_curve(models_of(slow), 4000.0)
+    bias, at = compute_curve_bias(convert_noise_model(slow), 4000.0)
     assert at[0] == 4000.0
     assert bias[0] == pytest.approx(hump(slow), rel=1e-3)
     assert bias[0] < 0.5e-4
@@ -66,9 +68,13 @@ def test_a_process_that_still_rises_counts_as_far_as_the_log_shows_it() -> None:
 
 def test_the_same_curve_has_the_same_bias_whatever_its_terms() -> None:
     # Two processes of one T_B are one process: variances add.
-    one = models_of(NoiseModel(N=1e-4, B=5e-5, T_B=80.0))
-    two = models_of(NoiseModel(N=1e-4, B=3e-5, T_B=80.0, further=[GaussMarkov(4e-5, 80.0)]))
-    assert bias_of_curve(two, 4000.0)[0] == pytest.approx(bias_of_curve(one, 4000.0)[0], rel=1e-9)
+    one = convert_noise_model(NoiseModel(N=1e-4, B=5e-5, T_B=80.0))
+    two = convert_noise_model(
+        NoiseModel(N=1e-4, B=3e-5, T_B=80.0, further=[GaussMarkov(4e-5, 80.0)])
+    )
+    assert compute_curve_bias(two, 4000.0)[0] == pytest.approx(
+        compute_curve_bias(one, 4000.0)[0], rel=1e-9
+    )
 
 
 @pytest.mark.parametrize(
@@ -83,16 +89,18 @@ def test_the_same_curve_has_the_same_bias_whatever_its_terms() -> None:
 )
 def test_the_lowest_point_is_that_of_the_curve(model: NoiseModel) -> None:
     curve = np.sqrt(model.allan_variance(FINE))
-    deviation, at, inside = lowest_point(models_of(model), TAU)
+    deviation, at, inside = find_lowest_point(convert_noise_model(model), TAU)
     assert inside[0]
     assert deviation[0] == pytest.approx(float(curve.min()), rel=1e-3)
     assert at[0] == pytest.approx(float(FINE[curve.argmin()]), rel=0.02)
-    assert np.sqrt(allan_variance(models_of(model), FINE)[0]) == pytest.approx(curve, rel=2e-4)
+    assert np.sqrt(compute_allan_variances(convert_noise_model(model), FINE)[0]) == pytest.approx(
+        curve, rel=2e-4
+    )
 
 
 def test_the_lowest_point_of_white_noise_and_a_walk_in_closed_form() -> None:
     # N^2/tau + K^2 tau/3 is least at tau = sqrt(3) N/K: 2 N K/sqrt(3)
-    deviation, at, _ = lowest_point(models_of(NoiseModel(N=1e-4, K=2e-6)), TAU)
+    deviation, at, _ = find_lowest_point(convert_noise_model(NoiseModel(N=1e-4, K=2e-6)), TAU)
     assert at[0] == pytest.approx(math.sqrt(3.0) * 50.0, rel=1e-3)
     assert deviation[0] == pytest.approx(math.sqrt(2.0 * 1e-4 * 2e-6 / math.sqrt(3.0)), rel=1e-4)
 
@@ -100,17 +108,19 @@ def test_the_lowest_point_of_white_noise_and_a_walk_in_closed_form() -> None:
 def test_ramps_and_lines_are_not_in_it() -> None:
     with_ramp = NoiseModel(N=1e-4, B=2e-5, K=1e-6, R=1e-8)
     without = NoiseModel(N=1e-4, B=2e-5, K=1e-6)
-    assert of_model(with_ramp, TAU) == of_model(without, TAU)
+    assert compute_curve_figures(with_ramp, TAU) == compute_curve_figures(without, TAU)
 
 
 def test_a_curve_that_only_falls_or_rises_has_no_lowest_point() -> None:
-    falls = of_model(NoiseModel(N=1e-4), TAU)
+    falls = compute_curve_figures(NoiseModel(N=1e-4), TAU)
     assert falls["B_curve"].status == "absent"
     assert falls["sigma_min"].status == "not_shown"
     assert "still falls at 4000 s" in (falls["sigma_min"].reason or "")
-    rises = of_model(NoiseModel(K=1e-4), TAU)
+    rises = compute_curve_figures(NoiseModel(K=1e-4), TAU)
     assert "rises from its shortest τ" in (rises["sigma_min"].reason or "")
-    assert {one.status for one in of_model(NoiseModel(), TAU).values()} == {"not_shown"}
+    assert {one.status for one in compute_curve_figures(NoiseModel(), TAU).values()} == {
+        "not_shown"
+    }
 
 
 def candidate(letters: str, powers: list[float], times: list[float], bic: float) -> Candidate:
@@ -137,7 +147,7 @@ def draws_of(*candidates: Candidate, spread: float = 0.05) -> dict[Terms, Poster
 
 def of(chosen: Candidate) -> Estimate:
     """An estimate with the model of a candidate."""
-    model = model_of(chosen.maximum)
+    model = make_noise_model(chosen.maximum)
     values = {name: getattr(model, name) for name in ("N", "B", "T_B", "K")}
     return Estimate("likelihood", {name: Parameter(value) for name, value in values.items()})
 
@@ -224,7 +234,7 @@ def test_a_time_at_the_bound_of_its_search_leaves_no_bias_instability() -> None:
 
 
 def test_models_hold_the_terms_of_a_noise_model() -> None:
-    models = models_of(NoiseModel(N=1.0, B=2.0, K=3.0, further=[GaussMarkov(4.0, 5.0)]))
+    models = convert_noise_model(NoiseModel(N=1.0, B=2.0, K=3.0, further=[GaussMarkov(4.0, 5.0)]))
     assert isinstance(models, Models)
     assert models.parameter("F")[0] == 2.0 and models.parameter("Q")[0] == 0.0
     assert (models.biases[0, 0], models.times[0, 0]) == (4.0, 5.0)

@@ -14,7 +14,7 @@ from imubench_pipeline.estimators.cutoff import (
 from imubench_pipeline.estimators.estimate import Parameter
 from imubench_pipeline.estimators.filter_fits import FilterFits
 from imubench_pipeline.estimators.goodness import Goodness
-from imubench_pipeline.estimators.identifiability import ideal_spectrum
+from imubench_pipeline.estimators.identifiability import make_ideal_spectrum
 from imubench_pipeline.estimators.joint_cutoff import select_joint_models
 from imubench_pipeline.estimators.model_choice import Candidate
 from imubench_pipeline.estimators.whittle import Behind, Maximum, Terms
@@ -23,7 +23,7 @@ from tests.estimators.test_filter_fits import RATE, trial, white
 
 
 def test_a_long_correlation_without_white_noise_may_be_a_process_or_a_filter() -> None:
-    flat = ideal_spectrum(RATE, 600.0, RATE / 2.0)
+    flat = make_ideal_spectrum(RATE, 600.0, RATE / 2.0)
 
     def told(
         samples: float, beside: float = 0.0, gained: float = 0.0, stated: float | None = None
@@ -90,7 +90,7 @@ def test_models_that_may_be_the_best_get_a_cutoff_of_their_own() -> None:
 
 @pytest.mark.parametrize(("duration", "told"), few([(20.0, False)], [(30.0, True)]))
 def test_a_cutoff_is_told_where_its_limits_are_a_fifth_apart(duration: float, told: bool) -> None:
-    flat = ideal_spectrum(RATE, duration, RATE / 2.0)
+    flat = make_ideal_spectrum(RATE, duration, RATE / 2.0)
     scatter = np.random.default_rng(3).chisquare(flat.ordinates) / flat.ordinates
     shape = white(RATE / (2.0 * np.pi), flat.frequency)
     found = find_cutoff(replace(flat, density=shape * scatter))

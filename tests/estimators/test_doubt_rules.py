@@ -10,12 +10,12 @@ from imubench_pipeline.estimators.doubts import add_doubts, describe_drift_alter
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
 from imubench_pipeline.estimators.frame import FitSelection
 from imubench_pipeline.estimators.goodness import Goodness
-from imubench_pipeline.estimators.identifiability import ideal_spectrum
+from imubench_pipeline.estimators.identifiability import make_ideal_spectrum
 from imubench_pipeline.estimators.model_choice import Candidate
-from imubench_pipeline.estimators.whittle import Maximum, Terms, whittle_of
+from imubench_pipeline.estimators.whittle import Maximum, Terms, make_whittle
 
 RATE, DURATION, N = 10.0, 4000.0, 1e-2
-FLAT = ideal_spectrum(RATE, DURATION, RATE / 2.0)
+FLAT = make_ideal_spectrum(RATE, DURATION, RATE / 2.0)
 SPECTRUM = replace(FLAT, density=np.full(len(FLAT.density), N**2))
 EVERY = np.ones(len(FLAT.density), dtype=np.bool_)
 NAMES = ("Q", "N", "B", "T_B", "K", "R")
@@ -132,7 +132,7 @@ def of_slope(power: float, bins: float = 8.0) -> tuple[str | None, float]:
     """What is said of a walk that is a drift of this spectrum, as it is expected."""
     f = SPECTRUM.frequency
     density = N**2 * (1.0 + (bins / (2.0 * DURATION) / f) ** power)
-    whittle = whittle_of(replace(SPECTRUM, density=density), RATE / 2.0)
+    whittle = make_whittle(replace(SPECTRUM, density=density), RATE / 2.0)
     maximum = whittle.maximum(Terms("NK"))
     return describe_drift_alternative(whittle, maximum), maximum.parameter("K")
 

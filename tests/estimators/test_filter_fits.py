@@ -16,10 +16,10 @@ from imubench_pipeline.estimators.filter_fits import (
     get_highest_cutoff,
     read_as_digital,
 )
-from imubench_pipeline.estimators.identifiability import ideal_spectrum
+from imubench_pipeline.estimators.identifiability import make_ideal_spectrum
 from imubench_pipeline.estimators.low_pass import Filter, Frequencies, Kind
 from imubench_pipeline.estimators.spectral_shapes import Shapes
-from imubench_pipeline.estimators.spectrum import spectra
+from imubench_pipeline.estimators.spectrum import compute_spectra
 from imubench_pipeline.estimators.whittle import Terms
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.simulate import simulate
@@ -34,7 +34,7 @@ def slow_terms(model: NoiseModel, seed: int) -> list[float]:
     """
     fine = simulate(model, OVER * RATE, OVER * 60_000, np.random.default_rng(seed))
     filtered = sosfilt(butter(1, CUTOFF, fs=OVER * RATE, output="sos"), fine)[::OVER][1000:]
-    fits = FilterFits(spectra([filtered], len(filtered), RATE)[0])
+    fits = FilterFits(compute_spectra([filtered], len(filtered), RATE)[0])
     fits.choose_slow(FilterTrial(0.0, 0.0, "analogue", 1, CUTOFF, False))
     return [float(fits.times[place]) for place in fits.slow]
 
@@ -66,7 +66,7 @@ def white(cutoff: float, frequency: np.ndarray, folds: int = 2000) -> np.ndarray
 @pytest.fixture(scope="module")
 def expected() -> FilterFits:
     """Of a spectrum as it is expected behind a filter of first order."""
-    flat = ideal_spectrum(RATE, 600.0, RATE / 2.0)
+    flat = make_ideal_spectrum(RATE, 600.0, RATE / 2.0)
     return FilterFits(replace(flat, density=white(CUTOFF, flat.frequency)))
 
 
@@ -110,7 +110,7 @@ def test_the_limits_are_where_the_profile_has_lost_half_of_chi_squared(
 
 
 def test_the_limits_end_with_the_search() -> None:
-    flat = ideal_spectrum(RATE, 20.0, RATE / 2.0)
+    flat = make_ideal_spectrum(RATE, 20.0, RATE / 2.0)
     fits = FilterFits(flat)
     fits.slow = []
     lower, upper = fits.limits(trial(3.9 * RATE))
@@ -153,7 +153,7 @@ def test_white_noise_beside_a_process_is_no_floor_behind_a_filter(expected: Filt
 
 
 def test_no_filter_bends_white_noise() -> None:
-    flat = ideal_spectrum(RATE, 600.0, RATE / 2.0)
+    flat = make_ideal_spectrum(RATE, 600.0, RATE / 2.0)
     fits = FilterFits(flat)
     assert not fits.may_bend()
     N, half_bic, cost, rising = fits.unfiltered()
@@ -165,7 +165,7 @@ def test_no_filter_bends_white_noise() -> None:
 
 
 def test_the_lengths_of_means_that_are_tried_are_whole() -> None:
-    fits = FilterFits(ideal_spectrum(RATE, 60.0, RATE / 2.0))
+    fits = FilterFits(make_ideal_spectrum(RATE, 60.0, RATE / 2.0))
     tried = fits._make_scan("boxcar", 1, RATE / 500.0, 24)
     lengths = 0.442946 * RATE / tried
     for whole in range(3, 21):
@@ -224,7 +224,7 @@ def test_a_filter_applied_to_the_samples_folds_nothing_into_n() -> None:
 def test_the_limits_are_the_outermost_of_several_hollows(
     order: int, cutoff: float, duration: float
 ) -> None:
-    flat = ideal_spectrum(RATE, duration, RATE / 2.0)
+    flat = make_ideal_spectrum(RATE, duration, RATE / 2.0)
     density = Filter("analogue", order, cutoff).white(Frequencies(flat.frequency, RATE))
     fits = FilterFits(replace(flat, density=density))
     fits.slow = []
@@ -253,7 +253,7 @@ def test_a_process_that_explains_all_is_the_only_slow_term(expected: FilterFits)
 
 def test_rounding_is_tried_beside_a_process_and_a_walk() -> None:
     terms = Terms("QNK", 1)
-    exact = ideal_spectrum(RATE, 2000.0, 0.5 * RATE)
+    exact = make_ideal_spectrum(RATE, 2000.0, 0.5 * RATE)
     shapes = Shapes(exact)
     density = 1e-6 * shapes.white() + 4e-9 * shapes.quantization() + 1e-7 * shapes.random_walk()
     density += 4e-5 * shapes.gauss_markov(2.0)

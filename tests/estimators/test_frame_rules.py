@@ -11,13 +11,13 @@ from imubench_pipeline.estimators.estimate import Parameter
 from imubench_pipeline.estimators.filter_fits import Allowed, FilterTrial, OfModel, Reading
 from imubench_pipeline.estimators.frame import FitSelection, select_for_fit
 from imubench_pipeline.estimators.goodness import Goodness
-from imubench_pipeline.estimators.identifiability import ideal_spectrum
+from imubench_pipeline.estimators.identifiability import make_ideal_spectrum
 from imubench_pipeline.estimators.model_choice import Candidate
 from imubench_pipeline.estimators.posterior import Posterior
 from imubench_pipeline.estimators.whittle import Behind, Maximum, Terms
 
 RATE = 100.0
-FLAT = ideal_spectrum(RATE, 100.0, RATE / 2.0)
+FLAT = make_ideal_spectrum(RATE, 100.0, RATE / 2.0)
 ONES = np.ones(len(FLAT.density))
 EVERY = ONES > 0.0
 
@@ -118,7 +118,7 @@ def test_a_band_that_is_asked_for_has_processes_of_ten_samples() -> None:
 
 def test_where_nothing_explains_all_the_bend_is_left_out() -> None:
     rng = np.random.default_rng(1)
-    wide = ideal_spectrum(RATE, 1000.0, RATE / 2.0)
+    wide = make_ideal_spectrum(RATE, 1000.0, RATE / 2.0)
     gain = 1.0 / (1.0 + (wide.frequency / 20.0) ** 8)
     spectrum = replace(wide, density=gain * rng.chisquare(wide.ordinates) / wide.ordinates)
     every = np.ones(len(gain), dtype=np.bool_)

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from scipy import optimize, stats
 
-from imubench_pipeline.estimators.goodness import MIN_FIT_CHANCE, Goodness, goodness
-from imubench_pipeline.estimators.spectrum import Spectrum, spectra
-from imubench_pipeline.estimators.whittle import Terms, whittle_of
+from imubench_pipeline.estimators.goodness import MIN_FIT_CHANCE, Goodness, assess_goodness_of_fit
+from imubench_pipeline.estimators.spectrum import Spectrum, compute_spectra
+from imubench_pipeline.estimators.whittle import Terms, make_whittle
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.simulate import simulate
 from tests.conftest import few
@@ -21,7 +21,7 @@ FREQUENCY = np.geomspace(1e-3, 25.0, len(BINS))
 def judged(data: np.ndarray, nu: np.ndarray = BINS, parameters: int = 0) -> Goodness:
     """Judge data that a model of density 1 is to explain."""
     frequency = np.geomspace(1e-3, 25.0, len(nu))
-    return goodness(nu, data, np.ones(len(nu)), frequency, parameters)
+    return assess_goodness_of_fit(nu, data, np.ones(len(nu)), frequency, parameters)
 
 
 def drawn(rng: np.random.Generator, nu: np.ndarray = BINS) -> np.ndarray:
@@ -30,14 +30,14 @@ def drawn(rng: np.random.Generator, nu: np.ndarray = BINS) -> np.ndarray:
 
 
 def spectrum_of(model: NoiseModel, samples: int, rng: np.random.Generator) -> Spectrum:
-    return spectra([simulate(model, RATE, samples, rng)], samples, RATE)[0]
+    return compute_spectra([simulate(model, RATE, samples, rng)], samples, RATE)[0]
 
 
 def of_fit(spectrum: Spectrum, terms: Terms) -> tuple[Goodness, np.ndarray]:
-    whittle = whittle_of(spectrum, RATE / 2, 48)
+    whittle = make_whittle(spectrum, RATE / 2, 48)
     found = whittle.maximum(terms)
     density = whittle.density(found)
-    judgement = goodness(
+    judgement = assess_goodness_of_fit(
         spectrum.ordinates, whittle.data(found), density, spectrum.frequency, terms.parameters
     )
     return judgement, density
@@ -91,7 +91,7 @@ def test_the_deviance_is_that_of_the_likelihood() -> None:
     # E[r - 1 - log r] of a squared normal variate, by numerical integration.
     one = stats.chi2(1).expect(lambda r: r - 1 - np.log(r), epsabs=1e-10, limit=200)
     assert one == pytest.approx(1.2704, abs=1e-3)
-    found = goodness(nu, data, density, np.array([1.0, 2.0, 3.0]), 0).deviance
+    found = assess_goodness_of_fit(nu, data, density, np.array([1.0, 2.0, 3.0]), 0).deviance
     assert found == pytest.approx(expected / (3 * one), rel=1e-4)
 
 
@@ -204,7 +204,7 @@ def test_a_single_wild_bin_is_no_explained_spectrum(rng) -> None:
 
 def test_units_make_no_difference(rng) -> None:
     data = drawn(rng)
-    small = goodness(BINS, 1e-14 * data, np.full(len(BINS), 1e-14), FREQUENCY, 2)
+    small = assess_goodness_of_fit(BINS, 1e-14 * data, np.full(len(BINS), 1e-14), FREQUENCY, 2)
     assert small.chance == pytest.approx(judged(data, parameters=2).chance, rel=1e-9)
     assert small.where == judged(data, parameters=2).where
 

@@ -5,13 +5,13 @@ import pytest
 
 from imubench_pipeline.estimators.identifiability import (
     TARGET_RELATIVE_ERROR,
-    bounds_of,
-    durations_needed,
-    ideal_spectrum,
-    parameter_names,
-    relative_errors,
+    compute_cramer_rao_bounds,
+    compute_relative_bounds,
+    find_durations_needed,
+    list_parameter_names,
+    make_ideal_spectrum,
 )
-from imubench_pipeline.estimators.whittle import Maximum, Terms, Whittle, whittle_of
+from imubench_pipeline.estimators.whittle import Maximum, Terms, Whittle, make_whittle
 from imubench_pipeline.noise import GaussMarkov, NoiseModel
 from tests.estimators.test_least_squares import C102, MTI_7
 
@@ -86,15 +86,15 @@ def test_the_bounds_of_the_papers_sensors_are_those_of_the_method(
     model: NoiseModel, rate: float, printed: Named
 ) -> None:
     # In per cent, of 10 h, all frequencies used.
-    found = bounds_of(model, rate, HOURS_10, rate / 2)
+    found = compute_cramer_rao_bounds(model, rate, HOURS_10, rate / 2)
     assert found.keys() == printed.keys()
     for name, per_cent in printed.items():
         assert 100 * found[name] == pytest.approx(per_cent, rel=0.012), name
 
 
 def test_a_band_to_a_tenth_of_the_rate_tells_n_half_as_well_and_the_rest_as_well() -> None:
-    whole = bounds_of(MTI_7, 100.0, HOURS_10, 50.0)
-    tenth = bounds_of(MTI_7, 100.0, HOURS_10, 10.0)
+    whole = compute_cramer_rao_bounds(MTI_7, 100.0, HOURS_10, 50.0)
+    tenth = compute_cramer_rao_bounds(MTI_7, 100.0, HOURS_10, 10.0)
     assert 100 * tenth["N"] == pytest.approx(0.084, abs=5e-4)
     for name in ("B", "T_B", "K"):
         assert tenth[name] == pytest.approx(whole[name], rel=0.01)
@@ -122,7 +122,7 @@ def test_bounds_are_those_of_the_integral_over_frequencies(
     # Up to a tenth of the rate, where samples and continuous time differ little.
     for highest in (2.0, 10.0):
         expected = integrated(model, 100.0, HOURS_10, highest)
-        found = bounds_of(model, 100.0, HOURS_10, highest)
+        found = compute_cramer_rao_bounds(model, 100.0, HOURS_10, highest)
         assert found.keys() == expected.keys()
         for name, bound in expected.items():
             assert found[name] == pytest.approx(bound, rel=tolerance), name
@@ -159,7 +159,7 @@ def test_bounds_of_a_short_log_are_those_of_its_covariance(model: NoiseModel) ->
         parts.append(inverse @ (covariance(up) - covariance(down)) / (2 * np.log(1.01)))
     information = [[0.5 * np.sum(a * b.T) for b in parts] for a in parts]
     exact = np.sqrt(np.diag(np.linalg.inv(information)))
-    found = bounds_of(model, rate, n / rate, rate / 2)
+    found = compute_cramer_rao_bounds(model, rate, n / rate, rate / 2)
     for name, bound in zip(values, exact, strict=True):
         # The transform is exactly diagonal for a random walk, nearly for a Gauss-Markov process.
         assert found[name] == pytest.approx(bound, rel=5e-3 if "K" in values else 0.02), name
@@ -173,22 +173,24 @@ def test_white_noise_alone_is_known_by_the_number_of_its_ordinates(
     duration: float, highest: float, ordinates: int
 ) -> None:
     # 100 samples have 99 ordinates, half an oscillation and so on.
-    found = bounds_of(NoiseModel(N=1e-3), 10.0, duration, highest)
+    found = compute_cramer_rao_bounds(NoiseModel(N=1e-3), 10.0, duration, highest)
     assert found["N"] == pytest.approx(1 / np.sqrt(2 * ordinates), rel=1e-9)
 
 
 @pytest.mark.parametrize("R", [1e-6, -1e-6])
 def test_a_ramp_in_white_noise_is_known_as_a_straight_line_is(R: float) -> None:
     # The slope of a straight line in white noise: sqrt(12 / T^3) N.
-    found = bounds_of(NoiseModel(N=1e-3, R=R), 10.0, 2000.0, 5.0)
+    found = compute_cramer_rao_bounds(NoiseModel(N=1e-3, R=R), 10.0, 2000.0, 5.0)
     assert found["R"] == pytest.approx(1e-3 * np.sqrt(12 / 2000.0**3) / 1e-6, rel=2e-3)
     # A ramp takes nothing from the other terms.
-    assert found["N"] == pytest.approx(bounds_of(NoiseModel(N=1e-3), 10.0, 2000.0, 5.0)["N"])
+    assert found["N"] == pytest.approx(
+        compute_cramer_rao_bounds(NoiseModel(N=1e-3), 10.0, 2000.0, 5.0)["N"]
+    )
 
 
 def test_a_ramp_in_a_random_walk_is_known_by_its_ends() -> None:
     # Its slope is the last value less the first, over T: K / sqrt(T).
-    found = bounds_of(NoiseModel(N=1e-7, K=1e-3, R=2e-5), 10.0, 2000.0, 5.0)
+    found = compute_cramer_rao_bounds(NoiseModel(N=1e-7, K=1e-3, R=2e-5), 10.0, 2000.0, 5.0)
     assert found["R"] == pytest.approx(1e-3 / np.sqrt(2000.0) / 2e-5, rel=0.01)
 
 
@@ -199,7 +201,7 @@ def test_a_ramp_in_a_random_walk_is_known_by_its_ends() -> None:
 def test_the_ordinates_of_an_ideal_spectrum_are_those_of_a_log(
     duration: float, highest: float, count: int
 ) -> None:
-    spectrum, spacing = ideal_spectrum(10.0, duration, highest), 1 / (2 * duration)
+    spectrum, spacing = make_ideal_spectrum(10.0, duration, highest), 1 / (2 * duration)
     assert spectrum.ordinates.sum() == count
     assert (spectrum.ordinates >= 1).all()
     assert spectrum.frequency[0] == pytest.approx(spacing)
@@ -212,8 +214,10 @@ def test_the_ordinates_of_an_ideal_spectrum_are_those_of_a_log(
 
 def test_a_log_without_an_ordinate_in_the_band_has_no_bounds() -> None:
     with pytest.raises(ValueError, match="no ordinate"):
-        bounds_of(NoiseModel(N=1e-3), 10.0, 0.4, 1.0)
-    assert bounds_of(NoiseModel(N=1e-3), 10.0, 0.6, 1.0)["N"] == pytest.approx(1 / np.sqrt(2))
+        compute_cramer_rao_bounds(NoiseModel(N=1e-3), 10.0, 0.4, 1.0)
+    assert compute_cramer_rao_bounds(NoiseModel(N=1e-3), 10.0, 0.6, 1.0)["N"] == pytest.approx(
+        1 / np.sqrt(2)
+    )
 
 
 @pytest.mark.parametrize(
@@ -226,7 +230,7 @@ def test_a_log_without_an_ordinate_in_the_band_has_no_bounds() -> None:
     ids=lambda model: model.name,
 )
 def test_bounds_do_not_depend_on_units(model: NoiseModel) -> None:
-    plain = bounds_of(model, 100.0, HOURS_10, 10.0)
+    plain = compute_cramer_rao_bounds(model, 100.0, HOURS_10, 10.0)
     c, s = 57.3, 60.0
     # The signal in other units, and time in minutes.
     other = NoiseModel(
@@ -238,14 +242,14 @@ def test_bounds_do_not_depend_on_units(model: NoiseModel) -> None:
         R=model.R * c * s,
         further=[GaussMarkov(one.B * c, one.T_B / s) for one in model.further],
     )
-    scaled = bounds_of(other, 100.0 * s, HOURS_10 / s, 10.0 * s)
+    scaled = compute_cramer_rao_bounds(other, 100.0 * s, HOURS_10 / s, 10.0 * s)
     assert scaled == pytest.approx(plain, rel=1e-6)
 
 
 def test_four_times_the_log_halves_the_bounds() -> None:
     for model in (MTI_7, NoiseModel(N=1e-4, B=1e-4, K=1e-6)):
-        long = bounds_of(model, 100.0, 1e8, 10.0)
-        longer = bounds_of(model, 100.0, 4e8, 10.0)
+        long = compute_cramer_rao_bounds(model, 100.0, 1e8, 10.0)
+        longer = compute_cramer_rao_bounds(model, 100.0, 4e8, 10.0)
         for name, bound in long.items():
             assert longer[name] == pytest.approx(bound / 2, rel=0.01), name
 
@@ -263,7 +267,7 @@ def test_four_times_the_log_halves_the_bounds() -> None:
 )
 def test_a_longer_log_never_tells_less(model: NoiseModel) -> None:
     durations = np.geomspace(4.0, 4e6, 25)
-    bounds = [bounds_of(model, 100.0, duration, 50.0) for duration in durations]
+    bounds = [compute_cramer_rao_bounds(model, 100.0, duration, 50.0) for duration in durations]
     for name in bounds[0]:
         column = np.array([bound[name] for bound in bounds])
         # Bins are averages, so that a bound may rise a little.
@@ -273,22 +277,22 @@ def test_a_longer_log_never_tells_less(model: NoiseModel) -> None:
 def test_what_is_far_from_the_bound_is_not_identified() -> None:
     # A weak B under a random walk and white noise, in 10 h and in 100 h.
     weak = NoiseModel(N=8.4e-5, B=8e-6, T_B=89.5, K=8.2e-7)
-    assert bounds_of(weak, 100.0, HOURS_10, 50.0)["T_B"] > 0.3
-    assert bounds_of(weak, 100.0, 100 * HOURS_10, 50.0)["T_B"] < 0.3
-    assert bounds_of(MTI_7, 100.0, HOURS_10, 50.0)["T_B"] < 0.3
+    assert compute_cramer_rao_bounds(weak, 100.0, HOURS_10, 50.0)["T_B"] > 0.3
+    assert compute_cramer_rao_bounds(weak, 100.0, 100 * HOURS_10, 50.0)["T_B"] < 0.3
+    assert compute_cramer_rao_bounds(MTI_7, 100.0, HOURS_10, 50.0)["T_B"] < 0.3
 
 
 def test_at_the_duration_that_is_needed_the_bound_is_ten_per_cent() -> None:
-    names = parameter_names(MTI_7_FOUND.terms)
-    needed = durations_needed(MTI_7_FOUND, 100.0, HOURS_10, 10.0)
+    names = list_parameter_names(MTI_7_FOUND.terms)
+    needed = find_durations_needed(MTI_7_FOUND, 100.0, HOURS_10, 10.0)
     for name, duration in zip(names[1:], needed[1:], strict=True):
         assert duration is not None
         exact = integrated(MTI_7, 100.0, duration, 10.0)[name]
         assert exact == pytest.approx(TARGET_RELATIVE_ERROR, rel=0.02), name
     # Far less than 10 h is enough for N.
-    short = durations_needed(MTI_7_FOUND, 100.0, 60.0, 10.0)
+    short = find_durations_needed(MTI_7_FOUND, 100.0, 60.0, 10.0)
     assert short[0] is not None
-    assert bounds_of(MTI_7, 100.0, short[0], 10.0)["N"] == pytest.approx(
+    assert compute_cramer_rao_bounds(MTI_7, 100.0, short[0], 10.0)["N"] == pytest.approx(
         TARGET_RELATIVE_ERROR, rel=0.03
     )
     # The duration of the log itself is only where the search begins.
@@ -298,18 +302,18 @@ def test_at_the_duration_that_is_needed_the_bound_is_ten_per_cent() -> None:
 @pytest.mark.parametrize("highest", [1.0, 5.0, 50.0])
 def test_the_duration_for_white_noise_has_its_closed_form(highest: float) -> None:
     found = maximum_of(Terms("N"), [1e-6])
-    (needed,) = durations_needed(found, 100.0, 1000.0, highest)
+    (needed,) = find_durations_needed(found, 100.0, 1000.0, highest)
     assert needed == pytest.approx(50 / (2 * highest), rel=0.03)
 
 
 @pytest.mark.parametrize("ratio", [1e-3, 1e-1, 10.0])
 def test_durations_scale_with_time(ratio: float) -> None:
-    plain = durations_needed(MTI_7_FOUND, 100.0, HOURS_10, 10.0)
+    plain = find_durations_needed(MTI_7_FOUND, 100.0, HOURS_10, 10.0)
     N, K, B = MTI_7_FOUND.powers
     found = maximum_of(
         Terms("NK", 1), [N * ratio, K / ratio, B], float(MTI_7_FOUND.times[0]) * ratio
     )
-    scaled = durations_needed(found, 100.0 / ratio, HOURS_10 * ratio, 10.0 / ratio)
+    scaled = find_durations_needed(found, 100.0 / ratio, HOURS_10 * ratio, 10.0 / ratio)
     assert scaled == pytest.approx([ratio * duration for duration in plain if duration], rel=1e-4)
 
 
@@ -317,7 +321,7 @@ def test_durations_of_a_strong_drift_are_not_those_at_which_it_looks_like_a_rand
     # In 10 h its B is known to 9 %. No log of less than a correlation time tells it at all.
     model = NoiseModel(N=1e-4, B=1e-1, T_B=500.0, K=1e-6)
     found = maximum_of(Terms("NK", 1), [1e-8, 1e-12, 1e-2], 500.0)
-    needed = durations_needed(found, 100.0, HOURS_10, 50.0)[2]
+    needed = find_durations_needed(found, 100.0, HOURS_10, 50.0)[2]
     assert needed is not None
     assert integrated(model, 100.0, 31_200.0, 10.0)["B"] == pytest.approx(
         TARGET_RELATIVE_ERROR, rel=0.02
@@ -353,10 +357,10 @@ def test_durations_are_those_of_a_scan_of_many_lengths(model: NoiseModel) -> Non
         *(time for _, time in processes),
         ramp=model.R,
     )
-    needed = durations_needed(found, 10.0, 3600.0, 5.0)
+    needed = find_durations_needed(found, 10.0, 3600.0, 5.0)
     lengths = 3600.0 * np.geomspace(1e-2, 1e4, 85)
-    bounds = [bounds_of(model, 10.0, float(length), 5.0) for length in lengths]
-    for name, duration in zip(parameter_names(found.terms), needed, strict=True):
+    bounds = [compute_cramer_rao_bounds(model, 10.0, float(length), 5.0) for length in lengths]
+    for name, duration in zip(list_parameter_names(found.terms), needed, strict=True):
         errors = np.array([bound[name] for bound in bounds])
         enough = np.flatnonzero(errors <= TARGET_RELATIVE_ERROR)
         if not len(enough):
@@ -372,30 +376,32 @@ def test_durations_are_those_of_a_scan_of_many_lengths(model: NoiseModel) -> Non
 def test_no_duration_is_given_for_what_no_log_would_tell() -> None:
     # B is 0, and so has no T_B; K is so weak that years would not do.
     found = maximum_of(Terms("NK", 1), [1e-6, 1e-24, 0.0], 100.0)
-    needed = durations_needed(found, 100.0, 3600.0, 10.0)
+    needed = find_durations_needed(found, 100.0, 3600.0, 10.0)
     assert needed[0] is not None
     assert needed[1:] == [None, None, None]
 
 
 def test_a_term_that_is_nothing_has_no_bound_and_takes_none_from_the_others() -> None:
-    spectrum = ideal_spectrum(10.0, 2000.0, 5.0)
-    whittle = whittle_of(spectrum, 5.0)
-    with_it = relative_errors(whittle, maximum_of(Terms("NFK"), [1e-6, 0.0, 1e-8]))
-    without = relative_errors(whittle, maximum_of(Terms("NK"), [1e-6, 1e-8]))
+    spectrum = make_ideal_spectrum(10.0, 2000.0, 5.0)
+    whittle = make_whittle(spectrum, 5.0)
+    with_it = compute_relative_bounds(whittle, maximum_of(Terms("NFK"), [1e-6, 0.0, 1e-8]))
+    without = compute_relative_bounds(whittle, maximum_of(Terms("NK"), [1e-6, 1e-8]))
     assert np.isinf(with_it[1])
     np.testing.assert_allclose(with_it[[0, 2]], without, rtol=1e-9)
 
 
 def test_bounds_come_in_the_order_of_their_names() -> None:
     model = NoiseModel(Q=1e-6, N=1e-4, B=2e-4, K=1e-6, R=1e-9, further=[GaussMarkov(3e-4, 50.0)])
-    names = parameter_names(Terms("QNFK", 1, ramp=True))
+    names = list_parameter_names(Terms("QNFK", 1, ramp=True))
     assert names == ["Q", "N", "B", "K", "B 2", "T_B 2", "R"]
-    assert list(bounds_of(model, 100.0, HOURS_10, 10.0)) == names
-    assert parameter_names(Terms("NK", 2)) == ["N", "K", "B", "B 2", "T_B", "T_B 2"]
+    assert list(compute_cramer_rao_bounds(model, 100.0, HOURS_10, 10.0)) == names
+    assert list_parameter_names(Terms("NK", 2)) == ["N", "K", "B", "B 2", "T_B", "T_B 2"]
     # Of two processes the one with the shorter correlation time comes first.
     short, long = GaussMarkov(3e-4, 5.0), GaussMarkov(6e-4, 200.0)
     one, other = (
-        bounds_of(NoiseModel(N=1e-4, B=a.B, T_B=a.T_B, further=[b]), 100.0, HOURS_10, 10.0)
+        compute_cramer_rao_bounds(
+            NoiseModel(N=1e-4, B=a.B, T_B=a.T_B, further=[b]), 100.0, HOURS_10, 10.0
+        )
         for a, b in ((short, long), (long, short))
     )
     assert one == other
@@ -403,10 +409,12 @@ def test_bounds_come_in_the_order_of_their_names() -> None:
 
 def test_bounds_do_not_depend_on_what_was_measured() -> None:
     # Expected information: the densities of a spectrum play no role in it.
-    spectrum = ideal_spectrum(10.0, 2000.0, 5.0)
+    spectrum = make_ideal_spectrum(10.0, 2000.0, 5.0)
     noisy = replace(
         spectrum, density=np.random.default_rng(0).chisquare(1, len(spectrum.density)) + 1e-3
     )
     found = maximum_of(Terms("NK", 1), [1e-6, 1e-8, 1e-5], 20.0)
-    one, other = (relative_errors(Whittle(part, 1.0, 400.0), found) for part in (spectrum, noisy))
+    one, other = (
+        compute_relative_bounds(Whittle(part, 1.0, 400.0), found) for part in (spectrum, noisy)
+    )
     np.testing.assert_allclose(one, other, rtol=1e-12)

@@ -7,17 +7,17 @@ from imubench_pipeline.estimators.band import Band
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
 from imubench_pipeline.estimators.frame import FitSelection
 from imubench_pipeline.estimators.goodness import Goodness
-from imubench_pipeline.estimators.identifiability import ideal_spectrum
+from imubench_pipeline.estimators.identifiability import make_ideal_spectrum
 from imubench_pipeline.estimators.intervals import (
-    as_good,
+    add_upper_limits,
+    compute_mixture_limits,
+    compute_mixture_quantile,
     describe,
-    mixture_limits,
-    mixture_quantile,
-    with_upper_limits,
+    is_as_good,
 )
 from imubench_pipeline.estimators.model_choice import Candidate
 from imubench_pipeline.estimators.posterior import Posterior
-from imubench_pipeline.estimators.whittle import Maximum, Terms, Whittle, whittle_of
+from imubench_pipeline.estimators.whittle import Maximum, Terms, Whittle, make_whittle
 
 RATE, DURATION = 1.0, 200_000.0
 N, K, B, T_B, R = 1.0, 1e-2, 1.0, 300.0, 1e-2
@@ -28,7 +28,7 @@ FRAME = FitSelection([], np.ones(1, dtype=np.bool_), np.ones(1, dtype=np.bool_),
 
 @pytest.fixture(scope="module")
 def whittle() -> Whittle:
-    return whittle_of(ideal_spectrum(RATE, DURATION, RATE / 2.0), RATE / 2.0, 6)
+    return make_whittle(make_ideal_spectrum(RATE, DURATION, RATE / 2.0), RATE / 2.0, 6)
 
 
 def candidate(terms: Terms, bic: float = 0.0, aic: float = 0.0, **values: float) -> Candidate:
@@ -162,19 +162,30 @@ def test_b_of_several_terms_is_another_quantity(whittle: Whittle) -> None:
 def test_quantiles_of_a_mixture_are_those_of_all_draws_by_weight() -> None:
     first, second = np.arange(1.0, 101.0), np.arange(201.0, 401.0)
     # Of weight 2 to 1: a half of the whole is three quarters of the first.
-    assert mixture_quantile([(first, 2.0), (second, 1.0)], 0.5) == pytest.approx(75.0, abs=1.0)
-    assert mixture_quantile([(first, 2.0), (second, 1.0)], 0.9) == pytest.approx(340.0, abs=1.0)
-    assert mixture_quantile([(first, 1.0), (second, 0.0)], 0.999) <= 100.0
+    assert compute_mixture_quantile([(first, 2.0), (second, 1.0)], 0.5) == pytest.approx(
+        75.0, abs=1.0
+    )
+    assert compute_mixture_quantile([(first, 2.0), (second, 1.0)], 0.9) == pytest.approx(
+        340.0, abs=1.0
+    )
+    assert compute_mixture_quantile([(first, 1.0), (second, 0.0)], 0.999) <= 100.0
     few = [(np.array([1.0, 2.0]), 1.0), (np.array([3.0]), 1.0)]
-    assert [mixture_quantile(few, level) for level in (0.2, 0.4, 0.6, 1.0)] == [1.0, 2.0, 3.0, 3.0]
-    low, high = mixture_limits([(first, 1.0), (second, 1.0)], [(np.arange(401.0, 500.0), 1.0)])
+    assert [compute_mixture_quantile(few, level) for level in (0.2, 0.4, 0.6, 1.0)] == [
+        1.0,
+        2.0,
+        3.0,
+        3.0,
+    ]
+    low, high = compute_mixture_limits(
+        [(first, 1.0), (second, 1.0)], [(np.arange(401.0, 500.0), 1.0)]
+    )
     assert (low, high) == pytest.approx((5.0, 496.5), abs=1.5)
 
 
 def test_models_are_about_as_good_by_aic_or_nearly_so_by_bic() -> None:
     chosen = candidate(Terms("NK"), 10.0, 10.0)
     for bic, aic, expected in ((11.9, 99.0, True), (12.1, 99.0, False), (99.0, 9.9, True)):
-        assert as_good(candidate(Terms("N"), bic, aic), chosen) is expected
+        assert is_as_good(candidate(Terms("N"), bic, aic), chosen) is expected
 
 
 def test_what_is_absent_has_the_limit_of_all_models_that_have_it() -> None:
@@ -190,20 +201,20 @@ def test_what_is_absent_has_the_limit_of_all_models_that_have_it() -> None:
         Terms("NK", 1): draws_of(Terms("NK", 1), K=(0.1, 0.2), T_B=(10.0, 20.0)),
     }
     wider = [walk, candidate(Terms("NFK"), 12.0, 12.0)]
-    found = with_upper_limits(estimate, [plain, slow], wider, drawn).parameters
+    found = add_upper_limits(estimate, [plain, slow], wider, drawn).parameters
     assert (found["K"].status, found["K"].lower) == ("absent", 0.0)
     assert found["K"].upper == pytest.approx(1.7 * K, rel=1e-3)
     assert (found["B"].status, found["T_B"].status) == ("absent", "absent")
-    found = with_upper_limits(estimate, [plain, near], wider, drawn).parameters
+    found = add_upper_limits(estimate, [plain, near], wider, drawn).parameters
     assert (found["B"].status, found["B"].lower) == ("not_identified", 0.0)
     assert "N+GM, which includes it, fits about as well as N:" in (found["B"].reason or "")
     assert (found["T_B"].lower, found["T_B"].upper) == pytest.approx((250.0, 360.0), rel=1e-3)
     both = candidate(Terms("NK", 1), 1.0, 9.0)
-    found = with_upper_limits(estimate, [plain, near, both], wider, drawn).parameters
+    found = add_upper_limits(estimate, [plain, near, both], wider, drawn).parameters
     assert "N+GM and N+GM+K, which include it, fit" in (found["B"].reason or "")
     assert (found["T_B"].lower, found["T_B"].upper) == pytest.approx((10.0, 360.0), rel=1e-2)
     # A model that has it at 0 says nothing for it.
     none = candidate(Terms("N", 1), 1.0, 9.0, B=0.0)
     assert (
-        with_upper_limits(estimate, [plain, none], wider, drawn).parameters["B"].status == "absent"
+        add_upper_limits(estimate, [plain, none], wider, drawn).parameters["B"].status == "absent"
     )

@@ -10,7 +10,7 @@ from imubench_pipeline.estimators.cutoff import Cutoff, _find_leaky_bins, find_c
 from imubench_pipeline.estimators.estimate import Parameter
 from imubench_pipeline.estimators.filter_fits import Allowed, FilterFits
 from imubench_pipeline.estimators.goodness import Goodness
-from imubench_pipeline.estimators.identifiability import ideal_spectrum
+from imubench_pipeline.estimators.identifiability import make_ideal_spectrum
 from imubench_pipeline.estimators.joint_cutoff import refine_cutoff
 from imubench_pipeline.estimators.low_pass import Filter, Frequencies
 from imubench_pipeline.estimators.model_choice import Candidate
@@ -53,7 +53,7 @@ class Profile:
 
 @pytest.fixture(scope="module")
 def profile() -> Profile:
-    flat = ideal_spectrum(RATE, 30.0, RATE / 2.0)
+    flat = make_ideal_spectrum(RATE, 30.0, RATE / 2.0)
     scatter = np.random.default_rng(3).chisquare(flat.ordinates) / flat.ordinates
     return Profile(replace(flat, density=4.0 * white(TRUE, flat.frequency) * scatter))
 
@@ -149,7 +149,7 @@ def test_a_filter_is_told_with_n_and_the_limits_of_both(profile: Profile) -> Non
 
 
 def test_bins_are_ruled_by_the_ends_where_the_filter_leaves_less() -> None:
-    flat = ideal_spectrum(RATE, 30.0, RATE / 2.0)
+    flat = make_ideal_spectrum(RATE, 30.0, RATE / 2.0)
     steep = Filter("bilinear", 4, 5.0)
     shape = steep.white(Frequencies(flat.frequency, RATE))
     leak = steep.leakage(Frequencies(flat.frequency, RATE), flat.length)
@@ -168,7 +168,7 @@ def test_bins_are_ruled_by_the_ends_where_the_filter_leaves_less() -> None:
 
 
 def test_the_rounding_of_a_register_stands_behind_the_filter() -> None:
-    flat = ideal_spectrum(RATE, 60.0, RATE / 2.0)
+    flat = make_ideal_spectrum(RATE, 60.0, RATE / 2.0)
     scatter = np.random.default_rng(6).chisquare(flat.ordinates) / flat.ordinates
     resolution = 20.0
     rounding = resolution**2 / 12.0 / RATE

@@ -8,9 +8,9 @@ from numba import njit
 from scipy import optimize
 from scipy.integrate import quad
 
-from imubench_pipeline.estimators.identifiability import bounds_of
-from imubench_pipeline.estimators.spectrum import spectra
-from imubench_pipeline.estimators.whittle import Maximum, Terms, whittle_of
+from imubench_pipeline.estimators.identifiability import compute_cramer_rao_bounds
+from imubench_pipeline.estimators.spectrum import compute_spectra
+from imubench_pipeline.estimators.whittle import Maximum, Terms, make_whittle
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.simulate import block_sums, simulate
 from tests.conftest import few
@@ -100,10 +100,10 @@ def values_of(found: Maximum) -> np.ndarray:
 
 def fitted(means: np.ndarray, rate: float, terms: Terms) -> np.ndarray:
     """What the Whittle likelihood says of the means of blocks of 10 s."""
-    spectrum = spectra([means], len(means), 1 / H)[0]
+    spectrum = compute_spectra([means], len(means), 1 / H)[0]
     blocks = np.full(len(spectrum.frequency), round(H * rate))
     spectrum = replace(spectrum, rate=rate, block=blocks)
-    return values_of(whittle_of(spectrum, 0.5 / H).maximum(terms))
+    return values_of(make_whittle(spectrum, 0.5 / H).maximum(terms))
 
 
 def most_likely(means: np.ndarray, starts: list[np.ndarray], free: np.ndarray) -> np.ndarray:
@@ -155,7 +155,7 @@ def test_estimates_are_those_of_an_exact_likelihood(
 ) -> None:
     truth = truth_of(model)
     found, exact = estimates(model, rate, logs, rng)
-    bounds = bounds_of(model, rate, HOURS_10, 0.5 / H)
+    bounds = compute_cramer_rao_bounds(model, rate, HOURS_10, 0.5 / H)
     for i, name in enumerate(NAMES):
         # All are identified in 10 h.
         assert bounds[name] < 0.3
@@ -174,7 +174,7 @@ def test_a_correlation_far_longer_than_a_fiftieth_of_the_log_is_estimated_as_wel
     # Here the transform is only nearly diagonal; what that costs is far below the scatter.
     model = NoiseModel(N=1e-3, B=7e-4, T_B=HOURS_10 / 25)
     found, exact = estimates(model, 50.0, logs, rng)
-    bounds = bounds_of(model, 50.0, HOURS_10, 0.5 / H)
+    bounds = compute_cramer_rao_bounds(model, 50.0, HOURS_10, 0.5 / H)
     for i, name in enumerate(NAMES):
         if name in bounds:
             apart = np.log(found[i] / exact[i]) / bounds[name]
@@ -188,9 +188,9 @@ def test_all_samples_tell_what_an_exact_likelihood_of_means_tells_once_n_is_know
     pairs = []
     for _ in range(12):
         log = simulate(MTI_7, rate, round(HOURS_10 * rate), rng)
-        spectrum = spectra([log], len(log), rate)[0]
+        spectrum = compute_spectra([log], len(log), rate)[0]
         assert len(np.unique(spectrum.block)) == 2
-        found = values_of(whittle_of(spectrum, 0.5 * rate).maximum(PAPERS))
+        found = values_of(make_whittle(spectrum, 0.5 * rate).maximum(PAPERS))
         means = log.reshape(-1, round(H * rate)).mean(axis=1)
         free = np.array([False, True, True, True])
         pairs.append((found, most_likely(means, [found, truth], free)))

@@ -7,7 +7,7 @@ import pytest
 from scipy import stats
 
 from imubench_pipeline.estimators.lines import Line, find_lines, mask_lines
-from imubench_pipeline.estimators.spectrum import LineSpectrum, Spectrum, spectra
+from imubench_pipeline.estimators.spectrum import LineSpectrum, Spectrum, compute_spectra
 from imubench_pipeline.noise import NoiseModel
 
 RATE, POINTS, SEGMENTS = 100.0, 1024, 20
@@ -164,9 +164,9 @@ def line_of(
     ("place", "amplitude", "wide"), [(20.0, 0.1, 1.2), (20.0, 2.0, 1.2), (0.07, 0.3, 0.03)]
 )
 def test_a_line_takes_the_bins_that_it_raises(place: float, amplitude: float, wide: float) -> None:
-    spectrum: Spectrum = spectra([np.random.default_rng(1).standard_normal(20_000)], 20_000, RATE)[
-        0
-    ]
+    spectrum: Spectrum = compute_spectra(
+        [np.random.default_rng(1).standard_normal(20_000)], 20_000, RATE
+    )[0]
     density = np.full(len(spectrum.frequency), 1.0 / RATE)
     for kind, half in (("sinusoid", 0.005), ("band", 0.5 * wide)):
         line = line_of(place, amplitude, kind, wide)

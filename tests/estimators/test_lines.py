@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from scipy import signal, stats
 
-from imubench_pipeline.estimators.likelihood import model_of
+from imubench_pipeline.estimators.likelihood import make_noise_model
 from imubench_pipeline.estimators.lines import FALSE_ALARM_PROBABILITY, Line, find_lines, mask_lines
-from imubench_pipeline.estimators.spectrum import LineSpectrum, Spectrum, spectra
-from imubench_pipeline.estimators.whittle import Terms, whittle_of
+from imubench_pipeline.estimators.spectrum import LineSpectrum, Spectrum, compute_spectra
+from imubench_pipeline.estimators.whittle import Terms, make_whittle
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.simulate import simulate
 from tests.conftest import few
@@ -28,9 +28,9 @@ STEP = RATE / 32768
 
 def search(log: np.ndarray, model: NoiseModel | None) -> tuple[list[Line], Spectrum]:
     """The lines of a log beside a model, which is fitted where it is not given."""
-    spectrum, line_spectra = spectra([log], len(log), RATE)
+    spectrum, line_spectra = compute_spectra([log], len(log), RATE)
     if model is None:
-        model = model_of(whittle_of(spectrum, RATE / 2, 2).maximum(Terms("NFK")))
+        model = model_of(make_whittle(spectrum, RATE / 2, 2).maximum(Terms("NFK")))
     return find_lines(line_spectra, model, RATE, crossover_of(spectrum)), spectrum
 
 
@@ -224,7 +224,7 @@ def test_a_strong_sinusoid_is_narrow(rng, strength: float) -> None:
 @pytest.mark.parametrize("A", [1.5e-3, 5e-2, 5.0])
 def test_a_line_where_the_two_spectra_meet_is_found_once(rng, beside: float, A: float) -> None:
     log = DEVIATION * rng.standard_normal(LONG)
-    crossover = crossover_of(spectra([log], LONG, RATE)[0])
+    crossover = crossover_of(compute_spectra([log], LONG, RATE)[0])
     frequency = crossover + beside * STEP
     lines, _ = search(log + wave(LONG, A, frequency), WHITE)
     (line,) = [line for line in lines if line.frequency < 1.0]
@@ -277,12 +277,12 @@ def test_bins_that_a_line_leaves_as_they_are_are_kept(
 
 
 def test_a_channel_without_lines_keeps_every_bin(rng) -> None:
-    spectrum = spectra([rng.standard_normal(LONG)], LONG, RATE)[0]
+    spectrum = compute_spectra([rng.standard_normal(LONG)], LONG, RATE)[0]
     assert mask_lines(spectrum, [], np.full(len(spectrum.frequency), 1 / RATE)).all()
 
 
 def test_a_stronger_line_takes_more_bins(rng) -> None:
-    spectrum = spectra([DEVIATION * rng.standard_normal(LONG)], LONG, RATE)[0]
+    spectrum = compute_spectra([DEVIATION * rng.standard_normal(LONG)], LONG, RATE)[0]
     density = np.full(len(spectrum.frequency), N**2)
 
     def taken(A: float) -> int:

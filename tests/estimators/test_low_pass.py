@@ -4,7 +4,7 @@ from scipy.integrate import quad
 from scipy.signal import butter, freqz, sosfreqz
 
 from imubench_pipeline.estimators.low_pass import Filter, Frequencies, Kind
-from imubench_pipeline.estimators.spectrum import spectra
+from imubench_pipeline.estimators.spectrum import compute_spectra
 
 RATE = 50.0
 FREQUENCY = np.array([0.01, 0.7, 3.0, 11.0, 19.0, 24.0])
@@ -69,7 +69,7 @@ def test_the_ends_of_the_transform_are_what_is_left_in_a_deep_stopband() -> None
         one.white(Frequencies(grid, RATE)) * RATE / 2
     )
     log = np.fft.irfft((lines[0] + 1j * lines[1]) * np.sqrt(1 << 21), 1 << 21)
-    spectrum, _ = spectra([log], len(log), RATE)
+    spectrum, _ = compute_spectra([log], len(log), RATE)
     deep = (spectrum.frequency > 17.0) & (spectrum.frequency < 21.0)
     part = spectrum.select(deep)
     leak = one.leakage(Frequencies(part.frequency, RATE), part.length)

@@ -7,7 +7,7 @@ import pytest
 from scipy.signal import lfilter
 
 from imubench_pipeline.estimators import likelihood
-from imubench_pipeline.estimators.spectral_findings import slow_noise_missing
+from imubench_pipeline.estimators.spectral_findings import find_missing_slow_noise
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.simulate import simulate
 from imubench_pipeline.tables.findings import Finding
@@ -21,7 +21,7 @@ SAMPLES = 30_000
 def missing(log: np.ndarray) -> Finding | None:
     found = likelihood.fit(log, RATE)
     white = found.estimates[0].parameters["N"].lower
-    return slow_noise_missing("gyro_x", found.spectrum, found.fitted, white)
+    return find_missing_slow_noise("gyro_x", found.spectrum, found.fitted, white)
 
 
 def zeroed(log: np.ndarray) -> np.ndarray:

@@ -7,7 +7,7 @@ import pytest
 import scipy.fft
 from scipy import optimize
 
-from imubench_pipeline.estimators.goodness import goodness
+from imubench_pipeline.estimators.goodness import assess_goodness_of_fit
 from imubench_pipeline.estimators.likelihood import fit
 from imubench_pipeline.estimators.model_choice import (
     CANDIDATE_MODELS,
@@ -17,8 +17,8 @@ from imubench_pipeline.estimators.model_choice import (
     describe_disagreement,
     rescore,
 )
-from imubench_pipeline.estimators.spectrum import Spectrum, spectra
-from imubench_pipeline.estimators.whittle import Maximum, Terms, whittle_of
+from imubench_pipeline.estimators.spectrum import Spectrum, compute_spectra
+from imubench_pipeline.estimators.whittle import Maximum, Terms, make_whittle
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.simulate import simulate
 from tests.conftest import few
@@ -33,11 +33,11 @@ VARIANCE = np.log(2) / (np.pi * 0.4365**2)
 
 
 def spectrum_of(log: np.ndarray) -> Spectrum:
-    return spectra([log], len(log), RATE)[0]
+    return compute_spectra([log], len(log), RATE)[0]
 
 
 def candidates_of(log: np.ndarray, quantization: bool = True) -> list[Candidate]:
-    return compare_models(whittle_of(spectrum_of(log), RATE / 2), quantization=quantization)
+    return compare_models(make_whittle(spectrum_of(log), RATE / 2), quantization=quantization)
 
 
 def flicker(B: float, samples: int, rng: np.random.Generator) -> np.ndarray:
@@ -149,7 +149,7 @@ def test_bic_and_aic_differ_as_by_hand(short_log: np.ndarray) -> None:
 
 def test_no_better_process_is_missed(rng) -> None:
     log = simulate(NoiseModel(N=N, B=1e-2, T_B=1.5), RATE, 10_000, rng)
-    whittle = whittle_of(spectrum_of(log), RATE / 2)
+    whittle = make_whittle(spectrum_of(log), RATE / 2)
     spectrum, found = whittle.spectrum, whittle.maximum(Terms("N", 1))
     inside = (np.arange(4)[:, None] + 0.5) / 4
     frequency = spectrum.lower + (spectrum.upper - spectrum.lower) * inside
@@ -174,7 +174,7 @@ def test_no_better_process_is_missed(rng) -> None:
 def test_scores_follow_from_the_costs(rng) -> None:
     log = simulate(NoiseModel(N=N, B=3e-3, T_B=8.0, K=2e-4), RATE, 30_000, rng)
     spectrum = spectrum_of(log)
-    candidates = compare_models(whittle_of(spectrum, RATE / 2), quantization=True)
+    candidates = compare_models(make_whittle(spectrum, RATE / 2), quantization=True)
     parameters = {
         "N": 1, "N+K": 2, "N+GM": 3, "N+GM+K": 4, "N+F": 2, "N+F+K": 3, "N+F+GM": 4,
         "N+F+GM+K": 5, "N+GM+GM": 5, "N+GM+GM+K": 6,
@@ -203,7 +203,7 @@ def test_scores_follow_from_the_costs(rng) -> None:
 def test_each_candidate_is_judged_by_its_own_fit(rng) -> None:
     log = simulate(NoiseModel(N=N, K=3e-4, R=2e-5), RATE, 30_000, rng)
     spectrum = spectrum_of(log)
-    whittle = whittle_of(spectrum, RATE / 2)
+    whittle = make_whittle(spectrum, RATE / 2)
     candidates = by_name(compare_models(whittle, quantization=False))
     assert candidates["N+K+R"].goodness.verdict == "explained"
     assert candidates["N"].goodness.verdict == "not explained"
@@ -213,7 +213,7 @@ def test_each_candidate_is_judged_by_its_own_fit(rng) -> None:
         # The ramp is taken out of the data, not added to the density.
         ramp = found.ramp * (np.arange(len(log)) / RATE) if "R" in name else 0.0
         data = spectrum_of(log - ramp).density
-        again = goodness(
+        again = assess_goodness_of_fit(
             spectrum.ordinates, data, whittle.density(found), spectrum.frequency, number
         )
         assert candidate.goodness.chance == pytest.approx(again.chance, rel=1e-6)
@@ -388,7 +388,7 @@ def test_models_of_more_parameters_than_a_quarter_of_the_bins_are_left_out(rng, 
 
 def scored(terms: Terms, bic: float, aic: float) -> Candidate:
     found = Maximum(terms, np.ones(len(terms.linear)), np.empty(0), 0.0, 0.0)
-    judgement = goodness(np.ones(5), np.ones(5), np.ones(5), np.arange(1.0, 6.0), 1)
+    judgement = assess_goodness_of_fit(np.ones(5), np.ones(5), np.ones(5), np.arange(1.0, 6.0), 1)
     return Candidate(found, bic, aic, 0.5, 0.5, judgement)
 
 
@@ -405,7 +405,7 @@ def test_a_ramp_must_be_the_better_and_more_so_in_place_of_a_walk() -> None:
     for seed, K in enumerate((0.0, 0.0, 1e-3, 1e-3)):
         rng = np.random.default_rng(seed)
         log = simulate(NoiseModel(N=1e-3, K=K, R=1e-5), 5.0, 3000, rng)
-        whittle = whittle_of(spectra([log], len(log), 5.0)[0], 2.5)
+        whittle = make_whittle(compute_spectra([log], len(log), 5.0)[0], 2.5)
         penalty = np.log(len(whittle.spectrum.density))
         for candidate in compare_models(whittle, quantization=False):
             found = candidate.maximum

@@ -5,8 +5,8 @@ from scipy.interpolate import PchipInterpolator
 
 from imubench_pipeline.estimators import posterior as posteriors
 from imubench_pipeline.estimators.posterior import MAX_DRAWS, sample
-from imubench_pipeline.estimators.spectrum import spectra
-from imubench_pipeline.estimators.whittle import SHAPES, Maximum, Terms, Whittle, whittle_of
+from imubench_pipeline.estimators.spectrum import compute_spectra
+from imubench_pipeline.estimators.whittle import SHAPES, Maximum, Terms, Whittle, make_whittle
 from imubench_pipeline.noise import GaussMarkov, NoiseModel
 from imubench_pipeline.noise.simulate import simulate
 from tests.conftest import few
@@ -25,7 +25,7 @@ def whittle_for(
     model: NoiseModel, samples: int, rng: np.random.Generator, shapes: int = 8
 ) -> Whittle:
     log = simulate(model, RATE, samples, rng)
-    return whittle_of(spectra([log], samples, RATE)[0], RATE / 2, shapes)
+    return make_whittle(compute_spectra([log], samples, RATE)[0], RATE / 2, shapes)
 
 
 def log_likelihood(whittle: Whittle, density: np.ndarray) -> np.ndarray:
@@ -261,7 +261,7 @@ def test_intervals_hold_the_truth_as_often_as_they_say(rng) -> None:
     inside = np.zeros(4)
     for number in range(logs):
         log = simulate(MTI_7, 1.0, 36_000, np.random.default_rng(number))
-        whittle = whittle_of(spectra([log], len(log), 1.0)[0], 0.5, 48)
+        whittle = make_whittle(compute_spectra([log], len(log), 1.0)[0], 0.5, 48)
         posterior = sample(whittle, whittle.maximum(PAPERS), rng, 2500)
         draws = np.column_stack([posterior.parameters, posterior.times])
         low, high = np.quantile(draws, [0.025, 0.975], axis=0)

@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from imubench_pipeline.estimators.identifiability import ideal_spectrum
+from imubench_pipeline.estimators.identifiability import make_ideal_spectrum
 from imubench_pipeline.estimators.posterior import _Target, sample
-from imubench_pipeline.estimators.posterior_kernels import log_posteriors, mode_at
-from imubench_pipeline.estimators.whittle import Maximum, Terms, Whittle, whittle_of
+from imubench_pipeline.estimators.posterior_kernels import compute_log_posteriors, find_mode
+from imubench_pipeline.estimators.whittle import Maximum, Terms, Whittle, make_whittle
 
 RATE, DURATION = 10.0, 500.0
 N, B, T_B, K = 1e-3, 2e-3, 12.0, 3e-4
@@ -17,8 +17,8 @@ N, B, T_B, K = 1e-3, 2e-3, 12.0, 3e-4
 @pytest.fixture(scope="module")
 def whittle() -> Whittle:
     """Of a spectrum that scatters as that of a log."""
-    flat = ideal_spectrum(RATE, DURATION, RATE / 2.0)
-    shapes = whittle_of(flat, RATE / 2.0, 24)
+    flat = make_ideal_spectrum(RATE, DURATION, RATE / 2.0)
+    shapes = make_whittle(flat, RATE / 2.0, 24)
     expected = (
         N**2 * shapes.column("N") + K**2 * shapes.column("K") + B**2 * shapes.gauss_markov(T_B)
     )
@@ -58,7 +58,7 @@ def direct(whittle: Whittle, terms: Terms, point: np.ndarray) -> float:
 def test_the_posterior_is_that_of_its_definition(whittle: Whittle, terms: Terms) -> None:
     target = _Target(whittle, maximum_of(terms))
     points = np.log([[N, K, B, T_B], [1.1 * N, 0.5 * K, B, T_B], [N, 2.0 * K, 0.7 * B, 2.0 * T_B]])
-    values, best, information = log_posteriors(points, target.problem)
+    values, best, information = compute_log_posteriors(points, target.problem)
     expected = [direct(whittle, terms, point) for point in points]
     np.testing.assert_allclose(np.diff(values), np.diff(expected), rtol=1e-6, atol=1e-8)
     if terms.ramp:
@@ -69,7 +69,7 @@ def test_the_posterior_is_that_of_its_definition(whittle: Whittle, terms: Terms)
         assert best[0] * target.ramp_unit == pytest.approx(R)
         assert information[0] / target.ramp_unit**2 == pytest.approx(below)
     outside = np.log([[N, K, B, whittle.longest * 1.01], [N, K, B, whittle.shortest / 1.01]])
-    assert (log_posteriors(outside, target.problem)[0] == -np.inf).all()
+    assert (compute_log_posteriors(outside, target.problem)[0] == -np.inf).all()
 
 
 @pytest.mark.parametrize("terms", [Terms("NK", 1), Terms("NK", 1, ramp=True)], ids=str)
@@ -77,12 +77,12 @@ def test_the_mode_is_one_and_curves_as_is_said(whittle: Whittle, terms: Terms) -
     target = _Target(whittle, maximum_of(terms))
     start = np.log([3.0 * N, 0.2 * K, 0.5 * B])
     place = np.log([T_B])
-    mode, curvature, parts = mode_at(start, place, target.problem)
+    mode, curvature, parts = find_mode(start, place, target.problem)
     middle = np.append(mode, place)
     for i in range(3):
         step = 1e-3 * np.eye(4)[i]
         points = np.array([middle - step, middle, middle + step])
-        values, _, information = log_posteriors(points, target.problem)
+        values, _, information = compute_log_posteriors(points, target.problem)
         # With the ramp at its best: not integrated over.
         low, at, high = values + (0.5 * np.log(information) if terms.ramp else 0.0)
         # The last step of Newton's has gained less than a thousandth.

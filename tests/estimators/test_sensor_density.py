@@ -9,8 +9,8 @@ from scipy.signal import lfilter
 from imubench_pipeline.estimators.band import Band
 from imubench_pipeline.estimators.cutoff import Cutoff
 from imubench_pipeline.estimators.estimate import Parameter
-from imubench_pipeline.estimators.frame import FitSelection, sensor_density
-from imubench_pipeline.estimators.identifiability import ideal_spectrum
+from imubench_pipeline.estimators.frame import FitSelection, estimate_sensor_density
+from imubench_pipeline.estimators.identifiability import make_ideal_spectrum
 from imubench_pipeline.estimators.likelihood import fit
 from imubench_pipeline.estimators.posterior import Posterior
 from imubench_pipeline.estimators.whittle import Behind, Maximum, Terms
@@ -19,7 +19,7 @@ from imubench_pipeline.typing import Array
 N, RATE, SAMPLES = 1e-4, 100.0, 40_000
 
 # For the rules alone: no log is fitted, and N is 1.
-SPECTRUM = ideal_spectrum(10.0, 4000.0, 5.0)
+SPECTRUM = make_ideal_spectrum(10.0, 4000.0, 5.0)
 ONES = np.ones(len(SPECTRUM.frequency))
 
 
@@ -105,7 +105,7 @@ def of_rules(
     drawn = np.column_stack([np.linspace(0.9, 1.1, 4001), *np.ones((len(times), 4001))])
     posterior = Posterior(drawn, np.tile(times, (4001, 1)), np.zeros(4001), 4001.0)
     maximum = Maximum(terms, powers, np.array(times), 0.0, 0.0)
-    return sensor_density(frame, maximum, posterior, SPECTRUM, np.random.default_rng(0))
+    return estimate_sensor_density(frame, maximum, posterior, SPECTRUM, np.random.default_rng(0))
 
 
 def told(found: Parameter | None) -> Parameter:

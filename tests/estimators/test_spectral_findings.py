@@ -8,12 +8,15 @@ from scipy import stats
 
 from imubench_pipeline.estimators.band import Band
 from imubench_pipeline.estimators.frame import FitSelection
-from imubench_pipeline.estimators.identifiability import ideal_spectrum
-from imubench_pipeline.estimators.spectral_findings import slow_noise_missing, spectral_findings
+from imubench_pipeline.estimators.identifiability import make_ideal_spectrum
+from imubench_pipeline.estimators.spectral_findings import (
+    find_missing_slow_noise,
+    spectral_findings,
+)
 from imubench_pipeline.model.states import BandSource
 from imubench_pipeline.tables.findings import Finding
 
-FLAT = ideal_spectrum(10.0, 1000.0, 5.0)
+FLAT = make_ideal_spectrum(10.0, 1000.0, 5.0)
 BINS = len(FLAT.density)
 
 
@@ -25,7 +28,7 @@ def missing(
     # The order of bins is that of no two spectra.
     turned = np.random.default_rng(1).permutation(BINS)
     spectrum = replace(FLAT, density=density).select(turned)
-    return slow_noise_missing("gyro_x", spectrum, np.full(BINS, fitted)[turned], white)
+    return find_missing_slow_noise("gyro_x", spectrum, np.full(BINS, fitted)[turned], white)
 
 
 def test_a_lack_has_its_part_its_end_and_is_beyond_chance() -> None:
@@ -66,7 +69,9 @@ def test_nothing_is_said_below_a_low_pass_or_without_n() -> None:
     assert missing(40, 0.15, white=None) is None
     # Beyond a twentieth of the rate what is lacking is a filter's.
     high = np.where(FLAT.frequency > 0.5, 0.1, 1.0)
-    assert slow_noise_missing("gyro_x", replace(FLAT, density=high), np.ones(BINS), 1.0) is None
+    assert (
+        find_missing_slow_noise("gyro_x", replace(FLAT, density=high), np.ones(BINS), 1.0) is None
+    )
 
 
 def test_a_band_that_ends_before_nyquist_is_told() -> None:

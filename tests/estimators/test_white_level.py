@@ -17,10 +17,10 @@ from imubench_pipeline.estimators.white_level import (
     WhiteStretch,
     count_fast_processes,
     find_white_stretch,
-    merged_maximum,
-    merged_posterior,
+    merge_fast_draws,
+    merge_fast_processes,
 )
-from imubench_pipeline.estimators.whittle import Maximum, Terms, model_of
+from imubench_pipeline.estimators.whittle import Maximum, Terms, make_noise_model
 from imubench_pipeline.noise import GaussMarkov, NoiseModel
 from imubench_pipeline.noise.simulate import simulate
 from imubench_pipeline.typing import Array
@@ -122,30 +122,30 @@ def test_as_many_fast_processes_count_as_the_level_asks(folding: float) -> None:
         stretch = WhiteStretch(level, 1.0, 10.0)
         assert count_fast_processes(best, folding, stretch) == number
     assert count_fast_processes(best, folding, None) == 0
-    merged = merged_maximum(best, 1, folding)
+    merged = merge_fast_processes(best, 1, folding)
     assert merged.terms == Terms("NK", 1)
-    in_the_log = replace(model_of(merged), N=model_of(merged).N * np.sqrt(folding))
+    in_the_log = replace(make_noise_model(merged), N=make_noise_model(merged).N * np.sqrt(folding))
     assert in_the_log.N == pytest.approx(2.0 * N, rel=1e-6)
     assert (in_the_log.B, in_the_log.T_B, in_the_log.K) == pytest.approx((1e-4, 30.0, 1e-6))
     # Beyond the process the curve is the same: nothing is lost, and nothing counts twice.
     late = np.geomspace(5.0, 1000.0, 20)
     assert in_the_log.allan_variance(late) == pytest.approx(model.allan_variance(late), rel=0.02)
-    assert merged_maximum(best, 0, folding) is best
+    assert merge_fast_processes(best, 0, folding) is best
 
 
 def test_n_and_its_draws_go_to_the_level_of_the_curve_by_one_factor() -> None:
     # With the process N is twice as high; the curve has not quite come to it.
     model = fast(3.0)
-    lower = merged_maximum(maximum(model), 1, 1.0, 0.98)
-    assert model_of(lower).N == pytest.approx(0.98 * 2.0 * N, rel=1e-6)
+    lower = merge_fast_processes(maximum(model), 1, 1.0, 0.98)
+    assert make_noise_model(lower).N == pytest.approx(0.98 * 2.0 * N, rel=1e-6)
     posterior = Posterior(np.array([[N, 0.0, model.B]]), np.full((1, 1), T_B), np.zeros(1), 1.0)
-    drawn = merged_posterior(posterior, Terms("NK", 1), 1, 0.98)
+    drawn = merge_fast_draws(posterior, Terms("NK", 1), 1, 0.98)
     assert drawn.parameters[0, 0] == pytest.approx(0.98 * 2.0 * N, rel=1e-6)
     # Where none counts into it, the process stays.
     for number in (0, 1):
-        left = merged_maximum(maximum(model), number, 1.7, 0.98)
+        left = merge_fast_processes(maximum(model), number, 1.7, 0.98)
         assert len(left.times) == 1 - number
-    alone = merged_posterior(posterior, Terms("NK", 1), 0, 0.98)
+    alone = merge_fast_draws(posterior, Terms("NK", 1), 0, 0.98)
     assert alone.parameters[0] == pytest.approx([0.98 * N, 0.0, model.B])
 
 
@@ -153,7 +153,7 @@ def test_draws_are_merged_one_by_one() -> None:
     model = fast(3.0)
     draws = np.array([[N, 0.0, model.B], [2.0 * N, 0.0, 0.0]])
     posterior = Posterior(draws, np.full((2, 1), T_B), np.zeros(2), 2.0)
-    merged = merged_posterior(posterior, Terms("NK", 1), 1)
+    merged = merge_fast_draws(posterior, Terms("NK", 1), 1)
     assert merged.parameters[:, 0] == pytest.approx([2.0 * N, 2.0 * N], rel=1e-6)
     assert merged.parameters.shape == (2, 2) and merged.times.shape == (2, 0)
 

@@ -7,8 +7,8 @@ import scipy.fft
 from scipy import optimize, stats
 
 from imubench_pipeline.estimators.spectral_shapes import Shapes
-from imubench_pipeline.estimators.spectrum import SINGLE, Spectrum, spectra
-from imubench_pipeline.estimators.whittle import SHAPES, Maximum, Terms, Whittle, whittle_of
+from imubench_pipeline.estimators.spectrum import SINGLE, Spectrum, compute_spectra
+from imubench_pipeline.estimators.whittle import SHAPES, Maximum, Terms, Whittle, make_whittle
 from imubench_pipeline.noise import GaussMarkov, NoiseModel
 from imubench_pipeline.noise.simulate import simulate
 from tests.conftest import few
@@ -23,12 +23,12 @@ MODEL = NoiseModel(N=1e-3, B=1.5e-3, T_B=20.0, K=1e-4)
 
 
 def spectrum_of(log: np.ndarray, rate: float = RATE) -> Spectrum:
-    return spectra([log], len(log), rate)[0]
+    return compute_spectra([log], len(log), rate)[0]
 
 
 def whittle_to(spectrum: Spectrum, shapes: int = SHAPES) -> Whittle:
     """The likelihood of all bins of a spectrum; few shapes are enough without a process."""
-    return whittle_of(spectrum, 0.5 * spectrum.rate, shapes)
+    return make_whittle(spectrum, 0.5 * spectrum.rate, shapes)
 
 
 def whittle_for(

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
-from imubench_pipeline.estimators.rows import parameter_rows
+from imubench_pipeline.estimators.rows import make_parameter_rows
 from imubench_pipeline.export.choice import choose, parameter_notes
 from imubench_pipeline.export.imu import ExportError
 from imubench_pipeline.model.estimates import ParameterRow
@@ -22,7 +22,7 @@ def rows(
     channel: str, found: Estimate, recording: str = "a", *, recommended: bool = True
 ) -> list[ParameterRow]:
     key = Key("mti_7", recording, channel)
-    return list(parameter_rows(key, found, recommended=recommended))
+    return list(make_parameter_rows(key, found, recommended=recommended))
 
 
 # At 60 s x is the best, y the worst; at 1 s y is the best and x the worst.

@@ -32,7 +32,7 @@ def discretised(F: Array, Q: Array, interval: float) -> tuple[Array, Array]:
 
 @pytest.mark.parametrize("model", [GYRO, EVERYTHING, NoiseModel(N=1e-4, B=1e-4)])
 def test_the_discrete_model_is_the_continuous_one_sampled(model: NoiseModel) -> None:
-    found = matrices.matrices(model, 20.0, 30.0)
+    found = matrices.compute_matrices(model, 20.0, 30.0)
     phi, drive = discretised(found.F, found.Q, 0.05)
     np.testing.assert_allclose(found.Phi, phi, atol=1e-12)
     np.testing.assert_allclose(found.Q_d, drive, rtol=1e-6, atol=1e-18)
@@ -42,7 +42,7 @@ def test_the_discrete_model_is_the_continuous_one_sampled(model: NoiseModel) -> 
 
 
 def test_quantization_noise_is_in_the_discrete_model_alone() -> None:
-    found = matrices.matrices(NoiseModel(Q=1e-6, N=1e-4, K=1e-6), 20.0, 30.0)
+    found = matrices.compute_matrices(NoiseModel(Q=1e-6, N=1e-4, K=1e-6), 20.0, 30.0)
     assert found.F.shape == (1, 1)
     assert found.Phi.shape == (3, 3)
 

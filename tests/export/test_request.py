@@ -9,7 +9,7 @@ import yaml
 
 from imubench_pipeline.allan import AllanCurve, cluster_sizes
 from imubench_pipeline.estimators.estimate import Estimate, JointDraws, Parameter
-from imubench_pipeline.estimators.rows import allan_rows, draw_rows, parameter_rows
+from imubench_pipeline.estimators.rows import make_allan_rows, make_draw_rows, make_parameter_rows
 from imubench_pipeline.export.imu import ExportError
 from imubench_pipeline.export.request import Request, build_imu, load, make_content
 from imubench_pipeline.export.targets import TARGETS
@@ -18,7 +18,7 @@ from imubench_pipeline.model.verdicts import DoubtMark
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.run.cli import main
 from imubench_pipeline.settings.config import ExportSettings
-from imubench_pipeline.steps.exports import exports
+from imubench_pipeline.steps.exports import make_exports
 from imubench_pipeline.tables import build, write, write_arrow
 from imubench_pipeline.tables.keys import Key
 from tests.conftest import few
@@ -45,8 +45,8 @@ def tables() -> dict[str, pa.Table]:
     for channel, model in CHANNELS.items():
         key = Key("mti_7", "sim_a", channel)
         values = {name: Parameter(getattr(model, name)) for name in ("N", "B", "T_B", "K")}
-        parameters += parameter_rows(key, Estimate("likelihood", values), recommended=True)
-        allan += allan_rows(key, curve(model))
+        parameters += make_parameter_rows(key, Estimate("likelihood", values), recommended=True)
+        allan += make_allan_rows(key, curve(model))
     recording = {
         "sensor": "mti_7", "device": "serial 1", "recording": "sim_a", "kind": "static",
         "simulated": True, "status": "ok", "rate": RATE, "samples": 1_800_000,
@@ -168,7 +168,9 @@ def test_an_overbound_lies_above_the_draws_of_the_recording(
         first = np.tile([0.0, model.N, model.B, model.T_B or np.nan, model.K, 0.0], (40, 1))
         first[:, [1, 2, 4]] *= np.geomspace(1.0 / spread, spread, 40)[:, None]
         drawn = JointDraws(first, np.empty((40, 0, 2)))
-        rows = draw_rows(Key("mti_7", "sim_a", "gyro_y"), Estimate("likelihood", {}, draws=drawn))
+        rows = make_draw_rows(
+            Key("mti_7", "sim_a", "gyro_y"), Estimate("likelihood", {}, draws=drawn)
+        )
         write("draws", rows, tmp_path / "mti_7/sim_a/draws.parquet")
         found = build_imu(
             tables, replace(REQUEST, overbound=True, horizon=600.0, most_excess=20.0), tmp_path
@@ -221,7 +223,7 @@ def test_the_head_of_an_overbound_says_where_its_density_holds(
 @pytest.mark.release
 def test_a_walk_that_cannot_follow_is_refused(tables: dict[str, pa.Table]) -> None:
     settings = ExportSettings(targets=("kalibr",), overbound=True, horizon="150 s", most_excess=1.2)
-    ((place, content),) = exports(tables, settings)
+    ((place, content),) = make_exports(tables, settings)
     assert str(place) == "mti_7/not_made.txt"
     assert "at most 1.2 times is allowed; N+GM is held by gnss" in str(content)
     assert "take a horizon shorter than 150 s" in str(content)
@@ -268,7 +270,7 @@ def test_a_run_leaves_a_file_a_program_and_says_what_it_cannot(
     tables: dict[str, pa.Table],
 ) -> None:
     settings = ExportSettings(targets=("kalibr", "npz", "none"), horizon="30 s")
-    found = {str(place): content for place, content in exports(tables, settings)}
+    found = {str(place): content for place, content in make_exports(tables, settings)}
     assert set(found) == {"mti_7/kalibr/imu.yaml", "mti_7/npz/noise.npz", "mti_7/not_made.txt"}
     assert "horizon of 30 s" in str(found["mti_7/kalibr/imu.yaml"])
     assert str(found["mti_7/not_made.txt"]).startswith("none: target 'none' is not known; ")

@@ -9,7 +9,7 @@ import pytest
 
 from imubench_pipeline.export import matlab, px4
 from imubench_pipeline.export.targets import TARGETS
-from imubench_pipeline.export.temperature import TemperatureEffect, temperature_effect
+from imubench_pipeline.export.temperature import TemperatureEffect, find_temperature_effect
 from imubench_pipeline.model.estimates import TemperatureRow
 from imubench_pipeline.model.recordings import RecordingRow
 from tests.export.sensors import imu
@@ -46,7 +46,7 @@ def rows(channel: str, compensated: bool = True, **changes: Any) -> list[Tempera
 def effect(*given: list[TemperatureRow], horizon: float = 60.0, **about: Any) -> TemperatureEffect:
     listed = [row for one in given for row in one]
     (recording,) = typed(RecordingRow, [RECORDING | about])
-    return temperature_effect(listed, recording, "gyro", horizon)
+    return find_temperature_effect(listed, recording, "gyro", horizon)
 
 
 def px4_offset(found: dict[str, float], axis: int, temperature: float) -> float:

@@ -7,10 +7,14 @@ import pytest
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
 from imubench_pipeline.extensions.fusion.board import Board
 from imubench_pipeline.extensions.fusion.equivalence import equivalence_rows
-from imubench_pipeline.extensions.fusion.fusion import fusion_rows
+from imubench_pipeline.extensions.fusion.fusion import yield_fusion_rows
 from imubench_pipeline.extensions.fusion.prediction import fused_allan
 from imubench_pipeline.extensions.fusion.weights import equal
-from imubench_pipeline.navigation.compared import ComparedChannel, TemperaturePart, number_needed
+from imubench_pipeline.navigation.compared import (
+    ComparedChannel,
+    TemperaturePart,
+    compute_number_needed,
+)
 from imubench_pipeline.settings.config import FusionSettings
 from imubench_pipeline.tables import build
 from tests.fusion.boards import FLICKER
@@ -62,7 +66,9 @@ def test_what_temperature_adds_is_not_averaged_away() -> None:
 
 def test_a_run_takes_temperature_from_its_tables() -> None:
     made = joined(recording_rows("one", temperature="followed"), recording_rows("two"))
-    rows = build("fusion", fusion_rows(made, FusionSettings(tau=["100 s"], draws=100))).to_pylist()
+    rows = build(
+        "fusion", yield_fusion_rows(made, FusionSettings(tau=["100 s"], draws=100))
+    ).to_pylist()
     (row,) = (row for row in rows if row["sensor"] == "one")
     # Three quarters of what was measured, beside the model that the tables have of the rest.
     added = 0.75 * row["other_adev"] ** 2
@@ -72,11 +78,16 @@ def test_a_run_takes_temperature_from_its_tables() -> None:
 
 
 def test_without_a_common_part_it_is_the_ratio_of_the_variances() -> None:
-    assert number_needed(9.0, 0.0, [1.0, 18.0]) == pytest.approx([9.0, 0.5])
+    assert compute_number_needed(9.0, 0.0, [1.0, 18.0]) == pytest.approx([9.0, 0.5])
 
 
 def test_a_floor_takes_more_and_at_last_no_number() -> None:
-    assert number_needed(9.0, 1.0, [10.0, 2.0, 1.0, 0.5]).tolist() == [1.0, 9.0, math.inf, math.inf]
+    assert compute_number_needed(9.0, 1.0, [10.0, 2.0, 1.0, 0.5]).tolist() == [
+        1.0,
+        9.0,
+        math.inf,
+        math.inf,
+    ]
 
 
 @pytest.mark.parametrize("common", [{}, {"N": 0.02, "B": 0.01, "K": 0.01}])
@@ -84,7 +95,7 @@ def test_that_many_on_a_board_reach_the_better_sensor(common: dict[str, float]) 
     wanted = float(FLICKER.allan_variance(30.0)) / 7.3
     board = Board.alike(FLICKER, 1, 1000.0, common)
     own, floor = board.allan_parts([30.0]).of_sum(np.ones((1, 1)))[0]
-    n = float(number_needed(own, floor, wanted))
+    n = float(compute_number_needed(own, floor, wanted))
     assert n >= 7.3 * (1 - 1e-9)
     for number, enough in ((math.floor(n), False), (math.ceil(n), True)):
         of_board = Board.alike(FLICKER, number, 1000.0, common)
@@ -189,7 +200,7 @@ def test_it_does_not_matter_what_else_is_compared() -> None:
 def test_the_tables_of_a_run_give_its_rows() -> None:
     made = joined(recording_rows("one"), recording_rows("two"), rejected_rows("three"))
     how = FusionSettings(tau=("1 s", "100 s", "1 h"), draws=100)
-    rows = build("fusion", fusion_rows(made, how)).to_pylist()
+    rows = build("fusion", yield_fusion_rows(made, how)).to_pylist()
     assert [(row["sensor"], row["other"], row["tau"]) for row in rows] == [
         (a, b, tau) for tau in (1.0, 100.0, 3600.0) for a, b in (("one", "two"), ("two", "one"))
     ]

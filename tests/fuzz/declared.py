@@ -32,18 +32,18 @@ from imubench_pipeline.recordings.kept import Quality
 from imubench_pipeline.report.publish import _read_keys
 from imubench_pipeline.run.faults import Faults
 from imubench_pipeline.run.lock import _describe_holder, read_note
-from imubench_pipeline.run.recovery import restarted
+from imubench_pipeline.run.recovery import was_restarted
 from imubench_pipeline.settings.config import read_run
 from imubench_pipeline.settings.requirements import Requirement
 from imubench_pipeline.settings.sensor import RecordingNotes, Sensor, merged_log
 from imubench_pipeline.settings.simulated_recordings import read_simulated
 from imubench_pipeline.settings.validation import ConfigError, parse
 from imubench_pipeline.settings.yaml_files import read_yaml
-from imubench_pipeline.simulate.sources import from_file
+from imubench_pipeline.simulate.sources import read_model_file
 from imubench_pipeline.tables import TableError, read, write
-from imubench_pipeline.tables.failures import Failure, failure_of
+from imubench_pipeline.tables.failures import Failure, read_failure
 from imubench_pipeline.tables.findings import RecordingError
-from imubench_pipeline.units import SI_UNITS, UnitError, conversion, quantity_to_si
+from imubench_pipeline.units import SI_UNITS, UnitError, find_conversion, parse_quantity
 from tests.conftest import PROJECT
 from tests.fuzz.mutations import mutated
 
@@ -200,7 +200,7 @@ def _take_unit(path: Path) -> object:
     text = path.read_bytes().decode("utf-8", "replace")
     refused = 0
     for dimension in SI_UNITS:
-        for take in (quantity_to_si, conversion):
+        for take in (parse_quantity, find_conversion):
             try:
                 take(text, dimension)
             except UnitError as error:
@@ -210,19 +210,19 @@ def _take_unit(path: Path) -> object:
 
 
 def _take_table(path: Path) -> object:
-    failure_of(path)
+    read_failure(path)
     return read("fixed_bias", [path]).to_pylist()
 
 
 def _take_quality(path: Path) -> object:
-    failure_of(path)
+    read_failure(path)
     found = Quality.read(path)
     return found.fault(path.parent, whole=True)
 
 
 def _take_note(path: Path) -> object:
     note = read_note(path)
-    return _describe_holder(note), restarted(note)
+    return _describe_holder(note), was_restarted(note)
 
 
 def _take_record(path: Path) -> object:
@@ -257,7 +257,7 @@ def subjects() -> dict[str, Subject]:
         "requirement": Subject("r.yaml", partial(_take_model, Requirement), requirements),
         "run": Subject("config.yaml", _take_run, _settings("config/config.yaml")),
         "simulated": Subject("s.yaml", _take_simulated, _SIMULATED),
-        "model": Subject("m.yaml", from_file, _MODELS),
+        "model": Subject("m.yaml", read_model_file, _MODELS),
         "unit": Subject("unit", _take_unit, _UNITS),
         "table": Subject(
             "fixed_bias.parquet",

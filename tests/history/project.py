@@ -15,10 +15,10 @@ from imubench_pipeline.run.plan import Plan
 from imubench_pipeline.run.processes import Job, Processes, StepError
 from imubench_pipeline.run.resources import Limit
 from imubench_pipeline.run.scripts import Scripts
-from imubench_pipeline.run.sealing import sealed, settings_digest, unsound
+from imubench_pipeline.run.sealing import digest_settings, find_unsound_jobs, seal_outputs
 from imubench_pipeline.steps.ingest import write_recording
 from imubench_pipeline.tables.failures import describe_error
-from imubench_pipeline.tables.seals import place_of
+from imubench_pipeline.tables.seals import name_place
 from tests.workflow.project import put_sensor
 
 OUTPUTS = ("quality.json", "envelope.parquet", "histogram.parquet")
@@ -46,7 +46,7 @@ class InThisProcess(Processes):
         folder = Path(job.output[0]).parent
         try:
             folder.mkdir(parents=True, exist_ok=True)
-            with sealed(job):
+            with seal_outputs(job):
                 write_recording(
                     Path(job.params.source),
                     job.params.settings,
@@ -82,9 +82,9 @@ class Project:
             key: {"source": str(log.path), "settings": plan.ingest_settings(*key), "code": "x"}
             for key, log in plan.recordings.items()
         }
-        places = {place_of("ingest", *key): key for key in settings}
-        digests = {place: settings_digest(settings[key]) for place, key in places.items()}
-        changed = set(unsound(self.results, digests))
+        places = {name_place("ingest", *key): key for key in settings}
+        digests = {place: digest_settings(settings[key]) for place, key in places.items()}
+        changed = set(find_unsound_jobs(self.results, digests))
         scripts = Scripts(plan.faults, lambda *_: Limit(10**9, 60.0, ""))
         scripts._processes = InThisProcess()
         done = []

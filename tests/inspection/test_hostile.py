@@ -18,7 +18,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from imubench_pipeline.readers import RecordingError
-from imubench_pipeline.readers.contents import contents
+from imubench_pipeline.readers.contents import list_contents
 from imubench_pipeline.readers.inspection import inspect
 from tests.conftest import few
 from tests.inspection.drafts import (
@@ -75,7 +75,7 @@ def test_a_thousand_columns_are_looked_at_whatever_they_hold(tmp_path: Path) -> 
     # Each of dates takes 3 ms, as its pattern is looked for.
     names = ["wx", "ax", *(f"n{place}" for place in range(8000))]
     path = saved(tmp_path, ",".join(names) + "\n" + ("1.5,2" + ",3" * 8000 + "\n") * 3)
-    (table,) = contents(path).tables
+    (table,) = list_contents(path).tables
     assert len(table.columns) == 1000
 
 
@@ -115,12 +115,12 @@ def test_hostile_names(tmp_path: Path) -> None:
 @given(st.text(max_size=60))
 @examples(150)
 def test_any_name(name: str) -> None:
-    from imubench_pipeline.readers.inspection.names import meaning
-    from imubench_pipeline.readers.stated_units import divided
+    from imubench_pipeline.readers.inspection.names import interpret_label
+    from imubench_pipeline.readers.stated_units import split_unit
 
-    meaning(name)
+    interpret_label(name)
     for dimension in ("time", "angular_rate", "acceleration", "temperature"):
-        divided(name, dimension)
+        split_unit(name, dimension)
 
 
 def test_cut_and_damaged_files(tmp_path: Path, si: Columns) -> None:

@@ -9,10 +9,10 @@ from imubench_pipeline.readers.inspection.names import (
     PLAIN,
     WEAK,
     WITHOUT_GRAVITY,
-    meaning,
+    interpret_label,
 )
-from imubench_pipeline.readers.stated_units import unit_of
-from imubench_pipeline.units import UnitError, conversion
+from imubench_pipeline.readers.stated_units import parse_unit
+from imubench_pipeline.units import UnitError, find_conversion
 
 MEANT = {
     "gyro_x": ("gyro", "x", None, PLAIN),
@@ -64,20 +64,20 @@ NOTHING = [
 
 @pytest.mark.parametrize("name", MEANT)
 def test_a_name_means(name: str) -> None:
-    found = meaning(name)
+    found = interpret_label(name)
     assert found is not None
     assert (found.quantity, found.axis, found.unit, found.rank) == MEANT[name]
 
 
 @pytest.mark.parametrize("name", NOTHING)
 def test_a_name_means_nothing_of_an_inertial_sensor(name: str) -> None:
-    assert meaning(name) is None
+    assert interpret_label(name) is None
 
 
 def test_an_axis_alone_means_what_its_table_is_called() -> None:
-    found = meaning("x", "Gyroscope")
+    found = interpret_label("x", "Gyroscope")
     assert found is not None and found.quantity == "gyro"
-    found = meaning("y", "Linear Accelerometer")
+    found = interpret_label("y", "Linear Accelerometer")
     assert found is not None and (found.quantity, found.rank) == ("accel", WITHOUT_GRAVITY)
 
 
@@ -105,13 +105,15 @@ SPELLED = {
 def test_units_as_tools_write_them(dimension: str) -> None:
     for unit, spellings in SPELLED[dimension].items():
         for written in spellings:
-            found = unit_of(written, dimension)
+            found = parse_unit(written, dimension)
             assert found is not None, written
-            assert conversion(found, dimension) == pytest.approx(conversion(unit, dimension))
+            assert find_conversion(found, dimension) == pytest.approx(
+                find_conversion(unit, dimension)
+            )
 
 
 @pytest.mark.parametrize("text", ["rps", "rpm", "LSB", "counts", "raw", "1/s", "", "g/s", "?"])
 def test_what_is_no_unit_of_a_rate(text: str) -> None:
-    assert unit_of(text, "angular_rate") is None
+    assert parse_unit(text, "angular_rate") is None
     with pytest.raises(UnitError):
-        conversion(text, "angular_rate")
+        find_conversion(text, "angular_rate")

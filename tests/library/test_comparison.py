@@ -8,7 +8,7 @@ import pytest
 import imubench_pipeline as imu
 from imubench_pipeline.estimators.estimate import Parameter
 from imubench_pipeline.library.estimates import Estimates
-from imubench_pipeline.navigation.ratios import Ratio, ratio_of_parameters
+from imubench_pipeline.navigation.ratios import Ratio, compare_parameters
 from tests.library.conftest import GYRO, RATE
 
 LOUD = imu.NoiseModel(N=1.5 * GYRO.N, K=GYRO.K)
@@ -59,7 +59,7 @@ def test_limits_of_a_ratio_are_those_of_log_normal_values() -> None:
         2.0, lower=2.0 * math.exp(-1.96 * spread), upper=2.0 * math.exp(1.96 * spread)
     )
     second = Parameter(1.0, lower=math.exp(-1.96 * other), upper=math.exp(1.96 * other))
-    ratio = ratio_of_parameters(first, second)
+    ratio = compare_parameters(first, second)
     width = 1.96 * math.hypot(spread, other)
     assert ratio.value == 2.0 and ratio.verdict == "higher"
     assert (ratio.lower, ratio.upper) == pytest.approx(
@@ -92,7 +92,7 @@ OPEN = Parameter(None, "not_shown", "the log is too short")
 def test_what_has_no_value_is_compared_by_its_limits(
     first: Parameter, second: Parameter, limits: tuple, verdict: str
 ) -> None:
-    ratio = ratio_of_parameters(first, second)
+    ratio = compare_parameters(first, second)
     assert (ratio.lower, ratio.upper) == pytest.approx(limits)
     assert ratio.verdict == verdict
     if first.status != "ok":

@@ -10,8 +10,8 @@ import imubench_pipeline as imu
 from imubench_pipeline.recordings.ingest import ingest_as_planned
 from imubench_pipeline.run.plan import Plan
 from imubench_pipeline.settings.config import AllanSettings
-from imubench_pipeline.steps.allan import curves
-from imubench_pipeline.steps.estimate import estimation
+from imubench_pipeline.steps.allan import yield_allan_rows
+from imubench_pipeline.steps.estimate import estimate_recording
 from imubench_pipeline.tables import write
 from tests.library.conftest import ACCEL, GYRO, RATE
 
@@ -29,9 +29,9 @@ def of_workflow(drop_zone: Path, tmp_path_factory: pytest.TempPathFactory):
     settings = plan.ingest_settings(*names)
     quality = ingest_as_planned(plan.recordings[names].path, settings, *names, folder)
     quality.write(folder / "quality.json")
-    write("allan", curves(folder, *names, AllanSettings()), folder / "curve.parquet")
+    write("allan", yield_allan_rows(folder, *names, AllanSettings()), folder / "curve.parquet")
     asked = plan.estimate_settings(*names)
-    return estimation(folder, *names, asked)
+    return estimate_recording(folder, *names, asked)
 
 
 @pytest.mark.release

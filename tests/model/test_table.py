@@ -10,7 +10,7 @@ import pytest
 
 from imubench_pipeline.model.estimates import ParameterRow, ScoreRow
 from imubench_pipeline.model.table import Column, SensorRow, TableRow, columns_of, names_of, table
-from imubench_pipeline.tables import build, schema
+from imubench_pipeline.tables import build, make_schema
 from imubench_pipeline.tables.schemas import ROWS, TABLES
 from tests.test_architecture import PACKAGE
 
@@ -63,7 +63,7 @@ def test_rows_come_back_from_their_table() -> None:
         ScoreRow(sensor="s", recording="r", channel="gyro_y", method="curve"),
     ]
     content = build("scores", rows)
-    assert content.schema == schema("scores")
+    assert content.schema == make_schema("scores")
     assert ScoreRow.rows_of(content) == rows
 
 

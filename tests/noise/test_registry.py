@@ -11,7 +11,7 @@ import yaml
 
 from imubench_pipeline.estimators.estimate import FAMILY, SI_UNITS
 from imubench_pipeline.estimators.model_choice import CANDIDATE_MODELS
-from imubench_pipeline.navigation.verdicts.evidence import parameters_behind
+from imubench_pipeline.navigation.verdicts.evidence import find_noise_parameters
 from imubench_pipeline.noise import (
     PARAMETERS,
     TERMS,
@@ -26,7 +26,7 @@ from imubench_pipeline.noise import (
     terms,
 )
 from imubench_pipeline.noise.terms.registry import register_terms
-from imubench_pipeline.report.practical import page_unit
+from imubench_pipeline.report.practical import choose_page_unit
 from imubench_pipeline.report.static_figures.style import SYMBOLS, TERM_LOOKS, TERM_NAMES
 from imubench_pipeline.settings.simulated_sensor import AxisSettings
 from imubench_pipeline.simulate.model import SensorModel
@@ -127,13 +127,13 @@ def test_pages_know_it(kind: type[Term]) -> None:
     for quantity in ("gyro", "accel"):
         assert "{" not in TERM_NAMES[quantity][kind.symbol]
     symbols = [one.symbol for one in kind.parameters]
-    assert set(symbols) <= parameters_behind(f"gyro {example(kind).source}")
+    assert set(symbols) <= find_noise_parameters(f"gyro {example(kind).source}")
     for symbol in symbols:
         assert symbol in SYMBOLS
         for quantity in ("gyro", "accel"):
             assert SI_UNITS[quantity][symbol]
             if kind.role is not Role.NO_NOISE:
-                assert page_unit(quantity, symbol, "si").per_si == pytest.approx(1.0)
+                assert choose_page_unit(quantity, symbol, "si").per_si == pytest.approx(1.0)
 
 
 def test_the_family_of_the_likelihood_is_registered() -> None:

@@ -5,9 +5,13 @@ import math
 import numpy as np
 
 from imubench_pipeline.noise import GaussMarkov, NoiseModel, Sinusoid
-from imubench_pipeline.noise.exponentials import decay, phi, squared_response
+from imubench_pipeline.noise.exponentials import (
+    evaluate_decay,
+    evaluate_phi,
+    integrate_squared_response,
+)
 from imubench_pipeline.noise.growth import Calibrated, Uncalibrated
-from imubench_pipeline.noise.stacked import stacked, summed
+from imubench_pipeline.noise.stacked import stack_models, sum_over_terms
 
 MODELS = [
     NoiseModel(Q=1e-6, N=1e-4, B=2e-5, T_B=90.0, K=1e-7, R=-1e-9),
@@ -24,15 +28,15 @@ def test_a_figure_of_many_models_is_that_of_each() -> None:
         for order in (0, 1, 2):
             for time in (1.0, 600.0):
                 alone = [math.fsum(t.growth(order, time, start) for t in m.terms) for m in MODELS]
-                at_once = summed(MODELS, lambda t: np.asarray(t.growth(order, time, start)))  # noqa: B023  # called at once
+                at_once = sum_over_terms(MODELS, lambda t: np.asarray(t.growth(order, time, start)))  # noqa: B023  # called at once
                 np.testing.assert_allclose(at_once, alone, rtol=1e-12)
     taus = np.array([0.1, 3.0, 700.0])
-    at_once = summed(MODELS, lambda term: term.allan_variance(taus[:, None]), len(taus))
+    at_once = sum_over_terms(MODELS, lambda term: term.allan_variance(taus[:, None]), len(taus))
     np.testing.assert_allclose(at_once.T, [m.allan_variance(taus) for m in MODELS], rtol=1e-12)
 
 
 def test_each_term_of_each_model_is_there_once() -> None:
-    there = [number for numbers, _ in stacked(MODELS) for number in numbers.tolist()]
+    there = [number for numbers, _ in stack_models(MODELS) for number in numbers.tolist()]
     assert [there.count(number) for number in range(len(MODELS))] == [
         len(model.terms) for model in MODELS
     ]
@@ -41,9 +45,13 @@ def test_each_term_of_each_model_is_there_once() -> None:
 def test_functions_of_exponentials_are_the_same_of_arrays() -> None:
     x = np.concatenate([[0.0], np.geomspace(1e-8, 1e5, 200), [2.0]])
     for order in range(5):
-        np.testing.assert_allclose(decay(order, x), [decay(order, e) for e in x.tolist()], 1e-13)
+        np.testing.assert_allclose(
+            evaluate_decay(order, x), [evaluate_decay(order, e) for e in x.tolist()], 1e-13
+        )
         z = 1j * x
-        np.testing.assert_allclose(phi(order, z), [phi(order, e) for e in z.tolist()], 1e-12)
+        np.testing.assert_allclose(
+            evaluate_phi(order, z), [evaluate_phi(order, e) for e in z.tolist()], 1e-12
+        )
     for order in range(3):
-        alone = [squared_response(order, each) for each in x.tolist()]
-        np.testing.assert_allclose(squared_response(order, x), alone, 1e-13)
+        alone = [integrate_squared_response(order, each) for each in x.tolist()]
+        np.testing.assert_allclose(integrate_squared_response(order, x), alone, 1e-13)

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from imubench_pipeline.extensions.papers.evidence import Evidence, Result
-from imubench_pipeline.extensions.papers.papers import judge, published_rows
+from imubench_pipeline.extensions.papers.papers import judge, make_published_rows
 from imubench_pipeline.extensions.papers.printed import parse_number, read_papers
 from imubench_pipeline.tables import build
 from tests.conftest import PROJECT
@@ -38,10 +38,10 @@ def test_numbers_are_read_as_printed(text: str, number: float) -> None:
 
 def test_a_run_without_logs_of_a_paper_says_nothing_of_it() -> None:
     rejected = {"sensor": "mti_7", "recording": "sim_published", "status": "rejected"}
-    assert list(published_rows(RUN)) == []
+    assert list(make_published_rows(RUN)) == []
     told = {"device": "a", "kind": "static", "simulated": True}
     tables = {"recordings": build("recordings", [rejected | told])}
-    assert list(published_rows(Evidence(tables))) == []
+    assert list(make_published_rows(Evidence(tables))) == []
 
 
 @pytest.mark.parametrize("paper", read_papers(), ids=lambda paper: paper.key)

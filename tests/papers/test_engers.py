@@ -9,7 +9,7 @@ from scipy import signal
 from imubench_pipeline.allan import allan_variance
 from imubench_pipeline.extensions.papers.engers import AXES, DEGREE, compute_cutoff
 from imubench_pipeline.extensions.papers.evidence import Evidence
-from imubench_pipeline.extensions.papers.papers import rows_of
+from imubench_pipeline.extensions.papers.papers import make_rows
 from imubench_pipeline.extensions.papers.printed import read_paper
 from imubench_pipeline.extensions.papers.tables import PublishedRow
 from imubench_pipeline.settings.sensor import read_sensors
@@ -18,7 +18,7 @@ from imubench_pipeline.tables import build
 from tests.conftest import PROJECT
 
 SENSORS = read_sensors(PROJECT / "config/sensors")
-ROWS = list(rows_of(read_paper("engers"), Evidence()))
+ROWS = list(make_rows(read_paper("engers"), Evidence()))
 
 
 def test_every_table_figure_and_equation_has_a_line() -> None:
@@ -133,7 +133,7 @@ def found_in(rows: dict[str, list[dict]], place: str, quantity: str) -> Publishe
     evidence = Evidence({name: build(name, own) for name, own in rows.items()})
     (line,) = [
         row
-        for row in rows_of(read_paper("engers"), evidence)
+        for row in make_rows(read_paper("engers"), evidence)
         if row["place"] == place and quantity in row["quantity"]
     ]
     return line

@@ -23,11 +23,11 @@ from imubench_pipeline.extensions.papers.maia_draws import (
     CHANNELS,
     GRIDS,
     MTI_GYRO,
-    lottery,
-    lowest_point,
-    readings,
+    find_lowest_point,
+    simulate_lottery,
+    simulate_readings,
 )
-from imubench_pipeline.extensions.papers.papers import rows_of
+from imubench_pipeline.extensions.papers.papers import make_rows
 from imubench_pipeline.extensions.papers.printed import read_paper
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.simulate import simulate
@@ -49,8 +49,8 @@ PRINTED = {
 def members(request: pytest.FixtureRequest) -> Iterator[int]:
     """The number of reconstructions: less than what the page has, every day."""
     cached = (
-        maia_draws.lottery,
-        maia_draws.readings,
+        maia_draws.simulate_lottery,
+        maia_draws.simulate_readings,
         maia_draws._simulate_deviations,
         maia._count_in_range,
     )
@@ -67,7 +67,7 @@ def members(request: pytest.FixtureRequest) -> Iterator[int]:
 def lines(members: int) -> dict[str, list[dict[str, Any]]]:
     assert members == maia_draws.MEMBERS
     by_place: dict[str, list[dict[str, Any]]] = {}
-    for row in rows_of(read_paper("maia"), Evidence()):
+    for row in make_rows(read_paper("maia"), Evidence()):
         by_place.setdefault(row["place"], []).append(dict(row))
     return by_place
 
@@ -150,7 +150,7 @@ def test_what_the_log_is_made_of_is_said_to_come_back(lines: dict[str, Any]) -> 
 
 
 def test_the_numbers_of_table_1_do_not_fit_equation_26(lines: dict[str, Any]) -> None:
-    taus = {channel.name: lowest_point(channel.table_1)[0] for channel in CHANNELS.values()}
+    taus = {channel.name: find_lowest_point(channel.table_1)[0] for channel in CHANNELS.values()}
     assert taus["MTi-7 gyro"] == pytest.approx(27.3, abs=0.1)
     for channel in CHANNELS.values():
         T_B = channel.table_1.T_B
@@ -189,7 +189,7 @@ def test_table_3_lies_in_the_spread_of_single_draws(lines: dict[str, Any], membe
         assert "6 are inside at nine τ" in row["reason"] and "5 are inside" in row["reason"]
     for channel in CHANNELS.values():
         for grid in GRIDS:
-            spread = lottery(channel, grid)
+            spread = simulate_lottery(channel, grid)
             assert 0.15 < spread.beats < 0.6  # never the 0 that one draw each seems to show
             assert spread.slow > 0.95
             for low, _, high in spread.ranges:
@@ -225,7 +225,7 @@ def test_single_draws_spread_as_full_length_logs_do(single: Any) -> None:
         by_steps = np.sqrt((square[..., steps].sum(-1) + below) / (steps.sum() + short.size))
         by_every = np.sqrt(square[..., np.isin(taus, (np.arange(30) + 0.5) * 600)].mean(-1))
         for values, grid in ((by_steps, "steps"), (by_every, "every")):
-            spread = lottery(MTI_GYRO, grid)  # type: ignore[arg-type]  # the two that there are
+            spread = simulate_lottery(MTI_GYRO, grid)  # type: ignore[arg-type]  # the two that there are
             expected = spread.ranges[place]
             assert np.median(values) == pytest.approx(expected[1], rel=0.35)
             beyond = float(np.mean(values >= MTI_GYRO.table_3[place]))
@@ -237,7 +237,7 @@ def test_single_curves_are_read_as_full_length_logs_are(single: Any) -> None:
     taus, (measured, *_) = single
     kept = taus <= 4000
     curves, taus = measured[:, kept], taus[kept]
-    ranges = readings(MTI_GYRO)
+    ranges = simulate_readings(MTI_GYRO)
     for symbol, read in (
         ("N", curves[:, 0]),
         ("B", curves.min(axis=1) / 0.6643),

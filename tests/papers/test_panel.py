@@ -4,7 +4,7 @@ from typing import Any
 
 import pytest
 
-from imubench_pipeline.extensions.papers.panel import panel_rows
+from imubench_pipeline.extensions.papers.panel import make_accuracy_rows
 
 pytestmark = pytest.mark.release
 
@@ -13,7 +13,7 @@ LOGS = 12
 
 @pytest.fixture(scope="module")
 def found() -> dict[tuple[str, str], dict[str, Any]]:
-    return {(row["method"], row["parameter"]): dict(row) for row in panel_rows(LOGS)}
+    return {(row["method"], row["parameter"]): dict(row) for row in make_accuracy_rows(LOGS)}
 
 
 def test_no_method_is_below_the_bound_but_for_chance(found: dict[Any, Any]) -> None:

@@ -10,12 +10,12 @@ from scipy.signal import lfilter
 from imubench_pipeline.extensions.earth_rate.simulation import PAPER_MINUTES
 from imubench_pipeline.extensions.papers import silva
 from imubench_pipeline.extensions.papers.evidence import Evidence
-from imubench_pipeline.extensions.papers.papers import rows_of
+from imubench_pipeline.extensions.papers.papers import make_rows
 from imubench_pipeline.extensions.papers.printed import read_paper
 from imubench_pipeline.tables import build
 from tests.conftest import few
 
-ROWS = {(row["place"], row["quantity"]): row for row in rows_of(read_paper("silva"), Evidence())}
+ROWS = {(row["place"], row["quantity"]): row for row in make_rows(read_paper("silva"), Evidence())}
 
 
 def test_every_figure_and_equation_has_a_line() -> None:
@@ -157,7 +157,7 @@ def test_the_median_of_many_runs_stands_beside_what_is_printed() -> None:
     told = {"device": "a", "kind": "two_position", "simulated": True, "status": "ok"}
     runs = [{"sensor": "sirrs01_03", "recording": f"sim_run_{run}"} | told for run in "1234"]
     evidence = Evidence({"recordings": build("recordings", runs)})
-    lines = {row["place"]: row for row in rows_of(read_paper("silva"), evidence)}
+    lines = {row["place"]: row for row in make_rows(read_paper("silva"), evidence)}
     for figure, run in (("10", "1"), ("11", "2"), ("12", "3"), ("13", "4")):
         line, times = lines[f"Figure {figure}"], silva.simulate_settling_times(run)["degrees"]
         assert line["verdict"] == "differs"

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pyarrow.csv as pacsv
 
-from imubench_pipeline.recordings.quality.columns import column_findings
-from imubench_pipeline.recordings.quality.copies import copied_channels
+from imubench_pipeline.recordings.quality.columns import check_columns
+from imubench_pipeline.recordings.quality.copies import find_copied_channels
 from imubench_pipeline.recordings.quality.summary import ColumnSummary
 from imubench_pipeline.settings.quality import QualitySettings
 from imubench_pipeline.tables.findings import Finding
@@ -43,8 +43,8 @@ def findings(log: Log, rate: float = RATE) -> list[Finding]:
         columns[name] = ColumnSummary()
         for piece in np.array_split(values, 7):
             columns[name].add(piece)
-    found = column_findings(columns, rate, QualitySettings())
-    return [*found, *copied_channels(columns)]
+    found = check_columns(columns, rate, QualitySettings())
+    return [*found, *find_copied_channels(columns)]
 
 
 def warnings(log: Log) -> list[tuple[str, str | None]]:

@@ -5,7 +5,7 @@ import pytest
 
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.simulate import simulate
-from imubench_pipeline.recordings.quality.columns import column_findings
+from imubench_pipeline.recordings.quality.columns import check_columns
 from imubench_pipeline.recordings.quality.summary import ColumnSummary
 from imubench_pipeline.settings.quality import QualitySettings
 from imubench_pipeline.tables.findings import Finding
@@ -34,7 +34,7 @@ def summary(log: np.ndarray, pieces: int = 7) -> ColumnSummary:
 
 
 def findings(log: np.ndarray, rate: float = RATE, channel: str = "gyro_x") -> list[Finding]:
-    return column_findings({channel: summary(log)}, rate, SETTINGS)
+    return check_columns({channel: summary(log)}, rate, SETTINGS)
 
 
 def names(log: np.ndarray, rate: float = RATE, channel: str = "gyro_x") -> list[str]:
@@ -184,7 +184,7 @@ def test_an_axis_that_is_zero_throughout_is_told_as_such() -> None:
 
 def test_steps_of_the_temperature_are_noted(rng: np.random.Generator) -> None:
     temperature = np.round(25 + 0.02 * np.cumsum(rng.standard_normal(5000)), 1)
-    (finding,) = column_findings({"temperature": summary(temperature)}, 1.0, SETTINGS)
+    (finding,) = check_columns({"temperature": summary(temperature)}, 1.0, SETTINGS)
     assert (finding.finding, finding.severity) == ("quantised", "note")
     assert finding.value == pytest.approx(0.1)
 
@@ -267,7 +267,7 @@ def test_where_rounding_is_all_there_is_nothing_else_is_told(rng: np.random.Gene
     log = np.round(level + rng.standard_normal(samples) / 6.0)
     column = ColumnSummary()
     column.add(0.004 * log)
-    found = column_findings({"gyro_z": column}, 50.0, SETTINGS)
+    found = check_columns({"gyro_z": column}, 50.0, SETTINGS)
     assert {finding.finding for finding in found if finding.severity == "warning"} == {"coarse"}
 
 
@@ -280,7 +280,7 @@ def test_a_level_that_comes_to_an_edge_of_a_coarse_register_is_no_motion(
     level[50_000:52_000] = 0.5
     column = ColumnSummary()
     column.add(0.01 * np.round(level + rng.standard_normal(72_000) / 6.0))
-    found = column_findings({"accel_x": column}, 20.0, SETTINGS)
+    found = check_columns({"accel_x": column}, 20.0, SETTINGS)
     assert {finding.finding for finding in found if finding.severity != "note"} == {"coarse"}
 
 
@@ -289,7 +289,7 @@ def test_a_channel_that_seldom_changes_is_coarse() -> None:
     log[[100, 30_000, 50_000]] += 0.05
     column = ColumnSummary()
     column.add(log)
-    assert "coarse" in {f.finding for f in column_findings({"accel_x": column}, 20.0, SETTINGS)}
+    assert "coarse" in {f.finding for f in check_columns({"accel_x": column}, 20.0, SETTINGS)}
 
 
 def test_motion_shows_in_a_coarse_register(rng: np.random.Generator) -> None:
@@ -297,4 +297,4 @@ def test_motion_shows_in_a_coarse_register(rng: np.random.Generator) -> None:
     log[30_000:31_000] += 4.0 * np.sin(np.arange(1000) / 3.0)
     column = ColumnSummary()
     column.add(0.01 * np.round(log + 0.5))
-    assert "motion" in {f.finding for f in column_findings({"accel_x": column}, 20.0, SETTINGS)}
+    assert "motion" in {f.finding for f in check_columns({"accel_x": column}, 20.0, SETTINGS)}

@@ -5,16 +5,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from imubench_pipeline.recordings.quality.held import regular_repeats
-from imubench_pipeline.recordings.quality.joined import interleaved
-from imubench_pipeline.recordings.quality.levels import quantisation
-from imubench_pipeline.recordings.quality.register import hidden_step
+from imubench_pipeline.recordings.quality.held import find_regular_repeats
+from imubench_pipeline.recordings.quality.joined import find_interleaved_samples
+from imubench_pipeline.recordings.quality.levels import detect_quantisation
+from imubench_pipeline.recordings.quality.register import find_hidden_step
 from imubench_pipeline.recordings.quality.summary import (
     MAX_PIECES,
     PIECE_SIZE,
     ColumnSummary,
     Excerpts,
-    common_samples,
+    pair_common_samples,
 )
 from tests.conftest import few
 from tests.quality.real import Log, adis16405, findings, warnings
@@ -101,7 +101,7 @@ def test_a_knock_makes_no_second_sensor(rng: np.random.Generator) -> None:
     log[4200:5400] = np.nan
     column = ColumnSummary()
     column.add(log)
-    assert list(interleaved("gyro_x", column)) == []
+    assert list(find_interleaved_samples("gyro_x", column)) == []
 
 
 @pytest.mark.release
@@ -120,9 +120,9 @@ def test_samples_of_a_real_log_that_are_held_in_turn(shared: Path, every: int) -
 def test_no_sample_is_held_by_chance(rng: np.random.Generator, step: float) -> None:
     log = rng.standard_normal(50_000)
     log = np.round(log / step) if step else log
-    assert regular_repeats(pieces(log)) is None
+    assert find_regular_repeats(pieces(log)) is None
     line = np.sin(2 * np.pi * np.arange(len(log)) / 10.0)
-    assert regular_repeats(pieces(np.round((log + line) / (step or 1.0)))) is None
+    assert find_regular_repeats(pieces(np.round((log + line) / (step or 1.0)))) is None
 
 
 def pieces(log: np.ndarray):
@@ -147,7 +147,7 @@ def test_excerpts_are_evenly_over_the_log(samples: int) -> None:
             piece.values, log[piece.first : piece.first + len(piece.values)]
         )
     shifted = pieces(np.where(np.arange(samples) % 7 == 0, np.nan, log))
-    for one, other in common_samples(kept, shifted):
+    for one, other in pair_common_samples(kept, shifted):
         np.testing.assert_array_equal(one, other)
         assert np.isfinite(one).all()
 
@@ -161,9 +161,9 @@ def test_a_register_behind_rounded_figures(
     log = rng.standard_normal(40_000) + 1e-3 * np.cumsum(rng.standard_normal(40_000)) + 9.8
     digit = step / digits
     rounded = np.round(np.round(log / step) * step / digit) * digit
-    assert hidden_step(pieces(rounded)) == pytest.approx(step, rel=0.015)
+    assert find_hidden_step(pieces(rounded)) == pytest.approx(step, rel=0.015)
     scattered = np.round(log / step) * step + 0.04 * step * rng.standard_normal(len(log))
-    assert hidden_step(pieces(scattered)) == pytest.approx(step, rel=0.005)
+    assert find_hidden_step(pieces(scattered)) == pytest.approx(step, rel=0.005)
 
 
 def test_noise_hides_no_register(rng: np.random.Generator) -> None:
@@ -172,7 +172,7 @@ def test_noise_hides_no_register(rng: np.random.Generator) -> None:
     swinging = 5.0 * np.sin(np.arange(len(log)) / 900)
     for other in (log, np.round(log, 1), np.round(log), np.round(log / 4), np.round(log, 4)):
         for drift in (0.0, 50.0 * late, np.linspace(0, 40, len(log)), swinging):
-            assert hidden_step(pieces(other + drift)) is None
+            assert find_hidden_step(pieces(other + drift)) is None
 
 
 def test_a_real_register_behind_rounded_figures(shared: Path) -> None:
@@ -180,7 +180,7 @@ def test_a_real_register_behind_rounded_figures(shared: Path) -> None:
     # 0.05 °/s in rad/s with four decimals: 8.7 digits a step.
     column = ColumnSummary()
     column.add(np.round(np.radians(log), 4))
-    steps = quantisation(column)
+    steps = detect_quantisation(column)
     assert steps is not None and steps.hidden
     assert steps.step == pytest.approx(np.radians(0.05), rel=0.005)
     assert column.step == pytest.approx(8e-4)

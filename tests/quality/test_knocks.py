@@ -7,10 +7,10 @@ from imubench_pipeline.estimators.likelihood import fit
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.simulate import simulate
 from imubench_pipeline.recordings.ingest import ingest
-from imubench_pipeline.recordings.quality.knocks import knocks, suspects
-from imubench_pipeline.recordings.quality.levels import quantisation
+from imubench_pipeline.recordings.quality.knocks import find_knocks, find_outlier_blocks
+from imubench_pipeline.recordings.quality.levels import detect_quantisation
 from imubench_pipeline.recordings.quality.summary import ColumnSummary
-from imubench_pipeline.recordings.recording import channel_logs
+from imubench_pipeline.recordings.recording import open_channel_logs
 from imubench_pipeline.settings.quality import QualitySettings
 from imubench_pipeline.settings.sensor import LogFormat, RecordingNotes
 from tests.quality.real import adis16405
@@ -24,9 +24,9 @@ def found_in(log: np.ndarray, sigmas: float = 10.0) -> list[tuple[int, int]]:
     column = ColumnSummary()
     column.add(log)
     pieces = np.array_split(log, 5)
-    steps = quantisation(column)
+    steps = detect_quantisation(column)
     step = steps.step if steps else None
-    return [(k.first, k.last) for k in knocks(pieces, column.blocks(), sigmas, 25, step)]
+    return [(k.first, k.last) for k in find_knocks(pieces, column.blocks(), sigmas, 25, step)]
 
 
 def test_knocks_are_found_where_they_are(rng: np.random.Generator) -> None:
@@ -64,7 +64,7 @@ def test_one_step_of_a_coarse_register_is_no_knock(rng: np.random.Generator, oft
     column = ColumnSummary()
     column.add(log)
     if often < 0.01:  # a knock by the noise alone
-        assert len(suspects(column.blocks(), 10.0)[0]) > 10
+        assert len(find_outlier_blocks(column.blocks(), 10.0)[0]) > 10
     assert found_in(log) == []
     log[50_000] += 12 * step
     ((first, last),) = found_in(log)
@@ -81,7 +81,7 @@ def test_steps_of_a_real_log_are_no_knocks(shared: Path) -> None:
             column = ColumnSummary()
             column.add(coarse)
             found = found_in(coarse)
-            excused += len(suspects(column.blocks(), 10.0)[0]) - len(found)
+            excused += len(find_outlier_blocks(column.blocks(), 10.0)[0]) - len(found)
             for first, last in found:
                 away = np.abs(coarse[first:last] - np.median(coarse))
                 assert away.max() > 1.9 * step
@@ -94,8 +94,8 @@ def kept(tmp_path: Path, log: np.ndarray) -> tuple[list[str], np.ndarray]:
     channels = {"accel_x": {"column": "ax", "unit": "m/s^2"}}
     layout = LogFormat.model_validate({"rate": "50 Hz", "channels": channels})
     out = ingest(path, layout, RecordingNotes(), QualitySettings(short=0), tmp_path / "out", {})
-    values = np.concatenate(list(channel_logs(tmp_path / "out")["accel_x"].blocks()))
-    assert channel_logs(tmp_path / "out")["accel_x"].holes
+    values = np.concatenate(list(open_channel_logs(tmp_path / "out")["accel_x"].blocks()))
+    assert open_channel_logs(tmp_path / "out")["accel_x"].holes
     counts = out.channels["accel_x"]
     assert counts["present"] == counts["used"] + counts["knocks"]
     assert counts["knocks"] == np.isnan(values).sum() - np.isnan(log).sum()

@@ -10,13 +10,13 @@ from imubench_pipeline.datasheets.plausibility import implausible, implausible_r
 from imubench_pipeline.earth import STANDARD_GRAVITY
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.simulate import simulate
-from imubench_pipeline.recordings.quality.levels import density_of, kept_level
-from imubench_pipeline.recordings.quality.rotation import gravity_turn
+from imubench_pipeline.recordings.quality.levels import bound_noise_density, summarise_level
+from imubench_pipeline.recordings.quality.rotation import detect_gravity_turn
 from imubench_pipeline.recordings.quality.summary import ColumnSummary
 from imubench_pipeline.settings.sensor import Sensor
 from imubench_pipeline.settings.validation import parse
 from imubench_pipeline.tables.findings import Finding
-from imubench_pipeline.units import conversion
+from imubench_pipeline.units import find_conversion
 from tests.test_configuration import SENSOR
 
 RATE = 100.0
@@ -41,12 +41,12 @@ def found(
     """Return what is implausible of logs in SI of what the sensor file takes them for."""
     columns = {name: summary(log) for name, log in logs.items()}
     channels = {
-        name: kept_level(column, RATE, units[name.split("_")[0]], timed=timed)
+        name: summarise_level(column, RATE, units[name.split("_")[0]], timed=timed)
         for name, column in columns.items()
     }
     axes = [columns.get(f"accel_{axis}") for axis in "xyz"]
     blocks = [column.blocks() for column in axes if column is not None]
-    turn = gravity_turn(blocks, RATE) if len(blocks) == 3 else None
+    turn = detect_gravity_turn(blocks, RATE) if len(blocks) == 3 else None
     return implausible(channels, turn, sensor, static=static)
 
 
@@ -77,11 +77,11 @@ def test_the_white_noise_lies_between_both_estimates(rng: np.random.Generator) -
     walk = white + np.cumsum(2e-3 * rng.standard_normal(100_000))
     coarse = np.round(white / 0.1) * 0.1  # three standard deviations
     for log in (white, smooth, walk, coarse):
-        low, high = density_of(summary(log), RATE)
+        low, high = bound_noise_density(summary(log), RATE)
         assert high is not None
         assert low < 1.1 * 3e-3 < 1.21 * high
-    assert density_of(summary(white), RATE) == pytest.approx((3e-3, 3e-3), rel=0.1)
-    assert density_of(summary(white[:2000]), RATE)[1] is None
+    assert bound_noise_density(summary(white), RATE) == pytest.approx((3e-3, 3e-3), rel=0.1)
+    assert bound_noise_density(summary(white[:2000]), RATE)[1] is None
 
 
 @pytest.mark.parametrize("meant", ["rad/s", "deg/s", "mdeg/s"])
@@ -89,7 +89,7 @@ def test_the_white_noise_lies_between_both_estimates(rng: np.random.Generator) -
 def test_units_of_angle_that_are_mixed_up_are_named(
     rng: np.random.Generator, meant: str, stated: str
 ) -> None:
-    factor = conversion(stated, "angular_rate")[0] / conversion(meant, "angular_rate")[0]
+    factor = find_conversion(stated, "angular_rate")[0] / find_conversion(meant, "angular_rate")[0]
     logs = {"gyro_z": factor * gyro(rng)}
     for sensor in (None, printing(noise_density=density(0.004))):
         said = found(logs, {"gyro": stated}, sensor)
@@ -129,7 +129,7 @@ def test_the_offset_of_degrees_taken_for_radians_is_no_turn(rng: np.random.Gener
 def test_gravity_names_the_unit_of_acceleration(
     rng: np.random.Generator, meant: str, stated: str
 ) -> None:
-    factor = conversion(stated, "acceleration")[0] / conversion(meant, "acceleration")[0]
+    factor = find_conversion(stated, "acceleration")[0] / find_conversion(meant, "acceleration")[0]
     logs = {name: factor * log for name, log in triad(rng, 1.05 * DOWN).items()}
     said = found(logs, {"accel": stated})
     assert {f.channel for f in said} == (set() if meant == stated else set(logs))
@@ -243,7 +243,7 @@ def test_gravity_that_turns_tells_the_rate_of_the_sensor(
 ) -> None:
     rate = math.radians(speed) * np.array([0.48, 0.6, -0.64])
     logs = triad(rng, turned(rate))
-    turn = gravity_turn([summary(log).blocks() for log in logs.values()], RATE)
+    turn = detect_gravity_turn([summary(log).blocks() for log in logs.values()], RATE)
     assert turn is not None
     np.testing.assert_allclose(turn.rate, rate, atol=0.02 * float(np.linalg.norm(rate)))
     assert turn.swept == pytest.approx(600 * math.radians(speed), rel=0.02)

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 import yaml
 
-from imubench_pipeline.recordings.fitness import doubts, fitness
+from imubench_pipeline.recordings.fitness import derive_doubts, judge_fitness
 from imubench_pipeline.recordings.ingest import ingest
 from imubench_pipeline.settings.quality import QualitySettings
 from imubench_pipeline.settings.sensor import LogFormat, RecordingNotes
@@ -35,7 +35,7 @@ def found(lines: list[str], folder: Path, **channels: dict[str, str]) -> list[Fi
 
 
 def verdict(findings: list[Finding]) -> str:
-    return fitness(doubts([f.row("cats_tag", "day1") for f in findings], [], []))
+    return judge_fitness(derive_doubts([f.row("cats_tag", "day1") for f in findings], [], []))
 
 
 def test_one_column_for_two_channels(tag: list[str], tmp_path: Path) -> None:

@@ -19,7 +19,7 @@ import pytest
 
 from imubench_pipeline.datasheets.plausibility import implausible_of
 from imubench_pipeline.model.recordings import FindingRow
-from imubench_pipeline.recordings.fitness import doubts, fitness
+from imubench_pipeline.recordings.fitness import derive_doubts, judge_fitness
 from imubench_pipeline.recordings.ingest import ingest
 from imubench_pipeline.settings.quality import QualitySettings
 from imubench_pipeline.settings.sensor import CHANNELS, RecordingNotes, Sensor, read_sensors
@@ -74,12 +74,12 @@ def findings(path: Path, of: Sensor, folder: Path) -> Rows:
 
 def unfit(found: Rows) -> dict[str, dict[str | None, float]]:
     """Return channels and factors of the doubts that make a recording unfit, by finding."""
-    doubted = list(doubts(found, [], []))
+    doubted = list(derive_doubts(found, [], []))
     serious: dict[str, dict[str | None, float]] = {}
     for one in doubted:
         if one.unfit:
             serious.setdefault(one.code, {})[one.channel] = one.factor or 0.0
-    assert (fitness(doubted) == "unfit") == bool(serious)
+    assert (judge_fitness(doubted) == "unfit") == bool(serious)
     return serious
 
 
@@ -165,7 +165,7 @@ def test_stamps_in_another_unit_than_the_sensor_file_states(
     factor = {"ms": 1e3, "us": 1e6, "ns": 1e9}[unit]
     (row,) = (row for row in found if row["finding"] == "rate_implausible")
     assert row["value"] == factor
-    (of_noise,) = (one for one in doubts([row], [], []) if "N" in one.parameters)
+    (of_noise,) = (one for one in derive_doubts([row], [], []) if "N" in one.parameters)
     assert of_noise.factor == pytest.approx(math.sqrt(factor))
 
 

@@ -5,7 +5,7 @@ import pytest
 
 from imubench_pipeline.recordings.quality.columns import (
     _expect_rounded_changes,
-    repeats_beyond_chance,
+    estimate_excess_repeats,
 )
 from imubench_pipeline.recordings.quality.summary import ColumnSummary
 
@@ -14,7 +14,7 @@ def beyond(log: np.ndarray) -> float:
     column = ColumnSummary()
     for piece in np.array_split(log, 7):
         column.add(piece)
-    return repeats_beyond_chance(column)[0]
+    return estimate_excess_repeats(column)[0]
 
 
 @pytest.mark.parametrize("deviation", [0.6, 1.0, 3.0])

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.signal import butter, lfilter
 
-from imubench_pipeline.recordings.quality.columns import column_findings
+from imubench_pipeline.recordings.quality.columns import check_columns
 from imubench_pipeline.recordings.quality.summary import ColumnSummary
 from imubench_pipeline.settings.quality import QualitySettings
 from tests.conftest import few
@@ -18,7 +18,7 @@ def told(log: dict[str, np.ndarray]) -> dict[str | None, float]:
     columns = {name: ColumnSummary() for name in log}
     for name, values in log.items():
         columns[name].add(values)
-    findings = column_findings(columns, 100.0, QualitySettings(short=0))
+    findings = check_columns(columns, 100.0, QualitySettings(short=0))
     return {f.channel: f.value for f in findings if f.finding == "shared_noise"}
 
 

@@ -1,6 +1,6 @@
 from imubench_pipeline.model.estimates import FixedBiasRow, ModelRow
 from imubench_pipeline.model.table import R
-from imubench_pipeline.recordings.quality.copies import recorded_twice
+from imubench_pipeline.recordings.quality.copies import find_copied_recordings
 from imubench_pipeline.words.findings.base import FINDINGS
 from tests.rows import typed
 
@@ -18,7 +18,7 @@ def likelihoods(*figures: float) -> list[ModelRow]:
 
 def test_a_log_that_lies_in_the_folder_twice_is_found() -> None:
     models = likelihoods(-51255.770919, -51255.7709190001, -51255.771)
-    (found,) = recorded_twice(models, rows(FixedBiasRow, 0.01, 0.01, 0.01))
+    (found,) = find_copied_recordings(models, rows(FixedBiasRow, 0.01, 0.01, 0.01))
     assert (found.finding, found.recording) == ("recording_twice", "run_2")
     assert "run_2 has the samples of run_1 (gyro x)" in found.detail
     assert FINDINGS[found.finding].unfit
@@ -26,5 +26,5 @@ def test_a_log_that_lies_in_the_folder_twice_is_found() -> None:
 
 def test_logs_that_share_one_figure_are_two() -> None:
     models = likelihoods(-51255.770919, -51255.770919, -60000.0)
-    assert list(recorded_twice(models, rows(FixedBiasRow, 0.01, 0.02, 0.01))) == []
-    assert list(recorded_twice([], [])) == []
+    assert list(find_copied_recordings(models, rows(FixedBiasRow, 0.01, 0.02, 0.01))) == []
+    assert list(find_copied_recordings([], [])) == []

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from imubench_pipeline.readers import RecordingError, read
-from imubench_pipeline.readers.bounded import BoundError, bounded, limit_memory
+from imubench_pipeline.readers.bounded import BoundError, limit_memory, run_bounded
 from imubench_pipeline.readers.formats import FILE_FORMATS
 from imubench_pipeline.readers.inspection import inspect
 from imubench_pipeline.recordings.opening import check_opening
@@ -29,7 +29,7 @@ def outcome(path: Path, given: dict[str, Any] | None) -> str:
     """Return the reason of a rejection; else how much there is."""
     try:
         if given is None:
-            found = bounded(INSPECTED_S, INSPECTED_BYTES, inspect, path)
+            found = run_bounded(INSPECTED_S, INSPECTED_BYTES, inspect, path)
             return f"listed: {found.proof.said}"
         log = LogFormat.model_validate(given)
         check_opening(path, log, QualitySettings().opening)

@@ -13,7 +13,7 @@ from hypothesis import given
 
 from imubench_pipeline.readers.arrays import arrow
 from imubench_pipeline.readers.arrays import file as arrays
-from imubench_pipeline.readers.arrays.arrow import pages
+from imubench_pipeline.readers.arrays.arrow import list_page_sizes
 from imubench_pipeline.settings.sensor import LogFormat
 from tests.readers.array_files import (
     FIRST,
@@ -322,7 +322,7 @@ def test_all_bytes_of_a_parquet_column_are_in_the_pages_that_are_found(
     with path.open("rb") as file:
         for group, column in product(range(3), range(3)):
             about = metadata.row_group(group).column(column)
-            unpacked = list(pages(file, about))
+            unpacked = list(list_page_sizes(file, about))
             headers = about.total_uncompressed_size - sum(unpacked)
             assert len(unpacked) >= 4 - (group == 2) * 2
             assert 10 * len(unpacked) < headers < 150 * len(unpacked)

@@ -15,7 +15,7 @@ import psutil
 import pytest
 
 from imubench_pipeline.readers import RecordingError
-from imubench_pipeline.readers.bounded import BoundError, bounded, is_kept_waiting
+from imubench_pipeline.readers.bounded import BoundError, is_kept_waiting, run_bounded
 from imubench_pipeline.run.cli import main
 from tests.readers.hostile import ATTACKS
 
@@ -27,10 +27,10 @@ def refuse() -> None:
 
 
 def test_what_is_returned_or_raised_comes_back() -> None:
-    assert bounded(10.0, MEMORY, sum, [1, 2]) == 3
-    assert len(bounded(10.0, MEMORY, np.ones, 10**6)) == 10**6
+    assert run_bounded(10.0, MEMORY, sum, [1, 2]) == 3
+    assert len(run_bounded(10.0, MEMORY, np.ones, 10**6)) == 10**6
     with pytest.raises(RecordingError, match=r"^a.csv: no log$"):
-        bounded(10.0, MEMORY, refuse)
+        run_bounded(10.0, MEMORY, refuse)
 
 
 @pytest.mark.parametrize(
@@ -47,7 +47,7 @@ def test_what_takes_more_is_ended(
 ) -> None:
     begin = time.monotonic()
     with pytest.raises(BoundError, match=said):
-        bounded(0.5 if function is time.sleep else 30.0, MEMORY, function, given)
+        run_bounded(0.5 if function is time.sleep else 30.0, MEMORY, function, given)
     assert time.monotonic() - begin < 20.0
     assert len(np.ones(2 * MEMORY // 8)) == 2 * MEMORY // 8  # not limited here
 
@@ -71,7 +71,7 @@ def test_what_others_keep_waiting_is_not_ended_for_it() -> None:
             process.wait()
     assert not is_kept_waiting(working, 60.0)
     with pytest.raises(BoundError, match=r"took more than 0.1 s"):
-        bounded(0.1, MEMORY, compute)
+        run_bounded(0.1, MEMORY, compute)
 
 
 def compute() -> None:

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from imubench_pipeline.readers import RecordingError
-from imubench_pipeline.readers.content import content_of
-from imubench_pipeline.readers.contents import contents
+from imubench_pipeline.readers.content import recognise_content
+from imubench_pipeline.readers.contents import list_contents
 from imubench_pipeline.readers.formats import FILE_FORMATS, TEXT
 from imubench_pipeline.settings.sensor import Reader
 from tests.corpus import ENTRIES
@@ -25,9 +25,9 @@ LENGTHS = [*range(3, 40), 64, 100, 257, 512, 1000, 4096, 20_000, 70_000]
 def test_bytes_of_chance_are_no_binary_format(tmp_path: Path, length: int) -> None:
     for seed in range(20):
         path = written(tmp_path, np.random.default_rng([length, seed]).bytes(length), "a.bin")
-        assert content_of(path) == (TEXT, "")
+        assert recognise_content(path) == (TEXT, "")
         with pytest.raises(RecordingError, match=r"^a\.bin") as raised:
-            contents(path)
+            list_contents(path)
         if length >= 512:
             said = re.search(
                 r"line (\d+): holds binary data .* the bytes (\w\w)", str(raised.value)
@@ -46,7 +46,7 @@ def test_a_mark_among_bytes_of_chance_is_not_enough(tmp_path: Path, mark: bytes)
     for seed in range(20):
         chance = np.random.default_rng(seed).bytes(2000)
         for data in (mark + b"\xff" + chance, chance[:1000] + mark * 20 + chance[1000:]):
-            assert content_of(written(tmp_path, data)) == (TEXT, "")
+            assert recognise_content(written(tmp_path, data)) == (TEXT, "")
 
 
 @pytest.mark.parametrize("name", ["PAR1", "BZh", "FEA1", "ARROW1", "ULog", "MATLAB"])
@@ -66,9 +66,9 @@ def test_the_beginning_of_a_log_is_of_its_format(tmp_path: Path, reader: Reader)
         return
     for data in beginnings(whole.read_bytes()):
         path = written(tmp_path, data, "cut")
-        assert content_of(path) == (FILE_FORMATS[reader], "")
+        assert recognise_content(path) == (FILE_FORMATS[reader], "")
         try:
-            assert contents(path).about == FILE_FORMATS[reader].title
+            assert list_contents(path).about == FILE_FORMATS[reader].title
         except RecordingError as error:
             assert str(error).startswith("cut")
 
@@ -84,6 +84,6 @@ def test_the_beginning_of_a_log_is_of_its_format(tmp_path: Path, reader: Reader)
 def test_a_format_that_is_not_read_is_named(tmp_path: Path, begin: bytes, said: str) -> None:
     path = written(tmp_path, begin + bytes(300))
     with pytest.raises(RecordingError, match=said):
-        contents(path)
+        list_contents(path)
     with pytest.raises(RecordingError, match=said):
         columns(path, log_format())

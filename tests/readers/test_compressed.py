@@ -19,7 +19,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from imubench_pipeline.readers import RecordingError, compressed, log_files, read
-from imubench_pipeline.readers.contents import contents
+from imubench_pipeline.readers.contents import list_contents
 from imubench_pipeline.recordings.drop_zone import _stem
 from tests.conftest import few
 from tests.readers.damage import examples
@@ -337,7 +337,7 @@ def test_two_members_of_one_name_are_refused(
     with pytest.raises(RecordingError, match=said):
         columns(path, log_format(channels))
     with pytest.raises(RecordingError, match=said):
-        contents(path)
+        list_contents(path)
 
 
 @pytest.mark.parametrize("folder", [False, True])

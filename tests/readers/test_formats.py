@@ -15,8 +15,8 @@ import pytest
 
 from imubench_pipeline.readers import read
 from imubench_pipeline.readers.batch import LogFile
-from imubench_pipeline.readers.content import content_of
-from imubench_pipeline.readers.contents import contents
+from imubench_pipeline.readers.content import recognise_content
+from imubench_pipeline.readers.contents import list_contents
 from imubench_pipeline.readers.file_format import FileFormat
 from imubench_pipeline.readers.formats import FILE_FORMATS, TEXT
 from imubench_pipeline.settings.sensor import ColumnSource, LogFormat, Reader
@@ -52,9 +52,9 @@ def log(file_format: FileFormat, tmp_path: Path) -> Path:
 
 
 def test_a_log_is_told_by_its_content(file_format: FileFormat, log: Path) -> None:
-    assert content_of(log) == (file_format, "")
+    assert recognise_content(log) == (file_format, "")
     renamed = log.rename(log.with_name("log"))
-    assert content_of(renamed) == (file_format, "")
+    assert recognise_content(renamed) == (file_format, "")
 
 
 LOADED = """
@@ -99,7 +99,7 @@ def test_a_log_is_read(file_format: FileFormat, log: Path) -> None:
 
 
 def test_what_a_log_holds_is_listed(file_format: FileFormat, log: Path) -> None:
-    listed = contents(log)
+    listed = list_contents(log)
     assert listed.about == file_format.title
     assert listed.tables
     assert all(table.file_format is file_format for table in listed.tables)

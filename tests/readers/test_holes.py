@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from imubench_pipeline.readers import RecordingError
-from imubench_pipeline.readers.holes import ZeroRuns, next_data
+from imubench_pipeline.readers.holes import ZeroRuns, find_next_data
 from tests.readers.text_logs import columns, log_format, written
 
 TERABYTES = 2 << 40
@@ -34,7 +34,7 @@ def sparse(path: Path, size: int, **parts: bytes) -> Path:
 @pytest.fixture(autouse=True)
 def has_holes(tmp_path: Path) -> None:
     with sparse(tmp_path / "probe", 1 << 20).open("rb") as probe:
-        if next_data(probe.fileno(), 0) is not None:
+        if find_next_data(probe.fileno(), 0) is not None:
             pytest.skip("this file system stores every zero")
 
 

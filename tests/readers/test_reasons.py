@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from imubench_pipeline.readers import RecordingError, read
-from imubench_pipeline.readers.contents import contents
+from imubench_pipeline.readers.contents import list_contents
 from imubench_pipeline.settings.sensor import LogFormat
 from tests.conftest import few
 from tests.corpus import ENTRIES, Rejected
@@ -55,7 +55,7 @@ def said_of(path: Path, log: LogFormat) -> list[str]:
     """Return what is said of a log by who lists it and who reads it."""
     said = []
     try:
-        said += [table.fault or table.about for table in contents(path).tables]
+        said += [table.fault or table.about for table in list_contents(path).tables]
     except RecordingError as error:
         said.append(str(error))
     try:

@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 
 from imubench_pipeline.readers import RecordingError, read
 from imubench_pipeline.readers.batch import LogFile
-from imubench_pipeline.readers.vectornav import FIELDS, Sentences, VectorNavFile, right_checksums
+from imubench_pipeline.readers.vectornav import FIELDS, Sentences, VectorNavFile, verify_checksums
 from imubench_pipeline.settings.sensor import LogFormat
 from tests.readers.damage import Damage, damaged, damages, examples
 
@@ -94,13 +94,13 @@ def ramp(kind: str, rows: int) -> np.ndarray:
 @pytest.mark.parametrize("body", ["*60", ",T1162704*2F", ",S0000*1F"])
 def test_the_checksums_of_the_manual_are_right(body: str) -> None:
     text, _, check = f"VNYPR,+010.071,+000.278,-002.026{body}".partition("*")
-    assert right_checksums([text.encode()], [check.encode()]) == [True]
-    assert right_checksums([text.encode()], [b"00"]) == [False]
+    assert verify_checksums([text.encode()], [check.encode()]) == [True]
+    assert verify_checksums([text.encode()], [b"00"]) == [False]
 
 
 def test_the_crc_is_that_of_its_reference_text() -> None:
     # CRC-16/XMODEM, the manual's algorithm, of the text that catalogues of CRCs use.
-    assert right_checksums([b"123456789", b"123456789"], [b"31C3", b"31C4"]) == [True, False]
+    assert verify_checksums([b"123456789", b"123456789"], [b"31C3", b"31C4"]) == [True, False]
 
 
 @pytest.mark.parametrize(("line", "figures"), PUBLISHED)

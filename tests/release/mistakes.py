@@ -27,7 +27,7 @@ import pyarrow.csv
 import yaml
 
 from imubench_pipeline.model.recordings import RecordingRow
-from imubench_pipeline.recordings.fitness import left_out
+from imubench_pipeline.recordings.fitness import list_excluded
 from imubench_pipeline.recordings.kept import Quality
 from imubench_pipeline.run.plan import Plan
 from imubench_pipeline.tables import read
@@ -334,7 +334,7 @@ def analysed(made: Made, folder: Path) -> Analysed:
     reason = recording["reason"] if recording["status"] != "ok" else None
     if not Quality.read(run.folder / "quality.json").channels:
         return Analysed({}, frozenset(), reason or "rejected")
-    apart = list(left_out([RecordingRow(**recording)]).values())
+    apart = list(list_excluded([RecordingRow(**recording)]).values())
     doubts = {(row["code"], row["channel"]) for row in tables["doubts"]}
     return Analysed(dict(_values(tables)), frozenset(doubts), reason or (apart or [None])[0])
 

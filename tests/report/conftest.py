@@ -34,7 +34,7 @@ def _once() -> Iterator[None]:
 def small_report() -> Iterator[None]:
     """What is large and the same in every report is left out."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(theory, "figure_text", lambda figure: "data:image/svg+xml;base64,PHN2Zy8+")
-        patch.setattr(theory, "theory_figure", lambda system: None)
-        patch.setattr(publishing, "plotting_script", lambda: "var Plotly = {};")
+        patch.setattr(theory, "encode_figure", lambda figure: "data:image/svg+xml;base64,PHN2Zy8+")
+        patch.setattr(theory, "draw_theory_figure", lambda system: None)
+        patch.setattr(publishing, "read_plotting_script", lambda: "var Plotly = {};")
         yield

@@ -11,22 +11,26 @@ import numpy as np
 import pyarrow as pa
 
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
-from imubench_pipeline.estimators.rows import parameter_rows
-from imubench_pipeline.extensions.fusion.fusion import fusion_rows
-from imubench_pipeline.extensions.papers.papers import rows_without_a_run
+from imubench_pipeline.estimators.rows import make_parameter_rows
+from imubench_pipeline.extensions.fusion.fusion import yield_fusion_rows
+from imubench_pipeline.extensions.papers.papers import make_rows_without_run
 from imubench_pipeline.model.comparisons import ErrorBudgetRow
 from imubench_pipeline.model.estimates import BacktestRow, FixedBiasRow, ParameterRow
 from imubench_pipeline.model.recordings import DoubtRow, RecordingRow
 from imubench_pipeline.navigation.drift import drift_rows
-from imubench_pipeline.navigation.expected_errors import error_rows, of_requirement, standard
-from imubench_pipeline.navigation.pooled import pooled_rows
-from imubench_pipeline.navigation.selection import ranked
+from imubench_pipeline.navigation.expected_errors import (
+    list_error_rows,
+    list_requirement_questions,
+    list_standard_questions,
+)
+from imubench_pipeline.navigation.pooled import list_pooled_rows
+from imubench_pipeline.navigation.selection import rank_sensors
 from imubench_pipeline.navigation.verdicts.basis import Basis
-from imubench_pipeline.navigation.verdicts.judgement import judgements
-from imubench_pipeline.navigation.verdicts.next_steps import next_step_rows
+from imubench_pipeline.navigation.verdicts.judgement import judge_sensors
+from imubench_pipeline.navigation.verdicts.next_steps import list_next_step_rows
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.recordings.recording import LogWriter
-from imubench_pipeline.report.publish import site_of
+from imubench_pipeline.report.publish import make_site
 from imubench_pipeline.report.site import Site
 from imubench_pipeline.settings.config import FusionSettings
 from imubench_pipeline.settings.requirements import Requirement
@@ -94,11 +98,11 @@ def recording_rows(
         if temperature is not None:
             for table, more in thermal_rows(Key(sensor, recording, channel), temperature).items():
                 rows.setdefault(table, []).extend(more)
-    questions = [*standard([60.0], 60.0, math.pi / 4, ["worst"])]
+    questions = [*list_standard_questions([60.0], 60.0, math.pi / 4, ["worst"])]
     for name, given in (requirements or {}).items():
-        questions += of_requirement(name, Requirement.model_validate(given))
+        questions += list_requirement_questions(name, Requirement.model_validate(given))
     estimates = dict.fromkeys(channels, Estimate("likelihood", parameters))
-    rows["error_budget"] = list(error_rows(names, estimates, questions, draws=3, seed=1))
+    rows["error_budget"] = list(list_error_rows(names, estimates, questions, draws=3, seed=1))
     return rows
 
 
@@ -135,7 +139,7 @@ def _channel_rows(
         "parameters": [
             row
             for number, estimate in enumerate((best, papers, curve))
-            for row in parameter_rows(key, estimate, recommended=number == 0)
+            for row in make_parameter_rows(key, estimate, recommended=number == 0)
         ],
         "reconstruction": [
             method | {"tau": t, "adev": a, "lower": a / 2, "upper": a * 2, "reconstructed": a}
@@ -219,8 +223,8 @@ def thermal_rows(key: Key, temperature: str) -> Rows:
         for name, one in KNOWN.items()
         if one.value is not None
     }
-    best = parameter_rows(key, Estimate("compensated", half), recommended=False)
-    before = parameter_rows(key, Estimate("likelihood", sensor), recommended=True)
+    best = make_parameter_rows(key, Estimate("compensated", half), recommended=False)
+    before = make_parameter_rows(key, Estimate("likelihood", sensor), recommended=True)
     return {
         "parameters": [*list(best) * followed, *before],
         "temperature": of({"compensated": followed}, figures),
@@ -291,14 +295,14 @@ def joined(
     shown = BacktestRow.rows_of(made["backtest"])
     basis = Basis.of(about, DoubtRow.rows_of(made["doubts"]), recommended, shown)
     errors = ErrorBudgetRow.rows_of(made["error_budget"])
-    judged = list(judgements(errors, asked, sensors, basis))
+    judged = list(judge_sensors(errors, asked, sensors, basis))
     return made | {
-        "pooled": build("pooled", pooled_rows(recommended, biases, devices)),
+        "pooled": build("pooled", list_pooled_rows(recommended, biases, devices)),
         "drift": build("drift", drift_rows(recommended, biases, about)),
-        "ranking": build("ranking", ranked(judged, basis)),
-        "next_steps": build("next_steps", next_step_rows(judged, basis)),
-        "fusion": build("fusion", fusion_rows(made, FUSION)),
-        "published": build("published", rows_without_a_run() if papers else ()),
+        "ranking": build("ranking", rank_sensors(judged, basis)),
+        "next_steps": build("next_steps", list_next_step_rows(judged, basis)),
+        "fusion": build("fusion", yield_fusion_rows(made, FUSION)),
+        "published": build("published", make_rows_without_run() if papers else ()),
     }
 
 
@@ -346,7 +350,7 @@ def settings_of(
 
 def site(tables: Mapping[str, pa.Table], results: Path = Path("nowhere"), **given: Any) -> Site:
     """The site of tables."""
-    return site_of(tables, settings_of(tables, **given), results)
+    return make_site(tables, settings_of(tables, **given), results)
 
 
 def put_samples(results: Path, sensor: str, recording: str, channel: str = "gyro_x") -> None:

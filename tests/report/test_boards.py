@@ -6,9 +6,9 @@ from typing import Any
 
 import pytest
 
-from imubench_pipeline.extensions.fusion.boards import BOARDS, published_lines
+from imubench_pipeline.extensions.fusion.boards import BOARDS, make_published_lines
 from imubench_pipeline.extensions.fusion.tables import PublishedFigureRow
-from imubench_pipeline.report.pages import pages
+from imubench_pipeline.report.pages import list_pages
 from imubench_pipeline.report.publish import publish
 from imubench_pipeline.report.site import Site
 from imubench_pipeline.tables import build
@@ -257,8 +257,8 @@ def test_every_page_leads_to_the_boards(read: dict[str, Read]) -> None:
 def test_without_boards_there_is_no_page_and_no_way_to_it(tmp_path: Path) -> None:
     few_rows = (of_board("cheap"), recording_rows("cheap", "day1"))
     none = made(*few_rows, boards={})
-    assert "boards.html" not in {page.path for page in pages(none)}
-    assert "boards.html" in {page.path for page in pages(made(*few_rows))}
+    assert "boards.html" not in {page.path for page in list_pages(none)}
+    assert "boards.html" in {page.path for page in list_pages(made(*few_rows))}
     publish(none, tmp_path)
     for path, page in read_pages(tmp_path).items():
         assert not [link for link in page.links if "boards.html" in link], path
@@ -269,7 +269,7 @@ def test_a_report_of_before_there_were_boards_can_be_published_again(tmp_path: P
     old = made(recording_rows("imu", "day1"), boards={})
     settings = {name: value for name, value in old.settings.items() if name != "boards"}
     again = replace(old, settings=settings)
-    assert "boards.html" not in {page.path for page in pages(again)}
+    assert "boards.html" not in {page.path for page in list_pages(again)}
     assert "boards.html" not in {path for path, _ in again.navigation}
 
 
@@ -332,7 +332,7 @@ def test_the_page_is_written_again_only_if_its_recordings_or_words_change() -> N
 
 def line(**changes: Any) -> dict[str, Any]:
     names = {"sensor": "imu", "recording": "sim_pair", "channel": "gyro_x"}
-    (found,) = published_lines(
+    (found,) = make_published_lines(
         PublishedFigureRow.rows_of(build("published_figures", [names | PRINTED | changes]))
     )
     return found

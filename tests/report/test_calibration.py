@@ -6,7 +6,11 @@ from typing import Any
 
 import pytest
 
-from imubench_pipeline.extensions.calibration.pages import answer, earth_words, scatter_words
+from imubench_pipeline.extensions.calibration.pages import (
+    describe_earth_rate,
+    describe_scatter,
+    summarise_calibration,
+)
 from imubench_pipeline.extensions.calibration.tables import CalibrationRow
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.report.publish import publish
@@ -115,14 +119,16 @@ def calibrated(parameter: str, **given: float | None) -> CalibrationRow:
 
 def test_sentences() -> None:
     bias = calibrated("bias", value=1e-3, lower=0.9e-3, upper=1.1e-3)
-    assert answer([bias], "si") == "The bias is 0.001 ± 0.0001 rad/s (95 %)."
-    assert answer([], "si") == "This recording has no result."
+    assert summarise_calibration([bias], "si") == "The bias is 0.001 ± 0.0001 rad/s (95 %)."
+    assert summarise_calibration([], "si") == "This recording has no result."
     bent = calibrated("linearity", value=0.0125, chance=1e-3)
-    assert "Noise does not explain" in answer([bias, bent], "si")
-    assert "from the line is 1.25 % of the largest rate" in answer([bias, bent], "si")
-    assert scatter_words([calibrated("bias", scatter=None)]) == ""
-    assert "scatter more than the noise" in scatter_words([calibrated("bias", scatter=1e-4)])
-    assert earth_words([calibrated("bias", earth_rate=None)], "si").startswith(
+    assert "Noise does not explain" in summarise_calibration([bias, bent], "si")
+    assert "from the line is 1.25 % of the largest rate" in summarise_calibration(
+        [bias, bent], "si"
+    )
+    assert describe_scatter([calibrated("bias", scatter=None)]) == ""
+    assert "scatter more than the noise" in describe_scatter([calibrated("bias", scatter=1e-4)])
+    assert describe_earth_rate([calibrated("bias", earth_rate=None)], "si").startswith(
         "The bias includes the Earth's rate"
     )
     turned = calibrated(
@@ -134,4 +140,4 @@ def test_sentences() -> None:
         heading=0.5,
         elevation=0.0,
     )
-    assert "determines it to 1×10⁻⁶ rad/s (1σ)." in earth_words([turned], "si")
+    assert "determines it to 1×10⁻⁶ rad/s (1σ)." in describe_earth_rate([turned], "si")

@@ -5,19 +5,19 @@ from typing import Any
 import pytest
 
 from imubench_pipeline.estimators.estimate import Parameter
-from imubench_pipeline.report.comparison import Comparison, compared_recording
-from imubench_pipeline.report.view import RecordingView, recording_views
+from imubench_pipeline.report.comparison import Comparison, gather_recording
+from imubench_pipeline.report.view import RecordingView, gather_recordings
 from tests.report.tables import HOUR, KNOWN, MODEL, WITHOUT_K, joined, recording_rows, rejected_rows
 
 NAMES = {"a": "Vendor A", "b": "Vendor B"}
 
 
 def views(*several: Any) -> list[RecordingView]:
-    return recording_views(joined(*several))
+    return gather_recordings(joined(*several))
 
 
 def together(recordings: Iterable[RecordingView]) -> Comparison:
-    return Comparison([compared_recording(one, "practical") for one in recordings], NAMES)
+    return Comparison([gather_recording(one, "practical") for one in recordings], NAMES)
 
 
 def lines(*several: Any) -> list[dict[str, Any]]:

@@ -5,13 +5,13 @@ import pytest
 
 from imubench_pipeline.model.comparisons import CoverageRow, RepeatabilityRow
 from imubench_pipeline.report.datasheets import (
-    coverage_tables,
-    curve_distances,
-    delta_rows,
-    deltas_of_sensors,
-    repeatability_lines,
+    compare_sensors_with_datasheets,
+    compare_with_datasheet,
+    format_curve_distances,
+    format_repeatability,
+    make_coverage_tables,
 )
-from imubench_pipeline.report.view import RecordingView, recording_views
+from imubench_pipeline.report.view import RecordingView, gather_recordings
 from imubench_pipeline.tables import build
 from tests.report.tables import DEGREE, HOUR, Rows, joined, recording_rows
 
@@ -32,7 +32,7 @@ def with_figures(
 
 
 def views(*several: Rows) -> list[RecordingView]:
-    return recording_views(joined(*several))
+    return gather_recordings(joined(*several))
 
 
 def deltas(
@@ -41,7 +41,7 @@ def deltas(
     coverage: dict[tuple[str, str, str], str] | None = None,
 ) -> list[dict[str, Any]]:
     (view,) = views(with_figures(*figures))
-    return list(delta_rows(view.channels()[0], coverage or {}, system))
+    return list(compare_with_datasheet(view.channels()[0], coverage or {}, system))
 
 
 def test_a_printed_figure_stands_beside_what_was_measured() -> None:
@@ -147,7 +147,7 @@ def test_one_line_a_figure_over_all_recordings_of_a_sensor() -> None:
         with_figures(FIGURE | {"delta": None}, recording="s"),
         with_figures(FIGURE, sensor="b", simulated=True),
     )
-    first, second = deltas_of_sensors(found, "practical")
+    first, second = compare_sensors_with_datasheets(found, "practical")
     assert (first["sensor"], first["simulated"], first["channel"]) == ("a", False, "gyro_x")
     assert first["recordings"] == 3
     (reading,) = first["readings"]
@@ -165,7 +165,7 @@ def test_one_line_a_figure_over_all_recordings_of_a_sensor() -> None:
 def test_both_readings_of_a_density_stand_in_one_line() -> None:
     other = {"sidedness": "two-sided", "delta": -0.2, "verdict": "better than typ"}
     found = views(with_figures(FIGURE | {"sidedness": "one-sided"}, FIGURE | other))
-    (row,) = deltas_of_sensors(found, "practical")
+    (row,) = compare_sensors_with_datasheets(found, "practical")
     assert (row["about"], row["verdicts"]) == ("typ", "depends on sidedness")
     assert [(one["as"], one["difference"]) for one in row["readings"]] == [
         ("read as one-sided", "+10 %"),
@@ -181,7 +181,7 @@ def test_distances_of_the_curve_are_told_in_words() -> None:
         for sidedness in ("two-sided", None)
     ]
     (view,) = views(rows)
-    assert list(curve_distances(view.channels()[0], "practical")) == [
+    assert list(format_curve_distances(view.channels()[0], "practical")) == [
         "2.5 °/h, 0.046 decades, density read as two-sided",
         "2.5 °/h, 0.046 decades",
     ]
@@ -202,7 +202,7 @@ def test_who_publishes_what_is_counted() -> None:
         *covered("c", {"N": "no", "temperature_coefficient": "yes"}, as_printed="7 ppm/K"),
         *covered("c", {"N": "no", "offset": "no"}, quantity="accel"),
     ]
-    gyro, accel = coverage_tables(CoverageRow.rows_of(build("coverage", rows)))
+    gyro, accel = make_coverage_tables(CoverageRow.rows_of(build("coverage", rows)))
     assert gyro["figures"] == ["N", "temperature coefficient"]
     assert gyro["counts"] == ["2 of 3 looked up", "1 of 2 looked up; 1 not looked up"]
     assert [line["name"] for line in gyro["lines"]] == ["V A", "V B", "V C"]
@@ -215,7 +215,7 @@ def test_who_publishes_what_is_counted() -> None:
     assert gyro["lines"][2]["cells"][1]["note"] == "7 ppm/K"
     assert [cell["class"] for cell in gyro["lines"][0]["cells"]] == ["", "none"]
     assert (accel["figures"], accel["counts"]) == (["N", "offset"], ["0 of 1 looked up"] * 2)
-    assert list(coverage_tables([])) == []
+    assert list(make_coverage_tables([])) == []
 
 
 def test_the_spread_of_turn_ons_stands_beside_what_is_printed() -> None:
@@ -236,7 +236,7 @@ def test_the_spread_of_turn_ons_stands_beside_what_is_printed() -> None:
         verdict="not sure",
         reason="why",
     )
-    (line,) = repeatability_lines([row, replace(row, sensor="b")], "a", "practical")
+    (line,) = format_repeatability([row, replace(row, sensor="b")], "a", "practical")
     assert (line["printed"], line["about"], line["delta"]) == ("4 deg/h", "typ", "−50 %")
     assert line["measured"] == ["2", "1 to 12"]
     assert (line["unit"], line["channel"], line["recordings"]) == ("°/h", "gyro x", 3)

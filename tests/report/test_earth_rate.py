@@ -8,15 +8,20 @@ from typing import Any
 
 import pytest
 
-from imubench_pipeline.extensions.earth_rate.page import answer, given_words, needs, published_words
+from imubench_pipeline.extensions.earth_rate.page import (
+    describe_published,
+    describe_settling,
+    summarise_earth_rate,
+    summarise_needs,
+)
 from imubench_pipeline.extensions.earth_rate.tables import (
     EarthRatePredictionRow,
     EarthRatePublishedRow,
     EarthRateRow,
 )
 from imubench_pipeline.noise import NoiseModel
-from imubench_pipeline.report.pages import pages
-from imubench_pipeline.report.publish import one_file, publish
+from imubench_pipeline.report.pages import list_pages
+from imubench_pipeline.report.publish import publish, render_one_file
 from imubench_pipeline.report.site import Site
 from imubench_pipeline.tables import build
 from tests.earth_rate.recordings import EVERY_30, put, put_at_rest, run, turned_log
@@ -134,7 +139,7 @@ def test_the_page_of_all_runs(read: dict[str, Read]) -> None:
 def test_every_page_leads_there_only_where_there_are_such_runs(read: dict[str, Read]) -> None:
     assert all("Earth’s rate" in page.text for page in read.values())
     others = site(joined(recording_rows("s", "night")))
-    assert "earth_rate.html" not in {page.path for page in pages(others)}
+    assert "earth_rate.html" not in {page.path for page in list_pages(others)}
     assert "earth_rate.html" not in {path for path, _ in others.navigation}
 
 
@@ -176,7 +181,7 @@ def test_turns_that_nothing_shows_are_a_remark(tmp_path: Path) -> None:
 
 @pytest.mark.release  # every day tests/report/test_publish.py asks for all pages in one file
 def test_all_pages_stand_in_one_file(made: Site) -> None:
-    text = one_file(made)
+    text = render_one_file(made)
     assert 'id="page:earth_rate.html"' in text and 'id="page:recordings/s/run.html"' in text
 
 
@@ -189,7 +194,7 @@ def _best_of(tried: list[float], nearly: list[float], best: float) -> str:
                   nearly_best=dwell in nearly)
         for dwell in tried
     ]  # fmt: skip
-    found = needs(rows)
+    found = summarise_needs(rows)
     assert found is not None
     return str(found["best"])
 
@@ -199,9 +204,12 @@ def test_sentences() -> None:
                        parameter="rate", unit="rad/s", truth=15.04 * HOUR,
                        latitude=0.0)  # fmt: skip
     row = estimate(method="filter", value=30 * HOUR, upper=32 * HOUR, status="ok", off_sigma=15.0)
-    assert "15 standard deviations away" in answer([row], "practical")
-    assert "Noise does not explain this error" in answer([row], "practical")
-    assert answer([], "practical") == "This recording has no estimate of the Earth's rate."
+    assert "15 standard deviations away" in summarise_earth_rate([row], "practical")
+    assert "Noise does not explain this error" in summarise_earth_rate([row], "practical")
+    assert (
+        summarise_earth_rate([], "practical")
+        == "This recording has no estimate of the Earth's rate."
+    )
     assert _best_of([300.0, 20.0, 5.0], [300.0], 300.0).endswith(
         " It is the longest dwell that was tried."
     )
@@ -214,7 +222,7 @@ def test_sentences() -> None:
     )
     assert "All other dwells" in _best_of([300.0, 20.0, 5.0], [20.0], 20.0)
     names = {"sensor": "s", "recording": "a", "verdict": "within the noise"}
-    assert published_words([EarthRatePublishedRow(**PUBLISHED | names)]) == (
+    assert describe_published([EarthRatePublishedRow(**PUBLISHED | names)]) == (
         "Noise explains the error of the published estimate. In these runs, σ of a filter that "
         "does not know the rate is 0.78 % smaller than that of the mean over pairs."
     )
@@ -222,8 +230,8 @@ def test_sentences() -> None:
     later = estimate(status="given", method="known_rate", settled=1800.0)
     other = estimate(status="given", method="known_rate_radians")
     assert "given rate after 15 min of data with P₀ in (°/s)²; never with P₀ in (rad/s)²" in (
-        given_words([given, other])
+        describe_settling([given, other])
     )
-    assert "after 15 min to 30 min of data" in given_words([given, later])
-    assert given_words([]) == ""
-    assert published_words([]) == "" and needs([]) is None
+    assert "after 15 min to 30 min of data" in describe_settling([given, later])
+    assert describe_settling([]) == ""
+    assert describe_published([]) == "" and summarise_needs([]) is None

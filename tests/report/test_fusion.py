@@ -3,11 +3,11 @@ from typing import Any
 
 from imubench_pipeline.extensions.fusion.page import (
     FUSION,
-    equal_numbers,
-    grade_lines,
-    matrices,
-    shared_words,
-    unprinted_grades,
+    describe_common_errors,
+    find_unprinted_grades,
+    make_grade_lines,
+    make_matrices,
+    make_pair_lines,
 )
 from imubench_pipeline.extensions.fusion.tables import FusionRow, GradeRow
 from imubench_pipeline.report.publish import publish
@@ -22,7 +22,7 @@ ROW = {"quantity": "gyro", "tau": 10.0, "sensor": "a", "recording": "r", "channe
 
 
 def line(**changes: Any) -> dict[str, Any]:
-    (found,) = equal_numbers(FusionRow.rows_of(build("fusion", [ROW | changes])))
+    (found,) = make_pair_lines(FusionRow.rows_of(build("fusion", [ROW | changes])))
     return found
 
 
@@ -45,20 +45,20 @@ def test_what_no_number_reaches_is_said() -> None:
 
 def test_only_the_worse_of_two_is_multiplied() -> None:
     rows = FusionRow.rows_of(build("fusion", [ROW | {"adev": 1e-5, "other_adev": 3e-5, "n": 0.1}]))
-    assert list(equal_numbers(rows)) == []
+    assert list(make_pair_lines(rows)) == []
 
 
 def test_what_is_not_known_of_a_pair_is_said_once() -> None:
     nothing = dict.fromkeys(("adev", "floor", "common_share", "n", "lower", "upper", "reachable"))
     one = ROW | nothing | {"reason": "too short"}
     two = one | {"sensor": "b", "other": "a", "adev": 1e-5, "other_adev": None}
-    (found,) = equal_numbers(FusionRow.rows_of(build("fusion", [one, two])))
+    (found,) = make_pair_lines(FusionRow.rows_of(build("fusion", [one, two])))
     assert (found["sensor"], found["number"], found["common"]) == ("a", "–", "–")
 
 
 def test_the_page_says_what_it_assumes() -> None:
-    assert "independent" in shared_words({"N": 0.0, "B": 0.0, "K": 0.0, "R": 0.0})
-    assert shared_words({"N": 0.125, "B": 0.0, "K": 1.0, "R": 0.0}).startswith(
+    assert "independent" in describe_common_errors({"N": 0.0, "B": 0.0, "K": 0.0, "R": 0.0})
+    assert describe_common_errors({"N": 0.125, "B": 0.0, "K": 1.0, "R": 0.0}).startswith(
         "The units of one sensor are assumed to share 12.5 % of the variance of the white noise "
         "(N), 100 % of the variance of the random walk (K). The effect of a logged temperature"
     )
@@ -93,7 +93,7 @@ GRADE = {"quantity": "gyro", "sensor": "a", "recording": "r", "channel": "gyro_x
 def test_how_many_reach_a_class_stands_in_a_line_of_both_figures() -> None:
     floor = GRADE | {"statistic": "sigma_min", "value": None, "n": None, "n_lower": 0.0,
                      "n_upper": 4.2, "reason": "it still falls"}  # fmt: skip
-    (found,) = grade_lines(GradeRow.rows_of(build("grades", [GRADE, floor])))
+    (found,) = make_grade_lines(GradeRow.rows_of(build("grades", [GRADE, floor])))
     assert (found["grade"], found["option"]) == ("V B", "C")
     noise, lowest = found["cells"]
     assert (noise["number"], noise["limits"]) == ("9", "9 to 10")
@@ -107,9 +107,9 @@ def test_a_class_of_which_nothing_is_printed_has_no_line() -> None:
         "grades", [GRADE, nothing | {"grade": "d", "grade_name": "V D", "reason": "it prints none"}]
     )
     rows = GradeRow.rows_of(table)
-    (found,) = grade_lines(rows)
+    (found,) = make_grade_lines(rows)
     assert found["grade"] == "V B"
-    assert unprinted_grades(rows) == {"V D, gyroscope": "it prints none"}
+    assert find_unprinted_grades(rows) == {"V D, gyroscope": "it prints none"}
 
 
 def test_what_is_not_printed_of_a_class_is_said_on_the_page(tmp_path: Path) -> None:
@@ -129,7 +129,7 @@ def test_a_matrix_has_the_quietest_first_and_a_number_where_one_is_not_enough() 
         ROW | {"other": "c", "other_adev": 2e-5, "n": 2.3, "lower": 2.0, "upper": 2.6},
         ROW | {"sensor": "c", "adev": 2e-5, "n": 4.0, "lower": 3.1, "upper": 5.0},
     ]
-    (matrix,) = matrices(list(equal_numbers(FusionRow.rows_of(build("fusion", rows)))))
+    (matrix,) = make_matrices(list(make_pair_lines(FusionRow.rows_of(build("fusion", rows)))))
     assert (matrix["name"], matrix["sensors"]) == ("Gyroscope, 10 s", ["b", "c", "a"])
     assert matrix["levels"] == [1e-5, 2e-5, 3e-5]
     numbers = [[cell and cell["number"] for cell in row] for row in matrix["cells"]]
@@ -138,4 +138,6 @@ def test_a_matrix_has_the_quietest_first_and_a_number_where_one_is_not_enough() 
 
 def test_a_sensor_of_which_nothing_is_known_is_in_no_matrix() -> None:
     row = ROW | {"adev": None, "n": None, "lower": None, "upper": None, "reason": "too short"}
-    assert list(matrices(list(equal_numbers(FusionRow.rows_of(build("fusion", [row])))))) == []
+    assert (
+        list(make_matrices(list(make_pair_lines(FusionRow.rows_of(build("fusion", [row])))))) == []
+    )

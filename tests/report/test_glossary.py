@@ -21,8 +21,8 @@ from imubench_pipeline.allan.confidence import equivalent_degrees
 from imubench_pipeline.datasheets import coverage
 from imubench_pipeline.earth import EARTH_RATE
 from imubench_pipeline.estimators import estimate, lines
-from imubench_pipeline.estimators.identifiability import bounds_of
-from imubench_pipeline.extensions.papers.page import words_of_reading
+from imubench_pipeline.estimators.identifiability import compute_cramer_rao_bounds
+from imubench_pipeline.extensions.papers.page import describe_reading
 from imubench_pipeline.extensions.papers.tables import AccuracyRow
 from imubench_pipeline.model.states import (
     BacktestVerdict,
@@ -38,10 +38,10 @@ from imubench_pipeline.navigation.error_budget import Gyrocompass, Start, budget
 from imubench_pipeline.noise import FLOOR, GaussMarkov, NoiseModel
 from imubench_pipeline.report import glossary as module
 from imubench_pipeline.report.datasheets import DEPENDS
-from imubench_pipeline.report.glossary import UnknownTermError, glossary, term
+from imubench_pipeline.report.glossary import UnknownTermError, find_term, read_glossary
 from imubench_pipeline.settings.validation import ConfigError
 from imubench_pipeline.tables import findings
-from imubench_pipeline.units import from_si, to_si
+from imubench_pipeline.units import convert_from_si, convert_to_si
 from imubench_pipeline.words.estimates import STATUS_WORDS
 from imubench_pipeline.words.findings import FINDINGS
 from imubench_pipeline.words.reasons.datasheets import DELTA_MEANINGS
@@ -67,7 +67,7 @@ def theory() -> str:
         lstrip_blocks=True,
     )
     page = environment.get_template("theory.html.jinja")
-    return page.render(figure="figures/theory.svg", terms=glossary(), sections=())
+    return page.render(figure="figures/theory.svg", terms=read_glossary(), sections=())
 
 
 class Page(HTMLParser):
@@ -110,7 +110,7 @@ def text() -> str:
 
 
 def test_every_term_is_a_short_sentence() -> None:
-    for one in glossary().values():
+    for one in read_glossary().values():
         assert one.name and one.short, one.key
         assert len(one.short.split()) <= 25, f"{one.key}: {one.short}"
         assert one.short.endswith(".") and one.short[0].isupper(), f"{one.key}: {one.short}"
@@ -119,7 +119,7 @@ def test_every_term_is_a_short_sentence() -> None:
 
 def test_every_section_is_a_place_on_the_theory_page() -> None:
     ids = {attributes.get("id") for _, attributes in page().tags}
-    for one in glossary().values():
+    for one in read_glossary().values():
         assert one.section in ids, one.key
 
 
@@ -127,7 +127,7 @@ def test_no_key_stands_twice() -> None:
     tree: Any = yaml.compose((SOURCE / "report/glossary.yaml").read_text())
     keys = [key.value for _, section in tree.value for key, _ in section.value]
     assert Counter(keys).most_common(1)[0][1] == 1
-    assert keys == list(glossary())
+    assert keys == list(read_glossary())
     sections = [key.value for key, _ in tree.value]
     assert len(sections) == len(set(sections))
 
@@ -137,23 +137,23 @@ def test_a_key_in_two_sections_is_refused(tmp_path: Path, monkeypatch: pytest.Mo
     file.write_text("one:\n  N: {name: N, short: A.}\ntwo:\n  N: {name: N, short: B.}\n")
     monkeypatch.setattr(module, "_FILE", file)
     with pytest.raises(ConfigError, match="N stands in one and two"):
-        glossary.__wrapped__()
+        read_glossary.__wrapped__()
 
 
 def test_an_unknown_term_is_an_error_that_names_close_ones() -> None:
     with pytest.raises(UnknownTermError, match=r"'alan_deviation' is not .* allan_deviation"):
-        glossary()["alan_deviation"]
+        read_glossary()["alan_deviation"]
     with pytest.raises(UnknownTermError):
-        term("splendid", "verdict")
-    assert "alan_deviation" not in glossary()
+        find_term("splendid", "verdict")
+    assert "alan_deviation" not in read_glossary()
 
 
 def test_what_a_table_holds_is_looked_up_by_its_kind() -> None:
-    assert term("not comparable (condition)", "verdict").name == "not comparable (condition)"
-    assert term("band", "line") is not term("band")
-    assert term("not_identified").name == "not determined"
+    assert find_term("not comparable (condition)", "verdict").name == "not comparable (condition)"
+    assert find_term("band", "line") is not find_term("band")
+    assert find_term("not_identified").name == "not determined"
     assert all(
-        term(status).name == name
+        find_term(status).name == name
         for status, name in STATUS_WORDS.items()
         if status not in ("ok", "does_not_decide")
     )
@@ -276,7 +276,7 @@ def test_findings_of_all_packages_are_known() -> None:
 
 
 def test_every_finding_has_an_entry_that_says_what_to_do() -> None:
-    known = glossary()
+    known = read_glossary()
     missing = {name: where for name, where in emitted().items() if name not in known}
     assert not missing, f"glossary.yaml lacks {missing}"
     for name in emitted():
@@ -327,15 +327,15 @@ def values_in_tables() -> Iterator[tuple[str, str]]:
 
 @pytest.mark.parametrize(("value", "kind"), sorted(set(values_in_tables())))
 def test_every_status_and_verdict_has_an_entry(value: str, kind: str) -> None:
-    assert term(value, kind).short
+    assert find_term(value, kind).short
 
 
 def test_the_verdicts_are_all_found() -> None:
     verdicts = {value for value, kind in values_in_tables() if kind == "verdict"}
     assert verdicts >= set(get_args(Verdict))
     assert verdicts >= {"explained", "not explained", "not sure", "agree", "differ"}
-    spoken = {one.key for one in glossary().values() if one.key.startswith("verdict_")}
-    assert spoken == {term(verdict, "verdict").key for verdict in verdicts}
+    spoken = {one.key for one in read_glossary().values() if one.key.startswith("verdict_")}
+    assert spoken == {find_term(verdict, "verdict").key for verdict in verdicts}
 
 
 # ---------------------------------------------------------------------------- the theory page
@@ -391,7 +391,7 @@ def test_a_page_may_name_another_base() -> None:
         )
     )
     made = environment.get_template("theory.html.jinja")
-    assert made.render(base="other", figure="f", terms=glossary(), sections=()).startswith(
+    assert made.render(base="other", figure="f", terms=read_glossary(), sections=()).startswith(
         "<p>other</p>"
     )
 
@@ -399,12 +399,13 @@ def test_a_page_may_name_another_base() -> None:
 # ------------------------------------------------------ its figures are those of the library
 
 GYRO = NoiseModel(
-    N=to_si(0.3, "deg/sqrt(h)", "gyro_density"),
-    B=to_si(10.0, "deg/h", "angular_rate"),
-    K=to_si(10.0, "deg/h/sqrt(h)", "gyro_random_walk"),
+    N=convert_to_si(0.3, "deg/sqrt(h)", "gyro_density"),
+    B=convert_to_si(10.0, "deg/h", "angular_rate"),
+    K=convert_to_si(10.0, "deg/h/sqrt(h)", "gyro_random_walk"),
 )
 ACCEL = NoiseModel(
-    N=to_si(100.0, "ug/sqrt(Hz)", "accel_density"), B=to_si(50.0, "ug", "acceleration")
+    N=convert_to_si(100.0, "ug/sqrt(Hz)", "accel_density"),
+    B=convert_to_si(50.0, "ug", "acceleration"),
 )
 NOTHING = NoiseModel()
 MTI_7_GYRO = NoiseModel(N=8.4e-5, B=6.7e-5, T_B=89.5, K=8.2e-7)
@@ -419,7 +420,7 @@ CAUSES: dict[str, tuple[NoiseModel, Start]] = {
     "N": (NoiseModel(N=GYRO.N), PERFECT),
     "B, flicker": (NoiseModel(B=GYRO.B), Start.calibrated(60.0)),
     "K": (NoiseModel(K=GYRO.K), PERFECT),
-    "R (example: 10 °/h/h)": (NoiseModel(R=to_si(10.0, "deg/h/h", "gyro_ramp")), PERFECT),
+    "R (example: 10 °/h/h)": (NoiseModel(R=convert_to_si(10.0, "deg/h/h", "gyro_ramp")), PERFECT),
 }
 
 
@@ -534,9 +535,9 @@ def test_the_logs_that_are_needed(
     assert shown == pytest.approx([length for length in hours if length])
     for name, length in zip(("B", "T_B", "K"), hours, strict=True):
         if length:
-            bound = bounds_of(model, rate, length * 3600.0, rate / 2)[name]
+            bound = compute_cramer_rao_bounds(model, rate, length * 3600.0, rate / 2)[name]
             assert bound == pytest.approx(0.1, rel=0.05)
-    assert bounds_of(model, rate, 15.0, rate / 20)["N"] < 0.1
+    assert compute_cramer_rao_bounds(model, rate, 15.0, rate / 20)["N"] < 0.1
 
 
 @pytest.mark.parametrize(
@@ -558,7 +559,7 @@ def test_the_conversions(
     shown: str, value: float, unit: str, other: str, dimension: str, expected: float
 ) -> None:
     assert shown in text()
-    converted = from_si(to_si(value, unit, dimension), other, dimension)
+    converted = convert_from_si(convert_to_si(value, unit, dimension), other, dimension)
     assert converted == pytest.approx(expected, rel=2e-3)
 
 
@@ -620,14 +621,14 @@ def test_what_is_said_of_reading_the_curve_is_of_the_run() -> None:
                     bound=0.04)
         for name, given in (("N", 100), ("B", 17), ("T_B", 17), ("K", 0))
     ]  # fmt: skip
-    assert words_of_reading(rows) == (
+    assert describe_reading(rows) == (
         "In 100 simulated logs of 10 h it finds B in 17, 29 % too small, and K in none: "
     )
-    assert words_of_reading([]) == ""
+    assert describe_reading([]) == ""
 
 
 def test_the_glossarys_own_figures() -> None:
-    known: dict[str, Any] = glossary()
+    known: dict[str, Any] = read_glossary()
     assert "0.9 m in a minute" in known["microg"].short
     assert 0.5 * ACCEL.B * 60.0**2 == pytest.approx(0.9, abs=0.05)
     assert "0.05 is 12 %" in known["score_rms_log10"].short

@@ -7,13 +7,17 @@ import pytest
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
 from imubench_pipeline.model.comparisons import ErrorBudgetRow, RankingRow
 from imubench_pipeline.model.verdicts import Condition, DoubtMark
-from imubench_pipeline.navigation.expected_errors import error_rows, of_requirement, standard
+from imubench_pipeline.navigation.expected_errors import (
+    list_error_rows,
+    list_requirement_questions,
+    list_standard_questions,
+)
 from imubench_pipeline.report.meaning import (
     Group,
     LimitLine,
-    budget_tables,
-    budget_words,
-    rankings,
+    explain_budget,
+    format_rankings,
+    make_budget_tables,
 )
 from imubench_pipeline.report.sourced import SourcedNumber
 from imubench_pipeline.settings.requirements import Requirement
@@ -30,8 +34,8 @@ def white(N: float) -> Estimate:
 
 def errors() -> list[ErrorBudgetRow]:
     requirement = Requirement.model_validate(ROBOT)
-    questions = [*standard([60.0], 60.0, math.pi / 4, ["worst"])]
-    questions += of_requirement("robot", requirement)
+    questions = [*list_standard_questions([60.0], 60.0, math.pi / 4, ["worst"])]
+    questions += list_requirement_questions("robot", requirement)
     rows: list[Any] = []
     for sensor, estimates in (
         ("poor", {"gyro_x": white(1e-3), "accel_x": white(1e-3)}),
@@ -39,7 +43,7 @@ def errors() -> list[ErrorBudgetRow]:
         ("gyro", {"gyro_x": white(1e-6)}),
     ):
         names = {"sensor": sensor, "recording": "r"}
-        rows += error_rows(names, estimates, questions, draws=50, seed=1)
+        rows += list_error_rows(names, estimates, questions, draws=50, seed=1)
     return ErrorBudgetRow.rows_of(build("error_budget", rows))
 
 
@@ -47,7 +51,7 @@ def test_sensors_stand_in_their_order_with_what_decides() -> None:
     requirements = {"robot": Requirement.model_validate(ROBOT)}
     about = {sensor: {"price_class": None} for sensor, _ in SIMULATED}
     table = RankingRow.rows_of(build("ranking", ranking_rows(errors(), requirements, about)))
-    (shown,) = rankings(table, {"robot": ROBOT}, SIMULATED, "practical")
+    (shown,) = format_rankings(table, {"robot": ROBOT}, SIMULATED, "practical")
     assert [(g.rank, g.sensor, g.stated) for g in shown.groups] == [
         ("1", "good", "meets the limits"),
         ("2", "poor", "fails"),
@@ -67,13 +71,13 @@ def test_a_verdict_stands_beside_what_is_doubted_of_its_logs() -> None:
     table = RankingRow.rows_of(build("ranking", ranking_rows(errors(), requirements, about)))
     marks = (DoubtMark("r", "knocks", ("gyro_x",)),)
     doubted = [replace(row, doubts=marks if row.sensor != "good" else ()) for row in table]
-    (shown,) = rankings(doubted, {"robot": ROBOT}, SIMULATED, "practical")
+    (shown,) = format_rankings(doubted, {"robot": ROBOT}, SIMULATED, "practical")
     # Of the third nothing is known, and the reason says why.
     assert [group.doubts for group in shown.groups] == ["", "knocks in gyro x", ""]
 
 
 def test_a_budget_names_its_sources_and_what_is_missing() -> None:
-    tables = list(budget_tables(errors(), SIMULATED, "practical"))
+    tables = list(make_budget_tables(errors(), SIMULATED, "practical"))
     assert [(t["sensor"], t["simulated"]) for t in tables] == [
         ("poor", False), ("good", True), ("gyro", False),
     ]  # fmt: skip
@@ -103,7 +107,7 @@ def budget(**changes: Any) -> list[dict[str, Any]]:
 
 
 def shown(rows: list[dict[str, Any]], system: Any = "practical") -> dict[str, Any]:
-    (table,) = budget_tables(ErrorBudgetRow.rows_of(build("error_budget", rows)), {}, system)
+    (table,) = make_budget_tables(ErrorBudgetRow.rows_of(build("error_budget", rows)), {}, system)
     return table
 
 
@@ -161,11 +165,11 @@ def test_what_is_assumed_is_said_once_with_the_errors_that_it_is_about() -> None
 
 def test_what_requirements_ask_for_is_no_part_of_a_budget() -> None:
     rows = ErrorBudgetRow.rows_of(build("error_budget", budget(requirement="x")))
-    assert list(budget_tables(rows, {}, "si")) == []
+    assert list(make_budget_tables(rows, {}, "si")) == []
 
 
 def test_words_of_a_budget_tell_the_rest_before_and_the_latitude() -> None:
-    words = budget_words({"static_window": "60 s", "latitude": "45 deg"})
+    words = explain_budget({"static_window": "60 s", "latitude": "45 deg"})
     assert "over 60 s at rest right before" in words and "a latitude of 45 deg" in words
 
 
@@ -176,7 +180,7 @@ def ranked(**changes: Any) -> tuple[Group, LimitLine]:
            "limit_verdict": "meets", "source": "gyro N", "share": 0.75,
            "reached_after": 7200.0}  # fmt: skip
     rows = RankingRow.rows_of(build("ranking", [row | changes]))
-    (one,) = rankings(rows, {"robot": ROBOT}, {("s", "r"): True}, "practical")
+    (one,) = format_rankings(rows, {"robot": ROBOT}, {("s", "r"): True}, "practical")
     (group,) = one.groups
     (limit,) = group.limits
     return group, limit
@@ -214,12 +218,12 @@ def test_tied_sensors_stand_in_the_order_of_their_margins(margins: list[float]) 
          "limit_verdict": "meets", "limit": 1.0, "sigma": 1 / margin, "chance": 1.0}
         for margin in margins
     ]  # fmt: skip
-    (one,) = rankings([RankingRow(**row) for row in rows], {"robot": ROBOT}, {}, "si")
+    (one,) = format_rankings([RankingRow(**row) for row in rows], {"robot": ROBOT}, {}, "si")
     assert [group.sensor for group in one.groups] == ["s3", "s2", "s1"]
 
 
 def test_a_requirement_that_nothing_answers_has_no_groups() -> None:
-    (one,) = rankings([], {"robot": ROBOT}, {}, "si")
+    (one,) = format_rankings([], {"robot": ROBOT}, {}, "si")
     assert (one.name, one.groups) == ("robot", [])
 
 
@@ -235,5 +239,5 @@ def test_of_tied_sensors_one_without_conditions_is_named_first() -> None:
         for row in table
         if row.sensor != "gyro"
     ]
-    (shown,) = rankings(given, {"robot": ROBOT}, SIMULATED, "practical")
+    (shown,) = format_rankings(given, {"robot": ROBOT}, SIMULATED, "practical")
     assert [group.sensor for group in shown.groups] == ["poor", "good"]

@@ -9,7 +9,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from imubench_pipeline.extensions.aided.page import NAVIGATION, TUNINGS, answers, ranking
+from imubench_pipeline.extensions.aided.page import (
+    NAVIGATION,
+    TUNINGS,
+    describe_tunings,
+    rank_sensors,
+)
 from imubench_pipeline.extensions.aided.tables import NavigationRow
 from imubench_pipeline.model.verdicts import DoubtMark
 from imubench_pipeline.settings.config import Method
@@ -55,7 +60,7 @@ def rows(*changes: dict[str, Any]) -> list[NavigationRow]:
 
 
 def test_a_tuning_matters_where_it_surely_costs_a_tenth() -> None:
-    (answer,) = answers(
+    (answer,) = describe_tunings(
         rows(
             {"tuning": "true", "recommended": False},
             {"smallest": True},
@@ -72,7 +77,7 @@ def test_a_tuning_matters_where_it_surely_costs_a_tenth() -> None:
 
 
 def test_the_longest_outage_answers_and_a_filter_that_is_wrong_of_itself_is_named() -> None:
-    (answer,) = answers(
+    (answer,) = describe_tunings(
         rows(
             ratio(3.0, 2.5, 3.5),
             {"outage": 60.0, "consistent": False, **ratio(1.0, 0.98, 1.05)},
@@ -88,7 +93,7 @@ def test_sensors_are_ranked_by_the_recommended_tuning_and_overlaps_are_said() ->
     near = {"position": 2.1, "position_lower": 1.9, "position_upper": 2.3}
     better = {"position": 1.0, "position_lower": 0.9, "position_upper": 1.1}
     places = list(
-        ranking(
+        rank_sensors(
             rows(
                 {"sensor": "a", **far},
                 {"sensor": "b"},

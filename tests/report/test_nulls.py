@@ -19,10 +19,10 @@ from rich.console import Console
 from imubench_pipeline.extensions.nightly import state as nightly
 from imubench_pipeline.report import publish as publishing
 from imubench_pipeline.report import run_summary, terminal
-from imubench_pipeline.report.html import environment
-from imubench_pipeline.report.pages import pages
+from imubench_pipeline.report.html import make_templates
+from imubench_pipeline.report.pages import list_pages
 from imubench_pipeline.report.site import Page, Site
-from imubench_pipeline.tables import build, schema, write_arrow
+from imubench_pipeline.tables import build, make_schema, write_arrow
 from imubench_pipeline.tables.schemas import OF_ONE_RECORDING, TABLES
 from tests.report import (
     test_boards,
@@ -102,7 +102,7 @@ def without(tables: Tables, table: str, columns: list[str], row: int | None = No
         values = [None] * len(values) if row is None else values
         if row is not None:
             values[row] = None
-        field = schema(table).field(place)
+        field = make_schema(table).field(place)
         changed = changed.set_column(place, field, pa.array(values, field.type))
     return dict(tables) | {table: changed}
 
@@ -112,7 +112,7 @@ class Reports:
 
     def __init__(self, tables: Tables) -> None:
         self.tables = tables
-        self.before = {page.path: page for page in pages(self.site(tables))}
+        self.before = {page.path: page for page in list_pages(self.site(tables))}
         self.absent = {path: _absent(self.text(page)) for path, page in self.before.items()}
 
     @staticmethod
@@ -121,11 +121,11 @@ class Reports:
 
     def text(self, page: Page) -> str:
         made = self.site(self.tables)
-        return publishing._render(made, environment(made.system), page)
+        return publishing._render(made, make_templates(made.system), page)
 
     def check(self, tables: Tables) -> None:
         """Make what differs: every page comes, and shows nothing as Python writes it."""
-        made = {page.path: page for page in pages(self.site(tables))}
+        made = {page.path: page for page in list_pages(self.site(tables))}
         assert made.keys() == self.before.keys()
         for path, page in made.items():
             if page.key != self.before[path].key:
@@ -200,9 +200,9 @@ def test_the_terminal_and_the_summaries_come(table: str, whole: Tables, tmp_path
 def _terminal(tables: Tables, results: Path) -> str:
     asked = {"requirement": None, "channel": None, "method": None}
     console = Console(file=StringIO(), width=120)
-    for part in terminal.parts(tables, system="practical", width=120, **asked):
+    for part in terminal.render_comparison(tables, system="practical", width=120, **asked):
         console.print(part)
     found = nightly.load_tables(results)
-    nightly.state_of(found, datetime(2026, 1, 1, tzinfo=UTC), {}, {})
+    nightly.make_state(found, datetime(2026, 1, 1, tzinfo=UTC), {}, {})
     assert isinstance(console.file, StringIO)
-    return console.file.getvalue() + run_summary.summary(results)
+    return console.file.getvalue() + run_summary.summarise_run(results)

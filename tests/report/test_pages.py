@@ -13,7 +13,7 @@ import pytest
 from imubench_pipeline import report
 from imubench_pipeline.registry import installed_extensions
 from imubench_pipeline.report import publish as publishing
-from imubench_pipeline.report.pages import ENTRIES, pages
+from imubench_pipeline.report.pages import ENTRIES, list_pages
 from imubench_pipeline.report.publish import publish
 from imubench_pipeline.report.site import Entry, Site
 from imubench_pipeline.report.view import BY_RECORDING
@@ -67,7 +67,7 @@ def test_a_page_reads_no_table_that_it_does_not_declare(entry: Entry, whole: Sit
     assert page.context()
     undeclared = tables.read - {*entry.shown_tables, *of_recordings}
     assert not undeclared, "the page would not be written again when these change"
-    publishing.environment(noting.system).get_template(page.template)
+    publishing.make_templates(noting.system).get_template(page.template)
 
 
 def test_a_page_disappears_with_what_it_shows(tmp_path: Path) -> None:
@@ -92,4 +92,4 @@ def test_every_page_that_a_module_declares_is_in_the_report(whole: Site) -> None
     assert len({entry.file for entry in ENTRIES}) == len(ENTRIES)
     assert len({entry.title for entry in ENTRIES}) == len(ENTRIES)
     assert [file for file, _ in whole.navigation] == [entry.file for entry in ENTRIES]
-    assert {entry.file for entry in ENTRIES} <= {page.path for page in pages(whole)}
+    assert {entry.file for entry in ENTRIES} <= {page.path for page in list_pages(whole)}

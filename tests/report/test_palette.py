@@ -4,9 +4,9 @@ import pytest
 
 from imubench_pipeline.report.palette import (
     Appearance,
-    method_appearance,
-    recording_styles,
-    sensor_appearances,
+    assign_sensor_styles,
+    get_method_style,
+    make_recording_styles,
 )
 from imubench_pipeline.report.view import METHOD_NAMES
 
@@ -29,8 +29,8 @@ def contrast(one: str, other: str) -> float:
 
 
 def all_looks() -> list[Appearance]:
-    sensors = sensor_appearances([str(i) for i in range(8)])
-    return [*sensors.values(), *(method_appearance(name) for name in METHOD_NAMES)]
+    sensors = assign_sensor_styles([str(i) for i in range(8)])
+    return [*sensors.values(), *(get_method_style(name) for name in METHOD_NAMES)]
 
 
 @pytest.mark.parametrize("scheme", BACKGROUNDS)
@@ -40,7 +40,7 @@ def test_every_line_has_a_contrast_of_three_to_one(scheme: str) -> None:
 
 
 def test_no_two_of_many_sensors_look_alike_even_in_grey() -> None:
-    looks = sensor_appearances([f"s{i}" for i in range(280)])
+    looks = assign_sensor_styles([f"s{i}" for i in range(280)])
     assert list(looks) == [f"s{i}" for i in range(280)]
     assert len(set(looks.values())) == 280
     for eight in (range(8 * turn, 8 * turn + 8) for turn in range(35)):
@@ -48,7 +48,7 @@ def test_no_two_of_many_sensors_look_alike_even_in_grey() -> None:
 
 
 def test_sensors_of_one_colour_differ_in_marker_and_dash() -> None:
-    looks = list(sensor_appearances([str(i) for i in range(40)]).values())
+    looks = list(assign_sensor_styles([str(i) for i in range(40)]).values())
     for one, other in combinations(looks, 2):
         if one.light == other.light:
             assert one.dash != other.dash
@@ -56,8 +56,8 @@ def test_sensors_of_one_colour_differ_in_marker_and_dash() -> None:
 
 
 def test_no_two_recordings_of_a_sensor_look_alike_until_the_looks_repeat() -> None:
-    for own in sensor_appearances([str(i) for i in range(12)]).values():
-        looks = recording_styles(own)
+    for own in assign_sensor_styles([str(i) for i in range(12)]).values():
+        looks = make_recording_styles(own)
         assert len(looks) == len(set(looks)) >= 50
         assert looks[0] == own
         # Its colour, only darker by day and lighter by night.
@@ -67,19 +67,19 @@ def test_no_two_recordings_of_a_sensor_look_alike_until_the_looks_repeat() -> No
 
 
 def test_methods_differ_in_more_than_their_colour() -> None:
-    for one, other in combinations([method_appearance(name) for name in METHOD_NAMES], 2):
+    for one, other in combinations([get_method_style(name) for name in METHOD_NAMES], 2):
         assert one.light != other.light
         assert one.marker != other.marker
         assert one.dash != other.dash
 
 
 def test_markers_and_dashes_are_such_as_both_kinds_of_figures_know() -> None:
-    for look in [*all_looks(), *recording_styles(all_looks()[0])]:
+    for look in [*all_looks(), *make_recording_styles(all_looks()[0])]:
         assert look.marker in MARKERS
         assert look.dash in DASHES
         assert look.light != look.dark
 
 
 def test_a_sensor_keeps_its_look_when_later_ones_are_added() -> None:
-    few, more = sensor_appearances(["a", "b"]), sensor_appearances(["a", "b", "c"])
+    few, more = assign_sensor_styles(["a", "b"]), assign_sensor_styles(["a", "b", "c"])
     assert few == {name: more[name] for name in ("a", "b")}

@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from imubench_pipeline.report.pages import pages
+from imubench_pipeline.report.pages import list_pages
 from imubench_pipeline.report.publish import publish
 from imubench_pipeline.run.cli import main
 from imubench_pipeline.tables import build, write
@@ -83,7 +83,7 @@ def test_the_panel_says_where_a_method_gives_no_value(read: dict[str, Read]) -> 
 def test_a_run_without_a_paper_has_no_page(tmp_path: Path) -> None:
     made = site(joined(recording_rows("one", "day")))
     publish_some(made, tmp_path, ["theory.html"])
-    assert "papers.html" not in {page.path for page in pages(made)}
+    assert "papers.html" not in {page.path for page in list_pages(made)}
     assert "papers.html" not in (tmp_path / "theory.html").read_text(encoding="utf-8")
 
 

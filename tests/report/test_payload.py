@@ -11,16 +11,16 @@ from numpy.typing import NDArray
 
 from imubench_pipeline.estimators.estimate import Parameter
 from imubench_pipeline.model.estimates import EnvelopeRow, HistogramRow
-from imubench_pipeline.report.palette import sensor_appearances
+from imubench_pipeline.report.palette import assign_sensor_styles
 from imubench_pipeline.report.payload import (
     Arrays,
-    channel_payload,
-    compared,
-    datasheet_lines,
-    looks,
-    samples_payload,
+    pack_channel,
+    pack_compared_channel,
+    pack_datasheet_lines,
+    pack_samples,
+    pack_styles,
 )
-from imubench_pipeline.report.view import METHOD_NAMES, ChannelView, recording_views
+from imubench_pipeline.report.view import METHOD_NAMES, ChannelView, gather_recordings
 from tests.report.tables import (
     HOUR,
     MODEL,
@@ -134,14 +134,14 @@ def test_arrays_of_a_page_are_few_and_short() -> None:
 
 
 def channel(**given_: Any) -> ChannelView:
-    (view,) = recording_views(joined(recording_rows(**given_)))
+    (view,) = gather_recordings(joined(recording_rows(**given_)))
     return view.channels()[0]
 
 
 def test_a_channel_among_others_has_its_curve_and_the_curves_of_its_models() -> None:
     arrays = Arrays()
     view = channel(simulated=True)
-    found = compared(view).among(arrays)
+    found = pack_compared_channel(view).among(arrays)
     assert found["simulated"] is True
     adev = np.sqrt(MODEL.allan_variance(TAU))
     for name, factor in (("adev", 1.0), ("lower", 1 / 1.2), ("upper", 1.2)):
@@ -155,7 +155,7 @@ def test_a_channel_among_others_has_its_curve_and_the_curves_of_its_models() -> 
 
 
 def test_parameters_are_drawn_by_the_recommended_method_and_the_papers() -> None:
-    found = compared(channel(parameters=WITHOUT_K)).among(Arrays())
+    found = pack_compared_channel(channel(parameters=WITHOUT_K)).among(Arrays())
     assert set(found["parameters"]) == {"likelihood", "likelihood_gm"}
     ((*numbers, status),) = found["parameters"]["likelihood"]["B"]
     assert numbers == pytest.approx([10 * HOUR, 8 * HOUR, 13 * HOUR], rel=1e-4)
@@ -171,15 +171,15 @@ def test_all_components_of_a_parameter_are_drawn() -> None:
     rows["parameters"].append(first | {"component": 2, "value": 3 * HOUR})
     (time,) = (r for r in rows["parameters"] if r["recommended"] and r["parameter"] == "T_B")
     rows["parameters"].append(time | {"component": 2, "value": 5.0})
-    (view,) = recording_views(joined(rows))
-    found = compared(view.channels()[0]).among(Arrays())["parameters"]["likelihood"]
+    (view,) = gather_recordings(joined(rows))
+    found = pack_compared_channel(view.channels()[0]).among(Arrays())["parameters"]["likelihood"]
     assert [value for value, *_ in found["B"]] == pytest.approx([10 * HOUR, 3 * HOUR], rel=1e-4)
     assert [value for value, *_ in found["T_B"]] == [100.0, 5.0]
 
 
 def test_the_terms_of_a_channel_add_up_to_its_model() -> None:
     arrays = Arrays()
-    found = channel_payload(channel(found=[0.5]), arrays)
+    found = pack_channel(channel(found=[0.5]), arrays)
     names = [term["name"] for term in found["terms"]]
     assert names == ["white noise N", "Gauss-Markov B, T_B", "random walk K"]
     total = sum(decoded(arrays, term["adev"]) ** 2 for term in found["terms"])
@@ -196,7 +196,7 @@ def test_the_terms_of_a_channel_add_up_to_its_model() -> None:
 
 def test_the_band_of_the_reconstruction_is_that_of_the_recommended_method() -> None:
     arrays = Arrays()
-    found = channel_payload(channel(), arrays)["methods"]
+    found = pack_channel(channel(), arrays)["methods"]
     assert set(found) == {"likelihood"}
     adev = np.sqrt(MODEL.allan_variance(TAU))
     for name, factor in (("lower", 0.5), ("upper", 2.0), ("reconstructed", 1.0)):
@@ -207,14 +207,14 @@ def test_the_band_of_the_reconstruction_is_that_of_the_recommended_method() -> N
 def test_a_channel_without_spectrum_or_datasheet_is_drawn_all_the_same() -> None:
     rows = recording_rows(printed=False)
     del rows["spectrum"]
-    (view,) = recording_views(joined(rows))
-    found = channel_payload(view.channels()[0], Arrays())
+    (view,) = gather_recordings(joined(rows))
+    found = pack_channel(view.channels()[0], Arrays())
     assert found["spectrum"] is None
     assert found["datasheet"] == []
 
 
 def test_a_datasheet_is_drawn_in_the_convention_of_what_is_measured() -> None:
-    (line,) = datasheet_lines(channel())
+    (line,) = pack_datasheet_lines(channel())
     assert line["slope"] == -0.5
     assert line["value"] == pytest.approx(18 * HOUR)
     assert line["label"] == "noise density 0.005 deg/s/sqrt(Hz) (typ, read as two-sided)"
@@ -260,7 +260,7 @@ def test_samples_are_drawn_by_channel_with_holes_where_there_are_none() -> None:
         for i, count in enumerate([1, 10, 0, 1000])
     ]
     arrays = Arrays()
-    found = samples_payload(envelope, histogram, arrays)
+    found = pack_samples(envelope, histogram, arrays)
     assert set(found["envelope"]) == {"gyro_x", "temperature"}
     own = found["envelope"]["gyro_x"]
     assert (own["start"], own["end"]) == (0.0, 9.0)
@@ -270,11 +270,11 @@ def test_samples_are_drawn_by_channel_with_holes_where_there_are_none() -> None:
     assert decoded(arrays, bins["edges"]).tolist() == [0.0, 1.0, 2.0, 3.0, 4.0]
     counts = np.nan_to_num(decoded(arrays, bins["count"]))
     np.testing.assert_allclose(counts, [1.0, 10.0, 0.0, 1000.0], rtol=LOG_ERROR)
-    assert samples_payload([], [], arrays) == {"envelope": {}, "histogram": {}}
+    assert pack_samples([], [], arrays) == {"envelope": {}, "histogram": {}}
 
 
 def test_looks_name_every_method_as_the_pages_do() -> None:
-    found = looks(sensor_appearances(["a"]))
+    found = pack_styles(assign_sensor_styles(["a"]))
     assert {name: look["name"] for name, look in found["methods"].items()} == METHOD_NAMES
     assert set(found["sensors"]["a"]) == {"light", "dark", "dash", "marker"}
 
@@ -283,5 +283,5 @@ def test_a_page_can_hold_what_is_drawn_as_json() -> None:
     unknown = {"N": Parameter(None, "not_identified", lower=1e-5, upper=2e-5, fitted=1.4e-5)}
     arrays = Arrays()
     view = channel(parameters=unknown)
-    found = [compared(view).among(arrays), channel_payload(view, arrays), arrays.texts]
+    found = [pack_compared_channel(view).among(arrays), pack_channel(view, arrays), arrays.texts]
     assert json.loads(json.dumps(found, allow_nan=False)) == found

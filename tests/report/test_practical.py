@@ -8,11 +8,11 @@ from hypothesis import strategies as st
 
 from imubench_pipeline.model.comparisons import DatasheetRow
 from imubench_pipeline.report.practical import (
-    first_choices,
-    page_unit,
-    printed_text,
-    unit_of,
-    units_of_pages,
+    choose_first_units,
+    choose_page_unit,
+    choose_unit,
+    format_printed,
+    list_page_units,
 )
 from imubench_pipeline.words.numbers import (
     Unit,
@@ -143,13 +143,13 @@ def test_numbers_as_they_are_printed(value: float, digits: int, text: str) -> No
 def test_units_of_pages_are_worth_what_books_say(
     quantity: str, symbol: str, choice: int, sign: str, per_si: float
 ) -> None:
-    unit = list(units_of_pages()[quantity].values())[choice][symbol]
+    unit = list(list_page_units()[quantity].values())[choice][symbol]
     assert unit.sign == sign
     assert unit.per_si == pytest.approx(per_si, rel=2e-9)
 
 
 def test_every_choice_has_every_symbol_and_the_last_is_si() -> None:
-    for quantity, choices in units_of_pages().items():
+    for quantity, choices in list_page_units().items():
         for name, units in choices.items():
             assert set(units) == SYMBOLS, (quantity, name)
         last = list(choices.values())[-1]
@@ -159,10 +159,10 @@ def test_every_choice_has_every_symbol_and_the_last_is_si() -> None:
 
 @pytest.mark.parametrize(("system", "place"), [("practical", 0), ("si", -1)])
 def test_a_page_opens_in_the_units_of_the_settings(system: str, place: int) -> None:
-    for quantity, choices in units_of_pages().items():
-        assert first_choices(system)[quantity] == list(choices)[place]
+    for quantity, choices in list_page_units().items():
+        assert choose_first_units(system)[quantity] == list(choices)[place]
         for symbol, unit in list(choices.values())[place].items():
-            assert page_unit(quantity, symbol, system) == unit
+            assert choose_page_unit(quantity, symbol, system) == unit
 
 
 @pytest.mark.parametrize(
@@ -175,14 +175,14 @@ def test_a_page_opens_in_the_units_of_the_settings(system: str, place: int) -> N
     ],
 )
 def test_units_of_errors(dimension: str, system: str, sign: str, per_si: float) -> None:
-    unit = unit_of(dimension, system)
+    unit = choose_unit(dimension, system)
     assert unit.sign == sign
     assert unit.per_si == pytest.approx(per_si, rel=2e-9)
 
 
 def test_a_value_has_the_unit_of_engineers_and_none_is_a_dash() -> None:
     degree_an_hour = math.pi / 180 / 3600
-    unit = page_unit("gyro", "B", "practical")
+    unit = choose_page_unit("gyro", "B", "practical")
     assert unit.text(degree_an_hour) == "1"
     assert unit.text(12.3456 * degree_an_hour, 3) == "12.3"
     assert unit.text(None) == "–"
@@ -250,8 +250,8 @@ def test_what_is_not_there_is_a_dash() -> None:
     assert number_text(None) == number_text(float("nan")) == "–"
     assert duration_text(None) == percent_text(None) == "–"
     assert degrees_text(None) == "–"
-    assert printed_text(figure(printed=None, unit="deg/h")) == "–"
-    assert printed_text(figure(printed=4.0, unit=None)) == "4"
+    assert format_printed(figure(printed=None, unit="deg/h")) == "–"
+    assert format_printed(figure(printed=4.0, unit=None)) == "4"
 
 
 def figure(*, printed: float | None, unit: str | None) -> DatasheetRow:

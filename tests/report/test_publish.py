@@ -18,9 +18,9 @@ from imubench_pipeline.estimators.estimate import Parameter
 from imubench_pipeline.model.verdicts import DoubtMark
 from imubench_pipeline.report import publish as publishing
 from imubench_pipeline.report import theory
-from imubench_pipeline.report.folder import attempt_at_pages, failed_pages
-from imubench_pipeline.report.pages import ENTRIES, pages
-from imubench_pipeline.report.publish import one_file, publish, published
+from imubench_pipeline.report.folder import count_attempt, read_failed_pages
+from imubench_pipeline.report.pages import ENTRIES, list_pages
+from imubench_pipeline.report.publish import load_site, publish, render_one_file
 from imubench_pipeline.report.site import Site
 from imubench_pipeline.report.start import START
 from imubench_pipeline.tables import build
@@ -58,10 +58,10 @@ MADE = publishing._make_page
 def _quick() -> Iterator[None]:
     """What is large and the same in every report is made by the tests of the command alone."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(theory, "figure_text", lambda figure: THEORY_FIGURE)
-        patch.setattr(theory, "theory_figure", lambda system: None)
-        patch.setattr(publishing, "plotting_script", lambda: PLOTTING)
-        patch.setattr(publishing, "source_digest", lambda *modules: "code")
+        patch.setattr(theory, "encode_figure", lambda figure: THEORY_FIGURE)
+        patch.setattr(theory, "draw_theory_figure", lambda system: None)
+        patch.setattr(publishing, "read_plotting_script", lambda: PLOTTING)
+        patch.setattr(publishing, "digest_sources", lambda *modules: "code")
         yield
 
 
@@ -420,7 +420,7 @@ def test_reports_of_every_shape_are_sound(tmp_path: Path, shape: str, units: str
     read = sound(tmp_path)
     recordings = sum(len(rows.get("recordings", [])) for rows in SHAPES[shape])
     assert f"{recordings} recording" in " ".join(read["index.html"].text.split())
-    assert Read(one_file(made)).faults == []
+    assert Read(render_one_file(made)).faults == []
 
 
 def test_nothing_to_show_is_still_a_report(tmp_path: Path) -> None:
@@ -549,7 +549,7 @@ def test_names_of_any_kind_break_nothing(tmp_path: Path) -> None:
     (table,) = (one for one in read["recordings.html"].elements if "data-filters" in one.attributes)
     filters = json.loads(table.attributes["data-filters"] or "")
     assert filters["sensor"] == [f"{HOSTILE} {HOSTILE}"]
-    whole = Read(one_file(made))
+    whole = Read(render_one_file(made))
     assert whole.faults == []
     known = {one.tag for page in read.values() for one in page.elements} | {"template", "style"}
     assert {one.tag for one in whole.elements} <= known
@@ -913,7 +913,7 @@ def test_the_same_tables_give_the_same_bytes_in_any_folder(report: Report, tmp_p
 
 
 def test_a_finished_run_tells_its_site_itself(report: Report, tmp_path: Path) -> None:
-    again = published(report.results)
+    again = load_site(report.results)
     assert publish(again, report.folder) == []
     assert publish(again, tmp_path)[-1] == "index.html"
     assert files(tmp_path) == files(report.folder)
@@ -924,14 +924,16 @@ def test_a_finished_run_tells_its_site_itself(report: Report, tmp_path: Path) ->
 
 @pytest.fixture(scope="module")
 def whole(report: Report) -> Read:
-    return Read(one_file(report.site))
+    return Read(render_one_file(report.site))
 
 
 def test_one_file_holds_every_page(report: Report, whole: Read) -> None:
     assert whole.faults == []
     made = report.site
     templates = [one for one in whole.elements if one.tag == "template"]
-    assert [one.attributes["id"] for one in templates] == [f"page:{p.path}" for p in pages(made)]
+    assert [one.attributes["id"] for one in templates] == [
+        f"page:{p.path}" for p in list_pages(made)
+    ]
     folder = read_pages(report.folder)
     for one in templates:
         path = (one.attributes["id"] or "").removeprefix("page:")
@@ -944,7 +946,7 @@ def test_one_file_holds_every_page(report: Report, whole: Read) -> None:
 
 def test_one_file_needs_no_other_file(report: Report, whole: Read) -> None:
     made = report.site
-    paths = {page.path for page in pages(made)}
+    paths = {page.path for page in list_pages(made)}
     ids: dict[str, set[str]] = {}
     for one in whole.elements:
         ids.setdefault(one.page.removeprefix("page:"), set()).add(one.attributes.get("id") or "")
@@ -976,8 +978,12 @@ def test_one_file_has_pages_without_fault_each(whole: Read) -> None:
 def test_nothing_breaks_out_of_one_file() -> None:
     hostile = "</script></template><script>alert(1)</script><!-- <script>"
     finding = {"finding": "missing_samples", "detail": hostile, "channel": "gyro_x"}
-    page = Read(one_file(run(recording_rows(device=hostile, findings=[finding], started=hostile))))
-    calm = Read(one_file(run(recording_rows(device="x", findings=[finding | {"detail": ""}]))))
+    page = Read(
+        render_one_file(run(recording_rows(device=hostile, findings=[finding], started=hostile)))
+    )
+    calm = Read(
+        render_one_file(run(recording_rows(device="x", findings=[finding | {"detail": ""}])))
+    )
     tags, calm_tags = ([one.tag for one in p.elements] for p in (page, calm))
     assert page.naming(hostile, "tr")
     assert tags.count("template") == calm_tags.count("template")
@@ -993,7 +999,9 @@ def test_settings_are_kept_beside_the_pages(report: Report) -> None:
 
 def test_tables_without_rows_are_tables() -> None:
     assert run().views == []
-    assert list(pages(site({name: build(name, []) for name in TABLES})))[-1].path == "index.html"
+    assert (
+        list(list_pages(site({name: build(name, []) for name in TABLES})))[-1].path == "index.html"
+    )
 
 
 def test_a_page_that_fails_stops_no_other_page(
@@ -1002,25 +1010,25 @@ def test_a_page_that_fails_stops_no_other_page(
     def broken(site: Site) -> list[Any]:
         return [
             replace(page, context=lambda: {}["lost"]) if page.path == "fusion.html" else page
-            for page in pages(site)
+            for page in list_pages(site)
         ]
 
     tables = joined(recording_rows("one", "day1"))
-    monkeypatch.setattr(publishing, "pages", broken)
+    monkeypatch.setattr(publishing, "list_pages", broken)
     monkeypatch.setattr(publishing, "_make_page", MADE)
     for attempt in range(2):
-        assert attempt_at_pages(tmp_path) == attempt
+        assert count_attempt(tmp_path) == attempt
         made = site(tables)
         written = publish(made, tmp_path)
-        assert made.failed == failed_pages(tmp_path) == {"fusion.html": "KeyError: 'lost'"}
+        assert made.failed == read_failed_pages(tmp_path) == {"fusion.html": "KeyError: 'lost'"}
         assert ("recordings.html" in written) == (attempt == 0)
         assert "KeyError: &#39;lost&#39;" in (tmp_path / "fusion.html").read_text()
     assert "KeyError" in capsys.readouterr().err
-    assert "KeyError: &#39;lost&#39;" in one_file(site(tables))
-    monkeypatch.setattr(publishing, "pages", pages)
+    assert "KeyError: &#39;lost&#39;" in render_one_file(site(tables))
+    monkeypatch.setattr(publishing, "list_pages", list_pages)
     made = site(tables)
     assert publish(made, tmp_path) == ["fusion.html"]
-    assert (made.failed, failed_pages(tmp_path), attempt_at_pages(tmp_path)) == ({}, {}, 0)
+    assert (made.failed, read_failed_pages(tmp_path), count_attempt(tmp_path)) == ({}, {}, 0)
 
 
 def test_a_full_disk_is_no_fault_of_a_page(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

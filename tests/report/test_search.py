@@ -7,7 +7,7 @@ from urllib.parse import unquote
 import pytest
 
 from imubench_pipeline.report.publish import publish
-from imubench_pipeline.report.search import index
+from imubench_pipeline.report.search import make_search_index
 from tests.report.browser.made import publish_some
 from tests.report.pages import Read, read_pages
 from tests.report.tables import ROBOT, joined, recording_rows, rejected_rows, site
@@ -25,7 +25,7 @@ def test_everything_that_has_a_name_is_found_and_is_there(tmp_path: Path) -> Non
     rows = recording_rows("one", "day1", device="unit 7"), rejected_rows("two", "torn")
     made = site(joined(*rows, requirements=asked, papers=True), requirements=asked)
     publish(made, tmp_path)
-    found = json.loads(index(made))
+    found = json.loads(make_search_index(made))
     kinds = {kind for kind, *_ in found}
     assert kinds == {
         "sensor", "recording", "device", "requirement", "page", "term", "paper"

@@ -11,7 +11,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from imubench_pipeline.report.publish import publish
-from imubench_pipeline.report.shell import imubench, made_again
+from imubench_pipeline.report.shell import make_command, make_recompute_command
 from imubench_pipeline.run.cli import main
 from tests.report.tables import joined, put_log, put_samples, recording_rows, site
 
@@ -52,10 +52,12 @@ def test_each_word_arrives_as_it_is(
 ) -> None:
     stated = [f"logs={name}" for name in given_to]
     config = ["--config", *stated] if stated else []
-    assert words_of(made_again(results, stated), stubs) == (
+    assert words_of(make_recompute_command(results, stated), stubs) == (
         ["snakemake", "-c2", *config, "--forcerun", "ingest", "--", results]
     )
-    name, place, *option = words_of(imubench("figures", results, {"--sensor": sensor}), stubs)[1:]
+    name, place, *option = words_of(make_command("figures", results, {"--sensor": sensor}), stubs)[
+        1:
+    ]
     assert (name, os.path.normpath(place)) == ("figures", os.path.normpath(results))
     assert not place.startswith("-")
     assert option in (["--sensor", sensor], [f"--sensor={sensor}"])
@@ -65,7 +67,7 @@ def test_names_that_begin_with_a_dash_are_no_options(
     stubs: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     options = {"--sensor": "-s", "--recording": "--help"}
-    words = words_of(imubench("figures", "--help", options), stubs)
+    words = words_of(make_command("figures", "--help", options), stubs)
     assert main(words[1:]) == 2
     assert "--help" in capsys.readouterr().err  # the folder that is not there, and no usage
 

@@ -7,9 +7,9 @@ from hypothesis import strategies as st
 
 from imubench_pipeline.estimators.estimate import Parameter
 from imubench_pipeline.model.comparisons import DriftRow
-from imubench_pipeline.report.sensor import change_words
-from imubench_pipeline.report.site import Page, Site, sensor_names
-from imubench_pipeline.report.start import START, summary
+from imubench_pipeline.report.sensor import describe_change
+from imubench_pipeline.report.site import Page, Site, name_sensors
+from imubench_pipeline.report.start import START, summarise_recordings
 from tests.report.tables import (
     KNOWN,
     MODEL,
@@ -158,9 +158,9 @@ def test_a_change_is_told_in_words() -> None:
         change=-0.256,
         p_value=0.00012,
     )
-    assert change_words(row, simulated=False) == ("r, gyro x: N changed by −26 % (p = 0.0001).")
+    assert describe_change(row, simulated=False) == ("r, gyro x: N changed by −26 % (p = 0.0001).")
     bias = replace(row, parameter="bias", change=None, p_value=0.002)
-    assert change_words(bias, simulated=True) == (
+    assert describe_change(bias, simulated=True) == (
         "r (simulated), gyro x: fixed bias changed (p = 0.002)."
     )
 
@@ -199,15 +199,15 @@ def test_a_summary_says_how_many_recordings_how_long_and_of_when() -> None:
         recording_rows("a", "q", started="2023-12-31T10:00:00Z", simulated=True),
         rejected_rows("b", "r"),
     ).views
-    assert summary(views) == (
+    assert summarise_recordings(views) == (
         "3 recordings of 2 sensors, 4 h of data, recorded from 2023-12-31 to 2024-02-03: "
         "2 analysed, 1 rejected. 1 of them is simulated, not measured."
     )
-    assert summary(views[1:2], several=False) == (
+    assert summarise_recordings(views[1:2], several=False) == (
         "1 recording, 2 h of data, recorded on 2023-12-31: 1 analysed, 0 rejected. "
         "All are simulated, not measured."
     )
-    assert summary([]) == "0 recordings of 0 sensors: 0 analysed, 0 rejected."
+    assert summarise_recordings([]) == "0 recordings of 0 sensors: 0 analysed, 0 rejected."
 
 
 def test_the_command_that_makes_results_again_has_what_the_run_was_given() -> None:
@@ -225,5 +225,5 @@ def test_sensors_of_one_vendor_and_model_are_told_apart() -> None:
         name: {"vendor": "V", "model": model}
         for name, model in (("a", "1"), ("b", "1"), ("c", "2"))
     }
-    names = sensor_names("abcd", described)
+    names = name_sensors("abcd", described)
     assert names == {"a": "V 1 (a)", "b": "V 1 (b)", "c": "V 2", "d": "d"}

@@ -9,7 +9,7 @@ from markupsafe import Markup, escape
 from imubench_pipeline.model.comparisons import RankingRow
 from imubench_pipeline.model.verdicts import Condition, DoubtMark, UnitFactor
 from imubench_pipeline.report import start
-from imubench_pipeline.report.meaning import rankings
+from imubench_pipeline.report.meaning import format_rankings
 from imubench_pipeline.tables import build
 from tests.report.tables import ROBOT
 
@@ -34,7 +34,7 @@ def said(*rows: dict[str, Any], simulated: bool = False) -> tuple[str, list[str]
     """Return the answer, and the lines below it."""
     table = RankingRow.rows_of(build("ranking", rows))
     of = {(one.sensor, "r"): simulated for one in table}
-    (ranking,) = rankings(table, {"robot": ROBOT}, of, "practical")
+    (ranking,) = format_rankings(table, {"robot": ROBOT}, of, "practical")
     views = [
         SimpleNamespace(sensor=one.sensor, static=True, name="r",
                         row=SimpleNamespace(duration=7200.0), recommended=lambda: ["gyro_x"])

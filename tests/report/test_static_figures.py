@@ -15,25 +15,29 @@ from matplotlib.lines import Line2D
 from matplotlib.text import Text
 
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
-from imubench_pipeline.estimators.rows import parameter_rows
+from imubench_pipeline.estimators.rows import make_parameter_rows
 from imubench_pipeline.noise import FLOOR, PEAK_TAU, NoiseModel
-from imubench_pipeline.report.practical import page_unit
+from imubench_pipeline.report.practical import choose_page_unit
 from imubench_pipeline.report.static_figures.command import add_arguments, run
 from imubench_pipeline.report.static_figures.comparison import (
-    comparison_figure,
-    forest_figure,
-    marks,
+    draw_comparison_figure,
+    draw_forest_figure,
+    make_marks,
 )
 from imubench_pipeline.report.static_figures.curves import (
-    allan_figure,
-    datasheet_figure,
-    methods_figure,
-    terms_figure,
+    draw_allan_figure,
+    draw_datasheet_figure,
+    draw_methods_figure,
+    draw_terms_figure,
 )
-from imubench_pipeline.report.static_figures.files import channel_figures, cross_figures, save
-from imubench_pipeline.report.static_figures.spectrum import spectrum_figure
-from imubench_pipeline.report.static_figures.theory import CHARACTERISTIC, theory_figure
-from imubench_pipeline.report.view import ChannelView, recording_views
+from imubench_pipeline.report.static_figures.files import (
+    list_channel_figures,
+    list_cross_figures,
+    save,
+)
+from imubench_pipeline.report.static_figures.spectrum import draw_spectrum_figure
+from imubench_pipeline.report.static_figures.theory import CHARACTERISTIC, draw_theory_figure
+from imubench_pipeline.report.view import ChannelView, gather_recordings
 from imubench_pipeline.tables import write
 from imubench_pipeline.tables.keys import Key
 from imubench_pipeline.tables.schemas import TABLES
@@ -51,7 +55,7 @@ KNOWN = {
     "T_B": Parameter(MODEL.T_B, lower=80.0, upper=130.0),
     "K": Parameter(MODEL.K, lower=0.5 * MODEL.K, upper=2.0 * MODEL.K),
 }
-TO_PAGE = page_unit("gyro", "adev", "practical").per_si
+TO_PAGE = choose_page_unit("gyro", "adev", "practical").per_si
 
 Rows = dict[str, list[dict[str, Any]]]
 
@@ -89,7 +93,7 @@ def rows_of(
             for t, a in zip(TAU, adev, strict=True)
         ],
         "parameters": list(
-            parameter_rows(Key(sensor, recording, channel), estimate, recommended=True)
+            make_parameter_rows(Key(sensor, recording, channel), estimate, recommended=True)
         ),
         "reconstruction": [
             method | {"tau": t, "adev": a, "lower": a / 2, "upper": a * 2, "reconstructed": a}
@@ -117,7 +121,7 @@ def rows_of(
 
 
 def views_of(*several: Rows) -> list[ChannelView]:
-    return [view for one in recording_views(tables_of(*several)) for view in one.channels()]
+    return [view for one in gather_recordings(tables_of(*several)) for view in one.channels()]
 
 
 def view_of(**values: Any) -> ChannelView:
@@ -167,19 +171,19 @@ def legend_is_clear(figure: Figure) -> bool:
 
 @pytest.mark.release
 def test_the_curve_alone_has_its_units_and_says_what_it_is(tmp_path: Path) -> None:
-    figure = allan_figure(usual())
+    figure = draw_allan_figure(usual())
     found = texts(figure, tmp_path)
     assert {"averaging time τ (s)", "Allan deviation (°/h)", "measured", "95 % limits"} <= {*found}
     assert "imu / day1: gyroscope, x axis" in found
     drawn = line(figure.axes[0], "measured")
     np.testing.assert_allclose(drawn.get_ydata(), np.sqrt(MODEL.allan_variance(TAU)) * TO_PAGE)
-    assert "Allan deviation (rad/s)" in written(allan_figure(usual(), "si"))
-    assert "Allan deviation (µg)" in written(allan_figure(view_of(channel="accel_z")))
+    assert "Allan deviation (rad/s)" in written(draw_allan_figure(usual(), "si"))
+    assert "Allan deviation (µg)" in written(draw_allan_figure(view_of(channel="accel_z")))
 
 
 @pytest.mark.release
 def test_terms_pass_through_the_points_where_they_are_read() -> None:
-    figure = made(terms_figure(usual()))
+    figure = made(draw_terms_figure(usual()))
     (axes,) = figure.axes
     white, walk = line(axes, "angle random walk"), line(axes, "rate random walk")
     assert value_at(white, 1.0) == pytest.approx(20.0, rel=1e-4)
@@ -208,10 +212,12 @@ def test_a_term_that_the_log_does_not_tell_is_called_so() -> None:
         )
     }
     view = view_of(parameters=unsure)
-    assert "rate random walk, K = 6 °/h/√h (not determined)" in written(made(terms_figure(view)))
-    (mark,) = marks(view, "K", 0.0)
+    assert "rate random walk, K = 6 °/h/√h (not determined)" in written(
+        made(draw_terms_figure(view))
+    )
+    (mark,) = make_marks(view, "K", 0.0)
     assert (mark.kind, mark.value, mark.lower) == ("not identified", MODEL.K, MODEL.K / 9)
-    figure = forest_figure([view], ["imu"], "K")
+    figure = draw_forest_figure([view], ["imu"], "K")
     (dot,) = [each for each in figure.axes[0].lines if each.get_marker() == "o"]
     assert dot.get_markerfacecolor() == "white"
     assert "not determined: fitted value, 95 % limits" in written(figure)
@@ -220,18 +226,20 @@ def test_a_term_that_the_log_does_not_tell_is_called_so() -> None:
 @pytest.mark.release
 def test_a_channel_without_k() -> None:
     view = view_of(parameters=KNOWN | {"K": Parameter(None, "absent", upper=0.3 * HOUR)})
-    (axes,) = made(terms_figure(view)).axes
+    (axes,) = made(draw_terms_figure(view)).axes
     assert not [each for each in axes.lines if "random walk, $K$" in str(each.get_label())]
-    assert [(mark.kind, mark.value) for mark in marks(view, "K", 0.0)] == [("limit", 0.3 * HOUR)]
-    assert "upper 95 % limit" in written(forest_figure([view], ["imu"], "K"))
+    assert [(mark.kind, mark.value) for mark in make_marks(view, "K", 0.0)] == [
+        ("limit", 0.3 * HOUR)
+    ]
+    assert "upper 95 % limit" in written(draw_forest_figure([view], ["imu"], "K"))
     nothing = view_of(parameters=KNOWN | {"K": Parameter(None, "absent")})
-    found = written(forest_figure([nothing], ["imu"], "K"))
+    found = written(draw_forest_figure([nothing], ["imu"], "K"))
     assert "not in the model" in found and "no recording has a value" in found
 
 
 @pytest.mark.release
 def test_models_of_the_methods_are_drawn_over_the_curve() -> None:
-    figure = made(methods_figure(usual()))
+    figure = made(draw_methods_figure(usual()))
     above, ratio = figure.axes
     np.testing.assert_allclose(
         line(above, "likelihood").get_ydata(), np.sqrt(MODEL.allan_variance(TAU)) * TO_PAGE
@@ -240,12 +248,12 @@ def test_models_of_the_methods_are_drawn_over_the_curve() -> None:
     names = {"likelihood (recommended)", "reconstruction", "95 % of reconstructions"}
     assert names <= {*written(figure)}
     without = view_of(parameters={"N": Parameter(None, "not_shown")})
-    assert methods_figure(without) is None and terms_figure(without) is None
+    assert draw_methods_figure(without) is None and draw_terms_figure(without) is None
 
 
 @pytest.mark.release
 def test_lines_of_the_datasheet() -> None:
-    figure = made(datasheet_figure(usual()))
+    figure = made(draw_datasheet_figure(usual()))
     (axes,) = figure.axes
     lines = [each for each in axes.lines if str(each.get_label()).startswith("datasheet $N$")]
     assert [value_at(each, 1.0) for each in lines] == pytest.approx([10.0, 14.0])
@@ -253,14 +261,14 @@ def test_lines_of_the_datasheet() -> None:
     np.testing.assert_allclose(line(axes, "datasheet bias").get_ydata(), 8.0)
     assert "datasheet N: 0.005 °/s/√Hz (read as two-sided)" in written(figure)
     assert "datasheet bias instability: 8 °/h (max)" in written(figure)
-    assert datasheet_figure(view_of(printed=False)) is None
+    assert draw_datasheet_figure(view_of(printed=False)) is None
 
 
 @pytest.mark.release
 def test_the_terms_of_the_spectrum_make_the_fit(tmp_path: Path) -> None:
-    figure = made(spectrum_figure(view_of(found=[2.0, 2.1, 30.0])))
+    figure = made(draw_spectrum_figure(view_of(found=[2.0, 2.1, 30.0])))
     (axes,) = figure.axes
-    unit = page_unit("gyro", "psd", "practical")
+    unit = choose_page_unit("gyro", "psd", "practical")
     terms = [line(axes, name) for name in ("angle random", "bias instability", "rate random")]
     total = np.sqrt(sum(np.asarray(term.get_ydata()) ** 2 for term in terms))
     fit = line(axes, "fit by likelihood: N+GM+K")
@@ -275,7 +283,7 @@ def test_the_terms_of_the_spectrum_make_the_fit(tmp_path: Path) -> None:
     assert [text for text in shown if text.endswith(" Hz")] == ["2 Hz", "30 Hz"]
     bare = view_of()
     bare.spectrum = {}
-    assert spectrum_figure(bare) is None
+    assert draw_spectrum_figure(bare) is None
 
 
 @pytest.mark.parametrize("step", few([4], [1]))
@@ -286,7 +294,7 @@ def test_a_simulated_log_is_called_so_in_every_figure(step: int) -> None:
         truth | {"component": 1, "value": MODEL.N, "unit": "x", "assumed": True, "source": "x"}
     ]
     views = views_of(rows)
-    makers = [make for _, make in (*cross_figures(views), *channel_figures(views[0]))]
+    makers = [make for _, make in (*list_cross_figures(views), *list_channel_figures(views[0]))]
     assert len(makers) == 7
     figures = [make() for make in makers[::step]]  # the first kind of each
     every = []
@@ -305,15 +313,15 @@ def test_recordings_of_a_sensor_share_one_entry(recordings: int, tmp_path: Path)
         *(rows_of(recording=f"r{n}", level=1 + 0.01 * n) for n in range(recordings)),
         rows_of(sensor="other", level=3.0),
     )
-    figure = comparison_figure(views, ["imu", "other"])
+    figure = draw_comparison_figure(views, ["imu", "other"])
     found = texts(figure, tmp_path)
     assert found.count("imu" if recordings == 1 else f"imu ({recordings} recordings)") == 1
     assert "other" in found and legend_is_clear(figure)
-    forest = forest_figure(views, ["imu", "other"], "N")
+    forest = draw_forest_figure(views, ["imu", "other"], "N")
     assert ("imu" if recordings == 1 else f"imu (n = {recordings})") in written(forest)
     assert legend_is_clear(forest) and forest.get_figheight() * 25.4 < 235.0
     (dots,) = [each for each in forest.axes[0].lines if len(each.get_ydata()) == recordings][:1]
-    np.testing.assert_allclose(dots.get_xdata(), MODEL.N * page_unit(
+    np.testing.assert_allclose(dots.get_xdata(), MODEL.N * choose_page_unit(
         "gyro", "N", "practical").per_si)  # fmt: skip
 
 
@@ -321,7 +329,7 @@ def test_recordings_of_a_sensor_share_one_entry(recordings: int, tmp_path: Path)
 def test_the_recording_that_stands_for_many_is_the_middle_one() -> None:
     levels = (1.0, 9.0, 3.0, 2.0, 4.0)
     views = views_of(*(rows_of(recording=f"r{n}", level=one) for n, one in enumerate(levels)))
-    (axes,) = comparison_figure(views, ["imu"]).axes
+    (axes,) = draw_comparison_figure(views, ["imu"]).axes
     (marked,) = [each for each in axes.lines if each.get_marker() == "o"]
     np.testing.assert_allclose(marked.get_ydata(), views[2].adev * TO_PAGE)
 
@@ -331,13 +339,13 @@ def test_the_recording_that_stands_for_many_is_the_middle_one() -> None:
 def test_many_sensors_have_room_below_the_curves(sensors: int) -> None:
     names = [f"a_sensor_with_quite_a_long_name_{n}" for n in range(sensors)]
     views = views_of(*(rows_of(sensor=name, level=1 + n) for n, name in enumerate(names)))
-    figure = comparison_figure(views, names)
+    figure = draw_comparison_figure(views, names)
     assert legend_is_clear(figure)
     looks = {
         (each.get_color(), each.get_linestyle(), each.get_marker()) for each in figure.axes[0].lines
     }
     assert len(looks) == sensors
-    forest = forest_figure(views, names, "N")
+    forest = draw_forest_figure(views, names, "N")
     assert len(forest.axes[0].get_yticklabels()) == sensors
     assert all(text.get_window_extent().x0 >= 0 for text in forest.axes[0].get_yticklabels())
 
@@ -346,16 +354,16 @@ def test_many_sensors_have_room_below_the_curves(sensors: int) -> None:
 def test_names_of_the_user_are_no_formulas_and_never_too_wide(tmp_path: Path) -> None:
     long = "x" * 150
     views = views_of(rows_of(sensor="a$b$"), rows_of(sensor=long, recording="_$"))
-    found = texts(comparison_figure(views, ["a$b$", long]), tmp_path)
+    found = texts(draw_comparison_figure(views, ["a$b$", long]), tmp_path)
     assert "a$b$" in found and any("xx…xx" in text for text in found)
-    figure = allan_figure(views[1])
+    figure = draw_allan_figure(views[1])
     assert any(text.endswith(": gyroscope, x axis") for text in written(figure))
     assert figure.texts[0].get_window_extent().x1 <= figure.bbox.x1
 
 
 @pytest.mark.release
 def test_the_characteristic_curve_is_computed(tmp_path: Path) -> None:
-    figure = theory_figure()
+    figure = draw_theory_figure()
     (axes,) = figure.axes
     total = line(axes, "Allan deviation")
     for tau in (0.01, 100.0, 1e5):
@@ -375,15 +383,15 @@ def test_the_same_data_make_the_same_bytes(tmp_path: Path) -> None:
     kinds = ("svg", "pdf")
     before = {key: mpl.rcParams[key] for key in ("font.size", "svg.fonttype", "axes.grid")}
     for kind in kinds:
-        save(forest_figure([usual()], ["imu"], "B"), tmp_path / f"first.{kind}")
+        save(draw_forest_figure([usual()], ["imu"], "B"), tmp_path / f"first.{kind}")
         with mpl.rc_context({"font.size": 20.0, "axes.facecolor": "red"}):
-            save(forest_figure([usual()], ["imu"], "B"), tmp_path / f"second.{kind}")
+            save(draw_forest_figure([usual()], ["imu"], "B"), tmp_path / f"second.{kind}")
         first, second = ((tmp_path / f"{n}.{kind}").read_bytes() for n in ("first", "second"))
         assert first == second
     assert first.startswith(b"%PDF") and b"CreationDate" not in first
     assert before == {key: mpl.rcParams[key] for key in before}
     with pytest.raises(ValueError, match="xyz"):
-        save(theory_figure(), tmp_path / "bad.xyz")
+        save(draw_theory_figure(), tmp_path / "bad.xyz")
     assert sorted(path.suffix[1:] for path in tmp_path.iterdir()) == sorted([*kinds, *kinds])
 
 

@@ -4,8 +4,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from imubench_pipeline.report.thermal import answer, figures
-from imubench_pipeline.report.view import ChannelView, recording_views
+from imubench_pipeline.report.thermal import describe_thermal, list_thermal_figures
+from imubench_pipeline.report.view import ChannelView, gather_recordings
 from tests.report.tables import DEGREE, HOUR, MODEL, Rows, joined, recording_rows
 
 CONFUSED = "the temperature is too close to a ramp"
@@ -13,7 +13,7 @@ NAMES = {"sensor": "imu", "recording": "day1", "channel": "gyro_x"}
 
 
 def channel(rows: Rows) -> ChannelView:
-    (view,) = recording_views(joined(rows))
+    (view,) = gather_recordings(joined(rows))
     (found,) = view.channels()
     return found
 
@@ -33,7 +33,7 @@ def warm(
 
 
 def lines(view: ChannelView) -> dict[str, dict[str, Any]]:
-    found = list(figures(view))
+    found = list(list_thermal_figures(view))
     named = {line["term"]: line for line in found}
     assert len(named) == len(found)
     return named
@@ -43,7 +43,7 @@ def lines(view: ChannelView) -> dict[str, dict[str, Any]]:
 
 
 def test_a_temperature_that_is_followed_is_said_with_what_is_left() -> None:
-    said = answer(warm(), "practical")
+    said = describe_thermal(warm(), "practical")
     assert said == [
         "The bias changes with temperature by 90 °/h/K. Compensated, the Allan deviation is lower "
         "by a factor of 2 at τ = 100 s, 2 at τ = 300 s, 2 at τ = 1000 s.",
@@ -52,12 +52,12 @@ def test_a_temperature_that_is_followed_is_said_with_what_is_left() -> None:
         "The mean temperature T₀ is 22.5 °C.",
         "The sensor's own low-pass has its cut-off at 64 Hz (first order).",
     ]
-    assert answer(warm(), "si")[0].startswith(
+    assert describe_thermal(warm(), "si")[0].startswith(
         "The bias changes with temperature by 0.000436 rad/s/K."
     )
     accel = warm(channels=("accel_x",))
     # The same number in m/s^2/K.
-    assert answer(accel, "practical")[0].startswith(
+    assert describe_thermal(accel, "practical")[0].startswith(
         "The bias changes with temperature by 44.5 µg/K."
     )
 
@@ -66,11 +66,11 @@ def test_only_where_the_curve_is_lower_it_is_said_so() -> None:
     rows = recording_rows(temperature="followed")
     for row, measured in zip(rows["allan_compensated"], rows["allan"], strict=True):
         row["adev"] = measured["adev"] / (3.0 if row["tau"] > 500 else 1.001)
-    said = answer(channel(rows), "practical")[0]
+    said = describe_thermal(channel(rows), "practical")[0]
     assert said.endswith("the Allan deviation is lower by a factor of 3 at τ = 1000 s.")
     for row, measured in zip(rows["allan_compensated"], rows["allan"], strict=True):
         row["adev"] = 1.02 * measured["adev"]
-    said = answer(channel(rows), "practical")[0]
+    said = describe_thermal(channel(rows), "practical")[0]
     assert said == "The bias changes with temperature by 90 °/h/K."
 
 
@@ -78,7 +78,7 @@ def test_the_times_that_are_told_are_those_of_the_curve() -> None:
     rows = recording_rows(temperature="followed")
     rows["allan_compensated"] = [row for row in rows["allan_compensated"] if row["tau"] < 400]
     longest = max(row["tau"] for row in rows["allan_compensated"])
-    said = answer(channel(rows), "practical")[0]
+    said = describe_thermal(channel(rows), "practical")[0]
     assert ("300 s" in said) == (longest >= 300)
     assert "100 s" in said and "1000 s" not in said
 
@@ -101,12 +101,12 @@ def test_a_fall_is_read_at_equal_times() -> None:
         }
         for t, a in zip(tau, adev, strict=True)
     ]
-    said = answer(channel(rows), "practical")[0]
+    said = describe_thermal(channel(rows), "practical")[0]
     assert said.endswith("lower by a factor of 4 at τ = 100 s, 4 at τ = 300 s.")
 
 
 def test_a_temperature_that_is_not_taken_out_says_why() -> None:
-    said = answer(warm(CONFUSED), "practical")
+    said = describe_thermal(warm(CONFUSED), "practical")
     assert said[:2] == [
         f"The temperature effect is not removed: {CONFUSED}.",
         "The mean temperature T₀ is 22.5 °C.",
@@ -114,11 +114,11 @@ def test_a_temperature_that_is_not_taken_out_says_why() -> None:
 
 
 def test_a_log_without_temperature_says_nothing_of_it() -> None:
-    assert answer(warm(None), "practical") == []
-    assert list(figures(warm(None))) == []
+    assert describe_thermal(warm(None), "practical") == []
+    assert list(list_thermal_figures(warm(None))) == []
     rows = recording_rows(temperature="followed")
     rows["temperature"] = rows["allan_compensated"] = []
-    assert answer(channel(rows), "practical") == [
+    assert describe_thermal(channel(rows), "practical") == [
         "The sensor's own low-pass has its cut-off at 64 Hz (first order)."
     ]
     assert set(lines(channel(rows))) == {"cutoff", "N_sensor"}
@@ -129,7 +129,7 @@ def low_pass(**changes: Any) -> dict[tuple[str, str], dict[str, Any]]:
 
 
 def test_the_order_of_a_butterworth_filter_is_said() -> None:
-    said = answer(warm(changes=low_pass(order=3)), "practical")
+    said = describe_thermal(warm(changes=low_pass(order=3)), "practical")
     assert said[-1].endswith("has its cut-off at 64 Hz (Butterworth, order 3).")
 
 
@@ -137,7 +137,9 @@ def test_no_low_pass_is_said_and_has_no_line() -> None:
     none = {("low_pass", "cutoff"): {"value": None, "lower": None, "upper": None, "order": None,
                                      "status": "absent", "reason": "it shows none"}}  # fmt: skip
     view = warm(changes=none)
-    assert answer(view, "practical")[-1] == "The spectrum shows no low-pass of the sensor."
+    assert (
+        describe_thermal(view, "practical")[-1] == "The spectrum shows no low-pass of the sensor."
+    )
     assert "cutoff" not in lines(view)
 
 
@@ -146,7 +148,7 @@ def test_a_cutoff_that_is_not_known_has_its_limits_and_why() -> None:
     unknown = {("low_pass", "cutoff"): {"value": None, "lower": 50.0, "upper": 90.0,
                                         "status": "not_identified", "reason": reason}}  # fmt: skip
     view = warm(changes=unknown)
-    assert "low-pass" not in " ".join(answer(view, "practical"))
+    assert "low-pass" not in " ".join(describe_thermal(view, "practical"))
     line = lines(view)["cutoff"]
     assert (line["value"], line["lower"], line["upper"]) == (None, 50.0, 90.0)
     assert (line["status"], line["why"]) == ("not_identified", reason[0].upper() + reason[1:] + ".")

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from imubench_pipeline.model.comparisons import ErrorBudgetRow
-from imubench_pipeline.report.view import ChannelView, RecordingView, recording_views
+from imubench_pipeline.report.view import ChannelView, RecordingView, gather_recordings
 from imubench_pipeline.tables import build, read, write_arrow
 from imubench_pipeline.tables.schemas import ROWS, TABLES
 from tests.conftest import few
@@ -57,7 +57,7 @@ def by_name(views: list[RecordingView]) -> dict[tuple[str, str], RecordingView]:
 @settings(max_examples=4)
 @given(st.integers(0, 2**32))
 def test_rows_go_to_their_recording_and_channel_whatever_their_order(seed: int) -> None:
-    views = recording_views(shuffled(RUN, seed))
+    views = gather_recordings(shuffled(RUN, seed))
     names = [(view.sensor, view.name) for view in views]
     assert names == [("a", "r"), ("b", "r"), ("b", "bad"), ("b", "q")]
     for view in views:
@@ -93,7 +93,7 @@ def test_rows_go_to_their_recording_and_channel_whatever_their_order(seed: int) 
 
 
 def test_a_channel_knows_what_it_is() -> None:
-    gyro, accel = recording_views(RUN)[3].channels()
+    gyro, accel = gather_recordings(RUN)[3].channels()
     assert (gyro.quantity, gyro.axis, gyro.title) == ("gyro", "x", "Gyroscope x")
     assert (accel.quantity, accel.axis, accel.title) == ("accel", "z", "Accelerometer z")
     assert gyro.label == "b / q (simulated)"
@@ -109,7 +109,7 @@ def test_findings_of_a_channel_are_its_own_and_those_of_the_whole_recording() ->
         {"finding": "lines", "channel": "gyro_x", "severity": "note"},
         {"finding": "motion", "channel": "accel_z"},
     ]
-    (view,) = recording_views(joined(recording_rows(channels=CHANNELS, findings=findings)))
+    (view,) = gather_recordings(joined(recording_rows(channels=CHANNELS, findings=findings)))
     channels = {channel.channel: channel for channel in view.channels()}
     assert channels["gyro_x"].warnings == ["missing_samples", "step"]
     assert [row["finding"] for row in channels["gyro_x"].findings] == [
@@ -123,7 +123,7 @@ def test_findings_of_a_channel_are_its_own_and_those_of_the_whole_recording() ->
 
 
 def test_a_rejected_recording_has_its_reason_and_nothing_else() -> None:
-    view = recording_views(RUN)[2]
+    view = gather_recordings(RUN)[2]
     assert view.rejected
     assert view.row["reason"] == "line 3: found 'x'"
     assert view.channels() == []
@@ -138,13 +138,13 @@ def test_errors_of_requirements_are_not_part_of_the_budget_of_a_recording() -> N
         "static_window": "10 s",
         "limits": [{"error": "heading", "after": "100 s", "at_most": "1 deg"}],
     }
-    (view,) = recording_views(joined(recording_rows(requirements={"robot": robot})))
+    (view,) = gather_recordings(joined(recording_rows(requirements={"robot": robot})))
     assert {row.requirement for row in view.rows(ErrorBudgetRow)} == {None, "robot"}
     assert {row["time"] for row in view.budget} == {60.0}
 
 
 def test_nothing_has_no_recordings() -> None:
-    assert recording_views({name: build(name, []) for name in TABLES}) == []
+    assert gather_recordings({name: build(name, []) for name in TABLES}) == []
 
 
 @cache
@@ -153,7 +153,7 @@ def keys_before() -> dict[tuple[str, str], str]:
 
 
 def keys(tables: Tables) -> dict[tuple[str, str], str]:
-    return {name: view.key for name, view in by_name(recording_views(tables)).items()}
+    return {name: view.key for name, view in by_name(gather_recordings(tables)).items()}
 
 
 CHANGES = {
@@ -236,7 +236,7 @@ def test_a_key_tells_a_missing_number_from_nothing_and_text_from_its_neighbour()
 
 def test_findings_of_a_channel_that_is_not_analysed_stop_nothing() -> None:
     dead = {"finding": "stuck", "severity": "fatal", "channel": "gyro_y"}
-    (view,) = recording_views(joined(recording_rows(findings=[dead])))
+    (view,) = gather_recordings(joined(recording_rows(findings=[dead])))
     (channel,) = view.channels()
     assert isinstance(channel, ChannelView)
     assert channel.findings == []

@@ -11,10 +11,10 @@ import yaml
 
 from imubench_pipeline.allan import allan_variance
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
-from imubench_pipeline.estimators.rows import parameter_rows
+from imubench_pipeline.estimators.rows import make_parameter_rows
 from imubench_pipeline.readers import read
 from imubench_pipeline.recordings.ingest import ingest
-from imubench_pipeline.recordings.recording import channel_logs, read_metadata
+from imubench_pipeline.recordings.recording import open_channel_logs, read_metadata
 from imubench_pipeline.run.cli import main
 from imubench_pipeline.settings.quality import QualitySettings
 from imubench_pipeline.settings.sensor import RecordingNotes, merged_log, read_sensors
@@ -39,7 +39,9 @@ def ingested(path: Path, sensor: str, folder: Path) -> dict[str, np.ndarray]:
     log = merged_log(read_sensors(SENSORS)[sensor], notes, "notes")
     kept = ingest(path, log, notes, QualitySettings(), folder, {})
     assert kept.summary["rate"] == 100.0
-    found = {name: np.concatenate([*one.blocks()]) for name, one in channel_logs(folder).items()}
+    found = {
+        name: np.concatenate([*one.blocks()]) for name, one in open_channel_logs(folder).items()
+    }
     found["temperature_range"] = np.array(
         [kept.summary["temperature_min"], kept.summary["temperature_max"]], dtype=float
     )
@@ -70,7 +72,7 @@ def test_a_text_log_of_a_sensor_with_names_needs_no_notes(tmp_path: Path) -> Non
     assert simulate("bno055", "--duration", "40 s", "--out", path) == 0
     log = read_sensors(SENSORS)["bno055"].log
     ingest(path, log, RecordingNotes(), QualitySettings(), tmp_path / "kept", {})
-    (block,) = channel_logs(tmp_path / "kept")["gyro_x"].blocks()
+    (block,) = open_channel_logs(tmp_path / "kept")["gyro_x"].blocks()
     steps = np.degrees(block) * 16  # 16 LSB/(deg/s)
     np.testing.assert_allclose(steps, np.rint(steps), atol=1e-6)
     assert path.read_text().startswith(
@@ -86,7 +88,7 @@ def test_parquet_is_a_kept_recording(tmp_path: Path) -> None:
     assert about["simulated"] is True and about["simulation"]["seed"] == 7
     assert "rms" in json.dumps(about["simulation"]["figures"])
     assert pq.read_schema(path).names == ["gyro_x", "gyro_y", "gyro_z", "temperature"]
-    kept = channel_logs(tmp_path)
+    kept = open_channel_logs(tmp_path)
     assert kept["gyro_x"].grid == 6000 and kept["gyro_x"].segments == ((0, 6000),)
     # Printed offset 1 deg/s, drift 0.015 deg/s/K over 5 K, signs drawn.
     means = np.degrees([abs(one.mean()) for one in kept.values()])
@@ -153,7 +155,7 @@ def test_estimates_of_a_run_are_simulated_as_the_log_showed_them(tmp_path: Path,
     }  # fmt: skip
     write("recordings", [about], tables / "recordings.parquet")
     estimate = parameters(N=3e-3, B=1e-4, T_B=200.0, K=0.0)
-    rows = parameter_rows(Key("bno055", "night", "gyro_y"), estimate, recommended=True)
+    rows = make_parameter_rows(Key("bno055", "night", "gyro_y"), estimate, recommended=True)
     write("parameters", list(rows), tables / "parameters.parquet")
     bias = {"sensor": "bno055", "recording": "night", "channel": "gyro_y", "value": 0.02}
     write("fixed_bias", [bias | {"unit": "rad/s"}], tables / "fixed_bias.parquet")
@@ -165,7 +167,7 @@ def test_estimates_of_a_run_are_simulated_as_the_log_showed_them(tmp_path: Path,
     said = capsys.readouterr().out
     assert "gyro_y: noise N+GM: estimated by method likelihood from bno055/night" in said
     assert "cut-off 64 Hz" in said
-    log = channel_logs(tmp_path)["gyro_y"]
+    log = open_channel_logs(tmp_path)["gyro_y"]
     assert log.mean() == pytest.approx(0.02, abs=3e-4)
     curve = allan_variance(np.concatenate([*log.blocks()]), 100.0, cluster_sizes=np.array([100]))
     assert curve.deviation[0] == pytest.approx(3e-3, rel=0.05)
@@ -187,7 +189,9 @@ def test_drift_and_cut_off_are_those_of_the_run(tmp_path: Path, capsys) -> None:
     assert "temperature sensitivity 0.0004363 rad/s/K: estimated" in said
     assert "no drift" not in said and "first order" not in said
     # 20 K above T_0, by 90 °/h/K, beside the bias there.
-    assert channel_logs(tmp_path)["gyro_x"].mean() == pytest.approx((20 * 90 + 5) * HOUR, rel=0.01)
+    assert open_channel_logs(tmp_path)["gyro_x"].mean() == pytest.approx(
+        (20 * 90 + 5) * HOUR, rel=0.01
+    )
 
 
 @pytest.mark.parametrize(

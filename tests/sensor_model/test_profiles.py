@@ -12,7 +12,7 @@ from imubench_pipeline.settings.profile_forms import Surroundings
 from imubench_pipeline.settings.validation import ConfigError, parse
 from imubench_pipeline.simulate.profile_files import FileSeries
 from imubench_pipeline.simulate.profiles import profiles_of
-from imubench_pipeline.units import UnitError, difference_to_si
+from imubench_pipeline.units import UnitError, parse_difference
 
 
 def profiles(settings: dict, folder: Path = Path()):
@@ -58,10 +58,10 @@ def test_formulas_are_what_they_say_in_si() -> None:
 
 
 def test_a_difference_of_temperatures_has_no_zero() -> None:
-    assert difference_to_si("5 degC", "temperature") == pytest.approx(5.0)
-    assert difference_to_si("5 K", "temperature") == pytest.approx(5.0)
+    assert parse_difference("5 degC", "temperature") == pytest.approx(5.0)
+    assert parse_difference("5 K", "temperature") == pytest.approx(5.0)
     with pytest.raises(UnitError, match="no unit of temperature"):
-        difference_to_si("5 m", "temperature")
+        parse_difference("5 m", "temperature")
 
 
 def test_a_sum_is_a_value_and_what_is_added_to_it() -> None:

@@ -9,10 +9,14 @@ from mpmath import mp, mpf, workdps
 from imubench_pipeline.noise import NoiseModel, RandomWalk, Sinusoid, WhiteNoise
 from imubench_pipeline.noise.low_pass import LowPass
 from imubench_pipeline.noise.terms import Flicker, GaussMarkov
-from imubench_pipeline.simulate.discretisation import filter_transition, slow_sources, white_factor
-from imubench_pipeline.simulate.flicker_band import bank
+from imubench_pipeline.simulate.discretisation import (
+    compute_filter_transition,
+    compute_white_factor,
+    discretise_slow_sources,
+)
+from imubench_pipeline.simulate.flicker_band import fit_density_bank
 from imubench_pipeline.simulate.model import SensorModel, bank_for, sources_of
-from imubench_pipeline.simulate.spectra import allan_variance as closed_form
+from imubench_pipeline.simulate.spectra import compute_allan_variance as closed_form
 from tests.conftest import few
 from tests.sensor_model import theory
 
@@ -96,7 +100,7 @@ def test_a_correlation_time_of_a_day_beside_a_filter_of_a_millisecond(
     """The discretisation against its integrals with fifty digits."""
     low_pass = LowPass(1000 / (2 * np.pi), 1)
     w, T, a = mpf(low_pass.angular_cutoff), 1 / mpf(rate), 1 / mpf(T_B)
-    found = slow_sources(np.array([T_B]), 1 / rate, low_pass)
+    found = discretise_slow_sources(np.array([T_B]), 1 / rate, low_pass)
 
     def integral(p, q):  # of e^-(p t) e^-(q t)
         return (1 - mp.exp(-(p + q) * T)) / (p + q)
@@ -114,8 +118,10 @@ def test_a_correlation_time_of_a_day_beside_a_filter_of_a_millisecond(
     assert found.shared[0, 0] == pytest.approx(float(xe / mp.sqrt(xx)), rel=1e-10)
     assert found.residual[0, 0, 0] ** 2 == pytest.approx(float(ee - xe**2 / xx), rel=1e-8)
     white = w**2 * integral(w, w)
-    assert white_factor(low_pass, 1 / rate)[0, 0] ** 2 == pytest.approx(float(white), rel=1e-12)
-    assert filter_transition(low_pass, 1 / rate)[0, 0] == pytest.approx(
+    assert compute_white_factor(low_pass, 1 / rate)[0, 0] ** 2 == pytest.approx(
+        float(white), rel=1e-12
+    )
+    assert compute_filter_transition(low_pass, 1 / rate)[0, 0] == pytest.approx(
         float(mp.exp(-w * T)), rel=1e-11
     )
 
@@ -129,16 +135,18 @@ def test_the_noise_of_a_butterworth_filter_is_the_integral_of_its_response(order
     t, weight = interval * (t + 1) / 2, weight * interval / 2
     g = np.array([expm(low_pass.transition * x) @ low_pass.input for x in t])
     wanted = (g * weight[:, None]).T @ g
-    factor = white_factor(low_pass, interval)
+    factor = compute_white_factor(low_pass, interval)
     np.testing.assert_allclose(factor.T @ factor, wanted, rtol=1e-10, atol=1e-12 * wanted.max())
 
 
 def test_a_bank_has_the_density_of_flicker_noise() -> None:
     f = np.geomspace(1e-5, 3e3, 777)
-    total = sum(theory.gauss_markov(f, term.B, term.T_B) for term in bank(0.7, 1e-5, 3e3))
+    total = sum(
+        theory.gauss_markov(f, term.B, term.T_B) for term in fit_density_bank(0.7, 1e-5, 3e3)
+    )
     np.testing.assert_allclose(total, 0.49 / (2 * np.pi * f), rtol=1e-3)
     with pytest.raises(ValueError, match="is empty"):
-        bank(1.0, 2.0, 1.0)
+        fit_density_bank(1.0, 2.0, 1.0)
 
 
 @pytest.mark.parametrize("order", [1, 3])

@@ -7,7 +7,7 @@ import pytest
 from imubench_pipeline.estimators.estimate import CURVE
 from imubench_pipeline.estimators.likelihood import fit
 from imubench_pipeline.settings.simulated_sensor import AxisSettings
-from imubench_pipeline.simulate.models import TrueFigure, axis_model, figures_of
+from imubench_pipeline.simulate.models import TrueFigure, list_true_figures, make_axis_model
 from imubench_pipeline.simulate.simulation import simulate
 from tests.conftest import few
 
@@ -33,7 +33,7 @@ AXIS: dict[str, Any] = {
 
 
 def figures(channel: str = "gyro_x", rate: float = 100.0, **settings: Any) -> list[TrueFigure]:
-    return list(figures_of(AxisSettings.model_validate(settings), channel, rate))
+    return list(list_true_figures(AxisSettings.model_validate(settings), channel, rate))
 
 
 def named(found: list[TrueFigure]) -> dict[str, TrueFigure]:
@@ -139,14 +139,14 @@ def test_lines_are_numbered_on_their_own_by_their_frequency() -> None:
 )  # fmt: skip
 def test_components_are_numbered_as_those_of_an_estimate(settings: dict[str, Any]) -> None:
     axis = AxisSettings.model_validate({"N": "0.3 deg/sqrt(h)"} | settings)
-    log = simulate(axis_model(axis, "gyro_x"), 10.0, 100_000, np.random.default_rng(2))
+    log = simulate(make_axis_model(axis, "gyro_x"), 10.0, 100_000, np.random.default_rng(2))
     best = fit(log, 10.0).estimates[0]
     found = {
         (n, name): p.in_model
         for n, name, p in best.components()
         if p.in_model is not None and name not in CURVE
     }
-    true = {(one.component, one.name): one.value for one in figures_of(axis, "gyro_x", 10.0)}
+    true = {(one.component, one.name): one.value for one in list_true_figures(axis, "gyro_x", 10.0)}
     assert set(found) == set(true)
     for key, value in true.items():
         assert found[key] == pytest.approx(value, rel=0.6), key

@@ -13,10 +13,10 @@ from imubench_pipeline.model.recordings import RecordingRow
 from imubench_pipeline.model.states import ShortlistVerdict
 from imubench_pipeline.navigation.shortlist.figures import (
     MeasuredRanges,
-    measured_ranges,
-    printed_ranges,
+    collect_measured_ranges,
+    collect_printed_ranges,
 )
-from imubench_pipeline.navigation.shortlist.rows import shortlist_rows
+from imubench_pipeline.navigation.shortlist.rows import list_shortlist_rows
 from imubench_pipeline.noise import FLOOR, Flicker, GaussMarkov
 from imubench_pipeline.noise.growth import Uncalibrated
 from imubench_pipeline.settings.requirements import Requirement
@@ -57,7 +57,7 @@ def judged(
     recordings: Sequence[RecordingRow] = (),
 ) -> list[dict[str, Any]]:
     named = {"s": sensors} if isinstance(sensors, Sensor) else sensors
-    rows = shortlist_rows({"r": asked or requirement()}, named, ranges, ranking, recordings)
+    rows = list_shortlist_rows({"r": asked or requirement()}, named, ranges, ranking, recordings)
     found: list[dict[str, Any]] = build("shortlist", rows).to_pylist()
     return found
 
@@ -135,7 +135,7 @@ def test_b_of_the_datasheets_of_its_class_stands_for_one_that_is_not_published()
     printed = {"value": 36, "unit": "deg/h"}
     silent, other = sensor(noise_density=DENSITY), sensor(bias_instability=printed)
     classes = {"s": "consumer", "o": "consumer"}
-    ranges = MeasuredRanges({}, classes, printed_ranges({"s": silent, "o": other}))
+    ranges = MeasuredRanges({}, classes, collect_printed_ranges({"s": silent, "o": other}))
     assert ranges.printed == {("o", "gyro"): pytest.approx((0.01 * DEG, 0.01 * DEG / FLOOR))}
     (row,) = judged(silent, ranges)
     start = Uncalibrated(bias=0.0, on_time=1.0)
@@ -194,16 +194,16 @@ def test_ranges_are_those_of_real_logs_that_decide() -> None:
     row = {"sensor": "m", "recording": "a", "simulated": False, "status": "ok",
            "decides": True}  # fmt: skip
     (about,) = typed(RecordingRow, [row])
-    found = measured_ranges(rows, [about], {"m": "consumer"})
+    found = collect_measured_ranges(rows, [about], {"m": "consumer"})
     assert found.of_sensor == {("m", "gyro", "B"): (1.0, 3.0), ("m", "gyro", "K"): (0.0, 5.0)}
     other = found.span("tactical", "gyro", "B")
     assert other is not None and "of any class" in other.words
     assert found.span("consumer", "gyro", "T_B") is None
     shown = [*rows, replace(parameter("K", "ok", 2.0, lower=1.5, upper=2.5), recording="b")]
-    both = measured_ranges(shown, [about, replace(about, recording="b")], {"m": "consumer"})
+    both = collect_measured_ranges(shown, [about, replace(about, recording="b")], {"m": "consumer"})
     assert both.of_sensor["m", "gyro", "K"] == (0.0, 2.5)
     for change in ({"simulated": True}, {"decides": False}):
-        assert measured_ranges(rows, [replace(about, **change)], {}).of_sensor == {}
+        assert collect_measured_ranges(rows, [replace(about, **change)], {}).of_sensor == {}
 
 
 def test_the_whole_catalogue_is_judged() -> None:

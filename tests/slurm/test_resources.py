@@ -4,7 +4,12 @@ import pytest
 import yaml
 
 from imubench_pipeline.run.plan import Plan
-from imubench_pipeline.run.resources import Extent, asked, resources_of, size_as_text
+from imubench_pipeline.run.resources import (
+    Extent,
+    compute_resources,
+    estimate_text_size,
+    make_resource_functions,
+)
 from tests.conftest import PROJECT
 from tests.workflow.project import put_log, put_sensor
 from tests.workflow.rules import costs
@@ -40,14 +45,14 @@ BESIDE = 550  # MB of the two Snakemakes on the node and of the process that for
 @pytest.mark.parametrize("size", MEASURED)
 def test_a_recording_gets_more_than_was_measured(size: tuple[float, int]) -> None:
     for rule, (memory, seconds) in MEASURED[size].items():
-        given = resources_of(costs()[rule], Extent(*size))
+        given = compute_resources(costs()[rule], Extent(*size))
         assert memory + BESIDE < given["mem_mb"] < 4 * (memory + BESIDE)
         assert 5 * seconds < 60 * given["runtime"] < 1200
 
 
 def test_a_hundred_recordings_get_more_than_was_measured() -> None:
     for rule, (memory, seconds) in OF_A_HUNDRED.items():
-        given = resources_of(costs()[rule], Extent(recordings=100))
+        given = compute_resources(costs()[rule], Extent(recordings=100))
         assert memory + BESIDE < given["mem_mb"] < 3 * (memory + BESIDE)
         assert 5 * seconds < 60 * given["runtime"] < 1200
 
@@ -56,9 +61,9 @@ def test_every_step_asks_for_more_of_a_larger_log_and_when_it_is_tried_again() -
     grows = set()
     for rule in costs():
         first, second = (
-            resources_of(costs()[rule], Extent(10, 3, 10), attempt) for attempt in (1, 2)
+            compute_resources(costs()[rule], Extent(10, 3, 10), attempt) for attempt in (1, 2)
         )
-        larger = resources_of(costs()[rule], Extent(100, 3, 1000))
+        larger = compute_resources(costs()[rule], Extent(100, 3, 1000))
         assert second == {what: 2 * amount for what, amount in first.items()}
         assert larger["mem_mb"] >= first["mem_mb"] and larger["runtime"] >= first["runtime"]
         grows |= {rule} if larger != first else set()
@@ -68,8 +73,8 @@ def test_every_step_asks_for_more_of_a_larger_log_and_when_it_is_tried_again() -
 def test_packed_samples_count_for_more(tmp_path: Path) -> None:
     for name, factor in {"a.csv": 1, "a.npy": 3, "a.csv.gz": 6}.items():
         (tmp_path / name).write_bytes(b"x" * 1000)
-        assert size_as_text(tmp_path / name) == factor * 1000
-    assert size_as_text(tmp_path / "no such file") == 0
+        assert estimate_text_size(tmp_path / name) == factor * 1000
+    assert estimate_text_size(tmp_path / "no such file") == 0
 
 
 def test_the_jobs_of_a_plan_ask_for_what_their_own_log_needs(tmp_path: Path) -> None:
@@ -88,16 +93,16 @@ def test_the_jobs_of_a_plan_ask_for_what_their_own_log_needs(tmp_path: Path) -> 
     paths = {name: str(tmp_path / name) for name in ("logs", "sensors", "results")}
     plan = Plan(config | paths | {"simulated": str(tmp_path / "simulated.yaml")})
     cost = costs()["reconstruct"]
-    functions = asked(plan)(cost)
+    functions = make_resource_functions(plan)(cost)
 
     def given(name: str, attempt: int = 1, sensor: str = "one") -> dict[str, int]:
         wildcards = {"sensor": sensor, "recording": name}
         return {w: f(wildcards, attempt) for w, f in functions.items()}
 
-    assert given("a") == given("a", sensor="unknown") == resources_of(cost, Extent(0, 2))
-    assert given("b") == resources_of(cost, Extent(50, 2))
-    assert given("sim_a", 2) == resources_of(cost, Extent(8.64, 2), 2)
+    assert given("a") == given("a", sensor="unknown") == compute_resources(cost, Extent(0, 2))
+    assert given("b") == compute_resources(cost, Extent(50, 2))
+    assert given("sim_a", 2) == compute_resources(cost, Extent(8.64, 2), 2)
     assert (
-        asked(plan)(costs()["report"])["runtime"]({}, 1)
-        == resources_of(costs()["report"], Extent(recordings=4))["runtime"]
+        make_resource_functions(plan)(costs()["report"])["runtime"]({}, 1)
+        == compute_resources(costs()["report"], Extent(recordings=4))["runtime"]
     )

@@ -18,7 +18,7 @@ from pathlib import Path
 import psutil
 import pytest
 
-from imubench_pipeline.run.resources import Extent, resources_of
+from imubench_pipeline.run.resources import Extent, compute_resources
 from tests.workflow.project import Project, linked, put_log, put_sensor
 from tests.workflow.rules import costs
 from tests.workflow.test_workflow import STEPS_OF_A_RECORDING
@@ -28,7 +28,7 @@ pytestmark = [pytest.mark.workflow, pytest.mark.release]
 SCRIPTS = Path(__file__).parent
 PROGRAMS = ("slurmctld", "slurmd", "munged", "sbatch", "srun", "squeue")
 PLUGIN = "snakemake_executor_plugin_slurm"
-ENOUGH = resources_of(costs()["estimate"], Extent())["mem_mb"]
+ENOUGH = compute_resources(costs()["estimate"], Extent())["mem_mb"]
 TOO_LITTLE = 100  # MB; Snakemake alone takes 180: it is killed within 3 s
 MEMORY = f"{TOO_LITTLE} if attempt == 1 or wildcards.recording == 'doomed' else {ENOUGH}"
 FLAGS = [

@@ -5,7 +5,7 @@ from typing import Any
 import pytest
 
 from imubench_pipeline.model.verdicts import Condition, Shortfall
-from imubench_pipeline.navigation.suitability.abilities import abilities, judge
+from imubench_pipeline.navigation.suitability.abilities import judge, read_abilities
 from imubench_pipeline.settings.requirements import Must
 from imubench_pipeline.settings.sensor import CHANNELS, Sensor
 from imubench_pipeline.words.verdicts import shortfall_text, subject_text
@@ -30,7 +30,7 @@ WHOLE: dict[str, Any] = {
 
 def of_sensor(must: dict[str, Any], **changes: Any) -> tuple[list[Shortfall], list[Condition]]:
     sensor = Sensor.model_validate(WHOLE | changes)
-    return judge(Must.model_validate(must), abilities(sensor))
+    return judge(Must.model_validate(must), read_abilities(sensor))
 
 
 def judged(must: dict[str, Any], **changes: Any) -> tuple[list[str], list[str]]:

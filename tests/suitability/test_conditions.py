@@ -5,12 +5,12 @@ from typing import Any
 import pytest
 
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
-from imubench_pipeline.navigation.error_budget.printed_errors import in_use
-from imubench_pipeline.navigation.expected_errors import error_rows, of_requirement
+from imubench_pipeline.navigation.error_budget.printed_errors import collect_figures_in_use
+from imubench_pipeline.navigation.expected_errors import list_error_rows, list_requirement_questions
 from imubench_pipeline.settings.printed import Datasheet
 from imubench_pipeline.settings.requirements import Requirement
 from imubench_pipeline.tables import build
-from imubench_pipeline.units import from_si
+from imubench_pipeline.units import convert_from_si
 from tests.ranking import ranking_rows
 
 CHANNELS = ("gyro_x", "accel_x")
@@ -36,10 +36,10 @@ def ranking(asked: Requirement, **sensors: dict[str, Any]) -> dict[str, dict[str
             channel: Estimate("likelihood", {"N": Parameter(N, lower=0.9 * N, upper=1.1 * N)})
             for channel, N in zip(CHANNELS, (5e-5, 1e-3), strict=True)
         }
-        figures = in_use(Datasheet.model_validate(printed), CHANNELS, ())
+        figures = collect_figures_in_use(Datasheet.model_validate(printed), CHANNELS, ())
         names = {"sensor": name, "recording": "r"}
-        questions = list(of_requirement("robot", asked))
-        rows += error_rows(names, estimates, questions, draws=100, seed=1, figures=figures)
+        questions = list(list_requirement_questions("robot", asked))
+        rows += list_error_rows(names, estimates, questions, draws=100, seed=1, figures=figures)
     about = {name: {"price_class": None} for name in sensors}
     errors = build("error_budget", rows).to_pylist()
     found = build("ranking", ranking_rows(errors, {"robot": asked}, about)).to_pylist()
@@ -76,7 +76,7 @@ def test_the_largest_figure_is_that_with_which_the_limit_is_just_kept(
         for condition in conditions:
             assert (condition["subject"], condition["property"]) == ("gyro", None)
             name, unit, dimension = UNITS[condition["figure"]]
-            size = share * from_si(condition["largest"], unit, dimension)
+            size = share * convert_from_si(condition["largest"], unit, dimension)
             printed[name] = {"value": size, "unit": unit}
         found = ranking(asked, s={"gyro": printed})["s"]
         assert found["conditions"] == []
@@ -96,13 +96,15 @@ def test_a_tilt_has_the_turn_on_bias_of_the_datasheet() -> None:
     assert (part["source"], part["kind"]) == (found["known"]["source"], "typ")
     assert found["unknown"]["verdict"] == "meets"
     assert (condition["figure"], condition["subject"]) == ("turn_on_bias", "accel")
-    assert from_si(condition["largest"], "mg", "acceleration") == pytest.approx(44.5, abs=0.5)
+    assert convert_from_si(condition["largest"], "mg", "acceleration") == pytest.approx(
+        44.5, abs=0.5
+    )
 
 
 def test_a_bias_that_is_calibrated_as_it_says_keeps_the_limit() -> None:
     asked = requirement("attitude", "5 deg", environment={})
     (condition,) = ranking(asked, s={"accel": ACCEL})["s"]["conditions"]
-    size = from_si(condition["largest"], "mg", "acceleration")
+    size = convert_from_si(condition["largest"], "mg", "acceleration")
     for share, conditions in ((0.97, 0), (1.05, 1)):
         offset = {"offset": {"value": share * size, "unit": "mg", "kind": "1sigma"}}
         row = ranking(asked, s={"accel": offset})["s"]

@@ -5,7 +5,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from imubench_pipeline.estimators.thermal.path import TemperaturePath, temperature_path
+from imubench_pipeline.estimators.thermal.path import TemperaturePath, estimate_temperature_path
 from imubench_pipeline.estimators.thermal.register import find_cell_stays
 from tests.conftest import few
 
@@ -42,7 +42,7 @@ def path_of_a_chamber(n: int) -> TemperaturePath:
     for i in range(n):
         state += mix * (levels[8 * i // n] - state)
         truth[i] = state
-    return temperature_path([np.round(truth)], [(0, n)], np.random.default_rng(1))
+    return estimate_temperature_path([np.round(truth)], [(0, n)], np.random.default_rng(1))
 
 
 @pytest.mark.parametrize("part", few([1, 6], [0, 2, 3, 4, 5, 7]))

@@ -7,9 +7,9 @@ import pytest
 from scipy.linalg import toeplitz
 
 from imubench_pipeline.allan import allan_variance
-from imubench_pipeline.estimators.spectrum import block_of, spectra
+from imubench_pipeline.estimators.spectrum import choose_block_size, compute_spectra
 from imubench_pipeline.estimators.thermal.fit import fit_temperature
-from imubench_pipeline.estimators.thermal.path import temperature_path
+from imubench_pipeline.estimators.thermal.path import estimate_temperature_path
 from imubench_pipeline.estimators.thermal.regression import BlockSeries, Coefficients, Regressors
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.simulate import simulate
@@ -32,7 +32,7 @@ def behind(values, lag):
 
 def fitted(log, readings, segments=None, rate=RATE, **options):
     rng = np.random.default_rng(11)
-    path = temperature_path([readings], segments or [(0, len(log))], rng)
+    path = estimate_temperature_path([readings], segments or [(0, len(log))], rng)
     # A band that is stated: no filter is looked for, which takes longest.
     options = {"band": 0.5 * rate} | options
     return fit_temperature(lambda: [log], len(log), rate, path, rng=rng, **options)
@@ -43,8 +43,8 @@ def test_products_with_the_log_itself_are_its_spectrum():
     rng = np.random.default_rng(1)
     samples, spans = 300_000, [(0, 140_000), (150_000, 300_000)]
     log = rng.standard_normal(samples).cumsum()
-    series = BlockSeries(spans, block_of(spans))
-    spectrum, _ = spectra(series.watch(np.array_split(log, 11)), samples, 100.0, spans)
+    series = BlockSeries(spans, choose_block_size(spans))
+    spectrum, _ = compute_spectra(series.watch(np.array_split(log, 11)), samples, 100.0, spans)
     coefficients = Coefficients(spectrum, series)
     low = spectrum.block > 1
     assert low.sum() > 64
@@ -61,9 +61,9 @@ def test_a_temperature_that_steps_between_segments_is_no_regressor():
     segments = [(0, 45_000), (45_000, SAMPLES)]
     readings = np.where(TIME < 9_000.0, 20.0, 30.0)
     log = simulate(NOISE, RATE, SAMPLES, np.random.default_rng(9))
-    path = temperature_path([readings], segments, np.random.default_rng(10))
-    series = BlockSeries(segments, block_of(segments))
-    spectrum, _ = spectra(series.watch([log]), SAMPLES, RATE, segments)
+    path = estimate_temperature_path([readings], segments, np.random.default_rng(10))
+    series = BlockSeries(segments, choose_block_size(segments))
+    spectrum, _ = compute_spectra(series.watch([log]), SAMPLES, RATE, segments)
     coefficients = Coefficients(spectrum, series)
     levels = np.where(path.sample < 45_000, 20.0, 30.0)
     assert np.abs(coefficients.of_knots(path, [levels])).max() < 1e-9
@@ -99,9 +99,9 @@ def test_sensitivity_for_known_noise_is_generalised_least_squares():
     bound = math.sqrt(np.linalg.inv(information)[0, 0])
 
     spans = [(0, n)]
-    path = temperature_path([temperature], spans, rng)
-    series = BlockSeries(spans, block_of(spans))
-    spectrum, _ = spectra(series.watch([log]), n, RATE, spans)
+    path = estimate_temperature_path([temperature], spans, rng)
+    series = BlockSeries(spans, choose_block_size(spans))
+    spectrum, _ = compute_spectra(series.watch([log]), n, RATE, spans)
     used = np.ones(len(spectrum.density), dtype=np.bool_)
     regressors = Regressors(Coefficients(spectrum, series), path, RATE, path.mean, used)
     weights = (

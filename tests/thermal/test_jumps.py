@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from imubench_pipeline.estimators.thermal.path import temperature_path
+from imubench_pipeline.estimators.thermal.path import estimate_temperature_path
 from imubench_pipeline.estimators.thermal.register import (
     estimate_resolution,
     gather_readings,
@@ -17,7 +17,9 @@ def stepping(jumps, levels=LEVELS, samples=SAMPLES):
 
 
 def path_of(values, segments=None):
-    return temperature_path([values], segments or [(0, len(values))], np.random.default_rng(3))
+    return estimate_temperature_path(
+        [values], segments or [(0, len(values))], np.random.default_rng(3)
+    )
 
 
 def jumps_of(read):

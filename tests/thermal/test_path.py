@@ -2,8 +2,12 @@ import numpy as np
 import pytest
 from scipy.special import ndtr
 
-from imubench_pipeline.estimators.thermal.path import TemperaturePath, _Evidence, temperature_path
-from imubench_pipeline.estimators.thermal.path_kernels import cell_moments
+from imubench_pipeline.estimators.thermal.path import (
+    TemperaturePath,
+    _Evidence,
+    estimate_temperature_path,
+)
+from imubench_pipeline.estimators.thermal.path_kernels import compute_cell_moments
 from imubench_pipeline.estimators.thermal.register import (
     MAX_BLOCKS,
     Readings,
@@ -19,7 +23,9 @@ WARM_UP = 30.0 + 6.0 * (1.0 - np.exp(-TIME / 0.1))
 
 
 def path_of(values, segments=None):
-    return temperature_path([values], segments or [(0, len(values))], np.random.default_rng(5))
+    return estimate_temperature_path(
+        [values], segments or [(0, len(values))], np.random.default_rng(5)
+    )
 
 
 def error_of(path, truth):
@@ -43,7 +49,7 @@ def test_moments_in_a_cell_are_those_of_quadrature(m, v, low, high, noise):
     # The integrand and all its slopes vanish at the ends: the sum over a grid is exact.
     x = np.linspace(low - 20 * np.sqrt(noise), high + 20 * np.sqrt(noise), 200_001)
     total, first, second = (np.sum(x**k * weight(x)) * (x[1] - x[0]) for k in range(3))
-    log_p, mean, variance = cell_moments(m, v, low, high, noise)
+    log_p, mean, variance = compute_cell_moments(m, v, low, high, noise)
     assert log_p == pytest.approx(np.log(total), abs=1e-6)
     assert mean == pytest.approx(first / total, abs=1e-6)
     assert variance == pytest.approx(second / total - (first / total) ** 2, rel=1e-4)

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from imubench_pipeline.estimators.spectrum import spectra
+from imubench_pipeline.estimators.spectrum import compute_spectra
 from imubench_pipeline.estimators.thermal.uncertainty import subtract_path_errors
-from imubench_pipeline.estimators.whittle import Terms, whittle_of
+from imubench_pipeline.estimators.whittle import Terms, make_whittle
 
 RATE, N, K = 1.0, 1e-3, 1e-5
 
@@ -15,8 +15,8 @@ RATE, N, K = 1.0, 1e-3, 1e-5
 @pytest.fixture
 def whittle():
     """Of noise whose density is measured as it is expected."""
-    spectrum, _ = spectra([np.random.default_rng(0).standard_normal(20_000)], 20_000, RATE)
-    shapes = whittle_of(spectrum, RATE / 2.0)
+    spectrum, _ = compute_spectra([np.random.default_rng(0).standard_normal(20_000)], 20_000, RATE)
+    shapes = make_whittle(spectrum, RATE / 2.0)
     density = N**2 * shapes.column("N") + K**2 * shapes.column("K")
     return shapes.of(replace(spectrum, density=density))
 

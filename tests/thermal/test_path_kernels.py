@@ -9,7 +9,11 @@ from scipy.integrate import quad
 from scipy.special import log_ndtr, ndtr
 from scipy.stats import multivariate_normal
 
-from imubench_pipeline.estimators.thermal.path_kernels import cell_moments, draw_paths, propagate
+from imubench_pipeline.estimators.thermal.path_kernels import (
+    compute_cell_moments,
+    draw_paths,
+    propagate,
+)
 
 STEPS = np.array([1.0, 1.0, 2.5, 1.0, 1.5, 3.0, 1.0])
 Q, SPREAD = 0.3, 2.0
@@ -139,7 +143,7 @@ def test_evidence_of_two_cells_is_nearly_the_chance_of_their_rectangle():
 def test_moments_far_from_a_cell_are_those_of_the_tail(side):
     m, v, noise = side * 40.0, 0.9, 0.1
     low, high = (-0.5, 0.5)
-    log_p, mean, variance = cell_moments(m, v, low, high, noise)
+    log_p, mean, variance = compute_cell_moments(m, v, low, high, noise)
     a = 39.5
     assert log_p == pytest.approx(log_ndtr(-a), rel=1e-5)
     # Of a normal variate beyond a: by its density over its tail.

@@ -6,18 +6,18 @@ import scipy.fft
 
 from imubench_pipeline.estimators.goodness import Goodness
 from imubench_pipeline.estimators.model_choice import Candidate
-from imubench_pipeline.estimators.spectrum import spectra
-from imubench_pipeline.estimators.thermal.path import TemperaturePath, lagged
+from imubench_pipeline.estimators.spectrum import compute_spectra
+from imubench_pipeline.estimators.thermal.path import TemperaturePath, apply_lag
 from imubench_pipeline.estimators.thermal.regression import BlockSeries, Coefficients, Regressors
 from imubench_pipeline.estimators.thermal.uncertainty import (
     _compute_explained_fraction,
     assess_fit,
+    assess_lag,
     compute_mean_error,
     compute_path_errors,
-    lag_parameter,
     weigh_models,
 )
-from imubench_pipeline.estimators.whittle import Maximum, Terms, whittle_of
+from imubench_pipeline.estimators.whittle import Maximum, Terms, make_whittle
 from imubench_pipeline.noise import NoiseModel
 
 RATE, SAMPLES, REFERENCE = 2.0, 64, 20.0
@@ -40,7 +40,7 @@ class Log:
 
     def __init__(self, values, path, rate=RATE):
         series = BlockSeries([(0, SAMPLES)], 1)
-        self.spectrum, _ = spectra(series.watch([values]), SAMPLES, rate)
+        self.spectrum, _ = compute_spectra(series.watch([values]), SAMPLES, rate)
         used = np.ones(SAMPLES - 1, dtype=np.bool_)
         self.regressors = Regressors(
             Coefficients(self.spectrum, series), path, rate, REFERENCE, used
@@ -62,7 +62,7 @@ def means(knots):
 @pytest.fixture(scope="module")
 def log():
     noise = N * np.sqrt(RATE) * np.random.default_rng(6).standard_normal(SAMPLES)
-    return Log(0.2 * (lagged(TIMES, SWING, 1.5) - REFERENCE) + noise, path_of(SWING))
+    return Log(0.2 * (apply_lag(TIMES, SWING, 1.5) - REFERENCE) + noise, path_of(SWING))
 
 
 WEIGHTS = 1.0 / N**2 / (1.0 + 30.0 / np.arange(1, SAMPLES) ** 2)
@@ -75,7 +75,7 @@ WEIGHTS = 1.0 / N**2 / (1.0 + 30.0 / np.arange(1, SAMPLES) ** 2)
 def test_a_fit_is_that_of_weighted_least_squares(log, quadratic, ramp, settling):
     regressors = log.regressors.also(quadratic=quadratic, ramp=ramp, settling=settling)
     lag = 1.0
-    knots = lagged(TIMES, SWING, lag) - REFERENCE
+    knots = apply_lag(TIMES, SWING, lag) - REFERENCE
     terms = [knots] + [knots**2] * quadratic
     if settling:
         # 8 s are 16 samples, beyond which nothing is added.
@@ -146,17 +146,19 @@ def test_the_longest_lag_is_half_an_hour(log):
 def test_errors_of_the_path_move_the_fit_and_stay_in_the_log():
     rng = np.random.default_rng(9)
     draws = SWING + 0.1 * rng.standard_normal((5, SAMPLES))
-    log = Log(0.2 * (lagged(TIMES, SWING, 1.0) - REFERENCE), path_of(SWING, draws))
+    log = Log(0.2 * (apply_lag(TIMES, SWING, 1.0) - REFERENCE), path_of(SWING, draws))
     found = log.regressors.at(1.0, WEIGHTS)
     changes, residual = compute_path_errors(log.regressors, found, WEIGHTS)
     step = 0.25  # half of the distance of two knots
-    by_lag = found.beta[0] * (lagged(TIMES, SWING, 1.0 + step) - lagged(TIMES, SWING, 1.0)) / step
-    columns = [lagged(TIMES, SWING, 1.0) - REFERENCE, by_lag]
+    by_lag = (
+        found.beta[0] * (apply_lag(TIMES, SWING, 1.0 + step) - apply_lag(TIMES, SWING, 1.0)) / step
+    )
+    columns = [apply_lag(TIMES, SWING, 1.0) - REFERENCE, by_lag]
     root = np.sqrt(WEIGHTS)
     X = np.array([dct(means(column)) for column in columns])
     density = np.zeros(SAMPLES - 1)
     for moved, draw in zip(changes, draws, strict=True):
-        error = dct(means(found.beta[0] * lagged(TIMES, draw - SWING, 1.0)))
+        error = dct(means(found.beta[0] * apply_lag(TIMES, draw - SWING, 1.0)))
         own = np.linalg.lstsq((X * root).T, error * root)[0]
         np.testing.assert_allclose(moved, own, rtol=1e-3)
         density += (error - own @ X) ** 2 * log.interval / len(draws)
@@ -179,7 +181,7 @@ def judged(temperature, s=0.2, gained=30.0, noise=1.0, seed=1, slope=0.0, quadra
     regressors = log.regressors.also(quadratic=quadratic)
     found = regressors.at(0.0, flat)
     left = regressors.without(log.spectrum, found, flat)
-    whittle = whittle_of(left, RATE / 2.0, 4)
+    whittle = make_whittle(left, RATE / 2.0, 4)
     lags = np.array([0.0])
     verdict = assess_fit(
         regressors, found, whittle, [candidate(Terms("N"))], lags, gained=gained,
@@ -234,24 +236,24 @@ def test_a_temperature_is_told_from_time_whatever_its_square_is_like():
 
 def test_a_lag_that_is_no_number_has_its_interval_alone():
     draws = np.linspace(0.0, 10.0, 1001)
-    assert lag_parameter(3.0, draws, 0.0, True).status == "absent"
-    assert lag_parameter(3.0, draws, 99.0, False).status == "not_identified"
+    assert assess_lag(3.0, draws, 0.0, True).status == "absent"
+    assert assess_lag(3.0, draws, 99.0, False).status == "not_identified"
     # From 0: one limit, of the whole 5 %.
-    found = lag_parameter(0.0, draws, 99.0, True)
+    found = assess_lag(0.0, draws, 99.0, True)
     assert (found.status, found.lower, found.upper) == ("not_identified", 0.0, pytest.approx(9.5))
     assert "includes 0" in (found.reason or "")
     # The shortest interval of 95 % leaves out the sparse end.
     skew = np.concatenate([np.linspace(5.0, 6.0, 96), np.linspace(20.0, 30.0, 4)])
-    found = lag_parameter(5.5, skew, 99.0, True)
+    found = assess_lag(5.5, skew, 99.0, True)
     assert (found.status, found.value) == ("ok", 5.5)
     assert (found.lower, found.upper) == pytest.approx((5.0, 6.0), abs=0.03)
     for value in (4.0, 7.0):
-        found = lag_parameter(value, skew, 99.0, True)
+        found = assess_lag(value, skew, 99.0, True)
         assert min(value, 5.02) >= (found.lower or 0.0) and max(value, 5.98) <= (found.upper or 0.0)
     # More than half of what was looked for says nothing.
-    found = lag_parameter(5.5, skew, 1.9, True)
+    found = assess_lag(5.5, skew, 1.9, True)
     assert found.status == "not_identified" and "lags from 5" in (found.reason or "")
-    assert lag_parameter(5.5, skew, 2.1, True).status == "ok"
+    assert assess_lag(5.5, skew, 2.1, True).status == "ok"
 
 
 def test_the_mean_of_a_log_is_known_as_its_noise_lets_it():
@@ -302,7 +304,7 @@ def test_what_a_fast_temperature_explains_is_where_most_of_it_is():
     noise = np.random.default_rng(6).standard_normal(SAMPLES)
     made = Log(0.2 * (fast - REFERENCE) + noise, path_of(fast))
     found = made.regressors.at(0.0, WEIGHTS)
-    x, y = dct(means(lagged(TIMES, fast, 0.0) - REFERENCE)), made.coefficients
+    x, y = dct(means(apply_lag(TIMES, fast, 0.0) - REFERENCE)), made.coefficients
     upto = int(np.argmax(np.cumsum(x**2) >= 0.95 * np.sum(x**2))) + 1
     assert 12 < upto < 40
     x, y = x[:upto], y[:upto]
@@ -316,7 +318,7 @@ def test_lags_are_drawn_by_their_likelihood(log):
     found = log.regressors.best(flat, lags)
     left = log.regressors.without(log.spectrum, found, flat)
     models = [candidate(Terms("N"))]
-    whittle = whittle_of(left, RATE / 2.0, 4)
+    whittle = make_whittle(left, RATE / 2.0, 4)
     told = assess_fit(
         log.regressors, found, whittle, models, lags, gained=30.0, rng=np.random.default_rng(2)
     ).lag

@@ -7,11 +7,11 @@ from imubench_pipeline.model.comparisons import ErrorBudgetRow
 from imubench_pipeline.model.estimates import ParameterRow
 from imubench_pipeline.model.recordings import DoubtRow, RecordingRow
 from imubench_pipeline.model.verdicts import DoubtMark
-from imubench_pipeline.navigation.expected_errors import error_rows, of_requirement
-from imubench_pipeline.navigation.selection import ranked
+from imubench_pipeline.navigation.expected_errors import list_error_rows, list_requirement_questions
+from imubench_pipeline.navigation.selection import rank_sensors
 from imubench_pipeline.navigation.verdicts.basis import Basis
-from imubench_pipeline.navigation.verdicts.judgement import judgements
-from imubench_pipeline.navigation.verdicts.next_steps import next_step_rows
+from imubench_pipeline.navigation.verdicts.judgement import judge_sensors
+from imubench_pipeline.navigation.verdicts.next_steps import list_next_step_rows
 from imubench_pipeline.settings.requirements import Requirement
 from imubench_pipeline.tables import build
 from tests.rows import typed
@@ -70,12 +70,12 @@ def judge(
     abilities: dict[str, Any] | None = None,
 ) -> tuple[Rows, Rows]:
     """Return the tables ``ranking``, of the limits that decide, and ``next_steps``."""
-    questions = [q for name, one in asked.items() for q in of_requirement(name, one)]
+    questions = [q for name, one in asked.items() for q in list_requirement_questions(name, one)]
     errors: list[ErrorBudgetRow] = []
     for sensor, logs in sensors.items():
         for recording, estimates in logs.items():
             names = {"sensor": sensor, "recording": recording}
-            rows = error_rows(names, estimates, questions, draws=400, seed=1)
+            rows = list_error_rows(names, estimates, questions, draws=400, seed=1)
             errors += ErrorBudgetRow.rows_of(build("error_budget", rows))
     if recordings is None:
         recordings = [about(sensor, name) for sensor, logs in sensors.items() for name in logs]
@@ -92,7 +92,7 @@ def judge(
         typed(ParameterRow, parameters),
     )
     files = {sensor: {"price_class": None, "abilities": abilities or {}} for sensor in sensors}
-    judged = list(judgements(errors, asked, files, basis))
-    ranking = build("ranking", ranked(judged, basis)).to_pylist()
-    steps = build("next_steps", next_step_rows(judged, basis)).to_pylist()
+    judged = list(judge_sensors(errors, asked, files, basis))
+    ranking = build("ranking", rank_sensors(judged, basis)).to_pylist()
+    steps = build("next_steps", list_next_step_rows(judged, basis)).to_pylist()
     return [row for row in ranking if row["decides"]], steps

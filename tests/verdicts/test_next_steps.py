@@ -4,7 +4,7 @@ import pytest
 from scipy import stats
 
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
-from imubench_pipeline.navigation.verdicts.next_steps import specimens_needed
+from imubench_pipeline.navigation.verdicts.next_steps import count_specimens_needed
 from imubench_pipeline.navigation.verdicts.specimens import Expected, Spread
 from tests.verdicts.budgets import (
     HEADING,
@@ -58,7 +58,7 @@ def test_a_margin_of_one_is_settled_by_no_log() -> None:
 def test_so_many_specimens_are_advised_as_it_takes() -> None:
     spread, away = 0.3, math.log(2.5)
     found = Expected(1.0, 0.1, 10.0, 0.9, 2, 2, Spread(spread**2, 1), "specimens")
-    more = specimens_needed(found, away)
+    more = count_specimens_needed(found, away)
     assert more is not None
 
     def half(count: int) -> float:
@@ -66,7 +66,7 @@ def test_so_many_specimens_are_advised_as_it_takes() -> None:
 
     assert half(2 + more) <= away < half(1 + more)
     # t is never below 1.96.
-    assert specimens_needed(found, 1.9 * spread) is None
+    assert count_specimens_needed(found, 1.9 * spread) is None
 
 
 def test_a_quantity_that_a_limit_needs_is_to_be_logged() -> None:

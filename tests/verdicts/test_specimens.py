@@ -5,7 +5,7 @@ import pytest
 from scipy import stats
 
 from imubench_pipeline.model.comparisons import ErrorBudgetRow
-from imubench_pipeline.navigation.verdicts.specimens import Spread, expected, usual_spread
+from imubench_pipeline.navigation.verdicts.specimens import Spread, pool_spreads, predict_error
 from tests.conftest import few
 from tests.rows import typed
 from tests.verdicts.budgets import HEADING, about, gyro, judge
@@ -30,7 +30,7 @@ def each(rows: list[ErrorBudgetRow]) -> dict[str, str]:
 def test_of_logs_without_error_it_is_the_next_value_by_student(count: int) -> None:
     logs = np.array([0.1, -0.3, 0.25, 0.0, -0.2])[:count]
     rows = totals(logs, 1e-7, limit=1.5)
-    found = expected(rows, each(rows))
+    found = predict_error(rows, each(rows))
     mean, deviation = logs.mean(), logs.std(ddof=1) * math.sqrt(1 + 1 / count)
     low, high = stats.t.interval(0.95, count - 1, mean, deviation)
     assert found.sigma == pytest.approx(math.exp(mean))
@@ -51,7 +51,7 @@ def test_the_interval_holds_the_next_specimen(
     for _ in range(sets):
         *specimens, following = rng.normal(1.0, 0.3, count + 1)
         rows = totals(rng.normal(specimens, error), error)
-        found = expected(rows, each(rows))
+        found = predict_error(rows, each(rows))
         assert found.lower is not None and found.upper is not None
         held += found.lower < math.exp(following) < found.upper
     assert held / sets >= 0.92
@@ -61,7 +61,7 @@ def test_the_interval_holds_the_next_specimen(
 
 def test_one_specimen_stands_for_itself_where_no_spread_is_known() -> None:
     (row,) = totals(np.array([0.2]), 0.1)
-    found = expected([row], {"0": "unit"})
+    found = predict_error([row], {"0": "unit"})
     assert (found.sigma, found.lower, found.upper, found.within) == (
         row["sigma"], row["lower"], row["upper"], 0.3,
     )  # fmt: skip
@@ -70,7 +70,7 @@ def test_one_specimen_stands_for_itself_where_no_spread_is_known() -> None:
 
 def test_one_specimen_has_the_spread_of_other_sensors() -> None:
     (row,) = totals(np.array([0.2]), 0.1)
-    found = expected([row], {"0": "unit"}, Spread(0.04, 4))
+    found = predict_error([row], {"0": "unit"}, Spread(0.04, 4))
     # It differs from the mean of its kind as the next one does.
     half = stats.t.ppf(0.975, 4) * math.sqrt(2 * 0.04 + 0.1**2)
     assert found.sigma == pytest.approx(row["sigma"])
@@ -80,17 +80,17 @@ def test_one_specimen_has_the_spread_of_other_sensors() -> None:
 
 def test_recordings_of_one_specimen_tell_how_they_differ_and_no_more() -> None:
     rows = totals(np.array([0.0, 0.2, 0.4]), 1e-7)
-    found = expected(rows, dict.fromkeys(each(rows), "unit"))
+    found = predict_error(rows, dict.fromkeys(each(rows), "unit"))
     assert (found.specimens, found.recordings, found.spread_of) == (1, 3, "recordings")
     # With another specimen, each counts once.
-    two = expected(rows, {"0": "a", "1": "a", "2": "b"})
+    two = predict_error(rows, {"0": "a", "1": "a", "2": "b"})
     assert (two.specimens, two.recordings, two.spread_of) == (2, 3, "specimens")
     assert two.spread is not None and two.spread.freedom == 1
 
 
 def test_a_usual_spread_weighs_sensors_by_what_they_tell() -> None:
-    assert usual_spread([Spread(0.01, 2)]) is None
-    found = usual_spread([Spread(0.01, 3), Spread(0.09, 1)])
+    assert pool_spreads([Spread(0.01, 2)]) is None
+    found = pool_spreads([Spread(0.01, 3), Spread(0.09, 1)])
     assert found == Spread(pytest.approx(0.03), 4)
 
 

@@ -10,9 +10,16 @@ from typing import Any
 
 import pytest
 
-from imubench_pipeline.run.sealing import settings_digest, unsound
+from imubench_pipeline.run.sealing import digest_settings, find_unsound_jobs
 from imubench_pipeline.tables.digests import read_sealed_json, write_sealed_json
-from imubench_pipeline.tables.seals import Seal, SealedFile, SealError, places, read_seal, seal_file
+from imubench_pipeline.tables.seals import (
+    Seal,
+    SealedFile,
+    SealError,
+    list_places,
+    name_seal_file,
+    read_seal,
+)
 from tests.verification.finished import Finished
 
 pytestmark = [pytest.mark.workflow, pytest.mark.release]
@@ -29,17 +36,17 @@ def results(done: Finished, tmp_path: Path) -> Path:
 
 def jobs(results: Path) -> dict[str, str]:
     """The jobs of the run, with the settings that they had."""
-    steps = [place for place in places(results) if not place.startswith("nightly/")]
+    steps = [place for place in list_places(results) if not place.startswith("nightly/")]
     return {place: read_seal(results, place).settings for place in steps}
 
 
 def test_a_run_that_is_complete_has_nothing_to_make_again(results: Path) -> None:
     settings = jobs(results)
     assert len(settings) > 25 and all(settings.values())
-    assert list(unsound(results, settings)) == []
+    assert list(find_unsound_jobs(results, settings)) == []
     for path in results.rglob("*"):
         os.utime(path, (1e9, 1e9))  # as git and rsync without -t leave it
-    assert list(unsound(results, settings)) == []
+    assert list(find_unsound_jobs(results, settings)) == []
 
 
 @pytest.mark.parametrize(
@@ -66,25 +73,25 @@ def test_what_was_removed_or_edited_is_made_again(
     path.unlink()
     if damage == "edited":
         path.write_bytes(data[:-1] + bytes([data[-1] ^ 1]))
-    assert list(unsound(results, settings)) == [place]
+    assert list(find_unsound_jobs(results, settings)) == [place]
 
 
 @pytest.mark.parametrize("damage", ["removed", "cut", "exchanged", "older form", "other settings"])
 def test_a_step_without_its_seal_is_run_again(results: Path, damage: str) -> None:
     settings = jobs(results)
-    path = results / seal_file(f"{A}/datasheet")
+    path = results / name_seal_file(f"{A}/datasheet")
     match damage:
         case "removed":
             path.unlink()
         case "cut":
             path.write_bytes(path.read_bytes()[:-2])
         case "exchanged":
-            shutil.copy(results / seal_file("recordings/one/b/datasheet"), path)
+            shutil.copy(results / name_seal_file("recordings/one/b/datasheet"), path)
         case "older form":
             write_sealed_json(read_sealed_json(path) | {"form": "0"}, path)
         case "other settings":
-            settings[f"{A}/datasheet"] = settings_digest({"settings": "{}", "code": "0"})
-    found = set(unsound(results, settings))
+            settings[f"{A}/datasheet"] = digest_settings({"settings": "{}", "code": "0"})
+    found = set(find_unsound_jobs(results, settings))
     assert f"{A}/datasheet" in found
     # Without it, what its files are is not known, of which others were made.
     assert found <= {f"{A}/datasheet", JOINED}
@@ -94,14 +101,14 @@ def test_what_was_made_of_another_file_is_made_again(results: Path) -> None:
     settings = jobs(results)
     path = results / f"{A}/scores.parquet"
     path.write_bytes((results / "recordings/one/b/scores.parquet").read_bytes())
-    seal = results / seal_file(f"{A}/reconstruct")
+    seal = results / name_seal_file(f"{A}/reconstruct")
     data = read_sealed_json(seal)
     about = SealedFile.of(path)
     data["outputs"][f"{A}/scores.parquet"] = {
         "size": about.size, "sha256": about.sha256, "changed": about.changed,
     }  # fmt: skip
     write_sealed_json(data, seal)
-    assert list(unsound(results, settings)) == [JOINED]
+    assert list(find_unsound_jobs(results, settings)) == [JOINED]
 
 
 FILE = {"size": 1, "sha256": "0", "changed": 0}
@@ -124,11 +131,11 @@ def test_a_seal_of_other_types_or_of_what_lies_elsewhere_is_none(
     seal = Seal("allan", "form", {"b": "0"}, {"a": SealedFile(**FILE)})
     seal.write(tmp_path)
     assert read_seal(tmp_path, "allan") == seal
-    write_sealed_json(asdict(seal) | change, tmp_path / seal_file("allan"))
+    write_sealed_json(asdict(seal) | change, tmp_path / name_seal_file("allan"))
     with pytest.raises(SealError, match="is not as it was written"):
         read_seal(tmp_path, "allan")
 
 
 def test_how_often_a_step_was_tried_is_no_setting() -> None:
-    assert settings_digest({"code": "1", "attempt": 2}) == settings_digest({"code": "1"})
-    assert settings_digest({"code": "1"}) != settings_digest({"code": "2"})
+    assert digest_settings({"code": "1", "attempt": 2}) == digest_settings({"code": "1"})
+    assert digest_settings({"code": "1"}) != digest_settings({"code": "2"})

@@ -18,7 +18,7 @@ from imubench_pipeline.run.cli import main
 from imubench_pipeline.run.verification.results import Results
 from imubench_pipeline.tables import read, write_arrow
 from imubench_pipeline.tables.digests import read_sealed_json, write_sealed_json
-from imubench_pipeline.tables.seals import SealedFile, read_seal, seal_file
+from imubench_pipeline.tables.seals import SealedFile, name_seal_file, read_seal
 from tests.conftest import few
 from tests.verification.finished import Finished
 
@@ -197,7 +197,7 @@ def test_a_link_to_nowhere_is_named(results: Path) -> None:
 
 def forge(results: Path, name: str, place: str) -> None:
     """Seal a file as if its step had left it so."""
-    path = results / seal_file(place)
+    path = results / name_seal_file(place)
     data = read_sealed_json(path)
     about = SealedFile.of(results / name)
     data["outputs"][name] = {"size": about.size, "sha256": about.sha256, "changed": about.changed}

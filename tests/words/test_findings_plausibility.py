@@ -2,7 +2,7 @@ import math
 
 import pytest
 
-from imubench_pipeline.recordings.fitness import doubts, fitness
+from imubench_pipeline.recordings.fitness import derive_doubts, judge_fitness
 from imubench_pipeline.tables.findings import find
 from imubench_pipeline.words.findings import plausibility
 from imubench_pipeline.words.findings.base import ALL, FindingData
@@ -136,8 +136,8 @@ def test_a_recording_that_may_not_be_at_rest_in_its_unit_is_not_used(
     data: FindingData, factor: float, expected: dict[str, float | None]
 ) -> None:
     row = find(data, "warning", factor, "gyro_x").row("s", "r")
-    found = list(doubts([row], [], []))
-    assert fitness(found) == "unfit"
+    found = list(derive_doubts([row], [], []))
+    assert judge_fitness(found) == "unfit"
     by_name = {name: doubt.factor for doubt in found for name in doubt.parameters}
     assert by_name == {
         name: value if value is None else pytest.approx(value) for name, value in expected.items()
@@ -146,6 +146,6 @@ def test_a_recording_that_may_not_be_at_rest_in_its_unit_is_not_used(
 
 def test_other_implausible_data_leave_a_recording_in_use() -> None:
     data = AxisUnlike(("gyro_x", "gyro_y"), 6.0, 0.3 * DEG, "deg/s", None)
-    (doubt,) = doubts([find(data, "warning", 6.0, "gyro_z").row("s", "r")], [], [])
-    assert fitness([doubt]) == "fit with doubts"
+    (doubt,) = derive_doubts([find(data, "warning", 6.0, "gyro_z").row("s", "r")], [], [])
+    assert judge_fitness([doubt]) == "fit with doubts"
     assert set(doubt.parameters) == ALL

@@ -15,7 +15,7 @@ from functools import cache
 from pathlib import Path
 from typing import IO
 
-from imubench_pipeline.tables.provenance import source_digest
+from imubench_pipeline.tables.provenance import digest_sources
 from tests.conftest import PROJECT
 
 
@@ -52,7 +52,9 @@ IMPORTED = (
 def _serve() -> None:
     cli, *_ = (importlib.import_module(name) for name in IMPORTED)
     for step in (PROJECT / "src/imubench_pipeline/steps").glob("[!_]*.py"):
-        source_digest(f"steps.{step.stem}")  # what a module uses is found once, and not by each run
+        digest_sources(
+            f"steps.{step.stem}"
+        )  # what a module uses is found once, and not by each run
     gc.freeze()
     for line in sys.stdin:
         asked = json.loads(line)

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from imubench_pipeline.run.lock import INHERITED, Lock, lock_of
+from imubench_pipeline.run.lock import INHERITED, Lock, locate_lock
 from tests.workflow.project import FEW, Project, linked, put_log, put_sensor
 
 
@@ -28,7 +28,7 @@ def test_a_second_run_is_refused_and_told_who_works_there(project: Project) -> N
     other = Project(
         project.folder, project.results, linked(project.folder / "other"), project.settings
     )
-    with Lock(lock_of(project.results)) as lock:
+    with Lock(locate_lock(project.results)) as lock:
         lock.acquire()
         refused = other.run("--until", "ingest")
         assert refused.returncode == 1
@@ -55,7 +55,7 @@ def test_who_was_killed_holds_nothing(tmp_path: Path) -> None:
         "import os, sys; from pathlib import Path; from imubench_pipeline.run.lock import Lock; "
         "Lock(Path(sys.argv[1])).acquire(); os.kill(os.getpid(), 9)"
     )
-    path = lock_of(tmp_path)
+    path = locate_lock(tmp_path)
     subprocess.run([sys.executable, "-c", held, str(path)], check=False, timeout=60)
     assert json.loads(path.read_text())["process"] > 0
     with Lock(path) as lock:

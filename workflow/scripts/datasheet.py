@@ -2,11 +2,13 @@
 
 from pathlib import Path
 
-from imubench_pipeline.steps.datasheet import datasheet_tables
+from imubench_pipeline.steps.datasheet import compare_with_datasheet
 from imubench_pipeline.tables import write_each
 
 if __name__ == "__main__":
     names = snakemake.wildcards
     folder = Path(snakemake.input.parameters).parent
-    tables = datasheet_tables(folder, names.sensor, names.recording, snakemake.params.settings)
+    tables = compare_with_datasheet(
+        folder, names.sensor, names.recording, snakemake.params.settings
+    )
     write_each(tables, map(Path, snakemake.output))

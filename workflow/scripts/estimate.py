@@ -2,12 +2,12 @@
 
 from pathlib import Path
 
-from imubench_pipeline.steps.estimate import estimation
+from imubench_pipeline.steps.estimate import estimate_recording
 from imubench_pipeline.tables import write_each
 
 if __name__ == "__main__":
     names = snakemake.wildcards
     folder = Path(snakemake.input.quality).parent
-    rows = estimation(folder, names.sensor, names.recording, snakemake.params.settings)
+    rows = estimate_recording(folder, names.sensor, names.recording, snakemake.params.settings)
     outputs = [Path(path) for path in snakemake.output]
     write_each({path.stem: getattr(rows, path.stem) for path in outputs}, outputs)

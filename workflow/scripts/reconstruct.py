@@ -3,10 +3,10 @@
 from pathlib import Path
 
 from imubench_pipeline.settings.config import ReconstructionSettings
-from imubench_pipeline.steps.reconstruct import reconstruction_rows
+from imubench_pipeline.steps.reconstruct import reconstruct_recording
 from imubench_pipeline.tables import write_each
 
 if __name__ == "__main__":
     settings = ReconstructionSettings.model_validate_json(snakemake.params.settings)
-    rows = reconstruction_rows(Path(snakemake.input.quality).parent, settings)
+    rows = reconstruct_recording(Path(snakemake.input.quality).parent, settings)
     write_each(vars(rows), map(Path, snakemake.output))

@@ -3,12 +3,12 @@
 from pathlib import Path
 
 from imubench_pipeline.settings.config import ReconstructionSettings
-from imubench_pipeline.steps.samples_of_models import samples_of_models
+from imubench_pipeline.steps.samples_of_models import simulate_samples_of_models
 from imubench_pipeline.tables import write
 
 if __name__ == "__main__":
     names = snakemake.wildcards
     settings = ReconstructionSettings.model_validate_json(snakemake.params.settings)
     folder = Path(snakemake.input.quality).parent
-    found = samples_of_models(folder, names.sensor, names.recording, settings.seed)
+    found = simulate_samples_of_models(folder, names.sensor, names.recording, settings.seed)
     write("samples_of_models", found, Path(snakemake.output.samples_of_models))

@@ -2,12 +2,12 @@
 
 from pathlib import Path
 
-from imubench_pipeline.steps.sensor_tables import joined_tables
+from imubench_pipeline.steps.sensor_tables import join_tables
 from imubench_pipeline.tables import write_arrow
 
 if __name__ == "__main__":
     parts = {name: [Path(path) for path in paths] for name, paths in snakemake.input.items()}
     params = snakemake.params
-    tables = joined_tables(parts, params.truths, params.sensor, params.usual, params.decide)
+    tables = join_tables(parts, params.truths, params.sensor, params.usual, params.decide)
     for output in map(Path, snakemake.output):
         write_arrow(tables[output.stem], output)

@@ -144,9 +144,9 @@ def deviation_limits(
 
     ``edf_upper`` are the degrees of freedom of the upper limit at 95 %; by default ``edf``. With
     few differences an Allan variance is less often far too small than a chi-squared variate with
-    the same variance (`tail_degrees`). At another confidence they are interpolated: from ``edf`` to
-    ``edf_upper`` by (z / 1.96)^1.4, with z the normal quantile. The coverage of 68 % limits is then
-    exact to 0.4 % for white, flicker, random walk and Gauss-Markov noise.
+    the same variance (`match_lower_tail`). At another confidence they are interpolated: from
+    ``edf`` to ``edf_upper`` by (z / 1.96)^1.4, with z the normal quantile. The coverage of 68 %
+    limits is then exact to 0.4 % for white, flicker, random walk and Gauss-Markov noise.
     """
     tail = (1.0 - confidence) / 2.0
     below = edf
@@ -158,7 +158,7 @@ def deviation_limits(
     return deviation * np.sqrt(edf / high), deviation * np.sqrt(below / low)
 
 
-def variance_degrees(weights: Array) -> float:
+def match_variance(weights: Array) -> float:
     """Return the degrees of freedom of the chi-squared variate with the same relative variance.
 
     The weights have shape (m,).
@@ -166,7 +166,7 @@ def variance_degrees(weights: Array) -> float:
     return float(weights.sum() ** 2 / (weights @ weights))
 
 
-def tail_degrees(weights: Array) -> float:
+def match_lower_tail(weights: Array) -> float:
     """Return the degrees of freedom of the chi-squared variate with the same lower tail.
 
     Relative to its mean it has the same 2.5 % quantile. The weights w_i >= 0, shape (m,), have any
@@ -174,7 +174,7 @@ def tail_degrees(weights: Array) -> float:
     """
     if len(weights) == 1:
         return 1.0
-    quantile = lower_quantile(weights, _LOWER_TAIL)
+    quantile = find_lower_quantile(weights, _LOWER_TAIL)
 
     def over(degrees: float) -> float:
         return float(2.0 * gammaincinv(degrees / 2.0, _LOWER_TAIL) / degrees - quantile)
@@ -182,7 +182,7 @@ def tail_degrees(weights: Array) -> float:
     return float(brentq(over, _MIN_DEGREES, _MAX_DEGREES, rtol=1e-6))
 
 
-def lower_quantile(weights: Array, chance: float) -> float:
+def find_lower_quantile(weights: Array, chance: float) -> float:
     """Return a quantile below the mean of a weighted sum of chi-squared variates over its mean.
 
     The relative error of the probability in the saddlepoint approximation is below a tenth, for

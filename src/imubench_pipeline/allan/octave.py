@@ -20,13 +20,13 @@ from imubench_pipeline.allan.phase import (
     Phase,
     accumulate,
     accumulate_present,
-    finite_mean,
-    full_sums,
+    average_finite,
     integrate,
+    sum_all_sizes,
     sum_present,
     sum_sizes,
 )
-from imubench_pipeline.allan.threads import in_threads
+from imubench_pipeline.allan.threads import run_in_threads
 from imubench_pipeline.typing import Array
 
 Integers = NDArray[np.int64]
@@ -51,7 +51,7 @@ _NUMBER_OF_LANES = 4  # parts of a section whose phases are interleaved
 _STARTS_PER_BLOCK = 1 << 11  # starts that are summed for all sizes while they are in the L1 cache
 
 
-def octave_sizes(sizes: Integers) -> Integers:
+def round_octave_sizes(sizes: Integers) -> Integers:
     """Round cluster sizes to multiples of the stride of their octave (by 1 % at most)."""
     stride = np.left_shift(1, _find_level(sizes))
     return np.unique(np.rint(sizes / stride).astype(np.int64) * stride)
@@ -64,7 +64,7 @@ def _find_level(sizes: Integers) -> Integers:
 class OctaveSums:
     """Sums of squared differences of cluster means of one segment of a log.
 
-    The sizes, shape (m,), equal `octave_sizes`; the sums have the same bits for any number
+    The sizes, shape (m,), equal `round_octave_sizes`; the sums have the same bits for any number
     of threads. With ``holes`` samples may be missing (NaN). ``theta`` and ``present`` are the phase
     at every `DECIMATION`-th sample, ``first`` is the phase of the first samples.
     """
@@ -149,7 +149,7 @@ class OctaveSums:
     def results(self) -> list[NDArray[Any]]:
         """Sum of squares, sum of mean inverse counts, number of differences, and their maximum."""
         steps = self._sizes[~self._short] // DECIMATION
-        long = full_sums(self.phase, steps, self._threads, stride=DECIMATION, gaps=self._gaps)
+        long = sum_all_sizes(self.phase, steps, self._threads, stride=DECIMATION, gaps=self._gaps)
         return [
             np.concatenate((of_short.astype(of_long.dtype), of_long))
             for of_short, of_long in zip(self._sums, long, strict=True)
@@ -161,7 +161,7 @@ class OctaveSums:
         The first sections are in ``head``, the others in ``body``.
         """
         if not self._filled:
-            self._bias = finite_mean((head if heads else body)[:SECTION_SAMPLES])
+            self._bias = average_finite((head if heads else body)[:SECTION_SAMPLES])
         # Converted to one type, so that the kernel is compiled only once.
         head, body = head.view(), body.astype(head.dtype, copy=False).view()
         head.flags.writeable = body.flags.writeable = False
@@ -173,7 +173,7 @@ class OctaveSums:
             finally:
                 self._rooms.put(room)
 
-        sums, totals, edges, counts = in_threads(work, sections, self._threads)
+        sums, totals, edges, counts = run_in_threads(work, sections, self._threads)
         for row in sums:
             self._sums += row  # one by one, so that the order does not depend on the blocks
         # At the end of the log the last section may be shorter.

@@ -14,7 +14,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from imubench_pipeline.allan.threads import in_threads
+from imubench_pipeline.allan.threads import run_in_threads
 from imubench_pipeline.typing import Array
 
 BLOCK_DIFFERENCES = 1 << 14  # summed together, so that three float64 blocks stay in the L2 cache
@@ -32,7 +32,7 @@ Span = tuple[int, int]
 """First and one-past-last sample of a segment."""
 
 
-def spans_of(segments: Sequence[Span] | None, samples: int) -> tuple[Span, ...]:
+def list_spans(segments: Sequence[Span] | None, samples: int) -> tuple[Span, ...]:
     """Return the segments of a log; by default it is one."""
     return tuple(segments) if segments else ((0, samples),)
 
@@ -86,7 +86,7 @@ class GapCount:
         return Gaps(self._samples, self._missing + _count_by_octave(np.array([self._open])))
 
 
-def gaps_of(blocks: Iterable[NDArray[np.floating[Any]]]) -> Gaps:
+def count_gaps(blocks: Iterable[NDArray[np.floating[Any]]]) -> Gaps:
     """Return the gaps of a log in consecutive blocks; NaN where a sample is missing."""
     count = GapCount()
     for block in blocks:
@@ -152,7 +152,7 @@ def integrate(
             raise ValueError(f"the blocks hold more than the {samples} samples stated")
         if level is None and not np.isnan(values).all():
             # A constant cancels in the variance, but 9.81 would cost digits of the sum.
-            level = finite_mean(values)
+            level = average_finite(values)
         if present is None:
             accumulate(values, level or 0.0, theta[reached : stop + 1])
         else:
@@ -165,7 +165,7 @@ def integrate(
         raise ValueError(
             "a sample is infinite" if holes else "a sample is missing or infinite, but holes=False"
         )
-    return Phase(theta, present, spans_of(segments, samples))
+    return Phase(theta, present, list_spans(segments, samples))
 
 
 def split(
@@ -189,7 +189,7 @@ def split(
         reached += len(block)
 
 
-def finite_mean(samples: NDArray[np.floating[Any]]) -> float:
+def average_finite(samples: NDArray[np.floating[Any]]) -> float:
     """Return the mean of the finite samples; 0 if there are none."""
     with np.errstate(invalid="ignore"):
         mean = float(samples.mean(dtype=np.float64))
@@ -305,7 +305,7 @@ def sum_present(
     return total, thinned, number
 
 
-def full_sums(
+def sum_all_sizes(
     phase: Phase, sizes: NDArray[np.int64], threads: int, *, stride: int = 1, gaps: Gaps = NO_GAPS
 ) -> tuple[Array, Array, NDArray[np.int64], NDArray[np.int64]]:
     """Return sums over the differences of cluster means, by size in points of the phase.
@@ -324,14 +324,14 @@ def full_sums(
         most = np.maximum(stop - start - 2 * sizes + 1, 0)
         possible += most
         if phase.present is None:
-            (sums,) = in_threads(partial(_sum_blocks, theta, sizes), blocks, threads)
+            (sums,) = run_in_threads(partial(_sum_blocks, theta, sizes), blocks, threads)
             total += sums.sum(axis=0) / samples.astype(np.float64) ** 2
             thinned += most / samples
             terms += most
         else:
             counts = phase.present[start : stop + 1]
             work = partial(_sum_blocks_present, theta, counts, sizes, gaps.enough(samples))
-            sums, inverse, numbers = in_threads(work, blocks, threads)
+            sums, inverse, numbers = run_in_threads(work, blocks, threads)
             total += sums.sum(axis=0)
             thinned += inverse.sum(axis=0)
             terms += numbers.sum(axis=0)
@@ -357,7 +357,7 @@ def _sum_blocks_present(
     low: int,
     high: int,
 ) -> tuple[Array, Array, NDArray[np.int64]]:
-    """Return the terms of `full_sums` over the samples present, by block and size."""
+    """Return the terms of `sum_all_sizes` over the samples present, by block and size."""
     sums, inverse = np.zeros((high - low, sizes.size)), np.zeros((high - low, sizes.size))
     numbers = np.zeros((high - low, sizes.size), dtype=np.int64)
     for block in range(sums.shape[0]):
@@ -409,7 +409,7 @@ class Presence:
         return complete, base * max(1, size // _STARTS_PER_CLUSTER)
 
 
-def presence(
+def count_presence(
     blocks: Iterable[NDArray[np.floating[Any]]],
     samples: int,
     segments: Sequence[Span] | None = None,
@@ -432,4 +432,4 @@ def presence(
             part = counts[: len(first) - 1 - reached]
             first[reached + 1 : reached + 1 + len(part)] = part
         reached, total = stop, int(counts[-1]) if len(counts) else total
-    return Presence(samples, spans_of(segments, samples), first, stride, coarse, gaps.gaps())
+    return Presence(samples, list_spans(segments, samples), first, stride, coarse, gaps.gaps())

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 _SHARES_PER_THREAD = 4  # so that no thread waits long for the last share
 
 
-def available(threads: int | None) -> int:
+def count_threads(threads: int | None) -> int:
     """Return the number of threads, by default of all cores available; ValueError below 1."""
     if threads is None:
         if hasattr(os, "sched_getaffinity"):
@@ -24,7 +24,7 @@ def available(threads: int | None) -> int:
     return threads
 
 
-def in_threads(
+def run_in_threads(
     work: Callable[[int, int], tuple[NDArray[Any], ...]], pieces: int, threads: int
 ) -> tuple[NDArray[Any], ...]:
     """Return the results of work on all pieces, computed in threads and joined in order.

@@ -24,7 +24,7 @@ from imubench_pipeline.allan.octave import (
     DECIMATION,
     MIN_DECIMATED_SAMPLES,
     OctaveSums,
-    octave_sizes,
+    round_octave_sizes,
 )
 from imubench_pipeline.allan.phase import (
     MIN_PRESENT_SHARE,
@@ -32,13 +32,13 @@ from imubench_pipeline.allan.phase import (
     Gaps,
     Phase,
     Span,
-    full_sums,
-    gaps_of,
+    count_gaps,
     integrate,
-    spans_of,
+    list_spans,
     split,
+    sum_all_sizes,
 )
-from imubench_pipeline.allan.threads import available, read_ahead
+from imubench_pipeline.allan.threads import count_threads, read_ahead
 from imubench_pipeline.typing import Array
 
 _MAX_UNCERTAIN_CLUSTERS = 100
@@ -197,8 +197,8 @@ def allan_variance(
             raise ValueError(f"valid has shape {mask.shape}, expected {values.shape}")
         values = np.where(mask, values, np.nan)
     present = np.isfinite(values)
-    holes, number, cores = not bool(present.all()), len(values), available(threads)
-    gaps = gaps_of([values]) if holes else NO_GAPS
+    holes, number, cores = not bool(present.all()), len(values), count_threads(threads)
+    gaps = count_gaps([values]) if holes else NO_GAPS
     if overlap == "octave":
         curve = of_blocks(
             [values],
@@ -240,8 +240,8 @@ def of_blocks(
     may be missing (NaN), as counted in ``gaps``. The sizes are rounded to the stride of their
     octave. The other arguments and the errors are those of `allan_variance`.
     """
-    spans = spans_of(segments, samples)
-    wanted = octave_sizes(_check_arguments(rate, sizes, samples, spans))
+    spans = list_spans(segments, samples)
+    wanted = round_octave_sizes(_check_arguments(rate, sizes, samples, spans))
     if samples < MIN_DECIMATED_SAMPLES:
         phase = integrate(blocks, samples, holes=holes, segments=spans)
         return of_phase(phase, rate, wanted, gaps=gaps, threads=threads)
@@ -293,7 +293,7 @@ def of_phase(
     def edges(n: int) -> tuple[Array, NDArray[Any] | None, int]:
         return *phase.every(n, start, stop), n
 
-    sums = full_sums(phase, wanted, threads, gaps=gaps)
+    sums = sum_all_sizes(phase, wanted, threads, gaps=gaps)
     return _make_curve(rate, wanted, phase.samples, phase.segments, sums, edges)
 
 

@@ -14,9 +14,9 @@ from dataclasses import dataclass, replace
 from imubench_pipeline.noise import FLOOR
 from imubench_pipeline.settings.conversions import (
     Sidedness,
-    noise_bandwidth,
-    noise_of_density,
-    noise_of_power_density,
+    compute_noise_bandwidth,
+    convert_density,
+    convert_power_density,
     noise_of_rms,
 )
 from imubench_pipeline.settings.printed import (
@@ -25,7 +25,7 @@ from imubench_pipeline.settings.printed import (
     PrintedFigure,
     QuantityDatasheet,
 )
-from imubench_pipeline.units import dimension_of, to_si
+from imubench_pipeline.units import convert_to_si, find_dimension
 from imubench_pipeline.words.reasons import datasheets as texts
 
 _SIDEDNESS_READINGS: dict[str, tuple[Sidedness, ...]] = {
@@ -82,7 +82,7 @@ class PrintedAxis:
     def si(self, name: str) -> Callable[[float, PrintedFigure], float]:
         """Return the SI conversion of a figure that needs no other conversion."""
         (dimension,) = FIGURE_DIMENSIONS[self.quantity][name]
-        return lambda value, figure: to_si(value, figure.unit or "", dimension)
+        return lambda value, figure: convert_to_si(value, figure.unit or "", dimension)
 
     def read(
         self,
@@ -153,7 +153,7 @@ class PrintedAxis:
         return replace(like, reason=texts.unpublished(looked_up=looked_up), looked_up=looked_up)
 
 
-def comparables(datasheet: Datasheet, channel: str) -> Iterator[Comparable]:
+def read_comparables(datasheet: Datasheet, channel: str) -> Iterator[Comparable]:
     """Yield the datasheet figures of N, bias instability, K and T_B of a channel, SI.
 
     Rows have no figure if none is published or looked up.
@@ -163,7 +163,7 @@ def comparables(datasheet: Datasheet, channel: str) -> Iterator[Comparable]:
     rms_to_si = axis.si("rms_noise")
 
     def convert_rms(value: float, figure: PrintedFigure) -> float:
-        bandwidth = noise_bandwidth(figure.bandwidth_hz or 0.0, figure.filter)
+        bandwidth = compute_noise_bandwidth(figure.bandwidth_hz or 0.0, figure.filter)
         return noise_of_rms(rms_to_si(value, figure), bandwidth)
 
     rms = Comparable("N", "N", None, "one-sided", reason=texts.density_of_rms(), is_rms=True)
@@ -191,7 +191,7 @@ def comparables(datasheet: Datasheet, channel: str) -> Iterator[Comparable]:
     yield from axis.read("allan_deviation", like, axis.si("allan_deviation"))
 
 
-def bias_comparables(datasheet: Datasheet, channel: str) -> Iterator[Comparable]:
+def read_bias_comparables(datasheet: Datasheet, channel: str) -> Iterator[Comparable]:
     """Yield the datasheet figures of the fixed bias of a channel, and of its changes, SI.
 
     The offset is always yielded, the others if published. Only the temperature coefficient is
@@ -208,7 +208,7 @@ def bias_comparables(datasheet: Datasheet, channel: str) -> Iterator[Comparable]
         yield from axis.read(name, like, axis.si(name))
 
 
-def repeatability_comparables(datasheet: Datasheet, channel: str) -> Iterator[Comparable]:
+def read_repeatability_comparables(datasheet: Datasheet, channel: str) -> Iterator[Comparable]:
     """Yield the printed turn-on to turn-on repeatability of the bias of a channel, SI."""
     axis, name = PrintedAxis.of(datasheet, channel), "bias_repeatability"
     yield from axis.read(name, Comparable(name, "spread", None), axis.si(name))
@@ -222,11 +222,11 @@ def _read_densities(axis: PrintedAxis) -> Iterator[Comparable]:
 
             def convert(value: float, figure: PrintedFigure, side: Sidedness = sidedness) -> float:
                 unit = figure.unit or ""
-                dimension = dimension_of(unit, dimensions)
-                density = to_si(value, unit, dimension)
+                dimension = find_dimension(unit, dimensions)
+                density = convert_to_si(value, unit, dimension)
                 if dimension == dimensions[0]:
-                    return noise_of_density(density, side)
-                return noise_of_power_density(density, side)
+                    return convert_density(density, side)
+                return convert_power_density(density, side)
 
             assumed = stated == "unknown"
             reason = texts.density_side(sidedness, assumed=assumed)

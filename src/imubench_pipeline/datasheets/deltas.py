@@ -16,10 +16,14 @@ from numpy.typing import NDArray
 from imubench_pipeline.datasheets.comparable import (
     SENSITIVITY,
     Comparable,
-    bias_comparables,
-    comparables,
+    read_bias_comparables,
+    read_comparables,
 )
-from imubench_pipeline.datasheets.measured import NO_TEMPERATURE_READINGS, fixed_bias, measured
+from imubench_pipeline.datasheets.measured import (
+    NO_TEMPERATURE_READINGS,
+    compute_fixed_bias,
+    get_measured,
+)
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
 from imubench_pipeline.settings.printed import Datasheet
 from imubench_pipeline.words.reasons import datasheets as texts
@@ -64,8 +68,8 @@ def deltas(
     tau, shape (m,), s, are the averaging times at which the curve is accurate enough to find its
     minimum. The tolerance is the relative difference that still counts as printed.
     """
-    for entry in comparables(datasheet, channel):
-        yield compare(entry, measured(entry, estimate, tau), tolerance)
+    for entry in read_comparables(datasheet, channel):
+        yield compare(entry, get_measured(entry, estimate, tau), tolerance)
 
 
 def bias_deltas(
@@ -89,10 +93,10 @@ def bias_deltas(
     tolerance : float
         Relative difference that still counts as printed.
     sensitivity : Parameter, optional
-        From `datasheets.measured.sensitivity`; None without readings of the temperature.
+        From `datasheets.measured.compute_sensitivity`; None without readings of the temperature.
     """
-    bias = fixed_bias(channel, means)
-    for entry in bias_comparables(datasheet, channel):
+    bias = compute_fixed_bias(channel, means)
+    for entry in read_bias_comparables(datasheet, channel):
         if entry.statistic == SENSITIVITY:
             yield compare(entry, sensitivity or NO_TEMPERATURE_READINGS, tolerance)
         elif entry.quantity != "offset":

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from imubench_pipeline.datasheets.comparable import Comparable
 from imubench_pipeline.earth import EARTH_RATE, STANDARD_GRAVITY
-from imubench_pipeline.estimators.curve_bias import of_model
+from imubench_pipeline.estimators.curve_bias import compute_curve_figures
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
 from imubench_pipeline.model.estimates import TemperatureRow
 from imubench_pipeline.noise import FLOOR
@@ -28,7 +28,7 @@ _MIN_VERTICAL_COSINE = math.cos(math.radians(15.0))
 _MAX_NORM_ERROR_AT_REST = 0.15
 
 
-def measured(entry: Comparable, estimate: Estimate, tau: NDArray[np.float64]) -> Parameter:
+def get_measured(entry: Comparable, estimate: Estimate, tau: NDArray[np.float64]) -> Parameter:
     """Return the estimate of the statistic that a printed figure is compared with, SI.
 
     Minimum and plateau are from `imubench_pipeline.estimators.curve_bias`, over the averaging times
@@ -38,7 +38,7 @@ def measured(entry: Comparable, estimate: Estimate, tau: NDArray[np.float64]) ->
     statistic = entry.statistic
     if statistic in ("plateau", "adev_minimum"):
         # An estimate that was made by hand has only its terms.
-        of_curve = estimate.curve or of_model(estimate.model, tau)
+        of_curve = estimate.curve or compute_curve_figures(estimate.model, tau)
         if statistic == "plateau":
             top = of_curve["B_curve"]
             value, lower, upper = (
@@ -78,7 +78,7 @@ def _list_interval_ends(estimate: Estimate) -> Iterator[Estimate]:
         yield replace(estimate, parameters=first, further=further)
 
 
-def fixed_bias(channel: str, means: Mapping[str, float]) -> Parameter:
+def compute_fixed_bias(channel: str, means: Mapping[str, float]) -> Parameter:
     """Return the magnitude of the fixed bias of a channel from a static recording, rad/s or m/s².
 
     For a gyro it is the magnitude of the mean, which includes the Earth's rotation. For a vertical
@@ -105,7 +105,7 @@ def _bound_size(value: float, unknown: float, reason: str) -> Parameter:
     return Parameter(size, "ok", reason, max(size - unknown, 0.0), size + unknown)
 
 
-def sensitivity(
+def compute_sensitivity(
     rows: Iterable[TemperatureRow], lowest: float | None, highest: float | None
 ) -> Parameter:
     """Return the magnitude of the temperature sensitivity of a channel, rad/s/K or m/s²/K.

@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from imubench_pipeline.datasheets.comparable import bias_comparables
+from imubench_pipeline.datasheets.comparable import read_bias_comparables
 from imubench_pipeline.datasheets.suspicion import MAX_FACTOR_FROM_PRINTED, printed_figures
 from imubench_pipeline.earth import STANDARD_GRAVITY
 from imubench_pipeline.model.recordings import FindingRow
@@ -24,7 +24,7 @@ from imubench_pipeline.recordings.kept import Quality
 from imubench_pipeline.recordings.quality.rotation import GravityTurn
 from imubench_pipeline.settings.sensor import QUANTITIES, Sensor, quantity_of
 from imubench_pipeline.tables.findings import Finding, find
-from imubench_pipeline.units import conversion, to_si
+from imubench_pipeline.units import convert_to_si, find_conversion
 from imubench_pipeline.words.findings.plausibility import (
     AxisUnlike,
     GravityNorm,
@@ -67,7 +67,7 @@ _TIME_UNIT_PENALTIES: Mapping[float, float] = {60.0: 1.0, 1e3: 0.0, 1e6: 0.0, 1e
 rate. Minutes have a penalty, since a sensor file cannot state them."""
 
 Level = Mapping[str, Any]
-"""Level of a channel, from `imubench_pipeline.recordings.quality.levels.kept_level`."""
+"""Level of a channel, from `imubench_pipeline.recordings.quality.levels.summarise_level`."""
 
 _GRAVITY_TOLERANCE = 0.15
 """Maximum error of the mean acceleration, as a fraction of gravity."""
@@ -138,7 +138,7 @@ def _find_max_offset(sensor: Sensor) -> tuple[float, str | None]:
     printed = [
         row.value * _OFFSET_FACTOR_OF_KIND.get(row.figure.kind, _OFFSET_FACTOR_OF_TYPICAL)
         for axis in "xyz"
-        for row in bias_comparables(sensor.datasheet, f"gyro_{axis}")
+        for row in read_bias_comparables(sensor.datasheet, f"gyro_{axis}")
         if row.quantity in ("offset", "bias_repeatability")
         and row.figure is not None
         and row.value is not None
@@ -158,7 +158,7 @@ def _find_max_bandwidth(sensor: Sensor, quantity: str) -> float | None:
     assert quantity in QUANTITIES
     sheet = getattr(sensor.datasheet, quantity)
     widest = [
-        to_si(value, figure.unit, "frequency")
+        convert_to_si(value, figure.unit, "frequency")
         for figure in (sheet.printed("bandwidth") if sheet else ())
         for axis in "xyz"
         for value in _list_values(figure.on_axis(axis))
@@ -281,9 +281,9 @@ def implausible_of(quality: Quality, sensor: Sensor | None) -> list[FindingRow]:
 def mistakes(unit: str, quantity: str) -> Iterator[tuple[str, float]]:
     """Yield the units that may be meant instead of one, and the factor that corrects the data."""
     dimension = QUANTITIES[quantity]
-    stated = conversion(unit, dimension)[0]
+    stated = find_conversion(unit, dimension)[0]
     for other in _LOGGER_UNITS[quantity]:
-        factor = conversion(other, dimension)[0] / stated
+        factor = find_conversion(other, dimension)[0] / stated
         if not math.isclose(factor, 1.0):
             yield other, factor
 

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import asdict, dataclass, replace
 from statistics import median
 
-from imubench_pipeline.datasheets.comparable import Comparable, comparables
+from imubench_pipeline.datasheets.comparable import Comparable, read_comparables
 from imubench_pipeline.model.estimates import ParameterRow
 from imubench_pipeline.model.recordings import FindingRow
 from imubench_pipeline.settings.sensor import QUANTITIES, Sensor, quantity_of
@@ -70,7 +70,7 @@ def printed_figures(sensor: Sensor, quantity: str) -> dict[str, float]:
     """
     figures: dict[str, float] = {}
     for axis in "xyz":
-        rows = comparables(sensor.datasheet, f"{quantity}_{axis}")
+        rows = read_comparables(sensor.datasheet, f"{quantity}_{axis}")
         with_value = [(row, row.value) for row in rows if row.value is not None]
         for figure, statistic in (("N", "N"), ("B", "adev_minimum")):
             values = [

@@ -59,7 +59,7 @@ def _doubt_group(
     return judged
 
 
-def disagreements(channel: str, estimates: Mapping[str, Estimate]) -> Iterator[Finding]:
+def yield_disagreements(channel: str, estimates: Mapping[str, Estimate]) -> Iterator[Finding]:
     """Yield a finding if N from the curve fit and N from the likelihood disagree."""
     if not {"weighted", "likelihood"} <= estimates.keys():
         return

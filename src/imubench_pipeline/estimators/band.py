@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from imubench_pipeline.estimators.spectrum import Spectrum
-from imubench_pipeline.estimators.whittle import COARSE, Maximum, Terms, Whittle, whittle_of
+from imubench_pipeline.estimators.whittle import COARSE, Maximum, Terms, Whittle, make_whittle
 from imubench_pipeline.model.states import BandSource
 
 _DEFAULT_BAND = 1 / 20  # Frequency over sampling rate below which filters are assumed to be flat
@@ -142,4 +142,4 @@ def _is_quantized(spectrum: Spectrum, clear: NDArray[np.bool_], cap: float) -> b
 
 
 def _make_whittle(spectrum: Spectrum) -> Whittle:
-    return whittle_of(spectrum, float(spectrum.upper.max()), COARSE)
+    return make_whittle(spectrum, float(spectrum.upper.max()), COARSE)

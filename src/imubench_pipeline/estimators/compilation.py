@@ -5,17 +5,17 @@ from __future__ import annotations
 import numpy as np
 
 from imubench_pipeline.estimators.posterior_kernels import (
+    compute_log_posteriors,
+    find_mode,
     fit_mixture,
-    log_posteriors,
-    mode_at,
     set_densities,
 )
 from imubench_pipeline.estimators.whittle_kernels import (
     Bins,
     Problem,
     ShapeTable,
-    best_powers,
-    cost_at,
+    fit_powers,
+    profile_cost,
 )
 
 
@@ -28,10 +28,10 @@ def compile_kernels() -> None:
     bins = Bins(*np.ones((4, 8)))
     problem = Problem(np.ones((8, 1)), bins, False, ShapeTable(0.0, 1.0, np.zeros((2, 8))))
     place = np.zeros(1)
-    cost_at(place, problem, 1.0)
-    best_powers(problem.fixed, bins, False, 1.0)
-    mode_at(np.zeros(2), place, problem)
-    log_posteriors(np.zeros((1, 3)), problem)
+    profile_cost(place, problem, 1.0)
+    fit_powers(problem.fixed, bins, False, 1.0)
+    find_mode(np.zeros(2), place, problem)
+    compute_log_posteriors(np.zeros((1, 3)), problem)
     weights, means, scales = np.ones(1), np.zeros((1, 1)), np.ones((1, 1, 1))
     points, densities = np.arange(3.0)[:, None], np.empty((3, 1))
     set_densities(points, weights, means, scales, 5, densities)

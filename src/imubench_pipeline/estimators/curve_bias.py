@@ -18,12 +18,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from imubench_pipeline.estimators.estimate import BROADBAND_TIME, CURVE, Estimate, Parameter
-from imubench_pipeline.estimators.intervals import as_good, mixture_limits
+from imubench_pipeline.estimators.intervals import compute_mixture_limits, is_as_good
 from imubench_pipeline.estimators.model_choice import Candidate
 from imubench_pipeline.estimators.posterior import Posterior
 from imubench_pipeline.estimators.whittle import Terms
 from imubench_pipeline.noise import FLOOR, PEAK_TAU, GaussMarkov, NoiseModel
-from imubench_pipeline.noise.terms import gauss_markov_shape
+from imubench_pipeline.noise.terms import evaluate_gauss_markov_shape
 from imubench_pipeline.typing import Array
 from imubench_pipeline.words.reasons import curves, estimates
 
@@ -31,7 +31,7 @@ MAX_TAU_FRACTION = 1 / 9  # Maximum tau over the duration of the log
 _POINTS_PER_DECADE = 16  # Averaging times for the search of the lowest point
 _POINTS_BETWEEN_PEAKS = 49  # Averaging times between the peaks of several processes
 _MAX_DRAWS = 16_000  # Draws of a model that are evaluated at many averaging times
-_PEAK_SHAPE = float(gauss_markov_shape(np.array([PEAK_TAU]), 1.0)[0])
+_PEAK_SHAPE = float(evaluate_gauss_markov_shape(np.array([PEAK_TAU]), 1.0)[0])
 
 
 @dataclass(frozen=True)
@@ -60,7 +60,7 @@ class Models:
         return replace(self, parameters=self.parameters[::every], times=self.times[::every])
 
 
-def models_of(model: NoiseModel) -> Models:
+def convert_noise_model(model: NoiseModel) -> Models:
     """Return a noise model alone, without its ramp and lines, as `Models` of one."""
     processes = model.further_processes
     letters = {"Q": model.Q, "N": model.N, "F": 0.0, "K": model.K}
@@ -78,7 +78,7 @@ def models_of(model: NoiseModel) -> Models:
     )
 
 
-def bias_of_curve(models: Models, longest: float) -> tuple[Array, Array]:
+def compute_curve_bias(models: Models, longest: float) -> tuple[Array, Array]:
     """Return the bias instability of the curve of models up to a tau in s, and its tau.
 
     The largest Allan deviation of the flicker and Gauss-Markov terms over 0.664, rad/s or m/s²,
@@ -95,14 +95,14 @@ def bias_of_curve(models: Models, longest: float) -> tuple[Array, Array]:
         tau = np.exp(np.linspace(*ends, _POINTS_BETWEEN_PEAKS, axis=1))
     squared = flicker[:, None] ** 2 + np.zeros_like(tau)
     for B, T_B in zip(models.biases.T, models.times.T, strict=True):
-        shape = gauss_markov_shape(tau / T_B[:, None], 1.0)
+        shape = evaluate_gauss_markov_shape(tau / T_B[:, None], 1.0)
         squared += B[:, None] ** 2 * shape / _PEAK_SHAPE
     highest = squared.argmax(axis=1)
     rows = np.arange(len(tau))
     return np.sqrt(squared[rows, highest]), tau[rows, highest]
 
 
-def allan_variance(models: Models, tau: Array) -> Array:
+def compute_allan_variances(models: Models, tau: Array) -> Array:
     """Return the Allan variance of models at averaging times of shape (m,), shape (d, m)."""
     variance = (
         3.0 * models.parameter("Q")[:, None] ** 2 / tau**2
@@ -111,19 +111,19 @@ def allan_variance(models: Models, tau: Array) -> Array:
         + models.parameter("K")[:, None] ** 2 * tau / 3.0
     )
     for B, T_B in zip(models.biases.T, models.times.T, strict=True):
-        shape = gauss_markov_shape(tau / T_B[:, None], 1.0)
+        shape = evaluate_gauss_markov_shape(tau / T_B[:, None], 1.0)
         variance = variance + (FLOOR * B[:, None]) ** 2 * shape / _PEAK_SHAPE
     return np.asarray(variance)
 
 
-def lowest_point(models: Models, tau: Array) -> tuple[Array, Array, NDArray[np.bool_]]:
+def find_lowest_point(models: Models, tau: Array) -> tuple[Array, Array, NDArray[np.bool_]]:
     """Return the lowest point of the Allan deviation of models.
 
     ``tau``, shape (m,), rises evenly in the logarithm, s; between them a parabola is taken.
     Returned are, each of shape (d,), the deviation, rad/s or m/s², its averaging time, s, and
     whether it is a minimum, and not an end of ``tau``.
     """
-    level = np.log(allan_variance(models, tau))
+    level = np.log(compute_allan_variances(models, tau))
     rows = np.arange(len(level))
     lowest = level.argmin(axis=1)
     inside = (lowest > 0) & (lowest < len(tau) - 1)
@@ -137,7 +137,7 @@ def lowest_point(models: Models, tau: Array) -> tuple[Array, Array, NDArray[np.b
     return deviation, tau[lowest] * np.exp(shift * step), inside
 
 
-def averaging_times(rate: float, duration: float) -> Array:
+def make_averaging_times(rate: float, duration: float) -> Array:
     """Return averaging times, s, for the search of the lowest point, up to `MAX_TAU_FRACTION`."""
     first, last = 1.0 / rate, max(duration * MAX_TAU_FRACTION, 4.0 / rate)
     return np.geomspace(first, last, 2 + math.ceil(math.log10(last / first) * _POINTS_PER_DECADE))
@@ -163,7 +163,7 @@ def add_curve_figures(
     wider : sequence of Candidate
         Models with one bias instability in addition: they limit an absent one.
     tau : ndarray, shape (m,)
-        As returned by `averaging_times`.
+        As returned by `make_averaging_times`.
     """
 
     def select(candidate: Candidate) -> Models:
@@ -172,15 +172,15 @@ def add_curve_figures(
         # The highest point of several processes is searched at many tau.
         return models.fewer() if terms.gauss_markov > 1 else models
 
-    model, longest = models_of(estimate.model), float(tau[-1])
+    model, longest = convert_noise_model(estimate.model), float(tau[-1])
     drawn = [select(candidate) for candidate in alike]
     if any(alike[0].terms.biases):
         bias = _estimate_bias(model, drawn, longest, estimate)
     else:
-        having = [c for c in alike if as_good(c, alike[0]) and any(c.terms.biases)]
+        having = [c for c in alike if is_as_good(c, alike[0]) and any(c.terms.biases)]
         every = [select(c) for c in wider if any(c.terms.biases)] + [select(c) for c in having]
         bias = _describe_weak_bias(every, bool(having), longest)
-    return replace(estimate, curve={"B_curve": bias} | lowest_parameters(model, drawn, tau))
+    return replace(estimate, curve={"B_curve": bias} | estimate_lowest_point(model, drawn, tau))
 
 
 def _estimate_bias(
@@ -188,8 +188,8 @@ def _estimate_bias(
 ) -> Parameter:
     """Return the bias instability of a curve, with limits from draws."""
     biased = [models for models in drawn if any(models.terms.biases)]
-    parts = [(bias_of_curve(models, longest)[0], models.weight) for models in biased]
-    value, at = (float(of_one[0]) for of_one in bias_of_curve(model, longest))
+    parts = [(compute_curve_bias(models, longest)[0], models.weight) for models in biased]
+    value, at = (float(of_one[0]) for of_one in compute_curve_bias(model, longest))
     lower, upper = _compute_limits(parts, value)
     if value == 0.0:
         return Parameter(None, "absent", estimates.absent_below(), 0.0, upper)
@@ -212,28 +212,32 @@ def _describe_weak_bias(drawn: Sequence[Models], as_good: bool, longest: float) 
     """Return the bias instability of a curve whose chosen model has none."""
     if not drawn:
         return Parameter(None, "absent", estimates.absent())
-    upper = max(float(np.quantile(bias_of_curve(models, longest)[0], 0.975)) for models in drawn)
+    upper = max(
+        float(np.quantile(compute_curve_bias(models, longest)[0], 0.975)) for models in drawn
+    )
     if as_good:
         return Parameter(None, "not_identified", estimates.bias_models_alike(), 0.0, upper)
     return Parameter(None, "absent", estimates.absent_below(), 0.0, upper)
 
 
-def of_model(model: NoiseModel, tau: Array) -> dict[str, Parameter]:
-    """Return the figures of the curve of a model as it is, at `averaging_times`, without limits."""
-    models = models_of(model)
+def compute_curve_figures(model: NoiseModel, tau: Array) -> dict[str, Parameter]:
+    """Return the figures of the curve of a model as it is, at `make_averaging_times`."""
+    models = convert_noise_model(model)
     if not models.terms.parameters:
         nothing = Parameter(None, "not_shown", curves.no_noise())
         return dict.fromkeys(CURVE, nothing)
     bias = Parameter(None, "absent", curves.no_bias_terms())
     if any(models.terms.biases):
-        bias = Parameter(float(bias_of_curve(models, float(tau[-1]))[0][0]))
-    return {"B_curve": bias} | lowest_parameters(models, [], tau)
+        bias = Parameter(float(compute_curve_bias(models, float(tau[-1]))[0][0]))
+    return {"B_curve": bias} | estimate_lowest_point(models, [], tau)
 
 
-def lowest_parameters(model: Models, drawn: Sequence[Models], tau: Array) -> dict[str, Parameter]:
+def estimate_lowest_point(
+    model: Models, drawn: Sequence[Models], tau: Array
+) -> dict[str, Parameter]:
     """Return ``sigma_min`` and ``tau_min`` of a model, with limits if draws of models are given."""
-    (sigma,), (time,), (inside,) = (part.tolist() for part in lowest_point(model, tau))
-    points = [lowest_point(models.fewer(), tau) for models in drawn]
+    (sigma,), (time,), (inside,) = (part.tolist() for part in find_lowest_point(model, tau))
+    points = [find_lowest_point(models.fewer(), tau) for models in drawn]
     weights = [models.weight for models in drawn]
     limits: list[tuple[float | None, float | None]] = [(None, None), (None, None)]
     if drawn:
@@ -266,5 +270,5 @@ def lowest_parameters(model: Models, drawn: Sequence[Models], tau: Array) -> dic
 
 def _compute_limits(parts: Sequence[tuple[Array, float]], value: float) -> tuple[float, float]:
     """Return the 95 % limits of draws of several models; those of the first lie inside."""
-    lower, upper = mixture_limits(parts, [(parts[0][0], 1.0)])
+    lower, upper = compute_mixture_limits(parts, [(parts[0][0], 1.0)])
     return min(lower, value), max(upper, value)

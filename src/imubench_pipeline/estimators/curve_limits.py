@@ -17,15 +17,15 @@ from numpy.typing import NDArray
 from imubench_pipeline.allan import FITTED, POWER_LAW, AllanCurve
 from imubench_pipeline.allan.phase import Presence, Span
 from imubench_pipeline.estimators.likelihood import Likelihood
-from imubench_pipeline.estimators.whittle import model_of
+from imubench_pipeline.estimators.whittle import make_noise_model
 from imubench_pipeline.noise import NoiseModel
-from imubench_pipeline.noise.spectral_degrees import Degrees, degrees_of_model
+from imubench_pipeline.noise.spectral_degrees import Degrees, compute_degrees_of_freedom
 
 _MIN_CLUSTERS = 100
 _MIN_TAU_TIMES_BAND = 1.0  # Below it the curve contains frequencies that were not fitted
 
 
-def with_fitted_limits(
+def add_fitted_limits(
     curve: AllanCurve,
     likelihood: Likelihood,
     segments: tuple[Span, ...] | None = None,
@@ -43,10 +43,10 @@ def with_fitted_limits(
     chosen = likelihood.candidates[0]
     rate = curve.rate
     sinusoids = [line.term for line in likelihood.lines if line.narrow]
-    model = replace(model_of(chosen.maximum), sinusoids=sinusoids)
+    model = replace(make_noise_model(chosen.maximum), sinusoids=sinusoids)
 
     def degrees_at(model: NoiseModel, points: NDArray[np.bool_]) -> Degrees:
-        return degrees_of_model(
+        return compute_degrees_of_freedom(
             model,
             rate,
             curve.cluster_size[points],

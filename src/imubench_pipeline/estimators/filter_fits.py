@@ -10,11 +10,11 @@ import numpy as np
 from scipy.optimize import brentq, minimize_scalar
 
 from imubench_pipeline.estimators.estimate import SIGMAS
-from imubench_pipeline.estimators.goodness import goodness
+from imubench_pipeline.estimators.goodness import assess_goodness_of_fit
 from imubench_pipeline.estimators.low_pass import BOXCAR_CUTOFF_LENGTH, Filter, Frequencies, Kind
 from imubench_pipeline.estimators.spectrum import Spectrum
-from imubench_pipeline.estimators.whittle import COARSE, Behind, Terms, Whittle, whittle_of
-from imubench_pipeline.estimators.whittle_kernels import TOLERANCE, best_powers
+from imubench_pipeline.estimators.whittle import COARSE, Behind, Terms, Whittle, make_whittle
+from imubench_pipeline.estimators.whittle_kernels import TOLERANCE, fit_powers
 from imubench_pipeline.typing import Array
 
 _POINTS_PER_BIN = 6
@@ -121,7 +121,7 @@ def explains_bend(spectrum: Spectrum, fitted: Array, trial: FilterTrial) -> bool
     """Return whether a fit, its density of shape (b,), explains the bend of a filter."""
     bent = spectrum.frequency > min(0.1 * trial.cutoff, spectrum.frequency[-MIN_BINS])
     shown = spectrum.select(bent)
-    judged = goodness(
+    judged = assess_goodness_of_fit(
         shown.ordinates, shown.density, fitted[bent], shown.frequency, 2 + trial.floor
     )
     return judged.verdict == "explained"
@@ -133,7 +133,7 @@ class FilterFits:
     def __init__(self, spectrum: Spectrum) -> None:
         self.rate = spectrum.rate
         self.lowest = _MIN_CUTOFF * spectrum.rate
-        self.whittle: Whittle = whittle_of(
+        self.whittle: Whittle = make_whittle(
             spectrum, 0.5 * spectrum.rate, COARSE, shortest=MIN_PROCESS_SAMPLES / spectrum.rate
         )
         whittle = self.whittle
@@ -191,7 +191,7 @@ class FilterFits:
             MIN_PROCESS_SAMPLES / self.rate, _MIN_CORRELATION_RATIO / (2.0 * math.pi * trial.cutoff)
         )
         spectrum = self.whittle.spectrum
-        whittle = whittle_of(spectrum, 0.5 * self.rate, COARSE, shortest=shortest, behind=behind)
+        whittle = make_whittle(spectrum, 0.5 * self.rate, COARSE, shortest=shortest, behind=behind)
         own = 1 + trial.floor
         terms = [Terms(*alone) for alone in _UNFILTERED_MODELS]
         return min(
@@ -333,7 +333,7 @@ class FilterFits:
 
     def _fit_powers(self, columns: Array) -> tuple[Array, float]:
         norm = columns.mean(axis=0)
-        powers, _, cost = best_powers(
+        powers, _, cost = fit_powers(
             np.ascontiguousarray(columns / norm), self._bins, False, TOLERANCE
         )
         return powers / norm * self.whittle.scale, cost

@@ -28,8 +28,8 @@ from imubench_pipeline.estimators.whittle import (
     Maximum,
     Terms,
     Whittle,
-    model_of,
-    whittle_of,
+    make_noise_model,
+    make_whittle,
 )
 from imubench_pipeline.model.states import BandSource
 from imubench_pipeline.typing import Array
@@ -79,7 +79,9 @@ class FitSelection:
         behind = self.low_pass.behind if self.low_pass is not None else None
         behind = behind.select(bins) if behind is not None else None
         highest, shortest = self.band.highest, self.shortest
-        return whittle_of(spectrum.select(bins), highest, shapes, shortest=shortest, behind=behind)
+        return make_whittle(
+            spectrum.select(bins), highest, shapes, shortest=shortest, behind=behind
+        )
 
     def needs_cutoff_per_model(self, spectrum: Spectrum, times: Array) -> bool:
         """Return whether the cut-off must be fitted for each noise model separately.
@@ -178,8 +180,8 @@ def select_for_fit(
 ) -> FitSelection:
     """Find the spectral lines and the low-pass filter, and select the bins to fit.
 
-    ``line_spectra`` are those of `imubench_pipeline.estimators.spectrum.spectra`; ``band`` is the
-    highest frequency to use, Hz, by default all, behind the low-pass filter if one is found;
+    ``line_spectra`` are those of `imubench_pipeline.estimators.spectrum.compute_spectra`; ``band``
+    is the highest frequency to use, Hz, by default all, behind the low-pass filter if one is found;
     ``bandwidth`` the configured cut-off of the sensor's filter, Hz, if known; ``resolution`` the
     step of the register, SI, or 0.
     """
@@ -188,12 +190,15 @@ def select_for_fit(
     below = spectrum.upper <= start
     if below.sum() < MIN_BINS:
         below = all_bins
-    maximum = whittle_of(spectrum.select(below), start, COARSE).maximum(Terms("NFK", 1))
+    maximum = make_whittle(spectrum.select(below), start, COARSE).maximum(Terms("NFK", 1))
     low = spectrum.block > 1
     crossover = float(spectrum.upper[low].max()) if low.any() else 0.0
-    lines, clear = find_lines(line_spectra, model_of(maximum), spectrum.rate, crossover), all_bins
+    lines, clear = (
+        find_lines(line_spectra, make_noise_model(maximum), spectrum.rate, crossover),
+        all_bins,
+    )
     if lines:
-        density = whittle_of(spectrum, 0.5 * spectrum.rate, COARSE).density(maximum)
+        density = make_whittle(spectrum, 0.5 * spectrum.rate, COARSE).density(maximum)
         clear = mask_lines(spectrum, lines, density)
     shortest = MIN_PROCESS_SAMPLES / spectrum.rate
     if band is not None:
@@ -215,7 +220,7 @@ def select_for_fit(
     return FitSelection(lines, clear, used, Band(highest, source), low_pass, shortest, bandwidth)
 
 
-def sensor_density(
+def estimate_sensor_density(
     frame: FitSelection,
     maximum: Maximum,
     posterior: Posterior,

@@ -26,7 +26,9 @@ class Goodness:
     where: str  # the frequencies at which the spectrum is furthest from the model
 
 
-def goodness(nu: Array, data: Array, density: Array, frequency: Array, parameters: int) -> Goodness:
+def assess_goodness_of_fit(
+    nu: Array, data: Array, density: Array, frequency: Array, parameters: int
+) -> Goodness:
     """Test the standardised residuals of a binned spectrum, its columns of shape (b,).
 
     Two tests, each at half the chance: the deviance sum nu (r - 1 - log r) with r = I / S, measured

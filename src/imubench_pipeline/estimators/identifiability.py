@@ -17,13 +17,13 @@ from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.typing import Array
 
 TARGET_RELATIVE_ERROR = 0.1
-"""Relative standard deviation at which `durations_needed` calls a parameter known."""
+"""Relative standard deviation at which `find_durations_needed` calls a parameter known."""
 
 _MIN_DURATION_RATIO, _MAX_DURATION_RATIO = 1e-4, 1e4
 _DURATIONS_PER_DECADE = 6
 
 
-def relative_errors(whittle: Whittle, maximum: Maximum) -> Array:
+def compute_relative_bounds(whittle: Whittle, maximum: Maximum) -> Array:
     """Return the Cramér-Rao bound of each parameter of a fit, relative to it.
 
     Shape (m,): the parameters in the order of `Maximum.powers`, then T_B, then R; infinite for a
@@ -44,7 +44,7 @@ def relative_errors(whittle: Whittle, maximum: Maximum) -> Array:
     return bounds
 
 
-def ideal_spectrum(rate: float, duration: float, highest: float) -> Spectrum:
+def make_ideal_spectrum(rate: float, duration: float, highest: float) -> Spectrum:
     """Return the bins of a gapless log of a duration, up to a frequency, without data.
 
     Raises
@@ -80,10 +80,12 @@ def ideal_spectrum(rate: float, duration: float, highest: float) -> Spectrum:
     )
 
 
-def bounds_of(model: NoiseModel, rate: float, duration: float, highest: float) -> dict[str, float]:
+def compute_cramer_rao_bounds(
+    model: NoiseModel, rate: float, duration: float, highest: float
+) -> dict[str, float]:
     """Return the Cramér-Rao bounds of a model's parameters in a log, relative to their values.
 
-    The keys are those of `parameter_names`. Rate and highest frequency used are in Hz.
+    The keys are those of `list_parameter_names`. Rate and highest frequency used are in Hz.
     """
     values = {"Q": model.Q, "N": model.N, "F": 0.0 if model.T_B else model.B, "K": model.K}
     letters = "".join(letter for letter, value in values.items() if value > 0)
@@ -94,11 +96,11 @@ def bounds_of(model: NoiseModel, rate: float, duration: float, highest: float) -
     times = np.array([time for _, time in processes], dtype=np.float64)
     terms = Terms(letters, len(processes), model.R != 0)
     maximum = Maximum(terms, np.array(powers), times, model.R, 0.0)
-    errors = _compute_relative_errors(ideal_spectrum(rate, duration, highest), maximum)
-    return dict(zip(parameter_names(terms), errors, strict=True))
+    errors = _compute_relative_errors(make_ideal_spectrum(rate, duration, highest), maximum)
+    return dict(zip(list_parameter_names(terms), errors, strict=True))
 
 
-def parameter_names(terms: Terms) -> list[str]:
+def list_parameter_names(terms: Terms) -> list[str]:
     """Return the names of the parameters in the order of the bounds: a second B is B 2."""
     names = ["B" if letter == "F" else letter for letter in terms.linear]
     offset = "F" in terms.linear
@@ -107,13 +109,13 @@ def parameter_names(terms: Terms) -> list[str]:
     return names + ["R"] * terms.ramp
 
 
-def durations_needed(
+def find_durations_needed(
     maximum: Maximum, rate: float, duration: float, highest: float
 ) -> list[float | None]:
     """Return the log duration, s, that determines each parameter to `TARGET_RELATIVE_ERROR`.
 
-    In the order of `relative_errors`; None where 10,000 times the duration does not suffice. Rate
-    and highest frequency used are in Hz.
+    In the order of `compute_relative_bounds`; None where 10,000 times the duration does not
+    suffice. Rate and highest frequency used are in Hz.
     """
     lengths = np.geomspace(
         duration * _MIN_DURATION_RATIO,
@@ -126,14 +128,14 @@ def durations_needed(
     def excess(place: int) -> Array:
         if place not in excesses:
             errors = _compute_relative_errors(
-                ideal_spectrum(rate, float(lengths[place]), highest), maximum
+                make_ideal_spectrum(rate, float(lengths[place]), highest), maximum
             )
             excesses[place] = np.log(errors / TARGET_RELATIVE_ERROR)
         return excesses[place]
 
     return [
         _find_crossing(np.log(lengths), excess, excesses, number)
-        for number in range(len(parameter_names(maximum.terms)))
+        for number in range(len(list_parameter_names(maximum.terms)))
     ]
 
 
@@ -186,7 +188,7 @@ def _compute_relative_errors(spectrum: Spectrum, maximum: Maximum) -> Array:
     """Return the relative Cramér-Rao bounds of a model, given the bins of a spectrum."""
     times = maximum.times if len(maximum.times) else np.array([1.0])
     whittle = _UntabulatedWhittle(spectrum, float(times[0]) / 2.0, float(times[-1]) * 2.0)
-    return relative_errors(whittle, maximum)
+    return compute_relative_bounds(whittle, maximum)
 
 
 class _UntabulatedWhittle(Whittle):

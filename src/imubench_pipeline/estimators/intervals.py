@@ -10,7 +10,7 @@ import numpy as np
 
 from imubench_pipeline.estimators.estimate import FAMILY, Estimate, Parameter
 from imubench_pipeline.estimators.frame import FitSelection
-from imubench_pipeline.estimators.identifiability import durations_needed, parameter_names
+from imubench_pipeline.estimators.identifiability import find_durations_needed, list_parameter_names
 from imubench_pipeline.estimators.model_choice import Candidate
 from imubench_pipeline.estimators.posterior import Posterior
 from imubench_pipeline.estimators.whittle import Terms, Whittle
@@ -21,7 +21,7 @@ _AT_BOUND = 0.985
 _ABOUT_AS_GOOD = 2.0
 
 
-def with_upper_limits(
+def add_upper_limits(
     estimate: Estimate,
     alike: Sequence[Candidate],
     wider: Sequence[Candidate],
@@ -38,21 +38,23 @@ def with_upper_limits(
     for name in ("K", "B"):
         if parameters[name].status != "absent":
             continue
-        having = [c.terms for c in (*wider, *alike) if name in parameter_names(c.terms)]
+        having = [c.terms for c in (*wider, *alike) if name in list_parameter_names(c.terms)]
         if not having:
             continue
         upper = max(float(np.quantile(_draws_of(name, terms, draws), 0.975)) for terms in having)
         good = []
         for other in alike[1:]:
-            powers = dict(zip(parameter_names(other.terms), other.maximum.powers, strict=False))
-            if as_good(other, alike[0]) and powers.get(name, 0.0) > 0.0:
+            powers = dict(
+                zip(list_parameter_names(other.terms), other.maximum.powers, strict=False)
+            )
+            if is_as_good(other, alike[0]) and powers.get(name, 0.0) > 0.0:
                 good.append(other)
         if not good:
             parameters[name] = Parameter(None, "absent", texts.absent_below(), 0.0, upper)
             continue
         reason = texts.models_alike([c.terms.name for c in good], alike[0].terms.name)
         parameters[name] = Parameter(None, "not_identified", reason, 0.0, upper)
-        timed = [c.terms for c in good if "T_B" in parameter_names(c.terms)]
+        timed = [c.terms for c in good if "T_B" in list_parameter_names(c.terms)]
         if name == "B" and timed:
             drawn = [_draws_of("T_B", terms, draws) for terms in timed]
             low = min(float(np.quantile(times, 0.025)) for times in drawn)
@@ -61,7 +63,7 @@ def with_upper_limits(
     return replace(estimate, parameters=parameters)
 
 
-def as_good(other: Candidate, chosen: Candidate) -> bool:
+def is_as_good(other: Candidate, chosen: Candidate) -> bool:
     """Return whether a model is about as good as the chosen one: by AIC, or hardly worse by BIC.
 
     A difference of 2 is not worth more than a bare mention (R. Kass and A. Raftery, J. Am. Stat.
@@ -85,11 +87,11 @@ def describe(
     ways, and the median is a fifth nearer to the truth than a single model where K is poorly known.
     """
     maximum = chosen.maximum
-    names = parameter_names(maximum.terms)
+    names = list_parameter_names(maximum.terms)
     values = [*np.sqrt(maximum.powers), *maximum.times] + [maximum.ramp] * maximum.terms.ramp
     if "N" in names:
         values[names.index("N")] *= math.sqrt(frame.folding)
-    needed = durations_needed(
+    needed = find_durations_needed(
         maximum, whittle.spectrum.rate, float(whittle.spectrum.duration), frame.band.highest
     )
     described: dict[str, Parameter] = {}
@@ -97,7 +99,7 @@ def describe(
         # The interval of the chosen model lies inside: AIC, against a model that fits as well,
         # prefers a process as slow as a walk to the walk.
         own = [(_draws_of(name, chosen.terms, draws), 1.0)]
-        lower, upper = mixture_limits(_over_models(name, chosen, alike, draws), own)
+        lower, upper = compute_mixture_limits(_over_models(name, chosen, alike, draws), own)
         if value == 0.0:
             described[name] = Parameter(None, "absent", texts.absent_below(), 0.0, upper)
             continue
@@ -113,7 +115,7 @@ def describe(
     if "K" in described and described["K"].checked().status == "ok":
         weighted_draws = _over_models("K", chosen, alike, draws)
         if len(weighted_draws) > 1:
-            median = mixture_quantile(weighted_draws, 0.5)
+            median = compute_mixture_quantile(weighted_draws, 0.5)
             described["K"] = replace(described["K"], value=median)
     for number in ("", " 2"):
         if f"B{number}" in described and described[f"B{number}"].status == "absent":
@@ -134,7 +136,7 @@ def _over_models(
     """Return the draws of a parameter in each model in which it means the same, with weights."""
 
     def is_comparable(terms: Terms, other: Terms) -> bool:
-        if name not in parameter_names(other):
+        if name not in list_parameter_names(other):
             return False
         # One bias instability is one level, flicker or not; of several each has its own.
         single = name == "B" and sum(terms.biases) == sum(other.biases) == 1
@@ -147,7 +149,7 @@ def _over_models(
     ]
 
 
-def mixture_quantile(parts: Sequence[tuple[Array, float]], level: float) -> float:
+def compute_mixture_quantile(parts: Sequence[tuple[Array, float]], level: float) -> float:
     """Return a quantile of draws that come from several models, each with its weight."""
     if len(parts) == 1:
         return float(np.quantile(parts[0][0], level))  # without the sorting
@@ -159,13 +161,13 @@ def mixture_quantile(parts: Sequence[tuple[Array, float]], level: float) -> floa
     return float(values[order][min(int(place), len(values) - 1)])
 
 
-def mixture_limits(
+def compute_mixture_limits(
     parts: Sequence[tuple[Array, float]], own: Sequence[tuple[Array, float]]
 ) -> tuple[float, float]:
     """Return the 95 % limits of draws of several models; those of one of them lie inside."""
     return (
-        min(mixture_quantile(parts, 0.025), mixture_quantile(own, 0.025)),
-        max(mixture_quantile(parts, 0.975), mixture_quantile(own, 0.975)),
+        min(compute_mixture_quantile(parts, 0.025), compute_mixture_quantile(own, 0.025)),
+        max(compute_mixture_quantile(parts, 0.975), compute_mixture_quantile(own, 0.975)),
     )
 
 
@@ -173,4 +175,4 @@ def _draws_of(name: str, terms: Terms, draws: dict[Terms, Posterior]) -> Array:
     """Return the draws of a parameter of a model."""
     posterior = draws[terms]
     columns = np.column_stack([posterior.parameters, posterior.times, posterior.ramps])
-    return np.asarray(columns[:, parameter_names(terms).index(name)])
+    return np.asarray(columns[:, list_parameter_names(terms).index(name)])

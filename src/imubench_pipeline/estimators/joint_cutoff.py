@@ -36,7 +36,14 @@ from imubench_pipeline.estimators.filter_fits import (
 )
 from imubench_pipeline.estimators.model_choice import Candidate
 from imubench_pipeline.estimators.spectrum import Spectrum
-from imubench_pipeline.estimators.whittle import COARSE, Behind, Maximum, Terms, Whittle, whittle_of
+from imubench_pipeline.estimators.whittle import (
+    COARSE,
+    Behind,
+    Maximum,
+    Terms,
+    Whittle,
+    make_whittle,
+)
 from imubench_pipeline.words.reasons import spectra as texts
 
 _MAX_LOG_SHIFT = math.log(2.0)  # Maximum change of log f_c by a joint fit
@@ -149,7 +156,7 @@ class _Joint:
         self._spectrum = spectrum.select(clear)
         self._gains = BinGains(self._spectrum)
         shortest = MIN_PROCESS_SAMPLES / spectrum.rate
-        self._plain = whittle_of(self._spectrum, 0.5 * spectrum.rate, COARSE, shortest=shortest)
+        self._plain = make_whittle(self._spectrum, 0.5 * spectrum.rate, COARSE, shortest=shortest)
         self._states: dict[tuple[FilterTrial, float, Terms], _State] = {}
 
     def behind(self, gains: BinGains, trial: FilterTrial, floor: float = 0.0) -> Behind:

@@ -21,9 +21,9 @@ from imubench_pipeline.estimators.limits import add_limits
 from imubench_pipeline.noise import (
     PEAK_TAU,
     NoiseModel,
-    bias_instability,
-    gauss_markov_shape,
-    sampled_gauss_markov_shape,
+    compute_bias_instability,
+    evaluate_gauss_markov_shape,
+    evaluate_sampled_shape,
 )
 from imubench_pipeline.noise.terms.gauss_markov import CORRELATION_TIMES
 from imubench_pipeline.typing import Array
@@ -218,12 +218,12 @@ class _Search:
         """Return the shape of the process at each tau, one row for each T_B."""
         if self._sampled:
             return np.array([self._shape(T_B) for T_B in times])
-        return np.asarray(gauss_markov_shape(self._tau, times[:, None]))
+        return np.asarray(evaluate_gauss_markov_shape(self._tau, times[:, None]))
 
     def _shape(self, T_B: float) -> Array:
         if self._sampled:
-            return sampled_gauss_markov_shape(self._n, self._interval, T_B)
-        return gauss_markov_shape(self._tau, T_B)
+            return evaluate_sampled_shape(self._n, self._interval, T_B)
+        return evaluate_gauss_markov_shape(self._tau, T_B)
 
     def _solved(self, shape: Array) -> tuple[Array, float]:
         """Return S_N, S_B, S_K that fit best with a process, and the root of the cost."""
@@ -270,7 +270,7 @@ class _Search:
             for name, part in parts.items()
         }
         absent = Parameter(None, "absent", texts.fit_without_term())
-        bias = Parameter(bias_instability(drive, T_B)) if present["B"] else absent
+        bias = Parameter(compute_bias_instability(drive, T_B)) if present["B"] else absent
         time = Parameter(T_B) if present["B"] else absent
         at_end = None
         if T_B > self.longest * 0.99:

@@ -14,10 +14,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from imubench_pipeline.allan import of_blocks
-from imubench_pipeline.allan.phase import Span, gaps_of, spans_of
+from imubench_pipeline.allan.phase import Span, count_gaps, list_spans
 from imubench_pipeline.estimators import least_squares
 from imubench_pipeline.estimators.band import Band
-from imubench_pipeline.estimators.curve_bias import add_curve_figures, averaging_times
+from imubench_pipeline.estimators.curve_bias import add_curve_figures, make_averaging_times
 from imubench_pipeline.estimators.cutoff import Cutoff
 from imubench_pipeline.estimators.doubts import add_doubts, describe_drift_alternative
 from imubench_pipeline.estimators.estimate import (
@@ -34,14 +34,14 @@ from imubench_pipeline.estimators.estimate import (
 from imubench_pipeline.estimators.frame import (
     MIN_BINS,
     FitSelection,
+    estimate_sensor_density,
     select_for_fit,
-    sensor_density,
 )
-from imubench_pipeline.estimators.intervals import describe, with_upper_limits
+from imubench_pipeline.estimators.intervals import add_upper_limits, describe
 from imubench_pipeline.estimators.joint_cutoff import select_joint_models
 from imubench_pipeline.estimators.lines import Line, select_sinusoids
 from imubench_pipeline.estimators.missing import (
-    block_means,
+    average_blocks,
     draw_slow_part,
     fill_missing,
     split_at_gaps,
@@ -58,16 +58,16 @@ from imubench_pipeline.estimators.posterior import (
     draw_jointly,
     sample,
 )
-from imubench_pipeline.estimators.spectrum import Spectrum, spectra
+from imubench_pipeline.estimators.spectrum import Spectrum, compute_spectra
 from imubench_pipeline.estimators.white_level import (
     WhiteStretch,
     count_fast_processes,
     describe_white_level,
     find_white_stretch,
-    merged_maximum,
-    merged_posterior,
+    merge_fast_draws,
+    merge_fast_processes,
 )
-from imubench_pipeline.estimators.whittle import Terms, Whittle, model_of
+from imubench_pipeline.estimators.whittle import Terms, Whittle, make_noise_model
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.typing import Array
 from imubench_pipeline.words.reasons import spectra as texts
@@ -166,7 +166,7 @@ def fit(
     if not present.any():
         raise ValueError(f"none of the {len(values)} samples is present")
     holes = not bool(present.all())
-    gaps = gaps_of([values])
+    gaps = count_gaps([values])
     curve = of_blocks([values], len(values), rate, holes=holes, gaps=gaps, segments=segments)
     return fit_blocks(
         lambda: [values],
@@ -212,17 +212,17 @@ def fit_blocks(
     rate, segments, band, bandwidth, resolution, rng
         As in `fit`.
     """
-    spans = spans_of(segments, samples)
+    spans = list_spans(segments, samples)
     select = partial(select_for_fit, band=band, bandwidth=bandwidth, resolution=resolution)
     if not holes:
-        spectrum, lines = spectra(blocks(), samples, rate, spans)
+        spectrum, lines = compute_spectra(blocks(), samples, rate, spans)
         return fit_spectrum(spectrum, select(spectrum, lines), rng=rng, stretch=stretch)
-    means = block_means(blocks(), spans)
+    means = average_blocks(blocks(), spans)
     parts = split_at_gaps(means, spans)
     if not parts:
         raise ValueError(f"none of the {samples} samples is present")
     present = float(means.count.sum()) / sum(stop - start for start, stop in parts)
-    gaps = gaps_of(blocks())
+    gaps = count_gaps(blocks())
     curve = of_blocks(blocks(), samples, rate, holes=True, gaps=gaps, segments=spans)
     try:
         model = least_squares.fit(curve).model
@@ -235,13 +235,15 @@ def fit_blocks(
     for number in range(1, rounds + 1):
         path = draw_slow_part(means, parts, model, rate, rng)
         complete = fill_missing(blocks(), path, model, rate, rng)
-        spectrum, lines = spectra(complete, samples, rate, parts)
+        spectrum, lines = compute_spectra(complete, samples, rate, parts)
         spectrum = replace(spectrum, ordinates=spectrum.ordinates * present)
         frame = select(spectrum, lines)
         if frame.used.sum() < MIN_BINS:
             break
         if number < rounds:
-            model = model_of(compare_models(frame.whittle(spectrum), quantization=False)[0].maximum)
+            model = make_noise_model(
+                compare_models(frame.whittle(spectrum), quantization=False)[0].maximum
+            )
     return fit_spectrum(spectrum, frame, rng=rng, stretch=stretch)
 
 
@@ -271,7 +273,7 @@ def fit_spectrum(
     }
     of_data = _InTheLog(whittle, frame, in_the_log, stretch, alike, wider)
     estimate = of_data.estimate("likelihood")
-    sensor = sensor_density(frame, chosen.maximum, posteriors[chosen.terms], spectrum, rng)
+    sensor = estimate_sensor_density(frame, chosen.maximum, posteriors[chosen.terms], spectrum, rng)
     if sensor is not None:
         estimate = replace(estimate, parameters={**estimate.parameters, SENSOR: sensor})
     of_papers = _InTheLog(whittle, frame, in_the_log, stretch, [papers], [])
@@ -312,7 +314,7 @@ class _InTheLog:
         self._number = count_fast_processes(alike[0].maximum, frame.folding, stretch)
         self._level = 1.0  # of the curve over N with all of those processes
         if stretch is not None and np.any(self._fastest < BROADBAND_TIME):
-            merged = merged_maximum(alike[0].maximum, self._number, frame.folding)
+            merged = merge_fast_processes(alike[0].maximum, self._number, frame.folding)
             self._level = stretch.level / (merged.parameter("N") * math.sqrt(frame.folding))
         self.draws: dict[Terms, Posterior] = {}
         self._posteriors = posteriors
@@ -326,21 +328,21 @@ class _InTheLog:
             terms, times = candidate.terms, candidate.maximum.times
             fast = int(np.sum(times < BROADBAND_TIME))
             number, level = min(self._number, fast), self._level if fast else 1.0
-            maximum = merged_maximum(candidate.maximum, number, self._frame.folding, level)
+            maximum = merge_fast_processes(candidate.maximum, number, self._frame.folding, level)
             if maximum.terms in merged:
                 continue
             merged.add(maximum.terms)
             if maximum.terms not in self.draws:
                 posterior = self._posteriors[terms]
-                self.draws[maximum.terms] = merged_posterior(posterior, terms, number, level)
+                self.draws[maximum.terms] = merge_fast_draws(posterior, terms, number, level)
             yield replace(candidate, maximum=maximum)
 
     def estimate(self, method: str) -> Estimate:
         """Return the parameters, the figures of the curve, and their intervals."""
         chosen, spectrum = self.alike[0], self._whittle.spectrum
         estimate = describe(method, self._whittle, chosen, self.alike, self.draws, self._frame)
-        estimate = with_upper_limits(estimate, self.alike, self.wider, self.draws)
-        tau = averaging_times(spectrum.rate, float(spectrum.length.max()))
+        estimate = add_upper_limits(estimate, self.alike, self.wider, self.draws)
+        tau = make_averaging_times(spectrum.rate, float(spectrum.length.max()))
         estimate = add_curve_figures(estimate, self.alike, self.wider, self.draws, tau)
         N, counted = estimate.parameters["N"], self._fastest[: self._number]
         reason = N.reason or describe_white_level(self._stretch, counted.tolist())

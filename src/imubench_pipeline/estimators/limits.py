@@ -20,14 +20,14 @@ from numpy.typing import NDArray
 from imubench_pipeline.allan import AllanCurve
 from imubench_pipeline.allan.confidence import equivalent_degrees
 from imubench_pipeline.estimators.curve_bias import (
-    averaging_times,
-    lowest_parameters,
-    lowest_point,
-    models_of,
+    convert_noise_model,
+    estimate_lowest_point,
+    find_lowest_point,
+    make_averaging_times,
 )
 from imubench_pipeline.estimators.estimate import BROADBAND_TIME, SIGMAS, Estimate, Parameter
 from imubench_pipeline.noise import NoiseModel
-from imubench_pipeline.noise.variance_covariance import variance_covariance
+from imubench_pipeline.noise.variance_covariance import compute_variance_covariance
 from imubench_pipeline.typing import Array
 from imubench_pipeline.words.reasons import curves as texts
 
@@ -121,7 +121,9 @@ def fit_errors(
     ]
     scale = np.sqrt(np.maximum(np.array(whole) / curve.edf[used], 1.0))
     scale = scale / model.allan_variance(curve.tau[used], rate)
-    covariance = variance_covariance(model, rate, curve.samples, sizes) * np.outer(scale, scale)
+    covariance = compute_variance_covariance(model, rate, curve.samples, sizes) * np.outer(
+        scale, scale
+    )
     return Errors(names, gain @ covariance @ gain.T)
 
 
@@ -228,20 +230,22 @@ def _estimate_lowest_point(
     model: NoiseModel, errors: Errors, curve: AllanCurve
 ) -> dict[str, Parameter]:
     """Return the lowest point of the fitted curve, with limits from the errors of the fit."""
-    tau = averaging_times(curve.rate, curve.samples / curve.rate)
-    best = models_of(model)
+    tau = make_averaging_times(curve.rate, curve.samples / curve.rate)
+    best = convert_noise_model(model)
     at = [getattr(model, name) for name in errors.names]
-    lowest = lowest_parameters(best, [], tau)
+    lowest = estimate_lowest_point(best, [], tau)
     finite = bool(np.isfinite(errors.covariance).all())
     if not finite or any(parameter.value is None for parameter in lowest.values()):
         return lowest
     ends = []
     for sign in (-1.0, 1.0):
         moved = [
-            models_of(replace(model, **{name: value * math.exp(sign * _LOG_PARAMETER_STEP)}))
+            convert_noise_model(
+                replace(model, **{name: value * math.exp(sign * _LOG_PARAMETER_STEP)})
+            )
             for name, value in zip(errors.names, at, strict=True)
         ]
-        ends.append([lowest_point(models, tau)[:2] for models in moved])
+        ends.append([find_lowest_point(models, tau)[:2] for models in moved])
     slopes = np.log(np.array(ends[1]) / np.array(ends[0]))[:, :, 0].T / (2.0 * _LOG_PARAMETER_STEP)
     described = {}
     for (name, parameter), slope in zip(lowest.items(), slopes, strict=True):

@@ -60,7 +60,7 @@ class SlowPath:
         return np.interp(samples, self.sample, self.value)
 
 
-def block_means(blocks: Iterable[Array], segments: Sequence[Span]) -> BlockMeans:
+def average_blocks(blocks: Iterable[Array], segments: Sequence[Span]) -> BlockMeans:
     """Return the means of blocks of a log with missing samples (NaN), in one pass."""
     begin = np.concatenate([np.arange(start, stop, BLOCK_SAMPLES) for start, stop in segments])
     ends = np.concatenate([np.full(-(-(b - a) // BLOCK_SAMPLES), b) for a, b in segments])
@@ -94,7 +94,7 @@ def yield_present_samples(
 
 
 def split_at_gaps(means: BlockMeans, segments: Sequence[Span]) -> tuple[Span, ...]:
-    """Divide the segments of `block_means` at gaps that are too long to fill; trim their ends."""
+    """Divide segments at gaps that are too long to fill, and trim their ends."""
     parts: list[Span] = []
     for start, stop in segments:
         chosen = means.within(start, stop)

@@ -9,7 +9,7 @@ from functools import partial
 
 import numpy as np
 
-from imubench_pipeline.estimators.goodness import Goodness, goodness
+from imubench_pipeline.estimators.goodness import Goodness, assess_goodness_of_fit
 from imubench_pipeline.estimators.whittle import Maximum, Terms, Whittle
 from imubench_pipeline.typing import Array
 from imubench_pipeline.words.reasons import estimates as texts
@@ -93,7 +93,9 @@ def compare_models(whittle: Whittle, *, quantization: bool) -> list[Candidate]:
     for maximum in tried.values():
         parameters, spectrum = maximum.terms.parameters, whittle.spectrum
         data, density = whittle.data(maximum), whittle.density(maximum)
-        tested = goodness(spectrum.ordinates, data, density, spectrum.frequency, parameters)
+        tested = assess_goodness_of_fit(
+            spectrum.ordinates, data, density, spectrum.frequency, parameters
+        )
         aic = 2.0 * (maximum.cost + parameters)
         candidates.append(Candidate(maximum, bic(maximum), aic, math.nan, math.nan, tested))
     return rescore(candidates, {})
@@ -120,7 +122,7 @@ def rescore(candidates: Sequence[Candidate], gained: Mapping[Terms, float]) -> l
     gains = [gained.get(replace(candidate.terms, ramp=False), 0.0) for candidate in candidates]
     bics = np.array([candidate.bic for candidate in candidates]) - 2.0 * np.array(gains)
     aics = np.array([candidate.aic for candidate in candidates]) - 2.0 * np.array(gains)
-    weights, akaike_weights = information_weights(bics), information_weights(aics)
+    weights, akaike_weights = compute_information_weights(bics), compute_information_weights(aics)
     return [
         replace(
             candidates[i],
@@ -136,7 +138,7 @@ def rescore(candidates: Sequence[Candidate], gained: Mapping[Terms, float]) -> l
 MIN_AKAIKE_WEIGHT = 0.05  # Candidates with a smaller Akaike weight do not enter the intervals
 
 
-def information_weights(scores: Array) -> Array:
+def compute_information_weights(scores: Array) -> Array:
     """Return the weights of models from their scores, BIC or AIC: e^(-score/2), normalised to 1."""
     weights = np.exp(-0.5 * (scores - scores.min()))
     return np.asarray(weights / weights.sum())

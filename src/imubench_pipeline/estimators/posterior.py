@@ -26,9 +26,13 @@ from imubench_pipeline.estimators.model_choice import (
     WALK_LIKE_TIME_FRACTION,
     Candidate,
 )
-from imubench_pipeline.estimators.posterior_kernels import chain, log_posteriors, mode_at
+from imubench_pipeline.estimators.posterior_kernels import (
+    compute_log_posteriors,
+    find_mode,
+    run_metropolis_chain,
+)
 from imubench_pipeline.estimators.whittle import Maximum, Terms, Whittle
-from imubench_pipeline.estimators.whittle_kernels import Problem, shape_at
+from imubench_pipeline.estimators.whittle_kernels import Problem, interpolate_shape
 from imubench_pipeline.typing import Array
 
 MAX_DRAWS = 80_000  # Default number of draws; a tail of 2.5 % has 2,000 of them
@@ -79,7 +83,7 @@ def sample(
     else:
         effective = math.nan
         start, covariance = target.start()
-        amplitudes = chain(start, covariance, rng, draws, target.problem)
+        amplitudes = run_metropolis_chain(start, covariance, rng, draws, target.problem)
     return target.posterior(amplitudes, effective, rng)
 
 
@@ -118,7 +122,7 @@ class _Target:
         result = np.full(len(points), -np.inf)
         inside = (points[:, : self.terms] > 0.0).all(axis=1)
         if inside.any():
-            values, _, _ = log_posteriors(self.amplitudes(points[inside]), self.problem)
+            values, _, _ = compute_log_posteriors(self.amplitudes(points[inside]), self.problem)
             # d log sinh z = coth z dz
             result[inside] = values - np.log(np.tanh(points[inside, : self.terms])).sum(axis=1)
         return result
@@ -150,7 +154,7 @@ class _Target:
         if self.terms > 1:
             components += [self._make_weak_component(term) for term in self.weak]
         means, scales = (np.array(part) for part in zip(*components, strict=True))
-        values, _, _ = log_posteriors(means, self.problem)
+        values, _, _ = compute_log_posteriors(means, self.problem)
         mass = values + 0.5 * np.linalg.slogdet(scales)[1]
         weights = np.exp(mass - mass.max())
         weights /= weights.sum()
@@ -204,7 +208,7 @@ class _Target:
         self, start: Array, places: Array, width: float, problem: Problem
     ) -> tuple[Array, Array]:
         """Return mean and covariance of the normal approximation for some of the terms."""
-        log_amplitudes, curvature, parts = mode_at(start, places, problem)
+        log_amplitudes, curvature, parts = find_mode(start, places, problem)
         p, g, linear = len(start), len(places), problem.fixed.shape[1]
         information = np.zeros((p + g, p + g))
         information[:p, :p] = curvature
@@ -215,8 +219,8 @@ class _Target:
             for k, place in enumerate(places.tolist()):
                 low = max(place - 0.5 * table.step, table.first)
                 high = min(place + 0.5 * table.step, last)
-                shape_at(low, table, ends[0])
-                shape_at(high, table, ends[1])
+                interpolate_shape(low, table, ends[0])
+                interpolate_shape(high, table, ends[1])
                 slope = np.log(ends[1] / ends[0]) / (high - low)
                 slopes[:, k] = 0.5 * parts[:, linear + k] * slope
             half = 0.5 * self.problem.bins.nu[:, None]
@@ -232,7 +236,7 @@ class _Target:
         if self.maximum.terms.ramp:
             # Given the noise, R is normal.
             _, first, again = np.unique(amplitudes[:, 0], return_index=True, return_inverse=True)
-            _, best, information = log_posteriors(amplitudes[first], self.problem)
+            _, best, information = compute_log_posteriors(amplitudes[first], self.problem)
             ramps = best[again] + rng.standard_normal(len(amplitudes)) / np.sqrt(information[again])
         times = np.exp(amplitudes[:, p:])
         order = np.argsort(times, axis=1)

@@ -12,7 +12,12 @@ import math
 import numpy as np
 from numba import njit
 
-from imubench_pipeline.estimators.whittle_kernels import Bins, Problem, cost_of, shape_at
+from imubench_pipeline.estimators.whittle_kernels import (
+    Bins,
+    Problem,
+    compute_cost,
+    interpolate_shape,
+)
 from imubench_pipeline.typing import Array
 
 _MOST_STEPS = 40
@@ -34,7 +39,7 @@ def _ramp_at(bins: Bins, model: Array) -> tuple[float, float]:
 
 
 @njit(cache=True)
-def log_posterior(
+def compute_log_posterior(
     point: Array, problem: Problem, model: Array, shape: Array
 ) -> tuple[float, float, float]:
     """Return the log posterior at a point, the best R and its information; model is set."""
@@ -50,11 +55,11 @@ def log_posterior(
         where = point[linear + processes + g]
         if where < table.first or where > last:
             return -np.inf, 0.0, 0.0
-        shape_at(where, table, shape)
+        interpolate_shape(where, table, shape)
         power = math.exp(2.0 * point[linear + g])
         for i in range(b):
             model[i] += power * shape[i]
-    value = -cost_of(bins.nu, bins.density, model)
+    value = -compute_cost(bins.nu, bins.density, model)
     for j in range(linear + processes):
         value += point[j]  # flat in the amplitude a is e^x in x = log a
     if not with_ramp:
@@ -66,17 +71,17 @@ def log_posterior(
 
 
 @njit(cache=True)
-def log_posteriors(points: Array, problem: Problem) -> tuple[Array, Array, Array]:
-    """Return `log_posterior` at points, each of shape (n,)."""
+def compute_log_posteriors(points: Array, problem: Problem) -> tuple[Array, Array, Array]:
+    """Return `compute_log_posterior` at points, each of shape (n,)."""
     n = points.shape[0]
     values, best, information = np.empty(n), np.empty(n), np.empty(n)
     model, shape = np.empty(problem.bins.nu.size), np.empty(problem.bins.nu.size)
     for k in range(n):
-        values[k], best[k], information[k] = log_posterior(points[k], problem, model, shape)
+        values[k], best[k], information[k] = compute_log_posterior(points[k], problem, model, shape)
     return values, best, information
 
 
-def mode_at(start: Array, times: Array, problem: Problem) -> tuple[Array, Array, Array]:
+def find_mode(start: Array, times: Array, problem: Problem) -> tuple[Array, Array, Array]:
     """Return the mode of the log amplitudes for given log T_B, the curvature and D there.
 
     ``start`` holds log amplitudes; D_j, shape (b, p), is the density of a term over the density of
@@ -94,7 +99,7 @@ def mode_at(start: Array, times: Array, problem: Problem) -> tuple[Array, Array,
     columns, shape = np.empty((b, p)), np.empty(b)
     columns[:, :linear] = fixed
     for g, time in enumerate(times):
-        shape_at(time, table, shape)
+        interpolate_shape(time, table, shape)
         columns[:, linear + g] = shape
     x, best, step = start.copy(), -math.inf, np.zeros(p)
     gradient, curvature, parts = np.empty(p), np.eye(p), np.empty((b, p))
@@ -149,7 +154,7 @@ def _climb(
             data[i] = density[i]
             if with_ramp:
                 data[i] = max(density[i] - 2.0 * R * cross[i] + R * R * ramp[i], 0.0)
-        value = total - cost_of(nu, data, model)
+        value = total - compute_cost(nu, data, model)
         if value >= best:
             moved = True
             break
@@ -174,7 +179,7 @@ def _climb(
     return value
 
 
-def chain(
+def run_metropolis_chain(
     start: Array, covariance: Array, rng: np.random.Generator, draws: int, problem: Problem
 ) -> Array:
     """Return draws of a point, shape (draws, d).
@@ -191,7 +196,7 @@ def chain(
     normals = rng.standard_normal((number, d))
     log_uniforms = np.log(rng.random(number))
     x, mean, covariance = start.copy(), start.copy(), root @ root.T * d / 5.76
-    current, scale = log_posteriors(start[None], problem)[0][0], 1.0
+    current, scale = compute_log_posteriors(start[None], problem)[0][0], 1.0
     points = np.empty((number, d))
     # Learn the covariance, and the scale, while burning in only.
     for first in range(0, _BURN_IN, _ADAPT_EVERY):
@@ -228,7 +233,7 @@ def _walk(
         np.dot(root, normals[k], away)
         for a in range(d):
             proposal[a] = x[a] + scale * away[a]
-        proposed = log_posterior(proposal, problem, model, shape)[0]
+        proposed = compute_log_posterior(proposal, problem, model, shape)[0]
         if log_uniforms[k] < proposed - current:
             for a in range(d):
                 x[a] = proposal[a]

@@ -23,12 +23,12 @@ from imubench_pipeline.estimators.estimate import (
 from imubench_pipeline.model.estimates import AllanRow, DrawRow, ParameterRow
 from imubench_pipeline.settings.sensor import quantity_of
 from imubench_pipeline.tables import read
-from imubench_pipeline.tables.keys import Key, divided
+from imubench_pipeline.tables.keys import Key, split_table
 
 
-def allan_rows(key: Key, curve: AllanCurve) -> Iterator[AllanRow]:
+def make_allan_rows(key: Key, curve: AllanCurve) -> Iterator[AllanRow]:
     """Yield the rows of the table ``allan``."""
-    for i, limits in enumerate(limit_rows(curve)):
+    for i, limits in enumerate(make_limit_rows(curve)):
         yield AllanRow(
             **asdict(key),
             **limits,
@@ -39,7 +39,7 @@ def allan_rows(key: Key, curve: AllanCurve) -> Iterator[AllanRow]:
         )
 
 
-def limit_rows(curve: AllanCurve) -> Iterator[dict[str, Any]]:
+def make_limit_rows(curve: AllanCurve) -> Iterator[dict[str, Any]]:
     """Yield what every table of a measured curve says at each tau."""
     lower, upper = curve.limits(0.95)
     for i, tau in enumerate(curve.tau):
@@ -54,7 +54,9 @@ def limit_rows(curve: AllanCurve) -> Iterator[dict[str, Any]]:
         }
 
 
-def parameter_rows(key: Key, estimate: Estimate, *, recommended: bool) -> Iterator[ParameterRow]:
+def make_parameter_rows(
+    key: Key, estimate: Estimate, *, recommended: bool
+) -> Iterator[ParameterRow]:
     """Yield the rows of the table ``parameters``."""
     units = SI_UNITS[quantity_of(key.channel)]
     for component, name, parameter in estimate.components():
@@ -70,8 +72,8 @@ def parameter_rows(key: Key, estimate: Estimate, *, recommended: bool) -> Iterat
         )
 
 
-def draw_rows(key: Key, estimate: Estimate) -> Iterator[DrawRow]:
-    """Yield the rows of the table ``draws``; none of an estimate that has no joint draws."""
+def make_draw_rows(key: Key, estimate: Estimate) -> Iterator[DrawRow]:
+    """Yield the rows of the table ``read_draws``; none of an estimate that has no joint draws."""
     if estimate.draws is None:
         return
     for number, (first, further) in enumerate(
@@ -85,10 +87,10 @@ def draw_rows(key: Key, estimate: Estimate) -> Iterator[DrawRow]:
                 yield draw(component=component, B=B, T_B=T_B)
 
 
-def draws(path: Path) -> dict[tuple[str, str], JointDraws]:
-    """Read the table ``draws`` of a recording, by channel and method."""
+def read_draws(path: Path) -> dict[tuple[str, str], JointDraws]:
+    """Read the table ``read_draws`` of a recording, by channel and method."""
     joint_draws = {}
-    for (channel, method), table in divided(read("draws", [path]), "channel", "method").items():
+    for (channel, method), table in split_table(read("draws", [path]), "channel", "method").items():
         columns = {name: table[name].to_numpy().astype(np.float64) for name in FAMILY}
         draw, component = table["draw"].to_numpy(), table["component"].to_numpy()
         count = int(draw.max()) + 1
@@ -105,29 +107,29 @@ def draws(path: Path) -> dict[tuple[str, str], JointDraws]:
     return joint_draws
 
 
-def estimates(path: Path, joint: Path | None = None) -> dict[str, list[Estimate]]:
+def read_estimates(path: Path, joint: Path | None = None) -> dict[str, list[Estimate]]:
     """Read the estimates of a recording by channel, with joint draws if their path is given."""
     return _estimates(read("parameters", [path]), joint)
 
 
-def recommended_estimates(path: Path, joint: Path | None = None) -> dict[str, Estimate]:
-    """Read the recommended estimate of each channel (see `estimates`)."""
+def read_recommended_estimates(path: Path, joint: Path | None = None) -> dict[str, Estimate]:
+    """Read the recommended estimate of each channel (see `read_estimates`)."""
     table = read("parameters", [path])
     estimates_of_channels = _estimates(table.filter(table["recommended"]), joint)
     return {channel: by_method[0] for channel, by_method in estimates_of_channels.items()}
 
 
 def _estimates(table: pa.Table, joint: Path | None) -> dict[str, list[Estimate]]:
-    drawn = draws(joint) if joint is not None else {}
+    drawn = read_draws(joint) if joint is not None else {}
     estimates_of_channels: dict[str, list[Estimate]] = {}
-    for (channel, method), rows in divided(table, "channel", "method").items():
-        estimate = estimate_of(method, ParameterRow.rows_of(rows))
+    for (channel, method), rows in split_table(table, "channel", "method").items():
+        estimate = make_estimate(method, ParameterRow.rows_of(rows))
         estimate = replace(estimate, draws=drawn.get((channel, method)))
         estimates_of_channels.setdefault(channel, []).append(estimate)
     return estimates_of_channels
 
 
-def estimate_of(method: str, rows: Iterable[ParameterRow]) -> Estimate:
+def make_estimate(method: str, rows: Iterable[ParameterRow]) -> Estimate:
     """Return the estimate that rows of the table ``parameters`` stand for."""
     components: dict[int, dict[str, Parameter]] = {}
     lines: dict[int, dict[str, Parameter]] = {}

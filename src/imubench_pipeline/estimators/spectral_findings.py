@@ -32,14 +32,14 @@ _SPACING_RATIO = 1.4  # Ratio of the numbers of ordinates in successive sums
 def spectral_findings(channel: str, frame: FitSelection, white: float | None) -> list[Finding]:
     """Return the findings on the lines and the band of a channel; ``white`` is N, SI, if known."""
     band = frame.band
-    findings = line_findings(channel, frame.lines, white)
+    findings = describe_lines(channel, frame.lines, white)
     if band.source in ("bend", "no_model"):
         data = BandLimit(band.highest, follows_model=band.source == "bend")
         findings.append(find(data, "note", band.highest, channel))
     return findings
 
 
-def line_findings(channel: str, lines: Iterable[Line], white: float | None) -> list[Finding]:
+def describe_lines(channel: str, lines: Iterable[Line], white: float | None) -> list[Finding]:
     """Return a note on lines, and warnings if they are too many, or strong relative to N."""
     group = [line for line in lines if line.kind != "alias"]
     if not group:
@@ -65,7 +65,7 @@ def line_findings(channel: str, lines: Iterable[Line], white: float | None) -> l
     return findings
 
 
-def slow_noise_missing(
+def find_missing_slow_noise(
     channel: str, spectrum: Spectrum, fitted: Array, white: float | None
 ) -> Finding | None:
     """Return a finding where the lowest frequencies hold less than white noise.

@@ -12,7 +12,7 @@ from functools import cache
 import numpy as np
 
 from imubench_pipeline.estimators.spectrum import SINGLE, Spectrum
-from imubench_pipeline.noise.terms import driving_density
+from imubench_pipeline.noise.terms import compute_driving_density
 from imubench_pipeline.typing import Array
 
 _POINTS_PER_BIN = 6  # Frequencies per bin at which a density is evaluated
@@ -76,7 +76,7 @@ class Shapes:
         ends of the log: c_k^2 is the quadratic form of the covariance in closed form, not the
         spectrum.
         """
-        variance = driving_density(1.0, T_B) * T_B / 2.0
+        variance = compute_driving_density(1.0, T_B) * T_B / 2.0
         h = self._interval / T_B
         m = self._block
         q, p = -math.expm1(-h), math.exp(-h)

@@ -17,7 +17,7 @@ import numpy as np
 import scipy.fft
 from numpy.typing import NDArray
 
-from imubench_pipeline.allan.phase import Span, spans_of, split
+from imubench_pipeline.allan.phase import Span, list_spans, split
 from imubench_pipeline.typing import Array
 
 SINGLE = 64  # Number of lowest ordinates that are not binned
@@ -69,7 +69,7 @@ class LineSpectrum:
     block: int  # samples in a block
 
 
-def spectra(
+def compute_spectra(
     blocks: Iterable[Array], samples: int, rate: float, segments: Sequence[Span] | None = None
 ) -> tuple[Spectrum, list[LineSpectrum]]:
     """Return the spectrum of a log, and the spectra for the detection of lines.
@@ -97,7 +97,7 @@ def spectra(
     N. Ahmed, T. Natarajan and K. Rao, "Discrete cosine transform", IEEE Trans. Computers C-23,
     1974; P. Whittle, "Estimation and information in stationary time series", 1953.
     """
-    spans = spans_of(segments, samples)
+    spans = list_spans(segments, samples)
     segment, block = _resolution(np.array([stop - start for start, stop in spans]))
     level, series, squares, hann, number = _sum_segments(blocks, spans, segment, block)
     interval = block / rate
@@ -127,7 +127,7 @@ def spectra(
     return spectrum, [line for line in lines if line is not None]
 
 
-def block_of(segments: Sequence[Span]) -> int:
+def choose_block_size(segments: Sequence[Span]) -> int:
     """Return the samples in the blocks whose means give the low frequencies of a spectrum."""
     return _resolution(np.array([stop - start for start, stop in segments]))[1]
 
@@ -202,7 +202,7 @@ def _binned(ordinates: Sequence[Array], block: int) -> dict[str, NDArray[np.gene
     """Average ordinates in bins: the lowest stay single, then each is 5 % wide."""
     order = np.argsort(ordinates[0], kind="stable")
     frequency, density, ramp, cross, length = (column[order] for column in ordinates)
-    edges = bin_edges(frequency)
+    edges = make_bin_edges(frequency)
     counts = np.diff(np.append(edges, len(frequency)))
     last = edges + counts - 1
     return {
@@ -218,7 +218,7 @@ def _binned(ordinates: Sequence[Array], block: int) -> dict[str, NDArray[np.gene
     }
 
 
-def bin_edges(frequency: Array) -> NDArray[np.int64]:
+def make_bin_edges(frequency: Array) -> NDArray[np.int64]:
     """Return the first ordinate of each bin."""
     edges = list(range(min(SINGLE, len(frequency))))
     while edges[-1] + 1 < len(frequency):

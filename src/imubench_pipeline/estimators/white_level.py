@@ -21,7 +21,7 @@ from imubench_pipeline.allan import AllanCurve
 from imubench_pipeline.estimators.estimate import BROADBAND_TIME
 from imubench_pipeline.estimators.posterior import Posterior
 from imubench_pipeline.estimators.whittle import Maximum, Terms
-from imubench_pipeline.noise.terms import driving_density
+from imubench_pipeline.noise.terms import compute_driving_density
 from imubench_pipeline.typing import Array
 from imubench_pipeline.words.reasons import curves as texts
 
@@ -83,7 +83,9 @@ def count_fast_processes(maximum: Maximum, folding: float, stretch: WhiteStretch
     return int(np.argmin(away))
 
 
-def merged_maximum(maximum: Maximum, number: int, folding: float, level: float = 1.0) -> Maximum:
+def merge_fast_processes(
+    maximum: Maximum, number: int, folding: float, level: float = 1.0
+) -> Maximum:
     """Return a fit whose ``number`` fastest processes are white noise, N times ``level``."""
     if (number, level) == (0, 1.0):
         return maximum
@@ -99,7 +101,7 @@ def merged_maximum(maximum: Maximum, number: int, folding: float, level: float =
     )
 
 
-def merged_posterior(
+def merge_fast_draws(
     posterior: Posterior, terms: Terms, number: int, level: float = 1.0
 ) -> Posterior:
     """Return draws of a model whose ``number`` fastest processes are part of its white noise.
@@ -135,4 +137,4 @@ def describe_white_level(stretch: WhiteStretch | None, times: Sequence[float]) -
 
 def _white_densities(squares: Array, times: Array) -> Array:
     """Return the density of Gauss-Markov processes of B^2 and T_B far below 1 / T_B."""
-    return np.asarray(squares * driving_density(1.0, 1.0) * times)
+    return np.asarray(squares * compute_driving_density(1.0, 1.0) * times)

@@ -24,9 +24,9 @@ from imubench_pipeline.estimators.whittle_kernels import (
     Bins,
     Problem,
     ShapeTable,
-    best_powers,
-    cost_at,
-    shape_at,
+    fit_powers,
+    interpolate_shape,
+    profile_cost,
 )
 from imubench_pipeline.noise import GaussMarkov, NoiseModel
 from imubench_pipeline.noise.terms.gauss_markov import CORRELATION_TIMES
@@ -185,7 +185,7 @@ class Whittle:
     def gauss_markov(self, time: float) -> Array:
         """Return the density of a Gauss-Markov process of B = 1 in each bin."""
         shape = np.empty(len(self._nu))
-        shape_at(np.log(time), self.shape_table(), shape)
+        interpolate_shape(np.log(time), self.shape_table(), shape)
         return shape
 
     def shape_table(self, unit: float = 1.0) -> ShapeTable:
@@ -233,7 +233,7 @@ class Whittle:
         processes = [self.gauss_markov(float(time)) for time in times]
         columns = np.ascontiguousarray(np.column_stack([fixed, *processes]))
         norm = columns.mean(axis=0)
-        powers, ramp, cost = best_powers(columns / norm, bins, terms.ramp, TOLERANCE)
+        powers, ramp, cost = fit_powers(columns / norm, bins, terms.ramp, TOLERANCE)
         powers = powers / norm * self.scale
         powers[: len(size)] /= size
         return Maximum(terms, powers, times, ramp, cost)
@@ -266,7 +266,7 @@ class Whittle:
         return full
 
 
-def whittle_of(
+def make_whittle(
     spectrum: Spectrum,
     highest: float,
     shapes: int = SHAPES,
@@ -286,7 +286,7 @@ def whittle_of(
     return Whittle(spectrum, min(least, longest / 4.0), longest, shapes, behind)
 
 
-def model_of(maximum: Maximum) -> NoiseModel:
+def make_noise_model(maximum: Maximum) -> NoiseModel:
     """Return the noise model of a fit; flicker noise comes first, then processes by T_B."""
     terms = maximum.terms
     values = {letter: maximum.parameter(letter) for letter in terms.linear}
@@ -314,7 +314,7 @@ def _polish(
 
     def cost(place: float) -> float:
         tried[which] = place
-        return cost_at(tried, problem, _POLISH_TOLERANCE)
+        return profile_cost(tried, problem, _POLISH_TOLERANCE)
 
     best = minimize_scalar(
         cost, bounds=(low, high), method="bounded", options={"xatol": _LOG_TIME_TOLERANCE}
@@ -331,7 +331,7 @@ def _scan(
     for i in range(0, table.logarithms.shape[0], _SCAN_STEP):
         tried[which] = table.first + i * table.step
         if low <= tried[which] <= high:
-            cost = cost_at(tried, problem, _SCAN_TOLERANCE)
+            cost = profile_cost(tried, problem, _SCAN_TOLERANCE)
             if cost < lowest:
                 best, lowest = tried[which], cost
     return best, lowest
@@ -374,7 +374,7 @@ def _pairs(problem: Problem) -> Iterator[tuple[Array, float]]:
             places[0], places[1] = first + i * step, first + j * step
             if places[1] - places[0] < apart:
                 continue
-            cost = cost_at(places, problem, _SCAN_TOLERANCE)
+            cost = profile_cost(places, problem, _SCAN_TOLERANCE)
             if cost < lowest:
                 lowest = cost
                 pair = places.copy()

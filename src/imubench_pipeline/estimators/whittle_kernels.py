@@ -46,7 +46,7 @@ class Problem(NamedTuple):
 
 
 @njit(cache=True)
-def shape_at(where: float, table: ShapeTable, shape: Array) -> None:
+def interpolate_shape(where: float, table: ShapeTable, shape: Array) -> None:
     """Interpolate the logarithm of a tabulated shape linearly in log T_B."""
     logarithms = table.logarithms
     place = min(max((where - table.first) / table.step, 0.0), logarithms.shape[0] - 1.000001)
@@ -57,7 +57,7 @@ def shape_at(where: float, table: ShapeTable, shape: Array) -> None:
 
 
 @njit(cache=True)
-def cost_of(nu: Array, data: Array, density: Array) -> float:
+def compute_cost(nu: Array, data: Array, density: Array) -> float:
     """Return 1/2 sum nu (log S + I / S); infinite where a density is not above 0."""
     total = 0.0
     for i in range(nu.size):
@@ -164,7 +164,7 @@ def _non_negative(gram: Array, target: Array, guess: Array) -> Array:
 
 
 @njit(cache=True)
-def best_powers(
+def fit_powers(
     columns: Array, bins: Bins, with_ramp: bool, tolerance: float
 ) -> tuple[Array, float, float]:
     """Return the squared parameters, R and the cost that fit best, to a tolerance of the cost.
@@ -193,7 +193,7 @@ def best_powers(
             R = above / below if below > 0.0 else 0.0
             for i in range(b):
                 data[i] = max(density[i] - 2.0 * R * cross[i] + R * R * ramp[i], 0.0)
-            cost = cost_of(nu, data, model)
+            cost = compute_cost(nu, data, model)
         gram[:] = 0.0
         target[:] = 0.0
         for i in range(b):
@@ -223,7 +223,7 @@ def best_powers(
                     largest = model[i]
             for i in range(b):
                 model[i] = max(model[i], 1e-12 * largest)
-            cost = cost_of(nu, data, model)
+            cost = compute_cost(nu, data, model)
             continue
         step = 1.0
         moved = False
@@ -232,7 +232,7 @@ def best_powers(
             for j in range(p):
                 tried[j] = powers[j] + step * (wanted[j] - powers[j])
             np.dot(columns, tried, tried_model)
-            tried_cost = cost_of(nu, data, tried_model)
+            tried_cost = compute_cost(nu, data, tried_model)
             if tried_cost <= cost:
                 moved = True
                 break
@@ -255,7 +255,7 @@ def best_powers(
 
 
 @njit(cache=True)
-def cost_at(places: Array, problem: Problem, tolerance: float) -> float:
+def profile_cost(places: Array, problem: Problem, tolerance: float) -> float:
     """Return the cost at logarithms of correlation times, profiled over everything else."""
     fixed, bins, with_ramp, table = problem
     b, p = fixed.shape
@@ -265,11 +265,11 @@ def cost_at(places: Array, problem: Problem, tolerance: float) -> float:
         for j in range(p):
             columns[i, j] = fixed[i, j]
     for g in range(places.size):
-        shape_at(places[g], table, shape)
+        interpolate_shape(places[g], table, shape)
         total = 0.0
         for i in range(b):
             total += shape[i]
         mean = total / b
         for i in range(b):
             columns[i, p + g] = shape[i] / mean
-    return best_powers(columns, bins, with_ramp, tolerance)[2]
+    return fit_powers(columns, bins, with_ramp, tolerance)[2]

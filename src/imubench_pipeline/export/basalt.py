@@ -15,10 +15,10 @@ from __future__ import annotations
 
 import json
 
-from imubench_pipeline.export.comments import heading
+from imubench_pipeline.export.comments import describe_model
 from imubench_pipeline.export.imu import Imu
 from imubench_pipeline.export.target import Target
-from imubench_pipeline.export.walks import positive_walks
+from imubench_pipeline.export.walks import map_to_positive_walks
 
 _CONVENTION = (
     "*_noise_std is N (rad/s/sqrt(Hz), m/s^2/sqrt(Hz)) and *_bias_std is K (rad/s^2/sqrt(Hz), "
@@ -28,10 +28,10 @@ _CONVENTION = (
 
 def write(imu: Imu) -> str:
     """Return JSON with the fields of the sensor in ``value0``; Basalt divides by K."""
-    mapped = positive_walks(imu, "Basalt")
+    mapped = map_to_positive_walks(imu, "Basalt")
     gyro, accel = mapped["gyro"].model, mapped["accel"].model
     content = {
-        "about": heading(imu, "Basalt", _CONVENTION, mapped),
+        "about": describe_model(imu, "Basalt", _CONVENTION, mapped),
         "value0": {
             "imu_update_rate": imu.rate,
             "accel_noise_std": [accel.N] * 3,

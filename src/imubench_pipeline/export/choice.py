@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from imubench_pipeline.estimators.estimate import Estimate
-from imubench_pipeline.estimators.rows import estimate_of
+from imubench_pipeline.estimators.rows import make_estimate
 from imubench_pipeline.export.imu import AxisNoise, ExportError
 from imubench_pipeline.export.temperature import AXES
 from imubench_pipeline.model.estimates import ParameterRow
@@ -116,7 +116,7 @@ def _rank_axes(
     """Return the axes with white noise, sorted by their Allan deviation at the horizon."""
     ranked = []
     for key, rows in estimated.items():
-        estimate = estimate_of(key[2], rows)
+        estimate = make_estimate(key[2], rows)
         if estimate.model.N > 0.0:
             deviation = float(np.sqrt(estimate.model.allan_variance(np.array([horizon]))[0]))
             ranked.append((deviation, key, estimate))

@@ -8,13 +8,13 @@ from collections.abc import Mapping, Sequence
 
 from imubench_pipeline.export.imu import Imu
 from imubench_pipeline.export.mapping import Mapped, describe_terms
-from imubench_pipeline.tables.texts import printable
+from imubench_pipeline.tables.texts import escape_invisible
 from imubench_pipeline.words.reasons import exports as texts
 
 _LINE_WIDTH = 96
 
 
-def heading(
+def describe_model(
     imu: Imu,
     program: str,
     convention: str,
@@ -58,7 +58,7 @@ def heading(
     return printed + [f"{name}: {words}." for name, model in replacements for words in model.words]
 
 
-def commented(statements: Sequence[str], mark: str = "#") -> str:
+def format_comments(statements: Sequence[str], mark: str = "#") -> str:
     """Return statements as comment lines, each beginning with a mark.
 
     Characters that are not safe in a comment of every format, such as a Unicode line separator in
@@ -73,30 +73,30 @@ def commented(statements: Sequence[str], mark: str = "#") -> str:
     return "\n".join(lines) + "\n"
 
 
-def commented_python(statements: Sequence[str]) -> str:
+def format_python_comments(statements: Sequence[str]) -> str:
     """Return statements as comments at the top of a file of Python.
 
     The first line declares the encoding (PEP 263). Without it, Python could take an encoding from
     the comments, which contain names chosen by users.
     """
-    return "# -*- coding: utf-8 -*-\n" + commented(statements)
+    return "# -*- coding: utf-8 -*-\n" + format_comments(statements)
 
 
 def _join_lines(statement: str) -> str:
-    return printable(re.sub(r"[\t\n]", " ", statement))
+    return escape_invisible(re.sub(r"[\t\n]", " ", statement))
 
 
-def setting(key: str, value: str, comment: str, indent: str = "") -> str:
+def format_setting(key: str, value: str, comment: str, indent: str = "") -> str:
     """Return a line of YAML with its comment."""
     return f"{indent}{key}: {value}  # {comment}\n"
 
 
-def number(value: float) -> str:
+def format_exponential(value: float) -> str:
     """Return a number as a float of every YAML reader: with a point and a signed exponent."""
     return f"{value:.6e}"
 
 
-def plain(value: float) -> str:
+def format_decimal(value: float) -> str:
     """Return a number without an exponent, and with a point."""
     text = f"{value:.9f}".rstrip("0")
     return text + "0" if text.endswith(".") else text

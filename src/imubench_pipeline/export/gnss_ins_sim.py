@@ -18,11 +18,11 @@ from __future__ import annotations
 
 import math
 
-from imubench_pipeline.export.comments import commented_python, heading
+from imubench_pipeline.export.comments import describe_model, format_python_comments
 from imubench_pipeline.export.imu import Imu
 from imubench_pipeline.export.mapping import as_process
 from imubench_pipeline.export.target import Target
-from imubench_pipeline.noise import NoiseModel, driving_density
+from imubench_pipeline.noise import NoiseModel, compute_driving_density
 from imubench_pipeline.words.reasons import exports as texts
 
 _CONVENTION = (
@@ -38,7 +38,7 @@ def write(imu: Imu) -> str:
     imu.require_both()
     mapped = {name: as_process(a.model, imu.horizon, imu.rate) for name, a in imu.axes.items()}
     gyro, accel = mapped["gyro"].model, mapped["accel"].model
-    about = heading(imu, "gnss-ins-sim", _CONVENTION, mapped)
+    about = describe_model(imu, "gnss-ins-sim", _CONVENTION, mapped)
     for name, process in mapped.items():
         if process.model.T_B is not None and process.model.T_B * imu.rate < _MIN_SAMPLES_IN_T_B:
             about.append(f"{name}: {texts.short_process(process.model.T_B * imu.rate)}.")
@@ -57,13 +57,18 @@ def write(imu: Imu) -> str:
         f'    "{key}": np.full(3, {float(f"{value:.9g}")!r}),  # {comment}\n'
         for key, value, comment in entries
     ]
-    return commented_python(about) + "import numpy as np\n\nimu_err = {\n" + "".join(lines) + "}\n"
+    return (
+        format_python_comments(about)
+        + "import numpy as np\n\nimu_err = {\n"
+        + "".join(lines)
+        + "}\n"
+    )
 
 
 def _stationary_deviation(model: NoiseModel) -> float:
     if model.T_B is None or model.B == 0.0:
         return 0.0
-    return math.sqrt(driving_density(model.B, model.T_B) * model.T_B / 2.0)
+    return math.sqrt(compute_driving_density(model.B, model.T_B) * model.T_B / 2.0)
 
 
 TARGET = Target("gnss-ins-sim", "gnss-ins-sim", "imu_err.py", write, "N+GM")

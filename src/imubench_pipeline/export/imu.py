@@ -98,7 +98,7 @@ def inflate(model: NoiseModel, factor: float) -> NoiseModel:
     )
 
 
-def normal_gravity(latitude: float) -> float:
+def compute_normal_gravity(latitude: float) -> float:
     """Return gravity on the WGS 84 ellipsoid, m/s^2, at a latitude in degrees; else ExportError.
 
     Somigliana's formula: NIMA TR8350.2, "Department of Defense World Geodetic System 1984",

@@ -10,20 +10,30 @@ ImuParameters (names, checks, conversion).
 
 from __future__ import annotations
 
-from imubench_pipeline.export.comments import commented, heading, plain, setting
+from imubench_pipeline.export.comments import (
+    describe_model,
+    format_comments,
+    format_decimal,
+    format_setting,
+)
 from imubench_pipeline.export.imu import Imu
 from imubench_pipeline.export.target import Target
-from imubench_pipeline.export.walks import CONVENTION, TOPIC, densities, positive_walks
+from imubench_pipeline.export.walks import (
+    CONVENTION,
+    TOPIC,
+    format_densities,
+    map_to_positive_walks,
+)
 
 
 def write(imu: Imu) -> str:
     """Return ``imu.yaml``."""
-    mapped = positive_walks(imu, "Kalibr")
+    mapped = map_to_positive_walks(imu, "Kalibr")
     return (
-        commented(heading(imu, "Kalibr", CONVENTION, mapped))
-        + densities(mapped)
-        + setting("rostopic", TOPIC, "of sensor_msgs/Imu")
-        + setting("update_rate", plain(imu.rate), "Hz")
+        format_comments(describe_model(imu, "Kalibr", CONVENTION, mapped))
+        + format_densities(mapped)
+        + format_setting("rostopic", TOPIC, "of sensor_msgs/Imu")
+        + format_setting("update_rate", format_decimal(imu.rate), "Hz")
     )
 
 

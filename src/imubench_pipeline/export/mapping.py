@@ -25,7 +25,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from imubench_pipeline.noise import GaussMarkov, NoiseModel, Role, Term, bias_instability
+from imubench_pipeline.noise import GaussMarkov, NoiseModel, Role, Term, compute_bias_instability
 from imubench_pipeline.typing import Array
 from imubench_pipeline.words.reasons import exports as texts
 
@@ -140,9 +140,9 @@ def _fit_nearest_process(slow: Sequence[Term], N: float, horizon: float) -> Gaus
     variance = _sum_allan_variance(slow, horizon)
 
     def process(T_B: float) -> GaussMarkov:
-        unit = GaussMarkov(bias_instability(1.0, T_B), T_B)
+        unit = GaussMarkov(compute_bias_instability(1.0, T_B), T_B)
         density = variance / _sum_allan_variance([unit], horizon)
-        return GaussMarkov(bias_instability(density, T_B), T_B)
+        return GaussMarkov(compute_bias_instability(density, T_B), T_B)
 
     times = np.geomspace(
         _MIN_TIME_OVER_HORIZON * horizon, _MAX_TIME_OVER_HORIZON * horizon, _TRIED_CORRELATION_TIMES

@@ -28,12 +28,12 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from imubench_pipeline.export.comments import commented, heading
+from imubench_pipeline.export.comments import describe_model, format_comments
 from imubench_pipeline.export.imu import AxisNoise, Imu
 from imubench_pipeline.export.mapping import Mapped, as_process
 from imubench_pipeline.export.target import Target
 from imubench_pipeline.export.temperature import AXES, TemperatureEffect
-from imubench_pipeline.noise import NoiseModel, driving_density
+from imubench_pipeline.noise import NoiseModel, compute_driving_density
 from imubench_pipeline.words.reasons import exports as texts
 
 _CONVENTION = (
@@ -62,10 +62,10 @@ def write(imu: Imu) -> str:
     for name, axis in imu.axes.items():
         mapped[name], parameters[name] = _map_parameters(axis, imu)
     convention = _CONVENTION.format(rate=imu.rate)
-    about = heading(imu, "MATLAB imuSensor", convention, mapped, temperature=True)
+    about = describe_model(imu, "MATLAB imuSensor", convention, mapped, temperature=True)
     biases = {name: _map_temperature(imu.temperature.get(name)) for name in parameters}
     about += [f"{name} and temperature: {words}." for name in biases for words in biases[name][1]]
-    text = commented(about, "%") + "IMU = imuSensor('accel-gyro');\n"
+    text = format_comments(about, "%") + "IMU = imuSensor('accel-gyro');\n"
     text += f"IMU.SampleRate = {imu.rate:.9g};  % Hz\n"
     members = {
         "gyro": ("Gyroscope", "gyroparams", "rad/s"),
@@ -129,7 +129,7 @@ def _map_parameters(axis: AxisNoise, imu: Imu) -> tuple[Mapped, _Parameters]:
     if process.T_B is None or process.B == 0.0:
         return mapped, _Parameters(process.N, process.K, 0.0, "fractalcoef(1)")
     p = math.exp(-1.0 / (imu.rate * process.T_B))
-    stationary = driving_density(process.B, process.T_B) * process.T_B / 2.0
+    stationary = compute_driving_density(process.B, process.T_B) * process.T_B / 2.0
     drive = math.sqrt(-stationary * math.expm1(-2.0 / (imu.rate * process.T_B)))
     coefficients = f"struct('Numerator', 1, 'Denominator', [1, {-p:.17g}])"
     return mapped, _Parameters(process.N, process.K, drive, coefficients)

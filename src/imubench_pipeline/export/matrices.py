@@ -23,7 +23,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import block_diag
 
-from imubench_pipeline.export.comments import heading
+from imubench_pipeline.export.comments import describe_model
 from imubench_pipeline.export.imu import Imu
 from imubench_pipeline.export.mapping import describe_terms
 from imubench_pipeline.export.target import Target
@@ -58,7 +58,7 @@ class Matrices:
     states: Sequence[str]  # term of each state of the discrete model
 
 
-def matrices(model: NoiseModel, rate: float, horizon: float) -> Matrices:
+def compute_matrices(model: NoiseModel, rate: float, horizon: float) -> Matrices:
     """Return the matrices of a model at a rate, Hz; flicker noise up to four times `horizon`, s."""
     longest = max(FLICKER_TAU_OVER_HORIZON * horizon, 4.0 / rate)
     terms = model.realised(1.0 / rate, longest)
@@ -84,7 +84,7 @@ def matrices(model: NoiseModel, rate: float, horizon: float) -> Matrices:
 def write_json(imu: Imu) -> str:
     """Return all matrices as JSON; a quantity without an estimate is absent."""
     content: dict[str, object] = {
-        "about": heading(imu, "any Kalman filter", _CONVENTION.format(rate=imu.rate)),
+        "about": describe_model(imu, "any Kalman filter", _CONVENTION.format(rate=imu.rate)),
         "sensor": imu.sensor,
         "rate": imu.rate,
         "horizon": imu.horizon,
@@ -93,7 +93,7 @@ def write_json(imu: Imu) -> str:
     }
     for name, axis in imu.axes.items():
         model = axis.model
-        of_axis = matrices(model, imu.rate, imu.horizon)
+        of_axis = compute_matrices(model, imu.rate, imu.horizon)
         lists = [np.asarray(getattr(of_axis, key)).tolist() for key in _MATRICES]
         F, Q, H_continuous, R, Phi, Q_d, H, R_d, x0, P0 = lists
         content[name] = {
@@ -116,12 +116,12 @@ def write_npz(imu: Imu) -> bytes:
     """Return the same matrices as NumPy arrays, such as ``gyro_Phi``, and ``about``."""
     arrays: dict[str, Array] = {"rate": np.array(imu.rate), "horizon": np.array(imu.horizon)}
     for name, axis in imu.axes.items():
-        of_axis = matrices(axis.model, imu.rate, imu.horizon)
+        of_axis = compute_matrices(axis.model, imu.rate, imu.horizon)
         if axis.bounded:
             arrays[f"{name}_density_bounded"] = np.array(axis.bounded)
         for key in _MATRICES:
             arrays[f"{name}_{key}"] = np.asarray(getattr(of_axis, key))
-    about = np.array(heading(imu, "any Kalman filter", _CONVENTION.format(rate=imu.rate)))
+    about = np.array(describe_model(imu, "any Kalman filter", _CONVENTION.format(rate=imu.rate)))
     stream = io.BytesIO()
     np.savez(stream, about=about, **arrays)  # type: ignore[arg-type]  # its stub takes a flag among the arrays
     return stream.getvalue()

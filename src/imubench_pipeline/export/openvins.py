@@ -10,30 +10,40 @@ ov_msckf/src/utils/NoiseManager.h (units), ov_msckf/src/state/Propagator.cpp (di
 
 from __future__ import annotations
 
-from imubench_pipeline.export.comments import commented, heading, plain, setting
+from imubench_pipeline.export.comments import (
+    describe_model,
+    format_comments,
+    format_decimal,
+    format_setting,
+)
 from imubench_pipeline.export.imu import Imu
 from imubench_pipeline.export.target import Target
-from imubench_pipeline.export.walks import CONVENTION, TOPIC, densities, positive_walks
+from imubench_pipeline.export.walks import (
+    CONVENTION,
+    TOPIC,
+    format_densities,
+    map_to_positive_walks,
+)
 
 
 def write(imu: Imu) -> str:
     """Return ``kalibr_imu_chain.yaml``."""
-    mapped = positive_walks(imu, "OpenVINS")
+    mapped = map_to_positive_walks(imu, "OpenVINS")
     about = [
-        *heading(imu, "OpenVINS", CONVENTION, mapped),
+        *describe_model(imu, "OpenVINS", CONVENTION, mapped),
         "Extrinsics and intrinsics (T_i_b, Tw, Ta, Tg, R_*) are those of an ideal sensor.",
     ]
     indent = "  "
     return (
         "%YAML:1.0\n\n"
-        + commented(about)
+        + format_comments(about)
         + "imu0:\n"
         + _format_matrix("T_i_b", 4)
-        + densities(mapped, indent)
-        + setting("rostopic", TOPIC, "of sensor_msgs/Imu", indent)
-        + setting("time_offset", plain(0.0), "s", indent)
-        + setting("update_rate", plain(imu.rate), "Hz", indent)
-        + setting("model", '"kalibr"', "of the intrinsics", indent)
+        + format_densities(mapped, indent)
+        + format_setting("rostopic", TOPIC, "of sensor_msgs/Imu", indent)
+        + format_setting("time_offset", format_decimal(0.0), "s", indent)
+        + format_setting("update_rate", format_decimal(imu.rate), "Hz", indent)
+        + format_setting("model", '"kalibr"', "of the intrinsics", indent)
         + "".join(_format_matrix(name, 3) for name in ("Tw", "R_IMUtoGYRO", "Ta", "R_IMUtoACC"))
         + _format_matrix("Tg", 3, diagonal="0.0")
     )

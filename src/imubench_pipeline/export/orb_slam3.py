@@ -11,10 +11,16 @@ Sources: UZ-SLAMLab/ORB_SLAM3, src/Settings.cc (readIMU, readParameter<float>), 
 
 from __future__ import annotations
 
-from imubench_pipeline.export.comments import commented, heading, number, plain, setting
+from imubench_pipeline.export.comments import (
+    describe_model,
+    format_comments,
+    format_decimal,
+    format_exponential,
+    format_setting,
+)
 from imubench_pipeline.export.imu import Imu
 from imubench_pipeline.export.target import Target
-from imubench_pipeline.export.walks import positive_walks
+from imubench_pipeline.export.walks import map_to_positive_walks
 
 _CONVENTION = (
     "N as IMU.Noise* and K as IMU.*Walk: continuous in time, two-sided, SI; the program itself "
@@ -24,20 +30,20 @@ _CONVENTION = (
 
 def write(imu: Imu) -> str:
     """Return the lines of the settings that concern the noise of the sensor; walks are inverted."""
-    mapped = positive_walks(imu, "ORB-SLAM3")
+    mapped = map_to_positive_walks(imu, "ORB-SLAM3")
     gyro, accel = mapped["gyro"].model, mapped["accel"].model
     about = [
-        *heading(imu, "ORB-SLAM3", _CONVENTION, mapped),
+        *describe_model(imu, "ORB-SLAM3", _CONVENTION, mapped),
         "These lines go into the settings of the camera, beside IMU.T_b_c1.",
     ]
     return (
         "%YAML:1.0\n\n"
-        + commented(about)
-        + setting("IMU.NoiseGyro", number(gyro.N), "N, rad/s/sqrt(Hz)")
-        + setting("IMU.NoiseAcc", number(accel.N), "N, m/s^2/sqrt(Hz)")
-        + setting("IMU.GyroWalk", number(gyro.K), "K, rad/s^2/sqrt(Hz)")
-        + setting("IMU.AccWalk", number(accel.K), "K, m/s^3/sqrt(Hz)")
-        + setting("IMU.Frequency", plain(imu.rate), "Hz")
+        + format_comments(about)
+        + format_setting("IMU.NoiseGyro", format_exponential(gyro.N), "N, rad/s/sqrt(Hz)")
+        + format_setting("IMU.NoiseAcc", format_exponential(accel.N), "N, m/s^2/sqrt(Hz)")
+        + format_setting("IMU.GyroWalk", format_exponential(gyro.K), "K, rad/s^2/sqrt(Hz)")
+        + format_setting("IMU.AccWalk", format_exponential(accel.K), "K, m/s^3/sqrt(Hz)")
+        + format_setting("IMU.Frequency", format_decimal(imu.rate), "Hz")
     )
 
 

@@ -59,7 +59,7 @@ from imubench_pipeline.export.smallest_model import (
     FAMILIES,
     Family,
     Limits,
-    count_of_points,
+    count_points,
     find_smallest,
 )
 from imubench_pipeline.noise import NoiseModel
@@ -281,8 +281,8 @@ def limits_of(
     tau = np.append(curve.tau[curve.tau < longest * (1.0 - 1e-9)], longest)
     limit = np.exp(np.interp(np.log(tau), np.log(curve.tau), np.log(upper)))
 
-    frequency = np.geomspace(*band, count_of_points(*band, _POINTS_A_DECADE))
-    time = np.geomspace(1.0 / rate, horizon, count_of_points(1.0 / rate, horizon, _POINTS_A_DECADE))
+    frequency = np.geomspace(*band, count_points(*band, _POINTS_A_DECADE))
+    time = np.geomspace(1.0 / rate, horizon, count_points(1.0 / rate, horizon, _POINTS_A_DECADE))
 
     def of_model(model: NoiseModel) -> Array:
         grown = growth(model, time, rate)

@@ -28,11 +28,11 @@ from __future__ import annotations
 
 import math
 
-from imubench_pipeline.export.comments import commented, heading
+from imubench_pipeline.export.comments import describe_model, format_comments
 from imubench_pipeline.export.imu import ExportError, Imu
 from imubench_pipeline.export.target import Target
 from imubench_pipeline.export.temperature import AXES
-from imubench_pipeline.export.walks import walks
+from imubench_pipeline.export.walks import map_to_walks
 from imubench_pipeline.words.reasons import exports as texts
 
 DEFAULT_PERIOD = 10_000
@@ -66,7 +66,7 @@ def write(imu: Imu, period: int = DEFAULT_PERIOD) -> str:
         raise ExportError(
             f"EKF2_PREDICT_US is {period}, expected {_PERIOD_RANGE[0]} to {_PERIOD_RANGE[1]}"
         )
-    mapped = walks(imu)
+    mapped = map_to_walks(imu)
     gyro, accel = mapped["gyro"].model, mapped["accel"].model
     step = math.sqrt(period * 1e-6)
     values = {
@@ -76,7 +76,7 @@ def write(imu: Imu, period: int = DEFAULT_PERIOD) -> str:
         "EKF2_GYR_NOISE": (gyro.N / step, "rad/s, from N"),
     }
     convention = _CONVENTION.format(step=period / 1000.0)
-    about = heading(imu, "PX4 EKF2", convention, mapped, temperature=True)
+    about = describe_model(imu, "PX4 EKF2", convention, mapped, temperature=True)
     rows = []
     for name, (value, comment) in values.items():
         low, high = _PARAMETER_RANGES[name]
@@ -107,7 +107,7 @@ def write(imu: Imu, period: int = DEFAULT_PERIOD) -> str:
             "above includes the effect of temperature; --method compensated leaves it out."
         )
     columns = "# Vehicle-Id Component-Id Name Value Type\n"
-    return commented(["Onboard parameters for Vehicle 1", *about]) + columns + "".join(rows)
+    return format_comments(["Onboard parameters for Vehicle 1", *about]) + columns + "".join(rows)
 
 
 TARGET = Target("px4", "PX4 (EKF2)", "ekf2.params", write, "N+K")

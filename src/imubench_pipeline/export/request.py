@@ -12,19 +12,19 @@ import pyarrow.compute as pc
 
 from imubench_pipeline.allan import AllanCurve
 from imubench_pipeline.earth import STANDARD_GRAVITY
-from imubench_pipeline.estimators.rows import draws
+from imubench_pipeline.estimators.rows import read_draws
 from imubench_pipeline.export.choice import WORST, Choice, choose
-from imubench_pipeline.export.imu import AxisNoise, ExportError, Imu, normal_gravity
+from imubench_pipeline.export.imu import AxisNoise, ExportError, Imu, compute_normal_gravity
 from imubench_pipeline.export.mapping import describe_terms
 from imubench_pipeline.export.overbound import MAX_EXCESS, overbound
 from imubench_pipeline.export.smallest_model import FAMILIES, Family
 from imubench_pipeline.export.targets import TARGETS
-from imubench_pipeline.export.temperature import TemperatureEffect, temperature_effect
+from imubench_pipeline.export.temperature import TemperatureEffect, find_temperature_effect
 from imubench_pipeline.model.estimates import AllanRow, ParameterRow, TemperatureRow
 from imubench_pipeline.model.recordings import RecordingRow
 from imubench_pipeline.model.table import R
-from imubench_pipeline.recordings.fitness import left_out
-from imubench_pipeline.tables import read, tables_folder, tables_of_run
+from imubench_pipeline.recordings.fitness import list_excluded
+from imubench_pipeline.tables import find_tables, find_tables_folder, read
 from imubench_pipeline.words.reasons import exports as texts
 from imubench_pipeline.words.reasons.pools import recordings_not_used
 from imubench_pipeline.words.verdicts import doubts_text
@@ -81,7 +81,7 @@ def load(path: Path) -> dict[str, pa.Table]:
         If a table is missing or of another form.
     """
     try:
-        paths = tables_of_run(path, NEEDED)
+        paths = find_tables(path, NEEDED)
         return {name: read(name, [table]) for name, table in paths.items()}
     except (OSError, ValueError) as error:
         raise ExportError(str(error)) from error
@@ -89,7 +89,7 @@ def load(path: Path) -> dict[str, pa.Table]:
 
 def recordings_of(path: Path) -> Path:
     """Return the folder of the recordings of a run, for a path as in `load`."""
-    return tables_folder(path).parent / "recordings"
+    return find_tables_folder(path).parent / "recordings"
 
 
 def make_content(tables: Tables, request: Request, recordings: Path | None = None) -> str | bytes:
@@ -149,13 +149,15 @@ def build_imu(tables: Tables, request: Request, folder: Path | None = None) -> I
         axes[quantity] = choice.axis
         place = {"sensor": request.sensor, "recording": choice.recording}
         warmed = _select_rows(TemperatureRow, tables, **place)
-        effects[quantity] = temperature_effect(warmed, about, quantity, request.horizon)
+        effects[quantity] = find_temperature_effect(warmed, about, quantity, request.horizon)
         if request.overbound:
             axes[quantity] = _bound_axis(tables, choice, request, about.rate, folder)
     if not axes:
         reasons = "; ".join(row.reason for row in recordings if row.reason)
         raise ExportError(f"{request.sensor}: no estimate; its recordings are left out: {reasons}")
-    gravity = STANDARD_GRAVITY if request.latitude is None else normal_gravity(request.latitude)
+    gravity = (
+        STANDARD_GRAVITY if request.latitude is None else compute_normal_gravity(request.latitude)
+    )
     return Imu(
         sensor=request.sensor,
         rate=request.rate or max(rates),
@@ -176,7 +178,7 @@ def _select_deciding(
 ) -> tuple[list[ParameterRow], list[str]]:
     """Return the estimates that an export may use, and cautions about the others."""
     rows = _select_rows(ParameterRow, tables, sensor=request.sensor)
-    apart = left_out(recordings)
+    apart = list_excluded(recordings)
     without = [
         texts.recording_rejected(row.recording, row.status, row.reason)
         for row in recordings
@@ -207,7 +209,7 @@ def _bound_axis(
     if folder is not None:
         path = folder / request.sensor / choice.recording / "draws.parquet"
         if path.is_file():
-            drawn = draws(path).get((choice.channel, choice.method))
+            drawn = read_draws(path).get((choice.channel, choice.method))
     place = {"sensor": request.sensor, "recording": choice.recording, "channel": choice.channel}
     curve = curve_of(_select_rows(AllanRow, tables, **place))
     try:

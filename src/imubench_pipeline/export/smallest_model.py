@@ -23,7 +23,7 @@ from imubench_pipeline.noise import (
     RandomWalk,
     Term,
     WhiteNoise,
-    bias_instability,
+    compute_bias_instability,
 )
 from imubench_pipeline.typing import Array
 
@@ -70,12 +70,12 @@ def find_smallest(
         cost, powers = _minimise_mean_log_ratio(limits, fixed)
         T_B = None
     else:
-        tried = np.log(np.geomspace(*times, count_of_points(*times, _TIMES_PER_DECADE)))
+        tried = np.log(np.geomspace(*times, count_points(*times, _TIMES_PER_DECADE)))
 
         def solved(log_time: float) -> tuple[float, Array]:
             time = math.exp(log_time)
             return _minimise_mean_log_ratio(
-                limits, [*fixed, GaussMarkov(bias_instability(1.0, time), time)]
+                limits, [*fixed, GaussMarkov(compute_bias_instability(1.0, time), time)]
             )
 
         costs = [solved(float(x))[0] for x in tried]
@@ -88,7 +88,7 @@ def find_smallest(
     if not math.isfinite(cost):
         raise ValueError(f"no model {family} lies above the limits")
     powers = powers * (1.0 + _ROUNDING_MARGIN)
-    B = bias_instability(float(powers[-1]), T_B) if T_B else 0.0
+    B = compute_bias_instability(float(powers[-1]), T_B) if T_B else 0.0
     K = math.sqrt(powers[1]) if walks else 0.0
     return NoiseModel(N=math.sqrt(powers[0]), B=B, T_B=T_B if B > 0.0 else None, K=K)
 
@@ -130,6 +130,6 @@ def _minimise_mean_log_ratio(
     return cost, np.asarray(powers / scale)
 
 
-def count_of_points(start: float, stop: float, a_decade: int) -> int:
+def count_points(start: float, stop: float, a_decade: int) -> int:
     """Return the number of log-spaced points in an interval, for a number per decade."""
     return 2 + math.ceil(a_decade * math.log10(stop / start))

@@ -7,7 +7,7 @@ Ramps, lines and quantization noise are left out.
 
 from __future__ import annotations
 
-from imubench_pipeline.export.comments import commented_python, heading
+from imubench_pipeline.export.comments import describe_model, format_python_comments
 from imubench_pipeline.export.imu import Imu
 from imubench_pipeline.export.mapping import describe_terms
 from imubench_pipeline.export.matrices import FLICKER_TAU_OVER_HORIZON
@@ -88,8 +88,8 @@ def write(imu: Imu) -> str:
         entries += f'        "gauss_markov": [  # S_B in ({unit[0]})^2/s, T_B in s\n'
         entries += "".join(f"            ({S!r}, {T!r}),\n" for S, T in processes)
         entries += f'        ],\n        "integral": "{unit[1]}",\n    }},\n'
-    about = [*heading(imu, "Python", _CONVENTION), *left_out]
-    return commented_python(about) + _PROGRAM.format(
+    about = [*describe_model(imu, "Python", _CONVENTION), *left_out]
+    return format_python_comments(about) + _PROGRAM.format(
         rate=float(imu.rate), horizon=float(imu.horizon), noise=entries
     )
 

@@ -42,7 +42,7 @@ class TemperatureEffect:
     notes: Sequence[str] = ()  # source of each axis, and reasons for omitted axes
 
 
-def temperature_effect(
+def find_temperature_effect(
     rows: Iterable[TemperatureRow], recording: RecordingRow, quantity: str, horizon: float
 ) -> TemperatureEffect:
     """Return the effect of temperature on a quantity in one recording.

@@ -20,10 +20,16 @@ from __future__ import annotations
 
 import math
 
-from imubench_pipeline.export.comments import commented, heading, number, plain, setting
+from imubench_pipeline.export.comments import (
+    describe_model,
+    format_comments,
+    format_decimal,
+    format_exponential,
+    format_setting,
+)
 from imubench_pipeline.export.imu import Imu
 from imubench_pipeline.export.target import Target
-from imubench_pipeline.export.walks import TOPIC, walks
+from imubench_pipeline.export.walks import TOPIC, map_to_walks
 
 _CONVENTION = (
     "acc_n, gyr_n = N sqrt(2 rate) and acc_w, gyr_w = K sqrt(rate): discrete in time, for samples "
@@ -34,23 +40,31 @@ _CONVENTION = (
 
 def write(imu: Imu) -> str:
     """Return the lines of the configuration that concern the sensor."""
-    mapped = walks(imu)
+    mapped = map_to_walks(imu)
     gyro, accel = mapped["gyro"].model, mapped["accel"].model
     per_sample, per_step = math.sqrt(2.0 * imu.rate), math.sqrt(imu.rate)
     about = [
-        *heading(imu, "VINS-Fusion", _CONVENTION.format(rate=imu.rate), mapped),
+        *describe_model(imu, "VINS-Fusion", _CONVENTION.format(rate=imu.rate), mapped),
         "These lines replace those of the same name in the configuration.",
     ]
     return (
         "%YAML:1.0\n\n"
-        + commented(about)
-        + setting("imu", "1", "use it")
-        + setting("imu_topic", f'"{TOPIC}"', "of sensor_msgs/Imu")
-        + setting("acc_n", number(accel.N * per_sample), f"m/s^2 a sample, N = {accel.N:.4e}")
-        + setting("gyr_n", number(gyro.N * per_sample), f"rad/s a sample, N = {gyro.N:.4e}")
-        + setting("acc_w", number(accel.K * per_step), f"m/s^3, K = {accel.K:.4e}")
-        + setting("gyr_w", number(gyro.K * per_step), f"rad/s^2, K = {gyro.K:.4e}")
-        + setting("g_norm", plain(imu.gravity), "gravity, m/s^2")
+        + format_comments(about)
+        + format_setting("imu", "1", "use it")
+        + format_setting("imu_topic", f'"{TOPIC}"', "of sensor_msgs/Imu")
+        + format_setting(
+            "acc_n", format_exponential(accel.N * per_sample), f"m/s^2 a sample, N = {accel.N:.4e}"
+        )
+        + format_setting(
+            "gyr_n", format_exponential(gyro.N * per_sample), f"rad/s a sample, N = {gyro.N:.4e}"
+        )
+        + format_setting(
+            "acc_w", format_exponential(accel.K * per_step), f"m/s^3, K = {accel.K:.4e}"
+        )
+        + format_setting(
+            "gyr_w", format_exponential(gyro.K * per_step), f"rad/s^2, K = {gyro.K:.4e}"
+        )
+        + format_setting("g_norm", format_decimal(imu.gravity), "gravity, m/s^2")
     )
 
 

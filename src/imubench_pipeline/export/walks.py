@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from imubench_pipeline.export.comments import number, setting
+from imubench_pipeline.export.comments import format_exponential, format_setting
 from imubench_pipeline.export.imu import ExportError, Imu
 from imubench_pipeline.export.mapping import Mapped, as_walk
 
@@ -15,7 +15,7 @@ TOPIC = "/imu0"
 """ROS topic of the samples."""
 
 
-def walks(imu: Imu) -> dict[str, Mapped]:
+def map_to_walks(imu: Imu) -> dict[str, Mapped]:
     """Return gyro and accelerometer as white noise and random walk; ExportError without both."""
     imu.require_both()
     return {
@@ -24,9 +24,9 @@ def walks(imu: Imu) -> dict[str, Mapped]:
     }
 
 
-def positive_walks(imu: Imu, program: str) -> dict[str, Mapped]:
-    """Return `walks` for a program that takes densities above 0 only; ExportError if one is 0."""
-    mapped = walks(imu)
+def map_to_positive_walks(imu: Imu, program: str) -> dict[str, Mapped]:
+    """Return `map_to_walks` for a program that takes no 0; ExportError if a density is 0."""
+    mapped = map_to_walks(imu)
     for name, axis in mapped.items():
         for letter in ("N", "K"):
             if not getattr(axis.model, letter) > 0.0:
@@ -37,7 +37,7 @@ def positive_walks(imu: Imu, program: str) -> dict[str, Mapped]:
     return mapped
 
 
-def densities(mapped: dict[str, Mapped], indent: str = "") -> str:
+def format_densities(mapped: dict[str, Mapped], indent: str = "") -> str:
     """Return the four lines with the densities."""
     text = ""
     for name, word, unit, slower in (
@@ -45,6 +45,10 @@ def densities(mapped: dict[str, Mapped], indent: str = "") -> str:
         ("gyro", "gyroscope", "rad/s", "rad/s^2"),
     ):
         model = mapped[name].model
-        text += setting(f"{word}_noise_density", number(model.N), f"N, {unit}/sqrt(Hz)", indent)
-        text += setting(f"{word}_random_walk", number(model.K), f"K, {slower}/sqrt(Hz)", indent)
+        text += format_setting(
+            f"{word}_noise_density", format_exponential(model.N), f"N, {unit}/sqrt(Hz)", indent
+        )
+        text += format_setting(
+            f"{word}_random_walk", format_exponential(model.K), f"K, {slower}/sqrt(Hz)", indent
+        )
     return text

@@ -12,11 +12,11 @@ from imubench_pipeline.library.estimates import ChannelEstimate, Estimates, Meth
 from imubench_pipeline.library.logs import Log
 from imubench_pipeline.library.shown import Shown, Summary, cut
 from imubench_pipeline.navigation.compared import ComparedChannel
-from imubench_pipeline.navigation.ratios import Ratio, ratio_of_deviations, ratio_of_parameters
-from imubench_pipeline.report.practical import page_unit
+from imubench_pipeline.navigation.ratios import Ratio, compare_deviations, compare_parameters
+from imubench_pipeline.report.practical import choose_page_unit
 from imubench_pipeline.settings.config import FusionSettings
 from imubench_pipeline.settings.sensor import quantity_of
-from imubench_pipeline.units import in_si
+from imubench_pipeline.units import parse_setting
 from imubench_pipeline.words.estimates import symbol_text
 from imubench_pipeline.words.numbers import limit_digits, number_text
 
@@ -70,9 +70,9 @@ class Comparison(Shown, Sequence[Compared]):
 
     def plot(self, ax: Axes | None = None) -> Axes:
         """Draw each ratio with its interval, on a logarithmic axis."""
-        from imubench_pipeline.library.drawing import axes_or_new, draw_ratios
+        from imubench_pipeline.library.drawing import draw_ratios, get_axes
 
-        axes: Axes = axes_or_new(ax)
+        axes: Axes = get_axes(ax)
         labels = []
         for each in self:
             labels.append(f"{each.channel} {each.label}")
@@ -113,7 +113,7 @@ class Comparison(Shown, Sequence[Compared]):
         several = len(self.names) > 2
         rows = []
         for each in self:
-            unit = page_unit(quantity_of(each.channel), each.symbol, "practical")
+            unit = choose_page_unit(quantity_of(each.channel), each.symbol, "practical")
             row = [each.channel, each.label, *(unit.text(value, 3) for value in each.values)]
             lower, upper = each.ratio.lower or 0.0, each.ratio.upper
             digits, interval = limit_digits(each.ratio.lower, upper), "–"
@@ -196,7 +196,7 @@ def compare(
         raise ValueError(
             f"names are {', '.join(called)}; expected {len(logs)} of them, all distinct"
         )
-    seconds = [in_si(each, "time", "tau") for each in tau]
+    seconds = [parse_setting(each, "time", "tau") for each in tau]
     compared = [
         figure
         for (a, first), (b, second) in combinations(zip(called, estimates, strict=True), 2)
@@ -219,13 +219,13 @@ def _pair(
         for symbol in COMPARED:
             a, b = ({**one.parameters, **one.curve}.get(symbol) for one in pair)
             if a is not None and b is not None:
-                ratio = ratio_of_parameters(a, b)
+                ratio = compare_parameters(a, b)
                 yield Compared(channel, symbol, None, names, (a.value, b.value), ratio)
         a_log, b_log = (_make_fusion_channel(one) for one in pair)
         for tau in seconds:
             if tau > _FUSION_DEFAULTS.longest * min(a_log.duration, b_log.duration):
                 continue
-            ratio = ratio_of_deviations(
+            ratio = compare_deviations(
                 a_log,
                 b_log,
                 tau,

@@ -11,23 +11,23 @@ from numpy.typing import ArrayLike
 
 from imubench_pipeline import allan
 from imubench_pipeline.allan import AllanCurve
-from imubench_pipeline.allan.threads import available
-from imubench_pipeline.estimators.rows import allan_rows
+from imubench_pipeline.allan.threads import count_threads
+from imubench_pipeline.estimators.rows import make_allan_rows
 from imubench_pipeline.library.given import (
     Channels,
     Units,
     check_present,
-    columns_of,
-    dimension_of,
+    convert_to_numbers,
+    get_dimension,
     has_columns,
-    numbers,
-    rate_of,
+    read_columns,
+    read_rate,
 )
 from imubench_pipeline.library.logs import Log
 from imubench_pipeline.library.shown import Shown, Summary
 from imubench_pipeline.recordings.recording import ChannelLog
 from imubench_pipeline.settings.sensor import TEMPERATURE, quantity_of
-from imubench_pipeline.steps.allan import curve_of, too_sparse
+from imubench_pipeline.steps.allan import curve_of, report_too_sparse
 from imubench_pipeline.tables.keys import Key
 from imubench_pipeline.units import SI_UNITS
 from imubench_pipeline.words.numbers import number_text
@@ -77,9 +77,9 @@ class Curve(Shown, AllanCurve):
 
     def plot(self, ax: Axes | None = None) -> Axes:
         """Draw the deviation with 95 % limits, and the slopes of noise terms in grey."""
-        from imubench_pipeline.library.drawing import axes_or_new, draw_curves
+        from imubench_pipeline.library.drawing import draw_curves, get_axes
 
-        axes: Axes = axes_or_new(ax)
+        axes: Axes = get_axes(ax)
         draw_curves(axes, {self.channel or "Allan deviation": self}, self.quantity)
         return axes
 
@@ -116,12 +116,12 @@ class Curves(Shown, Mapping[str, Curve]):
 
     def plot(self, ax: Axes | Sequence[Axes] | None = None) -> Any:
         """Draw the curves, one panel per quantity; return the axes, shape (quantities,)."""
-        from imubench_pipeline.library.drawing import draw_curves, panels
+        from imubench_pipeline.library.drawing import create_panels, draw_curves
 
         by_quantity: dict[str, dict[str, AllanCurve]] = {}
         for channel, curve in self.items():
             by_quantity.setdefault(quantity_of(channel), {})[channel] = curve
-        axes = panels([*by_quantity], ax)
+        axes = create_panels([*by_quantity], ax)
         for panel, (quantity, curves) in zip(axes, by_quantity.items(), strict=True):
             draw_curves(panel, curves, quantity)
         return axes
@@ -140,16 +140,16 @@ def measured(
 ) -> Curve | None:
     """Return the curve of a channel of a log at cluster sizes, shape (m,), or at the default ones.
 
-    None if too many samples are missing (`imubench_pipeline.steps.allan.too_sparse`).
+    None if too many samples are missing (`imubench_pipeline.steps.allan.report_too_sparse`).
     """
     curve = curve_of(log, sizes, overlap, threads=threads)
     return Curve.of(curve, log.channel) if len(curve.tau) else None
 
 
 def _make_row(curve: Curve) -> list[str]:
-    from imubench_pipeline.library.drawing import deviation_unit
+    from imubench_pipeline.library.drawing import choose_deviation_unit
 
-    unit = deviation_unit(curve.quantity)
+    unit = choose_deviation_unit(curve.quantity)
     lowest = int(np.argmin(curve.deviation))
     sign = "" if curve.quantity is None else f" {unit.sign}"
     return [
@@ -166,8 +166,8 @@ def _make_table(curves: Iterable[Curve]) -> pd.DataFrame:
 
     rows = []
     for curve in curves:
-        unit = None if curve.channel is None else SI_UNITS[dimension_of(curve.channel)]
-        for row in allan_rows(Key("", "", curve.channel or ""), curve):
+        unit = None if curve.channel is None else SI_UNITS[get_dimension(curve.channel)]
+        for row in make_allan_rows(Key("", "", curve.channel or ""), curve):
             kept = {key: getattr(row, key) for key in _TABLE_COLUMNS}
             rows.append(({"channel": curve.channel, "unit": unit} if unit else {}) | kept)
     table = pd.DataFrame(rows)
@@ -242,7 +242,7 @@ def allan_variance(
       gyro_y   34   0.01 s  39.8 s  351 °/h          3.85 °/h  31.6 s
       gyro_z   34   0.01 s  39.8 s  354 °/h          3.75 °/h  39.8 s
     """
-    cores = available(threads)
+    cores = count_threads(threads)
     if isinstance(data, Log):
         if rate is not None or units is not None or valid is not None or segments is not None:
             raise ValueError(
@@ -251,10 +251,10 @@ def allan_variance(
         chosen = data.chosen(channels)
         curves = [measured(log, cluster_sizes, overlap, cores) for log in chosen.values()]
         if not any(curves):
-            reasons = [too_sparse(name, log).detail for name, log in chosen.items()]
+            reasons = [report_too_sparse(name, log).detail for name, log in chosen.items()]
             raise ValueError(f"{data.name}: {'; '.join(reasons)}")
         return Curves((curve for curve in curves if curve is not None), data.name)
-    hertz = rate_of(rate, data)
+    hertz = read_rate(rate, data)
 
     def of_samples(samples: Any, channel: str | None) -> Curve:
         curve = allan.allan_variance(
@@ -269,11 +269,11 @@ def allan_variance(
         return Curve.of(curve, channel)
 
     if channels is None and units is None and not has_columns(data):
-        samples = numbers(data, "the array")
+        samples = convert_to_numbers(data, "the array")
         if samples.ndim == 1:
             check_present(samples, "the array")
             return of_samples(samples, None)
-    columns = columns_of(data, channels, units)
+    columns = read_columns(data, channels, units)
     return Curves(
         of_samples(column.in_si(name), name)
         for name, column in columns.items()

@@ -12,9 +12,9 @@ import numpy as np
 from imubench_pipeline.allan import AllanCurve
 from imubench_pipeline.navigation.ratios import Ratio
 from imubench_pipeline.noise import NoiseModel
-from imubench_pipeline.report.palette import sensor_appearances
-from imubench_pipeline.report.practical import page_unit
-from imubench_pipeline.settings.extras import extra
+from imubench_pipeline.report.palette import assign_sensor_styles
+from imubench_pipeline.report.practical import choose_page_unit
+from imubench_pipeline.settings.extras import require_extra
 from imubench_pipeline.words.numbers import Unit
 
 if TYPE_CHECKING:
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 _SAMPLE_UNIT = Unit("unit of the samples", 1.0)
 
 
-def panels(names: Sequence[str], ax: Axes | Sequence[Axes] | None = None) -> Any:
+def create_panels(names: Sequence[str], ax: Axes | Sequence[Axes] | None = None) -> Any:
     """Return the given axes, or new ones, at most three in a row: one for each name, (n,).
 
     Raises ExtraError if matplotlib is not installed, and ValueError for another number of axes.
@@ -34,7 +34,7 @@ def panels(names: Sequence[str], ax: Axes | Sequence[Axes] | None = None) -> Any
         if len(given) != count:
             raise ValueError(f"{len(given)} axes; expected one for each of {', '.join(names)}")
         return given
-    with extra("workflow", "draw"):
+    with require_extra("workflow", "draw"):
         from matplotlib import pyplot as plt
 
     columns = min(count, 3)
@@ -46,20 +46,20 @@ def panels(names: Sequence[str], ax: Axes | Sequence[Axes] | None = None) -> Any
     return axes.ravel()[:count]
 
 
-def axes_or_new(ax: Axes | None) -> Any:
+def get_axes(ax: Axes | None) -> Any:
     """Return the given axes, or new ones."""
-    return panels([""])[0] if ax is None else ax
+    return create_panels([""])[0] if ax is None else ax
 
 
-def deviation_unit(quantity: str | None) -> Unit:
+def choose_deviation_unit(quantity: str | None) -> Unit:
     """Return the unit of an Allan deviation in plots; the unit of the samples if not known."""
-    return _SAMPLE_UNIT if quantity is None else page_unit(quantity, "adev", "practical")
+    return _SAMPLE_UNIT if quantity is None else choose_page_unit(quantity, "adev", "practical")
 
 
 def draw_curves(axes: Axes, curves: Mapping[str, AllanCurve], quantity: str | None) -> None:
     """Draw Allan deviations with their 95 % limits, and the slopes of noise."""
-    unit = deviation_unit(quantity)
-    looks = cycle(sensor_appearances([*curves]).values())
+    unit = choose_deviation_unit(quantity)
+    looks = cycle(assign_sensor_styles([*curves]).values())
     for (name, curve), look in zip(curves.items(), looks, strict=False):
         draw_measured(axes, curve, unit, name, look.light)
     _format_axes(axes, unit)
@@ -99,13 +99,13 @@ def draw_model(axes: Axes, curve: AllanCurve, model: NoiseModel, quantity: str) 
     """Draw a measured curve, the terms of a model, and their sum."""
     from imubench_pipeline.report.static_figures.style import SUM_LOOK, TERM_LOOKS, TERM_NAMES
 
-    unit = deviation_unit(quantity)
+    unit = choose_deviation_unit(quantity)
     draw_measured(axes, curve, unit, "log, 95 % limits", "black")
     for term in model.terms:
         values = ", ".join(
             f"{symbol} = {each.text(abs(value), 3)} {each.sign}"
             for symbol, value in term.values.items()
-            for each in [page_unit(quantity, symbol, "practical")]
+            for each in [choose_page_unit(quantity, symbol, "practical")]
         )
         deviation = np.sqrt(term.allan_variance(curve.tau)) * unit.per_si
         label = f"{TERM_NAMES[quantity][term.symbol]}, {values}"

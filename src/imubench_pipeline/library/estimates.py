@@ -7,24 +7,24 @@ from dataclasses import dataclass, field, fields
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
 from imubench_pipeline.allan import cluster_sizes
-from imubench_pipeline.allan.threads import available
+from imubench_pipeline.allan.threads import count_threads
 from imubench_pipeline.datasheets.suspicion import usual_figures
 from imubench_pipeline.estimators.estimate import CURVE, SHOWN, Estimate, Parameter
-from imubench_pipeline.estimators.rows import parameter_rows
+from imubench_pipeline.estimators.rows import make_parameter_rows
 from imubench_pipeline.library.curves import Curve, Curves, measured
-from imubench_pipeline.library.given import Channels, Units, columns_of, rate_of
-from imubench_pipeline.library.logs import Log, log_of
+from imubench_pipeline.library.given import Channels, Units, read_columns, read_rate
+from imubench_pipeline.library.logs import Log, ingest_columns
 from imubench_pipeline.library.shown import Shown, Summary, cut
 from imubench_pipeline.noise import NoiseModel
-from imubench_pipeline.recordings.fitness import Doubt, doubts
-from imubench_pipeline.report.practical import System, page_unit
+from imubench_pipeline.recordings.fitness import Doubt, derive_doubts
+from imubench_pipeline.report.practical import System, choose_page_unit
 from imubench_pipeline.settings.config import AllanSettings, EstimateSettings
 from imubench_pipeline.settings.sensor import quantity_of, shipped_sensors
 from imubench_pipeline.settings.validation import parse
-from imubench_pipeline.steps.allan import too_sparse
+from imubench_pipeline.steps.allan import report_too_sparse
 from imubench_pipeline.steps.estimate import Estimation, estimate_channel
-from imubench_pipeline.steps.sensor_tables import findings_of
-from imubench_pipeline.tables.findings import Finding, finding_of
+from imubench_pipeline.steps.sensor_tables import collect_findings
+from imubench_pipeline.tables.findings import Finding, make_finding
 from imubench_pipeline.tables.keys import Key
 from imubench_pipeline.words.estimates import STATUS_WORDS, symbol_text
 from imubench_pipeline.words.numbers import interval_text
@@ -75,9 +75,9 @@ class ChannelEstimate(Shown, Estimate):
 
     def plot(self, ax: Axes | None = None) -> Axes:
         """Draw the measured curve with 95 % limits, the terms of the model, and their sum."""
-        from imubench_pipeline.library.drawing import axes_or_new, draw_model
+        from imubench_pipeline.library.drawing import draw_model, get_axes
 
-        axes: Axes = axes_or_new(ax)
+        axes: Axes = get_axes(ax)
         assert self.measured is not None
         draw_model(axes, self.measured, self.model, self.quantity)
         axes.set_title(self.channel)
@@ -163,9 +163,9 @@ class Estimates(Shown, Mapping[str, ChannelEstimate]):
 
     def plot(self, ax: Axes | Sequence[Axes] | None = None) -> Any:
         """Draw curve and terms of each channel; return the axes, shape (channels,)."""
-        from imubench_pipeline.library.drawing import panels
+        from imubench_pipeline.library.drawing import create_panels
 
-        axes = panels([*self], ax)
+        axes = create_panels([*self], ax)
         for panel, estimate in zip(axes, self.values(), strict=True):
             estimate.plot(panel)
         return axes
@@ -258,7 +258,7 @@ def estimate(
             raise ValueError("a log has its own rate and units; expected none of them beside it")
         log = data
     else:
-        log = log_of(columns_of(data, channels, units), rate_of(rate, data), name)
+        log = ingest_columns(read_columns(data, channels, units), read_rate(rate, data), name)
     chosen = log.chosen(channels if log is data else None)
     if method == "compensated" and not any(kept.temperature for kept in chosen.values()):
         raise ValueError(f"{log.name} has no readings of the temperature; expected another method")
@@ -271,10 +271,10 @@ def estimate(
     left_out: dict[str, str] = {}
     for channel, kept in chosen.items():
         sizes = cluster_sizes(kept.grid, per_decade=grid.per_decade, longest=grid.longest)
-        curve = measured(kept, sizes, grid.overlap, available(threads))
+        curve = measured(kept, sizes, grid.overlap, count_threads(threads))
         key = Key(log.sensor, log.recording, channel)
         if curve is None:
-            lack = too_sparse(channel, kept)
+            lack = report_too_sparse(channel, kept)
             into.add_findings(key, [lack])
             left_out[channel] = lack.detail
             continue
@@ -295,7 +295,7 @@ def estimate(
             f"{log.name}: no channel is estimated by {method}: {'; '.join(left_out.values())}"
         )
     recommended = [row for row in into.parameters if row.recommended]
-    rows = findings_of(
+    rows = collect_findings(
         [log.quality],
         into.deterministic,
         into.estimate_findings,
@@ -303,8 +303,8 @@ def estimate(
         {} if log.declared is None else {log.sensor: log.declared},
         usual_figures(shipped_sensors()),
     )
-    doubted = list(doubts(rows, recommended, into.models))
-    return Estimates(estimates, log, method, list(map(finding_of, rows)), doubted, left_out)
+    doubted = list(derive_doubts(rows, recommended, into.models))
+    return Estimates(estimates, log, method, list(map(make_finding, rows)), doubted, left_out)
 
 
 def _make_rows(estimate: ChannelEstimate) -> Iterator[list[str]]:
@@ -316,7 +316,7 @@ def _make_rows(estimate: ChannelEstimate) -> Iterator[list[str]]:
         if symbol in order and (parameter.value is not None or parameter.upper is not None)
     ]
     for component, symbol, parameter in sorted(components, key=lambda c: (c[0], order[c[1]])):
-        unit = page_unit(estimate.quantity, symbol, "practical")
+        unit = choose_page_unit(estimate.quantity, symbol, "practical")
         if parameter.value is None and not parameter.lower and parameter.upper is not None:
             interval = f"below {unit.text(parameter.upper, 3)}"
         else:
@@ -352,10 +352,10 @@ def _make_table(estimates: Any, units: System) -> pd.DataFrame:
     for estimate in estimates:
         sensor, _, recording = estimate.log.partition("/")
         key = Key(sensor, recording, estimate.channel)
-        for row in parameter_rows(key, estimate, recommended=True):
+        for row in make_parameter_rows(key, estimate, recommended=True):
             kept = {name: value for name, value in row.columns().items() if name != "recommended"}
             if units == "practical" and row.parameter in SHOWN:
-                unit = page_unit(estimate.quantity, row.parameter, "practical")
+                unit = choose_page_unit(estimate.quantity, row.parameter, "practical")
                 for name in ("value", "lower", "upper", "fitted"):
                     value = getattr(row, name)
                     kept[name] = None if value is None else value * unit.per_si

@@ -18,7 +18,13 @@ import numpy as np
 
 from imubench_pipeline.settings.sensor import CHANNELS, QUANTITIES, TEMPERATURE, quantity_of
 from imubench_pipeline.typing import Array
-from imubench_pipeline.units import SI_UNITS, UnitError, conversion, in_si, naming
+from imubench_pipeline.units import (
+    SI_UNITS,
+    UnitError,
+    add_key_to_errors,
+    find_conversion,
+    parse_setting,
+)
 
 Channels = str | Sequence[str]
 Units = Mapping[str, str]
@@ -39,16 +45,16 @@ class Column:
 
     def in_si(self, name: str) -> Array:
         """Return the samples in the SI unit of a channel, shape (L,)."""
-        factor, offset = conversion(self.unit, dimension_of(name))
+        factor, offset = find_conversion(self.unit, get_dimension(name))
         return self.values if (factor, offset) == (1.0, 0.0) else factor * self.values + offset
 
 
-def dimension_of(name: str) -> str:
+def get_dimension(name: str) -> str:
     """Return the dimension of a channel or of the temperature."""
     return TEMPERATURE if name == TEMPERATURE else QUANTITIES[quantity_of(name)]
 
 
-def rate_of(rate: float | str | None, data: object) -> float:
+def read_rate(rate: float | str | None, data: object) -> float:
     """Return the sampling rate of samples, Hz; a table may state it in its ``attrs``.
 
     Raises ValueError if none is given, or it is not a frequency above 0 (`UnitError`: another
@@ -60,10 +66,10 @@ def rate_of(rate: float | str | None, data: object) -> float:
             "no rate is given; expected the sampling rate of the samples, such as rate='100 Hz' or "
             "rate=100.0 (Hz)"
         )
-    return in_si(stated, "frequency", "rate")
+    return parse_setting(stated, "frequency", "rate")
 
 
-def numbers(values: object, name: str) -> Array:
+def convert_to_numbers(values: object, name: str) -> Array:
     """Return samples as floats, NaN where masked; ValueError if they are not real numbers."""
     filled = values.filled(np.nan) if isinstance(values, np.ma.MaskedArray) else values
     try:
@@ -77,7 +83,7 @@ def numbers(values: object, name: str) -> Array:
         ) from None
 
 
-def columns_of(
+def read_columns(
     data: object, channels: Channels | None = None, units: Units | None = None
 ) -> dict[str, Column]:
     """Return the channels, and the temperature, of an array, a table or a mapping.
@@ -103,12 +109,14 @@ def columns_of(
         raise ValueError(f"units name {unknown[0]!r}; expected of {', '.join(known)}")
     is_table = _is_table(data)
     if has_columns(data):
-        columns = dict(_select_columns(data, listed(channels), units or {}, stated=is_table))
+        columns = dict(
+            _select_columns(data, expand_channels(channels), units or {}, stated=is_table)
+        )
     else:
-        columns = dict(_name_columns(data, listed(channels), units or {}))
+        columns = dict(_name_columns(data, expand_channels(channels), units or {}))
     for name, column in columns.items():
-        with naming(f"{name}: "):
-            conversion(column.unit, dimension_of(name))
+        with add_key_to_errors(f"{name}: "):
+            find_conversion(column.unit, get_dimension(name))
         if name != TEMPERATURE:
             check_present(column.values, name)
     return columns
@@ -136,7 +144,7 @@ def _is_table(data: object) -> bool:
     return pandas is not None and isinstance(data, pandas.DataFrame)
 
 
-def listed(channels: Channels | None) -> list[str] | None:
+def expand_channels(channels: Channels | None) -> list[str] | None:
     """Return the names of channels; ``gyro`` and ``accel`` are expanded to three axes.
 
     Raises ValueError if a name is not a channel, is repeated, or is not text.
@@ -167,7 +175,7 @@ def _name_columns(
     data: object, names: list[str] | None, units: Units
 ) -> Iterator[tuple[str, Column]]:
     """Yield the columns of an array with their channel names."""
-    array = numbers(data, "the array")
+    array = convert_to_numbers(data, "the array")
     if array.ndim not in (1, 2) or not array.size:
         raise ValueError(
             f"the array has shape {array.shape}; expected (samples,), (samples, 3) or (samples, 6)"
@@ -191,7 +199,7 @@ def _name_columns(
             mend = f"expected a column for each of {', '.join(names)}"
         raise ValueError(f"the array has shape {array.shape}; {mend}")
     for place, name in enumerate(names):
-        unit = _find_unit(name, units) or SI_UNITS[dimension_of(name)]
+        unit = _find_unit(name, units) or SI_UNITS[get_dimension(name)]
         yield name, Column(table[:, place], unit)
 
 
@@ -219,7 +227,7 @@ def _select_columns(
     for name in names:
         if name not in there:
             raise ValueError(f"no column {name}; found {', '.join(map(str, written))}")
-        values = numbers(data[there[name]], name)
+        values = convert_to_numbers(data[there[name]], name)
         if values.ndim != 1:
             raise ValueError(f"{name} has shape {values.shape}, expected one dimension")
         lengths.add(len(values))
@@ -231,8 +239,8 @@ def _select_columns(
         factors = {}
         for source, unit in sources.items():
             if unit:
-                with naming(f"{name}: "):
-                    factors[conversion(unit, dimension_of(name))] = f"{unit!r} by {source}"
+                with add_key_to_errors(f"{name}: "):
+                    factors[find_conversion(unit, get_dimension(name))] = f"{unit!r} by {source}"
         if len(factors) > 1:
             raise UnitError(f"{name} is in {' and in '.join(factors.values())}; expected one unit")
         unit = next(filter(None, sources.values()), None)
@@ -240,9 +248,9 @@ def _select_columns(
             raise UnitError(
                 f"{name}: the table does not say its unit, which is never guessed; expected such "
                 f"as units={{'gyro': 'deg/s', 'accel': 'm/s^2'}}, or columns such as '{name} "
-                f"[{SI_UNITS[dimension_of(name)]}]'"
+                f"[{SI_UNITS[get_dimension(name)]}]'"
             )
-        yield name, Column(values, unit or SI_UNITS[dimension_of(name)])
+        yield name, Column(values, unit or SI_UNITS[get_dimension(name)])
     if len(lengths) > 1:
         raise ValueError(f"the channels have {sorted(lengths)} samples; expected as many of each")
 

@@ -16,14 +16,19 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from imubench_pipeline.datasheets.plausibility import implausible_of
-from imubench_pipeline.library.given import Channels, Column, Units, dimension_of, listed
+from imubench_pipeline.library.given import Channels, Column, Units, expand_channels, get_dimension
 from imubench_pipeline.library.shown import Shown, Summary, cut
 from imubench_pipeline.readers.inspection import inspect
 from imubench_pipeline.readers.inspection.draft import UNKNOWN
-from imubench_pipeline.recordings.drop_zone import name_of, sensor_of
+from imubench_pipeline.recordings.drop_zone import get_recording_name, get_sensor_name
 from imubench_pipeline.recordings.ingest import ingest_as_planned
 from imubench_pipeline.recordings.kept import Quality
-from imubench_pipeline.recordings.recording import ChannelLog, channel_logs, on_grid, was_at_rest
+from imubench_pipeline.recordings.recording import (
+    ChannelLog,
+    open_channel_logs,
+    place_on_grid,
+    was_at_rest,
+)
 from imubench_pipeline.settings.quality import QualitySettings
 from imubench_pipeline.settings.sensor import (
     CHANNELS,
@@ -37,9 +42,9 @@ from imubench_pipeline.settings.sensor import (
 )
 from imubench_pipeline.settings.validation import ConfigError, parse
 from imubench_pipeline.settings.yaml_files import read_settings, read_yaml
-from imubench_pipeline.tables.findings import RecordingError, finding_of
+from imubench_pipeline.tables.findings import RecordingError, make_finding
 from imubench_pipeline.typing import Array
-from imubench_pipeline.units import SI_UNITS, in_si, quantity_to_si
+from imubench_pipeline.units import SI_UNITS, parse_quantity, parse_setting
 from imubench_pipeline.words.numbers import duration_text, number_text
 
 if TYPE_CHECKING:
@@ -77,7 +82,7 @@ class Log(Shown):
         self, folder: Path, quality: Quality, sensor: Sensor | None, bandwidth: float | None
     ) -> None:
         weakref.finalize(self, shutil.rmtree, folder, ignore_errors=True)
-        self._logs = channel_logs(folder)
+        self._logs = open_channel_logs(folder)
         self._about = quality.row
         self.quality, self.declared = quality, sensor
         self.sensor = self._about.sensor
@@ -86,7 +91,7 @@ class Log(Shown):
         self.channels = tuple(self._logs)
         self._at_rest = was_at_rest(folder)
         rows = [*quality.findings, *implausible_of(quality, sensor)]
-        self.findings = tuple(map(finding_of, rows))
+        self.findings = tuple(map(make_finding, rows))
 
     @property
     def name(self) -> str:
@@ -125,18 +130,18 @@ class Log(Shown):
     @property
     def units(self) -> dict[str, str]:
         """SI unit of each channel."""
-        return {name: SI_UNITS[dimension_of(name)] for name in self.channels}
+        return {name: SI_UNITS[get_dimension(name)] for name in self.channels}
 
     def __getitem__(self, channel: str) -> Array:
         """Return a channel, or ``temperature``, on its grid: SI, shape (L,), NaN where missing."""
         if channel == TEMPERATURE and self._has_temperature:
             log = next(log for log in self._logs.values() if log.temperature)
-            return on_grid(log.temperatures(), log.grid)
+            return place_on_grid(log.temperatures(), log.grid)
         if channel not in self._logs:
             there = [*self.channels, *([TEMPERATURE] if self._has_temperature else [])]
             raise KeyError(f"no channel {channel!r} in {self.name}; it has {', '.join(there)}")
         log = self._logs[channel]
-        return on_grid(log.blocks(), log.grid)
+        return place_on_grid(log.blocks(), log.grid)
 
     def __iter__(self) -> Iterator[str]:
         return iter(self.channels)
@@ -161,7 +166,7 @@ class Log(Shown):
                 f"{self.name}: the notes beside the log say that the sensor was turned "
                 f"({self._about.kind}); expected a log at rest: noise is told from that alone"
             )
-        names = listed(channels) or self.channels
+        names = expand_channels(channels) or self.channels
         if missing := [name for name in names if name not in self._logs]:
             raise ValueError(
                 f"{self.name} has no {missing[0]}; expected of {', '.join(self.channels)}"
@@ -183,7 +188,7 @@ class Log(Shown):
         if len({(log.grid, log.rate) for log in self._logs.values()}) > 1:
             raise ValueError("the channels have clocks of their own; expected log[channel] of each")
         names = [*self.channels, *([TEMPERATURE] if self._has_temperature else [])]
-        columns = {f"{name} [{SI_UNITS[dimension_of(name)]}]": self[name] for name in names}
+        columns = {f"{name} [{SI_UNITS[get_dimension(name)]}]": self[name] for name in names}
         length = len(next(iter(columns.values())))
         table = pd.DataFrame(
             columns, index=pd.Index(np.arange(length) / self.rate, name="time [s]")
@@ -192,7 +197,7 @@ class Log(Shown):
             "sensor": self.sensor,
             "recording": self.recording,
             "rate": self.rate,
-            "units": {name: SI_UNITS[dimension_of(name)] for name in names},
+            "units": {name: SI_UNITS[get_dimension(name)] for name in names},
         }
         return table
 
@@ -266,7 +271,7 @@ def read_log(
     source = Path(path)
     if not source.exists():
         raise ValueError(f"{source}: no such file; expected the log of an inertial sensor")
-    name = source.name if source.is_dir() else name_of(source.name)
+    name = source.name if source.is_dir() else get_recording_name(source.name)
     declared, sensor_name, own = _load_sensor(source, sensor, Path(sensors), rate, units)
     notes_file = source.with_name(f"{name}.yaml")
     notes = RecordingNotes()
@@ -277,12 +282,12 @@ def read_log(
         notes.check_gyro(log)
     except ValueError as error:
         raise ConfigError(f"{notes_file}: {error}") from None
-    bandwidth = quantity_to_si(log.bandwidth, "frequency") if log.bandwidth else None
+    bandwidth = parse_quantity(log.bandwidth, "frequency") if log.bandwidth else None
     kept, found = _ingest(source, log, notes, (sensor_name, name), quality or {}, guarded=True)
     return Log(kept, found, declared if sensor is not None else None, bandwidth)
 
 
-def log_of(columns: Mapping[str, Column], rate: float, name: str) -> Log:
+def ingest_columns(columns: Mapping[str, Column], rate: float, name: str) -> Log:
     """Return samples as a log, ingested like a file, with the same checks.
 
     Parameters
@@ -347,7 +352,7 @@ def _load_sensor(
     source: Path, sensor: Any, folder: Path, rate: float | str | None, units: Units | None
 ) -> tuple[Sensor, str, Path | None]:
     """Return the sensor of a log, its name, and its sensor file, if there is one."""
-    of_folder = sensor_of(source.absolute().parent)
+    of_folder = get_sensor_name(source.absolute().parent)
     if sensor is None:
         return _draft_sensor(source, rate, units), of_folder, None
     if rate is not None or units is not None:
@@ -380,7 +385,7 @@ def _draft_sensor(source: Path, rate: float | str | None, units: Units | None) -
     sensor = inspection.draft.sensor()
     log = sensor["log"]
     if rate is not None:
-        log["rate"] = f"{in_si(rate, 'frequency', 'rate')!r} Hz"
+        log["rate"] = f"{parse_setting(rate, 'frequency', 'rate')!r} Hz"
     for channel, column in log["channels"].items():
         stated = (units or {}).get(channel) or (units or {}).get(quantity_of(channel))
         if stated is not None:

@@ -20,7 +20,7 @@ _MIN_RELEVANT_SHARE = 0.1
 """Minimum share of the Allan variance for which an unknown parameter matters."""
 
 
-def number_needed(own: ArrayLike, common: ArrayLike, wanted: ArrayLike) -> Array:
+def compute_number_needed(own: ArrayLike, common: ArrayLike, wanted: ArrayLike) -> Array:
     """Return the number of sensors of one kind whose mean has a given Allan variance.
 
     The mean of n sensors has ``own / n + common``. n is not rounded, may be below 1, and is

@@ -39,9 +39,9 @@ from imubench_pipeline.model.recordings import RecordingRow
 from imubench_pipeline.model.states import DriftVerdict, Status
 from imubench_pipeline.navigation.pooled import (
     POOLED_PARAMETERS,
-    bounded_exp,
-    points_about_median,
-    usable,
+    centre_on_median,
+    compute_bounded_exp,
+    is_usable,
 )
 from imubench_pipeline.noise import PARAMETERS, TERMS
 from imubench_pipeline.words.reasons import pools as texts
@@ -161,7 +161,9 @@ def _make_rows(
             own = cells[place].get(key)
             index = columns.get((*key, _get_bias_terms(own)), -1)
             *y, p, changed, count, alone = _EMPTY_RESULT if index < 0 else levels[place][index]
-            expected = [None if math.isnan(x) else bounded_exp(x) if noise else x for x in y]
+            expected = [
+                None if math.isnan(x) else compute_bounded_exp(x) if noise else x for x in y
+            ]
             value = own.value if own is not None and _get_status(own) == "ok" else None
             change = value / expected[0] - 1.0 if noise and value and expected[0] else None
             reasons = [_explain_no_verdict(own, count)] if math.isnan(p) else []
@@ -216,9 +218,9 @@ def _make_point(row: Estimated) -> tuple[float, ...]:
     if isinstance(row, FixedBiasRow):
         return row.value, 0.0, 0.0
     triple = (row.value if row.status == "ok" else None, row.lower, row.upper)
-    if not usable(triple):
+    if not is_usable(triple):
         return math.nan, math.nan, math.nan
-    y, points = points_about_median([triple])
+    y, points = centre_on_median([triple])
     return y, *points[0][1:]
 
 

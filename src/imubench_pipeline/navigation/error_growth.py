@@ -21,14 +21,14 @@ from imubench_pipeline.navigation.error_budget.budget import ACCEL_ORDER, GYRO_O
 from imubench_pipeline.navigation.expected_errors import (
     NO_FIGURES_OF_CHANNELS,
     AxisErrors,
-    answering,
-    axes_of,
-    standard,
+    collect_axis_errors,
+    list_standard_questions,
+    select_channels,
 )
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.growth import Calibrated
 from imubench_pipeline.noise.simulate import channel_rng
-from imubench_pipeline.noise.stacked import summed
+from imubench_pipeline.noise.stacked import sum_over_terms
 from imubench_pipeline.settings.requirements import DIMENSIONS
 from imubench_pipeline.typing import Array
 from imubench_pipeline.units import SI_UNITS
@@ -38,7 +38,7 @@ _STANDARD_WINDOWS = (10.0, 30.0, 60.0, 120.0, 300.0, 600.0)
 _TAIL_PROBABILITY = 0.025  # probability beyond each 95 % limit
 
 
-def growth_rows(
+def list_growth_rows(
     names: Mapping[str, str],
     estimates: Mapping[str, Estimate],
     *,
@@ -54,7 +54,7 @@ def growth_rows(
     ``window``, s, are in addition to those that every table has; the others are as in
     `expected_errors.error_rows`.
     """
-    axes = axes_of(estimates, figures)
+    axes = collect_axis_errors(estimates, figures)
 
     @cache
     def models(channel: str) -> Sequence[NoiseModel]:
@@ -63,7 +63,9 @@ def growth_rows(
 
     @cache
     def grown(channel: str, order: int, time: float, start: Calibrated | Uncalibrated) -> Array:
-        return summed(models(channel), lambda term: np.asarray(term.growth(order, time, start)))
+        return sum_over_terms(
+            models(channel), lambda term: np.asarray(term.growth(order, time, start))
+        )
 
     def noise(error: str, time: float, start: Calibrated, gyro: str, accel: str | None) -> Array:
         """Return the variances of an error from noise, shape (draws,)."""
@@ -83,10 +85,12 @@ def growth_rows(
     for letter in letters if len(letters) > 1 else []:
         answerers[letter] = {name: errors for name, errors in axes.items() if name[-1] == letter}
     for axis, at_rest in product(answerers, sorted({*_STANDARD_WINDOWS, window})):
-        for question in standard(sorted({*_STANDARD_TIMES, *times}), at_rest, 0.0, ["worst"]):
+        for question in list_standard_questions(
+            sorted({*_STANDARD_TIMES, *times}), at_rest, 0.0, ["worst"]
+        ):
             if question.error == "north":
                 continue
-            chosen = answering(question, answerers[axis])
+            chosen = select_channels(question, answerers[axis])
             if chosen is None:
                 continue
             budget = question.answer(*(axes[c] if c else AxisErrors() for c in chosen.values()))

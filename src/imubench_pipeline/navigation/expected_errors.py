@@ -24,10 +24,10 @@ from imubench_pipeline.navigation.error_budget import (
     Uncalibrated,
     Use,
     budget,
-    chance_within,
+    compute_chance_within,
+    compute_interval,
     draw_models,
-    drawn_jointly,
-    interval,
+    has_joint_draws,
     time_until,
 )
 from imubench_pipeline.navigation.error_budget.parts import Largest
@@ -35,7 +35,7 @@ from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.simulate import channel_rng
 from imubench_pipeline.settings.requirements import DIMENSIONS, Axis, Error, Requirement
 from imubench_pipeline.settings.sensor import quantity_of
-from imubench_pipeline.units import SI_UNITS, difference_to_si, quantity_to_si
+from imubench_pipeline.units import SI_UNITS, parse_difference, parse_quantity
 from imubench_pipeline.words.reasons import budgets as texts
 
 NO_FIGURES_OF_CHANNELS: Mapping[str, Figures] = MappingProxyType({})
@@ -104,7 +104,7 @@ class Question:
         return Gyrocompass(gyro=gyro.model, latitude=self.latitude, bias=stated, figures=figures)
 
 
-def standard(
+def list_standard_questions(
     times: Sequence[float], window: float, latitude: float, axes: Sequence[Axis]
 ) -> Iterator[Question]:
     """Yield the standard questions, which are computed for every recording.
@@ -120,17 +120,17 @@ def standard(
             yield Question(None, "north", time, start, axis, latitude)
 
 
-def of_requirement(name: str, requirement: Requirement) -> Iterator[Question]:
+def list_requirement_questions(name: str, requirement: Requirement) -> Iterator[Question]:
     """Yield the questions of a requirement."""
     latitude = requirement.latitude
     if requirement.static_window is not None:
-        start = Start.calibrated(quantity_to_si(requirement.static_window, "time"))
+        start = Start.calibrated(parse_quantity(requirement.static_window, "time"))
     elif requirement.turn_on is not None:
         gyro, accel = requirement.turn_on.gyro, requirement.turn_on.accel
         start = Start.uncalibrated(
-            gyro_bias=None if gyro is None else quantity_to_si(gyro, "angular_rate"),
-            accel_bias=None if accel is None else quantity_to_si(accel, "acceleration"),
-            on_time=quantity_to_si(requirement.turn_on.on_time, "time"),
+            gyro_bias=None if gyro is None else parse_quantity(gyro, "angular_rate"),
+            accel_bias=None if accel is None else parse_quantity(accel, "acceleration"),
+            on_time=parse_quantity(requirement.turn_on.on_time, "time"),
         )
     environment = requirement.environment
     stated = {
@@ -138,9 +138,9 @@ def of_requirement(name: str, requirement: Requirement) -> Iterator[Question]:
         "speed_change": (environment.speed_change, "velocity"),
         "vibration": (environment.vibration, "acceleration"),
     }
-    use = {name: quantity_to_si(text, of) for name, (text, of) in stated.items() if text}
+    use = {name: parse_quantity(text, of) for name, (text, of) in stated.items() if text}
     if environment.temperature_change:
-        change = difference_to_si(environment.temperature_change, "temperature")
+        change = parse_difference(environment.temperature_change, "temperature")
         use["temperature_change"] = change
     for limit in requirement.by_dead_reckoning:
         yield Question(
@@ -149,13 +149,13 @@ def of_requirement(name: str, requirement: Requirement) -> Iterator[Question]:
             limit.seconds,
             start,  # a limit of dead reckoning has one
             requirement.axis,
-            None if latitude is None else quantity_to_si(latitude, "angle"),
+            None if latitude is None else parse_quantity(latitude, "angle"),
             limit.size / requirement.sigmas,
             Use(over=limit.seconds, **use),
         )
 
 
-def error_rows(
+def list_error_rows(
     names: Mapping[str, str],
     estimates: Mapping[str, Estimate],
     questions: Iterable[Question],
@@ -171,7 +171,7 @@ def error_rows(
     Each channel has its own random stream of the seed. ``figures`` are those of the errors in use,
     by channel (`printed_errors.in_use`).
     """
-    axes = axes_of(estimates, figures)
+    axes = collect_axis_errors(estimates, figures)
 
     def drawn_of(channel: str) -> list[AxisErrors]:
         stream = partial(channel_rng, seed, repr(estimates[channel].model), channel)
@@ -192,7 +192,7 @@ def error_rows(
             limit=question.limit,
             unit=SI_UNITS[DIMENSIONS[question.error]],
         )
-        chosen = answering(question, axes)
+        chosen = select_channels(question, axes)
         if chosen is None:
             missing = []
             for quantity in question.needs:
@@ -210,11 +210,11 @@ def error_rows(
         nominal = question.answer(*pair)
         budgets = [question.answer(*axes_drawn) for axes_drawn in zip(*many, strict=True)]
         asked = replace(asked, gyro=chosen["gyro"], accel=chosen["accel"])
-        lower, upper = interval(budgets)
+        lower, upper = compute_interval(budgets)
         # Draws of an absent term are above 0: extend the limits to the value.
         lower, upper = min(lower, nominal.total), max(upper, nominal.total)
         used = [channel for channel in chosen.values() if channel]
-        apart = [channel for channel in used if not drawn_jointly(estimates[channel])]
+        apart = [channel for channel in used if not has_joint_draws(estimates[channel])]
         reasons = [
             *nominal.assumptions,
             *(
@@ -236,7 +236,7 @@ def error_rows(
             lower=lower,
             upper=upper,
             drawn="one by one" if apart else "jointly",
-            within=question.limit and chance_within(question.limit, budgets),
+            within=question.limit and compute_chance_within(question.limit, budgets),
             reason="; ".join(reasons) or None,
             reached_after=question.reached(*pair),
         )
@@ -247,7 +247,7 @@ def error_rows(
             yield largest.of_missing(asked, missed)
 
 
-def axes_of(
+def collect_axis_errors(
     estimates: Mapping[str, Estimate], figures: Mapping[str, Figures]
 ) -> dict[str, AxisErrors]:
     """Return the error sources of the axes with a noise model: the noise of others is not 0."""
@@ -258,7 +258,9 @@ def axes_of(
     }
 
 
-def answering(question: Question, axes: Mapping[str, AxisErrors]) -> dict[str, str | None] | None:
+def select_channels(
+    question: Question, axes: Mapping[str, AxisErrors]
+) -> dict[str, str | None] | None:
     """Return the gyro and accelerometer channels to use; None if one of them is missing."""
     if not all(_list_channels(quantity, axes) for quantity in question.needs):
         return None

@@ -107,8 +107,8 @@ def pool(
     unit with their 95 % limits; one counts if 0 < lower < value < upper < infinity.
     """
     triples = list(zip(values, lower, upper, strict=True))
-    used = [triple for triple in triples if usable(triple)]
-    others = [triple[1:] for triple in triples if not usable(triple)]
+    used = [triple for triple in triples if is_usable(triple)]
+    others = [triple[1:] for triple in triples if not is_usable(triple)]
 
     def count_outside(low: float, high: float) -> int:
         """Count the left-out intervals that lie wholly outside a range; None is an open end."""
@@ -119,7 +119,7 @@ def pool(
     if len(used) == 1:
         value, low, high = used[0]
         return Pool(value, low, high, 1, len(others), count_outside(low, high))
-    middle, points = points_about_median(used)
+    middle, points = centre_on_median(used)
     freedom = len(used) - 1
     low_q, high_q, t = _compute_quantiles(freedom)
     spread_squared = _solve_spread_squared(points, float(freedom))
@@ -131,12 +131,12 @@ def pool(
     p_value = float(chdtrc(freedom, _minimise_q(points, 0.0)[1]))
     return Pool(
         value=math.exp(centre),
-        lower=bounded_exp(centre - half),
-        upper=bounded_exp(centre + half),
+        lower=compute_bounded_exp(centre - half),
+        upper=compute_bounded_exp(centre + half),
         recordings=len(used),
         left_out=len(others),
         contradicting=count_outside(
-            bounded_exp(centre - predicted), bounded_exp(centre + predicted)
+            compute_bounded_exp(centre - predicted), compute_bounded_exp(centre + predicted)
         ),
         error=error,
         spread=math.sqrt(spread_squared),
@@ -147,7 +147,7 @@ def pool(
     )
 
 
-def usable(triple: tuple[float | None, ...]) -> TypeGuard[tuple[float, float, float]]:
+def is_usable(triple: tuple[float | None, ...]) -> TypeGuard[tuple[float, float, float]]:
     """Return whether value and limits are known, positive and in order."""
     value, lower, upper = triple
     if value is None or lower is None or upper is None:
@@ -155,7 +155,7 @@ def usable(triple: tuple[float | None, ...]) -> TypeGuard[tuple[float, float, fl
     return 0.0 < lower < value < upper < math.inf  # False for NaN
 
 
-def bounded_exp(exponent: float) -> float:
+def compute_bounded_exp(exponent: float) -> float:
     """Return the exponential of a number, at most the largest float."""
     return math.exp(min(exponent, 709.0))
 
@@ -167,7 +167,7 @@ def _compute_quantiles(freedom: int) -> tuple[float, float, float]:
     return low, high, float(stdtrit(freedom, 0.975))
 
 
-def points_about_median(used: Iterable[tuple[float, float, float]]) -> tuple[float, list[_Point]]:
+def centre_on_median(used: Iterable[tuple[float, float, float]]) -> tuple[float, list[_Point]]:
     """Return the median of ln value, and the points about it, ascending."""
     logs = sorted((math.log(v), math.log(low), math.log(high)) for v, low, high in used)
     middle = logs[len(logs) // 2][0]  # subtracted, to keep the precision of narrow limits
@@ -223,7 +223,7 @@ def _solve_spread_squared(points: list[_Point], target: float) -> float:
     return spread_squared
 
 
-def turn_on_bias(means: Iterable[float | None]) -> TurnOnBias:
+def estimate_turn_on_bias(means: Iterable[float | None]) -> TurnOnBias:
     """Return the spread of the fixed bias from recording to recording.
 
     Its limits follow from the chi-squared distribution of (K - 1) s^2 / sigma^2. The spread
@@ -247,7 +247,7 @@ def turn_on_bias(means: Iterable[float | None]) -> TurnOnBias:
     return TurnOnBias(*counts, mean, mean - half, mean + half, deviation, *limits)
 
 
-def pooled_rows(
+def list_pooled_rows(
     parameters: Iterable[ParameterRow],
     biases: Iterable[FixedBiasRow],
     devices: Mapping[tuple[str, str], str],
@@ -325,7 +325,7 @@ def _make_parameter_row(
     logs: list[tuple[float | None, str]] = []
     left_out = Counter[str]()
     for (of, row), triple in zip(present, triples, strict=True):
-        if usable(triple):
+        if is_usable(triple):
             logs.append((math.log(triple[0]), of))
         else:
             left_out[texts.not_comparable(row.status)] += 1
@@ -365,7 +365,7 @@ def _make_bias_row(
 ) -> PooledRow:
     sensor, device, channel, parameter = group
     pairs = [(row.value, of) for of, row in present]
-    bias = turn_on_bias(value for value, _ in pairs)
+    bias = estimate_turn_on_bias(value for value, _ in pairs)
     reasons = [texts.not_pooled(bias.left_out, texts.without_mean())] * (bias.left_out > 0)
     if channel.startswith("accel"):
         reasons.append(texts.gravity_in_mean())

@@ -23,9 +23,9 @@ import numpy as np
 
 from imubench_pipeline.estimators.estimate import Parameter
 from imubench_pipeline.model.estimates import DrawnDeviationRow
-from imubench_pipeline.navigation.compared import ComparedChannel, number_needed
+from imubench_pipeline.navigation.compared import ComparedChannel, compute_number_needed
 from imubench_pipeline.noise.simulate import channel_rng
-from imubench_pipeline.noise.stacked import summed
+from imubench_pipeline.noise.stacked import sum_over_terms
 from imubench_pipeline.typing import Array
 from imubench_pipeline.words.reasons import pools as texts
 
@@ -57,7 +57,7 @@ class Ratio:
         return "not told apart" if limited else "not known"
 
 
-def ratio_of_parameters(first: Parameter, second: Parameter) -> Ratio:
+def compare_parameters(first: Parameter, second: Parameter) -> Ratio:
     """Return the ratio of one noise parameter of two logs (Zou and Donner 2008, eq. 2 and 3).
 
     If one has limits but no value, the interval is that of all quotients within the limits.
@@ -107,7 +107,7 @@ def _add_in_quadrature(*sides: float | None) -> float | None:
     return None if None in sides else math.hypot(*(side for side in sides if side is not None))
 
 
-def ratio_of_deviations(
+def compare_deviations(
     first: ComparedChannel,
     second: ComparedChannel,
     tau: float,
@@ -127,9 +127,9 @@ def ratio_of_deviations(
         return Ratio(None, None, None, texts.tau_beyond(longest_tau))
     if not first.model.terms or not second.model.terms:
         return Ratio(None, None, None, texts.no_model())
-    value = math.sqrt(float(number_needed(first.variance(tau), 0.0, second.variance(tau))))
+    value = math.sqrt(float(compute_number_needed(first.variance(tau), 0.0, second.variance(tau))))
     own, other = (_draw_variances(channel, draws, seed, [tau])[0] for channel in (first, second))
-    ratios = np.sqrt(number_needed(own[:, None], 0.0, other[None, :]))
+    ratios = np.sqrt(compute_number_needed(own[:, None], 0.0, other[None, :]))
     lower, upper = np.quantile(
         ratios, [_TAIL_PROBABILITY, 1.0 - _TAIL_PROBABILITY], method="inverted_cdf"
     )
@@ -143,17 +143,19 @@ def _draw_variances(channel: ComparedChannel, draws: int, seed: int, tau: Sequen
     """Return the Allan variances of drawn noise models of a channel, shape (tau, draws)."""
     stream = channel_rng(seed, repr(channel.model), channel.channel, "ratio")
     times = np.asarray(tau, dtype=np.float64)[:, np.newaxis]
-    return summed(channel.drawn(draws, stream), lambda term: term.allan_variance(times), len(tau))
+    return sum_over_terms(
+        channel.drawn(draws, stream), lambda term: term.allan_variance(times), len(tau)
+    )
 
 
-def deviation_rows(
+def list_deviation_rows(
     channel: ComparedChannel, rate: float, *, longest: float, draws: int, seed: int
 ) -> Iterator[DrawnDeviationRow]:
     """Yield the rows of the table ``drawn_deviations`` of a channel.
 
-    They are the input of `ratio_of_deviations`, at two tau a decade from the sampling interval on,
+    They are the input of `compare_deviations`, at two tau a decade from the sampling interval on,
     so that any two channels can be compared without their logs. ``rate`` is in Hz; the others are
-    as in `ratio_of_deviations`.
+    as in `compare_deviations`.
     """
     if not channel.model.terms:
         return

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 
-from imubench_pipeline.datasheets.comparable import repeatability_comparables
+from imubench_pipeline.datasheets.comparable import read_repeatability_comparables
 from imubench_pipeline.datasheets.deltas import compare
 from imubench_pipeline.estimators.estimate import Parameter
 from imubench_pipeline.model.comparisons import RepeatabilityRow
 from imubench_pipeline.model.estimates import FixedBiasRow
 from imubench_pipeline.model.recordings import RecordingRow
-from imubench_pipeline.navigation.pooled import turn_on_bias
+from imubench_pipeline.navigation.pooled import estimate_turn_on_bias
 from imubench_pipeline.settings.sensor import Sensor
 from imubench_pipeline.words.reasons import pools as texts
 
@@ -46,10 +46,10 @@ def repeatability_rows(
             if unknown:
                 assumptions.append(texts.power_cycles_assumed())
             reason = "; ".join(assumptions)
-            bias = turn_on_bias(value for _, value in several)
+            bias = estimate_turn_on_bias(value for _, value in several)
             limits = bias.deviation_lower, bias.deviation_upper
             spread = Parameter(bias.deviation, "ok", reason, *limits)
-        for entry in repeatability_comparables(sensors[sensor].datasheet, channel):
+        for entry in read_repeatability_comparables(sensors[sensor].datasheet, channel):
             found = compare(entry, spread, tolerance)
             unsaid = found.delta is None and spread.reason and entry.value is not None
             yield RepeatabilityRow(

@@ -8,10 +8,10 @@ from imubench_pipeline.model.comparisons import RankingRow
 from imubench_pipeline.model.verdicts import UnitFactor
 from imubench_pipeline.navigation.verdicts.basis import Basis
 from imubench_pipeline.navigation.verdicts.judgement import Judgement
-from imubench_pipeline.navigation.verdicts.standing import Standing, trajectory_of
+from imubench_pipeline.navigation.verdicts.standing import Standing, get_trajectory
 
 
-def ranked(judged: Sequence[Judgement], basis: Basis) -> Iterator[RankingRow]:
+def rank_sensors(judged: Sequence[Judgement], basis: Basis) -> Iterator[RankingRow]:
     """Yield the rows of the table ``ranking``, from the judgements and their recordings.
 
     The rank of a sensor is one more than the number of significantly better ones: the interval of
@@ -72,7 +72,7 @@ def _make_row(
         recording=total.recording,
         error=total.error,
         time=total.time,
-        trajectory=trajectory_of(total),
+        trajectory=get_trajectory(total),
         at_most=None if total.limit is None else total.limit * requirement.sigmas,
         confidence=requirement.confidence,
         limit=total.limit,

@@ -18,10 +18,10 @@ from imubench_pipeline.noise.terms import (
     Term,
     TermParameter,
     WhiteNoise,
-    bias_instability,
-    driving_density,
-    gauss_markov_shape,
-    sampled_gauss_markov_shape,
+    compute_bias_instability,
+    compute_driving_density,
+    evaluate_gauss_markov_shape,
+    evaluate_sampled_shape,
 )
 
 __all__ = [
@@ -42,8 +42,8 @@ __all__ = [
     "Term",
     "TermParameter",
     "WhiteNoise",
-    "bias_instability",
-    "driving_density",
-    "gauss_markov_shape",
-    "sampled_gauss_markov_shape",
+    "compute_bias_instability",
+    "compute_driving_density",
+    "evaluate_gauss_markov_shape",
+    "evaluate_sampled_shape",
 ]

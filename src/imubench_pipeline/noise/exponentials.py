@@ -21,10 +21,10 @@ ComplexArray = NDArray[np.complex128]
 
 
 @overload
-def phi(order: int, z: complex) -> complex: ...
+def evaluate_phi(order: int, z: complex) -> complex: ...
 @overload
-def phi(order: int, z: Array | ComplexArray) -> ComplexArray: ...
-def phi(order: int, z: complex | Array | ComplexArray) -> complex | ComplexArray:
+def evaluate_phi(order: int, z: Array | ComplexArray) -> ComplexArray: ...
+def evaluate_phi(order: int, z: complex | Array | ComplexArray) -> complex | ComplexArray:
     """Return phi_k(z), the integral of (1 - s)^(k-1) / (k-1)! e^(z s) over s from 0 to 1.
 
     phi_k(z) = z^-k (e^z - sum_{j<k} z^j / j!) = sum_n z^n / (n + k)!, k from 0.
@@ -60,19 +60,19 @@ def phi(order: int, z: complex | Array | ComplexArray) -> complex | ComplexArray
 
 
 @overload
-def decay(order: int, x: float) -> float: ...
+def evaluate_decay(order: int, x: float) -> float: ...
 @overload
-def decay(order: int, x: Array) -> Array: ...
-def decay(order: int, x: float | Array) -> float | Array:
+def evaluate_decay(order: int, x: Array) -> Array: ...
+def evaluate_decay(order: int, x: float | Array) -> float | Array:
     """Return phi_k(-x) for a real x from 0: it is 1/k! at 0 and decreases."""
-    return phi(order, -x).real
+    return evaluate_phi(order, -x).real
 
 
 @overload
-def squared_response(order: int, x: float) -> float: ...
+def integrate_squared_response(order: int, x: float) -> float: ...
 @overload
-def squared_response(order: int, x: Array) -> Array: ...
-def squared_response(order: int, x: float | Array) -> float | Array:
+def integrate_squared_response(order: int, x: Array) -> Array: ...
+def integrate_squared_response(order: int, x: float | Array) -> float | Array:
     """Return x^-(2m+3) times the integral of E(v)^2 from 0 to x, E(v) = v^(m+1) phi_{m+1}(-v).
 
     E is the response to a pulse of a Gauss-Markov process with unit correlation time and m + 1
@@ -104,13 +104,13 @@ def _sum_squared_response(order: int, x: float) -> float: ...
 def _sum_squared_response(order: int, x: Array) -> Array: ...
 def _sum_squared_response(order: int, x: float | Array) -> float | Array:
     m = order
-    parts = [(-1) ** j * decay(m + 2 + j, x) / math.factorial(m - j) for j in range(m + 1)]
-    return (sum(parts) - 0.5 * decay(m + 1, x) ** 2) / x
+    parts = [(-1) ** j * evaluate_decay(m + 2 + j, x) / math.factorial(m - j) for j in range(m + 1)]
+    return (sum(parts) - 0.5 * evaluate_decay(m + 1, x) ** 2) / x
 
 
 @lru_cache(maxsize=8)
 def _expand_squared_response(order: int) -> tuple[float, ...]:
-    """Return the coefficients of the power series of `squared_response`."""
+    """Return the coefficients of the power series of `integrate_squared_response`."""
     powers = np.arange(_MAX_SERIES_TERMS)
     single = [(-1.0) ** n / math.factorial(n + order + 1) for n in powers]
     square = np.convolve(single, single)[:_MAX_SERIES_TERMS]

@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 from imubench_pipeline.allan import of_phase
 from imubench_pipeline.allan.phase import integrate
 from imubench_pipeline.noise.model import NoiseModel
-from imubench_pipeline.noise.state_space import root_of
-from imubench_pipeline.noise.variance_covariance import variance_covariance
+from imubench_pipeline.noise.state_space import factor_covariance
+from imubench_pipeline.noise.variance_covariance import compute_variance_covariance
 from imubench_pipeline.typing import Array
 
 _BLOCK_SAMPLES = 1 << 16  # fits the cache: a quarter faster than a million
@@ -70,7 +70,7 @@ def simulate_blocks(
         for space, state, stream in zip(spaces, states, streams, strict=True):
             if len(state):
                 driven = np.flatnonzero(np.diag(space.process_noise))
-                root = root_of(space.process_noise)[np.ix_(driven, driven)]
+                root = factor_covariance(space.process_noise)[np.ix_(driven, driven)]
                 drive = stream.standard_normal((size, len(driven)))
                 if len(driven) == 1:  # a matrix product takes four times as long
                     drive *= root[0, 0]
@@ -138,7 +138,7 @@ def ensemble(
     if not long.all():
         short = sizes[~long]
         mean = model.allan_variance(short / rate, rate)
-        relative = variance_covariance(model, rate, samples, short) / np.outer(mean, mean)
+        relative = compute_variance_covariance(model, rate, samples, short) / np.outer(mean, mean)
         # Wilson and Hilferty (1931): the cube root of a chi-squared variate is nearly normal.
         spread = np.sqrt(np.diag(relative))
         values, vectors = np.linalg.eigh(relative / np.outer(spread, spread))

@@ -14,8 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from imubench_pipeline.allan.confidence import tail_degrees, variance_degrees
-from imubench_pipeline.allan.phase import Presence, Span, spans_of
+from imubench_pipeline.allan.confidence import match_lower_tail, match_variance
+from imubench_pipeline.allan.phase import Presence, Span, list_spans
 from imubench_pipeline.noise.model import NoiseModel
 from imubench_pipeline.noise.terms import Deterministic, Quantization
 from imubench_pipeline.typing import Array
@@ -39,7 +39,7 @@ class Degrees:
     upper: Array  # (m,): chi-squared variate with the same lower tail, for the upper limit
 
 
-def degrees_of_model(
+def compute_degrees_of_freedom(
     model: NoiseModel,
     rate: float,
     sizes: NDArray[np.int64],
@@ -61,7 +61,7 @@ def degrees_of_model(
     PTTI 2003, for power laws; W. Satterthwaite, "An approximate distribution of estimates of
     variance components", Biometrics Bulletin 2, 1946.
     """
-    spans = spans_of(segments, samples)
+    spans = list_spans(segments, samples)
     left = np.ones(len(sizes)) if share is None else share
     pairs = [
         _find_degrees(model, 1.0 / rate, int(n), spans, presence, float(part))
@@ -110,7 +110,7 @@ def _find_degrees(
     weights = noise.eigenvalues(terms, mask)
     if weights is None:
         return edf, edf
-    return edf, edf * max(tail_degrees(weights) / variance_degrees(weights), 1.0)
+    return edf, edf * max(match_lower_tail(weights) / match_variance(weights), 1.0)
 
 
 class _Covariance:

@@ -14,7 +14,7 @@ from imubench_pipeline.noise.terms import Term
 from imubench_pipeline.typing import Array
 
 
-def stacked(models: Sequence[NoiseModel]) -> Iterator[tuple[NDArray[np.intp], Term]]:
+def stack_models(models: Sequence[NoiseModel]) -> Iterator[tuple[NDArray[np.intp], Term]]:
     """Yield terms with array parameters, each with the indices of the models that have the term.
 
     Closed forms such as `Term.growth` or `Term.allan_variance` of such a term hold for all these
@@ -33,7 +33,7 @@ def stacked(models: Sequence[NoiseModel]) -> Iterator[tuple[NDArray[np.intp], Te
         yield np.array([number for number, _ in members]), kind(*values)
 
 
-def summed(
+def sum_over_terms(
     models: Sequence[NoiseModel], figure: Callable[[Term], Array], places: int | None = None
 ) -> Array:
     """Return a quantity of each model that is the sum over its terms, such as a variance.
@@ -42,6 +42,6 @@ def summed(
     shape (k,). The result has the shape (models,), or (places, models).
     """
     total = np.zeros((len(models),) if places is None else (places, len(models)))
-    for numbers, term in stacked(models):
+    for numbers, term in stack_models(models):
         total[..., numbers] += figure(term)
     return total

@@ -88,7 +88,7 @@ def _build_block_diagonal(parts: Sequence[Array]) -> Array:
     return whole
 
 
-def root_of(covariance: Array) -> Array:
+def factor_covariance(covariance: Array) -> Array:
     """Return the lower triangular root of a covariance, shape (m, m).
 
     Components without variance have rows of zeros.

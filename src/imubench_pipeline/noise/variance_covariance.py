@@ -34,7 +34,7 @@ class Spectrum(Protocol):
         """Return the spectrum at angular frequencies in rad per sample, SI^2."""
 
 
-def variance_covariance(
+def compute_variance_covariance(
     model: Spectrum, rate: float, samples: int, sizes: NDArray[np.int64]
 ) -> Array:
     """Return the covariance of the Allan variance estimates of a Gaussian log.

@@ -8,10 +8,16 @@ import unicodedata
 from itertools import islice
 from pathlib import Path
 
-from imubench_pipeline.readers.batch import Batch, LogFile, stated_in
+from imubench_pipeline.readers.batch import Batch, LogFile, name_settings_file
 from imubench_pipeline.readers.bounds import MAX_ARCHIVE_PROBES
-from imubench_pipeline.readers.compressed import holds_text, is_archive, is_member, members, visible
-from imubench_pipeline.readers.content import format_of, format_of_folder, is_endless
+from imubench_pipeline.readers.compressed import (
+    holds_text,
+    is_archive,
+    is_member,
+    is_visible,
+    list_members,
+)
+from imubench_pipeline.readers.content import find_format, is_endless, recognise_folder
 from imubench_pipeline.settings.sensor import (
     CHANNELS,
     POSITION,
@@ -23,7 +29,7 @@ from imubench_pipeline.settings.sensor import (
 from imubench_pipeline.settings.validation import cut
 from imubench_pipeline.tables.findings import RecordingError
 
-__all__ = ["Batch", "LogFile", "RecordingError", "is_endless", "log_files", "only_log", "read"]
+__all__ = ["Batch", "LogFile", "RecordingError", "find_only_log", "is_endless", "log_files", "read"]
 
 
 def log_files(path: Path) -> list[Path]:
@@ -46,7 +52,7 @@ def log_files(path: Path) -> list[Path]:
         with os.scandir(waiting.pop()) as entries:
             for entry in entries:
                 file = Path(entry.path)
-                if not visible(Path(entry.name)):
+                if not is_visible(Path(entry.name)):
                     continue
                 if entry.is_dir(follow_symlinks=False):
                     waiting.append(file)
@@ -89,32 +95,32 @@ def read(path: Path, log: LogFormat) -> list[LogFile]:
         file = _find_file(path, present, source, name)
         clock = ""  # the part of the file with a clock of its own: a topic, or a kind of message
         if source.variable is not None and not is_member(file):
-            own = format_of(file, log.reader).clock_of == "variable"
+            own = find_format(file, log.reader).clock_of == "variable"
             clock = source.variable if own else ""
         together.setdefault((file, clock), {})[name] = source
     files = []
     for (file, _), columns in sorted(together.items(), key=lambda item: item[0]):
         inside = None if is_member(file) else _list_present(file, log)
         if inside is not None:
-            file = only_log(file, inside)  # an archive with one log, among other files
-        files.append(format_of(file, log.reader).load().log_file(file, log, columns))
+            file = find_only_log(file, inside)  # an archive with one log, among other files
+        files.append(find_format(file, log.reader).load().log_file(file, log, columns))
     return files
 
 
 def _list_present(path: Path, log: LogFormat) -> list[Path] | None:
     """Return the files of a folder or an archive; None if the path is one log."""
-    if format_of_folder(path) is not None:
+    if recognise_folder(path) is not None:
         return None
     if path.is_dir():
         return log_files(path)
-    if is_archive(path) and format_of(path, log.reader).streamed:
-        return members(path)
+    if is_archive(path) and find_format(path, log.reader).streamed:
+        return list_members(path)
     return None
 
 
 def _find_file(path: Path, present: list[Path] | None, source: ColumnSource, name: str) -> Path:
     if source.file is None:
-        return path if present is None else only_log(path, present)
+        return path if present is None else find_only_log(path, present)
     if present is None:
         raise RecordingError(
             f"{path.name}: is one file, but the sensor file takes {name} from {source.file!r} of "
@@ -130,7 +136,8 @@ def _find_file(path: Path, present: list[Path] | None, source: ColumnSource, nam
         what = f"{len(found)} files" if found else "no file"
         raise RecordingError(
             f"{path.name}: {what} {source.file!r} for {name}; the folder has "
-            f"{_join_names(path, found or present)}; mend 'file' of {name} in {stated_in(name)}"
+            f"{_join_names(path, found or present)}; mend 'file' of {name} in "
+            f"{name_settings_file(name)}"
         )
     return found[0]
 
@@ -140,7 +147,7 @@ def _compose_accents(name: str) -> str:
     return unicodedata.normalize("NFC", name)
 
 
-def only_log(path: Path, present: list[Path]) -> Path:
+def find_only_log(path: Path, present: list[Path]) -> Path:
     """Return the only log of a folder or archive; files in subfolders describe it.
 
     Raise `RecordingError` if there is no log among the files ``present``, or more than one.

@@ -24,7 +24,7 @@ from imubench_pipeline.settings.sensor import (
     quantity_of,
 )
 from imubench_pipeline.tables.findings import Finding, find
-from imubench_pipeline.units import conversion
+from imubench_pipeline.units import find_conversion
 from imubench_pipeline.words.findings.base import FindingData
 from imubench_pipeline.words.findings.files import UnitContradicts
 
@@ -41,7 +41,7 @@ _MIN_FACTOR_OF_OTHER_UNIT = 1.5
 the next one, of mrad/s and °/s, is 17. Smaller ratios may be a calibration in ``scale``."""
 
 
-def stated_in(key: str) -> str:
+def name_settings_file(key: str) -> str:
     """Return the file with the column of a channel or an additional column, for messages."""
     notes = "the notes beside the log or " if key == POSITION else ""
     return f"{notes}the sensor file"
@@ -110,8 +110,8 @@ class LogFile(ABC):
         for channel, in_log in (fixed | self.units).items():
             source = self.sources[channel]
             dimension = QUANTITIES[quantity_of(channel)]
-            read = conversion(source.unit, dimension)[0] * abs(source.scale)
-            factor = conversion(in_log.unit, dimension)[0] / read
+            read = find_conversion(source.unit, dimension)[0] * abs(source.scale)
+            factor = find_conversion(in_log.unit, dimension)[0] / read
             if 1.0 / _MIN_FACTOR_OF_OTHER_UNIT < factor < _MIN_FACTOR_OF_OTHER_UNIT:
                 continue
             data = UnitContradicts(
@@ -141,7 +141,7 @@ class LogFile(ABC):
             return source.scale * (raw - source.offset)
         others = {TEMPERATURE: "temperature", TABLE_RATE: "angular_rate"}
         dimension = others[name] if name in others else QUANTITIES[quantity_of(name)]
-        factor, zero = conversion(source.unit, dimension)
+        factor, zero = find_conversion(source.unit, dimension)
         if source.offset:
             raw = raw - source.offset
         with np.errstate(over="ignore"):  # infinite, and counted as such

@@ -57,7 +57,7 @@ def limit_memory(more: int) -> None:
     resource.setrlimit(resource.RLIMIT_DATA, (most, hard))
 
 
-def bounded(
+def run_bounded(
     seconds: float, memory: int, function: Callable[P, T], *arguments: P.args, **named: P.kwargs
 ) -> T:
     """Return the result of a function in a process of its own, with limits of time and memory.
@@ -83,7 +83,7 @@ def bounded(
 
 
 class Bounded(Generic[T]):
-    """A function call in a process of its own, which starts immediately (see `bounded`)."""
+    """A function call in a process of its own, which starts immediately (see `run_bounded`)."""
 
     def __init__(
         self, memory: int, function: Callable[P, T], *arguments: P.args, **named: P.kwargs
@@ -124,8 +124,8 @@ class Bounded(Generic[T]):
     def result(self, seconds: float) -> T:
         """Return the result of the function, or raise its exception; to be called once.
 
-        Raise `BoundError` if a limit is exceeded (see `bounded`; ``seconds`` count from now), or if
-        the system ends the process.
+        Raise `BoundError` if a limit is exceeded (see `run_bounded`; ``seconds`` count from now),
+        or if the system ends the process.
         """
         process = psutil.Process(self._process)
         try:

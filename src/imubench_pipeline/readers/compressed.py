@@ -110,7 +110,7 @@ class _GzipDecompressor:
         return self._inflate.decompress(self._inflate.unconsumed_tail + packed, most)
 
 
-def unpacked_zstd(data: bytes, most: int) -> bytes:
+def unpack_zstd(data: bytes, most: int) -> bytes:
     """Return at most ``most`` bytes of a frame of zstd; raise `ValueError` if it is corrupt."""
     try:
         return _create_zstd().decompress(data, most)
@@ -143,7 +143,7 @@ MAX_MAGIC_LENGTH = 10
 """Bytes of the longest signature. Shorter signatures would match random bytes."""
 
 
-def compression_of(begin: bytes) -> str:
+def recognise_compression(begin: bytes) -> str:
     """Return the compression (a key of `DECOMPRESSORS`) by the first bytes; empty if none."""
     magic = _MAGIC.match(begin[:MAX_MAGIC_LENGTH])
     return "" if magic is None else magic.lastgroup or ""
@@ -287,7 +287,7 @@ def open_bytes(path: Path) -> Bytes:
                             f"{path.name}: is compressed with {kind}; expected gzip, zstd, xz, "
                             "bzip2 or zip: unpack it"
                         )
-                if how := compression_of(begin):
+                if how := recognise_compression(begin):
                     stream = DECOMPRESSORS[how](log)
                     opened = Bytes(path.name, stream, path.stat().st_size, (log,))
                 else:
@@ -317,12 +317,12 @@ def is_member(path: Path) -> bool:
     return not path.exists() and _find_archive(path) is not None
 
 
-def members(archive: Path) -> list[Path]:
+def list_members(archive: Path) -> list[Path]:
     """Return the visible files of a zip archive, sorted, as its path followed by their names."""
-    return sorted(archive / name for name in _list_directory(archive) if visible(Path(name)))
+    return sorted(archive / name for name in _list_directory(archive) if is_visible(Path(name)))
 
 
-def visible(path: Path) -> bool:
+def is_visible(path: Path) -> bool:
     """Return whether a path within a folder is no hidden file of the operating system."""
     return not any(part.startswith((".", "__MACOSX")) for part in path.parts)
 
@@ -352,7 +352,7 @@ def _read_directory(archive: Path, _size: int, _written: int) -> Mapping[str, zi
     """Return the members of an archive by name; cached by size and time of writing."""
     try:
         try:
-            with opened_archive(archive) as file:
+            with open_archive(archive) as file:
                 members = file.infolist()
         except zipfile.BadZipFile:
             members = _scan_for_members(archive)
@@ -367,7 +367,7 @@ def _read_directory(archive: Path, _size: int, _written: int) -> Mapping[str, zi
         # An absolute name would lead out of the archive.
         name = Path(info.filename.lstrip("/")).as_posix()
         other = by_name.setdefault(name, info)
-        if other is not info and visible(Path(name)):
+        if other is not info and is_visible(Path(name)):
             raise RecordingError(
                 f"{archive.name}: {_describe_member(other)} and {_describe_member(info)} have one "
                 "name; expected each name once: pack it again without the copy"
@@ -381,7 +381,7 @@ def _describe_member(info: zipfile.ZipInfo) -> str:
 
 
 @contextmanager
-def opened_archive(path: Path) -> Iterator[zipfile.ZipFile]:
+def open_archive(path: Path) -> Iterator[zipfile.ZipFile]:
     """Open a zip archive; raise `RecordingError` if its directory exceeds `MAX_DIRECTORY`."""
     with _Archive(path) as file, zipfile.ZipFile(file) as archive:
         file.most = None
@@ -505,12 +505,12 @@ def blocks(path: Path, findings: list[Finding], least_zeros: int) -> Iterator[by
             if len(block) < BLOCK_BYTES:
                 break
     if stream.ended_early:
-        findings.append(ended_early(path))
+        findings.append(make_truncation_finding(path))
     total = zeros.count + stream.omitted
     if (finding := zeros.finding(path.name, f"byte {zeros.first[0]}", total)) is not None:
         findings.append(finding)
 
 
-def ended_early(path: Path) -> Finding:
+def make_truncation_finding(path: Path) -> Finding:
     """Return the finding about a log with truncated compressed data."""
     return find(TruncatedFile(path.name, "compressed"), "warning", 1)

@@ -8,10 +8,10 @@ from pathlib import Path
 
 from imubench_pipeline.readers.compressed import (
     MAX_MAGIC_LENGTH,
-    compression_of,
     is_member,
-    members,
+    list_members,
     open_bytes,
+    recognise_compression,
 )
 from imubench_pipeline.readers.file_format import FileFormat
 from imubench_pipeline.readers.formats import FILE_FORMATS, TEXT
@@ -33,7 +33,7 @@ _UNSUPPORTED_FORMATS = {
 """Known files that are not read: place and bytes of their signature, and how to convert them."""
 
 
-def format_of_folder(path: Path) -> FileFormat | None:
+def recognise_folder(path: Path) -> FileFormat | None:
     """Return the format of a folder that is one log, such as a ROS 2 bag; else None."""
     marks = ((found, found.signature.folder_has) for found in FILE_FORMATS.values())
     return next((found for found, mark in marks if mark and (path / mark).is_file()), None)
@@ -44,12 +44,12 @@ def is_endless(path: Path) -> bool:
     return path.exists() and not path.is_file() and not path.is_dir()
 
 
-def format_of(path: Path, stated: Reader | None = None) -> FileFormat:
+def find_format(path: Path, stated: Reader | None = None) -> FileFormat:
     """Return the stated format of a file (``reader``), or else the one of its content."""
-    return content_of(path)[0] if stated is None else FILE_FORMATS[stated]
+    return recognise_content(path)[0] if stated is None else FILE_FORMATS[stated]
 
 
-def content_of(path: Path) -> tuple[FileFormat, str]:
+def recognise_content(path: Path) -> tuple[FileFormat, str]:
     """Return the format of a log, and its compression; empty if it is not compressed.
 
     For a zip archive with several files the format is text.
@@ -58,11 +58,11 @@ def content_of(path: Path) -> tuple[FileFormat, str]:
     Raise `RecordingError` if it cannot be opened, is compressed twice, or is compressed and its
     format does not allow that.
     """
-    if (of_folder := format_of_folder(path)) is not None:
+    if (of_folder := recognise_folder(path)) is not None:
         return of_folder, ""
     packed = _find_compression(path)
     if packed == "zip" and path.is_file():
-        endings = {member.suffix for member in members(path)}
+        endings = {member.suffix for member in list_members(path)}
         for file_format in FILE_FORMATS.values():
             if file_format.signature.archive_has in endings:
                 return file_format, ""
@@ -106,4 +106,4 @@ def _find_compression(path: Path) -> str:
 
 
 def _name_compression(begin: bytes) -> str:
-    return "zip" if begin.startswith(_ZIP_MAGIC) else compression_of(begin)
+    return "zip" if begin.startswith(_ZIP_MAGIC) else recognise_compression(begin)

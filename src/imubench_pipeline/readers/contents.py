@@ -7,9 +7,9 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from imubench_pipeline.readers import log_files, only_log
-from imubench_pipeline.readers.compressed import is_archive, is_member, members
-from imubench_pipeline.readers.content import content_of, format_of, format_of_folder
+from imubench_pipeline.readers import find_only_log, log_files
+from imubench_pipeline.readers.compressed import is_archive, is_member, list_members
+from imubench_pipeline.readers.content import find_format, recognise_content, recognise_folder
 from imubench_pipeline.readers.file_format import FileFormat, LogTable
 from imubench_pipeline.readers.formats import TEXT
 from imubench_pipeline.tables.findings import RecordingError
@@ -36,18 +36,18 @@ class Contents:
     """The only file of a folder that is read if no ``file`` is stated."""
 
 
-def contents(path: Path) -> Contents:
+def list_contents(path: Path) -> Contents:
     """Return the contents of a recording, from the beginning of each of its files.
 
     Raise `RecordingError` if it cannot be read, or has no data.
     """
     if not path.exists():
         raise RecordingError(f"{path.name}: no such file or folder; expected a log")
-    if path.is_dir() and format_of_folder(path) is None:
+    if path.is_dir() and recognise_folder(path) is None:
         return _inspect_files(path, "a folder", log_files(path))
-    if is_archive(path) and format_of(path) is TEXT:
-        return _inspect_files(path, "a zip archive", members(path))
-    file_format, packed = content_of(path)
+    if is_archive(path) and find_format(path) is TEXT:
+        return _inspect_files(path, "a zip archive", list_members(path))
+    file_format, packed = recognise_content(path)
     about = file_format.title + (f", compressed by {packed}" if packed else "")
     tables = tuple(file_format.tables(path))
     _check_has_numbers(path, tables)
@@ -64,9 +64,9 @@ def _inspect_files(path: Path, kind: str, files: list[Path]) -> Contents:
         untold = TEXT
         try:
             log = file
-            if not is_member(file) and is_archive(file) and format_of(file) is TEXT:
-                log = only_log(file, members(file))  # an archive with one log
-            file_format, packed = content_of(log)
+            if not is_member(file) and is_archive(file) and find_format(file) is TEXT:
+                log = find_only_log(file, list_members(file))  # an archive with one log
+            file_format, packed = recognise_content(log)
             untold = TEXT if is_member(log) else file_format
             of_file = [
                 replace(table, file=name, about=table.about + (f", {packed}" if packed else ""))
@@ -83,7 +83,7 @@ def _inspect_files(path: Path, kind: str, files: list[Path]) -> Contents:
     _check_has_numbers(path, tables)
     only = None
     with suppress(RecordingError):
-        only = only_log(path, files).relative_to(path).as_posix()
+        only = find_only_log(path, files).relative_to(path).as_posix()
     about = f"{kind} of {len(files)} file" + ("s" if len(files) > 1 else "")
     return Contents(path, about, tuple(tables), stated, len(files), only)
 

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from imubench_pipeline.readers.batch import LogFile
-from imubench_pipeline.settings.extras import Extra, ExtraError, extra
+from imubench_pipeline.settings.extras import Extra, ExtraError, require_extra
 from imubench_pipeline.settings.sensor import LogFormat, Reader
 from imubench_pipeline.tables.findings import RecordingError
 
@@ -87,7 +87,7 @@ class FileFormat:
         if self.extra is None:
             return self.code()
         try:
-            with extra(self.extra, f"read a {self.title}"):
+            with require_extra(self.extra, f"read a {self.title}"):
                 return self.code()
         except ExtraError as error:
             raise RecordingError(str(error)) from None
@@ -149,7 +149,7 @@ class LogTable:
     """Reason why the table cannot be used, as the end of a sentence."""
 
 
-def shown(values: NDArray[Any]) -> tuple[str, ...]:
+def format_first_numbers(values: NDArray[Any]) -> tuple[str, ...]:
     """Return the first numbers as text."""
     whole = values.dtype.kind in "iu"
     return tuple(str(value) if whole else f"{value:.10g}" for value in values[:MAX_SHOWN_VALUES])

@@ -18,7 +18,7 @@ _MAX_HOLE_READ = 1 << 16
 _REPLACEMENT_ZEROS = 512  # bytes: the zeros that are returned in place of a longer hole
 
 
-def next_data(descriptor: int, offset: int) -> int | None:
+def find_next_data(descriptor: int, offset: int) -> int | None:
     """Return the offset of the first stored byte at or after an offset; None if there is none.
 
     Without support of the system, every byte counts as stored. The position of the file changes.
@@ -42,7 +42,7 @@ class FileWithoutHoles:
     def read(self, size: int) -> bytes:
         """Return the next bytes, at most ``size``; none at the end."""
         descriptor = self._file.fileno()
-        data = next_data(descriptor, self._at)
+        data = find_next_data(descriptor, self._at)
         hole = (os.fstat(descriptor).st_size if data is None else data) - self._at
         if hole > _MAX_HOLE_READ:
             self.omitted += hole - _REPLACEMENT_ZEROS

@@ -41,7 +41,7 @@ class Clock:
         """
         if self._wraps is not None:
             stamps = stamps.copy()
-            stamps[present] = unwrapped(stamps[present], self._wraps, self._state)
+            stamps[present] = unwrap(stamps[present], self._wraps, self._state)
         if self.first is None:
             if not present.any():
                 raise RecordingError(
@@ -64,7 +64,7 @@ class WrapState:
     """Number of wraps of the counter."""
 
 
-def unwrapped(stamps: NDArray[Any], wraps: float, state: WrapState) -> NDArray[Any]:
+def unwrap(stamps: NDArray[Any], wraps: float, state: WrapState) -> NDArray[Any]:
     """Unwrap the stamps of a counter; int64 for integers, exact, else float64 with NaN if missing.
 
     A step back by more than half of ``wraps`` is a wrap. A step forward by more than half is a late
@@ -88,23 +88,23 @@ def unwrapped(stamps: NDArray[Any], wraps: float, state: WrapState) -> NDArray[A
     return going_on
 
 
-def date_of(nanoseconds: int) -> str | None:
+def format_date(nanoseconds: int) -> str | None:
     """Return ISO 8601 date and time (UTC) of ns since 1970; None outside of 2001 to 2099."""
     if not _YEAR_2001 <= nanoseconds < _YEAR_2100:
         return None
-    return date_of_nanoseconds(nanoseconds)
+    return format_nanoseconds(nanoseconds)
 
 
-def date_of_stamp(first: float, source: TimeSource) -> str | None:
-    """Return ISO 8601 date and time of a stamp as written (see `date_of`); ns are exact."""
+def format_date_of_stamp(first: float, source: TimeSource) -> str | None:
+    """Return ISO 8601 date and time of a stamp as written (see `format_date`); ns are exact."""
     if source.unit not in SECONDS:
         return None
     if source.unit == "ns" and source.scale == 1:
-        return date_of(int(first))
+        return format_date(int(first))
     nanoseconds = float(first) * SECONDS[source.unit] * source.scale * 1e9
-    return date_of(round(nanoseconds)) if math.isfinite(nanoseconds) else None
+    return format_date(round(nanoseconds)) if math.isfinite(nanoseconds) else None
 
 
-def date_of_nanoseconds(since_1970: Any) -> str:
+def format_nanoseconds(since_1970: Any) -> str:
     """Return ISO 8601 date and time of ns since 1970 that are known to be a date."""
     return str(np.datetime64(int(since_1970), "ns"))[:23]

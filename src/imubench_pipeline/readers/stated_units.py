@@ -6,7 +6,7 @@ import re
 from dataclasses import dataclass
 
 from imubench_pipeline.settings.sensor import CHANNELS, QUANTITIES, quantity_of
-from imubench_pipeline.units import UnitError, conversion
+from imubench_pipeline.units import UnitError, find_conversion
 
 _MAX_UNIT_LENGTH = 24
 _MAX_TAILS = 6
@@ -42,7 +42,7 @@ _SPELLINGS: dict[str, tuple[tuple[str, str], ...]] = {
 }
 
 
-def unit_of(text: str, dimension: str) -> str | None:
+def parse_unit(text: str, dimension: str) -> str | None:
     """Return the unit of a text, such as ``m_s2`` or ``dps``, in the notation of a sensor file.
 
     None if the text is no known unit of the dimension, a key of `imubench_pipeline.units.SI_UNITS`.
@@ -61,18 +61,20 @@ def unit_of(text: str, dimension: str) -> str | None:
     ):
         return None
     try:
-        conversion(text, dimension)
+        find_conversion(text, dimension)
     except UnitError:
         return None
     return text
 
 
-def divided(label: str, dimension: str) -> tuple[str, str | None]:
+def split_unit(label: str, dimension: str) -> tuple[str, str | None]:
     """Split a name such as ``Gyroscope x (rad/s)`` or ``accel_x_m_s2`` into name and unit.
 
     The name is without texts in brackets, except numbers. ``dimension``: dimension of the unit.
     """
-    unit = next((unit for text in bracketed(label) if (unit := unit_of(text, dimension))), None)
+    unit = next(
+        (unit for text in find_bracketed(label) if (unit := parse_unit(text, dimension))), None
+    )
     name = _BRACKETED.sub(
         lambda bracket: bracket[0] if bracket[1].strip().isdigit() else " ", label
     )
@@ -82,12 +84,12 @@ def divided(label: str, dimension: str) -> tuple[str, str | None]:
         begin = max(len(text) - _MAX_UNIT_LENGTH, 0)
         places = [begin + separator.end() for separator in _SEPARATOR.finditer(text[begin:])]
         for place in places[-_MAX_TAILS:]:
-            if 0 < place < len(text) and (unit := unit_of(text[place:], dimension)):
+            if 0 < place < len(text) and (unit := parse_unit(text[place:], dimension)):
                 return name[:place], unit
     return name, unit
 
 
-def bracketed(label: str) -> list[str]:
+def find_bracketed(label: str) -> list[str]:
     """Return the texts in brackets in a name that are no numbers."""
     return [text for text in _BRACKETED.findall(label) if text.strip() and not text.isdigit()]
 
@@ -105,7 +107,7 @@ class StatedUnit:
     """The place in the log."""
 
 
-def stated(channel: str, text: str | None, where: str, label: str) -> StatedUnit | None:
+def find_stated_unit(channel: str, text: str | None, where: str, label: str) -> StatedUnit | None:
     """Return the unit that a log states for a channel; None if there is no known unit.
 
     ``text``, ``where``: text in the place of the unit, and a description of this place.
@@ -113,8 +115,8 @@ def stated(channel: str, text: str | None, where: str, label: str) -> StatedUnit
     if channel not in CHANNELS:
         return None
     dimension = QUANTITIES[quantity_of(channel)]
-    unit = unit_of(text or "", dimension)
+    unit = parse_unit(text or "", dimension)
     if unit is not None:
         return StatedUnit(unit, where)
-    unit = unit_of(label, dimension) or divided(label, dimension)[1]
+    unit = parse_unit(label, dimension) or split_unit(label, dimension)[1]
     return None if unit is None else StatedUnit(unit, f"the name {label[:_MAX_SHOWN_NAME]!r}")

@@ -21,7 +21,7 @@ from imubench_pipeline.settings.sensor import (
     quantity_of,
 )
 from imubench_pipeline.settings.validation import ConfigError
-from imubench_pipeline.units import conversion
+from imubench_pipeline.units import find_conversion
 
 _DECIMALS = 12
 """Decimals that are written; more are rounding errors, and would double the size of the file."""
@@ -102,7 +102,7 @@ class TextLog:
             columns[str(self._log.time.column)] = np.round(stamps, 9)
         for name, source in self._sources.items():
             dimension = "temperature" if name == TEMPERATURE else QUANTITIES[quantity_of(name)]
-            factor, zero = conversion(source.unit, dimension)
+            factor, zero = find_conversion(source.unit, dimension)
             raw = (block[name] - zero) / (factor * source.scale) + source.offset
             columns[str(source.column)] = np.round(raw, _DECIMALS).astype(self._kind)
         empty = np.zeros(count, dtype=np.int8)

@@ -33,9 +33,9 @@ from imubench_pipeline.readers.file_format import (
     FileFormat,
     LogColumn,
     LogTable,
-    shown,
+    format_first_numbers,
 )
-from imubench_pipeline.readers.stamps import WrapState, unwrapped
+from imubench_pipeline.readers.stamps import WrapState, unwrap
 from imubench_pipeline.readers.ubx_frames import Frames
 from imubench_pipeline.tables.findings import RecordingError
 from imubench_pipeline.words.findings.files import IncompleteLastRecord, WrongChecksum
@@ -307,7 +307,7 @@ class _Clock:
             return tags
         if self._wraps is None:
             self._wraps = _guess_wrap(tags, self._state.last)
-        stamps = unwrapped(tags, self._wraps or _NO_WRAP, self._state) * self._tick
+        stamps = unwrap(tags, self._wraps or _NO_WRAP, self._state) * self._tick
         if self.first is None:
             self.first = stamps[0]
         if self._date is not None:
@@ -400,7 +400,7 @@ _MAX_DESCRIBED_BYTES, _MAX_SEARCHED_BYTES = 1 << 22, 1 << 26
 """Bytes that are examined after a first message was found, and bytes searched for it."""
 
 
-def tables(path: Path, file_format: FileFormat) -> list[LogTable]:
+def list_messages(path: Path, file_format: FileFormat) -> list[LogTable]:
     """Return a table for each message with inertial data; raise `RecordingError` if none."""
     names = list(COLUMNS)
     words = {kind: Words(kind, names) for kind in KINDS}
@@ -421,13 +421,21 @@ def tables(path: Path, file_format: FileFormat) -> list[LogTable]:
             values = figures[places == place]
             if len(values):
                 unit = UNITS[column.split("_")[0]]
-                columns.append(LogColumn(column, column, "number", shown(values), values, unit))
+                columns.append(
+                    LogColumn(column, column, "number", format_first_numbers(values), values, unit)
+                )
         if columns:
             first = tags[places == places[0]].astype(np.float64)
             ticks = first * TICK_MS if kind == ESF_RAW else first
-            columns.append(LogColumn("time_tag", "time_tag", "number", shown(ticks), ticks, "ms"))
+            columns.append(
+                LogColumn(
+                    "time_tag", "time_tag", "number", format_first_numbers(ticks), ticks, "ms"
+                )
+            )
             if kind == ESF_RAW:
-                columns.append(LogColumn("sTtag", "sTtag", "number", shown(first), first))
+                columns.append(
+                    LogColumn("sTtag", "sTtag", "number", format_first_numbers(first), first)
+                )
         about = f"{frames.right[kind]} messages at the beginning"
         described.append(LogTable(file_format, name, tuple(columns), variable=name, about=about))
     if not any(table.columns for table in described):

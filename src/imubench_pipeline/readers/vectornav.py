@@ -34,11 +34,11 @@ from imubench_pipeline.readers.file_format import (
     FileFormat,
     LogColumn,
     LogTable,
-    shown,
+    format_first_numbers,
 )
-from imubench_pipeline.readers.stamps import Clock, date_of
+from imubench_pipeline.readers.stamps import Clock, format_date
 from imubench_pipeline.readers.text.cells import is_number
-from imubench_pipeline.readers.text.stamps import StampError, stamps_of
+from imubench_pipeline.readers.text.stamps import StampError, parse_stamps
 from imubench_pipeline.tables.findings import Finding, RecordingError, find
 from imubench_pipeline.words.findings import files
 
@@ -128,7 +128,7 @@ class Sentences:
                 checks.append(check.rstrip() if body else b"")
                 before = b""
         rows: list[Row] = []
-        right = right_checksums(bodies, checks)
+        right = verify_checksums(bodies, checks)
         for good, before, body in zip(right, befores, bodies, strict=True):
             if good and body.startswith(self._head):
                 self.right += 1
@@ -154,7 +154,7 @@ class Sentences:
         return rows
 
 
-def position_of(kind: str, column: str | int) -> int:
+def find_position(kind: str, column: str | int) -> int:
     """Return the position of a column in a kind of sentence, from 0; -1 if there is none."""
     fields = FIELDS[kind]
     if isinstance(column, int):
@@ -163,7 +163,7 @@ def position_of(kind: str, column: str | int) -> int:
     return fields.index(name) if name in fields and sentence in ("", kind) else -1
 
 
-def lines_of(path: Path, findings: list[Finding]) -> Iterator[bytes]:
+def read_lines(path: Path, findings: list[Finding]) -> Iterator[bytes]:
     """Yield the text of a log in blocks of complete lines.
 
     A last line without its line break is used if its checksum is right. Otherwise the end of the
@@ -181,7 +181,7 @@ def lines_of(path: Path, findings: list[Finding]) -> Iterator[bytes]:
             )
         yield text[:cut]
     body, _, check = rest.rpartition(b"$")[2].rpartition(b"*")
-    if right_checksums([body], [check.rstrip()])[0] and b"$" in rest:
+    if verify_checksums([body], [check.rstrip()])[0] and b"$" in rest:
         yield rest
     elif rest.strip(b"\0\r\t "):
         shown = rest[:60].decode("ascii", "replace")
@@ -189,7 +189,7 @@ def lines_of(path: Path, findings: list[Finding]) -> Iterator[bytes]:
         findings.append(find(data, "note", 1))
 
 
-def right_checksums(bodies: list[bytes], checks: list[bytes]) -> list[bool]:
+def verify_checksums(bodies: list[bytes], checks: list[bytes]) -> list[bool]:
     """Return which sentences have a right checksum: XOR of 8 bits, or CRC of 16 bits."""
     if not bodies:
         return []
@@ -205,7 +205,7 @@ def right_checksums(bodies: list[bytes], checks: list[bytes]) -> list[bool]:
     ]
 
 
-def fields_of(
+def parse_fields(
     kind: str, rows: list[Row], positions: set[int]
 ) -> tuple[dict[int, NDArray[np.float64]], int]:
     """Return fields of records by position, and the number of unreadable sentences."""
@@ -275,11 +275,11 @@ class VectorNavFile(LogFile):
         kind = self._kind()
         records = Sentences(kind, self.log.time is not None)
         positions = {
-            name: position_of(kind, source.column) for name, source in self.sources.items()
+            name: find_position(kind, source.column) for name, source in self.sources.items()
         }
         wraps = None if self.log.time is None else self.log.time.wraps
         clock = Clock(self, wraps, self._started)
-        for text in lines_of(self.path, self.findings):
+        for text in read_lines(self.path, self.findings):
             rows = records.add(text)
             if not rows:
                 continue
@@ -297,7 +297,7 @@ class VectorNavFile(LogFile):
                         "file, or drop it and state 'rate'"
                     )
                 time = clock.seconds(stamps, ~missing)
-            fields, unread = fields_of(kind, rows, set(positions.values()))
+            fields, unread = parse_fields(kind, rows, set(positions.values()))
             records.unread += unread
             columns = {
                 name: self.to_si(name, fields[position]) for name, position in positions.items()
@@ -308,7 +308,7 @@ class VectorNavFile(LogFile):
     def _kind(self) -> str:
         """Return the kind of sentence with the columns."""
         wanted = [source.column for source in self.sources.values()]
-        able = [kind for kind in FIELDS if all(position_of(kind, c) >= 0 for c in wanted)]
+        able = [kind for kind in FIELDS if all(find_position(kind, c) >= 0 for c in wanted)]
         if not able:
             named = ", ".join(map(str, wanted))
             expected = "; ".join(f"{kind}: {' '.join(FIELDS[kind])}" for kind in FIELDS)
@@ -337,9 +337,9 @@ class VectorNavFile(LogFile):
     def _present(self) -> set[str]:
         """Return the names of the sentences at the beginning of the file."""
         names: Counter[str] = Counter()
-        for text in lines_of(self.path, []):
+        for text in read_lines(self.path, []):
             pieces = [piece.rpartition(b"*") for piece in text.replace(b"\n", b"$").split(b"$")]
-            right = right_checksums([p[0] for p in pieces], [p[2].rstrip() for p in pieces])
+            right = verify_checksums([p[0] for p in pieces], [p[2].rstrip() for p in pieces])
             names.update(
                 piece[0].partition(b",")[0].decode("ascii", "replace")
                 for good, piece in zip(right, pieces, strict=True)
@@ -389,7 +389,7 @@ class VectorNavFile(LogFile):
             return None
         stamp = first.item()
         scale = SECONDS[time.unit or "ns"] * 1e9
-        return date_of(stamp if isinstance(stamp, int) else round(stamp * scale))
+        return format_date(stamp if isinstance(stamp, int) else round(stamp * scale))
 
     def _report(self, kind: str, records: Sentences) -> None:
         if not records.right:
@@ -420,12 +420,12 @@ def _shorten_names(names: Iterable[str]) -> tuple[str, ...]:
 _MAX_DESCRIBED_BYTES = 1 << 21  # bytes
 
 
-def tables(path: Path, file_format: FileFormat) -> list[LogTable]:
+def list_sentences(path: Path, file_format: FileFormat) -> list[LogTable]:
     """Return a table for each sentence with inertial data; raise `RecordingError` if none."""
     sentences = {kind: Sentences(kind, stamped=True) for kind in FIELDS}
     rows: dict[str, list[Row]] = {kind: [] for kind in FIELDS}
     read = 0
-    for text in lines_of(path, []):
+    for text in read_lines(path, []):
         for kind, of_kind in sentences.items():
             if b"$" + kind.encode() in text:
                 rows[kind] += of_kind.add(text)
@@ -441,13 +441,15 @@ def tables(path: Path, file_format: FileFormat) -> list[LogTable]:
     described = []
     for kind in present:
         first = rows[kind][:MAX_EXAMINED_RECORDS]
-        fields, _ = fields_of(kind, first, set(range(len(FIELDS[kind]))))
+        fields, _ = parse_fields(kind, first, set(range(len(FIELDS[kind]))))
         columns = []
         for place, name in enumerate(FIELDS[kind]):
             source = name if len(present) == 1 else f"{kind}.{name}"
             values = fields[place]
             unit = UNITS.get(name)
-            columns.append(LogColumn(source, name, "number", shown(values), values, unit))
+            columns.append(
+                LogColumn(source, name, "number", format_first_numbers(values), values, unit)
+            )
         columns += _describe_time(HOST_TIME, [row.before.strip(STAMP_PADDING) for row in first])
         columns += _describe_time(COUNTER, [row.counter for row in first])
         about = f"{len(rows[kind])} sentences at the beginning"
@@ -465,7 +467,7 @@ def _describe_time(name: str, cells: list[bytes]) -> list[LogColumn]:
         values = np.array([float(text) if text else np.nan for text in texts])
         return [LogColumn(name, name, "number", first, values)]
     try:
-        dates = stamps_of("iso8601", texts)
+        dates = parse_stamps("iso8601", texts)
         return [LogColumn(name, name, "date", first, dates, None, ("iso8601",))]
     except StampError:
         return [LogColumn(name, name, "text", first)]

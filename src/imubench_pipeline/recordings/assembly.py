@@ -16,10 +16,10 @@ from imubench_pipeline.recordings.parts import Part
 from imubench_pipeline.recordings.recording import BESIDE, LogWriter
 from imubench_pipeline.settings.quality import QualitySettings
 from imubench_pipeline.settings.sensor import quantity_of
-from imubench_pipeline.tables import checked_parquet, checked_row_group
+from imubench_pipeline.tables import open_parquet, read_row_group
 
 
-def names_of(parts: list[Part], groups: list[list[int]]) -> list[str]:
+def name_parquet_files(parts: list[Part], groups: list[list[int]]) -> list[str]:
     """Return the name of the Parquet file of each clock, from its quantity or its channels."""
     if len(groups) == 1:
         return ["log.parquet"]
@@ -64,7 +64,7 @@ def assemble(
                 writer.write(block)
         else:
             first = None
-            places = timebase.positions(base, parts[0].stamps, settings)
+            places = timebase.locate_samples(base, parts[0].stamps, settings)
             for block, stamps, points in zip(blocks, parts[0].stamps(), places, strict=True):
                 first = stamps[0] if first is None else first
                 block["time"] = stamps - first
@@ -81,12 +81,12 @@ def assemble(
 
 def _read_columns(parts: list[Part]) -> Iterator[dict[str, NDArray[Any]]]:
     """Yield the columns of several files side by side, a row group at a time."""
-    files = [checked_parquet(part.data) for part in parts]
+    files = [open_parquet(part.data) for part in parts]
     try:
         for group in range(files[0].num_row_groups):
             block: dict[str, NDArray[Any]] = {}
             for file in files:
-                table = checked_row_group(file, group)
+                table = read_row_group(file, group)
                 block |= {name: table.column(name).to_numpy() for name in table.column_names}
             yield block
     finally:
@@ -94,7 +94,7 @@ def _read_columns(parts: list[Part]) -> Iterator[dict[str, NDArray[Any]]]:
             file.close()
 
 
-def counted(
+def count_samples(
     path: Path, parts: list[Part], repeated: Mapping[str, int]
 ) -> dict[str, dict[str, int]]:
     """Return the number of samples of each column that were used and left out, by reason.

@@ -11,7 +11,7 @@ from collections.abc import Callable, Collection, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from imubench_pipeline.recordings.known_logs import identity
+from imubench_pipeline.recordings.known_logs import read_identity
 from imubench_pipeline.tables.findings import RecordingError, UnavailableError
 
 OF_RESULTS = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EMFILE, errno.ENFILE})
@@ -27,7 +27,7 @@ _ABSENT = frozenset({errno.ENOENT, errno.ENOTDIR})
 
 
 @contextmanager
-def watched(source: Path, planned: Collection[str] = ()) -> Iterator[Callable[[], bool]]:
+def watch_log(source: Path, planned: Collection[str] = ()) -> Iterator[Callable[[], bool]]:
     """Let a `RecordingError` pass only where it is a property of the log.
 
     It gives a function that returns whether the log is still the one that was there at first.
@@ -40,7 +40,7 @@ def watched(source: Path, planned: Collection[str] = ()) -> Iterator[Callable[[]
     open files.
     """
     try:
-        before = identity(source)
+        before = read_identity(source)
     except OSError as error:
         if error.errno in _OF_SURROUNDINGS | _ABSENT:
             raise _unavailable(source, error) from None
@@ -70,7 +70,7 @@ def watched(source: Path, planned: Collection[str] = ()) -> Iterator[Callable[[]
 
 def _identity(source: Path) -> dict[str, tuple[int, ...]] | None:
     try:
-        return identity(source)
+        return read_identity(source)
     except OSError:
         return None
 

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from imubench_pipeline.readers import is_endless, log_files
 from imubench_pipeline.settings.validation import cut
-from imubench_pipeline.tables.texts import printable
+from imubench_pipeline.tables.texts import escape_invisible
 from imubench_pipeline.words.reasons import files as texts
 
 PARTIAL = frozenset({".part", ".tmp", ".filepart", ".crdownload"})
@@ -83,7 +83,7 @@ class FoundFile:
     reason: str | None = None  # why it is skipped
 
 
-def found_logs(logs: Path) -> list[Recording]:
+def find_logs(logs: Path) -> list[Recording]:
     """Return the recordings of a drop zone, in order; two logs of one name are there twice.
 
     Logs in no folder of a sensor are among them, with the reason why they cannot be analysed.
@@ -94,13 +94,13 @@ def found_logs(logs: Path) -> list[Recording]:
         if path.is_dir():
             recordings += _logs_of(path)
         elif _is_dangling(path):
-            recordings.append(_behind_link(path, sensor_of(path), sensor_of(path)))
+            recordings.append(_behind_link(path, get_sensor_name(path), get_sensor_name(path)))
         elif _is_log(path):
             fault = _fault(path, _stem(path)) or (
                 f"{path.name} lies beside the folders of the sensors; expected it in "
                 f"{logs / '<sensor>'}, a folder of the name of its sensor file: move it there"
             )
-            name = name_of(path.name)
+            name = get_recording_name(path.name)
             recordings.append(Recording(NO_SENSOR, name, path, None, simulated=False, error=fault))
     return recordings
 
@@ -116,7 +116,9 @@ def account_for(
     waiting = {file for recording in held_back for file in recording.files}
     found = []
     for file in sorted(_every_file(logs)) if logs.is_dir() else ():
-        place = printable(os.fsencode(file.relative_to(logs)).decode(errors="backslashreplace"))
+        place = escape_invisible(
+            os.fsencode(file.relative_to(logs)).decode(errors="backslashreplace")
+        )
         if owner := owners.get(file):
             found.append(FoundFile(place, owner.sensor, owner.name))
         elif file in waiting:
@@ -177,7 +179,7 @@ def _why_skipped(file: Path, logs: Path) -> str:
 
 def _logs_of(folder: Path) -> Iterator[Recording]:
     """Yield the recordings in the folder of a sensor."""
-    sensor = sensor_of(folder)
+    sensor = get_sensor_name(folder)
     try:
         shown = _shown(folder)
     except OSError as error:
@@ -240,12 +242,12 @@ def _is_log(path: Path) -> bool:
     return path.suffix.lower() not in _NOT_LOGS
 
 
-def name_of(file: str) -> str:
+def get_recording_name(file: str) -> str:
     """Return the name of the recording whose log has this file name."""
     return _usable(_stem(Path(file)))
 
 
-def sensor_of(folder: Path) -> str:
+def get_sensor_name(folder: Path) -> str:
     """Return the name of the sensor whose logs are in a folder of the drop zone."""
     return _usable(folder.name)
 

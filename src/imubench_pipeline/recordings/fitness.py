@@ -59,7 +59,7 @@ class Doubt:
         return self.code != "doubtful"
 
     def row(self) -> DoubtRow:
-        """Return the row of the table ``doubts``."""
+        """Return the row of the table ``derive_doubts``."""
         return DoubtRow(
             sensor=self.sensor,
             recording=self.recording,
@@ -78,7 +78,7 @@ Estimated = TypeVar("Estimated", ParameterRow, FixedBiasRow)
 Doubted = TypeVar("Doubted", bound=TableRow)
 
 
-def doubts(
+def derive_doubts(
     findings: Iterable[FindingRow], parameters: Iterable[ParameterRow], models: Iterable[ModelRow]
 ) -> Iterator[Doubt]:
     """Yield doubts about recordings, the unfit first; ``parameters``: by recommended methods."""
@@ -121,14 +121,16 @@ def doubts(
     yield from sorted(every, key=lambda doubt: not doubt.unfit)
 
 
-def not_sold(recordings: Iterable[RecordingRow], sensors: Collection[str]) -> Iterator[Doubt]:
+def doubt_unsold_sensors(
+    recordings: Iterable[RecordingRow], sensors: Collection[str]
+) -> Iterator[Doubt]:
     """Yield a doubt for each recording of sensors that cannot be bought: they decide nothing."""
     for row in recordings:
         if row.sensor in sensors:
             yield Doubt(*_key(row), None, "not_sold", texts.not_sold(), unfit=True)
 
 
-def simulated_beside_measured(recordings: Sequence[RecordingRow]) -> Iterator[Doubt]:
+def doubt_simulated_recordings(recordings: Sequence[RecordingRow]) -> Iterator[Doubt]:
     """Yield a doubt for each simulated recording, where any measured one was analysed.
 
     ``recordings``: of one sensor or of all.
@@ -140,7 +142,7 @@ def simulated_beside_measured(recordings: Sequence[RecordingRow]) -> Iterator[Do
                 yield Doubt(*_key(row), None, BESIDE_MEASURED, reason, unfit=True)
 
 
-def without_simulated(recordings: Sequence[RecordingRow]) -> tuple[list[RecordingRow], list[Doubt]]:
+def exclude_simulated(recordings: Sequence[RecordingRow]) -> tuple[list[RecordingRow], list[Doubt]]:
     """Return the recordings of all sensors, judged anew, and the doubts that are new.
 
     Sensors are judged each by itself: a simulated recording of one decides until a measured one of
@@ -149,7 +151,7 @@ def without_simulated(recordings: Sequence[RecordingRow]) -> tuple[list[Recordin
     known = {_key(row) for row in recordings if any(d.code == BESIDE_MEASURED for d in row.doubts)}
     new = [
         doubt
-        for doubt in simulated_beside_measured(recordings)
+        for doubt in doubt_simulated_recordings(recordings)
         if (doubt.sensor, doubt.recording) not in known
     ]
     apart = {(doubt.sensor, doubt.recording): mark_doubts([doubt]) for doubt in new}
@@ -167,7 +169,7 @@ def without_simulated(recordings: Sequence[RecordingRow]) -> tuple[list[Recordin
     return judged_anew, new
 
 
-def fitness(of_recording: Iterable[Doubt]) -> Fitness:
+def judge_fitness(of_recording: Iterable[Doubt]) -> Fitness:
     """Return the verdict on a recording from all doubts about it."""
     of_log = [doubt for doubt in of_recording if doubt.of_recording]
     if any(doubt.unfit for doubt in of_log):
@@ -175,7 +177,7 @@ def fitness(of_recording: Iterable[Doubt]) -> Fitness:
     return "fit with doubts" if of_log else "fit"
 
 
-def judged(
+def judge_recordings(
     recordings: Sequence[RecordingRow], doubts: Iterable[Doubt], included: Collection[str]
 ) -> list[RecordingRow]:
     """Return the rows of recordings with whether they decide, and their doubts.
@@ -188,7 +190,7 @@ def judged(
     rows = []
     for row in recordings:
         own = by_recording[_key(row)]
-        verdict = fitness(own) if row.status == "ok" else None
+        verdict = judge_fitness(own) if row.status == "ok" else None
         named = f"{row.sensor}/{row.recording}" in included
         named &= all(doubt.code != BESIDE_MEASURED for doubt in own)
         decides = verdict is not None and (verdict != "unfit" or named)
@@ -209,14 +211,14 @@ def mark_doubts(of_recording: Iterable[Doubt]) -> tuple[DoubtMark, ...]:
     )
 
 
-def left_out(recordings: Iterable[RecordingRow]) -> dict[Key, tuple[DoubtMark, ...]]:
+def list_excluded(recordings: Iterable[RecordingRow]) -> dict[Key, tuple[DoubtMark, ...]]:
     """Return the analysed recordings that are not used in comparisons, each with its doubts."""
     return {
         _key(row): row.doubts for row in recordings if row.status == "ok" and row.decides is False
     }
 
 
-def undecided(rows: Iterable[Estimated], not_deciding: Collection[Key]) -> Iterator[Estimated]:
+def mask_excluded(rows: Iterable[Estimated], not_deciding: Collection[Key]) -> Iterator[Estimated]:
     """Yield rows of estimates, without the values of recordings that do not decide.
 
     A mean that is left out is NaN, as a row of it has a value.
@@ -230,7 +232,7 @@ def undecided(rows: Iterable[Estimated], not_deciding: Collection[Key]) -> Itera
             yield replace(row, value=None, lower=None, upper=None, status="does_not_decide")
 
 
-def with_doubts(
+def attach_doubts(
     rows: Iterable[Doubted],
     recordings: Iterable[RecordingRow],
     named: Collection[tuple[str, str]] = (("sensor", "recording"),),
@@ -248,7 +250,7 @@ def with_doubts(
         yield replace(row, doubts=tuple(dict.fromkeys(codes)))  # type: ignore[type-var]  # a dataclass
 
 
-def with_doubts_of_all(
+def attach_doubts_to_pools(
     pools: Iterable[PooledRow], recordings: Iterable[RecordingRow]
 ) -> Iterator[PooledRow]:
     """Yield pools with the doubts of the recordings of sensor or device."""

@@ -14,19 +14,19 @@ from threading import Event
 from typing import Any
 
 from imubench_pipeline.readers import log_files, read
-from imubench_pipeline.readers.content import format_of_folder
+from imubench_pipeline.readers.content import recognise_folder
 from imubench_pipeline.recordings import timebase
-from imubench_pipeline.recordings.assembly import assemble, counted, names_of
-from imubench_pipeline.recordings.availability import watched
-from imubench_pipeline.recordings.kept import Quality, identified
-from imubench_pipeline.recordings.known_logs import KnownFile, read_log, write_known
+from imubench_pipeline.recordings.assembly import assemble, count_samples, name_parquet_files
+from imubench_pipeline.recordings.availability import watch_log
+from imubench_pipeline.recordings.kept import Quality, identify_files
+from imubench_pipeline.recordings.known_logs import KnownFile, identify_log_files, write_known
 from imubench_pipeline.recordings.opening import check_opening
 from imubench_pipeline.recordings.parts import Part, leave_out_knocks, read_part
-from imubench_pipeline.recordings.quality.columns import column_findings
-from imubench_pipeline.recordings.quality.copies import copied_channels
-from imubench_pipeline.recordings.quality.levels import kept_level
-from imubench_pipeline.recordings.quality.rotation import GravityTurn, gravity_turn
-from imubench_pipeline.recordings.recording import BESIDE, channel_logs, log_paths
+from imubench_pipeline.recordings.quality.columns import check_columns
+from imubench_pipeline.recordings.quality.copies import find_copied_channels
+from imubench_pipeline.recordings.quality.levels import summarise_level
+from imubench_pipeline.recordings.quality.rotation import GravityTurn, detect_gravity_turn
+from imubench_pipeline.recordings.recording import BESIDE, list_log_files, open_channel_logs
 from imubench_pipeline.recordings.separation import separate_clocks
 from imubench_pipeline.settings.quality import QualitySettings
 from imubench_pipeline.settings.sensor import TEMPERATURE, LogFormat, RecordingNotes, UsedPart
@@ -48,7 +48,7 @@ class Ingested:
     channels: dict[str, dict[str, Any]] = field(default_factory=dict)
     """Rate in Hz, points of the grid, segments and levels of each analysed channel."""
     kept: dict[str, dict[str, Any]] = field(default_factory=dict)
-    """The files of samples (`imubench_pipeline.recordings.kept.identified`)."""
+    """The files of samples (`imubench_pipeline.recordings.kept.identify_files`)."""
     gravity: GravityTurn | None = None
     """How gravity turns against the sensor."""
     sources: dict[str, KnownFile] | None = None
@@ -101,7 +101,7 @@ def ingest(
     scratch = Path(tempfile.mkdtemp(prefix=".ingest.", suffix=".part", dir=folder))
     # The files are identified while they are read; to the end only where they can be used.
     beside, rejected = ThreadPoolExecutor(1), Event()
-    sources = beside.submit(read_log, source, rejected.is_set)
+    sources = beside.submit(identify_log_files, source, rejected.is_set)
     try:
         whole = _ingest(source, log, notes, settings, folder, scratch, provenance, sources)
         end = max((f.end or 0.0 for f in whole.findings if f.finding == "warm_up"), default=0.0)
@@ -121,7 +121,7 @@ def ingest(
 
 def remove_kept(folder: Path) -> None:
     """Remove the log of an earlier run, and the scratch files of a killed one."""
-    for path in log_paths(folder):
+    for path in list_log_files(folder):
         path.unlink()
     for path in folder.glob(".ingest.*.part"):
         shutil.rmtree(path, ignore_errors=True)
@@ -156,7 +156,7 @@ def _ingest(
         findings.append(find(files.SimulatedByMark(marked[0]), "warning", len(marked)))
     findings += _unused_files(source, parts)
     unusable = {finding.channel for finding in findings if finding.severity == "fatal"}
-    names = names_of(parts, groups)
+    names = name_parquet_files(parts, groups)
     simulated = bool(marked or notes.simulated or provenance.get("simulated"))
     metadata = provenance | {
         "simulated": simulated,
@@ -176,7 +176,7 @@ def _ingest(
         chosen, base = [parts[index] for index in group], bases[group[0]]
         about = metadata | _of_clock(chosen, base) | left_out
         assembled, repeated = assemble(chosen, base, settings, about, scratch / name)
-        counts |= counted(assembled, chosen, repeated)
+        counts |= count_samples(assembled, chosen, repeated)
         written.append((assembled, folder / name))
     summary = _summary(parts, bases, metadata["started"]) | {"simulated": simulated}
     if all(channel in unusable for channel in log.channels):
@@ -190,21 +190,21 @@ def _ingest(
     channels = {
         name: {"grid": channel.grid, "segments": channel.segments}
         | counts[name]
-        | kept_level(column[name], channel.rate, units[name], timed=name in timed)
-        for name, channel in channel_logs(folder).items()
+        | summarise_level(column[name], channel.rate, units[name], timed=name in timed)
+        for name, channel in open_channel_logs(folder).items()
     }
     begin = notes.use.start
     findings = [
         f if f.start is None else replace(f, start=f.start + begin, end=(f.end or 0.0) + begin)
         for f in findings
     ]
-    kept = identified(log_paths(folder))
+    kept = identify_files(list_log_files(folder))
     return Ingested(summary, findings, channels, kept, _gravity(parts, bases), sources.result())
 
 
 def _unused_files(source: Path, parts: list[Part]) -> list[Finding]:
     """Return a note of the files of a folder that no channel is read from."""
-    if not source.is_dir() or format_of_folder(source) is not None:
+    if not source.is_dir() or recognise_folder(source) is not None:
         return []
     used = {path for part in parts for path in (part.source.path, *part.source.path.parents)}
     unused = [file.relative_to(source).as_posix() for file in log_files(source) if file not in used]
@@ -229,13 +229,13 @@ def _findings(
     findings += [finding for file in read_files for finding in file.contradicted_units()]
     for part, base in zip(parts, bases, strict=True):
         columns = part.columns | part.left_out
-        found = column_findings(columns, base.rate, settings, static=static)
+        found = check_columns(columns, base.rate, settings, static=static)
         findings += [finding for finding in found if finding not in findings]
         findings += part.findings
         if static:  # a turn looks like a knock
             findings += _knock_findings(part, base.rate, settings, scratch)
     channels = {name: column for part in parts for name, column in part.columns.items()}
-    findings += copied_channels({n: c for n, c in channels.items() if n not in BESIDE})
+    findings += find_copied_channels({n: c for n, c in channels.items() if n not in BESIDE})
     whole = [part for part in parts if part.base is None]
     if len({part.rows for part in whole if not part.stamped}) > 1:
         rows = tuple(part.rows for part in whole)
@@ -277,7 +277,7 @@ def _gravity(parts: list[Part], bases: list[timebase.TimeBase]) -> GravityTurn |
     if len({(parts[n].digest(), parts[n].rows) for n in place.values()}) != 1 or len(place) < 3:
         return None  # they have no clock in common
     blocks = [parts[place[name]].columns[name].blocks() for name in axes]
-    return gravity_turn(blocks, bases[place[axes[0]]].rate)
+    return detect_gravity_turn(blocks, bases[place[axes[0]]].rate)
 
 
 def _knock_findings(
@@ -300,9 +300,9 @@ def _base(part: Part, log: LogFormat, settings: QualitySettings) -> timebase.Tim
         return part.base
     if not part.stamped:
         assert log.rate_hz is not None  # checked with the sensor file
-        return timebase.without_stamps(part.rows, log.rate_hz)
+        return timebase.assume_stated_rate(part.rows, log.rate_hz)
     try:
-        return timebase.from_stamps(part.stamps, log.rate_hz or part.source.rate, settings)
+        return timebase.fit_time_base(part.stamps, log.rate_hz or part.source.rate, settings)
     except RecordingError as error:
         raise RecordingError(f"{part.source.path.name}: {error}") from None
 
@@ -363,7 +363,7 @@ def ingest_as_planned(
             raise RecordingError(plan["error"])
         log = LogFormat.model_validate(plan["log"])
         limits = QualitySettings.model_validate(plan["quality"])
-        with watched(source, plan.get("files", ())) as is_same:
+        with watch_log(source, plan.get("files", ())) as is_same:
             if guarded:
                 check_opening(source, log, limits.opening)
             ingested = ingest(source, log, notes, limits, folder, provenance)
@@ -375,7 +375,7 @@ def ingest_as_planned(
         ingested = rejected(error, notes)
         if "files" in plan:
             with suppress(OSError):  # a path that cannot be listed at all
-                sources = read_log(source, lambda: True)  # no digests of large files
+                sources = identify_log_files(source, lambda: True)  # no digests of large files
     if versions := plan.get("files"):
         write_known(sources, folder, versions)
     return ingested.quality(provenance | {"power_cycled": notes.power_cycled})

@@ -12,13 +12,13 @@ from imubench_pipeline.model.recordings import FindingRow, RecordingRow
 from imubench_pipeline.recordings.recording import (
     MEND,
     ChannelLog,
-    channel_logs,
-    log_paths,
+    list_log_files,
+    open_channel_logs,
     was_at_rest,
 )
-from imubench_pipeline.tables.digests import digest_of, read_sealed_json, write_sealed_json
+from imubench_pipeline.tables.digests import compute_digest, read_sealed_json, write_sealed_json
 from imubench_pipeline.tables.findings import RecordingError
-from imubench_pipeline.tables.parquet import end_of
+from imubench_pipeline.tables.parquet import read_footer
 
 
 @dataclass(frozen=True)
@@ -33,7 +33,7 @@ class Quality:
     findings: list[FindingRow]
     channels: dict[str, dict[str, Any]]
     kept: dict[str, dict[str, Any]] | None = None
-    """The files of samples, as `identified` gives them; None: not known."""
+    """The files of samples, as `identify_files` gives them; None: not known."""
     failure: dict[str, Any] | None = None
     """Why the ingest failed (`imubench_pipeline.tables.failures.Failure`)."""
     gravity: dict[str, Any] | None = None
@@ -78,7 +78,7 @@ class Quality:
                 if path.stat().st_size != stated["size"]:
                     wrong = f"has {path.stat().st_size} bytes instead of {stated['size']}"
                 elif _footer(path) != stated["footer"] or (
-                    whole and digest_of(path) != stated["sha256"]
+                    whole and compute_digest(path) != stated["sha256"]
                 ):
                     wrong = "is not as the ingest wrote it"
                 else:
@@ -91,7 +91,7 @@ class Quality:
         return None
 
 
-def outcome(results: Path, sensor: str, recording: str) -> str:
+def describe_outcome(results: Path, sensor: str, recording: str) -> str:
     """Return the outcome of a recording in one line: used, with doubts, or rejected."""
     name = f"{sensor}/{recording}"
     try:
@@ -109,19 +109,23 @@ def outcome(results: Path, sensor: str, recording: str) -> str:
     return told + (f"; in doubt: {', '.join(kinds)}" if kinds else "")
 
 
-def identified(paths: Iterable[Path]) -> dict[str, dict[str, Any]]:
+def identify_files(paths: Iterable[Path]) -> dict[str, dict[str, Any]]:
     """Return size, digest, and digest of the metadata of Parquet files, by name."""
     return {
-        path.name: {"size": path.stat().st_size, "footer": _footer(path), "sha256": digest_of(path)}
+        path.name: {
+            "size": path.stat().st_size,
+            "footer": _footer(path),
+            "sha256": compute_digest(path),
+        }
         for path in paths
     }
 
 
 def _footer(path: Path) -> str:
-    return hashlib.sha256(end_of(path)).hexdigest()
+    return hashlib.sha256(read_footer(path)).hexdigest()
 
 
-def kept_logs(folder: Path) -> dict[str, ChannelLog]:
+def load_logs(folder: Path) -> dict[str, ChannelLog]:
     """Return the channels of a recording that can be analysed, by name; none of a rejected one.
 
     ``folder`` contains its ``quality.json``.
@@ -133,13 +137,13 @@ def kept_logs(folder: Path) -> dict[str, ChannelLog]:
     if fault := quality.fault(folder):
         raise RecordingError(fault)
     if quality.kept is not None:
-        for path in log_paths(folder):
+        for path in list_log_files(folder):
             if path.name not in quality.kept:
                 raise RecordingError(f"{path}: is none that the ingest wrote: {MEND}")
-    return channel_logs(folder)
+    return open_channel_logs(folder)
 
 
-def kept_static_logs(folder: Path) -> dict[str, ChannelLog]:
-    """Return `kept_logs` of a sensor that was at rest all the time; none of a turned sensor."""
-    logs = kept_logs(folder)
+def load_static_logs(folder: Path) -> dict[str, ChannelLog]:
+    """Return `load_logs` of a sensor that was at rest all the time; none of a turned sensor."""
+    logs = load_logs(folder)
     return logs if was_at_rest(folder) else {}

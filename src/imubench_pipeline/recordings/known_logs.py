@@ -116,7 +116,9 @@ def write_known(
     write_sealed_json({"files": rows}, folder / KNOWN)
 
 
-def read_log(source: Path, is_stopped: Callable[[], bool] = lambda: False) -> dict[str, KnownFile]:
+def identify_log_files(
+    source: Path, is_stopped: Callable[[], bool] = lambda: False
+) -> dict[str, KnownFile]:
     """Read all files of a log, and return their identity by their place in the log.
 
     ``source``: the log file, or the folder of a recording. ``is_stopped`` is called now and then:
@@ -127,7 +129,7 @@ def read_log(source: Path, is_stopped: Callable[[], bool] = lambda: False) -> di
     return {name: KnownFile.of(file, is_stopped) for name, file in _places(source).items()}
 
 
-def identity(source: Path) -> dict[str, tuple[int, ...]]:
+def read_identity(source: Path) -> dict[str, tuple[int, ...]]:
     """Return size, stamps and inode of the files of a log and of their folder, by their place.
 
     It is another value whenever a file was changed, replaced, renamed, or moved away and back.
@@ -161,7 +163,7 @@ def plan_versions(source: Path, folder: Path) -> dict[str, str]:
         before = (known or {}).get(name)
         try:
             now = None if before is None else _now(path, before)
-            versions[name] = now.version if now else glimpse(path)
+            versions[name] = now.version if now else digest_blocks(path)
             if now and now != before:
                 touched[name] = now
         except OSError as error:
@@ -218,7 +220,7 @@ def is_changed(source: Path, folder: Path) -> bool:
     return False
 
 
-def versions_of(recording: Recording, results: Path) -> dict[str, str]:
+def plan_recording_versions(recording: Recording, results: Path) -> dict[str, str]:
     """Return `plan_versions` of a recording; of one that is to be simulated, none."""
     if recording.simulated:
         return {}
@@ -226,7 +228,7 @@ def versions_of(recording: Recording, results: Path) -> dict[str, str]:
     return plan_versions(recording.path, folder)
 
 
-def glimpse(path: Path) -> str:
+def digest_blocks(path: Path) -> str:
     """Return the size of a file and a digest of it; of a large file, of blocks spread over it.
 
     The first and the last block are among them. In a file above 1 MB, a change that leaves the

@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 from imubench_pipeline.readers import log_files, read
-from imubench_pipeline.readers.bounded import BoundError, bounded
-from imubench_pipeline.recordings.availability import watched
+from imubench_pipeline.readers.bounded import BoundError, run_bounded
+from imubench_pipeline.recordings.availability import watch_log
 from imubench_pipeline.settings.sensor import LogFormat
 from imubench_pipeline.tables.findings import RecordingError, UnavailableError
 
@@ -27,7 +27,7 @@ def check_opening(source: Path, log: LogFormat, seconds: float) -> None:
     """
     size = sum(path.stat().st_size for path in log_files(source))
     try:
-        bounded(seconds + size / _SLOWEST, _MEMORY, _read_first_records, source, log)
+        run_bounded(seconds + size / _SLOWEST, _MEMORY, _read_first_records, source, log)
     except BoundError as error:
         if error.is_external:
             raise UnavailableError(f"{source.name}: to read its first records {error}") from None
@@ -39,7 +39,7 @@ def check_opening(source: Path, log: LogFormat, seconds: float) -> None:
 
 
 def _read_first_records(source: Path, log: LogFormat) -> None:
-    with watched(source):  # an error loses its causes on its way out of this process
+    with watch_log(source):  # an error loses its causes on its way out of this process
         try:
             for file in read(source, log):
                 next(iter(file.batches()), None)

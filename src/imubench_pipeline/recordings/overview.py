@@ -20,8 +20,8 @@ from numpy.typing import NDArray
 from imubench_pipeline.model.estimates import EnvelopeRow, HistogramRow
 from imubench_pipeline.recordings.recording import (
     ChannelLog,
-    channel_logs,
-    log_paths,
+    list_log_files,
+    open_channel_logs,
     read_metadata,
     was_at_rest,
 )
@@ -71,8 +71,8 @@ def overview(folder: Path, sensor: str, recording: str, buckets: int | None = No
         Max. intervals of time of an envelope; more by default if the sensor was turned.
     """
     result = Overview([], [])
-    logs = [*channel_logs(folder).values()]
-    for path in log_paths(folder):
+    logs = [*open_channel_logs(folder).values()]
+    for path in list_log_files(folder):
         if TEMPERATURE in pq.read_schema(path).names:
             about = read_metadata(path)
             logs.append(ChannelLog(path, TEMPERATURE, about["rate"], about["grid"], (), holes=True))

@@ -16,12 +16,12 @@ from numpy.typing import NDArray
 
 from imubench_pipeline.readers import LogFile
 from imubench_pipeline.recordings.quality import levels
-from imubench_pipeline.recordings.quality.knocks import Knock, knocks, suspects
+from imubench_pipeline.recordings.quality.knocks import Knock, find_knocks, find_outlier_blocks
 from imubench_pipeline.recordings.quality.summary import ColumnSummary
 from imubench_pipeline.recordings.recording import ROW_GROUP, LogWriter
 from imubench_pipeline.recordings.timebase import TimeBase
 from imubench_pipeline.settings.sensor import UsedPart
-from imubench_pipeline.tables import checked_parquet, checked_row_group
+from imubench_pipeline.tables import open_parquet, read_row_group
 from imubench_pipeline.tables.findings import Finding, RecordingError
 from imubench_pipeline.typing import Array
 from imubench_pipeline.words.findings.files import NotUsed
@@ -75,7 +75,7 @@ class Part:
 
 
 @contextlib.contextmanager
-def new_part(
+def open_part(
     source: LogFile, columns: Iterable[str], scratch: Path, name: str
 ) -> Iterator[tuple[Part, PartWriter]]:
     """Begin a part; yield it with the writer of its records.
@@ -129,7 +129,7 @@ def read_part(file: LogFile, use: UsedPart, scratch: Path, number: int) -> Part:
     """
     rate = file.log.rate_hz
     read_rows = 0
-    with new_part(file, file.sources, scratch, f"part{number}") as (part, writer):
+    with open_part(file, file.sources, scratch, f"part{number}") as (part, writer):
         for batch in file.batches():
             clock, columns = batch.time, batch.columns
             if use.start > 0.0 or use.end is not None:
@@ -163,17 +163,19 @@ def leave_out_knocks(
     event is motion.
     """
     blocks = {name: column.blocks() for name, column in part.columns.items()}
-    doubtful = [name for name, b in blocks.items() if len(suspects(b, sigmas)[0])]
-    steps = {name: levels.quantisation(part.columns[name]) for name in doubtful}
+    doubtful = [name for name, b in blocks.items() if len(find_outlier_blocks(b, sigmas)[0])]
+    steps = {name: levels.detect_quantisation(part.columns[name]) for name in doubtful}
     step = {name: steps_of.step if steps_of else None for name, steps_of in steps.items()}
-    doubtful = [name for name in doubtful if len(suspects(blocks[name], sigmas, step[name])[0])]
+    doubtful = [
+        name for name in doubtful if len(find_outlier_blocks(blocks[name], sigmas, step[name])[0])
+    ]
     if not doubtful:
         return {}
     part.writer.finish({})
     knocks_of = {}
     for name in doubtful:
         values = _read_row_groups(part.data, name)
-        if here := list(knocks(values, blocks[name], sigmas, longest, step[name])):
+        if here := list(find_knocks(values, blocks[name], sigmas, longest, step[name])):
             knocks_of[name] = here
     # Write the columns again without the samples of knocks; the new writer stays open.
     old = part.data
@@ -181,9 +183,9 @@ def leave_out_knocks(
     part.writer = LogWriter(part.data, dict.fromkeys(part.columns, pa.float64()))
     part.knocks = dict.fromkeys(part.columns, 0)
     reached = 0
-    with checked_parquet(old) as file:
+    with open_parquet(old) as file:
         for number in range(file.num_row_groups):
-            table = checked_row_group(file, number)
+            table = read_row_group(file, number)
             columns = {}
             for name in part.columns:
                 samples = np.array(table.column(name).to_numpy(), dtype=np.float64)
@@ -200,7 +202,7 @@ def leave_out_knocks(
 
 
 def _read_row_groups(path: Path, name: str) -> Iterator[Array]:
-    with checked_parquet(path) as file:
+    with open_parquet(path) as file:
         for number in range(file.num_row_groups):
-            table = checked_row_group(file, number, [name])
+            table = read_row_group(file, number, [name])
             yield np.asarray(table.column(name).to_numpy(), dtype=np.float64)

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from imubench_pipeline.readers.arrays.arrow import METADATA
 from imubench_pipeline.settings.sensor import POSITION, TABLE_RATE, TEMPERATURE
-from imubench_pipeline.tables import checked_parquet, checked_row_group
+from imubench_pipeline.tables import open_parquet, read_row_group
 from imubench_pipeline.tables.findings import RecordingError
 from imubench_pipeline.typing import Array
 
@@ -129,12 +129,12 @@ class ChannelLog:
         Raises RecordingError if the file is damaged.
         """
         try:
-            with checked_parquet(self.path) as file:
+            with open_parquet(self.path) as file:
                 placed = "sample" in file.schema_arrow.names
                 columns = [self.channel, *(["sample"] if placed else [])]
                 reached = 0
                 for number in range(file.num_row_groups):
-                    table = checked_row_group(file, number, columns)
+                    table = read_row_group(file, number, columns)
                     values = _to_numpy(table.column(self.channel))
                     if not placed:
                         yield values
@@ -167,15 +167,15 @@ class ChannelLog:
     @property
     def position_elsewhere(self) -> bool:
         """Whether the position of the sensor is on another clock than this channel."""
-        others = (path for path in log_paths(self.path.parent) if path != self.path)
+        others = (path for path in list_log_files(self.path.parent) if path != self.path)
         return any(POSITION in pq.read_schema(path).names for path in others)
 
     def mean(self) -> float:
         """Return the mean of the samples present, SI."""
-        return mean_of(self.blocks())
+        return average_blocks(self.blocks())
 
 
-def mean_of(blocks: Iterable[Array]) -> float:
+def average_blocks(blocks: Iterable[Array]) -> float:
     """Return the mean of the samples present in consecutive blocks; NaN of none."""
     total, number = 0.0, 0
     for values in blocks:
@@ -192,25 +192,27 @@ def read_metadata(path: Path) -> dict[str, Any]:
     return data
 
 
-def log_paths(folder: Path) -> list[Path]:
+def list_log_files(folder: Path) -> list[Path]:
     """Return the Parquet files of a kept recording, one a time base."""
     return sorted(folder.glob("log*.parquet"))
 
 
-def static_logs(folder: Path) -> dict[str, ChannelLog]:
+def open_static_logs(folder: Path) -> dict[str, ChannelLog]:
     """Return the channels that were at rest all the time: none of a sensor that was turned."""
-    return channel_logs(folder) if was_at_rest(folder) else {}
+    return open_channel_logs(folder) if was_at_rest(folder) else {}
 
 
 def was_at_rest(folder: Path) -> bool:
     """Return whether the sensor of a kept recording was to be at rest all the time."""
-    return all(read_metadata(path).get("kind", "static") == "static" for path in log_paths(folder))
+    return all(
+        read_metadata(path).get("kind", "static") == "static" for path in list_log_files(folder)
+    )
 
 
-def channel_logs(folder: Path) -> dict[str, ChannelLog]:
+def open_channel_logs(folder: Path) -> dict[str, ChannelLog]:
     """Return the channels of a kept recording that can be analysed, by name, in order."""
     logs: dict[str, ChannelLog] = {}
-    for path in log_paths(folder):
+    for path in list_log_files(folder):
         metadata = read_metadata(path)
         columns = pq.read_schema(path).names
         beside = set(columns) - set(metadata.get("empty", ()))  # without one reading
@@ -232,7 +234,7 @@ def channel_logs(folder: Path) -> dict[str, ChannelLog]:
     return {name: logs[name] for name in order if name in logs}
 
 
-def on_grid(blocks: Iterable[Array], grid: int) -> Array:
+def place_on_grid(blocks: Iterable[Array], grid: int) -> Array:
     """Return consecutive blocks of a column on a grid of L points, shape (L,); NaN at the end."""
     values = np.full(grid, np.nan)
     reached = 0

@@ -18,12 +18,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from imubench_pipeline.recordings import timebase
-from imubench_pipeline.recordings.parts import STAMP_BLOCK, Part, new_part
+from imubench_pipeline.recordings.parts import STAMP_BLOCK, Part, open_part
 from imubench_pipeline.recordings.recording import BESIDE
 from imubench_pipeline.recordings.timebase import TimeBase
 from imubench_pipeline.settings.quality import QualitySettings
 from imubench_pipeline.settings.sensor import quantity_of
-from imubench_pipeline.tables import checked_parquet, checked_row_group
+from imubench_pipeline.tables import open_parquet, read_row_group
 from imubench_pipeline.tables.findings import RecordingError, find
 from imubench_pipeline.typing import Array
 from imubench_pipeline.words.findings.time_base import OwnRate
@@ -98,9 +98,9 @@ class _Records:
                 yield block[has_one(present, bits)]
 
         settings = self._settings
-        base = timebase.from_stamps(stamps, None, settings, known=known)
+        base = timebase.fit_time_base(stamps, None, settings, known=known)
         if self._stated and any(found.finding == "coarse_stamps" for found in base.findings):
-            lossy = timebase.from_stamps(stamps, self._stated, settings)
+            lossy = timebase.fit_time_base(stamps, self._stated, settings)
             if abs(lossy.rate / self._stated - 1.0) <= settings.rate_tolerance:
                 base = lossy
         by_number = numbered or not self._part.stamped
@@ -108,7 +108,7 @@ class _Records:
 
     def points(self, base: TimeBase, bits: int) -> Iterator[NDArray[np.int64]]:
         """Yield the grid points of the records with a number, in the time base of all records."""
-        places = timebase.positions(base, self.times, self._settings)
+        places = timebase.locate_samples(base, self.times, self._settings)
         for points, present in zip(places, self._part.present(), strict=True):
             chosen = points[has_one(present, bits)]
             yield chosen[chosen >= 0]
@@ -175,7 +175,7 @@ def separate_clocks(
         for name in channels if grid.stamped or not part.stamped else ():
             if records.count(name) < (1.0 - timebase.MIN_MISSING) * part.rows:
                 points = records.points(grid, records.bit[name])
-                part.findings += timebase.rate_changes(points, grid.rate, name)
+                part.findings += timebase.find_rate_changes(points, grid.rate, name)
         return [part]
     clocks = _group_by_clock(own, records, settings)
     rest = _assign_to_clocks(channels, own, clocks, records, leaders)
@@ -306,12 +306,12 @@ def _write_parts(part: Part, clocks: list[_Clock], records: _Records, scratch: P
         for number, clock in enumerate(clocks):
             names = [name for name in part.columns if name in clock.channels]
             stem = f"{part.data.stem}.{number}"
-            made.append(stack.enter_context(new_part(part.source, names + beside, scratch, stem)))
+            made.append(stack.enter_context(open_part(part.source, names + beside, scratch, stem)))
         waiting = [dict.fromkeys(beside, math.nan) for _ in clocks]
-        with checked_parquet(part.data) as file:
+        with open_parquet(part.data) as file:
             blocks = zip(records.times(), part.present(), strict=True)
             for group, (times, present) in enumerate(blocks):
-                table = checked_row_group(file, group)
+                table = read_row_group(file, group)
                 for clock, (of_clock, writer), readings in zip(clocks, made, waiting, strict=True):
                     chosen = has_one(present, clock.bits)
                     columns = {}

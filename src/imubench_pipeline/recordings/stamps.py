@@ -63,7 +63,7 @@ class Interval:
         return self.other is not None and self.other > self.mean
 
 
-def typical_interval(stamps: Stamps) -> Interval | None:
+def estimate_interval(stamps: Stamps) -> Interval | None:
     """Return the interval between samples; None if the stamps do not advance."""
     medians, rounded, repeated = [], [], []
     for block in stamps():
@@ -200,7 +200,7 @@ class Track:
         return points
 
 
-def tracked(stamps: Stamps, interval: float, longest_hole: float) -> Track:
+def track_stamps(stamps: Stamps, interval: float, longest_hole: float) -> Track:
     """Return the track of all stamps of a file."""
     track = Track(interval, longest_hole)
     for block in stamps():

@@ -23,9 +23,9 @@ from imubench_pipeline.recordings.stamps import (
     Interval,
     Stamps,
     Track,
+    estimate_interval,
     is_set_back,
-    tracked,
-    typical_interval,
+    track_stamps,
 )
 from imubench_pipeline.settings.quality import QualitySettings
 from imubench_pipeline.tables.findings import Finding, RecordingError, find
@@ -93,12 +93,12 @@ class TimeBase:
         return self.rows - self.repeated
 
 
-def without_stamps(rows: int, rate: float) -> TimeBase:
+def assume_stated_rate(rows: int, rate: float) -> TimeBase:
     """Return the time base of a file without stamps, at the stated rate."""
     return TimeBase(rate, "stated", rows, rows, ((0, rows),), uniform=True, stamped=False)
 
 
-def from_stamps(
+def fit_time_base(
     stamps: Stamps, stated: float | None, settings: QualitySettings, *, known: float | None = None
 ) -> TimeBase:
     """Return the time base of a file from its stamps, which are read several times.
@@ -108,7 +108,7 @@ def from_stamps(
 
     Raises RecordingError if the stamps do not advance, or jump or stop too often.
     """
-    typical = typical_interval(stamps) if known is None else Interval(known)
+    typical = estimate_interval(stamps) if known is None else Interval(known)
     if typical is None:
         raise RecordingError("the time stamps do not advance; is the right column named?")
     interval = typical.mean
@@ -119,11 +119,11 @@ def from_stamps(
         )
     if typical.other is not None and _is_rate_of(stated, typical.other, settings):
         interval = typical.other
-    track = tracked(stamps, interval, settings.longest_hole)
+    track = track_stamps(stamps, interval, settings.longest_hole)
     mean = track.mean_interval or interval
     if abs(mean / interval - 1.0) > _MAX_INTERVAL_ERROR:
         # The mean interval is more accurate than the typical one: track again.
-        track = tracked(stamps, mean, settings.longest_hole)
+        track = track_stamps(stamps, mean, settings.longest_hole)
     if track.grid > _MAX_EXTRA_POINTS + _MAX_MISSING_PER_SAMPLE * track.rows:
         raise RecordingError(
             f"of {track.grid} samples at {1.0 / interval:.6g} Hz {track.rows} are there; expected "
@@ -144,7 +144,7 @@ def from_stamps(
         return replace(base, findings=(*base.findings, coarse))
     if track.off_grid > settings.jitter * track.rows or bursts or shared:
         if stated and known is None and not complete:  # many samples may be missing
-            of_stated = from_stamps(stamps, stated, settings, known=1.0 / stated)
+            of_stated = fit_time_base(stamps, stated, settings, known=1.0 / stated)
             if of_stated.stamped and _is_rate_of(stated, 1.0 / of_stated.rate, settings):
                 return of_stated
         return _assume_consecutive(stamps, track, stated, settings)
@@ -158,7 +158,7 @@ def from_stamps(
     findings += _find_drift(track, settings)
     if track.grid - track.rows > MIN_MISSING * track.grid:
         follow = Track(track.interval, settings.longest_hole)
-        findings += rate_changes((follow.follow(block) for block in stamps()), rate)
+        findings += find_rate_changes((follow.follow(block) for block in stamps()), rate)
     jitter = math.sqrt(track.scatter / max(track.steps, 1))
     uniform = track.grid == track.rows and len(track.starts) == 1 and not track.duplicates
     return TimeBase(
@@ -176,7 +176,7 @@ def from_stamps(
     )
 
 
-def positions(
+def locate_samples(
     base: TimeBase, stamps: Stamps, settings: QualitySettings
 ) -> Iterator[NDArray[np.int64]]:
     """Yield the grid point of each record, block by block; -1 for a repeated stamp."""
@@ -192,7 +192,7 @@ def positions(
         yield track.follow(block)
 
 
-def rate_changes(
+def find_rate_changes(
     points: Iterator[NDArray[np.int64]], rate: float, channel: str | None = None
 ) -> list[Finding]:
     """Return a finding if a part of a log has every second (third, ...) sample only.

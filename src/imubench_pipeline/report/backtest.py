@@ -7,18 +7,18 @@ from typing import Any
 
 from imubench_pipeline.model.comparisons import RankingRow
 from imubench_pipeline.model.estimates import BacktestRow
-from imubench_pipeline.report.practical import System, unit_of
+from imubench_pipeline.report.practical import System, choose_unit
 from imubench_pipeline.settings.requirements import DIMENSIONS
 from imubench_pipeline.words.numbers import duration_text, number_text
 
 
-def backtest_lines(
+def format_backtest(
     rows: Sequence[BacktestRow], requirements: Mapping[str, Any], system: System
 ) -> list[Mapping[str, object]]:
     """Return the lines of a recording's back-test, from rows of ``backtest``."""
     lines: list[Mapping[str, object]] = []
     for row in rows:
-        unit = unit_of(DIMENSIONS[row.error], system)
+        unit = choose_unit(DIMENSIONS[row.error], system)
         line: dict[str, object] = {
             "requirement": requirements.get(row.requirement, {}).get("title") or row.requirement,
             "channel": row.channel.replace("_", " "),
@@ -38,7 +38,7 @@ def backtest_lines(
         if row.ratio is not None:
             line["measured"] = f"{unit.text(row.measured, 3)} {unit.sign}"
             line["ratio"] = number_text(row.ratio, 3)
-            line["range"] = range_text(row.ratio_lower, row.ratio_upper)
+            line["range"] = format_range(row.ratio_lower, row.ratio_upper)
             independent = f"({number_text(row.independent, 2)} independent)"
             line["windows"] = f"{number_text(row.windows, 9)} {independent}"
         if row.taken_out and not row.reason:
@@ -47,12 +47,12 @@ def backtest_lines(
     return lines
 
 
-def range_text(lower: float | None, upper: float | None) -> str:
+def format_range(lower: float | None, upper: float | None) -> str:
     """Return the expected range of a ratio."""
     return f"{number_text(lower, 2)} to {number_text(upper, 2)}"
 
 
-def standing_text(row: RankingRow) -> str:
+def describe_backtest(row: RankingRow) -> str:
     """Return the back-test of the deciding error, from a row of ``ranking``; empty without one."""
     if row.backtest_ratio is None:
         return ""
@@ -63,5 +63,5 @@ def standing_text(row: RankingRow) -> str:
         place = ": inside" if lower <= row.backtest_ratio <= upper else ": outside"
     return (
         f"observed / predicted {row.error} of {channel} after {duration_text(row.time)}: "
-        f"{number_text(row.backtest_ratio, 3)} (expected {range_text(lower, upper)}){place}"
+        f"{number_text(row.backtest_ratio, 3)} (expected {format_range(lower, upper)}){place}"
     )

@@ -8,8 +8,8 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from imubench_pipeline.report.folder import files_of_report, is_report
-from imubench_pipeline.settings.extras import extra
+from imubench_pipeline.report.folder import is_report, list_report_files
+from imubench_pipeline.settings.extras import require_extra
 from imubench_pipeline.tables.outputs import OutputFolder, add_output
 
 if TYPE_CHECKING:
@@ -37,13 +37,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Write the report; return the exit status: 2 where there are no results."""
     # Imported here, because templates and figures take half a second to load.
-    with extra("workflow", "write the report"):
-        from imubench_pipeline.report.publish import published
+    with require_extra("workflow", "write the report"):
+        from imubench_pipeline.report.publish import load_site
     from imubench_pipeline.tables.findings import RecordingError
-    from imubench_pipeline.tables.seals import lost_inputs
+    from imubench_pipeline.tables.seals import list_missing_inputs
 
     try:
-        site = published(arguments.results)
+        site = load_site(arguments.results)
     except FileNotFoundError as error:
         print(
             f"{arguments.results}: found no {Path(error.filename).name}; expected the results of a "
@@ -54,7 +54,7 @@ def run(arguments: argparse.Namespace) -> int:
     except ValueError as error:
         print(error, file=sys.stderr)
         return 2
-    if lost := lost_inputs(arguments.results, "report"):
+    if lost := list_missing_inputs(arguments.results, "report"):
         print(
             f"{arguments.results / lost[0]}: is no longer there; run snakemake -c2 again, as for "
             "these results, and it is made anew",
@@ -73,12 +73,12 @@ def run(arguments: argparse.Namespace) -> int:
 
 def _write(site: Site, arguments: argparse.Namespace) -> None:
     """Write the pages of a site to the selected place."""
-    from imubench_pipeline.report.publish import one_file, publish, remove_old_pages
+    from imubench_pipeline.report.publish import publish, remove_old_pages, render_one_file
     from imubench_pipeline.report.static_figures.files import draw_comparison
     from imubench_pipeline.tables.seals import seal_again
 
     if arguments.one_file is not None:
-        page = one_file(site).encode()
+        page = render_one_file(site).encode()
         arguments.one_file.write(page)
         print(f"{arguments.one_file}: {len(page) / 1e6:.1f} MB")
         return
@@ -87,7 +87,7 @@ def _write(site: Site, arguments: argparse.Namespace) -> None:
     if output is None:
         folder = arguments.results / "report"
         written = publish(site, folder, say)
-        seal_again(arguments.results, "report", files_of_report(folder))
+        seal_again(arguments.results, "report", list_report_files(folder))
     else:
         folder = output.path
         with output.filling() as made:

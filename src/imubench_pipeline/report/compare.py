@@ -13,14 +13,14 @@ import numpy as np
 
 from imubench_pipeline.estimators.estimate import COMPARED
 from imubench_pipeline.report.comparison import Comparison
-from imubench_pipeline.report.glossary import term
-from imubench_pipeline.report.payload import Arrays, Json, looks
-from imubench_pipeline.report.practical import temperature_text, unit_of, units_by_size
+from imubench_pipeline.report.glossary import find_term
+from imubench_pipeline.report.payload import Arrays, Json, pack_styles
+from imubench_pipeline.report.practical import choose_unit, format_temperature, list_units_by_size
 from imubench_pipeline.report.site import Entry, Site
 from imubench_pipeline.report.view import RecordingView
 from imubench_pipeline.settings.requirements import DIMENSIONS, Requirement
 from imubench_pipeline.tables import read
-from imubench_pipeline.units import quantity_to_si
+from imubench_pipeline.units import parse_quantity
 from imubench_pipeline.words.numbers import duration_text, number_text
 
 KEPT = ("error_growth", "drawn_deviations")
@@ -55,20 +55,20 @@ def _make_context(site: Site) -> Mapping[str, object]:
     errors = {}
     for error in _COMPARED_ERRORS:
         # The unit of an axis, and the units of numbers: smallest size in SI, sign, factor.
-        axis = unit_of(DIMENSIONS[error], site.system)
-        sized = units_by_size(DIMENSIONS[error], site.system)
+        axis = choose_unit(DIMENSIONS[error], site.system)
+        sized = list_units_by_size(DIMENSIONS[error], site.system)
         units = [[least, unit.sign, unit.per_si] for least, unit in sized]
         errors[error] = {"axis": [axis.sign, axis.per_si], "sized": units}
     return {
         "several": len(views) > 1,
         "page": {
             "grouped": "sensor",
-            "looks": looks({view.sensor: site.looks[view.sensor] for view in views}),
+            "looks": pack_styles({view.sensor: site.looks[view.sensor] for view in views}),
             "names": site.names,
             "compared": COMPARED,
             "recordings": recordings,
             "errors": errors,
-            "window": quantity_to_si(window, "time"),
+            "window": parse_quantity(window, "time"),
             "limits": [  # as 1 sigma
                 {
                     "requirement": name,
@@ -117,9 +117,9 @@ def _describe_recording(view: RecordingView) -> Json:
         "duration": duration_text(row.duration),
         "rate": number_text(row.rate),
         "started": row.started,
-        "temperature": temperature_text(row) or None,
+        "temperature": format_temperature(row) or None,
         "decides": row.decides is not False,
-        "doubts": [term(name).name for name in findings],
+        "doubts": [find_term(name).name for name in findings],
     }
 
 

@@ -7,13 +7,13 @@ from dataclasses import dataclass
 from itertools import chain
 
 from imubench_pipeline.estimators.estimate import SHOWN
-from imubench_pipeline.report.parameters import cell, model_words, shown_symbols
+from imubench_pipeline.report.parameters import describe_model, make_parameter_cell, select_symbols
 from imubench_pipeline.report.payload import (
     Arrays,
     ComparedChannel,
     Json,
-    compared,
-    datasheet_lines,
+    pack_compared_channel,
+    pack_datasheet_lines,
 )
 from imubench_pipeline.report.practical import System
 from imubench_pipeline.report.view import QUANTITY_NAMES, RecordingView
@@ -31,12 +31,12 @@ class ComparedRecording:
     lines: Mapping[str, list[Json]]  # of the tables of parameters, by quantity
 
 
-def compared_recording(view: RecordingView, system: System) -> ComparedRecording:
+def gather_recording(view: RecordingView, system: System) -> ComparedRecording:
     """Gather the compared data of a recording; ``system`` has the units of its numbers."""
     channels = view.channels()
     lines: dict[str, list[Json]] = {name: [] for name in QUANTITY_NAMES}
     for channel in channels:
-        shown = shown_symbols(chain(*channel.parameters.values()))
+        shown = select_symbols(chain(*channel.parameters.values()))
         methods = {channel.recommended: "recommended"}
         if _PAPERS_METHOD in channel.parameters:
             methods.setdefault(_PAPERS_METHOD, "papers' model")
@@ -47,16 +47,18 @@ def compared_recording(view: RecordingView, system: System) -> ComparedRecording
                 "channel": channel.channel,
                 "warnings": channel.warnings,
                 "asked": asked,
-                "model": model_words(channel, method),
+                "model": describe_model(channel, method),
                 "cells": {
-                    symbol: cell(channel, method, symbol, view.row.duration, system)
+                    symbol: make_parameter_cell(channel, method, symbol, view.row.duration, system)
                     for symbol in shown
                 },
             }
             for method, asked in methods.items()
         ]
-    datasheet = {channel.channel: datasheet_lines(channel) for channel in channels}
-    return ComparedRecording(view, [compared(channel) for channel in channels], datasheet, lines)
+    datasheet = {channel.channel: pack_datasheet_lines(channel) for channel in channels}
+    return ComparedRecording(
+        view, [pack_compared_channel(channel) for channel in channels], datasheet, lines
+    )
 
 
 class Comparison:

@@ -8,7 +8,7 @@ from statistics import median
 
 from imubench_pipeline.model.comparisons import CoverageRow, DatasheetRow, RepeatabilityRow
 from imubench_pipeline.report.payload import Json
-from imubench_pipeline.report.practical import System, page_unit, printed_text
+from imubench_pipeline.report.practical import System, choose_page_unit, format_printed
 from imubench_pipeline.report.view import ChannelView, RecordingView
 from imubench_pipeline.settings.sensor import quantity_of
 from imubench_pipeline.words.numbers import NO_VALUE, Unit
@@ -34,7 +34,7 @@ _COVERAGE_TITLES = {
 _COVERAGE_SIGNS = {"yes": "yes", "no": "no", "other convention": "other", "not looked up": "?"}
 
 
-def delta_rows(
+def compare_with_datasheet(
     view: ChannelView, coverage: Mapping[tuple[str, str, str], str], system: System
 ) -> Iterator[Json]:
     """Yield each figure of the datasheet with all its readings, the measured value and a verdict.
@@ -46,13 +46,13 @@ def delta_rows(
         first = rows[0]
         published = first.printed is not None
         figure = "B" if first.quantity == "bias_instability" else first.quantity
-        verdict, why = one_verdict(rows)
-        unit = page_unit(view.quantity, _UNIT_SYMBOLS.get(first.quantity, "B"), system)
+        verdict, why = merge_verdicts(rows)
+        unit = choose_page_unit(view.quantity, _UNIT_SYMBOLS.get(first.quantity, "B"), system)
         yield {
             "quantity": _name_figure(first),
             "published": published,
             "coverage": coverage.get((view.sensor, view.quantity, figure), "not looked up"),
-            "printed": printed_text(first),
+            "printed": format_printed(first),
             "about": ", ".join(filter(None, (first.kind, first.condition))),
             "readings": [
                 {
@@ -83,7 +83,7 @@ def _group_by_figure(rows: Iterable[DatasheetRow]) -> dict[_Figure, list[Datashe
     return figures
 
 
-def one_verdict(readings: Sequence[DatasheetRow]) -> tuple[str, str]:
+def merge_verdicts(readings: Sequence[DatasheetRow]) -> tuple[str, str]:
     """Return the verdict on a printed figure from the rows of its readings, and its reason.
 
     A bias instability is judged by the minimum of the curve, as vendors print it. A density of
@@ -102,7 +102,9 @@ DEPENDS = "depends on sidedness"
 """The verdict where the readings of a density differ."""
 
 
-def deltas_of_sensors(views: Sequence[RecordingView], system: System) -> Iterator[Json]:
+def compare_sensors_with_datasheets(
+    views: Sequence[RecordingView], system: System
+) -> Iterator[Json]:
     """Yield each printed figure of a channel against all recordings of the sensor."""
     groups: dict[tuple[str, bool, _Figure], list[list[DatasheetRow]]] = {}
     for view in views:
@@ -116,8 +118,10 @@ def deltas_of_sensors(views: Sequence[RecordingView], system: System) -> Iterato
             groups.setdefault((view.sensor, view.simulated, figure), []).append(rows)
     for (sensor, simulated, (channel, *_)), group in groups.items():
         first = group[0][0]
-        unit = page_unit(quantity_of(channel), _UNIT_SYMBOLS.get(first.quantity, "B"), system)
-        verdicts = Counter(one_verdict(rows)[0] for rows in group)
+        unit = choose_page_unit(
+            quantity_of(channel), _UNIT_SYMBOLS.get(first.quantity, "B"), system
+        )
+        verdicts = Counter(merge_verdicts(rows)[0] for rows in group)
         by_reading: dict[str, list[DatasheetRow]] = {}
         for row in (row for rows in group for row in rows):
             by_reading.setdefault(_name_reading(row), []).append(row)
@@ -139,7 +143,7 @@ def deltas_of_sensors(views: Sequence[RecordingView], system: System) -> Iterato
             "simulated": simulated,
             "channel": channel,
             "quantity": _name_figure(first),
-            "printed": printed_text(first),
+            "printed": format_printed(first),
             "about": first.kind or "",
             "unit": unit.sign,
             "readings": readings,
@@ -156,7 +160,7 @@ def _list_deltas(rows: Iterable[DatasheetRow]) -> list[float]:
     return sorted(row.delta for row in rows if row.delta is not None)
 
 
-def repeatability_lines(
+def format_repeatability(
     rows: Sequence[RepeatabilityRow], sensor: str, system: System
 ) -> Iterator[Json]:
     """Yield the scatter of the fixed biases of each device of a sensor, and the printed figure.
@@ -166,12 +170,12 @@ def repeatability_lines(
     for row in rows:
         if row.sensor != sensor:
             continue
-        unit = page_unit(quantity_of(row.channel), "adev", system)
+        unit = choose_page_unit(quantity_of(row.channel), "adev", system)
         yield {
             "device": row.device,
             "channel": row.channel.replace("_", " "),
             "recordings": row.recordings,
-            "printed": printed_text(row),
+            "printed": format_printed(row),
             "about": ", ".join(filter(None, (row.kind, row.condition))),
             "comparable": unit.text(row.comparable),
             "measured": _format_measured(row, unit),
@@ -197,9 +201,9 @@ def _format_range(ends: Sequence[str]) -> str:
     return ends[0] if ends[0] == ends[1] else f"{ends[0]} to {ends[1]}"
 
 
-def curve_distances(view: ChannelView, system: System) -> Iterator[str]:
+def format_curve_distances(view: ChannelView, system: System) -> Iterator[str]:
     """Yield the distance between the curve and the lines of the datasheet, as text."""
-    unit = page_unit(view.quantity, "adev", system)
+    unit = choose_page_unit(view.quantity, "adev", system)
     for row in view.datasheet_curve:
         reading = f", density read as {row.sidedness}" if row.sidedness else ""
         away = row.rms_log10
@@ -228,7 +232,7 @@ def _format_difference(row: DatasheetRow) -> list[str]:
     return [_format_percent(row.delta), f"{_format_percent(lower)} to {_format_percent(upper)}"]
 
 
-def coverage_tables(rows: Sequence[CoverageRow]) -> Iterator[Json]:
+def make_coverage_tables(rows: Sequence[CoverageRow]) -> Iterator[Json]:
     """Yield a table per quantity with a line per sensor and a column per figure."""
     for quantity, title in _COVERAGE_TITLES.items():
         own = [row for row in rows if row.quantity == quantity]

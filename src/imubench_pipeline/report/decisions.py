@@ -14,7 +14,12 @@ from typing import get_args
 from imubench_pipeline.model.comparisons import RankingRow
 from imubench_pipeline.model.states import Verdict
 from imubench_pipeline.report.site import Site
-from imubench_pipeline.report.sourced import SourcedNumber, margin, margin_limits, of_row
+from imubench_pipeline.report.sourced import (
+    SourcedNumber,
+    compute_margin_limits,
+    format_margin,
+    source_number,
+)
 from imubench_pipeline.report.view import RecordingView
 from imubench_pipeline.settings.requirements import Requirement
 from imubench_pipeline.words.numbers import counted, duration_text, number_text
@@ -117,7 +122,7 @@ class Matrix:
     legend: Sequence[tuple[Verdict, str, str]]  # verdict, its word and meaning
 
 
-def matrix(site: Site) -> Matrix | None:
+def make_decision_matrix(site: Site) -> Matrix | None:
     """Return the matrix of a report; None where nothing is asked of its sensors."""
     requirements = site.settings["requirements"]
     rows = {(row.requirement, row.sensor): row for row in site.rows(RankingRow) if row.decides}
@@ -126,7 +131,7 @@ def matrix(site: Site) -> Matrix | None:
     drawn: list[float | None] = []
     for deciding in rows.values():
         drawn += [deciding.logged_margin, deciding.corrected_margin, deciding.margin]
-        drawn += margin_limits(deciding) if deciding.margin is not None else ()
+        drawn += compute_margin_limits(deciding) if deciding.margin is not None else ()
     scale = Scale.of(value for value in drawn if value is not None)
     # A sensor that cannot be bought is not compared with others.
     apart = {sensor: "not sold" for sensor in site.sensors if not site.is_sold(sensor)}
@@ -167,7 +172,7 @@ def matrix(site: Site) -> Matrix | None:
     )
 
 
-def unranked(own: Iterable[RecordingView]) -> str:
+def explain_missing_rank(own: Iterable[RecordingView]) -> str:
     """Return why a sensor is in no ranking, from its recordings."""
     at_rest = [view for view in own if view.static]
     if not at_rest:
@@ -177,14 +182,14 @@ def unranked(own: Iterable[RecordingView]) -> str:
 
 def _empty(site: Site, requirement: str, sensor: str) -> Cell:
     """Return the cell of a sensor that is in no ranking."""
-    reason = unranked(view for view in site.views if view.sensor == sensor)
+    reason = explain_missing_rank(view for view in site.views if view.sensor == sensor)
     verdict: Verdict = "not_enough_data"
     return Cell(requirement, sensor, verdict, 0, None, None, "", "", reason, (), -math.inf)
 
 
 def _cell(row: RankingRow, scale: Scale) -> Cell:
     judged = row.margin is not None and row.verdict != "excluded"
-    low, high = margin_limits(row) if judged else (None, None)
+    low, high = compute_margin_limits(row) if judged else (None, None)
     bar, order = None, -math.inf
     if row.margin is not None and low is not None and high is not None:
         bar = (scale.place(row.margin), scale.place(low), scale.place(high))
@@ -202,7 +207,7 @@ def _cell(row: RankingRow, scale: Scale) -> Cell:
         reason = row.reason or "too little is known"
     # Margins with the recordings that are not used, and with corrected units.
     alternatives = [
-        (words, of_row(row, name, number_text(size, 2)), scale.place(size))
+        (words, source_number(row, name, number_text(size, 2)), scale.place(size))
         for words, name, size in (
             ("as logged", "logged_margin", row.logged_margin),
             ("if corrected", "corrected_margin", row.corrected_margin),
@@ -214,7 +219,7 @@ def _cell(row: RankingRow, scale: Scale) -> Cell:
         row.sensor,
         row.verdict,
         len(row.conditions) if judged else 0,
-        margin(row) if judged else None,
+        format_margin(row) if judged else None,
         bar,
         evidence_text(row) if judged else "",
         used_doubts_text(row),
@@ -224,7 +229,7 @@ def _cell(row: RankingRow, scale: Scale) -> Cell:
     )
 
 
-def strip(site: Site) -> list[dict[str, object]]:
+def summarise_counts(site: Site) -> list[dict[str, object]]:
     """Return the content of the report in numbers: each with its words and its link."""
     views = site.views
     rejected = sum(view.rejected for view in views)

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 
 from imubench_pipeline.model.comparisons import ErrorBudgetRow, RankingRow
-from imubench_pipeline.report.decisions import unranked
-from imubench_pipeline.report.meaning import error_of_recording, limit_words, rankings
-from imubench_pipeline.report.practical import temperature_text
+from imubench_pipeline.report.decisions import explain_missing_rank
+from imubench_pipeline.report.meaning import describe_limit, format_rankings, format_recording_error
+from imubench_pipeline.report.practical import format_temperature
 from imubench_pipeline.report.site import Site
-from imubench_pipeline.report.sourced import of_row
+from imubench_pipeline.report.sourced import source_number
 from imubench_pipeline.report.view import RecordingView
 from imubench_pipeline.words.numbers import counted, number_text
 from imubench_pipeline.words.requirements import requirement_text
@@ -23,7 +23,7 @@ from imubench_pipeline.words.verdicts import (
 )
 
 
-def evidence(
+def trace_verdicts(
     site: Site, sensor: str, own: Sequence[RecordingView]
 ) -> Iterator[Mapping[str, object]]:
     """Yield each requirement with the verdict on a sensor, its numbers and its recordings.
@@ -39,11 +39,11 @@ def evidence(
     ]
     simulated = {view.full_name: view.simulated for view in own}
     requirements = site.settings["requirements"] if rows else {}
-    for ranking in rankings(own_rows, requirements, simulated, site.system):
+    for ranking in format_rankings(own_rows, requirements, simulated, site.system):
         name, requirement = ranking.name, ranking.requirement
         about = {"name": name, "title": requirement.title, "asked": requirement_text(requirement)}
         if not ranking.groups:
-            word, why = SHORT_VERDICTS["not_enough_data"], unranked(own)
+            word, why = SHORT_VERDICTS["not_enough_data"], explain_missing_rank(own)
             yield {**about, "row": None, "verdict": "not_enough_data", "word": word, "why": why}
             continue
         (group,) = ranking.groups
@@ -75,14 +75,14 @@ def evidence(
                 (
                     words,
                     verdict_text(verdict) if verdict else "",
-                    of_row(row, column, number_text(size, 3)),
+                    source_number(row, column, number_text(size, 3)),
                 )
                 for words, column, size, verdict in alternatives
                 if size is not None
             ],
             "window": window,
             "limits": [
-                limit_words(each)
+                describe_limit(each)
                 for each in own_rows
                 if each.requirement == name and each.trajectory is None
             ],
@@ -90,9 +90,9 @@ def evidence(
                 {
                     "view": view,
                     "axes": counted(len(view.recommended()), "axis", "axes"),
-                    "temperature": temperature_text(view.row),
+                    "temperature": format_temperature(view.row),
                     "errors": [
-                        error_of_recording(total, site.system)
+                        format_recording_error(total, site.system)
                         for total in of_view
                         if total.requirement == name
                     ],

@@ -14,12 +14,12 @@ KEYS = "pages.json"
 _FAILED_PAGES_FILE = "failed_pages.json"
 
 
-def failed_pages(folder: Path) -> dict[str, str]:
+def read_failed_pages(folder: Path) -> dict[str, str]:
     """Return the pages of a report that could not be made, and why."""
     return _read_failed(folder)[1]
 
 
-def attempt_at_pages(folder: Path) -> int:
+def count_attempt(folder: Path) -> int:
     """Return the number of the next attempt at pages that could not be made; 0: there are none."""
     attempt, failed = _read_failed(folder)
     return attempt + bool(failed)
@@ -28,7 +28,7 @@ def attempt_at_pages(folder: Path) -> int:
 def write_failed_pages(failed: Mapping[str, str], folder: Path) -> None:
     """Write which pages could not be made, and why."""
     if failed:
-        content = {"attempt": attempt_at_pages(folder), "pages": dict(failed)}
+        content = {"attempt": count_attempt(folder), "pages": dict(failed)}
         write_content(json.dumps(content, indent=1) + "\n", folder / _FAILED_PAGES_FILE)
     else:
         (folder / _FAILED_PAGES_FILE).unlink(missing_ok=True)
@@ -47,13 +47,13 @@ def is_report(folder: Path) -> bool:
     return all((folder / name).is_file() for name in (KEYS, "index.html", "assets/report.js"))
 
 
-def files_of_report(folder: Path) -> list[Path]:
+def list_report_files(folder: Path) -> list[Path]:
     """Return the files and folders of the report, without its figures, which another step draws."""
     names = sorted(path.name for path in folder.iterdir() if not path.name.startswith("."))
     return [folder / name for name in names if name != "figures"]
 
 
-def drop_zone_of(results: Path) -> Path | None:
+def find_drop_zone(results: Path) -> Path | None:
     """Return the drop zone of the last run by the settings in its report; None if not known.
 
     Relative paths count from the folder of the run, if ``results`` has its name of that time.

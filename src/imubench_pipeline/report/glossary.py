@@ -54,7 +54,7 @@ class _Glossary(dict[str, Term]):
 
 
 @lru_cache(maxsize=1)
-def glossary() -> dict[str, Term]:
+def read_glossary() -> dict[str, Term]:
     """Return all terms by their keys, in the order of the file; read once, not to be changed.
 
     An unknown key raises an UnknownTermError with similar terms.
@@ -74,7 +74,7 @@ def glossary() -> dict[str, Term]:
     return terms
 
 
-def term(value: str, kind: str = "") -> Term:
+def find_term(value: str, kind: str = "") -> Term:
     """Return the term of a value of a table, such as ``not comparable (condition)``.
 
     ``kind`` begins the key of values that are ambiguous alone: ``verdict``, ``published``, ``kind``
@@ -85,4 +85,4 @@ def term(value: str, kind: str = "") -> Term:
     UnknownTermError
         If the glossary does not have it.
     """
-    return glossary()["_".join(re.findall(r"\w+", f"{kind} {value}"))]
+    return read_glossary()["_".join(re.findall(r"\w+", f"{kind} {value}"))]

@@ -17,15 +17,15 @@ from jinja2.runtime import Context
 from markupsafe import Markup, escape
 
 from imubench_pipeline.registry import files_of
-from imubench_pipeline.report.glossary import term
-from imubench_pipeline.report.practical import System, page_unit
+from imubench_pipeline.report.glossary import find_term
+from imubench_pipeline.report.practical import System, choose_page_unit
 from imubench_pipeline.words.estimates import status_text, symbol_text
 from imubench_pipeline.words.numbers import NO_VALUE, Unit, duration_text, number_text, started_text
 from imubench_pipeline.words.verdicts import doubts_text
 
 
 @cache  # compiling the templates takes longer than writing pages of a small report
-def environment(system: System) -> jinja2.Environment:
+def make_templates(system: System) -> jinja2.Environment:
     """Return the templates, with the units in which the pages open."""
     templates = jinja2.Environment(
         loader=jinja2.FileSystemLoader(
@@ -77,7 +77,7 @@ def environment(system: System) -> jinja2.Environment:
         return Markup('<span data-sign="{}">{}</span>').format(unit, _find_unit(unit, system).sign)
 
     templates.globals |= {
-        "action": lambda key: term(key).action or "",  # of a finding
+        "action": lambda key: find_term(key).action or "",  # of a finding
         "si": si,
         "sign": sign,
         "parameter_cell": parameter_cell,
@@ -86,7 +86,7 @@ def environment(system: System) -> jinja2.Environment:
         "to": _link_to,
     }
     templates.filters |= {"duration": duration_text, "number": number_text, "json": _make_json}
-    templates.filters |= {"started": started_text, "symbol_text": symbol_text, "packed": packed}
+    templates.filters |= {"started": started_text, "symbol_text": symbol_text, "packed": pack_text}
     templates.filters |= {"attribute": _make_compact_json, "doubts": doubts_text}
     templates.filters["status_text"] = status_text
     templates.tests["hidden_row"] = lambda row: row.partition(">")[0].endswith(" hidden")
@@ -96,7 +96,7 @@ def environment(system: System) -> jinja2.Environment:
 @cache
 def _find_unit(reference: str, system: System) -> Unit:
     quantity, symbol = reference.split(".")
-    return page_unit(quantity, symbol, system)
+    return choose_page_unit(quantity, symbol, system)
 
 
 @jinja2.pass_context
@@ -108,7 +108,7 @@ def _link_to(context: Context, path: str) -> str:
 @jinja2.pass_context
 def _link_term(context: Context, key: str, text: str | None = None) -> Markup:
     """Return a term of the glossary, with its explanation and a link to the theory."""
-    entry = term(key)
+    entry = find_term(key)
     return Markup('<a class="term" href="{}theory.html#{}" data-term="{}">{}</a>').format(
         context["root"], entry.section, entry.key, escape(text or entry.name)
     )
@@ -122,7 +122,7 @@ def _explain_term(key: str, text: str | None = None) -> Markup:
     """
     if not key:
         return Markup(NO_VALUE)
-    entry = term(key)
+    entry = find_term(key)
     return Markup('<i data-term="{}">{}</i>').format(entry.key, escape(text or entry.name))
 
 
@@ -131,7 +131,7 @@ def _make_json(value: Any) -> Markup:
     return Markup(_make_compact_json(value).replace("<", "\\u003c"))
 
 
-def packed(text: str) -> Markup:
+def pack_text(text: str) -> Markup:
     """Return a compressed text, which a script unpacks when the page opens."""
     return Markup(base64.b64encode(zlib.compress(text.encode(), 6)).decode())
 

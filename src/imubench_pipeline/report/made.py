@@ -6,8 +6,8 @@ import platform
 from collections.abc import Mapping
 from importlib.metadata import version
 
-from imubench_pipeline.report.plotting import plotting_version
-from imubench_pipeline.report.shell import imubench
+from imubench_pipeline.report.plotting import read_plotting_version
+from imubench_pipeline.report.shell import make_command
 from imubench_pipeline.report.site import Entry, Site
 
 _LIBRARIES = ("numpy", "scipy", "numba", "pyarrow", "matplotlib", "snakemake")
@@ -32,7 +32,7 @@ _COMMANDS: tuple[tuple[str, dict[str, str], str], ...] = (
 def _make_context(site: Site) -> Mapping[str, object]:
     commands = [_RUN_COMMAND]
     for name, options, words in _COMMANDS:
-        commands.append((imubench(name, site.results_name, options), words))
+        commands.append((make_command(name, site.results_name, options), words))
     if site.at_once:
         commands = [(site.at_once, "writes these pages again")]
     return {
@@ -40,7 +40,7 @@ def _make_context(site: Site) -> Mapping[str, object]:
         "versions": {
             "python": platform.python_version(),
             **{name: version(name) for name in ("imubench_pipeline", *_LIBRARIES)},
-            "plotly.js": plotting_version(),
+            "plotly.js": read_plotting_version(),
         },
         "settings": {
             f"{section}.{key}": value

@@ -8,15 +8,15 @@ from dataclasses import dataclass
 from typing import Any
 
 from imubench_pipeline.model.comparisons import ErrorBudgetRow, RankingRow
-from imubench_pipeline.navigation.suitability.conditions import shares_of
-from imubench_pipeline.report.backtest import standing_text
+from imubench_pipeline.navigation.suitability.conditions import compute_variance_shares
+from imubench_pipeline.report.backtest import describe_backtest
 from imubench_pipeline.report.payload import Json
-from imubench_pipeline.report.practical import System, unit_of
+from imubench_pipeline.report.practical import System, choose_unit
 from imubench_pipeline.report.sourced import (
     SourcedInterval,
     SourcedNumber,
-    margin,
-    of_row,
+    format_margin,
+    source_number,
 )
 from imubench_pipeline.settings.requirements import DIMENSIONS, Requirement
 from imubench_pipeline.words.numbers import NO_VALUE, Unit, duration_text, interval_text
@@ -91,7 +91,7 @@ class Ranking:
     groups: Sequence[Group]
 
 
-def rankings(
+def format_rankings(
     rows: Sequence[RankingRow],
     requirements: Mapping[str, Any],
     simulated: Simulated,
@@ -134,12 +134,12 @@ def _order(row: RankingRow) -> tuple[int, int, float]:
 
 
 def _limit(row: RankingRow, system: System) -> LimitLine:
-    size = margin(row)
-    chance = "–" if row.sigma is None else of_row(row, "chance", _percent(row.chance), "%")
-    unit = unit_of(DIMENSIONS[row.error], system, row.limit)
+    size = format_margin(row)
+    chance = "–" if row.sigma is None else source_number(row, "chance", _percent(row.chance), "%")
+    unit = choose_unit(DIMENSIONS[row.error], system, row.limit)
     return LimitLine(
-        limit=limit_words(row),
-        allowed=of_row(row, "limit", f"{unit.text(row.limit, 3)} {unit.sign}", unit.sign),
+        limit=describe_limit(row),
+        allowed=source_number(row, "limit", f"{unit.text(row.limit, 3)} {unit.sign}", unit.sign),
         sigma=_expected(row, system),
         interval=_interval(row, system),
         margin=size[0] if size else NO_VALUE,
@@ -150,7 +150,7 @@ def _limit(row: RankingRow, system: System) -> LimitLine:
         reached=duration_text(row.reached_after),
         decides=row.decides,
         reason=row.reason or "",
-        backtest=standing_text(row),
+        backtest=describe_backtest(row),
     )
 
 
@@ -162,9 +162,9 @@ def _expected(row: ErrorRow, system: System) -> str:
     """Return the error of a row; a dash where it is not known."""
     if row.sigma is None:
         return NO_VALUE
-    unit = unit_of(DIMENSIONS[row.error], system, row.sigma)
+    unit = choose_unit(DIMENSIONS[row.error], system, row.sigma)
     text = _format_error(row, row.sigma, unit)
-    return of_row(row, "sigma", text, unit.sign) if _is_sensible(row, row.sigma) else text
+    return source_number(row, "sigma", text, unit.sign) if _is_sensible(row, row.sigma) else text
 
 
 def _interval(row: ErrorRow, system: System) -> str:
@@ -173,29 +173,29 @@ def _interval(row: ErrorRow, system: System) -> str:
         return NO_VALUE
     if not _is_sensible(row, row.sigma):
         return NO_VALUE
-    unit = unit_of(DIMENSIONS[row.error], system, row.sigma)
+    unit = choose_unit(DIMENSIONS[row.error], system, row.sigma)
     digits = unit.digits(row.sigma, row.lower, row.upper)
     lower, upper = (
-        of_row(row, name, unit.text(value, digits), unit.sign)
+        source_number(row, name, unit.text(value, digits), unit.sign)
         for name, value in (("lower", row.lower), ("upper", row.upper))
     )
     return SourcedInterval(lower, upper)
 
 
-def error_of_recording(total: ErrorBudgetRow, system: System) -> tuple[str, str]:
+def format_recording_error(total: ErrorBudgetRow, system: System) -> tuple[str, str]:
     """Return the error of a recording and its limits, of a total of ``error_budget``."""
     if total.sigma is None:
         return "–", ""
     return _expected(total, system), _interval(total, system)
 
 
-def limit_words(row: RankingRow) -> str:
+def describe_limit(row: RankingRow) -> str:
     """Return the error and the time of a limit, of a row of ``ranking``."""
     drive = f" without GNSS ({row.trajectory})" if row.trajectory else ""
     return f"{_NAMES[row.error]}, {duration_text(row.time)}{drive}"
 
 
-def budget_tables(
+def make_budget_tables(
     rows: Sequence[ErrorBudgetRow], simulated: Simulated, system: System
 ) -> Iterator[Json]:
     """Yield the error budget of each recording: a line an error and axis, a column a time.
@@ -234,7 +234,7 @@ def budget_tables(
         }
 
 
-def budget_bars(rows: Sequence[ErrorBudgetRow], system: System) -> list[Json]:
+def make_budget_bars(rows: Sequence[ErrorBudgetRow], system: System) -> list[Json]:
     """Return a bar for each error and time of the worst axes: the parts of its variance.
 
     Of the rows of the table ``error_budget`` of one recording.
@@ -250,7 +250,7 @@ def budget_bars(rows: Sequence[ErrorBudgetRow], system: System) -> list[Json]:
         sigma = total.sigma if total else None
         if not total or not sigma:
             continue
-        size = _format_error(total, sigma, unit_of(DIMENSIONS[error], system, sigma))
+        size = _format_error(total, sigma, choose_unit(DIMENSIONS[error], system, sigma))
         shares = [
             (row.source, float(f"{(row.sigma / sigma) ** 2:.3g}"))
             for row in parts
@@ -270,14 +270,16 @@ def _cell(rows: Sequence[ErrorBudgetRow], system: System) -> Json:
     total = _total(rows)
     if total is None or total.sigma is None:
         return {"lines": [NO_VALUE], "note": (total and total.reason) or "", "known": False}
-    unit = unit_of(DIMENSIONS[total.error], system, total.sigma)
+    unit = choose_unit(DIMENSIONS[total.error], system, total.sigma)
     lines = [_format_error(total, total.sigma, unit)]
     if _is_sensible(total, total.sigma):
         digits = unit.digits(total.sigma, total.lower, total.upper)
         lines.append(interval_text(total.lower, total.upper, unit, digits))
     sources = [row for row in rows if row.source != "total"]
     if total.sigma > 0.0:
-        lines += [share_text(share) for share in shares_of(total.sigma, sources)] or [""]
+        lines += [share_text(share) for share in compute_variance_shares(total.sigma, sources)] or [
+            ""
+        ]
     return {"lines": lines, "note": total.reason or "", "known": True}
 
 
@@ -299,7 +301,7 @@ def _percent(share: float | None) -> str:
     return NO_VALUE if share is None else f"{100 * share:.0f} %"
 
 
-def budget_words(settings: Mapping[str, Any]) -> str:
+def explain_budget(settings: Mapping[str, Any]) -> str:
     """Return the meaning of a budget, by the section ``error_budget`` of the settings."""
     return (
         "Errors that the noise causes in dead reckoning, with 95 % intervals and the parts of the "

@@ -55,7 +55,7 @@ _METHOD_STYLES = {
 }
 
 
-def sensor_appearances(sensors: list[str]) -> dict[str, Appearance]:
+def assign_sensor_styles(sensors: list[str]) -> dict[str, Appearance]:
     """Return the appearance of each sensor, by its place among all sensors of the run.
 
     Colours repeat after eight sensors; marker and dash then differ.
@@ -68,12 +68,12 @@ def sensor_appearances(sensors: list[str]) -> dict[str, Appearance]:
     return looks
 
 
-def method_appearance(method: str) -> Appearance:
+def get_method_style(method: str) -> Appearance:
     """Return the appearance of an estimation method."""
     return _METHOD_STYLES[method]
 
 
-def recording_styles(sensor_style: Appearance) -> list[Appearance]:
+def make_recording_styles(sensor_style: Appearance) -> list[Appearance]:
     """Return the appearances of the recordings of a sensor, by their place; they repeat.
 
     The first is that of the sensor; the others are shades of its colour towards the ink of the

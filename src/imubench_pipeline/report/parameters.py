@@ -8,16 +8,16 @@ from itertools import chain
 import numpy as np
 
 from imubench_pipeline.estimators.estimate import PARAMETERS, SENSOR, SHOWN
-from imubench_pipeline.estimators.model_choice import MIN_AKAIKE_WEIGHT, information_weights
+from imubench_pipeline.estimators.model_choice import MIN_AKAIKE_WEIGHT, compute_information_weights
 from imubench_pipeline.model.estimates import ParameterRow
 from imubench_pipeline.report.payload import Json
-from imubench_pipeline.report.practical import System, page_unit
+from imubench_pipeline.report.practical import System, choose_page_unit
 from imubench_pipeline.report.view import ChannelView
 from imubench_pipeline.words.estimates import estimate_text, model_text
 from imubench_pipeline.words.numbers import Unit, counted, limit_digits
 
 
-def shown_symbols(rows: Iterable[ParameterRow]) -> list[str]:
+def select_symbols(rows: Iterable[ParameterRow]) -> list[str]:
     """Return the parameters of the papers' model, and others that were estimated.
 
     N_sensor is listed with the low-pass.
@@ -26,17 +26,17 @@ def shown_symbols(rows: Iterable[ParameterRow]) -> list[str]:
     return [s for s in SHOWN if s in PARAMETERS or (s in estimated and s != SENSOR)]
 
 
-def methods_table(
+def make_methods_table(
     channel: ChannelView, duration: float | None, system: System
 ) -> tuple[list[str], list[Json]]:
     """Return the symbols, and one line per method; of a simulation also the true parameters."""
-    symbols = shown_symbols(chain(*channel.parameters.values()))
+    symbols = select_symbols(chain(*channel.parameters.values()))
     lines: list[Json] = [
         {
             "method": method,
             "recommended": method == channel.recommended,
-            "model": model_words(channel, method),
-            "cells": [cell(channel, method, s, duration, system) for s in symbols],
+            "model": describe_model(channel, method),
+            "cells": [make_parameter_cell(channel, method, s, duration, system) for s in symbols],
         }
         for method in channel.parameters
     ]
@@ -50,7 +50,7 @@ def methods_table(
     return symbols, lines
 
 
-def model_words(channel: ChannelView, method: str) -> str:
+def describe_model(channel: ChannelView, method: str) -> str:
     """Return the model of a method, and how many other models its intervals include.
 
     The intervals of the likelihood include all models that fit nearly as well as the best; those of
@@ -59,7 +59,7 @@ def model_words(channel: ChannelView, method: str) -> str:
     text = model_text(channel.parameters[method][0].model)
     if method != "likelihood" or not channel.models:
         return text
-    shares = information_weights(np.array([row.aic for row in channel.models]))
+    shares = compute_information_weights(np.array([row.aic for row in channel.models]))
     others = sum(
         share >= MIN_AKAIKE_WEIGHT and not row.chosen and "R" not in row.model.split("+")
         for share, row in zip(shares, channel.models, strict=True)
@@ -69,11 +69,11 @@ def model_words(channel: ChannelView, method: str) -> str:
     return f"{text} ({counted(others, 'other model fits', 'other models fit')} as well)"
 
 
-def cell(
+def make_parameter_cell(
     channel: ChannelView, method: str, symbol: str, duration: float | None, system: System
 ) -> Json:
     """Return a cell with a part for each component: its value, interval and status."""
-    unit = page_unit(channel.quantity, symbol, system)
+    unit = choose_page_unit(channel.quantity, symbol, system)
     rows = channel.named(method, symbol)
     parts = [
         _part(
@@ -84,7 +84,7 @@ def cell(
         )
         for row in rows
     ]
-    digits = max((digits_of(unit, row.value, row.lower, row.upper) for row in rows), default=3)
+    digits = max((count_digits(unit, row.value, row.lower, row.upper) for row in rows), default=3)
     words = [sentence for row in rows if (sentence := estimate_text(row, unit, duration))]
     return _cell(parts, " ".join(words), digits)
 
@@ -98,7 +98,7 @@ def _cell(parts: Sequence[Json], words: str, digits: int) -> Json:
     return {"parts": parts, "words": words, "value": value, "digits": digits}
 
 
-def digits_of(unit: Unit, value: float | None, lower: float | None, upper: float | None) -> int:
+def count_digits(unit: Unit, value: float | None, lower: float | None, upper: float | None) -> int:
     """Return the digits of a parameter and its limits in a unit.
 
     The interval determines them; the two limits must differ as printed.

@@ -14,8 +14,8 @@ from imubench_pipeline.estimators.estimate import COMPARED
 from imubench_pipeline.model.estimates import EnvelopeRow, HistogramRow, ModelSampleRow
 from imubench_pipeline.model.table import ChannelRow
 from imubench_pipeline.noise import NoiseModel, Term
-from imubench_pipeline.report.palette import Appearance, method_appearance
-from imubench_pipeline.report.practical import printed_text
+from imubench_pipeline.report.palette import Appearance, get_method_style
+from imubench_pipeline.report.practical import format_printed
 from imubench_pipeline.report.view import METHOD_NAMES, ChannelView
 
 Json = dict[str, Any]
@@ -35,7 +35,7 @@ Packed = tuple[str, float, float, bytes]
 """An array quantised to the visible resolution: kind, begin, step and codes."""
 
 
-def packed_log(values: ArrayLike) -> Packed:
+def pack_logarithms(values: ArrayLike) -> Packed:
     """Return positive numbers, shape (n,), packed with a relative error of a few 1e-4."""
     numbers = np.asarray(values, dtype=np.float64)
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -72,7 +72,7 @@ class Arrays:
 
     def log(self, values: ArrayLike) -> int:
         """Return the place of an array of positive numbers with a relative error of a few 1e-4."""
-        return self.place(packed_log(values))
+        return self.place(pack_logarithms(values))
 
     def even(self, values: ArrayLike) -> int:
         """Return the place of an array that is drawn on an even axis, in 254 steps."""
@@ -92,12 +92,12 @@ class Arrays:
         ]
 
 
-def looks(sensors: Mapping[str, Appearance]) -> Json:
+def pack_styles(sensors: Mapping[str, Appearance]) -> Json:
     """Return the appearance of sensors and methods."""
     return {
         "sensors": {name: asdict(look) for name, look in sensors.items()},
         "methods": {
-            name: asdict(method_appearance(name)) | {"name": text}
+            name: asdict(get_method_style(name)) | {"name": text}
             for name, text in METHOD_NAMES.items()
         },
     }
@@ -123,7 +123,7 @@ class ComparedChannel:
         }
 
 
-def compared(view: ChannelView) -> ComparedChannel:
+def pack_compared_channel(view: ChannelView) -> ComparedChannel:
     """Return the data of a channel in a comparison: curve, models, parameters."""
     parameters: dict[str, dict[str, list[list[object]]]] = {}
     for method in (view.recommended, "likelihood_gm"):
@@ -139,12 +139,12 @@ def compared(view: ChannelView) -> ComparedChannel:
         model, tau = view.model(method), view.tau
         if not model.sinusoids:  # it is smooth
             tau = np.geomspace(tau[0], tau[-1], _COMPARED_MODEL_POINTS)
-        models[method] = packed_log(tau), packed_log(_compute_curve(model, tau))
+        models[method] = pack_logarithms(tau), pack_logarithms(_compute_curve(model, tau))
     about = ("sensor", "recording", "channel", "simulated", "recommended")
     curve = ("tau", "adev", "lower", "upper")
     return ComparedChannel(
         {name: getattr(view, name) for name in about} | {"parameters": parameters},
-        {name: packed_log(getattr(view, name)) for name in curve},
+        {name: pack_logarithms(getattr(view, name)) for name in curve},
         models,
     )
 
@@ -153,7 +153,7 @@ def _round(value: float | None) -> float | None:
     return None if value is None else float(f"{value:.7g}")
 
 
-def channel_payload(view: ChannelView, arrays: Arrays) -> Json:
+def pack_channel(view: ChannelView, arrays: Arrays) -> Json:
     """Return the data of all figures of a channel, except samples."""
     model = view.model(view.recommended)
     band = ("lower", "upper", "reconstructed")
@@ -184,7 +184,7 @@ def channel_payload(view: ChannelView, arrays: Arrays) -> Json:
             for name, term in terms
         ],
         "compensated": {name: arrays.log(values) for name, values in view.compensated.items()},
-        "datasheet": datasheet_lines(view),
+        "datasheet": pack_datasheet_lines(view),
         "spectrum": _pack_spectrum(view, model, arrays) if view.spectrum else None,
     }
 
@@ -202,7 +202,7 @@ def _name_terms(model: NoiseModel) -> list[tuple[str, Term]]:
     ]
 
 
-def datasheet_lines(view: ChannelView) -> list[Json]:
+def pack_datasheet_lines(view: ChannelView) -> list[Json]:
     """Return the lines of the datasheet that can be drawn beside the curve of a channel.
 
     Each is the power ``slope`` of tau, with the value at 1 s.
@@ -214,7 +214,7 @@ def datasheet_lines(view: ChannelView) -> list[Json]:
             continue
         name, slope = names[row.statistic]
         reading = f"read as {row.sidedness}" if row.sidedness else ""
-        label = f"{name} {printed_text(row)} ({', '.join(filter(None, (row.kind, reading)))})"
+        label = f"{name} {format_printed(row)} ({', '.join(filter(None, (row.kind, reading)))})"
         lines.append({"slope": slope, "value": row.comparable, "label": label})
     return lines
 
@@ -245,7 +245,7 @@ def _pack_spectrum(view: ChannelView, model: NoiseModel, arrays: Arrays) -> Json
     }
 
 
-def samples_payload(
+def pack_samples(
     envelope: Sequence[EnvelopeRow], histogram: Sequence[HistogramRow], arrays: Arrays
 ) -> Json:
     """Return the envelope of the samples of a recording and their histogram, by channel."""
@@ -271,7 +271,7 @@ MODEL_SAMPLE_NAMES = {
 }
 
 
-def model_samples_payload(rows: Sequence[ModelSampleRow], arrays: Arrays) -> Json:
+def pack_model_samples(rows: Sequence[ModelSampleRow], arrays: Arrays) -> Json:
     """Return the samples of a log and of logs simulated from its models, by channel."""
     drawn: Json = {}
     for channel, of_channel in _group_by_channel(rows).items():
@@ -284,7 +284,7 @@ def model_samples_payload(rows: Sequence[ModelSampleRow], arrays: Arrays) -> Jso
                     "name": name,
                     "end": envelope[-1].end,
                     **_pack_envelope(envelope, arrays),
-                    "stretch": arrays.even(numbers(row.mean for row in stretch)),
+                    "stretch": arrays.even(fill_missing(row.mean for row in stretch)),
                     "stretch_end": stretch[-1].end,
                 }
     return drawn
@@ -292,9 +292,9 @@ def model_samples_payload(rows: Sequence[ModelSampleRow], arrays: Arrays) -> Jso
 
 def _pack_envelope(rows: Sequence[EnvelopeRow | ModelSampleRow], arrays: Arrays) -> dict[str, int]:
     return {
-        "low": arrays.even(numbers(row.low for row in rows)),
-        "high": arrays.even(numbers(row.high for row in rows)),
-        "mean": arrays.even(numbers(row.mean for row in rows)),
+        "low": arrays.even(fill_missing(row.low for row in rows)),
+        "high": arrays.even(fill_missing(row.high for row in rows)),
+        "mean": arrays.even(fill_missing(row.mean for row in rows)),
     }
 
 
@@ -308,6 +308,6 @@ def _group_by_channel(rows: Sequence[_OfChannel]) -> dict[str, list[_OfChannel]]
     return channels
 
 
-def numbers(values: Iterable[float | None]) -> list[float]:
+def fill_missing(values: Iterable[float | None]) -> list[float]:
     """Return the values of a column; NaN where there is none."""
     return [np.nan if value is None else value for value in values]

@@ -1,7 +1,7 @@
 """The units in which engineers state inertial errors, and numbers as they are printed.
 
-A page can show each quantity in several units (`units_of_pages`). The first choice is the practical
-one, the last is SI.
+A page can show each quantity in several units (`list_page_units`). The first choice is the
+practical one, the last is SI.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from imubench_pipeline.estimators.dimensions import DIMENSIONS
 from imubench_pipeline.model.comparisons import DatasheetRow, RepeatabilityRow
 from imubench_pipeline.model.recordings import RecordingRow
 from imubench_pipeline.settings.sensor import QUANTITIES
-from imubench_pipeline.units import conversion
+from imubench_pipeline.units import find_conversion
 from imubench_pipeline.words.numbers import NO_VALUE, Unit, number_text
 
 System = Literal["practical", "si"]
@@ -64,16 +64,16 @@ _MIN_SIZE_OF_PREFIX = ((1e3, "k"), (0.1, ""), (1e-4, "m"), (0.0, "µ"))
 """Smallest size in SI for each prefix."""
 
 
-def page_unit(quantity: str, symbol: str, system: System) -> Unit:
+def choose_page_unit(quantity: str, symbol: str, system: System) -> Unit:
     """Return the unit in which a page first shows a figure of a quantity.
 
     The symbol is a parameter, or ``adev``, ``psd`` (root of a density) or ``signal`` (the log
     itself).
     """
-    return _find_unit(quantity, symbol, first_choices(system)[quantity])
+    return _find_unit(quantity, symbol, choose_first_units(system)[quantity])
 
 
-def units_of_pages() -> dict[str, dict[str, dict[str, Unit]]]:
+def list_page_units() -> dict[str, dict[str, dict[str, Unit]]]:
     """Return quantity -> name of the choice -> symbol -> unit, the practical choice first."""
     return {
         quantity: {
@@ -84,7 +84,7 @@ def units_of_pages() -> dict[str, dict[str, dict[str, Unit]]]:
     }
 
 
-def first_choices(system: System) -> Mapping[str, str]:
+def choose_first_units(system: System) -> Mapping[str, str]:
     """Return the name of the choice with which a page opens, by quantity."""
     place = 0 if system == "practical" else -1
     return {quantity: list(choices)[place] for quantity, choices in _UNIT_CHOICES.items()}
@@ -104,17 +104,17 @@ def _find_unit(quantity: str, symbol: str, choice: str) -> Unit:
     return _make_unit(signs.get(symbol) or signs[alike], dimension)
 
 
-def unit_of(dimension: str, system: System, size: float | None = None) -> Unit:
+def choose_unit(dimension: str, system: System, size: float | None = None) -> Unit:
     """Return the unit in which a page shows an angle, a velocity or a length.
 
     A prefix is chosen for ``size`` (SI) in practical units.
     """
     if not size:
         return _make_unit(_SIGNS_OF_DIMENSIONS[system][dimension], dimension)
-    return next(unit for least, unit in units_by_size(dimension, system) if abs(size) >= least)
+    return next(unit for least, unit in list_units_by_size(dimension, system) if abs(size) >= least)
 
 
-def units_by_size(dimension: str, system: System) -> list[tuple[float, Unit]]:
+def list_units_by_size(dimension: str, system: System) -> list[tuple[float, Unit]]:
     """Return the units of an angle, a velocity or a length, each from a size in SI on."""
     sign = _SIGNS_OF_DIMENSIONS[system][dimension]
     prefixed = system == "practical" and dimension in _PREFIXED_DIMENSIONS
@@ -123,11 +123,11 @@ def units_by_size(dimension: str, system: System) -> list[tuple[float, Unit]]:
 
 
 def _make_unit(sign: str, dimension: str) -> Unit:
-    factor, _ = conversion(sign, dimension)
+    factor, _ = find_conversion(sign, dimension)
     return Unit(sign, 1.0 / factor)
 
 
-def temperature_text(row: RecordingRow) -> str:
+def format_temperature(row: RecordingRow) -> str:
     """Return the range of the temperature of a recording; empty if it is not known."""
     if row.temperature_min is None:
         return ""
@@ -135,7 +135,7 @@ def temperature_text(row: RecordingRow) -> str:
     return f"{low} to {high} °C"
 
 
-def printed_text(row: DatasheetRow | RepeatabilityRow) -> str:
+def format_printed(row: DatasheetRow | RepeatabilityRow) -> str:
     """Return the figure of a datasheet as it is printed; `NO_VALUE` where there is none."""
     if row.printed is None:
         return NO_VALUE

@@ -15,18 +15,18 @@ import pyarrow as pa
 from imubench_pipeline.estimators.estimate import SHOWN
 from imubench_pipeline.registry import files_of
 from imubench_pipeline.report.folder import KEYS, write_failed_pages
-from imubench_pipeline.report.glossary import glossary
-from imubench_pipeline.report.html import environment
-from imubench_pipeline.report.pages import ENTRIES, pages
+from imubench_pipeline.report.glossary import read_glossary
+from imubench_pipeline.report.html import make_templates
+from imubench_pipeline.report.pages import ENTRIES, list_pages
 from imubench_pipeline.report.palette import TERM_COLOURS
-from imubench_pipeline.report.plotting import plotting_script
-from imubench_pipeline.report.practical import units_of_pages
-from imubench_pipeline.report.run_summary import one_line
-from imubench_pipeline.report.search import index
+from imubench_pipeline.report.plotting import read_plotting_script
+from imubench_pipeline.report.practical import list_page_units
+from imubench_pipeline.report.run_summary import fold_text
+from imubench_pipeline.report.search import make_search_index
 from imubench_pipeline.report.site import Page, Site
 from imubench_pipeline.tables import read, read_json, write_content
 from imubench_pipeline.tables.failures import describe_error
-from imubench_pipeline.tables.provenance import source_digest
+from imubench_pipeline.tables.provenance import digest_sources
 from imubench_pipeline.tables.schemas import OF_ONE_RECORDING, TABLES
 from imubench_pipeline.words.estimates import STATUS_WORDS, symbol_text
 
@@ -52,10 +52,10 @@ def publish(site: Site, folder: Path, say: Progress = lambda _: None) -> list[st
     """
     written = []
     # A page opened from disk may not read files, but it may run scripts.
-    search = {"assets/search.js": f"imubenchSearch({index(site)});\n"}
+    search = {"assets/search.js": f"imubenchSearch({make_search_index(site)});\n"}
     for path, content in (_make_assets() | search).items():
         written += _put(folder, path, content)
-    every = list(pages(site))
+    every = list(list_pages(site))
     keys = {page.path: page.key for page in every}
     before = _read_keys(folder / KEYS)
     unchanged = {
@@ -68,7 +68,7 @@ def publish(site: Site, folder: Path, say: Progress = lambda _: None) -> list[st
     # A killed run must not leave the digests of pages that it has already replaced.
     if unchanged != before:
         _put(folder, KEYS, _format_json(unchanged))
-    templates = environment(site.system)
+    templates = make_templates(site.system)
     shown = dict(unchanged)
     for page in every:
         if page.path not in unchanged:
@@ -133,7 +133,7 @@ def _make_page(
         raise
     except Exception as error:
         traceback.print_exc()
-        reason = one_line(describe_error(error))
+        reason = fold_text(describe_error(error))
         site.failed[page.path] = reason
         about = {"title": page.path, "reason": reason}
         instead = replace(page, template="failed.html.jinja", context=lambda: about)
@@ -156,7 +156,7 @@ def _make_assets() -> dict[str, str]:
             for name in ("report.css", "decisions.css")
         ),
         "assets/report.js": _make_script(),
-        "assets/plotly.min.js": plotting_script(),
+        "assets/plotly.min.js": read_plotting_script(),
     }
 
 
@@ -167,12 +167,12 @@ def _make_script() -> str:
             choice: {symbol: [unit.sign, unit.per_si] for symbol, unit in symbols.items()}
             for choice, symbols in choices.items()
         }
-        for quantity, choices in units_of_pages().items()
+        for quantity, choices in list_page_units().items()
     }
     *own, last = (_STATIC_FOLDER / f"{name}.js" for name in _SCRIPT_NAMES)
     added = (path for folder in files_of("static") for path in sorted(folder.glob("*.js")))
     parts = [path.read_text(encoding="utf-8") for path in (*own, *added, last)]
-    terms = {key: entry.short for key, entry in glossary().items()}
+    terms = {key: entry.short for key, entry in read_glossary().items()}
     head = "".join(
         f"const {name} = {json.dumps(value, ensure_ascii=False)};\n"
         for name, value in (
@@ -186,12 +186,12 @@ def _make_script() -> str:
     return '(() => {\n"use strict";\n' + head + "\n".join(parts) + "})();\n"
 
 
-def one_file(site: Site) -> str:
+def render_one_file(site: Site) -> str:
     """Return the whole report as one page that needs no other file."""
-    templates = environment(site.system)
+    templates = make_templates(site.system)
     shown = [
         {"path": page.path, "content": _make_page(site, templates, page, "fragment.html.jinja")}
-        for page in pages(site)
+        for page in list_pages(site)
     ]
     assets = _make_assets()
     scripts = (assets[f"assets/{name}.js"] for name in ("report", "plotly.min"))
@@ -199,19 +199,19 @@ def one_file(site: Site) -> str:
         pages=shown,
         css=assets["assets/report.css"],
         scripts=[script.replace("</script", "<\\/script") for script in scripts],
-        search=index(site).replace("<", "\\u003c"),
+        search=make_search_index(site).replace("<", "\\u003c"),
         site=site.shown(alone=True),
         path="index.html",
         root="",
     )
 
 
-def site_of(tables: Mapping[str, pa.Table], settings: str, results: Path) -> Site:
+def make_site(tables: Mapping[str, pa.Table], settings: str, results: Path) -> Site:
     """Return the site of a run, by its settings as the plan gives them."""
-    return Site(tables, json.loads(settings), results, ENTRIES, source_digest("report.publish"))
+    return Site(tables, json.loads(settings), results, ENTRIES, digest_sources("report.publish"))
 
 
-def published(results: Path) -> Site:
+def load_site(results: Path) -> Site:
     """Return the site of a finished run, from its files.
 
     Raises
@@ -237,4 +237,4 @@ def published(results: Path) -> Site:
     for path in paths.values():
         path.stat()  # its error names the missing file, unlike the error of Parquet
     tables = {name: read(name, [path]) for name, path in paths.items()}
-    return site_of(tables, settings, results)
+    return make_site(tables, settings, results)

@@ -15,22 +15,22 @@ from imubench_pipeline.model.estimates import (
 )
 from imubench_pipeline.model.table import R
 from imubench_pipeline.recordings.kept import Quality
-from imubench_pipeline.recordings.recording import log_paths, read_metadata
+from imubench_pipeline.recordings.recording import list_log_files, read_metadata
 from imubench_pipeline.registry import Hook
 from imubench_pipeline.report import thermal
-from imubench_pipeline.report.backtest import backtest_lines
-from imubench_pipeline.report.datasheets import curve_distances, delta_rows
-from imubench_pipeline.report.meaning import budget_bars, budget_tables, budget_words
-from imubench_pipeline.report.parameters import digits_of, methods_table
+from imubench_pipeline.report.backtest import format_backtest
+from imubench_pipeline.report.datasheets import compare_with_datasheet, format_curve_distances
+from imubench_pipeline.report.meaning import explain_budget, make_budget_bars, make_budget_tables
+from imubench_pipeline.report.parameters import count_digits, make_methods_table
 from imubench_pipeline.report.payload import (
     Arrays,
-    channel_payload,
-    looks,
-    model_samples_payload,
-    samples_payload,
+    pack_channel,
+    pack_model_samples,
+    pack_samples,
+    pack_styles,
 )
-from imubench_pipeline.report.practical import System, page_unit, temperature_text
-from imubench_pipeline.report.shell import imubench
+from imubench_pipeline.report.practical import System, choose_page_unit, format_temperature
+from imubench_pipeline.report.shell import make_command
 from imubench_pipeline.report.site import Page, RecordingPage, Site
 from imubench_pipeline.report.view import ChannelView, RecordingView
 from imubench_pipeline.tables import read
@@ -62,34 +62,34 @@ Section = Callable[[Site, RecordingView], tuple[str, Any] | None]
 _SECTIONS: Hook[Section] = Hook("recording_sections")
 
 
-def page_of(site: Site, view: RecordingView, of: RecordingPage) -> Page:
+def make_recording_page(site: Site, view: RecordingView, of: RecordingPage) -> Page:
     """Return the page of a recording of any kind."""
     folder = site.results / "recordings" / view.sensor / view.name
-    key = recording_key(site, view, folder)
+    key = hash_recording(site, view, folder)
     return Page(view.page, of.template, key, lambda: of.context(site, view, folder))
 
 
-def recording_key(site: Site, view: RecordingView, folder: Path) -> str:
+def hash_recording(site: Site, view: RecordingView, folder: Path) -> str:
     """Return the digest of the data of a recording's page; ``folder`` is the recording's."""
     shown = ("envelope", "histogram", "samples_of_models")
     samples = [folder / f"{table}.parquet" for table in shown]
     own = [path.read_bytes() for path in samples if path.is_file()]
     published = [row for row in site.rows(CoverageRow) if row.sensor == view.sensor]
     look = site.looks.get(view.sensor)
-    return site.key_of(view.key, view.device_page, look, published, metadata_of(folder), *own)
+    return site.key_of(view.key, view.device_page, look, published, load_metadata(folder), *own)
 
 
-def rows_of_samples(folder: Path, of: type[R]) -> list[R]:
+def read_sample_rows(folder: Path, of: type[R]) -> list[R]:
     """Return the rows of a table of samples in the folder of a recording, if any."""
     path = folder / f"{of.table}.parquet"
     return of.rows_of(read(of.table, [path])) if path.is_file() else []
 
 
-def context(site: Site, view: RecordingView, folder: Path) -> Mapping[str, object]:
+def make_recording_context(site: Site, view: RecordingView, folder: Path) -> Mapping[str, object]:
     """Return the context of the template; ``folder`` is the recording's."""
     arrays = Arrays()
-    envelope = rows_of_samples(folder, EnvelopeRow)
-    histogram = rows_of_samples(folder, HistogramRow)
+    envelope = read_sample_rows(folder, EnvelopeRow)
+    histogram = read_sample_rows(folder, HistogramRow)
     channels = view.channels()
     names = {channel.channel for channel in channels}
     sorted_findings = sorted(view.findings, key=lambda row: _SEVERITIES.index(row.severity))
@@ -97,11 +97,11 @@ def context(site: Site, view: RecordingView, folder: Path) -> Mapping[str, objec
         {**row.columns(), "number": i, "linked": row.channel in names}
         for i, row in enumerate(sorted_findings, start=1)
     ]
-    samples = samples_payload(envelope, histogram, arrays)
-    of_models = rows_of_samples(folder, ModelSampleRow)
-    budgets = list(budget_tables(view.budget, {view.full_name: view.simulated}, site.system))
+    samples = pack_samples(envelope, histogram, arrays)
+    of_models = read_sample_rows(folder, ModelSampleRow)
+    budgets = list(make_budget_tables(view.budget, {view.full_name: view.simulated}, site.system))
     return {
-        **about_of(site, view, channels, folder),
+        **describe_recording(site, view, channels, folder),
         "summary": _summarise(view, len(channels)),
         "findings": numbered,
         "serious": [row for row in numbered if row["severity"] != "note"],
@@ -112,23 +112,23 @@ def context(site: Site, view: RecordingView, folder: Path) -> Mapping[str, objec
         "has_temperature": "temperature" in samples["envelope"],
         "added": [made for add in _SECTIONS.objects() if (made := add(site, view)) is not None],
         "budget": budgets[0] if budgets else None,
-        "backtest": backtest_lines(
+        "backtest": format_backtest(
             view.rows(BacktestRow), site.settings["requirements"], site.system
         ),
-        "budget_words": budget_words(site.settings["settings"]["error_budget"]),
+        "budget_words": explain_budget(site.settings["settings"]["error_budget"]),
         "command": site.again(view, "scores"),
         # A recording that is left out has no figures.
         "figures_command": None
         if view.left_out or site.at_once
-        else imubench(
+        else make_command(
             "figures", site.results_name, {"--sensor": view.sensor, "--recording": view.name}
         ),
         "page": {
-            "looks": looks({view.sensor: site.looks[view.sensor]}),
-            "channels": [channel_payload(channel, arrays) for channel in channels],
+            "looks": pack_styles({view.sensor: site.looks[view.sensor]}),
+            "channels": [pack_channel(channel, arrays) for channel in channels],
             "samples": samples,
-            "of_models": model_samples_payload(of_models, arrays),
-            "budgets": [budget_bars(view.budget, site.system)] if budgets else [],
+            "of_models": pack_model_samples(of_models, arrays),
+            "budgets": [make_budget_bars(view.budget, site.system)] if budgets else [],
             "findings": [
                 {name: row[name] for name in ("number", "finding", "channel", "start", "end")}
                 for row in numbered
@@ -138,7 +138,7 @@ def context(site: Site, view: RecordingView, folder: Path) -> Mapping[str, objec
     }
 
 
-STATIC = RecordingPage("recording.html.jinja", context)
+STATIC = RecordingPage("recording.html.jinja", make_recording_context)
 """The page of a sensor that was at rest."""
 
 
@@ -148,11 +148,11 @@ def _summarise(view: RecordingView, channels: int) -> str:
         return f"This recording {why}; the comparison does not include it."
     started = f"from {started_text(view.row.started)}" if view.row.started else ""
     warnings = counted(len(view.warnings), "warning") if view.warnings else "no warnings"
-    parts = (started, temperature_text(view.row), counted(channels, "channel"), warnings)
-    return summary_words(view, [part for part in parts if part])
+    parts = (started, format_temperature(view.row), counted(channels, "channel"), warnings)
+    return summarise_recording(view, [part for part in parts if part])
 
 
-def summary_words(view: RecordingView, parts: Sequence[str]) -> str:
+def summarise_recording(view: RecordingView, parts: Sequence[str]) -> str:
     """Return length and rate of a recording, and parts that say more, as a sentence."""
     row = view.row
     length = f"{duration_text(row.duration)} at {rates_text(row.rate, view.rates)}"
@@ -167,7 +167,7 @@ def _describe_channel(
     samples: Mapping[str, Any],
     of_models: Sequence[ModelSampleRow],
 ) -> dict[str, Any]:
-    symbols, lines = methods_table(channel, view.row.duration, site.system)
+    symbols, lines = make_methods_table(channel, view.row.duration, site.system)
     used = next(line for line in lines if line["recommended"])
     for line in lines:
         line |= {"score": "–", "drawn": ("–", ""), "inside": "–"}
@@ -202,11 +202,11 @@ def _describe_channel(
             if place < _SHOWN_MODELS or row.model == "N+GM+K"
         ],
         "spectral_lines": channel.lines,
-        "thermal": thermal.answer(channel, site.system),
-        "thermal_figures": list(thermal.figures(channel)),
+        "thermal": thermal.describe_thermal(channel, site.system),
+        "thermal_figures": list(thermal.list_thermal_figures(channel)),
         "line_count": counted(len(channel.lines), "line"),
-        "deltas": list(delta_rows(channel, site.coverage, site.system)),
-        "away": list(curve_distances(channel, site.system)),
+        "deltas": list(compare_with_datasheet(channel, site.coverage, site.system)),
+        "away": list(format_curve_distances(channel, site.system)),
     }
 
 
@@ -236,16 +236,16 @@ def _describe_values(channel: ChannelView, system: System) -> str:
     """Return the values to use, with how well they are known, in a sentence."""
     parts = []
     for symbol in ("N", "B_curve", "B", "T_B", "K"):
-        unit = page_unit(channel.quantity, symbol, system)
+        unit = choose_page_unit(channel.quantity, symbol, system)
         for row in channel.named(channel.recommended, symbol)[:1]:
             if row.value is not None:
                 doubt = "doubtful" if row.status == "doubtful" else ""
                 certainty = ", ".join(filter(None, [precision_text(row, unit), doubt]))
-                size = unit.text(row.value, digits_of(unit, row.value, row.lower, row.upper))
+                size = unit.text(row.value, count_digits(unit, row.value, row.lower, row.upper))
                 text = f"{symbol_text(symbol)} {size} {unit.sign}"
                 parts.append(f"{text} ({certainty})" if certainty else text)
     if channel.fixed_bias is not None:
-        unit = page_unit(channel.quantity, "signal", system)
+        unit = choose_page_unit(channel.quantity, "signal", system)
         parts.append(f"mean {unit.text(channel.fixed_bias, 4)} {unit.sign}")
     return "; ".join(parts) + "."
 
@@ -276,7 +276,7 @@ def _describe_model(channel: ChannelView) -> str:
     return " ".join(filter(None, [text, sentence(best.note), sentence(best.band_source)]))
 
 
-def about_of(
+def describe_recording(
     site: Site, view: RecordingView, channels: Sequence[ChannelView], folder: Path
 ) -> Mapping[str, object]:
     """Return the common context of the pages of recordings; ``folder`` is the recording's."""
@@ -285,12 +285,12 @@ def about_of(
         "name": site.names[view.sensor],
         "sensor_page": site.sensor_page(view.sensor),
         "provenance": list(_list_provenance(view, channels, folder)),
-        "sources": metadata_of(folder).get("sources", []),
+        "sources": load_metadata(folder).get("sources", []),
         "figures_command": None,
     }
 
 
-def metadata_of(folder: Path) -> Mapping[str, Any]:
+def load_metadata(folder: Path) -> Mapping[str, Any]:
     """Return the metadata of the log in a folder of a recording; empty without them.
 
     Raises
@@ -301,7 +301,7 @@ def metadata_of(folder: Path) -> Mapping[str, Any]:
     quality = folder / "quality.json"
     if quality.is_file() and (fault := Quality.read(quality).fault(folder)):
         raise RecordingError(fault)
-    paths = log_paths(folder)
+    paths = list_log_files(folder)
     return read_metadata(paths[0]) if paths else {}
 
 
@@ -309,7 +309,7 @@ def _list_provenance(
     view: RecordingView, channels: Sequence[ChannelView], folder: Path
 ) -> Iterator[tuple[str, str]]:
     """Yield the origin of a recording, as names and texts; ``folder`` is the recording's."""
-    row, metadata = view.row, metadata_of(folder)
+    row, metadata = view.row, load_metadata(folder)
     yield "Recording", f"{row.sensor} / {row.recording}"
     yield "Device", str(row.device)
     yield "Kind", row.kind.replace("_", " ") + (", simulated" if row.simulated else "")

@@ -10,8 +10,8 @@ from typing import Protocol
 
 from imubench_pipeline.model.comparisons import RankingRow
 from imubench_pipeline.model.recordings import FailureRow, FindingRow, RecordingRow
-from imubench_pipeline.report.drop_zone import drop_zone_lines
-from imubench_pipeline.report.folder import failed_pages
+from imubench_pipeline.report.drop_zone import describe_drop_zone
+from imubench_pipeline.report.folder import read_failed_pages
 from imubench_pipeline.tables import read
 from imubench_pipeline.tables.findings import LEFT_OUT
 from imubench_pipeline.words.numbers import counted, join_names
@@ -37,7 +37,7 @@ _DONE = re.compile(r"^Finished jobid: (\d+) ", re.MULTILINE)
 _INTERRUPTED = "Terminating processes on user request"
 
 
-def summary(results: Path) -> str:
+def summarise_run(results: Path) -> str:
     """Return the summary of a finished run; empty without tables."""
     paths = {name: results / f"tables/{name}.parquet" for name in _NEEDED}
     if not all(path.is_file() for path in paths.values()):
@@ -46,12 +46,12 @@ def summary(results: Path) -> str:
         tables = {name: read(name, [path]) for name, path in paths.items()}
     except (OSError, ValueError) as error:
         # A run for one file alone succeeds even if older tables cannot be read.
-        return one_line(f"no summary: {error}")
+        return fold_text(f"no summary: {error}")
     recordings = RecordingRow.rows_of(tables["recordings"])
-    rejected = list(rejections(recordings))
-    warned = list(warnings(FindingRow.rows_of(tables["findings"])))
+    rejected = list(list_rejections(recordings))
+    warned = list(list_warnings(FindingRow.rows_of(tables["findings"])))
     simulated = sum(row.simulated for row in recordings)
-    failed = list(left_out(FailureRow.rows_of(tables["failures"])))
+    failed = list(list_failures(FailureRow.rows_of(tables["failures"])))
     analysed = sum(row.status == "ok" for row in recordings)
     lines = [f"{counted(analysed, 'recording')} analysed, {len(rejected)} rejected"]
     not_read = len(recordings) - analysed - len(rejected)
@@ -59,23 +59,23 @@ def summary(results: Path) -> str:
     lines[0] += f"; {simulated} of all are simulated, not measured" * (simulated > 0)
     lines += _bounded(f"  failed: {line}" for line in failed)
     lines += _bounded(f"  rejected: {line}" for line in rejected)
-    lines += drop_zone_lines(results)
+    lines += describe_drop_zone(results)
     if warned:
         lines.append(f"warnings in {len(warned)} of the recordings:")
         lines += _bounded(f"  {line}" for line in warned)
-    lines += _bounded(leaders(RankingRow.rows_of(tables["ranking"]), recordings))
+    lines += _bounded(list_best_sensors(RankingRow.rows_of(tables["ranking"]), recordings))
     lines.append(f"report: {results / 'report/index.html'}")
     return "\n".join(lines)
 
 
-def without_pages(results: Path) -> str:
+def list_failed_pages(results: Path) -> str:
     """Return which pages of the report could not be made, and why; nothing if there are none."""
-    failed = failed_pages(results / "report")
-    lines = (f"\n  {one_line(f'{path}: {reason}')}" for path, reason in failed.items())
+    failed = read_failed_pages(results / "report")
+    lines = (f"\n  {fold_text(f'{path}: {reason}')}" for path, reason in failed.items())
     return "pages that could not be made; the next run tries again" * bool(failed) + "".join(lines)
 
 
-def failure(logs: Sequence[str], results: Path) -> str:
+def describe_failure(logs: Sequence[str], results: Path) -> str:
     """Return the summary of a run that failed or was stopped, from the logs of Snakemake."""
     texts = [Path(log).read_text(encoding="utf-8", errors="replace") for log in logs]
     steps = dict.fromkeys(step for text in texts for step in _failed_steps(text, results))
@@ -112,12 +112,12 @@ def _failed_steps(log: str, results: Path) -> Iterator[str]:
         yield what + f" ({cluster_log})" * bool(cluster_log)
 
 
-def rejections(recordings: Iterable[RecordingRow]) -> Iterator[str]:
+def list_rejections(recordings: Iterable[RecordingRow]) -> Iterator[str]:
     """Yield a line for each rejected recording: its name and the reason."""
     for row in recordings:
         if row.status == "rejected":
             reason = row.reason or "no reason is kept"
-            yield one_line(f"{row.sensor}/{row.recording}: {reason}")
+            yield fold_text(f"{row.sensor}/{row.recording}: {reason}")
 
 
 class Failed(Protocol):
@@ -136,34 +136,36 @@ class Failed(Protocol):
         """Why it failed."""
 
 
-def left_out(failures: Iterable[Failed]) -> Iterator[str]:
+def list_failures(failures: Iterable[Failed]) -> Iterator[str]:
     """Yield a line for each step that failed, with the lost recording and the reason."""
     for row in failures:
         of = f"{row.sensor}/{row.recording}" if row.recording else row.sensor
-        yield one_line(f"{of}: {row.reason}")
+        yield fold_text(f"{of}: {row.reason}")
 
 
-def warnings(findings: Iterable[FindingRow]) -> Iterator[str]:
+def list_warnings(findings: Iterable[FindingRow]) -> Iterator[str]:
     """Yield a line for each recording that has warnings, the worst first."""
     by_recording: dict[str, Counter[str]] = {}
     left_out: Counter[str] = Counter()
-    for row in serious(findings):
+    for row in select_warnings(findings):
         name = f"{row.sensor}/{row.recording}"
         by_recording.setdefault(name, Counter())[row.finding.replace("_", " ")] += 1
         left_out[name] += row.severity == "fatal"
     for name, of in sorted(by_recording.items(), key=lambda i: (-left_out[i[0]], -i[1].total())):
         kinds = ", ".join(kind + f" ({n})" * (n > 1) for kind, n in of.most_common())
-        yield one_line(f"{name}: {counted(of.total(), 'warning')}: {kinds}")
+        yield fold_text(f"{name}: {counted(of.total(), 'warning')}: {kinds}")
 
 
-def serious(findings: Iterable[FindingRow]) -> Iterator[FindingRow]:
+def select_warnings(findings: Iterable[FindingRow]) -> Iterator[FindingRow]:
     """Yield the findings that put results in doubt: no notes, nor that a recording is left out."""
     for row in findings:
         if row.severity != "note" and row.finding not in LEFT_OUT:
             yield row
 
 
-def leaders(ranking: Iterable[RankingRow], recordings: Iterable[RecordingRow]) -> Iterator[str]:
+def list_best_sensors(
+    ranking: Iterable[RankingRow], recordings: Iterable[RecordingRow]
+) -> Iterator[str]:
     """Yield a line for each requirement: the best sensor, and whether it meets the limits."""
     deciding = [row for row in ranking if row.decides]
     simulated = {(row.sensor, row.recording) for row in recordings if row.simulated}
@@ -178,10 +180,10 @@ def leaders(ranking: Iterable[RankingRow], recordings: Iterable[RecordingRow]) -
         if ranked and ranked[0].tied_with:
             others = join_names([names.get(each, each) for each in ranked[0].tied_with])
             text += f" The difference from {others} is not significant."
-        yield one_line(f"{name}: {text}")
+        yield fold_text(f"{name}: {text}")
 
 
-def one_line(text: str, longest: int = _MOST_LETTERS) -> str:
+def fold_text(text: str, longest: int = _MOST_LETTERS) -> str:
     """Return a text from logs on one line, without control characters, cut with an ellipsis."""
     shown = "".join(letter if letter.isprintable() else " " for letter in text)
     shown = " ".join(shown.split())

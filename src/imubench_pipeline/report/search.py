@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Iterator
 from urllib.parse import quote
 
 from imubench_pipeline.registry import Hook
-from imubench_pipeline.report.glossary import glossary, term
+from imubench_pipeline.report.glossary import find_term, read_glossary
 from imubench_pipeline.report.site import Site
 
 Found = tuple[str, str, str, str]
@@ -20,7 +20,7 @@ Search = Callable[[Site], Iterable[Found]]
 _ADDED: Hook[Search] = Hook("search")
 
 
-def index(site: Site) -> str:
+def make_search_index(site: Site) -> str:
     """Return the index as JSON."""
     return json.dumps(list(_list_entries(site)), ensure_ascii=False, separators=(",", ":"))
 
@@ -30,7 +30,7 @@ def _list_entries(site: Site) -> Iterator[Found]:
         about = site.settings["sensors"].get(sensor, {}).get("price_class") or ""
         yield "sensor", site.names[sensor], quote(site.sensor_page(sensor)), f"{sensor} {about}"
     for view in site.views:
-        findings = (term(row.finding).name for row in view.findings)
+        findings = (find_term(row.finding).name for row in view.findings)
         state = [*dict.fromkeys(findings), *(["simulated"] if view.simulated else [])]
         if view.left_out:
             state += [view.row.status, view.row.reason or ""]
@@ -43,7 +43,7 @@ def _list_entries(site: Site) -> Iterator[Found]:
         yield "requirement", requirement["title"], f"index.html#requirement-{name}", name
     for file, title in site.navigation:
         yield "page", title, file, ""
-    for entry in glossary().values():
+    for entry in read_glossary().values():
         yield "term", entry.name, f"theory.html#{entry.section}", entry.short
     for entries_of in _ADDED.objects():
         yield from entries_of(site)

@@ -17,13 +17,13 @@ from imubench_pipeline.model.comparisons import (
 )
 from imubench_pipeline.navigation.drift import SIGNIFICANCE_LEVEL
 from imubench_pipeline.report.comparison import Comparison
-from imubench_pipeline.report.datasheets import delta_rows, repeatability_lines
-from imubench_pipeline.report.evidence import evidence
-from imubench_pipeline.report.meaning import budget_bars, budget_tables, budget_words
-from imubench_pipeline.report.palette import recording_styles
-from imubench_pipeline.report.payload import FOREST, looks
+from imubench_pipeline.report.datasheets import compare_with_datasheet, format_repeatability
+from imubench_pipeline.report.evidence import trace_verdicts
+from imubench_pipeline.report.meaning import explain_budget, make_budget_bars, make_budget_tables
+from imubench_pipeline.report.palette import make_recording_styles
+from imubench_pipeline.report.payload import FOREST, pack_styles
 from imubench_pipeline.report.site import Page, Site
-from imubench_pipeline.report.start import summary
+from imubench_pipeline.report.start import summarise_recordings
 from imubench_pipeline.report.view import QUANTITY_NAMES, RecordingView
 from imubench_pipeline.settings.sensor import quantity_of
 from imubench_pipeline.words.estimates import symbol_text
@@ -35,7 +35,7 @@ _MAX_DETAILED_RECORDINGS = 12
 """With more recordings the page of a sensor has no budgets and no comparison with the datasheet."""
 
 
-def sensor_page(site: Site, sensor: str) -> Page:
+def make_sensor_page(site: Site, sensor: str) -> Page:
     """Return the page of a sensor."""
     own = [view for view in site.views if view.sensor == sensor]
     key = site.key_of(
@@ -69,7 +69,7 @@ def _make_sensor_context(
     shown = own if len(own) <= _MAX_DETAILED_RECORDINGS else []
     deltas = []
     for channel in (channel for view in shown for channel in view.channels()):
-        rows = list(delta_rows(channel, site.coverage, site.system))
+        rows = list(compare_with_datasheet(channel, site.coverage, site.system))
         if any(row["published"] for row in rows):
             deltas.append({"view": channel, "rows": rows})
     by_device: dict[tuple[str, str | None], list[RecordingView]] = {}
@@ -81,8 +81,8 @@ def _make_sensor_context(
     return {
         "name": site.names[sensor],
         "summary": (f"Price class: {price_class}. " if price_class else "")
-        + summary(own, several=False),
-        "verdicts": list(evidence(site, sensor, own)),
+        + summarise_recordings(own, several=False),
+        "verdicts": list(trace_verdicts(site, sensor, own)),
         "beside": urlencode({"a": sensor}) if any(view.static for view in own) else "",
         "devices": [
             {"name": name, "page": page, "views": of, "count": counted(len(of), "recording")}
@@ -96,24 +96,26 @@ def _make_sensor_context(
             "axis": list(dict.fromkeys(row["axis"] for row in pooled)),
             "parameter": list(dict.fromkeys(row["name"] for row in pooled)),
         },
-        "budgets": list(budget_tables(budget, simulated, site.system)),
-        "budget_words": budget_words(site.settings["settings"]["error_budget"]),
+        "budgets": list(make_budget_tables(budget, simulated, site.system)),
+        "budget_words": explain_budget(site.settings["settings"]["error_budget"]),
         "too_many": len(own) > _MAX_DETAILED_RECORDINGS,
         "deltas": deltas,
-        "repeated": list(repeatability_lines(site.rows(RepeatabilityRow), sensor, site.system)),
+        "repeated": list(format_repeatability(site.rows(RepeatabilityRow), sensor, site.system)),
         "page": {
             "grouped": "recording",
             "recordings": [view.name for view in own],
-            "looks": looks({sensor: site.looks[sensor]})
-            | {"places": [asdict(look) for look in recording_styles(site.looks[sensor])]},
+            "looks": pack_styles({sensor: site.looks[sensor]})
+            | {"places": [asdict(look) for look in make_recording_styles(site.looks[sensor])]},
             "names": site.names,
-            "budgets": [budget_bars(view.budget, site.system) for view in shown if view.budget],
+            "budgets": [
+                make_budget_bars(view.budget, site.system) for view in shown if view.budget
+            ],
             **together.page,
         },
     }
 
 
-def device_page(site: Site, page: str) -> Page:
+def make_device_page(site: Site, page: str) -> Page:
     """Return the page of a device: its recordings over time."""
     own = [view for view in site.views if view.device_page == page]
     named = {view.full_name for view in own}
@@ -132,8 +134,8 @@ def device_page(site: Site, page: str) -> Page:
             "name": site.names[sensor],
             "device": own[0].row.device,
             "views": own,
-            "summary": summary(own, several=False),
-            "changes": [change_words(row, simulated=simulated) for row in changed],
+            "summary": summarise_recordings(own, several=False),
+            "changes": [describe_change(row, simulated=simulated) for row in changed],
             "order": "Recordings are plotted at their start times."
             if dated
             else "Some logs have no start time, so the recordings are plotted in the order of "
@@ -194,7 +196,7 @@ def _list_trends(
     return trends, payload
 
 
-def change_words(row: DriftRow, *, simulated: bool) -> str:
+def describe_change(row: DriftRow, *, simulated: bool) -> str:
     """Return a change of a device in words."""
     name = symbol_text(row.parameter)
     by = "" if row.change is None else f" by {100 * row.change:+.0f} %".replace("-", "−")

@@ -6,8 +6,8 @@ import shlex
 from collections.abc import Mapping, Sequence
 
 
-def imubench(name: str, results: str, options: Mapping[str, str] | None = None) -> str:
-    """Return a command of `imubench`, such as ``figures``, for the results of a run.
+def make_command(name: str, results: str, options: Mapping[str, str] | None = None) -> str:
+    """Return a command of `make_command`, such as ``figures``, for the results of a run.
 
     ``options`` has the values of options such as ``--sensor``; a word in capitals is a placeholder.
     """
@@ -17,7 +17,7 @@ def imubench(name: str, results: str, options: Mapping[str, str] | None = None) 
     return shlex.join(words)
 
 
-def made_again(target: str, overrides: Sequence[str] = ()) -> str:
+def make_recompute_command(target: str, overrides: Sequence[str] = ()) -> str:
     """Return the command that recomputes a file of a recording from its log.
 
     ``overrides`` are the settings of the run for ``snakemake --config``.

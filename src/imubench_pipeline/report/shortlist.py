@@ -14,7 +14,7 @@ def _make_context(site: Site) -> Mapping[str, object]:
     asked = site.settings["requirements"]
     boards: dict[str, list[Mapping[str, object]]] = {}
     for row in site.rows(ShortlistRow):
-        sensor, verdict, best, worst, measured, _ = cells(row)
+        sensor, verdict, best, worst, measured, _ = format_shortlist_row(row)
         line = row.columns() | {
             "code": row.verdict,
             "shortfalls": list(map(shortfall_text, row.shortfalls)),
@@ -43,7 +43,7 @@ SHORTLIST = Entry(
 """The page of all sensors of the catalogue, for every requirement."""
 
 
-def cells(row: ShortlistRow) -> list[str]:
+def format_shortlist_row(row: ShortlistRow) -> list[str]:
     """Return sensor, verdict, margins (best, worst, measured) and deciding limit, as texts."""
     measured = _format_margin(row.measured_margin)
     if row.measured_margin_of == "simulated logs":
@@ -58,7 +58,7 @@ def cells(row: ShortlistRow) -> list[str]:
     ]
 
 
-def notes(rows: Sequence[ShortlistRow]) -> Iterator[str]:
+def list_assumptions(rows: Sequence[ShortlistRow]) -> Iterator[str]:
     """Yield a line per sensor with its assumptions, or the reason why it is not judged."""
     for row in rows:
         remarks = [*map(shortfall_text, row.shortfalls), row.reason, *row.assumed]

@@ -9,14 +9,14 @@ from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from imubench_pipeline.settings.command_line import whole_number
+from imubench_pipeline.settings.command_line import make_integer_type
 
 if TYPE_CHECKING:
     import pyarrow as pa
     from rich.console import RenderableType
 
 _NEEDED_TABLES = ("recordings", "findings", "failures", "ranking", "next_steps", "parameters")
-_parse_width = whole_number(40, 10_000, "40 to 10000 columns")
+_parse_width = make_integer_type(40, 10_000, "40 to 10000 columns")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -46,8 +46,8 @@ def run(arguments: argparse.Namespace) -> int:
     # Loaded here, so that other commands answer at once.
     from rich.text import Text
 
-    from imubench_pipeline.report.terminal import parts
-    from imubench_pipeline.tables import tables_folder
+    from imubench_pipeline.report.terminal import render_comparison
+    from imubench_pipeline.tables import find_tables_folder
 
     try:
         tables = _load(arguments.results)
@@ -59,7 +59,7 @@ def run(arguments: argparse.Namespace) -> int:
         return 2
 
     def shown(width: int) -> Iterator[RenderableType]:
-        yield from parts(
+        yield from render_comparison(
             tables,
             requirement=arguments.requirement,
             channel=arguments.channel,
@@ -67,7 +67,7 @@ def run(arguments: argparse.Namespace) -> int:
             system=arguments.units,
             width=width,
         )
-        page = tables_folder(arguments.results).parent / "report/index.html"
+        page = find_tables_folder(arguments.results).parent / "report/index.html"
         no_page = f"No report at {page}; `snakemake -c2` makes it"
         text = f"Report: {page}" if page.is_file() else no_page
         yield Text(text, no_wrap=True, overflow="ignore")
@@ -103,10 +103,10 @@ class _ShowError(ValueError):
 
 
 def _load(results: Path) -> dict[str, pa.Table]:
-    from imubench_pipeline.tables import TableError, read, tables_of_run
+    from imubench_pipeline.tables import TableError, find_tables, read
 
     try:
-        paths = tables_of_run(results, _NEEDED_TABLES)
+        paths = find_tables(results, _NEEDED_TABLES)
     except TableError as error:
         raise _ShowError(str(error)) from error
     try:

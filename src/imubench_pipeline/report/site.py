@@ -19,11 +19,11 @@ import pyarrow as pa
 from imubench_pipeline.model.comparisons import CoverageRow, DriftRow
 from imubench_pipeline.model.table import OfRecordingRow, R
 from imubench_pipeline.registry import Hook
-from imubench_pipeline.report.comparison import ComparedRecording, compared_recording
-from imubench_pipeline.report.palette import Appearance, sensor_appearances
-from imubench_pipeline.report.practical import System, first_choices, units_of_pages
-from imubench_pipeline.report.shell import made_again
-from imubench_pipeline.report.view import Name, RecordingView, recording_views
+from imubench_pipeline.report.comparison import ComparedRecording, gather_recording
+from imubench_pipeline.report.palette import Appearance, assign_sensor_styles
+from imubench_pipeline.report.practical import System, choose_first_units, list_page_units
+from imubench_pipeline.report.shell import make_recompute_command
+from imubench_pipeline.report.view import Name, RecordingView, gather_recordings
 from imubench_pipeline.tables.schemas import OF_ONE_RECORDING, TABLES
 
 _CHANNEL_ORDER = ("gyro_x", "gyro_y", "gyro_z", "accel_x", "accel_y", "accel_z")
@@ -143,7 +143,7 @@ class Site:
 
     def again(self, view: RecordingView, table: str) -> str:
         """Return the command that recomputes the results of a recording, up to a table."""
-        return self.at_once or made_again(
+        return self.at_once or make_recompute_command(
             f"{self.results_name}/recordings/{view.sensor}/{view.name}/{table}.parquet",
             self.settings.get("given", []),
         )
@@ -151,7 +151,7 @@ class Site:
     @cached_property
     def views(self) -> list[RecordingView]:
         """The recordings, with the pages that they have."""
-        views = recording_views(self.tables)
+        views = gather_recordings(self.tables)
         together = Counter((view.sensor, view.row.device, view.simulated) for view in views)
         for view in views:
             view.page = f"recordings/{view.sensor}/{view.name}.html"
@@ -168,7 +168,7 @@ class Site:
         """Yield the compared data of recordings."""
         for view in views:
             if view.full_name not in self._compared:
-                self._compared[view.full_name] = compared_recording(view, self.system)
+                self._compared[view.full_name] = gather_recording(view, self.system)
             yield self._compared[view.full_name]
 
     def named_in(self, of: type[OfRecordingRow]) -> set[Name]:
@@ -188,7 +188,7 @@ class Site:
     @cached_property
     def names(self) -> dict[str, str]:
         """Vendor and model of each sensor."""
-        return sensor_names(self.sensors, self.settings["sensors"])
+        return name_sensors(self.sensors, self.settings["sensors"])
 
     def is_sold(self, sensor: str) -> bool:
         """Tell whether a sensor can be bought; True if it has no sensor file."""
@@ -198,7 +198,7 @@ class Site:
     @cached_property
     def looks(self) -> dict[str, Appearance]:
         """The appearance of each sensor in all figures."""
-        return sensor_appearances(self.sensors)
+        return assign_sensor_styles(self.sensors)
 
     @cached_property
     def channel_names(self) -> list[str]:
@@ -259,8 +259,8 @@ class Site:
         return {
             "title": self.title,
             "navigation": self.navigation,
-            "units": {quantity: list(choices) for quantity, choices in units_of_pages().items()},
-            "first_units": first_choices(self.system),
+            "units": {quantity: list(choices) for quantity, choices in list_page_units().items()},
+            "first_units": choose_first_units(self.system),
             "names": self.names,
             "tables": [] if alone else sorted(set(TABLES) - set(OF_ONE_RECORDING)),
             "alone": alone,
@@ -295,7 +295,7 @@ def _make_digest(*parts: object) -> str:
     return digest.hexdigest()
 
 
-def sensor_names(
+def name_sensors(
     sensors: Iterable[str], described: Mapping[str, Mapping[str, str]]
 ) -> dict[str, str]:
     """Return vendor and model of each sensor, with the name of its file if two are equal.

@@ -51,7 +51,7 @@ class SourcedInterval(str):
         return Markup("{} to {}").format(*self.ends)
 
 
-def of_row(
+def source_number(
     row: RankingRow | ErrorBudgetRow, column: str, text: str, unit: str = ""
 ) -> SourcedNumber:
     """Return a number of a row of ``ranking``, or of a total of ``error_budget``."""
@@ -60,18 +60,18 @@ def of_row(
     return SourcedNumber(text, "/".join([*names, row.error, f"{row.time:g}", column]), unit)
 
 
-def margin(row: RankingRow) -> tuple[SourcedNumber, SourcedNumber, SourcedNumber] | None:
+def format_margin(row: RankingRow) -> tuple[SourcedNumber, SourcedNumber, SourcedNumber] | None:
     """Return the margin of a row of the table ``ranking`` with its 95 % limits, if there is one."""
     if row.margin is None:
         return None
-    low, high = margin_limits(row)
+    low, high = compute_margin_limits(row)
     digits = digits_by(row.margin, low, high)
     named = (("margin", row.margin), ("limit:upper", low), ("limit:lower", high))
-    first, lower, upper = (of_row(row, name, number_text(x, digits)) for name, x in named)
+    first, lower, upper = (source_number(row, name, number_text(x, digits)) for name, x in named)
     return first, lower, upper
 
 
-def margin_limits(row: RankingRow) -> tuple[float | None, float | None]:
+def compute_margin_limits(row: RankingRow) -> tuple[float | None, float | None]:
     """Return the 95 % limits of the margin of a row of the table ``ranking`` that has one."""
     # Infinite where the error is zero, None where it is unknown.
     low, high = (

@@ -10,10 +10,13 @@ from markupsafe import Markup
 from imubench_pipeline.model.comparisons import CoverageRow, NextStepRow, RankingRow
 from imubench_pipeline.model.recordings import FailureRow, FileRow, FindingRow
 from imubench_pipeline.report.comparison import Comparison
-from imubench_pipeline.report.datasheets import coverage_tables, deltas_of_sensors
-from imubench_pipeline.report.decisions import matrix, strip
-from imubench_pipeline.report.meaning import Group, rankings
-from imubench_pipeline.report.payload import FOREST, looks
+from imubench_pipeline.report.datasheets import (
+    compare_sensors_with_datasheets,
+    make_coverage_tables,
+)
+from imubench_pipeline.report.decisions import make_decision_matrix, summarise_counts
+from imubench_pipeline.report.meaning import Group, format_rankings
+from imubench_pipeline.report.payload import FOREST, pack_styles
 from imubench_pipeline.report.site import Entry, Site
 from imubench_pipeline.report.view import RecordingView
 from imubench_pipeline.settings.requirements import Requirement
@@ -48,15 +51,17 @@ def _start(site: Site) -> Mapping[str, object]:
     if unexpected < len(warned):
         in_doubt += f", all{f' but {unexpected}' if unexpected else ''} simulated to show it"
     return {
-        "strip": strip(site),
-        "about": " ".join(filter(None, (dated(views), made(views)))),
-        "matrix": matrix(site),
+        "strip": summarise_counts(site),
+        "about": " ".join(filter(None, (describe_dates(views), describe_simulated(views)))),
+        "matrix": make_decision_matrix(site),
         "failures": [
             {**row.columns(), "view": by_name.get((row.sensor, row.recording or ""))}
             for row in site.rows(FailureRow)
         ],
         "rejected": [
-            {"view": view, "reason": folded(view.row.reason)} for view in views if view.rejected
+            {"view": view, "reason": fold_reason(view.row.reason)}
+            for view in views
+            if view.rejected
         ],
         "skipped": [row for row in site.rows(FileRow) if row.status == "skipped"],
         "warned": [
@@ -77,14 +82,14 @@ def _start(site: Site) -> Mapping[str, object]:
         "sensors": {name: _describe_sensor(site, name) for name in site.sensors},
         "page": {
             "grouped": "sensor",
-            "looks": looks(site.looks),
+            "looks": pack_styles(site.looks),
             "names": site.names,
             **together.page,
         },
     }
 
 
-def summary(views: Sequence[RecordingView], several: bool = True) -> str:
+def summarise_recordings(views: Sequence[RecordingView], several: bool = True) -> str:
     """Return a sentence with number, length, dates and states of recordings."""
     sensors = {view.sensor for view in views}
     rejected = sum(view.rejected for view in views)
@@ -92,13 +97,13 @@ def summary(views: Sequence[RecordingView], several: bool = True) -> str:
     of = f" of {counted(len(sensors), 'sensor')}" if several else ""
     parts = [counted(len(views), "recording") + of]
     lasting = sum(view.row.duration or 0.0 for view in views)
-    parts += [f"{duration_text(lasting)} of data" if lasting else "", dated(views)]
+    parts += [f"{duration_text(lasting)} of data" if lasting else "", describe_dates(views)]
     counts = f"{len(views) - rejected - failed} analysed, {rejected} rejected"
     counts += f", {failed} failed" * bool(failed)
-    return f"{', '.join(filter(None, parts))}: {counts}. {made(views)}".rstrip()
+    return f"{', '.join(filter(None, parts))}: {counts}. {describe_simulated(views)}".rstrip()
 
 
-def dated(views: Sequence[RecordingView]) -> str:
+def describe_dates(views: Sequence[RecordingView]) -> str:
     """Return when recordings were made; empty where none says."""
     started = sorted(view.row.started[:10] for view in views if view.row.started)
     if not started:
@@ -110,7 +115,7 @@ def dated(views: Sequence[RecordingView]) -> str:
     return text
 
 
-def made(views: Sequence[RecordingView]) -> str:
+def describe_simulated(views: Sequence[RecordingView]) -> str:
     """Return in a sentence how many recordings are simulated; empty where none is."""
     number = sum(view.simulated for view in views)
     if not number:
@@ -119,7 +124,7 @@ def made(views: Sequence[RecordingView]) -> str:
     return f"{'All are' if number == len(views) else of_them} simulated, not measured."
 
 
-def folded(reason: str | None) -> tuple[str, str]:
+def fold_reason(reason: str | None) -> tuple[str, str]:
     """Return the beginning of a reason that fits on a line, and the whole; empty if that is all."""
     if reason is None or len(reason) <= _LINE:
         return reason or "", ""
@@ -153,7 +158,7 @@ class _Answer:
 def _list_rankings(site: Site) -> Iterator[_Answer]:
     simulated = {view.full_name: view.simulated for view in site.views}
     rows = site.rows(RankingRow)
-    for ranking in rankings(rows, site.settings["requirements"], simulated, site.system):
+    for ranking in format_rankings(rows, site.settings["requirements"], simulated, site.system):
         groups = ranking.groups
         ranked = [group for group in groups if group.row.rank]
         yield _Answer(
@@ -256,16 +261,16 @@ def _recordings(site: Site) -> Mapping[str, object]:
         "status": list(dict.fromkeys(view.row.status for view in site.views)),
         "sensor": [site.names[sensor] for sensor in site.sensors],
     }
-    return {"views": site.views, "summary": summary(site.views), "filters": filters}
+    return {"views": site.views, "summary": summarise_recordings(site.views), "filters": filters}
 
 
 def _datasheets(site: Site) -> Mapping[str, object]:
-    lines = list(deltas_of_sensors(site.views, site.system))
+    lines = list(compare_sensors_with_datasheets(site.views, site.system))
     filters = {
         "figure": list(dict.fromkeys(line["quantity"] for line in lines)),
         "sensor": list(dict.fromkeys(site.names[line["sensor"]] for line in lines)),
     }
-    coverage = list(coverage_tables(site.rows(CoverageRow)))
+    coverage = list(make_coverage_tables(site.rows(CoverageRow)))
     return {"lines": lines, "filters": filters, "coverage": coverage}
 
 

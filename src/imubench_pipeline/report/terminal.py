@@ -15,11 +15,16 @@ from imubench_pipeline.model.estimates import AllanRow, ParameterRow
 from imubench_pipeline.model.recordings import DoubtRow, FailureRow, FindingRow, RecordingRow
 from imubench_pipeline.model.states import Verdict
 from imubench_pipeline.model.table import OfRecordingRow
-from imubench_pipeline.report.meaning import Group, rankings
-from imubench_pipeline.report.parameters import shown_symbols
-from imubench_pipeline.report.practical import System, page_unit, temperature_text
-from imubench_pipeline.report.run_summary import left_out, one_line, rejections, serious
-from imubench_pipeline.report.terminal_table import fitting
+from imubench_pipeline.report.meaning import Group, format_rankings
+from imubench_pipeline.report.parameters import select_symbols
+from imubench_pipeline.report.practical import System, choose_page_unit, format_temperature
+from imubench_pipeline.report.run_summary import (
+    fold_text,
+    list_failures,
+    list_rejections,
+    select_warnings,
+)
+from imubench_pipeline.report.terminal_table import fit_table
 from imubench_pipeline.settings.requirements import Requirement
 from imubench_pipeline.settings.sensor import quantity_of
 from imubench_pipeline.words.estimates import STATUS_WORDS, symbol_text
@@ -51,7 +56,7 @@ _BESIDE = 34
 """Columns of the remarks below a verdict."""
 
 
-def parts(
+def render_comparison(
     tables: Mapping[str, pa.Table],
     *,
     requirement: str | None,
@@ -78,11 +83,11 @@ def parts(
         + f", {failed} failed" * bool(failed)
         + f"; {simulated} simulated, not measured\n"
     )
-    yield from _listed("Failed", left_out(FailureRow.rows_of(tables["failures"])))
-    yield from _listed("Rejected", rejections(recordings))
+    yield from _listed("Failed", list_failures(FailureRow.rows_of(tables["failures"])))
+    yield from _listed("Rejected", list_rejections(recordings))
     findings = FindingRow.rows_of(tables["findings"])
     warnings = []
-    for row in serious(findings):
+    for row in select_warnings(findings):
         place = " ".join(filter(None, (f"{row.sensor}/{row.recording}", row.channel)))
         warnings.append(f"{place} ({row.finding.replace('_', ' ')}): {row.detail}")
     yield from _listed("Warnings", warnings, cut=True)
@@ -101,7 +106,9 @@ def parts(
     yield from _parameter_tables(chosen, f"{which}, with 95 % intervals", about, system, width)
 
 
-def logs(tables: Mapping[str, pa.Table], system: System, width: int) -> Iterator[RenderableType]:
+def render_logs(
+    tables: Mapping[str, pa.Table], system: System, width: int
+) -> Iterator[RenderableType]:
     """Yield properties, findings and parameters of each of a few logs.
 
     The width is in columns of the terminal.
@@ -113,11 +120,11 @@ def logs(tables: Mapping[str, pa.Table], system: System, width: int) -> Iterator
     for row in RecordingRow.rows_of(tables["recordings"]):
         findings, parameters = _of(row, every_finding), _of(row, every_parameter)
         length = _length(row, parameters, _of(row, allan))
-        yield Text(one_line(row.recording) + length, style="bold")
+        yield Text(fold_text(row.recording) + length, style="bold")
         if row.status != "ok":
-            yield Text(f"  {row.status}: {one_line(row.reason or '', _LONGEST_FINDING)}\n")
+            yield Text(f"  {row.status}: {fold_text(row.reason or '', _LONGEST_FINDING)}\n")
             continue
-        yield from _listed("Warnings", map(_of_log, serious(findings)))
+        yield from _listed("Warnings", map(_of_log, select_warnings(findings)))
         doubts = []
         for doubt in _of(row, every_doubt):
             of = " ".join(filter(None, (doubt.channel, ", ".join(doubt.parameters)))) or "all"
@@ -150,7 +157,7 @@ def _length(
     rates = [line.cluster_size / line.tau for line in allan]
     words = [f"{duration_text(row.duration)} at {rates_text(row.rate, rates)}"]
     words += [counted(channels, "channel")]
-    words += [text] if (text := temperature_text(row)) else []
+    words += [text] if (text := format_temperature(row)) else []
     return ": " + ", ".join(words) + ", simulated" * row.simulated
 
 
@@ -168,7 +175,7 @@ def _parameter_tables(
         own = [row for row in rows if quantity_of(row.channel) == quantity]
         if own:
             heads, lines = _parameter_lines(quantity, own, about, system)
-            yield fitting(f"{title}: {which}", heads, lines, width, names=0)
+            yield fit_table(f"{title}: {which}", heads, lines, width, names=0)
             # The reasons of values without a doubt, each remark once.
             channels: dict[str, dict[str, None]] = {}
             for row in own:
@@ -176,7 +183,7 @@ def _parameter_tables(
                     remark = f"{symbol_text(row.parameter)}: {row.reason}"
                     channels.setdefault(remark, {})[row.channel] = None
             for remark, of in channels.items():
-                yield Text(one_line(f"{', '.join(of)}: {remark}", _LONGEST_FINDING))
+                yield Text(fold_text(f"{', '.join(of)}: {remark}", _LONGEST_FINDING))
             yield Text()
 
 
@@ -186,7 +193,7 @@ def _listed(title: str, lines: Iterable[str], *, cut: bool = False) -> Iterator[
     if listed:
         yield Text(f"{title}: {len(listed)}", style="bold")
         for line in listed:
-            text = one_line(line, _LONGEST_FINDING)
+            text = fold_text(line, _LONGEST_FINDING)
             yield Text(f"  {text}", no_wrap=cut, overflow="ellipsis")
         yield Text()
 
@@ -207,24 +214,24 @@ def _ranking_tables(
     simulated = {key: row.simulated for key, row in about.items()}
     limit = "limit" if requirement else "deciding limit"
     heads = ["", "sensor", "verdict", "error of allowed (1σ)", limit, "margin"]
-    for ranking in rankings(rows, asked, simulated, system):
+    for ranking in format_rankings(rows, asked, simulated, system):
         lines = [
             line
             for group in ranking.groups
             for line in _ranking_lines(group, every=requirement is not None)
         ]
-        yield fitting(f"Ranking for {ranking.name}", heads, lines, width, names=1)
+        yield fit_table(f"Ranking for {ranking.name}", heads, lines, width, names=1)
         yield Text()
 
 
 def _ranking_lines(group: Group, *, every: bool) -> Iterator[list[str | Text]]:
     """Yield the lines of a sensor: of every limit, or of the deciding one."""
     row = group.row
-    sensor = one_line(group.sensor + " (simulated)" * group.simulated)
+    sensor = fold_text(group.sensor + " (simulated)" * group.simulated)
     if row.tied_with:
-        sensor += "\n" + one_line(f"similar to {', '.join(row.tied_with)}")
+        sensor += "\n" + fold_text(f"similar to {', '.join(row.tied_with)}")
     style = "yellow" if row.conditions else _STYLES[row.verdict]
-    verdict = Text(one_line(group.stated), style=style)
+    verdict = Text(fold_text(group.stated), style=style)
     if group.weak:
         verdict.stylize("dim")
     for line in (
@@ -233,7 +240,7 @@ def _ranking_lines(group: Group, *, every: bool) -> Iterator[list[str | Text]]:
         group.corrected,
     ):
         # The column of names gets the rest of the width.
-        wrapped = wrap(one_line(line, _LONGEST_FINDING), _BESIDE)
+        wrapped = wrap(fold_text(line, _LONGEST_FINDING), _BESIDE)
         verdict.append("".join(f"\n{part}" for part in wrapped), style="yellow")
     first: list[str | Text] = [group.rank, sensor, verdict]
     for limit in group.limits:
@@ -249,8 +256,8 @@ def _parameter_lines(
     quantity: str, rows: Sequence[ParameterRow], about: About, system: System
 ) -> tuple[list[str], list[list[str | Text]]]:
     """Return the heads and a line a channel, with a column a parameter that some channel has."""
-    symbols = shown_symbols(rows)
-    units = {symbol: page_unit(quantity, symbol, system) for symbol in symbols}
+    symbols = select_symbols(rows)
+    units = {symbol: choose_page_unit(quantity, symbol, system) for symbol in symbols}
     by_channel: dict[tuple[str, str, str], list[ParameterRow]] = {}
     for row in rows:
         name = (row.sensor, row.recording, row.channel)
@@ -265,7 +272,7 @@ def _parameter_lines(
             _cell([each for each in own if each.parameter == symbol], unit, log.duration)
             for symbol, unit in units.items()
         )
-        lines.append([one_line(shown), *cells])
+        lines.append([fold_text(shown), *cells])
     return [
         "channel" if alone else "recording",
         *(f"{symbol_text(symbol)}\n{unit.sign}" for symbol, unit in units.items()),

@@ -14,7 +14,7 @@ _NAME_FOLDS_AT = 16
 _GAP = 2
 
 
-def fitting(
+def fit_table(
     title: str,
     heads: Sequence[str],
     lines: Sequence[Sequence[str | Text]],

@@ -8,7 +8,7 @@ import numpy as np
 
 from imubench_pipeline.estimators.estimate import SENSOR
 from imubench_pipeline.model.estimates import LowPassRow, ParameterRow, TemperatureRow
-from imubench_pipeline.report.practical import System, page_unit
+from imubench_pipeline.report.practical import System, choose_page_unit
 from imubench_pipeline.report.view import ChannelView
 from imubench_pipeline.words.numbers import limit_digits, number_text, sentence
 
@@ -37,7 +37,7 @@ _MIN_SHOWN_RATIO = 1.05
 """Ratio of Allan deviations without and with compensation from which it is stated."""
 
 
-def figures(channel: ChannelView) -> Iterator[Mapping[str, object]]:
+def list_thermal_figures(channel: ChannelView) -> Iterator[Mapping[str, object]]:
     """Yield the lines of the table: temperature effect, where it was fitted, and low-pass."""
     estimated = channel.parameters.get("likelihood", ())
     before = {row.parameter: row for row in estimated if row.parameter == SENSOR}
@@ -66,14 +66,14 @@ def figures(channel: ChannelView) -> Iterator[Mapping[str, object]]:
         }
 
 
-def answer(channel: ChannelView, system: System) -> list[str]:
+def describe_thermal(channel: ChannelView, system: System) -> list[str]:
     """Return the results for temperature and low-pass, as sentences."""
     lines = []
     temperature, low_pass = channel.temperature, channel.low_pass
     if temperature:
         sensitivity = temperature["sensitivity"]
         if sensitivity.compensated:
-            unit = page_unit(channel.quantity, "sensitivity", system)
+            unit = choose_page_unit(channel.quantity, "sensitivity", system)
             size = f"{unit.text(sensitivity.value, 3)} {unit.sign}"
             change = f"The bias changes with temperature by {size}."
             lines += [change + _describe_reduction(channel), _NOT_COMPENSATED]

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from pandas.util import hash_array
 from scipy.special import chdtri
 
-from imubench_pipeline.estimators.rows import estimate_of
+from imubench_pipeline.estimators.rows import make_estimate
 from imubench_pipeline.model.comparisons import DatasheetCurveRow, DatasheetRow, ErrorBudgetRow
 from imubench_pipeline.model.estimates import (
     DeterministicRow,
@@ -129,7 +129,7 @@ class ChannelView:
     def model(self, method: str) -> NoiseModel:
         """Return the noise model that a method estimated."""
         if method not in self._models:
-            self._models[method] = estimate_of(method, self.parameters[method]).model
+            self._models[method] = make_estimate(method, self.parameters[method]).model
         return self._models[method]
 
     def named(self, method: str, symbol: str) -> list[ParameterRow]:
@@ -267,7 +267,7 @@ class RecordingView:
         return list(channels.values())
 
 
-def recording_views(tables: Mapping[str, pa.Table]) -> list[RecordingView]:
+def gather_recordings(tables: Mapping[str, pa.Table]) -> list[RecordingView]:
     """Gather the tables by recording, in the order of the table ``recordings``."""
     divided = {name: _divide(tables[name], "sensor", "recording") for name in BY_RECORDING}
     keys = cache(partial(_make_keys, tables))

@@ -10,15 +10,15 @@ from imubench_pipeline.datasheets.plausibility import implausible_of
 from imubench_pipeline.estimators.frame import MIN_BINS, select_for_fit
 from imubench_pipeline.estimators.likelihood import fit_models
 from imubench_pipeline.estimators.spectral_findings import spectral_findings
-from imubench_pipeline.estimators.spectrum import spectra
+from imubench_pipeline.estimators.spectrum import compute_spectra
 from imubench_pipeline.recordings.drop_zone import Recording
 from imubench_pipeline.recordings.ingest import ingest_as_planned
 from imubench_pipeline.recordings.kept import Quality
-from imubench_pipeline.recordings.recording import ChannelLog, static_logs
-from imubench_pipeline.report.run_summary import one_line
+from imubench_pipeline.recordings.recording import ChannelLog, open_static_logs
+from imubench_pipeline.report.run_summary import fold_text
 from imubench_pipeline.run.plan import Plan
 from imubench_pipeline.settings.config import AllanSettings
-from imubench_pipeline.steps.allan import curve_of_channel, too_sparse
+from imubench_pipeline.steps.allan import compute_channel_curve, report_too_sparse
 from imubench_pipeline.tables.failures import Failure, describe_error
 from imubench_pipeline.tables.findings import Finding
 
@@ -32,7 +32,7 @@ def check(plan: Plan) -> Iterator[tuple[str, str, Quality]]:
             with tempfile.TemporaryDirectory(prefix="imubench.") as folder:
                 quality = _check_recording(plan, recording, Path(folder))
         except Exception as error:  # the others are checked all the same
-            reason = one_line(f"{recording.path.name}: {describe_error(error)}")
+            reason = fold_text(f"{recording.path.name}: {describe_error(error)}")
             failure = Failure(sensor, name, "check", "error", reason)
             quality = Quality({"status": "failed"}, [failure.finding().row(sensor, name)], {})
         yield sensor, name, quality
@@ -45,7 +45,7 @@ def _check_recording(plan: Plan, recording: Recording, folder: Path) -> Quality:
     quality = ingest_as_planned(recording.path, settings, *key, folder, guarded=True)
     quality.findings.extend(implausible_of(quality, plan.sensors.get(recording.sensor)))
     how = AllanSettings.model_validate_json(plan.settings("allan"))
-    for channel, log in static_logs(folder).items():
+    for channel, log in open_static_logs(folder).items():
         for finding in findings_of_channel(channel, log, plan.bandwidth(*key), how):
             quality.findings.append(finding.row(*key))
     return quality
@@ -60,8 +60,12 @@ def findings_of_channel(
     """
     if log.holes:
         # Filling gaps needs a model, which only the estimation has.
-        return [] if len(curve_of_channel(log, settings).tau) else [too_sparse(channel, log)]
-    spectrum, line_spectra = spectra(log.blocks(), log.grid, log.rate, log.segments)
+        return (
+            []
+            if len(compute_channel_curve(log, settings).tau)
+            else [report_too_sparse(channel, log)]
+        )
+    spectrum, line_spectra = compute_spectra(log.blocks(), log.grid, log.rate, log.segments)
     frame = select_for_fit(spectrum, line_spectra, bandwidth=bandwidth)
     if frame.used.sum() >= MIN_BINS:
         frame, _, _ = fit_models(spectrum, frame)

@@ -29,15 +29,15 @@ from imubench_pipeline.run import run_command as run
 from imubench_pipeline.run import shortlist_command as shortlist
 from imubench_pipeline.run import simulate_command as simulation
 from imubench_pipeline.run.analysis import command as analysis
-from imubench_pipeline.run.places import places_about
+from imubench_pipeline.run.places import find_protected_places
 from imubench_pipeline.run.verification import command as verification
 from imubench_pipeline.settings.command_line import (
     LONGEST,
     NO_RESULTS,
     Command,
-    named_path,
-    number,
-    seconds,
+    make_number_type,
+    parse_path,
+    parse_seconds,
 )
 from imubench_pipeline.settings.config import Run, read_config
 from imubench_pipeline.settings.extras import ExtraError
@@ -51,7 +51,7 @@ from imubench_pipeline.tables.outputs import (
     check_outputs,
     explain,
 )
-from imubench_pipeline.tables.texts import printable
+from imubench_pipeline.tables.texts import escape_invisible
 
 SCHEMAS: dict[str, type[BaseModel]] = {
     "run": Run,
@@ -67,7 +67,7 @@ _CLOSED_PIPE = 141
 """Exit status that shells give a command whose reader has gone."""
 
 
-def command_parser() -> argparse.ArgumentParser:
+def make_parser() -> argparse.ArgumentParser:
     """Return what reads the commands and their options."""
     parser = argparse.ArgumentParser(prog="imubench", description="Inertial sensor benchmark.")
     parser.add_argument(
@@ -79,7 +79,7 @@ def command_parser() -> argparse.ArgumentParser:
         command.add_arguments(of_it)
         for action in of_it._actions:
             if action.type is Path:
-                action.type = named_path
+                action.type = parse_path
         said = (f"{status} {meaning}" for status, meaning in enumerate(command.statuses) if meaning)
         of_it.epilog = f"Exit status: {'; '.join(said)}."
     return parser
@@ -87,7 +87,7 @@ def command_parser() -> argparse.ArgumentParser:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command; return its exit status."""
-    parser = command_parser()
+    parser = make_parser()
     own = list(sys.argv[1:] if arguments is None else arguments)
     first = next(iter(own), "-")
     flags = []
@@ -101,7 +101,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = parser.parse_args(own, argparse.Namespace(flags=flags))
     results = getattr(options, "results", None)
     try:
-        check_outputs(options, lambda path: places_about(path, results))
+        check_outputs(options, lambda path: find_protected_places(path, results))
         status = COMMANDS[options.command].run(options)
         sys.stdout.flush()
         return status
@@ -113,7 +113,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         _close_terminal()
         return _CLOSED_PIPE
     except OSError as error:
-        file = "" if error.filename is None else f"{printable(os.fsdecode(error.filename))}: "
+        file = (
+            "" if error.filename is None else f"{escape_invisible(os.fsdecode(error.filename))}: "
+        )
         print(f"imubench {options.command}: {file}{explain(error)}", file=sys.stderr)
         _close_terminal()
         return 2
@@ -164,7 +166,7 @@ def _add_export(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--horizon",
-        type=number(1e-9, LONGEST, "a time above 0, such as 60 s", seconds),
+        type=make_number_type(1e-9, LONGEST, "a time above 0, such as 60 s", parse_seconds),
         default="60 s",
         metavar="TIME",
         help="of coasting, for which terms that the program lacks are mapped; default: 60 s",
@@ -172,7 +174,7 @@ def _add_export(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--inflate",
         dest="inflation",
-        type=number(1e-6, 1e6, "a factor of 1e-6 to 1e6"),
+        type=make_number_type(1e-6, 1e6, "a factor of 1e-6 to 1e6"),
         default=1.0,
         metavar="FACTOR",
         help="multiplies every deviation",
@@ -186,7 +188,7 @@ def _add_export(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--excess",
         dest="most_excess",
-        type=number(1.0, 1e6, "a factor of 1 to 1e6"),
+        type=make_number_type(1.0, 1e6, "a factor of 1 to 1e6"),
         default=3.0,
         metavar="FACTOR",
         help="an overbound whose Allan deviation must be more times its limit is refused; "
@@ -195,13 +197,13 @@ def _add_export(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--method", help="of the estimates; default: the recommended one")
     parser.add_argument(
         "--latitude",
-        type=number(-90.0, 90.0, "a latitude of -90 to 90, in degrees"),
+        type=make_number_type(-90.0, 90.0, "a latitude of -90 to 90, in degrees"),
         metavar="DEG",
         help="for gravity",
     )
     parser.add_argument(
         "--rate",
-        type=number(1e-6, 1e9, "a rate above 0, in Hz"),
+        type=make_number_type(1e-6, 1e9, "a rate above 0, in Hz"),
         metavar="HZ",
         help="default: the recording's",
     )
@@ -268,7 +270,7 @@ def _check(options: argparse.Namespace) -> int:
         simulated = ", simulated" * bool(quality.recording.get("simulated"))
         print(f"{sensor}/{recording}: {status}{simulated}")
         for finding in quality.findings:
-            line = f"  {finding.severity:8} {finding.finding}: {printable(finding.detail)}"
+            line = f"  {finding.severity:8} {finding.finding}: {escape_invisible(finding.detail)}"
             if sys.stdout.isatty():  # elsewhere one line each, for programs such as grep
                 width = max(shutil.get_terminal_size().columns - 1, 40)
                 line = textwrap.fill(line, width, subsequent_indent=" " * 11)
@@ -282,7 +284,7 @@ INSPECTED_S, INSPECTED_BYTES = 10.0, 1 << 29
 
 
 def _inspect(options: argparse.Namespace) -> int:
-    from imubench_pipeline.readers.bounded import BoundError, bounded
+    from imubench_pipeline.readers.bounded import BoundError, run_bounded
     from imubench_pipeline.readers.inspection import inspect
     from imubench_pipeline.tables.findings import RecordingError
 
@@ -292,7 +294,7 @@ def _inspect(options: argparse.Namespace) -> int:
     output: OutputFile | None = options.output
     try:
         model = output.path.stem if output is not None else None
-        inspected = bounded(INSPECTED_S, INSPECTED_BYTES, inspect, options.log, model)
+        inspected = run_bounded(INSPECTED_S, INSPECTED_BYTES, inspect, options.log, model)
         if output is not None:
             output.write(inspected.block)
     except BoundError as error:
@@ -322,13 +324,13 @@ def _add_completion(parser: argparse.ArgumentParser) -> None:
 
 
 def _completion(options: argparse.Namespace) -> int:
-    parser = command_parser()
+    parser = make_parser()
     of_commands = next(
         action for action in parser._actions if isinstance(action, argparse._SubParsersAction)
     )
     for command in of_commands.choices.values():
         for action in command._actions:
-            if action.type is named_path:
+            if action.type is parse_path:
                 action.complete = shtab.FILE
     print(shtab.complete(parser, options.shell))
     return 0

@@ -11,11 +11,11 @@ from pathlib import Path
 from pydantic import BaseModel
 
 from imubench_pipeline.recordings.kept import Quality
-from imubench_pipeline.report.run_summary import one_line
+from imubench_pipeline.report.run_summary import fold_text
 from imubench_pipeline.tables.digests import read_sealed_json, write_sealed_json
 from imubench_pipeline.tables.failures import Cause, Failure
 from imubench_pipeline.tables.findings import RecordingError
-from imubench_pipeline.tables.seals import place_of
+from imubench_pipeline.tables.seals import name_place
 
 Of = tuple[str, str, str | None]
 """Step, sensor and recording; None: a step of the whole sensor."""
@@ -98,11 +98,11 @@ class Faults:
         """Return the message about failures of a run; empty if its caller reports them (`TOLD`)."""
         lines = ["what failed is left out, and tried again by the next run; the report is there"]
         for failure, log in self.now():
-            lines.append(f"  {one_line(f'{failure.name}: {failure.reason}')}\n    log: {log}")
+            lines.append(f"  {fold_text(f'{failure.name}: {failure.reason}')}\n    log: {log}")
         return "" if len(lines) == 1 or TOLD in os.environ else "\n".join(lines)
 
     def _path(self, of: Of) -> Path:
-        return self._folder / f"{place_of(*of)}.json"
+        return self._folder / f"{name_place(*of)}.json"
 
     def _records(self) -> Iterator[tuple[Of, _Record]]:
         for path in sorted(self._folder.glob("*/**/*.json")):

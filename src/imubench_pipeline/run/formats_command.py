@@ -11,13 +11,13 @@ Line = Sequence[str]
 def run(_: argparse.Namespace) -> int:
     """Print both tables; return the exit status."""
     print("Logs that are read: `reader` of a sensor file, mostly found in the file itself")
-    print("\n".join(_aligned(list(log_formats()))))
+    print("\n".join(_aligned(list(list_log_formats()))))
     print("\nPrograms that files are written for: `imubench export --target`, `exports: targets`")
-    print("\n".join(_aligned(list(export_targets()))))
+    print("\n".join(_aligned(list(list_export_targets()))))
     return 0
 
 
-def log_formats() -> Iterator[Line]:
+def list_log_formats() -> Iterator[Line]:
     """Yield a line a format of log files, the heads first."""
     # Only this command needs these: the others answer at once.
     from imubench_pipeline.readers.formats import FILE_FORMATS
@@ -34,7 +34,7 @@ def log_formats() -> Iterator[Line]:
         )
 
 
-def export_targets() -> Iterator[Line]:
+def list_export_targets() -> Iterator[Line]:
     """Yield a line a program that noise models are exported for, the heads first."""
     from imubench_pipeline.export.targets import TARGETS
 

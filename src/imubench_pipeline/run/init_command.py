@@ -8,7 +8,7 @@ from functools import partial
 from pathlib import Path
 
 from imubench_pipeline.run.places import has_results
-from imubench_pipeline.settings.shipped import project
+from imubench_pipeline.settings.shipped import find_project
 from imubench_pipeline.tables.outputs import OutputFolder, add_output
 
 _DEMONSTRATION = ("config/simulated.yaml", "config/boards")
@@ -37,7 +37,7 @@ def run(options: argparse.Namespace) -> int:
     """Make the folder; return the exit status."""
     output: OutputFolder = options.folder
     folder = output.path
-    shipped, own = project(), Path(__file__).with_name("lab")
+    shipped, own = find_project(), Path(__file__).with_name("lab")
     files = {
         "config/config.yaml": shipped / "config/config.yaml",
         "config/example_sensor.yaml": own / "example_sensor.yaml",

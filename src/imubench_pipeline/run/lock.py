@@ -17,7 +17,7 @@ from typing import Any
 
 import psutil
 
-from imubench_pipeline.run.recovery import restarted
+from imubench_pipeline.run.recovery import was_restarted
 from imubench_pipeline.tables import read_json
 
 INHERITED = "IMUBENCH_LOCK"
@@ -31,7 +31,7 @@ class TakenError(RuntimeError):
     """Raised if another run uses the results; the message names it and its start."""
 
 
-def lock_of(results: Path) -> Path:
+def locate_lock(results: Path) -> Path:
     """Return the file of the lock on a folder of results."""
     return results / "nightly/lock"
 
@@ -87,7 +87,7 @@ class Lock:
             if os.path.samestat(held, self.path.stat()):
                 return
         self.acquire()
-        if not restarted(self.left_over):
+        if not was_restarted(self.left_over):
             self.left_over = {}
 
     def note(self, **more: object) -> None:

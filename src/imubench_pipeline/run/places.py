@@ -6,9 +6,9 @@ import os
 from collections.abc import Iterator
 from pathlib import Path
 
-from imubench_pipeline.report.folder import drop_zone_of
+from imubench_pipeline.report.folder import find_drop_zone
 from imubench_pipeline.settings.config import Run
-from imubench_pipeline.settings.shipped import CATALOGUE, project
+from imubench_pipeline.settings.shipped import CATALOGUE, find_project
 from imubench_pipeline.settings.validation import ConfigError
 from imubench_pipeline.settings.yaml_files import read_settings
 from imubench_pipeline.tables.outputs import Place
@@ -31,7 +31,7 @@ _RESULT_FOLDERS = (
 _WORKFLOW_PARTS = ("Snakefile", "workflow", "profiles", "src", "tests", "pyproject.toml")
 
 
-def places_about(path: Path, results: Path | None = None) -> Iterator[Place]:
+def find_protected_places(path: Path, results: Path | None = None) -> Iterator[Place]:
     """Yield the protected places that may contain a path, or be inside it.
 
     These are the configuration of the package, and the ``config/``, logs, results, sensors,
@@ -43,7 +43,7 @@ def places_about(path: Path, results: Path | None = None) -> Iterator[Place]:
     above = [path, *path.parents]
     given = [] if results is None else [results.absolute(), Path(os.path.realpath(results))]
     found = [folder for folder in above if has_results(folder)] + given
-    yield Place(project() / "config", "config", "the configuration of the package")
+    yield Place(find_project() / "config", "config", "the configuration of the package")
     projects = [Path.cwd(), *above, *(folder for one in given for folder in one.parents)]
     for folder in dict.fromkeys(projects):
         if not (folder / _CONFIG_FILE).is_file():
@@ -60,7 +60,7 @@ def places_about(path: Path, results: Path | None = None) -> Iterator[Place]:
         found.append(folder / run.results)
     found += [folder / "results" for folder in projects if has_results(folder / "results")]
     for folder in dict.fromkeys(found):
-        if (logs := drop_zone_of(folder)) is not None:
+        if (logs := find_drop_zone(folder)) is not None:
             yield Place(logs.absolute(), "logs", "the logs")
         yield from (
             Place(folder / name, "results", "the results of runs") for name in _RESULT_FOLDERS

@@ -19,9 +19,9 @@ from typing import Any
 from pydantic import BaseModel
 
 from imubench_pipeline.datasheets.suspicion import usual_as_text, usual_figures
-from imubench_pipeline.navigation.suitability.abilities import abilities
-from imubench_pipeline.recordings.drop_zone import Recording, account_for, found_logs
-from imubench_pipeline.recordings.known_logs import versions_of
+from imubench_pipeline.navigation.suitability.abilities import read_abilities
+from imubench_pipeline.recordings.drop_zone import Recording, account_for, find_logs
+from imubench_pipeline.recordings.known_logs import plan_recording_versions
 from imubench_pipeline.registry import blocks
 from imubench_pipeline.run.faults import Faults
 from imubench_pipeline.settings.config import Run, given_beside, read_run
@@ -37,7 +37,7 @@ from imubench_pipeline.settings.sensor import (
     read_sensor_files,
     shipped_sensors,
 )
-from imubench_pipeline.settings.shipped import folders, own_folder
+from imubench_pipeline.settings.shipped import find_own_folder, list_folders
 from imubench_pipeline.settings.simulated_recordings import (
     Board,
     SimulatedRecording,
@@ -47,9 +47,9 @@ from imubench_pipeline.settings.simulated_recordings import (
 )
 from imubench_pipeline.settings.validation import ConfigError, UnavailableSettingsError, parse
 from imubench_pipeline.settings.yaml_files import read_yaml
-from imubench_pipeline.tables.digests import digest_of
-from imubench_pipeline.tables.provenance import source_digest
-from imubench_pipeline.units import quantity_to_si
+from imubench_pipeline.tables.digests import compute_digest
+from imubench_pipeline.tables.provenance import digest_sources
+from imubench_pipeline.units import parse_quantity
 
 _INGEST_OUTPUTS = ("quality.json", "envelope.parquet", "histogram.parquet")
 _RANKING_KEYS = ("price_class", "must")
@@ -83,7 +83,7 @@ class Plan:
         self.run: Run = read_run(config)
         _check_places(self.run)
         self.faults = Faults(self.run.results)
-        declared = read_sensor_files(folders(self.run.sensors, "sensors"))
+        declared = read_sensor_files(list_folders(self.run.sensors, "sensors"))
         self.sensors: dict[str, Sensor] = {}
         self.unusable: dict[str, ConfigError] = {}
         """Error of each unusable sensor file, by sensor: all logs of these sensors are rejected."""
@@ -93,7 +93,7 @@ class Plan:
             else:
                 self.sensors[name] = sensor
         self.requirements: dict[str, Requirement] = read_requirements(
-            self.run.requirements and folders(self.run.requirements, "requirements")
+            self.run.requirements and list_folders(self.run.requirements, "requirements")
         )
         simulated = read_simulated(self.run.to_simulate, declared)
         self.boards: dict[str, Board] = simulated.boards
@@ -140,7 +140,7 @@ class Plan:
             return []
         by_name: dict[str, list[Recording]] = {}
         results = self.run.results.resolve()
-        for log in found_logs(self.run.logs):
+        for log in find_logs(self.run.logs):
             if log.path.is_symlink() and Path(os.path.realpath(log.path)).is_relative_to(results):
                 log = replace(log, error=f"{log.path.name} links to the results of runs: remove it")
             by_name.setdefault(f"{log.sensor}/{log.name}", []).append(log)
@@ -199,7 +199,7 @@ class Plan:
                     notes.check_gyro(log)
                 except ValueError as error:
                     raise ConfigError(f"{recording.notes}: {error}") from None
-            files = versions_of(recording, self.run.results)
+            files = plan_recording_versions(recording, self.run.results)
             return settings | of_ingest(log, notes, kind) | {"files": files}
         except UnavailableSettingsError as error:
             return settings | {"unavailable": self._without_folders(str(error))}
@@ -305,7 +305,7 @@ class Plan:
         if recording.sensor in self.unusable:
             raise self.unusable[recording.sensor]
         if recording.sensor not in self.sensors:
-            expected = own_folder(self.run.sensors) / f"{recording.sensor}.yaml"
+            expected = find_own_folder(self.run.sensors) / f"{recording.sensor}.yaml"
             raise ConfigError(
                 f"no sensor file {expected} for the logs in {self.run.logs / recording.sensor}; "
                 "write one, or move the logs to the folder of their sensor"
@@ -329,14 +329,14 @@ class Plan:
             stated = self._written(self.recordings[sensor, name])[0].bandwidth
         except ConfigError:
             return None
-        return quantity_to_si(stated, "frequency") if stated else None
+        return parse_quantity(stated, "frequency") if stated else None
 
     def simulated_settings(self, sensor: str, name: str) -> str:
         """Return the parameters and the log format of a simulated recording."""
         recording = self.simulated[sensor, name]
         written = layout(recording, self.sensors[sensor].log)
         try:
-            profiles = {str(path): digest_of(path) for path in profile_files(recording)}
+            profiles = {str(path): compute_digest(path) for path in profile_files(recording)}
         except OSError as error:
             raise ConfigError(
                 f"{sensor}/{name}: {error.filename} cannot be read "
@@ -385,7 +385,7 @@ class Plan:
             if self.sensors[name].sold
         }
         for name, about in sensors.items():
-            about["abilities"] = abilities(self.sensors[name]).model_dump(mode="json")
+            about["abilities"] = read_abilities(self.sensors[name]).model_dump(mode="json")
         requirements = self._requirements("title", "note", "example", "environment")
         return to_json({"requirements": requirements, "sensors": sensors})
 
@@ -463,7 +463,7 @@ class Plan:
     @staticmethod
     def code(step: str, package: str = "steps") -> str:
         """Return the digest of the code that a step runs: the module of its name in a package."""
-        return source_digest(f"{package}.{step}")
+        return digest_sources(f"{package}.{step}")
 
 
 def _dump_for_samples(recording: SimulatedRecording) -> dict[str, Any]:

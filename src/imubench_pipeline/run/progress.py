@@ -24,7 +24,7 @@ from snakemake.logging import ColorizingTextHandler
 from snakemake_interface_logger_plugins.base import LogHandlerBase
 from snakemake_interface_logger_plugins.common import LogEvent
 
-from imubench_pipeline.report.run_summary import one_line
+from imubench_pipeline.report.run_summary import fold_text
 
 OURS: Mapping[str, Any] = {"imubench": True}
 """Marks a record that is shown unchanged: ``logger.info(text, extra=OURS)``."""
@@ -135,7 +135,7 @@ class LogHandler(LogHandlerBase):
 
     def _start_job(self, about: Mapping[str, Any]) -> None:
         wildcards: Mapping[str, Any] = about.get("wildcards") or {}
-        label = one_line(f"{about.get('rule_name')} {'/'.join(map(str, wildcards.values()))}")
+        label = fold_text(f"{about.get('rule_name')} {'/'.join(map(str, wildcards.values()))}")
         self._running[about["jobid"]] = (label, time.monotonic())
         if wildcards.get("sensor") and wildcards.get("recording"):
             self._of[about["jobid"]] = str(wildcards["sensor"]), str(wildcards["recording"])
@@ -164,7 +164,7 @@ class LogHandler(LogHandlerBase):
         _expected[recording] -= 1
         if _expected[recording] == 0:
             for told in _told:
-                self._print(one_line(told(*recording), _MAX_LINE_LENGTH))
+                self._print(fold_text(told(*recording), _MAX_LINE_LENGTH))
 
     def _hide(self) -> None:
         if self._live is not None:

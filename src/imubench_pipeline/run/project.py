@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from imubench_pipeline.settings.shipped import project
+from imubench_pipeline.settings.shipped import find_project
 from imubench_pipeline.settings.validation import ConfigError
 
 _SNAKEFILE_PATHS = ("Snakefile", "workflow/Snakefile")
@@ -15,7 +15,7 @@ def has_snakefile(folder: Path) -> bool:
     return any((folder / own).is_file() for own in _SNAKEFILE_PATHS)
 
 
-def snakefile_of(folder: Path) -> Path:
+def find_snakefile(folder: Path) -> Path:
     """Return the Snakefile of a folder; for a folder of logs, the Snakefile of this package.
 
     Raises
@@ -26,7 +26,7 @@ def snakefile_of(folder: Path) -> Path:
     for own in _SNAKEFILE_PATHS:
         if (folder / own).is_file():
             return (folder / own).absolute()
-    shipped = project() / "Snakefile"
+    shipped = find_project() / "Snakefile"
     if not (folder / "config/config.yaml").is_file():
         raise ConfigError(
             f"{folder}: found no config/config.yaml and no Snakefile; expected a folder of logs, "

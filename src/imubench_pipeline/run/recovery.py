@@ -37,7 +37,7 @@ _MAX_WRITE_DELAY = 60.0  # s; systems buffer writes in memory for about half a m
 _MAX_TERMINATION_TIME = 10.0  # s; for a process to end
 
 
-def snakemake_locks(project: Path, results: Path) -> list[Path]:
+def find_snakemake_locks(project: Path, results: Path) -> list[Path]:
     """Return the locks of Snakemake on files of these results; `project` has the Snakefile."""
     # The paths in a lock are as given to Snakemake: links are not resolved.
     inside = os.path.normpath(results) + os.sep
@@ -56,7 +56,7 @@ def snakemake_locks(project: Path, results: Path) -> list[Path]:
     return locks
 
 
-def owner(locks: Iterable[Path], project: Path, results: Path) -> int | None:
+def find_lock_owner(locks: Iterable[Path], project: Path, results: Path) -> int | None:
     """Return the Snakemake process that may own these locks; None: they are stale."""
     stamps = []
     for lock in locks:
@@ -89,7 +89,7 @@ def end_left_over(note: Mapping[str, Any], project: Path) -> int:
     `note` is the note of that run in the lock; the steps run in `project`.
     """
     group = note.get("snakemake")
-    if note.get("host") != platform.node() or not isinstance(group, int) or restarted(note):
+    if note.get("host") != platform.node() or not isinstance(group, int) or was_restarted(note):
         return 0
     ended = []
     for process in psutil.process_iter():
@@ -110,7 +110,7 @@ def end_group(group: int) -> None:
         os.killpg(group, signal.SIGKILL)
 
 
-def restarted(note: Mapping[str, Any], boot: float | None = None) -> bool:
+def was_restarted(note: Mapping[str, Any], boot: float | None = None) -> bool:
     """Return whether the machine was restarted after the begin of the run of this note.
 
     `boot`: start of the machine, s since 1970; default: from the system.
@@ -142,7 +142,7 @@ def remove_temporary(results: Path, locked: float) -> tuple[int, int]:
     return number, size
 
 
-def temporary(results: Path) -> list[Path]:
+def find_unfinished(results: Path) -> list[Path]:
     """Return the files and folders below the results that are not complete."""
     unfinished = [path for path in _walk_outputs(results) if _TEMPORARY_NAME.fullmatch(path.name)]
     return [path for path in unfinished if not any(other in path.parents for other in unfinished)]

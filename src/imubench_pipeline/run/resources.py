@@ -16,7 +16,7 @@ from pathlib import Path
 
 from imubench_pipeline.recordings.drop_zone import COMPRESSED, Recording
 from imubench_pipeline.run.plan import Plan
-from imubench_pipeline.units import quantity_to_si
+from imubench_pipeline.units import parse_quantity
 
 _OVERHEAD_MEMORY = 900
 """Memory of a job besides the step, MB: 550 for two Snakemake processes and the process that forks,
@@ -119,7 +119,7 @@ class OfMany:
 Cost = OfRecording | OfMany
 
 
-def resources_of(cost: Cost, extent: Extent, attempt: int = 1) -> dict[str, int]:
+def compute_resources(cost: Cost, extent: Extent, attempt: int = 1) -> dict[str, int]:
     """Return the memory in MB and the time in minutes that a job requests.
 
     Each attempt, counted from 1, requests twice as much as the one before.
@@ -132,7 +132,7 @@ def resources_of(cost: Cost, extent: Extent, attempt: int = 1) -> dict[str, int]
     }
 
 
-def asked(plan: Plan) -> Callable[[Cost], dict[str, Asked]]:
+def make_resource_functions(plan: Plan) -> Callable[[Cost], dict[str, Asked]]:
     """Return a function from the cost of a rule to its resource functions."""
     extent = _make_extent_lookup(plan)
 
@@ -141,7 +141,7 @@ def asked(plan: Plan) -> Callable[[Cost], dict[str, Asked]]:
             # Snakemake passes arguments by their names.
             def amount(wildcards: Mapping[str, str], attempt: int) -> int:
                 size = extent(wildcards.get("sensor"), wildcards.get("recording"))
-                return resources_of(cost, size, attempt)[what]
+                return compute_resources(cost, size, attempt)[what]
 
             return amount
 
@@ -150,12 +150,12 @@ def asked(plan: Plan) -> Callable[[Cost], dict[str, Asked]]:
     return stated
 
 
-def limits_of_steps(plan: Plan) -> Limits:
+def make_step_limits(plan: Plan) -> Limits:
     """Return the limits of steps of recordings and sensors, from the settings of the plan."""
     extent = _make_extent_lookup(plan)
     limits = plan.run.limits
     seconds = {
-        key: quantity_to_si(getattr(limits, key), "time")
+        key: parse_quantity(getattr(limits, key), "time")
         for key in ("recording", "million_values", "sensor", "each_recording")
     }
 
@@ -193,19 +193,19 @@ def _estimate_extent(plan: Plan, recording: Recording) -> Extent:
     if recording.simulated:
         text = plan.simulated_settings(recording.sensor, recording.name)
         made = json.loads(text)["recording"]
-        seconds = quantity_to_si(made["duration"], "time")
-        samples = seconds * quantity_to_si(made["rate"], "frequency")
+        seconds = parse_quantity(made["duration"], "time")
+        samples = seconds * parse_quantity(made["rate"], "frequency")
         return Extent(samples / 1e6, len(made["channels"]))
     sensor = plan.sensors.get(recording.sensor)
     channels = len(sensor.log.channels) if sensor else 1
     try:
-        size = sum(size_as_text(path) for path in recording.files)
+        size = sum(estimate_text_size(path) for path in recording.files)
     except OSError:
         size = 0  # the ingest says what is wrong with it
     return Extent(size / (_BYTES_PER_VALUE * channels) / 1e6, channels)
 
 
-def size_as_text(path: Path) -> int:
+def estimate_text_size(path: Path) -> int:
     """Return the size that a file of a log might have as text, in bytes; 0 if there is none.
 
     Its samples may be packed: counts in binary, compressed text.

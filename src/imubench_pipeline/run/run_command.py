@@ -8,8 +8,8 @@ import sys
 from importlib import import_module
 from pathlib import Path
 
-from imubench_pipeline.run.project import snakefile_of
-from imubench_pipeline.settings.extras import extra
+from imubench_pipeline.run.project import find_snakefile
+from imubench_pipeline.settings.extras import require_extra
 from imubench_pipeline.settings.validation import ConfigError
 
 
@@ -31,11 +31,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Become Snakemake, whose exit status is that of the command."""
-    with extra("workflow", "run the workflow"):
+    with require_extra("workflow", "run the workflow"):
         import_module("snakemake")
     folder: Path = options.folder
     try:
-        snakefile = snakefile_of(folder)
+        snakefile = find_snakefile(folder)
         os.chdir(folder)
     except (ConfigError, OSError) as error:
         print(f"imubench run: {error}", file=sys.stderr)

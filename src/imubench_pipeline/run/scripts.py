@@ -15,8 +15,8 @@ from imubench_pipeline.run.faults import Faults, Of
 from imubench_pipeline.run.processes import Job, Processes, StepError
 from imubench_pipeline.run.recovery import remove_unfinished
 from imubench_pipeline.run.resources import Limits
-from imubench_pipeline.run.sealing import sealed
-from imubench_pipeline.tables.failures import QUALITY, Failure, failure_of, write_empty
+from imubench_pipeline.run.sealing import seal_outputs
+from imubench_pipeline.tables.failures import QUALITY, Failure, read_failure, write_empty
 
 _SCRIPT_SIGNATURE = signature(script_of_snakemake)
 
@@ -69,8 +69,8 @@ class Scripts:
         of: Of = (job.name, job.wildcards["sensor"], job.wildcards.get("recording"))
         outputs = [Path(path) for path in job.output]
         own = (Path(path) for path in job.input if Path(path).parent == outputs[0].parent)
-        if before := next((failure for path in own if (failure := failure_of(path))), None):
-            with sealed(job):
+        if before := next((failure for path in own if (failure := read_failure(path))), None):
+            with seal_outputs(job):
                 _leave_out(outputs, job.params, before)
             return
         limit = limits(*of[1:])
@@ -93,7 +93,7 @@ class Scripts:
             sys.stderr.write(error.trace)
             print(f"{failure.name} is left out: {reason}", file=sys.stderr, flush=True)
             self._faults.failed(failure, attempt, job.log)
-            with sealed(job):
+            with seal_outputs(job):
                 _leave_out(outputs, job.params, failure)
         else:
             self._faults.succeeded(of, attempt)

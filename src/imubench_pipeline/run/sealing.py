@@ -8,21 +8,21 @@ import json
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
-from imubench_pipeline.report.folder import files_of_report
+from imubench_pipeline.report.folder import list_report_files
 from imubench_pipeline.run.processes import Job
 from imubench_pipeline.tables.seals import (
     Seal,
     SealError,
-    digests,
-    form,
-    place_of,
+    compute_digests,
+    compute_form_digest,
+    name_place,
     read_seal,
     seal_files,
 )
 
 
 @contextlib.contextmanager
-def sealed(job: Job) -> Iterator[None]:
+def seal_outputs(job: Job) -> Iterator[None]:
     """Seal the outputs and inputs of a job when the block ends without error.
 
     A job without ``results`` is not sealed.
@@ -30,33 +30,33 @@ def sealed(job: Job) -> Iterator[None]:
     if job.results is None:
         yield
         return
-    inputs = digests(job.results, map(Path, job.input))
+    inputs = compute_digests(job.results, map(Path, job.input))
     yield
-    place = place_of(job.name, job.wildcards.get("sensor"), job.wildcards.get("recording"))
+    place = name_place(job.name, job.wildcards.get("sensor"), job.wildcards.get("recording"))
     outputs = [Path(path) for path in job.output]
     folder = outputs[0].parent
     # Outputs that no rule can declare: pages, and a series of each channel.
     if job.name == "report":
-        outputs = files_of_report(folder)
+        outputs = list_report_files(folder)
     elif job.name == "reconstruct" and (folder / "series").is_dir():
         outputs.append(folder / "series")
-    seal_files(job.results, place, outputs, inputs, settings_digest(dict(job.params.items())))
+    seal_files(job.results, place, outputs, inputs, digest_settings(dict(job.params.items())))
 
 
-def settings_digest(params: Mapping[str, object]) -> str:
+def digest_settings(params: Mapping[str, object]) -> str:
     """Return a digest of the parameters of a job, without the number of its attempt."""
     settings = {name: value for name, value in params.items() if name != "attempt"}
     return hashlib.sha256(json.dumps(settings, sort_keys=True).encode()).hexdigest()
 
 
-def unsound(results: Path, jobs: Mapping[str, str]) -> Iterator[str]:
+def find_unsound_jobs(results: Path, jobs: Mapping[str, str]) -> Iterator[str]:
     """Yield the jobs whose outputs are not those of the present inputs and settings.
 
     Outputs are missing or changed, have no seal, are of another form, or were made of other files
     or with other settings. The records of Snakemake are not used: results may come from a backup,
     or from another machine. A file with unchanged size and date is not read.
 
-    A job is named by the place of its seal; `jobs` has the `settings_digest` of each.
+    A job is named by the place of its seal; `jobs` has the `digest_settings` of each.
     """
     seals: dict[str, Seal] = {}
     for place in jobs:
@@ -67,7 +67,7 @@ def unsound(results: Path, jobs: Mapping[str, str]) -> Iterator[str]:
         seal = seals.get(place)
         if (
             seal is None
-            or (seal.settings, seal.form) != (settings, form())
+            or (seal.settings, seal.form) != (settings, compute_form_digest())
             or any(left.get(name) != digest for name, digest in seal.inputs.items())
             or any(file.fault(results / name, whole=False) for name, file in seal.outputs.items())
         ):

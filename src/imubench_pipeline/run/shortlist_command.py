@@ -34,16 +34,16 @@ def run(options: argparse.Namespace) -> int:
     # Only this command draws and computes: the others answer at once.
     from rich.console import Console
 
-    from imubench_pipeline.report.shortlist import cells, notes
-    from imubench_pipeline.report.terminal_table import fitting
+    from imubench_pipeline.report.shortlist import format_shortlist_row, list_assumptions
+    from imubench_pipeline.report.terminal_table import fit_table
     from imubench_pipeline.settings.config import Run
     from imubench_pipeline.settings.requirements import Requirement, read_requirements
     from imubench_pipeline.settings.sensor import read_sensors
-    from imubench_pipeline.settings.shipped import folders
+    from imubench_pipeline.settings.shipped import list_folders
     from imubench_pipeline.settings.validation import ConfigError
     from imubench_pipeline.settings.yaml_files import read_settings
-    from imubench_pipeline.steps.shortlist import NEEDED, rows_of_run
-    from imubench_pipeline.tables import tables_of_run
+    from imubench_pipeline.steps.shortlist import NEEDED, list_shortlist
+    from imubench_pipeline.tables import find_tables
 
     try:
         path = Path(options.requirement)
@@ -51,25 +51,25 @@ def run(options: argparse.Namespace) -> int:
             name, asked = path.stem, read_settings(Requirement, path)
         else:
             requirements = read_requirements(
-                folders(options.requirements or Run().requirements or (), "requirements")
+                list_folders(options.requirements or Run().requirements or (), "requirements")
             )
             if options.requirement not in requirements:
                 names = ", ".join(requirements) or "none"
                 raise ConfigError(f"no requirement {options.requirement!r}; there are: {names}")
             name, asked = options.requirement, requirements[options.requirement]
-        sensors = read_sensors(folders(options.sensors or Run().sensors, "sensors"))
+        sensors = read_sensors(list_folders(options.sensors or Run().sensors, "sensors"))
         tables = {}
         if options.results is not None:
-            tables = tables_of_run(options.results, NEEDED)
-        rows = [*rows_of_run({name: asked}, sensors, tables)]
+            tables = find_tables(options.results, NEEDED)
+        rows = [*list_shortlist({name: asked}, sensors, tables)]
     except (ConfigError, OSError, ValueError) as error:
         print(error, file=sys.stderr)
         return 2
     console = Console(highlight=False, markup=False, emoji=False)
     margins = [f"Margin\n{which}" for which in ("at best", "at worst", "measured")]
     heads = ["Sensor", "Verdict", *margins, "Limit"]
-    lines = [cells(row) for row in rows]
-    console.print(fitting(asked.title, heads, lines, console.width, names=0))
-    for note in notes(rows):
+    lines = [format_shortlist_row(row) for row in rows]
+    console.print(fit_table(asked.title, heads, lines, console.width, names=0))
+    for note in list_assumptions(rows):
         console.print(note, soft_wrap=True)
     return 0

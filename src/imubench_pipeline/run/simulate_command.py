@@ -13,12 +13,12 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from imubench_pipeline.settings.command_line import MOST_WHOLE, whole_number
-from imubench_pipeline.settings.shipped import folders
+from imubench_pipeline.settings.command_line import MOST_WHOLE, make_integer_type
+from imubench_pipeline.settings.shipped import list_folders
 from imubench_pipeline.settings.validation import ConfigError, cut, parse
-from imubench_pipeline.settings.yaml_files import files_in, read_settings, read_yaml
+from imubench_pipeline.settings.yaml_files import list_files, read_settings, read_yaml
 from imubench_pipeline.tables.outputs import OutputFile, add_output
-from imubench_pipeline.units import UnitError, naming, quantity_to_si
+from imubench_pipeline.units import UnitError, add_key_to_errors, parse_quantity
 
 if TYPE_CHECKING:
     from imubench_pipeline.simulate.profiles import Profile
@@ -69,7 +69,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--seed",
-        type=whole_number(0, MOST_WHOLE, "a whole number from 0"),
+        type=make_integer_type(0, MOST_WHOLE, "a whole number from 0"),
         default=1,
         help="of the noise; default: 1",
     )
@@ -208,8 +208,8 @@ def _declared(name: str, stated: Path | None) -> Any:
     from imubench_pipeline.settings.config import Run
     from imubench_pipeline.settings.sensor import Sensor
 
-    places = folders(stated or Run().sensors, "sensors")
-    files = files_in(places, "sensor")
+    places = list_folders(stated or Run().sensors, "sensors")
+    files = list_files(places, "sensor")
     if name not in files:
         raise ConfigError(
             f"{places[-1] / name}.yaml: no such sensor file; there are: "
@@ -237,7 +237,7 @@ def _origin(options: argparse.Namespace) -> tuple[Origin, Any]:
     if path.suffix in _YAML_SUFFIXES:
         if options.results:
             raise ConfigError("--results are for a sensor by name; the file of models has its own")
-        origin = sources.from_file(path)
+        origin = sources.read_model_file(path)
         sensor = _declared(origin.sensor, options.sensors) if origin.sensor else None
     else:
         sensor = _declared(options.sensor, options.sensors)
@@ -256,8 +256,8 @@ def _origin(options: argparse.Namespace) -> tuple[Origin, Any]:
 
 def _rate(text: str | None, log: Any) -> float:
     if text is not None:
-        with naming("--rate: "):
-            rate = quantity_to_si(text, "frequency")
+        with add_key_to_errors("--rate: "):
+            rate = parse_quantity(text, "frequency")
         if rate <= 0:
             raise ConfigError(f"--rate {text}: expected a frequency above 0")
         return rate
@@ -269,8 +269,8 @@ def _rate(text: str | None, log: Any) -> float:
 def _duration(text: str | None, hours: float | None, rate: float) -> float:
     """Return the length of the log in s."""
     if text is not None:
-        with naming("--duration: "):
-            duration = quantity_to_si(text, "time")
+        with add_key_to_errors("--duration: "):
+            duration = parse_quantity(text, "time")
         option = f"--duration {text}"
     else:
         assert hours is not None  # one of them is required
@@ -317,8 +317,8 @@ def _profiles(
     elif path.suffix in (".csv", ".parquet", ".txt"):
         warm = {"form": "file", "file": str(path)}
     else:
-        with naming("--temperature: "):
-            celsius = quantity_to_si(options.temperature, "temperature")
+        with add_key_to_errors("--temperature: "):
+            celsius = parse_quantity(options.temperature, "temperature")
         if not _MIN_TEMPERATURE <= celsius <= _MAX_TEMPERATURE:
             raise ConfigError(
                 f"--temperature {options.temperature}: expected {_MIN_TEMPERATURE:g} "

@@ -24,10 +24,10 @@ from numba import njit
 
 from imubench_pipeline.readers.bounded import limit_memory
 from imubench_pipeline.recordings.availability import OF_RESULTS
-from imubench_pipeline.report.run_summary import one_line
+from imubench_pipeline.report.run_summary import fold_text
 from imubench_pipeline.run.kernels import compile_once
 from imubench_pipeline.run.processes import Job, StepError
-from imubench_pipeline.run.sealing import sealed
+from imubench_pipeline.run.sealing import seal_outputs
 from imubench_pipeline.tables.failures import describe_error
 from imubench_pipeline.tables.findings import UnavailableError
 
@@ -127,7 +127,7 @@ def _run(connection: Connection[Any, Any], job: Job, *, imported: bool) -> None:
         _print_to(job.log)
         if job.memory is not None:
             limit_memory(job.memory)
-        with sealed(job):
+        with seal_outputs(job):
             runpy.run_path(str(job.script), init_globals={"snakemake": job}, run_name="__main__")
             sys.stdout.flush()
             sys.stderr.flush()
@@ -138,7 +138,7 @@ def _run(connection: Connection[Any, Any], job: Job, *, imported: bool) -> None:
         assert isinstance(outcome, StepError)
         if not isinstance(error, UnavailableError):  # of the surroundings: its text says it all
             outcome.trace = _trace(error, str(job.script))
-        outcome.reason = one_line(describe_error(error), _MAX_ERROR_LENGTH)
+        outcome.reason = fold_text(describe_error(error), _MAX_ERROR_LENGTH)
         if isinstance(error, MemoryError):
             outcome.reason += f"; limits.memory allows {(job.memory or 0) // 10**6} MB"
         of_results = isinstance(error, OSError) and error.errno in OF_RESULTS

@@ -12,27 +12,27 @@ from typing import NamedTuple, TypeVar
 T = TypeVar("T", int, float)
 
 
-def named_path(text: str) -> Path:
+def parse_path(text: str) -> Path:
     """Return a path that is not empty."""
     if not text or "\0" in text:
         raise argparse.ArgumentTypeError(f"found {text!r}; expected a path")
     return Path(text)
 
 
-def seconds(text: str) -> float:
+def parse_seconds(text: str) -> float:
     """Return a time in s, with its unit or without."""
-    from imubench_pipeline.units import UnitError, quantity_to_si
+    from imubench_pipeline.units import UnitError, parse_quantity
 
     try:
         return float(text)
     except ValueError:
         try:
-            return quantity_to_si(text, "time")
+            return parse_quantity(text, "time")
         except UnitError as error:
             raise argparse.ArgumentTypeError(str(error)) from None
 
 
-def number(
+def make_number_type(
     least: float, most: float, words: str, read: Callable[[str], float] = float
 ) -> Callable[[str], float]:
     """Return the type of a finite number in a range, its ends included.
@@ -42,8 +42,8 @@ def number(
     return _make_type(least, most, words, read)
 
 
-def whole_number(least: int, most: int, words: str) -> Callable[[str], int]:
-    """Return the type of a whole number in a range, its ends included; see `number`."""
+def make_integer_type(least: int, most: int, words: str) -> Callable[[str], int]:
+    """Return the type of a whole number in a range, its ends included; see `make_number_type`."""
     return _make_type(least, most, words, int)
 
 

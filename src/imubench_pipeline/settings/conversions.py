@@ -21,7 +21,7 @@ _NOISE_OVER_CUT_OFF: dict[Filter, float] = {
 }
 
 
-def noise_of_density(density: float, sidedness: Sidedness) -> float:
+def convert_density(density: float, sidedness: Sidedness) -> float:
     """Return N of an amplitude density in rad/s/√Hz or m/s²/√Hz.
 
     N = density, or density / √2 if it is one-sided (Engers, eq. 7, two-sided as printed).
@@ -29,14 +29,14 @@ def noise_of_density(density: float, sidedness: Sidedness) -> float:
     return density / math.sqrt(2.0) if sidedness == "one-sided" else density
 
 
-def noise_of_power_density(density: float, sidedness: Sidedness) -> float:
+def convert_power_density(density: float, sidedness: Sidedness) -> float:
     """Return N of a power spectral density, 0 or more, in (rad/s)²/Hz or (m/s²)²/Hz.
 
     N = √S, or √(S/2) if it is one-sided (Engers, eq. 6, two-sided as printed).
     """
     if density < 0:
         raise ValueError(f"a power density of {density:g}; expected 0 or more")
-    return noise_of_density(math.sqrt(density), sidedness)
+    return convert_density(math.sqrt(density), sidedness)
 
 
 def noise_of_rms(rms: float, bandwidth: float, sidedness: Sidedness = "one-sided") -> float:
@@ -47,10 +47,10 @@ def noise_of_rms(rms: float, bandwidth: float, sidedness: Sidedness = "one-sided
     """
     if bandwidth <= 0:
         raise ValueError(f"a noise bandwidth of {bandwidth:g} Hz; expected one above 0")
-    return noise_of_density(rms / math.sqrt(bandwidth), sidedness)
+    return convert_density(rms / math.sqrt(bandwidth), sidedness)
 
 
-def noise_bandwidth(cut_off: float, filter_: Filter = "stated") -> float:
+def compute_noise_bandwidth(cut_off: float, filter_: Filter = "stated") -> float:
     """Return the noise bandwidth of a low-pass filter by its -3 dB frequency, both in Hz.
 
     It is π/2 times the cut-off with one pole, π/(2√2) times with a Butterworth filter of second

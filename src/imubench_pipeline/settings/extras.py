@@ -15,7 +15,7 @@ class ExtraError(ImportError):
 
 
 @contextmanager
-def extra(name: Extra, purpose: str) -> Iterator[None]:
+def require_extra(name: Extra, purpose: str) -> Iterator[None]:
     """Raise an `ExtraError` if a package that is imported within is not installed.
 
     ``purpose`` completes "to ...".

@@ -16,7 +16,7 @@ from pydantic import (
 
 from imubench_pipeline.settings.conversions import Filter
 from imubench_pipeline.settings.validation import Duration, Frequency, Strict, Text
-from imubench_pipeline.units import UnitError, dimension_of, quantity_to_si, to_si
+from imubench_pipeline.units import UnitError, convert_to_si, find_dimension, parse_quantity
 
 Value = float | tuple[float, ...] | dict[str, float]
 Kind = Literal["typ", "max", "min", "range", "choices", "1sigma", "derived"]
@@ -124,12 +124,12 @@ class PrintedFigure(Strict):
     @property
     def tau_s(self) -> float | None:
         """The averaging time of an Allan deviation, s."""
-        return None if self.tau is None else quantity_to_si(self.tau, "time")
+        return None if self.tau is None else parse_quantity(self.tau, "time")
 
     @property
     def bandwidth_hz(self) -> float | None:
         """The bandwidth of an rms, Hz."""
-        return None if self.bandwidth is None else quantity_to_si(self.bandwidth, "frequency")
+        return None if self.bandwidth is None else parse_quantity(self.bandwidth, "frequency")
 
 
 def _listed(value: Any) -> Any:
@@ -259,13 +259,16 @@ def _check_unit(key: str, quantity: str, name: str, figure: PrintedFigure) -> No
         return
     unit = figure.unit
     try:
-        dimension = dimension_of(unit, dimensions)
+        dimension = find_dimension(unit, dimensions)
     except UnitError as error:
         mend = "; a figure by LSB is the 'sensitivity'" * ("LSB" in unit)
         raise ValueError(f"{key}.unit: {error}{mend}") from error
     if name in ("noise_density", "bias_instability") and quantity == "accel":
         for value in map(figure.on_axis, "xyz"):
-            if isinstance(value, float) and to_si(value, unit, dimension) > _MAX_ACCELERATION_NOISE:
+            if (
+                isinstance(value, float)
+                and convert_to_si(value, unit, dimension) > _MAX_ACCELERATION_NOISE
+            ):
                 raise ValueError(
                     f"{key}: found {value:g} {unit}, which no accelerometer has; was the sign of "
                     f"micro or milli lost? expected such as {value:g} u{unit.removeprefix('m')}"

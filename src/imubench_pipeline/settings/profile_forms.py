@@ -17,12 +17,12 @@ from pydantic import BeforeValidator, Field, field_validator, model_validator
 
 from imubench_pipeline.settings.sensor import QUANTITIES, Channel, quantity_of
 from imubench_pipeline.settings.validation import Strict, Text
-from imubench_pipeline.units import UnitError, difference_to_si, quantity_to_si
+from imubench_pipeline.units import UnitError, parse_difference, parse_quantity
 
 
 def _check_time(text: str, above_zero: str | None = None) -> None:
     """Raise for a text that is no time, or one that is not above 0 under the name of its key."""
-    if quantity_to_si(text, "time") <= 0 and above_zero:
+    if parse_quantity(text, "time") <= 0 and above_zero:
         raise ValueError(f"{above_zero} is {text}, expected a time above 0")
 
 
@@ -46,7 +46,7 @@ class StepsForm(Strict):
             raise ValueError(
                 f"{len(self.times)} times and {len(self.values)} values; expected as many"
             )
-        times = [quantity_to_si(time, "time") for time in self.times]
+        times = [parse_quantity(time, "time") for time in self.times]
         if times != sorted(set(times)):
             raise ValueError("the times do not ascend; expected each later than the one before")
         return self
@@ -143,16 +143,16 @@ def _check_units(form: Form, dimension: str) -> None:
     """Raise UnitError if a figure of a form has a unit of another dimension."""
     match form:
         case ConstantForm():
-            quantity_to_si(form.value, dimension)
+            parse_quantity(form.value, dimension)
         case StepsForm():
             for value in form.values:
-                quantity_to_si(value, dimension)
+                parse_quantity(value, dimension)
         case DayCycleForm():
-            quantity_to_si(form.mean, dimension)
-            difference_to_si(form.amplitude, dimension)
+            parse_quantity(form.mean, dimension)
+            parse_difference(form.amplitude, dimension)
         case WarmUpForm():
-            quantity_to_si(form.start, dimension)
-            quantity_to_si(form.end, dimension)
+            parse_quantity(form.start, dimension)
+            parse_quantity(form.end, dimension)
         case SumForm():
             for part in form.parts:
                 _check_units(part, dimension)

@@ -10,9 +10,16 @@ from typing import Annotated, Literal
 
 from pydantic import AfterValidator, Field, model_validator
 
-from imubench_pipeline.settings.validation import Between, Frequency, Strict, Text, checked, of_size
-from imubench_pipeline.settings.yaml_files import read_folder, usable
-from imubench_pipeline.units import difference_to_si, quantity_to_si
+from imubench_pipeline.settings.validation import (
+    Between,
+    Frequency,
+    Strict,
+    Text,
+    make_size_validator,
+    make_validator,
+)
+from imubench_pipeline.settings.yaml_files import read_folder, require_valid
+from imubench_pipeline.units import parse_difference, parse_quantity
 
 Error = Literal["attitude", "heading", "velocity", "position", "north"]
 """What is limited; ``north`` is the heading that a gyro at rest finds from the Earth's rate."""
@@ -30,7 +37,7 @@ Axis = Literal["worst", "median"]  # the axis of a sensor that a requirement is 
 
 
 def _latitude(text: str) -> str:
-    if not abs(quantity_to_si(text, "angle")) < 1.5707:
+    if not abs(parse_quantity(text, "angle")) < 1.5707:
         raise ValueError(
             "expected a latitude between the poles: there cos φ is 0, and a gyro in a horizontal "
             "axis senses nothing of the Earth's rate"
@@ -38,11 +45,11 @@ def _latitude(text: str) -> str:
     return text
 
 
-Time = Annotated[Text, checked("time", "a time above zero"), Field(examples=["60 s"])]
+Time = Annotated[Text, make_validator("time", "a time above zero"), Field(examples=["60 s"])]
 
 
 def _of_outage(text: str) -> str:
-    if not 2.0 <= quantity_to_si(text, "time") <= 3600.0:
+    if not 2.0 <= parse_quantity(text, "time") <= 3600.0:
         raise ValueError(f"found {text}; expected an outage of 2 s to 1 h")
     return text
 
@@ -91,12 +98,12 @@ class Limit(Strict):
     @property
     def seconds(self) -> float:
         """The time in s."""
-        return quantity_to_si(self.outage or self.after or "", "time")
+        return parse_quantity(self.outage or self.after or "", "time")
 
     @property
     def size(self) -> float:
         """The largest error in SI."""
-        return quantity_to_si(self.at_most, DIMENSIONS[self.error])
+        return parse_quantity(self.at_most, DIMENSIONS[self.error])
 
     @property
     def text(self) -> str:
@@ -116,11 +123,13 @@ def _axes(text: str) -> str:
     return text
 
 
-Rate = Annotated[Text, of_size("angular_rate"), Field(examples=["300 deg/s"])]
-Acceleration = Annotated[Text, of_size("acceleration"), Field(examples=["8 g"])]
+Rate = Annotated[Text, make_size_validator("angular_rate"), Field(examples=["300 deg/s"])]
+Acceleration = Annotated[Text, make_size_validator("acceleration"), Field(examples=["8 g"])]
 
 
-_change = checked("temperature", "a difference above zero, such as 20 K", to_si=difference_to_si)
+_change = make_validator(
+    "temperature", "a difference above zero, such as 20 K", to_si=parse_difference
+)
 
 
 class TurnOn(Strict):
@@ -137,9 +146,9 @@ class TurnOn(Strict):
     @model_validator(mode="after")
     def _units(self) -> TurnOn:
         if self.gyro is not None:
-            quantity_to_si(self.gyro, "angular_rate")
+            parse_quantity(self.gyro, "angular_rate")
         if self.accel is not None:
-            quantity_to_si(self.accel, "acceleration")
+            parse_quantity(self.accel, "acceleration")
         return self
 
 
@@ -151,10 +160,10 @@ class Environment(Strict):
         examples=["20 K"],
         description="±, from the static window to the end; with turn_on, from where its bias holds",
     )
-    turns: Annotated[Text, of_size("angle")] | None = Field(
+    turns: Annotated[Text, make_size_validator("angle")] | None = Field(
         None, examples=["360 deg"], description="± about the axis of the gyro, by the end"
     )
-    speed_change: Annotated[Text, of_size("velocity")] | None = Field(
+    speed_change: Annotated[Text, make_size_validator("velocity")] | None = Field(
         None, examples=["10 m/s"], description="± along the axis of the accelerometer, by the end"
     )
     vibration: Acceleration | None = Field(None, description="rms of one axis")
@@ -177,10 +186,10 @@ class Must(Strict):
     axes: tuple[Annotated[str, AfterValidator(_axes)], ...] = Field(
         (), description="such as [gyro_xyz, accel_xyz]"
     )
-    mass: Annotated[Text, of_size("mass")] | None = Field(
+    mass: Annotated[Text, make_size_validator("mass")] | None = Field(
         None, examples=["30 g"], description="at most"
     )
-    power: Annotated[Text, of_size("power")] | None = Field(
+    power: Annotated[Text, make_size_validator("power")] | None = Field(
         None, examples=["1 W"], description="at most"
     )
 
@@ -243,9 +252,11 @@ class Requirement(Strict):
 
 def read_requirements(folders: Path | Iterable[Path] | None) -> dict[str, Requirement]:
     """Read the requirements of folders by file name, none without a folder."""
-    return {} if folders is None else usable(read_folder(Requirement, folders, "requirement"))
+    return (
+        {} if folders is None else require_valid(read_folder(Requirement, folders, "requirement"))
+    )
 
 
-def requirements_of(sections: Mapping[str, object]) -> dict[str, Requirement]:
+def validate_requirements(sections: Mapping[str, object]) -> dict[str, Requirement]:
     """Return the requirements of a plan."""
     return {name: Requirement.model_validate(section) for name, section in sections.items()}

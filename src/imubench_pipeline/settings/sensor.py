@@ -20,18 +20,18 @@ from imubench_pipeline.settings.experiments import (
     with_blocks,
 )
 from imubench_pipeline.settings.printed import Datasheet
-from imubench_pipeline.settings.shipped import CATALOGUE, folders
+from imubench_pipeline.settings.shipped import CATALOGUE, list_folders
 from imubench_pipeline.settings.validation import (
     Between,
     ConfigError,
     Frequency,
     Strict,
     Text,
-    of_size,
+    make_size_validator,
     parse,
 )
-from imubench_pipeline.settings.yaml_files import read_folder, usable
-from imubench_pipeline.units import UnitError, conversion, quantity_to_si
+from imubench_pipeline.settings.yaml_files import read_folder, require_valid
+from imubench_pipeline.units import UnitError, find_conversion, parse_quantity
 
 QUANTITIES: dict[str, str] = {"gyro": "angular_rate", "accel": "acceleration"}
 """The measured quantities and the dimension of each."""
@@ -234,12 +234,12 @@ class LogFormat(Strict):
     @property
     def rate_hz(self) -> float | None:
         """The stated sampling rate in Hz."""
-        return None if self.rate is None else quantity_to_si(self.rate, "frequency")
+        return None if self.rate is None else parse_quantity(self.rate, "frequency")
 
 
 def _check_unit(unit: str, dimension: str, key: str) -> None:
     try:
-        conversion(unit, dimension)
+        find_conversion(unit, dimension)
     except UnitError as error:
         raise ValueError(f"{key}: {error}") from error
 
@@ -256,10 +256,10 @@ class Sensor(Strict):
         "its recordings decide nothing, and it is on no shortlist",
     )
     price: Text | None = Field(None, description="with its currency and number, such as 12 EUR")
-    mass: Annotated[Text, of_size("mass")] | None = Field(
+    mass: Annotated[Text, make_size_validator("mass")] | None = Field(
         None, examples=["15 g"], description="null: not known"
     )
-    power: Annotated[Text, of_size("power")] | None = Field(
+    power: Annotated[Text, make_size_validator("power")] | None = Field(
         None, examples=["0.2 W"], description="that it takes; null: not known"
     )
     temperature_range: Between | None = Field(
@@ -337,7 +337,7 @@ class RecordingNotes(WithBlocks):
 
 def read_sensors(folders: Path | Iterable[Path]) -> dict[str, Sensor]:
     """Read every sensor file of one or several folders, by name; raises `ConfigError`."""
-    return usable(read_sensor_files(folders))
+    return require_valid(read_sensor_files(folders))
 
 
 def read_sensor_files(folders: Path | Iterable[Path]) -> dict[str, Sensor | ConfigError]:
@@ -354,7 +354,7 @@ def read_sensor_files(folders: Path | Iterable[Path]) -> dict[str, Sensor | Conf
 @cache
 def shipped_sensors() -> Mapping[str, Sensor]:
     """Return the sensors of the catalogue that comes with the package."""
-    declared = read_sensor_files(folders(CATALOGUE, "sensors"))
+    declared = read_sensor_files(list_folders(CATALOGUE, "sensors"))
     return {name: sensor for name, sensor in declared.items() if isinstance(sensor, Sensor)}
 
 

@@ -15,20 +15,20 @@ CATALOGUE = Path("catalogue")
 Folders = Path | Sequence[Path]
 
 
-def project() -> Path:
+def find_project() -> Path:
     """Return the folder that holds the Snakefile, workflow/, config/ and profiles/."""
     inside = Path(__file__).parents[1] / "project"
     return inside if inside.is_dir() else Path(__file__).parents[3]
 
 
-def folders(stated: Folders, kind: Literal["sensors", "requirements"]) -> list[Path]:
+def list_folders(stated: Folders, kind: Literal["sensors", "requirements"]) -> list[Path]:
     """Return the folders that a configuration names, each once; a later one has precedence.
 
     The folder of a project, ``config/<kind>``, may be missing beside another one.
     """
     found: dict[Path, Path] = {}
     for folder in [stated] if isinstance(stated, Path) else stated:
-        place = project() / "config" / kind if folder == CATALOGUE else folder
+        place = find_project() / "config" / kind if folder == CATALOGUE else folder
         found.pop(place.resolve(), None)
         found[place.resolve()] = place
     places = list(found.values())
@@ -36,7 +36,7 @@ def folders(stated: Folders, kind: Literal["sensors", "requirements"]) -> list[P
     return needed or places
 
 
-def own_folder(stated: Folders) -> Path:
+def find_own_folder(stated: Folders) -> Path:
     """Return the folder for a missing file: the last that is not the package's."""
     named = [stated] if isinstance(stated, Path) else stated
     return next((folder for folder in reversed(named) if folder != CATALOGUE), named[-1])

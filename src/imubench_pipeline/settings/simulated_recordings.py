@@ -42,7 +42,7 @@ from imubench_pipeline.settings.validation import (
     Text,
 )
 from imubench_pipeline.settings.yaml_files import read_settings
-from imubench_pipeline.units import naming, quantity_to_si
+from imubench_pipeline.units import add_key_to_errors, parse_quantity
 
 _Around = TypeVar("_Around", bound=Surroundings)
 
@@ -68,7 +68,7 @@ class PublishedFigure(Strict):
             "N": f"{quantity}_density",
             "sensitivity": f"{quantity}_temperature_coefficient",
         }
-        return quantity_to_si(self.means, dimensions.get(self.parameter, QUANTITIES[quantity]))
+        return parse_quantity(self.means, dimensions.get(self.parameter, QUANTITIES[quantity]))
 
 
 class ReadByAuthors(Strict):
@@ -98,10 +98,10 @@ class SimulatedChannel(AxisSettings):
         """Raise UnitError if a unit has another dimension than its figure."""
         super().check(channel)
         if self.read is not None:
-            with naming("read."):
+            with add_key_to_errors("read."):
                 self.read.si(channel)
         for number, figure in enumerate(self.published):
-            with naming(f"published.{number}.means: "):
+            with add_key_to_errors(f"published.{number}.means: "):
                 figure.si(quantity_of(channel))
 
     @model_validator(mode="after")
@@ -128,7 +128,7 @@ class OfASensor(ImuSettings):
 
     @model_validator(mode="after")
     def _samples_and_units(self) -> Self:
-        length = quantity_to_si(self.duration, "time") * quantity_to_si(self.rate, "frequency")
+        length = parse_quantity(self.duration, "time") * parse_quantity(self.rate, "frequency")
         if not 0.5 < length <= _MAX_SAMPLES:
             content = "no sample" if length < 1.0 else f"more than {_MAX_SAMPLES:g} samples"
             raise ValueError(f"duration: {self.duration} at {self.rate} hold {content}")
@@ -138,8 +138,8 @@ class OfASensor(ImuSettings):
     @property
     def samples(self) -> int:
         """Length of the log."""
-        rate = quantity_to_si(self.rate, "frequency")
-        return round(quantity_to_si(self.duration, "time") * rate)
+        rate = parse_quantity(self.rate, "frequency")
+        return round(parse_quantity(self.duration, "time") * rate)
 
 
 @with_blocks("simulated")

@@ -19,7 +19,7 @@ from pydantic import AfterValidator, Field, model_validator
 
 from imubench_pipeline.settings.sensor import QUANTITIES, Channel, quantity_of
 from imubench_pipeline.settings.validation import Frequency, Strict, Text
-from imubench_pipeline.units import UnitError, difference_to_si, naming, quantity_to_si
+from imubench_pipeline.units import UnitError, add_key_to_errors, parse_difference, parse_quantity
 
 
 class ProcessSettings(Strict):
@@ -120,13 +120,13 @@ class AxisSettings(Strict):
         quantity = quantity_of(channel)
         self.si(channel)
         for number, process in enumerate(self.further):
-            with naming(f"further.{number}."):
+            with add_key_to_errors(f"further.{number}."):
                 process.si(quantity)
         for number, line in enumerate(self.sinusoids):
-            with naming(f"sinusoids.{number}."):
+            with add_key_to_errors(f"sinusoids.{number}."):
                 line.si(quantity)
         if self.drift is not None:
-            with naming("drift."):
+            with add_key_to_errors("drift."):
                 self.drift.si(quantity)
 
 
@@ -153,7 +153,7 @@ class ImuSettings(Strict):
         if unknown := set(self.misalignment) - set(QUANTITIES):
             raise ValueError(f"misalignment of {min(unknown)!r}; expected gyro or accel")
         if self.temperature_step is not None:
-            difference_to_si(self.temperature_step, "temperature")
+            parse_difference(self.temperature_step, "temperature")
         return self
 
 
@@ -184,6 +184,6 @@ def _in_si(figures: Mapping[str, tuple[str | None, str]]) -> dict[str, float]:
     in_si = {}
     for key, (text, dimension) in figures.items():
         if text is not None:
-            with naming(f"{key}: "):
-                in_si[key] = quantity_to_si(text, dimension)
+            with add_key_to_errors(f"{key}: "):
+                in_si[key] = parse_quantity(text, dimension)
     return in_si

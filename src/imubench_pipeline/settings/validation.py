@@ -12,7 +12,7 @@ from typing import Annotated, Any, TypeVar
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
 
-from imubench_pipeline.units import quantity_to_si
+from imubench_pipeline.units import parse_quantity
 
 
 class ConfigError(ValueError):
@@ -61,12 +61,12 @@ def cut(
     return text if len(text) <= most else f"{text[: most - 3]}..."
 
 
-def checked(
+def make_validator(
     dimension: str,
     expected: str | None = None,
     *,
     from_zero: bool = False,
-    to_si: Callable[[str, str], float] = quantity_to_si,
+    to_si: Callable[[str, str], float] = parse_quantity,
 ) -> AfterValidator:
     """Return a validator for a number with a unit of a dimension, and its range.
 
@@ -83,13 +83,13 @@ def checked(
     return AfterValidator(check)
 
 
-def of_size(dimension: str) -> AfterValidator:
+def make_size_validator(dimension: str) -> AfterValidator:
     """Return a validator for a number above zero with a unit of a dimension."""
-    return checked(dimension, f"more than zero, with its unit of {dimension}")
+    return make_validator(dimension, f"more than zero, with its unit of {dimension}")
 
 
 def _check_order(ends: tuple[str, str]) -> tuple[str, str]:
-    low, high = (quantity_to_si(end, "temperature") for end in ends)
+    low, high = (parse_quantity(end, "temperature") for end in ends)
     if not low < high:
         raise ValueError(f"found {ends[0]} to {ends[1]}; expected the lower temperature first")
     return ends
@@ -122,21 +122,21 @@ def _check_visible(text: str) -> str:
 
 Text = Annotated[str, AfterValidator(_check_visible)]  # a text that is shown in tables and on pages
 Frequency = Annotated[
-    Text, checked("frequency", "a frequency above zero"), Field(examples=["100 Hz"])
+    Text, make_validator("frequency", "a frequency above zero"), Field(examples=["100 Hz"])
 ]
 Between = Annotated[tuple[Text, Text], AfterValidator(_check_order)]
 """A lower and an upper temperature, with their units."""
-Duration = Annotated[Text, checked("time", "a time above 0"), Field(examples=["10 h"])]
+Duration = Annotated[Text, make_validator("time", "a time above 0"), Field(examples=["10 h"])]
 
 
 def _from_zero(dimension: str) -> AfterValidator:
-    return checked(dimension, "a figure from 0", from_zero=True)
+    return make_validator(dimension, "a figure from 0", from_zero=True)
 
 
 TimeFromZero = Annotated[Text, _from_zero("time"), Field(examples=["2 s"])]
-Angle = Annotated[Text, checked("angle"), Field(examples=["30 deg"])]
+Angle = Annotated[Text, make_validator("angle"), Field(examples=["30 deg"])]
 AngleFromZero = Annotated[Text, _from_zero("angle"), Field(examples=["0.5 deg"])]
-Rate = Annotated[Text, checked("angular_rate"), Field(examples=["-10 deg/s"])]
+Rate = Annotated[Text, make_validator("angular_rate"), Field(examples=["-10 deg/s"])]
 RateFromZero = Annotated[Text, _from_zero("angular_rate"), Field(examples=["0.05 deg/s"])]
 AccelerationFromZero = Annotated[Text, _from_zero("acceleration"), Field(examples=["20 mg"])]
 

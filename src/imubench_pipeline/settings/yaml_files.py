@@ -168,7 +168,7 @@ def read_folder(
     A later folder has precedence; a missing one raises a `ConfigError`.
     """
     models: dict[str, _Model | ConfigError] = {}
-    for name, path in files_in(folders, each).items():
+    for name, path in list_files(folders, each).items():
         try:
             models[name] = read_settings(model, path)
         except ConfigError as error:
@@ -176,7 +176,7 @@ def read_folder(
     return models
 
 
-def files_in(folders: Path | Iterable[Path], each: str) -> dict[str, Path]:
+def list_files(folders: Path | Iterable[Path], each: str) -> dict[str, Path]:
     """Return the paths of the files of `read_folder` by name; raises `ConfigError`."""
     files: dict[str, Path] = {}
     for folder in [folders] if isinstance(folders, Path) else folders:
@@ -186,7 +186,7 @@ def files_in(folders: Path | Iterable[Path], each: str) -> dict[str, Path]:
     return dict(sorted(files.items(), key=lambda file: file[1].name))
 
 
-def usable(read: Mapping[str, _Model | ConfigError]) -> dict[str, _Model]:
+def require_valid(read: Mapping[str, _Model | ConfigError]) -> dict[str, _Model]:
     """Return the models of `read_folder` if all are valid; else raise the first error."""
     models = {}
     for name, model in read.items():

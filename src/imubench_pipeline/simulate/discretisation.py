@@ -47,12 +47,12 @@ class SlowSources:
     residual: Array
 
 
-def filter_transition(low_pass: LowPass, interval: float) -> Array:
+def compute_filter_transition(low_pass: LowPass, interval: float) -> Array:
     """Return the transition matrix of a filter over an interval, s: e^(F interval), (m, m)."""
     return np.asarray(expm(low_pass.transition * interval))
 
 
-def slow_sources(times: Array, interval: float, low_pass: LowPass | None) -> SlowSources:
+def discretise_slow_sources(times: Array, interval: float, low_pass: LowPass | None) -> SlowSources:
     """Discretise Gauss-Markov processes and random walks, and the filter that they drive.
 
     The correlation times, s, shape (n,), are infinite for a random walk. The interval is the
@@ -80,7 +80,7 @@ def slow_sources(times: Array, interval: float, low_pass: LowPass | None) -> Slo
     return SlowSources(decay, lost, own, transition[:, 1:, 0], shared, factor[:, 1:, 1:])
 
 
-def white_factor(low_pass: LowPass, interval: float) -> Array:
+def compute_white_factor(low_pass: LowPass, interval: float) -> Array:
     """Return a factor R of the process noise of a filter driven by white noise of density 1.
 
     The covariance over the interval, s, is R.T @ R; R has shape (m, m).
@@ -130,7 +130,7 @@ class HeldInput:
     lagged_step: Array  # ``lag_coupling * ε + lagged_step * change``
 
 
-def held_input(low_pass: LowPass | None, lag: float, interval: float) -> HeldInput:
+def discretise_held_input(low_pass: LowPass | None, lag: float, interval: float) -> HeldInput:
     """Return the exact discretisation of filter and thermal lag for a first-order hold input.
 
     The lag (a time constant; 0: none) and the interval are in s.
@@ -159,7 +159,7 @@ def held_input(low_pass: LowPass | None, lag: float, interval: float) -> HeldInp
     return HeldInput(step, decay, lag_step, whole[:m, m], whole[:m, m + 1])
 
 
-def stationary(
+def compute_stationary_distribution(
     times: Array, densities: Array, white: float, low_pass: LowPass
 ) -> tuple[Array, Array]:
     """Return the stationary distribution of the filter deviation e, given x.

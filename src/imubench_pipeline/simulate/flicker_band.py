@@ -1,10 +1,10 @@
 """Approximate flicker noise at the input of a filter by a bank of Gauss-Markov processes.
 
-`noise.terms.flicker.bank` approximates the Allan variance of flicker noise that is sampled without
-a filter. At the input of a filter, whose cut-off may lie above the Nyquist frequency, the density
-B^2 / (2 pi f) itself must be approximated far beyond the cut-off. Processes of equal variance
-(ln r / pi) B^2 whose correlation times have the ratio r approximate this density. The relative
-ripple is 4 e^(-pi^2 / ln r), below 1e-3 for two processes per decade.
+`noise.terms.flicker.fit_flicker_bank` approximates the Allan variance of flicker noise that is
+sampled without a filter. At the input of a filter, whose cut-off may lie above the Nyquist
+frequency, the density B^2 / (2 pi f) itself must be approximated far beyond the cut-off. Processes
+of equal variance (ln r / pi) B^2 whose correlation times have the ratio r approximate this density.
+The relative ripple is 4 e^(-pi^2 / ln r), below 1e-3 for two processes per decade.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from functools import lru_cache
 import numpy as np
 from scipy.optimize import nnls
 
-from imubench_pipeline.noise.terms import GaussMarkov, bias_instability
+from imubench_pipeline.noise.terms import GaussMarkov, compute_bias_instability
 from imubench_pipeline.typing import Array
 
 MAX_FREQUENCY_RATIO = 30.0
@@ -28,7 +28,7 @@ _BAND_EXTENSION = 4.0
 """Factor by which the correlation times extend the band 1 / (2 pi f) at both ends."""
 
 
-def bank(B: float, lowest: float, highest: float) -> list[GaussMarkov]:
+def fit_density_bank(B: float, lowest: float, highest: float) -> list[GaussMarkov]:
     """Return Gauss-Markov processes whose sum has the density of flicker noise.
 
     The variances are fitted by non-negative least squares of the relative error. B is the bias
@@ -43,7 +43,7 @@ def bank(B: float, lowest: float, highest: float) -> list[GaussMarkov]:
     for time, variance in zip(times / (2.0 * math.pi * lowest), variances, strict=True):
         if variance > 0:
             density = 2.0 * B**2 * variance / time  # of the driving noise
-            processes.append(GaussMarkov(bias_instability(density, time), time))
+            processes.append(GaussMarkov(compute_bias_instability(density, time), time))
     return processes
 
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from imubench_pipeline.datasheets.comparable import Comparable, comparables
+from imubench_pipeline.datasheets.comparable import Comparable, read_comparables
 from imubench_pipeline.noise import FLOOR, NoiseModel
 from imubench_pipeline.noise.low_pass import LowPass
 from imubench_pipeline.noise.simulate import channel_rng
@@ -16,7 +16,7 @@ from imubench_pipeline.settings.validation import ConfigError
 from imubench_pipeline.simulate.imu import ImuModel
 from imubench_pipeline.simulate.model import SensorModel, TemperatureDrift
 from imubench_pipeline.simulate.sources import Origin, Remark, Topic
-from imubench_pipeline.units import dimension_of, quantity_to_si, to_si
+from imubench_pipeline.units import convert_to_si, find_dimension, parse_quantity
 from imubench_pipeline.words.reasons import simulations as texts
 
 _STEPS_PER_SIDE = 1 << 15  # steps on each side of 0 of a 16-bit register
@@ -66,7 +66,7 @@ class _Printed:
         self._origin = origin
 
     def noise(self) -> NoiseModel | None:
-        rows = [row for row in comparables(self._sensor.datasheet, self._channel) if row.value]
+        rows = [row for row in read_comparables(self._sensor.datasheet, self._channel) if row.value]
         density = _select_best([row for row in rows if row.statistic == "N"])
         if density is None or density.value is None:
             return None
@@ -108,7 +108,7 @@ class _Printed:
         stated = self._sensor.log.bandwidth
         if stated is not None:
             self._remarks.append(Remark("low-pass", texts.stated_cutoff(stated)))
-            cutoff: float | None = quantity_to_si(stated, "frequency")
+            cutoff: float | None = parse_quantity(stated, "frequency")
         else:
             cutoff = self._single("bandwidth", "low-pass", "cut-off")
         self._assume("low-pass", texts.low_pass_assumed(known=cutoff is not None))
@@ -128,7 +128,7 @@ class _Printed:
             if value is None or figure.unit is None:
                 continue
             values = [value] if isinstance(value, float) else list(value)
-            ranges = [to_si(each, figure.unit, dimension) for each in values]
+            ranges = [convert_to_si(each, figure.unit, dimension) for each in values]
             chosen = len(ranges) - 1
             if step is not None and len(ranges) > 1:
                 # The printed sensitivity belongs to the range that it gives with a 16-bit register.
@@ -154,8 +154,8 @@ class _Printed:
             if isinstance(value, float) and figure.unit is not None:
                 text = texts.printed_figure(label, value, figure.unit, figure.kind)
                 self._remarks.append(Remark(topic, text))
-                dimension = dimension_of(figure.unit, FIGURE_DIMENSIONS[self._quantity][name])
-                in_si = to_si(value, figure.unit, dimension)
+                dimension = find_dimension(figure.unit, FIGURE_DIMENSIONS[self._quantity][name])
+                in_si = convert_to_si(value, figure.unit, dimension)
                 return 1.0 / in_si if dimension.endswith("sensitivity") else in_si
         return None
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import pyarrow as pa
 import pyarrow.compute as pc
 
-from imubench_pipeline.estimators.rows import estimate_of
+from imubench_pipeline.estimators.rows import make_estimate
 from imubench_pipeline.model.estimates import FixedBiasRow, LowPassRow, ParameterRow, TemperatureRow
 from imubench_pipeline.model.recordings import RecordingRow
 from imubench_pipeline.noise.low_pass import LowPass
@@ -18,7 +18,7 @@ from imubench_pipeline.settings.validation import ConfigError
 from imubench_pipeline.simulate.imu import ImuModel
 from imubench_pipeline.simulate.model import SensorModel, TemperatureDrift, before_the_filter
 from imubench_pipeline.simulate.sources import Origin, Remark, Topic
-from imubench_pipeline.tables import read, tables_folder, tables_of_run
+from imubench_pipeline.tables import find_tables, find_tables_folder, read
 from imubench_pipeline.words.reasons import simulations as texts
 
 _NEEDED_TABLES = ("recordings", "parameters", "fixed_bias", "temperature", "low_pass")
@@ -38,9 +38,9 @@ def with_estimates(
     ConfigError
         If there is no estimate of the sensor, or of the recording.
     """
-    folder = tables_folder(results)
+    folder = find_tables_folder(results)
     try:
-        paths = tables_of_run(results, _NEEDED_TABLES)
+        paths = find_tables(results, _NEEDED_TABLES)
         tables = {table: read(table, [path]) for table, path in paths.items()}
     except (OSError, ValueError) as error:
         raise ConfigError(str(error)) from error
@@ -126,7 +126,7 @@ def _estimate_axis(
         for row in ParameterRow.rows_of(tables["parameters"])
         if (row.method == "compensated" if compensated else row.recommended)
     ]
-    estimate = estimate_of(rows[0].method, rows)
+    estimate = make_estimate(rows[0].method, rows)
     text = texts.estimated_noise(estimate.model.name, estimate.method, log)
     remarks.append(Remark("noise", text))
     # The mean of an accelerometer is mostly gravity.

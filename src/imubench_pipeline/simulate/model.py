@@ -145,7 +145,7 @@ class SensorModel:
         behind = [
             term.sampled_spectrum(w, 1.0 / rate) for term in self.noise.terms if term.drive is None
         ]
-        before = spectra.sampled_spectrum(self.sources, self.low_pass, w, rate)
+        before = spectra.compute_sampled_spectrum(self.sources, self.low_pass, w, rate)
         return np.asarray(np.sum(behind, axis=0) + rounding + before)
 
     def allan_variance(self, tau: ArrayLike, rate: float) -> Array:
@@ -159,7 +159,7 @@ class SensorModel:
         rounding = self.resolution**2 / 12.0 / n
         if self.low_pass is None:
             return self.noise.allan_variance(n / rate, rate) + rounding
-        variance = rounding + spectra.allan_variance(self.sources, self.low_pass, n, rate)
+        variance = rounding + spectra.compute_allan_variance(self.sources, self.low_pass, n, rate)
         for term in self.noise.terms:
             if term.drive is None:
                 left = term.passed(self.low_pass.power)
@@ -194,7 +194,7 @@ def bank_for(model: SensorModel, rate: float, duration: float) -> list[GaussMark
     for term in model.noise.terms:
         if term.drive is not None and term.drive.flicker and model.low_pass is not None:
             highest = flicker_band.MAX_FREQUENCY_RATIO * max(model.low_pass.cutoff, rate / 2.0)
-            processes += flicker_band.bank(term.drive.flicker, 0.5 / duration, highest)
+            processes += flicker_band.fit_density_bank(term.drive.flicker, 0.5 / duration, highest)
     return processes
 
 

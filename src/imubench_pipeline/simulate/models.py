@@ -18,7 +18,7 @@ from imubench_pipeline.simulate.imu import ImuModel
 from imubench_pipeline.simulate.model import SensorModel, TemperatureDrift, in_the_log
 from imubench_pipeline.simulate.profiles import Profile
 from imubench_pipeline.typing import Array
-from imubench_pipeline.units import difference_to_si, quantity_to_si
+from imubench_pipeline.units import parse_difference, parse_quantity
 
 _NOISE_PARAMETERS = ("N", "B", "T_B", "K", "R", "Q")
 
@@ -39,7 +39,7 @@ SIMULATIONS: Hook[Simulation] = Hook("simulations")
 """How they are simulated, by their block of settings."""
 
 
-def axis_model(settings: AxisSettings, channel: str) -> SensorModel:
+def make_axis_model(settings: AxisSettings, channel: str) -> SensorModel:
     """Return the model of an axis, ``gyro_x`` to ``accel_z``, in SI.
 
     Raises UnitError if a unit has another dimension than its figure. Raises ValueError if a figure
@@ -55,7 +55,7 @@ def axis_model(settings: AxisSettings, channel: str) -> SensorModel:
         ),
         bias=figures.get("bias", 0.0),
         drift=None if drift is None else TemperatureDrift(**drift.si(quantity)),
-        low_pass=LowPass(quantity_to_si(low_pass.cutoff, "frequency"), low_pass.order)
+        low_pass=LowPass(parse_quantity(low_pass.cutoff, "frequency"), low_pass.order)
         if low_pass
         else None,
         scale_error=settings.scale_error,
@@ -64,22 +64,22 @@ def axis_model(settings: AxisSettings, channel: str) -> SensorModel:
     )
 
 
-def imu_model(axes: Mapping[Channel, AxisSettings], settings: ImuSettings) -> ImuModel:
+def make_imu_model(axes: Mapping[Channel, AxisSettings], settings: ImuSettings) -> ImuModel:
     """Return the model of a sensor, in SI, from its axes by channel and their common settings.
 
-    Raises ValueError as `axis_model`, with the name of the channel.
+    Raises ValueError as `make_axis_model`, with the name of the channel.
     """
     models = {}
     for channel, axis in axes.items():
         try:
-            models[str(channel)] = axis_model(axis, channel)
+            models[str(channel)] = make_axis_model(axis, channel)
         except ValueError as error:
             raise ValueError(f"{channel}: {error}") from error
     step = settings.temperature_step
     return ImuModel(
         axes=models,
         misalignment={name: np.array(rows) for name, rows in settings.misalignment.items()},
-        temperature_step=0.0 if step is None else difference_to_si(step, "temperature"),
+        temperature_step=0.0 if step is None else parse_difference(step, "temperature"),
     )
 
 
@@ -94,7 +94,7 @@ class TrueFigure:
     component: int = 1  # number of a repeated term, from 1
 
 
-def figures_of(settings: AxisSettings, channel: str, rate: float) -> Iterator[TrueFigure]:
+def list_true_figures(settings: AxisSettings, channel: str, rate: float) -> Iterator[TrueFigure]:
     """Yield the true values of the parameters of an axis, in a log of a rate in Hz.
 
     N is the density at low frequencies of the log; N_sensor is the density before the low-pass, if
@@ -102,7 +102,7 @@ def figures_of(settings: AxisSettings, channel: str, rate: float) -> Iterator[Tr
     """
     quantity = quantity_of(channel)
     units, plain = SI_UNITS[quantity], SI_UNITS[quantity]["B"]
-    model = axis_model(settings, channel)
+    model = make_axis_model(settings, channel)
     figures = settings.si(channel)
     for name, value in figures.items():
         if name == "N":

@@ -19,7 +19,7 @@ import pyarrow.parquet as pq
 
 from imubench_pipeline.settings.validation import ConfigError
 from imubench_pipeline.typing import Array
-from imubench_pipeline.units import SI_UNITS, UnitError, conversion
+from imubench_pipeline.units import SI_UNITS, UnitError, find_conversion
 
 _HEADING_PATTERN = re.compile(r"^\s*(\w+)\s*(?:[\[(]\s*(.+?)\s*[\])])?\s*$")
 _TIME_COLUMN = "time"
@@ -70,7 +70,7 @@ class FileSeries:
             )
         heading, unit = self._headings[name]
         try:
-            factor, offset = conversion(unit or SI_UNITS[dimension], dimension)
+            factor, offset = find_conversion(unit or SI_UNITS[dimension], dimension)
         except UnitError as error:
             raise ConfigError(f"{self.path}: column {heading!r}: {error}") from error
         self._asked[name] = (heading, factor, offset)

@@ -23,7 +23,7 @@ from imubench_pipeline.settings.profile_forms import (
 from imubench_pipeline.settings.sensor import QUANTITIES, quantity_of
 from imubench_pipeline.simulate.profile_files import FileSeries
 from imubench_pipeline.typing import Array
-from imubench_pipeline.units import difference_to_si, quantity_to_si
+from imubench_pipeline.units import parse_difference, parse_quantity
 
 
 class Profile(ABC):
@@ -169,10 +169,10 @@ def make_profile(form: Form, name: str, folder: Path, opened: dict[Path, FileSer
 
 def _make_formula_profile(form: Formula, dimension: str, *, difference: bool = False) -> Profile:
     """Return a profile of a value, or of a difference, for which 5 degC and 5 K are the same."""
-    convert: Callable[[str, str], float] = difference_to_si if difference else quantity_to_si
+    convert: Callable[[str, str], float] = parse_difference if difference else parse_quantity
 
     def time(text: str) -> float:
-        return quantity_to_si(text, "time")
+        return parse_quantity(text, "time")
 
     def value(text: str) -> float:
         return convert(text, dimension)
@@ -183,7 +183,7 @@ def _make_formula_profile(form: Formula, dimension: str, *, difference: bool = F
         case StepsForm():
             return Steps(tuple(map(time, form.times)), tuple(map(value, form.values)))
         case DayCycleForm():
-            swing = difference_to_si(form.amplitude, dimension)
+            swing = parse_difference(form.amplitude, dimension)
             return DayCycle(value(form.mean), swing, time(form.period), time(form.highest))
         case WarmUpForm():
             start, end = value(form.start), value(form.end)

@@ -10,7 +10,7 @@ import numpy as np
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise import simulate as noise
 from imubench_pipeline.typing import Array
-from imubench_pipeline.units import in_si
+from imubench_pipeline.units import parse_setting
 
 
 class HasModel(Protocol):
@@ -92,14 +92,14 @@ def simulate(
     >>> imu.simulate(gyro, "100 Hz", duration="10 min", seed=1).shape
     (60000,)
     """
-    frequency = in_si(rate, "frequency", "rate")
+    frequency = parse_setting(rate, "frequency", "rate")
     if (samples is None) == (duration is None):
         raise ValueError(
             "expected either samples (such as 60000) or duration (such as '10 min'): "
             + ("neither is given" if samples is None else "both are given")
         )
     if duration is not None:
-        samples = round(in_si(duration, "time", "duration") * frequency)
+        samples = round(parse_setting(duration, "time", "duration") * frequency)
     if samples is None or isinstance(samples, bool) or int(samples) != samples or samples < 1:
         raise ValueError(f"{samples} samples; expected a whole number from 1")
     number = int(samples)

@@ -21,11 +21,11 @@ from numba import njit
 
 from imubench_pipeline.noise.terms import Term
 from imubench_pipeline.simulate.discretisation import (
-    filter_transition,
-    held_input,
-    slow_sources,
-    stationary,
-    white_factor,
+    compute_filter_transition,
+    compute_stationary_distribution,
+    compute_white_factor,
+    discretise_held_input,
+    discretise_slow_sources,
 )
 from imubench_pipeline.simulate.model import SensorModel, bank_for, sources_of
 from imubench_pipeline.typing import Array
@@ -228,7 +228,7 @@ class _Axis:
         begin, self._noise, lines, self._counts = rng.spawn(4)
         self._slow, self._filter = self._discretise(interval)
         drift = model.drift
-        hold = held_input(model.low_pass, drift.lag if drift else 0.0, interval)
+        hold = discretise_held_input(model.low_pass, drift.lag if drift else 0.0, interval)
         lag = np.array([hold.lag_decay, hold.lag_step])
         figures = (drift.sensitivity, drift.quadratic, drift.reference) if drift else (0.0,) * 3
         self._input = (hold.step, lag, hold.lag_coupling, hold.lagged_step, np.array(figures))
@@ -243,7 +243,7 @@ class _Axis:
     ) -> tuple[tuple[Array, Array, Array, Array], tuple[Array, Array, Array, float]]:
         """Return the arguments of `run` for slow states and filter, over one sampling interval."""
         low_pass = self._model.low_pass
-        slow = slow_sources(self._times, interval, low_pass)
+        slow = discretise_slow_sources(self._times, interval, low_pass)
         scale = np.sqrt(self._densities)
         coupling, shared = (
             np.ascontiguousarray(part.T) for part in (slow.coupling, slow.shared * scale[:, None])
@@ -254,9 +254,9 @@ class _Axis:
             return states, (none, none, np.zeros(0), math.sqrt(self._white / interval))
         # Noise of the filter that is independent of the noise of the slow states.
         parts = (slow.residual * scale[:, None, None]).reshape(-1, low_pass.order)
-        white_part = math.sqrt(self._white) * white_factor(low_pass, interval)
+        white_part = math.sqrt(self._white) * compute_white_factor(low_pass, interval)
         factor = np.asarray(np.linalg.qr(np.concatenate([parts, white_part]), mode="r"))
-        return states, (filter_transition(low_pass, interval), factor, low_pass.output, 0.0)
+        return states, (compute_filter_transition(low_pass, interval), factor, low_pass.output, 0.0)
 
     def _draw_initial_states(self, rng: np.random.Generator) -> tuple[Array, Array]:
         """Draw the states at the first sample."""
@@ -266,7 +266,9 @@ class _Axis:
         low_pass = self._model.low_pass
         if low_pass is None:
             return x, np.zeros(0)
-        mean, covariance = stationary(self._times, self._densities, self._white, low_pass)
+        mean, covariance = compute_stationary_distribution(
+            self._times, self._densities, self._white, low_pass
+        )
         values, vectors = np.linalg.eigh(covariance)
         root = vectors * np.sqrt(np.maximum(values, 0.0))
         # For a ramp that has always been rising, e is constant: F^-1 p R.

@@ -11,7 +11,7 @@ from imubench_pipeline.settings.simulated_sensor import ModelSettings
 from imubench_pipeline.settings.validation import ConfigError
 from imubench_pipeline.settings.yaml_files import read_settings
 from imubench_pipeline.simulate.imu import ImuModel
-from imubench_pipeline.simulate.models import imu_model
+from imubench_pipeline.simulate.models import make_imu_model
 from imubench_pipeline.words.reasons import simulations as texts
 
 Topic = Literal["noise", "bias", "drift", "low-pass", "register", "log"]
@@ -44,7 +44,7 @@ class Origin:
             self.assumed.append(remark)
 
 
-def from_file(path: Path) -> Origin:
+def read_model_file(path: Path) -> Origin:
     """Read a file of models (see `settings`).
 
     Raises ConfigError if the file does not exist, or a figure cannot be used.
@@ -54,7 +54,7 @@ def from_file(path: Path) -> Origin:
     as_given = Remark("noise", texts.stated_in(path.name))
     figures = {str(name): [as_given] for name in settings.axes}
     try:
-        model = imu_model(settings.axes, settings)
+        model = make_imu_model(settings.axes, settings)
     except ValueError as error:
         raise ConfigError(f"{path}: axes.{error}") from error
     return Origin(model, source, figures, [], settings.sensor)

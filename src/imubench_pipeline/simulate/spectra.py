@@ -13,10 +13,10 @@ import numpy as np
 
 from imubench_pipeline.noise.low_pass import LowPass
 from imubench_pipeline.simulate.discretisation import (
-    filter_transition,
-    slow_sources,
-    stationary,
-    white_factor,
+    compute_filter_transition,
+    compute_stationary_distribution,
+    compute_white_factor,
+    discretise_slow_sources,
 )
 from imubench_pipeline.typing import Array
 
@@ -56,7 +56,9 @@ class Sources:
         return np.concatenate([self.times, times]), np.concatenate([self.densities, densities])
 
 
-def sampled_spectrum(sources: Sources, low_pass: LowPass, omega: Array, rate: float) -> Array:
+def compute_sampled_spectrum(
+    sources: Sources, low_pass: LowPass, omega: Array, rate: float
+) -> Array:
     """Return the spectrum of the samples, SI^2, in the shape of omega, rad/sample, not 0.
 
     The rate is in Hz.
@@ -65,9 +67,9 @@ def sampled_spectrum(sources: Sources, low_pass: LowPass, omega: Array, rate: fl
     flat = np.ravel(omega)
     lowest = float(np.abs(flat).min(initial=math.pi))
     times, densities = sources.realised(low_pass, interval, interval / lowest)
-    slow = slow_sources(times, interval, low_pass)
-    transition = filter_transition(low_pass, interval)
-    white = white_factor(low_pass, interval)
+    slow = discretise_slow_sources(times, interval, low_pass)
+    transition = compute_filter_transition(low_pass, interval)
+    white = compute_white_factor(low_pass, interval)
     spectrum = np.empty_like(flat)
     for begin in range(0, len(flat), _FREQUENCIES_PER_CHUNK):
         w = flat[begin : begin + _FREQUENCIES_PER_CHUNK]
@@ -89,7 +91,7 @@ def sampled_spectrum(sources: Sources, low_pass: LowPass, omega: Array, rate: fl
     return spectrum.reshape(np.shape(omega))
 
 
-def allan_variance(sources: Sources, low_pass: LowPass, n: Array, rate: float) -> Array:
+def compute_allan_variance(sources: Sources, low_pass: LowPass, n: Array, rate: float) -> Array:
     """Return the Allan variance of the samples, SI^2, in the shape of n, samples per cluster.
 
     The difference of the sums over two adjacent clusters is a linear function of the state before
@@ -161,8 +163,8 @@ def _make_one_sample(
 ) -> tuple[_Cluster, Array]:
     """Return one sample of every source, white noise last, and the stationary covariance."""
     n, m = len(times), low_pass.order
-    slow = slow_sources(times, interval, low_pass)
-    A = filter_transition(low_pass, interval)
+    slow = discretise_slow_sources(times, interval, low_pass)
+    A = compute_filter_transition(low_pass, interval)
     transition = np.zeros((n + 1, 1 + m, 1 + m))
     transition[:, 1:, 1:] = A
     transition[:n, 0, 0] = slow.decay
@@ -174,7 +176,7 @@ def _make_one_sample(
     factor[:n, 0, 1:] = slow.shared
     factor[:n, 1:, 1:] = slow.residual
     factor[:n] *= np.sqrt(densities)[:, None, None]
-    factor[n, 1:, 1:] = math.sqrt(white) * white_factor(low_pass, interval)
+    factor[n, 1:, 1:] = math.sqrt(white) * compute_white_factor(low_pass, interval)
     sums = np.zeros((n + 1, 1 + m))
     sums[:n, 0] = 1.0
     sums[:, 1:] = low_pass.output
@@ -184,10 +186,10 @@ def _make_one_sample(
     for i in range(n):
         # The initial value of a random walk does not matter: it cancels in the difference.
         alone = (times[i : i + 1], densities[i : i + 1])
-        mean, covariance = stationary(*alone, 0.0, low_pass)
+        mean, covariance = compute_stationary_distribution(*alone, 0.0, low_pass)
         variance = 0.0 if math.isinf(times[i]) else densities[i] * times[i] / 2.0
         start[i, 0, 0] = variance
         start[i, 0, 1:] = start[i, 1:, 0] = variance * mean[0]
         start[i, 1:, 1:] = covariance + variance * np.outer(mean[0], mean[0])
-    start[n, 1:, 1:] = stationary(times[:0], densities[:0], white, low_pass)[1]
+    start[n, 1:, 1:] = compute_stationary_distribution(times[:0], densities[:0], white, low_pass)[1]
     return sample, start

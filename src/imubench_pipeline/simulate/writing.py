@@ -14,9 +14,9 @@ from typing import Any
 import pyarrow as pa
 import yaml
 
-from imubench_pipeline.readers.text.header import SIMULATED, states_simulated
+from imubench_pipeline.readers.text.header import SIMULATED, is_simulated
 from imubench_pipeline.readers.text_log import TextLog
-from imubench_pipeline.recordings.drop_zone import name_of
+from imubench_pipeline.recordings.drop_zone import get_recording_name
 from imubench_pipeline.recordings.recording import LogWriter
 from imubench_pipeline.settings.sensor import (
     QUANTITIES,
@@ -96,7 +96,7 @@ def check_notes(notes: Path, path: Path) -> None:
     """
     beside = sorted(path.parent.iterdir()) if path.parent.is_dir() else []
     for other in beside:
-        name = other.name if other.is_dir() else name_of(other.name)
+        name = other.name if other.is_dir() else get_recording_name(other.name)
         if name == path.stem and other not in (path, notes):
             raise ConfigError(
                 f"{path}: {other.name} is a recording of the same name, and the notes "
@@ -105,7 +105,7 @@ def check_notes(notes: Path, path: Path) -> None:
     if not notes.is_file():
         return
     mark = notes.read_text("utf-8", "replace").partition("\n")[0].partition(": ")[0]
-    if not states_simulated([mark]):
+    if not is_simulated([mark]):
         raise ConfigError(f"{notes}: exists, and is not of a simulation; name another --out")
 
 

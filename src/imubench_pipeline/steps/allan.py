@@ -11,32 +11,34 @@ import pyarrow as pa
 from numpy.typing import ArrayLike
 
 from imubench_pipeline.allan import AllanCurve, cluster_sizes, of_blocks, of_phase
-from imubench_pipeline.allan.phase import NO_GAPS, gaps_of, integrate
-from imubench_pipeline.estimators.rows import allan_rows
+from imubench_pipeline.allan.phase import NO_GAPS, count_gaps, integrate
+from imubench_pipeline.estimators.rows import make_allan_rows
 from imubench_pipeline.model.estimates import AllanRow
-from imubench_pipeline.recordings.kept import kept_static_logs
+from imubench_pipeline.recordings.kept import load_static_logs
 from imubench_pipeline.recordings.recording import ChannelLog
 from imubench_pipeline.settings.config import AllanSettings
 from imubench_pipeline.tables import read
 from imubench_pipeline.tables.findings import Finding, find
-from imubench_pipeline.tables.keys import Key, divided
+from imubench_pipeline.tables.keys import Key, split_table
 from imubench_pipeline.words.findings.samples import TooShort
 
 
-def too_sparse(channel: str, log: ChannelLog) -> Finding:
+def report_too_sparse(channel: str, log: ChannelLog) -> Finding:
     """Return why a channel has no Allan variance, and so no estimates."""
     return find(TooShort(log.grid, rate=log.rate), "fatal", log.grid, channel)
 
 
-def curves(
+def yield_allan_rows(
     folder: Path, sensor: str, recording: str, settings: AllanSettings
 ) -> Iterator[AllanRow]:
     """Yield the rows of the table ``allan``; none of a rejected recording."""
-    for channel, log in kept_static_logs(folder).items():
-        yield from allan_rows(Key(sensor, recording, channel), curve_of_channel(log, settings))
+    for channel, log in load_static_logs(folder).items():
+        yield from make_allan_rows(
+            Key(sensor, recording, channel), compute_channel_curve(log, settings)
+        )
 
 
-def curve_of_channel(log: ChannelLog, settings: AllanSettings) -> AllanCurve:
+def compute_channel_curve(log: ChannelLog, settings: AllanSettings) -> AllanCurve:
     """Return the Allan variance of a channel at the cluster sizes of the settings."""
     sizes = cluster_sizes(log.grid, per_decade=settings.per_decade, longest=settings.longest)
     return curve_of(log, sizes, settings.overlap)
@@ -51,7 +53,7 @@ def curve_of(
 ) -> AllanCurve:
     """Return the Allan variance of a channel, with the same bits for any number of threads."""
     blocks, holes, segments = log.blocks(), log.holes, log.segments
-    gaps = gaps_of(log.blocks()) if holes else NO_GAPS
+    gaps = count_gaps(log.blocks()) if holes else NO_GAPS
     if overlap == "full":
         phase = integrate(blocks, log.grid, holes=holes, segments=segments)
         return of_phase(phase, log.rate, sizes, gaps=gaps, threads=threads)
@@ -72,7 +74,7 @@ def read_curves(path: Path, samples: Mapping[str, int]) -> dict[str, AllanCurve]
 
     `samples`: number of each channel, including missing ones.
     """
-    by_channel = divided(read("allan", [path]), "channel")
+    by_channel = split_table(read("allan", [path]), "channel")
     return {
         channel: AllanCurve(
             tau=table["tau"].to_numpy(),
@@ -104,7 +106,7 @@ def read_compensated_curves(
 
     `measured`: the curves of the log as it is, with the same clusters.
     """
-    by_channel = divided(read("allan_compensated", [path]), "channel")
+    by_channel = split_table(read("allan_compensated", [path]), "channel")
     return {
         channel: replace(
             measured[channel], variance=table["adev"].to_numpy() ** 2, **_read_degrees(table)

@@ -8,10 +8,10 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from imubench_pipeline.datasheets.comparable import SENSITIVITY, comparables
+from imubench_pipeline.datasheets.comparable import SENSITIVITY, read_comparables
 from imubench_pipeline.datasheets.deltas import bias_deltas, curve_rms, deltas
-from imubench_pipeline.datasheets.measured import sensitivity
-from imubench_pipeline.estimators.rows import estimates
+from imubench_pipeline.datasheets.measured import compute_sensitivity
+from imubench_pipeline.estimators.rows import read_estimates
 from imubench_pipeline.model.comparisons import DatasheetCurveRow, DatasheetRow
 from imubench_pipeline.model.estimates import FixedBiasRow, TemperatureRow
 from imubench_pipeline.recordings.kept import Quality
@@ -20,7 +20,7 @@ from imubench_pipeline.steps.allan import read_curves
 from imubench_pipeline.tables import read
 
 
-def datasheet_tables(
+def compare_with_datasheet(
     folder: Path, sensor: str, recording: str, settings: str
 ) -> dict[str, list[Any]]:
     """Return the rows of ``datasheet`` and ``datasheet_curve``; none of a rejected recording."""
@@ -33,18 +33,18 @@ def datasheet_tables(
     sections = json.loads(settings)
     datasheet, tolerance = Datasheet.model_validate(sections["datasheet"]), sections["tolerance"]
     rows, of_curves = list[DatasheetRow](), list[DatasheetCurveRow]()
-    for channel, by_method in estimates(folder / "parameters.parquet").items():
+    for channel, by_method in read_estimates(folder / "parameters.parquet").items():
         row = partial(DatasheetRow, sensor=sensor, recording=recording, channel=channel)
         tau = measured[channel].up_to(sections["longest"])
         for estimate in by_method:
             for delta in deltas(datasheet, channel, estimate, tau, tolerance):
                 rows.append(row(method=estimate.method, **asdict(delta)))
-        own = sensitivity([row for row in thermal if row.channel == channel], *temperatures)
+        own = compute_sensitivity([row for row in thermal if row.channel == channel], *temperatures)
         for delta in bias_deltas(datasheet, channel, means, tolerance, own):
             method = "temperature" if delta.statistic == SENSITIVITY else "mean"
             rows.append(row(method=method, **asdict(delta)))
     for channel, curve in measured.items():
-        printed = list(comparables(datasheet, channel))
+        printed = list(read_comparables(datasheet, channel))
         above_zero = curve.deviation > 0.0  # 0 at multiples of the period of a periodic log
         tau, deviation = curve.tau[above_zero], curve.deviation[above_zero]
         for distance in curve_rms(printed, tau, deviation) if above_zero.any() else ():

@@ -8,49 +8,55 @@ from pathlib import Path
 from typing import Any
 
 from imubench_pipeline.estimators.estimate import Estimate
-from imubench_pipeline.estimators.rows import recommended_estimates
+from imubench_pipeline.estimators.rows import read_recommended_estimates
 from imubench_pipeline.model.estimates import DeterministicRow, DrawnDeviationRow, TemperatureRow
 from imubench_pipeline.model.table import TableRow
-from imubench_pipeline.navigation.backtest.of_recording import backtest_rows
+from imubench_pipeline.navigation.backtest.of_recording import list_backtest_rows
 from imubench_pipeline.navigation.compared import ComparedChannel
-from imubench_pipeline.navigation.error_budget.printed_errors import in_use
-from imubench_pipeline.navigation.error_growth import growth_rows
-from imubench_pipeline.navigation.expected_errors import error_rows, of_requirement, standard
-from imubench_pipeline.navigation.ratios import deviation_rows
-from imubench_pipeline.recordings.kept import Quality, kept_static_logs
+from imubench_pipeline.navigation.error_budget.printed_errors import collect_figures_in_use
+from imubench_pipeline.navigation.error_growth import list_growth_rows
+from imubench_pipeline.navigation.expected_errors import (
+    list_error_rows,
+    list_requirement_questions,
+    list_standard_questions,
+)
+from imubench_pipeline.navigation.ratios import list_deviation_rows
+from imubench_pipeline.recordings.kept import Quality, load_static_logs
 from imubench_pipeline.settings.config import ErrorBudgetSettings, FusionSettings
 from imubench_pipeline.settings.printed import Datasheet
-from imubench_pipeline.settings.requirements import requirements_of
+from imubench_pipeline.settings.requirements import validate_requirements
 from imubench_pipeline.tables import read
-from imubench_pipeline.units import quantity_to_si
+from imubench_pipeline.units import parse_quantity
 
 
-def error_tables(
+def compute_error_tables(
     folder: Path, sensor: str, recording: str, settings: str
 ) -> dict[str, Iterator[TableRow]]:
     """Return the rows of the tables of the step, from a folder; none of a rejected log."""
     names = {"sensor": sensor, "recording": recording}
     sections = json.loads(settings)
     how = ErrorBudgetSettings.model_validate(sections["error_budget"])
-    times = [quantity_to_si(time, "time") for time in how.times]
-    window = quantity_to_si(how.static_window, "time")
-    latitude = quantity_to_si(how.latitude, "angle")
-    requirements = requirements_of(sections["requirements"])
-    questions = list(standard(times, window, latitude, how.axes))
+    times = [parse_quantity(time, "time") for time in how.times]
+    window = parse_quantity(how.static_window, "time")
+    latitude = parse_quantity(how.latitude, "angle")
+    requirements = validate_requirements(sections["requirements"])
+    questions = list(list_standard_questions(times, window, latitude, how.axes))
     for name, requirement in requirements.items():
-        questions += of_requirement(name, requirement)
-    estimates = recommended_estimates(folder / "parameters.parquet", folder / "draws.parquet")
+        questions += list_requirement_questions(name, requirement)
+    estimates = read_recommended_estimates(folder / "parameters.parquet", folder / "draws.parquet")
     if not estimates:
         return {name: iter(()) for name in _OUTPUT_TABLES}
     drawn = {"draws": how.draws, "seed": how.seed}
-    logs = kept_static_logs(folder)
+    logs = load_static_logs(folder)
     apart = DeterministicRow.rows_of(read("deterministic", [folder / "deterministic.parquet"]))
     temperature = TemperatureRow.rows_of(read("temperature", [folder / "temperature.parquet"]))
-    figures = in_use(Datasheet.model_validate(sections["datasheet"]), estimates, temperature)
+    figures = collect_figures_in_use(
+        Datasheet.model_validate(sections["datasheet"]), estimates, temperature
+    )
     tables = (
-        error_rows(names, estimates, questions, figures=figures, **drawn),
-        backtest_rows(names, logs, estimates, requirements, apart, **drawn),
-        growth_rows(names, estimates, times=times, window=window, figures=figures, **drawn),
+        list_error_rows(names, estimates, questions, figures=figures, **drawn),
+        list_backtest_rows(names, logs, estimates, requirements, apart, **drawn),
+        list_growth_rows(names, estimates, times=times, window=window, figures=figures, **drawn),
         _deviations(names, Quality.read(folder / "quality.json"), estimates, sections),
     )
     return dict(zip(_OUTPUT_TABLES, tables, strict=True))
@@ -77,6 +83,6 @@ def _deviations(
             estimate=estimate,
         )
         rate = quality.channels[name]["rate"]
-        yield from deviation_rows(
+        yield from list_deviation_rows(
             channel, rate, longest=how.longest, draws=how.draws, seed=how.seed
         )

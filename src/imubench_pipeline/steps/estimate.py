@@ -12,20 +12,28 @@ from typing import Any
 import numpy as np
 
 from imubench_pipeline.allan import AllanCurve, of_blocks
-from imubench_pipeline.allan.phase import NO_GAPS, presence
+from imubench_pipeline.allan.phase import NO_GAPS, count_presence
 from imubench_pipeline.estimators import curve as reading
 from imubench_pipeline.estimators import least_squares, likelihood
-from imubench_pipeline.estimators.agreement import disagreements, doubt_contradicted
-from imubench_pipeline.estimators.curve_limits import with_fitted_limits
+from imubench_pipeline.estimators.agreement import doubt_contradicted, yield_disagreements
+from imubench_pipeline.estimators.curve_limits import add_fitted_limits
 from imubench_pipeline.estimators.deterministic.courses import find_deterministic_signals
-from imubench_pipeline.estimators.deterministic.verdict import assess_signals, deterministic_rows
+from imubench_pipeline.estimators.deterministic.verdict import assess_signals, tabulate_signals
 from imubench_pipeline.estimators.estimate import PARAMETERS, SI_UNITS, Estimate, Parameter
 from imubench_pipeline.estimators.likelihood import Likelihood
 from imubench_pipeline.estimators.model_choice import describe_disagreement
-from imubench_pipeline.estimators.rows import allan_rows, draw_rows, limit_rows, parameter_rows
-from imubench_pipeline.estimators.spectral_findings import slow_noise_missing, spectral_findings
+from imubench_pipeline.estimators.rows import (
+    make_allan_rows,
+    make_draw_rows,
+    make_limit_rows,
+    make_parameter_rows,
+)
+from imubench_pipeline.estimators.spectral_findings import (
+    find_missing_slow_noise,
+    spectral_findings,
+)
 from imubench_pipeline.estimators.thermal.fit import fit_temperature
-from imubench_pipeline.estimators.thermal.path import TemperaturePath, temperature_path
+from imubench_pipeline.estimators.thermal.path import TemperaturePath, estimate_temperature_path
 from imubench_pipeline.estimators.thermal.register import estimate_resolution
 from imubench_pipeline.estimators.thermal.result import ThermalFit, add_temperature_effect
 from imubench_pipeline.estimators.white_level import find_white_stretch
@@ -44,15 +52,15 @@ from imubench_pipeline.model.estimates import (
 )
 from imubench_pipeline.model.recordings import FindingRow
 from imubench_pipeline.noise.simulate import channel_rng
-from imubench_pipeline.recordings.kept import kept_static_logs
-from imubench_pipeline.recordings.recording import ChannelLog, mean_of
+from imubench_pipeline.recordings.kept import load_static_logs
+from imubench_pipeline.recordings.recording import ChannelLog, average_blocks
 from imubench_pipeline.settings.config import EstimateSettings
 from imubench_pipeline.settings.sensor import quantity_of
-from imubench_pipeline.steps.allan import read_curves, too_sparse
+from imubench_pipeline.steps.allan import read_curves, report_too_sparse
 from imubench_pipeline.tables.findings import Finding
 from imubench_pipeline.tables.keys import Key
 from imubench_pipeline.typing import Array
-from imubench_pipeline.units import quantity_to_si
+from imubench_pipeline.units import parse_quantity
 from imubench_pipeline.words.numbers import sentence
 from imubench_pipeline.words.reasons import simulations as texts
 
@@ -98,14 +106,14 @@ def estimate_channel(
     """
     channel = _Channel(key, log, curve, settings, bandwidth)
     verdict = assess_signals(key.channel, channel.signals)
-    into.deterministic += deterministic_rows(asdict(key), channel.unit, channel.signals)
+    into.deterministic += tabulate_signals(asdict(key), channel.unit, channel.signals)
     into.add_findings(key, verdict.findings)
     estimates = channel.by_curve()
     if _LIKELIHOOD_METHODS & set(settings.methods):
         estimates |= channel.by_likelihood(into)
     else:
-        into.allan += allan_rows(key, curve)
-    into.add_findings(key, disagreements(key.channel, estimates))
+        into.allan += make_allan_rows(key, curve)
+    into.add_findings(key, yield_disagreements(key.channel, estimates))
     if "likelihood" in estimates:
         estimates |= {
             method: doubt_contradicted(estimates[method], estimates["likelihood"])
@@ -119,8 +127,8 @@ def estimate_channel(
             if method != "compensated":
                 estimate = verdict.apply(estimate)
             into.estimates.setdefault(key.channel, {})[method] = estimate
-            into.parameters += parameter_rows(key, estimate, recommended=method == best)
-            into.draws += draw_rows(key, estimate)
+            into.parameters += make_parameter_rows(key, estimate, recommended=method == best)
+            into.draws += make_draw_rows(key, estimate)
     if channel.fitted is not None:
         recommended = into.estimates[key.channel].get(best)
         N = recommended.parameters["N"].value if recommended else None
@@ -145,13 +153,13 @@ class _Channel:
         self.unit = SI_UNITS[quantity_of(key.channel)]["B"]
         self.mean = log.mean()
         self._bandwidth = bandwidth
-        self._band = quantity_to_si(settings.band, "frequency") if settings.band else None
+        self._band = parse_quantity(settings.band, "frequency") if settings.band else None
         limits = [limit for limit in (self._band, 0.5 * (bandwidth or 0.0)) if limit]
         unfiltered = min(limits, default=None)  # the noise is as it is up to this frequency
         self.signals = find_deterministic_signals(
             log.blocks, log.grid, log.rate, segments=log.segments, highest=unfiltered
         )
-        self._presence = presence(log.blocks(), log.grid, log.segments) if log.holes else None
+        self._presence = count_presence(log.blocks(), log.grid, log.segments) if log.holes else None
         self._bare = self._curve_of(self._blocks()) if self.signals.signals else curve
         self.fitted: Likelihood | None = None
 
@@ -184,11 +192,11 @@ class _Channel:
                 add_temperature_effect(nothing, warm.path, warm.effect), whole=True
             )
 
-        limited = partial(with_fitted_limits, segments=log.segments, presence=self._presence)
-        into.allan += allan_rows(key, limited(self.curve, fitted))
+        limited = partial(add_fitted_limits, segments=log.segments, presence=self._presence)
+        into.allan += make_allan_rows(key, limited(self.curve, fitted))
         if not self.signals.signals:  # else what they explain is taken out
             white = fitted.estimates[0].parameters["N"].lower
-            lack = slow_noise_missing(key.channel, fitted.spectrum, fitted.fitted, white)
+            lack = find_missing_slow_noise(key.channel, fitted.spectrum, fitted.fitted, white)
             into.add_findings(key, [lack] if lack else [])
         into.models += _model_rows(key, fitted)
         for line in fitted.lines:
@@ -200,7 +208,7 @@ class _Channel:
         if warm is not None:
             into.temperature += _temperature_rows(key, warm)
             if warm.compensated:
-                rows = limit_rows(limited(left, without))
+                rows = make_limit_rows(limited(left, without))
                 for about, effect in zip(rows, added.deviation, strict=True):
                     row = CompensatedAllanRow(**asdict(key), **about, temperature=float(effect))
                     into.allan_compensated.append(row)
@@ -224,9 +232,9 @@ class _Channel:
         """Return what temperature explains of the channel."""
         log = self.log
         if log.path not in into.paths:
-            of_clock = f"{log.path.name} {mean_of(log.temperatures())!r}"
+            of_clock = f"{log.path.name} {average_blocks(log.temperatures())!r}"
             rng = channel_rng(self.settings.seed, of_clock, "temperature")
-            into.paths[log.path] = temperature_path(log.temperatures(), log.segments, rng)
+            into.paths[log.path] = estimate_temperature_path(log.temperatures(), log.segments, rng)
         # A warm-up is what temperature explains: it stays in the log that they are fitted to.
         plain = self._fitted(log.blocks) if self.signals.signals else fitted
         return fit_temperature(
@@ -237,7 +245,7 @@ class _Channel:
             holes=log.holes,
             band=self._band,
             bandwidth=self._bandwidth,
-            resolution=resolution_of(log),
+            resolution=estimate_register_step(log),
             plain=plain,
             rng=self._stream("temperature"),
         )
@@ -253,7 +261,7 @@ class _Channel:
             segments=log.segments,
             band=self._band,
             bandwidth=self._bandwidth,
-            resolution=resolution_of(log),
+            resolution=estimate_register_step(log),
             rng=self._stream("posterior"),
         )
 
@@ -365,20 +373,20 @@ def _estimate_columns(parameter: Parameter, unit: str) -> dict[str, Any]:
     return columns
 
 
-def resolution_of(log: ChannelLog) -> float:
+def estimate_register_step(log: ChannelLog) -> float:
     """Return the step of the register that a log shows at its beginning, SI; 0 where none shows."""
     values = next((block for block in log.blocks() if np.isfinite(block).any()), np.empty(0))
     present = values[np.isfinite(values)][:_MIN_SAMPLES_FOR_STEP]
     return estimate_resolution(np.unique(present), len(present))
 
 
-def estimation(
+def estimate_recording(
     folder: Path, sensor: str, recording: str, settings: str, channels: Container[str] | None = None
 ) -> Estimation:
     """Return the rows of all or some channels in a folder; none of a rejected recording."""
     sections = json.loads(settings)
     into = Estimation()
-    logs = kept_static_logs(folder)
+    logs = load_static_logs(folder)
     grids = {channel: log.grid for channel, log in logs.items()}
     measured = read_curves(folder / "curve.parquet", grids)
     for channel, log in logs.items():
@@ -386,7 +394,7 @@ def estimation(
             continue
         key = Key(sensor, recording, channel)
         if channel not in measured:
-            into.add_findings(key, [too_sparse(channel, log)])
+            into.add_findings(key, [report_too_sparse(channel, log)])
             continue
         how = EstimateSettings.model_validate(sections["estimate"])
         estimate_channel(key, log, measured[channel], how, sections["bandwidth"], into)
@@ -397,5 +405,5 @@ def estimation(
                 name: Parameter(read[name]) if name in read else unread for name in PARAMETERS
             }
             estimate = Estimate("authors", figures)
-            into.parameters += parameter_rows(key, estimate, recommended=False)
+            into.parameters += make_parameter_rows(key, estimate, recommended=False)
     return into

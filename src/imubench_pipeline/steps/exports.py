@@ -9,15 +9,15 @@ from imubench_pipeline.export.imu import ExportError
 from imubench_pipeline.export.request import Request, Tables, load, make_content, recordings_of
 from imubench_pipeline.export.targets import TARGETS
 from imubench_pipeline.settings.config import ExportSettings
-from imubench_pipeline.tables import making, write_content
-from imubench_pipeline.tables.texts import printable
-from imubench_pipeline.units import quantity_to_si
+from imubench_pipeline.tables import make_folder, write_content
+from imubench_pipeline.tables.texts import escape_invisible
+from imubench_pipeline.units import parse_quantity
 
 NOT_MADE = "not_made.txt"
 """Names the programs for which there is no file, with the reason."""
 
 
-def exports(
+def make_exports(
     tables: Tables, settings: ExportSettings, recordings: Path | None = None
 ) -> Iterator[tuple[Path, str | bytes]]:
     """Yield the files of a run, each with its place in the folder of the exports.
@@ -32,7 +32,7 @@ def exports(
                 sensor=sensor,
                 target=target,
                 axis=settings.axis,
-                horizon=quantity_to_si(settings.horizon, "time"),
+                horizon=parse_quantity(settings.horizon, "time"),
                 inflation=settings.inflation,
                 because=settings.because,
                 overbound=settings.overbound,
@@ -41,7 +41,7 @@ def exports(
             try:
                 content = make_content(tables, request, recordings)
             except ExportError as error:
-                refused.append(printable(f"{target}: {error}"))
+                refused.append(escape_invisible(f"{target}: {error}"))
                 continue
             yield Path(sensor, target, TARGETS[target].file_name), content
         if refused:
@@ -51,6 +51,6 @@ def exports(
 def write_exports(tables: Path, settings: str, folder: Path) -> None:
     """Write a folder a sensor, with a file a program; all appear together."""
     how = ExportSettings.model_validate_json(settings)
-    with making(folder) as made:
-        for place, content in exports(load(tables), how, recordings_of(tables)):
+    with make_folder(folder) as made:
+        for place, content in make_exports(load(tables), how, recordings_of(tables)):
             write_content(content, made / place)

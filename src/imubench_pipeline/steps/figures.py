@@ -7,12 +7,12 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from imubench_pipeline.report.static_figures.files import draw_comparison
-from imubench_pipeline.tables import making, read
+from imubench_pipeline.tables import make_folder, read
 
 
 def write_figures(tables: Iterable[Path], settings: str, figures: Path) -> None:
     """Write a folder of figures; all appear together."""
-    with making(figures) as folder:
+    with make_folder(figures) as folder:
         draw_comparison(
             {path.stem: read(path.stem, [path]) for path in tables},
             json.loads(settings)["report"]["units"],

@@ -22,7 +22,7 @@ _STATUS: Mapping[RecordingStatus, FileStatus] = {
 }
 
 
-def file_rows(
+def list_files(
     files: Iterable[Mapping[str, Any]],
     recordings: Iterable[RecordingRow],
     failures: Iterable[FailureRow],
@@ -49,4 +49,4 @@ def write_files(tables: Mapping[str, Path], files: str, outputs: Iterable[Path])
     """Write the table ``files``, as Parquet and CSV; `files` is what the plan found, as JSON."""
     recordings = RecordingRow.rows_of(read("recordings", [tables["recordings"]]))
     failures = FailureRow.rows_of(read("failures", [tables["failures"]]))
-    write_each({"files": file_rows(json.loads(files), recordings, failures)}, outputs)
+    write_each({"files": list_files(json.loads(files), recordings, failures)}, outputs)

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from imubench_pipeline.estimators.rows import estimates, recommended_estimates
+from imubench_pipeline.estimators.rows import read_estimates, read_recommended_estimates
 from imubench_pipeline.model.recordings import RecordingRow
 from imubench_pipeline.navigation.error_budget.uncertainty import draw_models
 from imubench_pipeline.noise import NoiseModel
@@ -45,7 +45,7 @@ class NoiseSource:
     drawn: tuple[NoiseModel, ...] = ()  # from the uncertainty of the model, if it is known
 
 
-def from_static(
+def take_static_noise(
     folders: Sequence[Path], own: RecordingRow, channel: str, draws: int = 0
 ) -> NoiseSource | None:
     """Return the noise of a gyro from the static recordings of its sensor, in `folders`.
@@ -58,14 +58,14 @@ def from_static(
     def far(row: RecordingRow) -> tuple[bool, bool]:
         return row.simulated != own.simulated, row.device != own.device
 
-    for row, folder in static_recordings(folders, far):
+    for row, folder in find_static_recordings(folders, far):
         parameters = folder / "parameters.parquet"
         joint = folder / "draws.parquet" if draws else None
-        best = recommended_estimates(parameters, joint)
+        best = read_recommended_estimates(parameters, joint)
         gyros = [name for name in best if name.startswith("gyro_") and best[name].model.N]
         if gyros:
             name = min(gyros, key=lambda name: (name != channel, name))
-            every = {estimate.method: estimate for estimate in estimates(parameters)[name]}
+            every = {estimate.method: estimate for estimate in read_estimates(parameters)[name]}
             papers = every.get("likelihood_gm", best[name]).model
             source = _words(row, own, name, channel, best[name].method)
             rng = channel_rng(_DRAW_SEED, repr(best[name].model), name)
@@ -74,7 +74,7 @@ def from_static(
     return None
 
 
-def static_recordings(
+def find_static_recordings(
     folders: Sequence[Path], far: Callable[[RecordingRow], tuple[bool, ...]]
 ) -> list[Kept]:
     """Return the usable static recordings: the nearest first, of these the longest.
@@ -91,21 +91,21 @@ def static_recordings(
     return sorted(usable, key=order)
 
 
-def noise_source(
+def find_noise_source(
     folder: Path, static: Sequence[Path], key: Key, sensor: Sensor, draws: int = 0
 ) -> NoiseSource | None:
-    """Return the noise of a gyro: `from_static`, or else `from_printed`.
+    """Return the noise of a gyro: `take_static_noise`, or else `take_printed_noise`.
 
     `folder` is that of the recording that was turned, `static` those of the static recordings of
     its sensor; `draws`: models that are drawn from what a static log leaves open.
     """
     own = Quality.read(folder / "quality.json").row
-    return from_static(static, own, key.channel, draws) or from_printed(
+    return take_static_noise(static, own, key.channel, draws) or take_printed_noise(
         key.sensor, sensor, key.channel
     )
 
 
-def from_printed(name: str, sensor: Sensor, channel: str) -> NoiseSource | None:
+def take_printed_noise(name: str, sensor: Sensor, channel: str) -> NoiseSource | None:
     """Return the noise of a gyro as its datasheet prints it; None where none is printed."""
     try:
         origin = from_datasheet(name, sensor, 0)
@@ -121,7 +121,7 @@ def from_printed(name: str, sensor: Sensor, channel: str) -> NoiseSource | None:
     )
 
 
-def segments_reason(log: ChannelLog) -> str:
+def explain_segments(log: ChannelLog) -> str:
     """Return the reason why a log of several segments cannot be used as one."""
     return texts.several_segments(len(log.segments))
 

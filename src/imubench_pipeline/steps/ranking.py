@@ -12,12 +12,12 @@ import pyarrow.compute as pc
 from imubench_pipeline.model.comparisons import ErrorBudgetRow
 from imubench_pipeline.model.estimates import BacktestRow, ParameterRow
 from imubench_pipeline.model.recordings import DoubtRow, RecordingRow
-from imubench_pipeline.navigation.selection import ranked
+from imubench_pipeline.navigation.selection import rank_sensors
 from imubench_pipeline.navigation.verdicts.basis import Basis
-from imubench_pipeline.navigation.verdicts.judgement import judgements
-from imubench_pipeline.navigation.verdicts.next_steps import next_step_rows
+from imubench_pipeline.navigation.verdicts.judgement import judge_sensors
+from imubench_pipeline.navigation.verdicts.next_steps import list_next_step_rows
 from imubench_pipeline.registry import Hook
-from imubench_pipeline.settings.requirements import Requirement, requirements_of
+from imubench_pipeline.settings.requirements import Requirement, validate_requirements
 from imubench_pipeline.tables import read, write_each
 
 OtherErrors = Callable[
@@ -31,7 +31,7 @@ _LIMITS: Hook[OtherErrors] = Hook("limits")
 def write_ranking(tables: dict[str, Path], settings: str, outputs: list[Path]) -> None:
     """Write the tables ``ranking`` and ``next_steps``, as Parquet and CSV."""
     sections = json.loads(settings)
-    requirements = requirements_of(sections["requirements"])
+    requirements = validate_requirements(sections["requirements"])
     joined = {name: read(name, [path]) for name, path in tables.items()}
     asked = joined["error_budget"].filter(pc.field("requirement").is_valid())
     recommended = joined["parameters"].filter(pc.field("recommended"))
@@ -47,6 +47,9 @@ def write_ranking(tables: dict[str, Path], settings: str, outputs: list[Path]) -
     for name, errors_of in _LIMITS.by_key().items():
         errors += errors_of(joined[name], recordings, requirements)
     of_sensors = [row for row in errors if row.sensor in sensors]
-    judged = list(judgements(of_sensors, requirements, sensors, basis))
-    rows = {"ranking": ranked(judged, basis), "next_steps": next_step_rows(judged, basis)}
+    judged = list(judge_sensors(of_sensors, requirements, sensors, basis))
+    rows = {
+        "ranking": rank_sensors(judged, basis),
+        "next_steps": list_next_step_rows(judged, basis),
+    }
     write_each(rows, outputs)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from imubench_pipeline.allan import AllanCurve
 from imubench_pipeline.estimators.estimate import Estimate
-from imubench_pipeline.estimators.rows import estimates, recommended_estimates
+from imubench_pipeline.estimators.rows import read_estimates, read_recommended_estimates
 from imubench_pipeline.estimators.score import beats, rms, score
 from imubench_pipeline.model.estimates import ReconstructionRow, ScoreRow
 from imubench_pipeline.noise.simulate import (
@@ -25,7 +25,7 @@ from imubench_pipeline.recordings.kept import Quality
 from imubench_pipeline.recordings.recording import LogWriter
 from imubench_pipeline.settings.config import ReconstructionSettings
 from imubench_pipeline.steps.allan import read_compensated_curves, read_curves
-from imubench_pipeline.tables import replacing
+from imubench_pipeline.tables import replace_file
 from imubench_pipeline.tables.keys import Key
 from imubench_pipeline.words.reasons import simulations as texts
 
@@ -67,7 +67,7 @@ def reconstruct(
     if settings.keep_series:
         about = {"simulated": True, "rate": rate, "rows": samples, "model": asdict(model)}
         columns = {"simulated": pa.float64()}
-        with replacing(series) as temporary, LogWriter(temporary, columns) as log:
+        with replace_file(series) as temporary, LogWriter(temporary, columns) as log:
             for block in simulate_blocks(model, rate, samples, stream("member 1")):
                 log.write({"simulated": block})
             log.finish(about)
@@ -102,7 +102,7 @@ class ReconstructionRows:
     scores: list[ScoreRow] = field(default_factory=list)
 
 
-def reconstruction_rows(
+def reconstruct_recording(
     folder: Path, settings: ReconstructionSettings, channels: Container[str] | None = None
 ) -> ReconstructionRows:
     """Return the rows of a recording, of all channels that have estimates or of some of them."""
@@ -110,9 +110,9 @@ def reconstruction_rows(
     measured = read_curves(folder / "allan.parquet", about.grids)
     left = read_compensated_curves(folder / "allan_compensated.parquet", measured)
     parameters = folder / "parameters.parquet"
-    best = recommended_estimates(parameters)
+    best = read_recommended_estimates(parameters)
     rows = ReconstructionRows()
-    for channel, by_method in estimates(parameters).items():
+    for channel, by_method in read_estimates(parameters).items():
         if channels is not None and channel not in channels:
             continue
         key = Key(about.row.sensor, about.row.recording, channel)

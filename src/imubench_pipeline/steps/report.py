@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from imubench_pipeline.report.publish import publish, site_of
+from imubench_pipeline.report.publish import make_site, publish
 from imubench_pipeline.tables import read
 
 
 def write_report(tables: list[Path], settings: str, start_page: Path) -> None:
     """Write the report; its start page is the last to appear."""
     folder = start_page.parent
-    site = site_of({path.stem: read(path.stem, [path]) for path in tables}, settings, folder.parent)
+    site = make_site(
+        {path.stem: read(path.stem, [path]) for path in tables}, settings, folder.parent
+    )
     publish(site, folder)

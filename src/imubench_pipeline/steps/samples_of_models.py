@@ -15,11 +15,11 @@ from pathlib import Path
 
 import numpy as np
 
-from imubench_pipeline.estimators.rows import estimates
+from imubench_pipeline.estimators.rows import read_estimates
 from imubench_pipeline.model.estimates import LowPassRow, ModelSampleRow, TemperatureRow
 from imubench_pipeline.noise.low_pass import LowPass
 from imubench_pipeline.noise.simulate import channel_rng
-from imubench_pipeline.recordings.kept import kept_static_logs
+from imubench_pipeline.recordings.kept import load_static_logs
 from imubench_pipeline.recordings.overview import (
     BUCKETS,
     PRESENT,
@@ -48,21 +48,21 @@ _TEMPERATURE_AVERAGING_TIME = 100.0
 """Averaging time of temperature readings, s."""
 
 
-def samples_of_models(
+def simulate_samples_of_models(
     folder: Path, sensor: str, recording: str, seed: int
 ) -> Iterator[ModelSampleRow]:
-    """Yield the rows of the table ``samples_of_models``; none of a rejected recording.
+    """Yield the rows of the table ``simulate_samples_of_models``; none of a rejected recording.
 
     `folder`: of the recording; `seed`: each channel and model has a stream of its own.
     """
-    logs = kept_static_logs(folder)
+    logs = load_static_logs(folder)
     if not logs:
         return
     filters = LowPassRow.rows_of(read("low_pass", [folder / "low_pass.parquet"]))
     thermal = TemperatureRow.rows_of(read("temperature", [folder / "temperature.parquet"]))
     by_method = {
         channel: {estimate.method: estimate.model for estimate in own}
-        for channel, own in estimates(folder / "parameters.parquet").items()
+        for channel, own in read_estimates(folder / "parameters.parquet").items()
     }
     for channel, log in logs.items():
         key = Key(sensor, recording, channel)

@@ -22,27 +22,32 @@ from imubench_pipeline.model.recordings import FindingRow
 from imubench_pipeline.model.table import TableRow
 from imubench_pipeline.navigation.backtest import comparison
 from imubench_pipeline.navigation.drift import drift_rows
-from imubench_pipeline.navigation.pooled import pooled_rows
+from imubench_pipeline.navigation.pooled import list_pooled_rows
 from imubench_pipeline.recordings.fitness import (
     WITH_DOUBTS,
-    doubts,
-    judged,
-    left_out,
-    not_sold,
-    simulated_beside_measured,
-    undecided,
-    with_doubts,
-    with_doubts_of_all,
+    attach_doubts,
+    attach_doubts_to_pools,
+    derive_doubts,
+    doubt_simulated_recordings,
+    doubt_unsold_sensors,
+    judge_recordings,
+    list_excluded,
+    mask_excluded,
 )
 from imubench_pipeline.recordings.kept import Quality
-from imubench_pipeline.recordings.quality.copies import recorded_twice
+from imubench_pipeline.recordings.quality.copies import find_copied_recordings
 from imubench_pipeline.registry import Hook
 from imubench_pipeline.settings.sensor import Sensor, sensors_of
 from imubench_pipeline.settings.simulated_recordings import SimulatedRecording
-from imubench_pipeline.simulate.models import SIMULATIONS, figures_of
+from imubench_pipeline.simulate.models import SIMULATIONS, list_true_figures
 from imubench_pipeline.tables import build
-from imubench_pipeline.tables.failures import Failure, read_with_failures, with_failures, without
-from imubench_pipeline.units import quantity_to_si
+from imubench_pipeline.tables.failures import (
+    Failure,
+    mark_failures,
+    read_with_failures,
+    remove_recordings,
+)
+from imubench_pipeline.units import parse_quantity
 
 SensorTable = Callable[
     [str, Sequence[SimulatedTruthRow], Mapping[str, pa.Table]], Iterable[TableRow]
@@ -55,7 +60,7 @@ By its simulated recordings, as the plan wrote them, their true parameters, and 
 _ADDED: Hook[SensorTable] = Hook("sensor_tables")
 
 
-def joined_tables(
+def join_tables(
     parts: Mapping[str, list[Path]], truths: str, sensor: str, usual: str, decide: str
 ) -> dict[str, pa.Table]:
     """Return every table of recordings, joined for a sensor.
@@ -72,7 +77,9 @@ def joined_tables(
             joined[name], failed = read_with_failures(name, paths)
             failed_steps += failed
     failures = list(dict.fromkeys(failed_steps))
-    joined = without(joined, {(failure.sensor, failure.recording) for failure in failures})
+    joined = remove_recordings(
+        joined, {(failure.sensor, failure.recording) for failure in failures}
+    )
     about = [quality.row for quality in qualities]
     devices = {(row.sensor, row.recording): row.device for row in about}
     recommended = joined["parameters"].filter(joined["parameters"]["recommended"])
@@ -81,7 +88,7 @@ def joined_tables(
     models = ModelRow.rows_of(joined["models"])
     joined["drift"] = build("drift", drift_rows(estimated, biases, about))
     sensors = sensors_of(sensor)
-    findings = findings_of(
+    findings = collect_findings(
         qualities,
         DeterministicRow.rows_of(joined["deterministic"]),
         FindingRow.rows_of(joined.pop("estimate_findings")),
@@ -89,28 +96,28 @@ def joined_tables(
         sensors,
         usual_of_text(usual),
     )
-    findings += recorded_twice(models, biases)
+    findings += find_copied_recordings(models, biases)
     if "backtest" in joined:
         findings += comparison.findings(BacktestRow.rows_of(joined["backtest"]))
     joined["findings"] = build("findings", findings)
     doubted = [
-        *simulated_beside_measured(about),
-        *not_sold(about, {name for name, sensor in sensors.items() if not sensor.sold}),
-        *doubts(FindingRow.rows_of(joined["findings"]), estimated, models),
+        *doubt_simulated_recordings(about),
+        *doubt_unsold_sensors(about, {name for name, sensor in sensors.items() if not sensor.sold}),
+        *derive_doubts(FindingRow.rows_of(joined["findings"]), estimated, models),
     ]
-    about = judged(about, doubted, json.loads(decide).get("include", ()))
+    about = judge_recordings(about, doubted, json.loads(decide).get("include", ()))
     joined["recordings"] = build("recordings", about)
     joined["doubts"] = build("doubts", (doubt.row() for doubt in doubted))
-    apart = left_out(about)
-    pools = pooled_rows(undecided(estimated, apart), undecided(biases, apart), devices)
-    joined["pooled"] = build("pooled", with_doubts_of_all(pools, about))
+    apart = list_excluded(about)
+    pools = list_pooled_rows(mask_excluded(estimated, apart), mask_excluded(biases, apart), devices)
+    joined["pooled"] = build("pooled", attach_doubts_to_pools(pools, about))
     for name in WITH_DOUBTS.keys() & joined.keys():
-        joined[name] = build(name, with_doubts(WITH_DOUBTS[name].rows_of(joined[name]), about))
-    truth = list(truth_rows(truths))
+        joined[name] = build(name, attach_doubts(WITH_DOUBTS[name].rows_of(joined[name]), about))
+    truth = list(list_true_parameters(truths))
     joined["simulated_truth"] = build("simulated_truth", truth)
     for name, rows_of in _ADDED.by_key().items():
         joined[name] = build(name, rows_of(truths, truth, joined))
-    return with_failures(joined, failures)
+    return mark_failures(joined, failures)
 
 
 _KIND_OF_FINDING = {"step": "bias_step", "warm_up": "warm_up_drift"}
@@ -120,7 +127,7 @@ _MAX_STEP_DISTANCE = 1 / 100
 """Max. distance of two steps that are treated as one, over the length of the recording."""
 
 
-def findings_of(
+def collect_findings(
     qualities: Sequence[Quality],
     deterministic: Sequence[DeterministicRow],
     of_estimates: Iterable[FindingRow],
@@ -134,7 +141,7 @@ def findings_of(
     the recommended parameters, the sensor files, and the usual figures of other sensors.
     """
     about = [quality.row for quality in qualities]
-    of_logs = without_doubles(
+    of_logs = drop_duplicate_findings(
         (row for quality in qualities for row in quality.findings),
         deterministic,
         {(row.sensor, row.recording): row.duration or 0.0 for row in about},
@@ -145,7 +152,7 @@ def findings_of(
     return [*found, *of_estimates, *unusual_rows(estimated, sensors, usual)]
 
 
-def without_doubles(
+def drop_duplicate_findings(
     findings: Iterable[FindingRow],
     deterministic: Iterable[DeterministicRow],
     durations: Mapping[tuple[str, str], float],
@@ -169,16 +176,16 @@ def without_doubles(
             yield finding
 
 
-def truth_rows(truths: str) -> Iterator[SimulatedTruthRow]:
+def list_true_parameters(truths: str) -> Iterator[SimulatedTruthRow]:
     """Yield the rows of the table ``simulated_truth``."""
     for entry in json.loads(truths):
         recording = SimulatedRecording.model_validate(entry)
-        rate = quantity_to_si(recording.rate, "frequency")
+        rate = parse_quantity(recording.rate, "frequency")
         for channel, truth in recording.channels.items():
             factors: Mapping[str, float] = {}
             for key in recording.simulated_sensors:
                 factors = SIMULATIONS.by_key()[key].factors(recording, str(channel))
-            for figure in figures_of(truth, channel, rate):
+            for figure in list_true_figures(truth, channel, rate):
                 factor = factors.get(figure.name.removesuffix(" in the log"), 1.0)
                 yield SimulatedTruthRow(
                     sensor=recording.sensor,

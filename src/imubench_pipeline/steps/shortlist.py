@@ -11,9 +11,12 @@ from imubench_pipeline.model.comparisons import RankingRow, ShortlistRow
 from imubench_pipeline.model.estimates import ParameterRow
 from imubench_pipeline.model.recordings import RecordingRow
 from imubench_pipeline.model.table import R
-from imubench_pipeline.navigation.shortlist.figures import measured_ranges, printed_ranges
-from imubench_pipeline.navigation.shortlist.rows import shortlist_rows
-from imubench_pipeline.settings.requirements import Requirement, requirements_of
+from imubench_pipeline.navigation.shortlist.figures import (
+    collect_measured_ranges,
+    collect_printed_ranges,
+)
+from imubench_pipeline.navigation.shortlist.rows import list_shortlist_rows
+from imubench_pipeline.settings.requirements import Requirement, validate_requirements
 from imubench_pipeline.settings.sensor import Sensor, sensors_of
 from imubench_pipeline.tables import read, write_each
 
@@ -21,7 +24,7 @@ NEEDED = ("recordings", "parameters", "ranking")
 """The tables of a run that the step reads."""
 
 
-def rows_of_run(
+def list_shortlist(
     requirements: Mapping[str, Requirement],
     sensors: Mapping[str, Sensor],
     tables: Mapping[str, Path],
@@ -38,15 +41,15 @@ def rows_of_run(
 
     recordings = rows_of(RecordingRow)
     classes = {name: sensor.price_class for name, sensor in sensors.items()}
-    measured = measured_ranges(rows_of(ParameterRow), recordings, classes)
-    ranges = replace(measured, printed=printed_ranges(sensors))
-    yield from shortlist_rows(requirements, sensors, ranges, rows_of(RankingRow), recordings)
+    measured = collect_measured_ranges(rows_of(ParameterRow), recordings, classes)
+    ranges = replace(measured, printed=collect_printed_ranges(sensors))
+    yield from list_shortlist_rows(requirements, sensors, ranges, rows_of(RankingRow), recordings)
 
 
 def write_shortlist(
     tables: dict[str, Path], settings: str, catalogue: str, outputs: list[Path]
 ) -> None:
     """Write the table ``shortlist``, as Parquet and CSV."""
-    requirements = requirements_of(json.loads(settings)["requirements"])
-    rows = rows_of_run(requirements, sensors_of(catalogue), tables)
+    requirements = validate_requirements(json.loads(settings)["requirements"])
+    rows = list_shortlist(requirements, sensors_of(catalogue), tables)
     write_each({"shortlist": rows}, outputs)

@@ -17,10 +17,10 @@ from imubench_pipeline.settings.sensor import TEMPERATURE, ColumnSource, LogForm
 from imubench_pipeline.settings.simulated_recordings import SimulatedRecording
 from imubench_pipeline.settings.validation import ConfigError
 from imubench_pipeline.simulate.imu import simulate_imu
-from imubench_pipeline.simulate.models import SIMULATIONS, imu_model
+from imubench_pipeline.simulate.models import SIMULATIONS, make_imu_model
 from imubench_pipeline.simulate.profiles import Profile, profiles_of
-from imubench_pipeline.tables import making
-from imubench_pipeline.units import quantity_to_si
+from imubench_pipeline.tables import make_folder
+from imubench_pipeline.units import parse_quantity
 
 Motion = Callable[[SimulatedRecording, float], Mapping[str, Profile]]
 """Returns what ideal channels sense in an experiment, by its recording and sampling rate, Hz."""
@@ -41,7 +41,7 @@ def write_simulated(recording: SimulatedRecording, log: LogFormat, folder: Path)
             f"{recording.sensor}: simulated logs are written as text, the sensor file has "
             f"reader {log.reader!r}"
         )
-    rate = quantity_to_si(recording.rate, "frequency")
+    rate = parse_quantity(recording.rate, "frequency")
     files: dict[str, dict[str, ColumnSource]] = {}
     sources = {str(name): source for name, source in log.channels.items()}
     if log.temperature is not None:
@@ -63,7 +63,7 @@ def write_simulated(recording: SimulatedRecording, log: LogFormat, folder: Path)
 def _blocks(recording: SimulatedRecording, rate: float) -> Iterator[dict[str, NDArray[np.float64]]]:
     """Return the blocks of the channels in SI and, where there is one, of the temperature."""
     try:
-        model = imu_model(recording.channels, recording)
+        model = make_imu_model(recording.channels, recording)
     except ValueError as error:
         name = f"{recording.sensor}/{recording.recording}"
         raise ConfigError(f"{name}: channels.{error}") from error
@@ -88,5 +88,5 @@ def write_recording(settings: str, folder: Path) -> None:
     """Write the recording into ``folder``, which appears when it is complete."""
     sections = json.loads(settings)
     recording = SimulatedRecording.model_validate(sections["recording"])
-    with making(folder) as made:
+    with make_folder(folder) as made:
         write_simulated(recording, LogFormat.model_validate(sections["log"]), made)

@@ -8,23 +8,23 @@ from pathlib import Path
 import pyarrow as pa
 
 from imubench_pipeline.model.recordings import DoubtRow, RecordingRow
-from imubench_pipeline.recordings.fitness import WITH_DOUBTS, with_doubts, without_simulated
+from imubench_pipeline.recordings.fitness import WITH_DOUBTS, attach_doubts, exclude_simulated
 from imubench_pipeline.tables import build
-from imubench_pipeline.tables.failures import Failure, read_with_failures, with_failures
+from imubench_pipeline.tables.failures import Failure, mark_failures, read_with_failures
 
 
-def tables_of_all(parts: Mapping[str, Sequence[Path]]) -> dict[str, pa.Table]:
+def join_all_tables(parts: Mapping[str, Sequence[Path]]) -> dict[str, pa.Table]:
     """Return every table, of its files in their order, and what failed in ``failures``."""
     joined, failures = {}, dict[Failure, None]()
     for name, paths in parts.items():
         joined[name], failed = read_with_failures(name, paths)
         failures |= dict.fromkeys(failed)
-    return _remove_simulated(with_failures(joined, list(failures)))
+    return _remove_simulated(mark_failures(joined, list(failures)))
 
 
 def _remove_simulated(tables: dict[str, pa.Table]) -> dict[str, pa.Table]:
     """Return tables in which no simulated recording decides beside measured ones of any sensor."""
-    recordings, new = without_simulated(RecordingRow.rows_of(tables["recordings"]))
+    recordings, new = exclude_simulated(RecordingRow.rows_of(tables["recordings"]))
     if not new:
         return tables
     doubts = [*(doubt.row() for doubt in new), *DoubtRow.rows_of(tables["doubts"])]
@@ -32,7 +32,7 @@ def _remove_simulated(tables: dict[str, pa.Table]) -> dict[str, pa.Table]:
         "recordings": build("recordings", recordings),
         "doubts": build("doubts", doubts),
         **{
-            name: build(name, with_doubts(WITH_DOUBTS[name].rows_of(tables[name]), recordings))
+            name: build(name, attach_doubts(WITH_DOUBTS[name].rows_of(tables[name]), recordings))
             for name in WITH_DOUBTS.keys() & tables.keys()
         },
     }

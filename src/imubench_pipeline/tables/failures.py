@@ -20,8 +20,15 @@ import pyarrow.parquet as pq
 
 from imubench_pipeline.model.recordings import FailureRow, FindingRow, RecordingRow
 from imubench_pipeline.model.table import R
-from imubench_pipeline.tables.files import build, joined, read_json, read_part, schema, write_arrow
-from imubench_pipeline.tables.findings import Finding, UnavailableError, find, without_addresses
+from imubench_pipeline.tables.files import (
+    build,
+    join_tables,
+    make_schema,
+    read_json,
+    read_part,
+    write_arrow,
+)
+from imubench_pipeline.tables.findings import Finding, UnavailableError, find, remove_addresses
 from imubench_pipeline.words.findings.files import Failed
 
 Cause = Literal["error", "killed", "time"]
@@ -68,10 +75,10 @@ def describe_error(error: BaseException) -> str:
     text = "".join(traceback.format_exception_only(error)).strip()
     for name in filter(None, (getattr(error, "filename", None), getattr(error, "filename2", None))):
         text = text.replace(repr(name), repr(Path(os.fsdecode(name)).name))
-    return without_addresses(text)
+    return remove_addresses(text)
 
 
-def failure_of(path: Path) -> Failure | None:
+def read_failure(path: Path) -> Failure | None:
     """Return why an output, Parquet or ``quality.json``, is empty; None without a failure."""
     if path.name == QUALITY:
         with contextlib.suppress(ValueError, TypeError, AttributeError):
@@ -79,11 +86,11 @@ def failure_of(path: Path) -> Failure | None:
             return Failure(**failure) if failure else None
     if path.suffix == ".parquet":
         with contextlib.suppress(OSError, ValueError, TypeError, pa.ArrowException):
-            return told_by(pq.read_schema(path))
+            return parse_failure(pq.read_schema(path))
     return None
 
 
-def told_by(read: pa.Schema) -> Failure | None:
+def parse_failure(read: pa.Schema) -> Failure | None:
     """Return the failure in the metadata of a table."""
     text = (read.metadata or {}).get(_METADATA)
     return Failure(**json.loads(text)) if text else None
@@ -92,18 +99,20 @@ def told_by(read: pa.Schema) -> Failure | None:
 def read_with_failures(table: str, paths: Sequence[Path]) -> tuple[pa.Table, list[Failure]]:
     """Read and join files of one table, and return the failures of the empty ones."""
     parts = [read_part(table, path) for path in paths]
-    failures = [failure for part in parts if len(part) == 0 and (failure := told_by(part.schema))]
-    return joined(table, parts), failures
+    failures = [
+        failure for part in parts if len(part) == 0 and (failure := parse_failure(part.schema))
+    ]
+    return join_tables(table, parts), failures
 
 
 def write_empty(tables: Iterable[Path], failure: Failure) -> None:
     """Write the tables that a step declares, without a row and with its failure."""
     metadata = {_METADATA: json.dumps(asdict(failure), sort_keys=True).encode()}
     for path in tables:
-        write_arrow(schema(path.stem).empty_table().replace_schema_metadata(metadata), path)
+        write_arrow(make_schema(path.stem).empty_table().replace_schema_metadata(metadata), path)
 
 
-def with_failures(
+def mark_failures(
     tables: Mapping[str, pa.Table], failures: Sequence[Failure]
 ) -> dict[str, pa.Table]:
     """Return tables with the failures, and without failed recordings.
@@ -113,7 +122,7 @@ def with_failures(
     ``findings``.
     """
     if not failures:
-        return {"failures": schema("failures").empty_table()} | dict(tables)
+        return {"failures": make_schema("failures").empty_table()} | dict(tables)
     recordings = RecordingRow.rows_of(tables["recordings"])
     kinds = {(row.sensor, row.recording): row.kind for row in recordings}
     reasons = {
@@ -122,7 +131,7 @@ def with_failures(
         if failure.step not in _BESIDE
         or kinds.get((failure.sensor, failure.recording or "")) != "static"
     }
-    marked = without(tables, reasons)
+    marked = remove_recordings(tables, reasons)
     marked["recordings"] = build(
         "recordings",
         (
@@ -138,19 +147,19 @@ def with_failures(
     found = [
         failure.finding().row(failure.sensor, str(failure.recording)) for failure in of_recordings
     ]
-    marked["findings"] = build("findings", with_new(listed, found))
+    marked["findings"] = build("findings", append_new_rows(listed, found))
     before = FailureRow.rows_of(tables["failures"]) if "failures" in tables else []
-    marked["failures"] = build("failures", with_new(before, [one.row() for one in failures]))
+    marked["failures"] = build("failures", append_new_rows(before, [one.row() for one in failures]))
     return marked
 
 
-def with_new(listed: Sequence[R], rows: Iterable[R]) -> list[R]:
+def append_new_rows(listed: Sequence[R], rows: Iterable[R]) -> list[R]:
     """Return rows, and after them those others that are not among them."""
     known = {tuple(row.columns().values()) for row in listed}
     return [*listed, *(row for row in rows if tuple(row.columns().values()) not in known)]
 
 
-def without(
+def remove_recordings(
     tables: Mapping[str, pa.Table], left_out: Container[tuple[str, str | None]]
 ) -> dict[str, pa.Table]:
     """Return tables without the rows of some (sensor, recording); those with the reason remain."""

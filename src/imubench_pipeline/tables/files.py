@@ -18,9 +18,9 @@ import pyarrow.compute as pc
 import pyarrow.csv as pacsv
 
 from imubench_pipeline.model.table import AnyRow, TableRow, TypedColumn
-from imubench_pipeline.tables.parquet import SEAL, checked_parquet, seal_broken, write_sealed
+from imubench_pipeline.tables.parquet import SEAL, is_seal_broken, open_parquet, write_sealed
 from imubench_pipeline.tables.schemas import PARTS_OF, TABLES
-from imubench_pipeline.tables.texts import printable, with_safe_cells
+from imubench_pipeline.tables.texts import escape_cells, escape_invisible
 
 _SMALL = 1_000_000  # bytes
 _LONGEST_NAME = 240  # bytes of a name to which a temporary one can add; file systems take 255
@@ -30,12 +30,12 @@ class TableError(ValueError):
     """Rows that do not fit the schema of their table."""
 
 
-def columns_of(table: str) -> tuple[TypedColumn, ...]:
+def get_columns(table: str) -> tuple[TypedColumn, ...]:
     """Return the columns of a table, or of the table that a file of a recording has rows of."""
     return TABLES[PARTS_OF.get(table, table)]
 
 
-def schema(table: str) -> pa.Schema:
+def make_schema(table: str) -> pa.Schema:
     """Return the Arrow schema of a table, with unit and meaning in the field metadata."""
     return pa.schema(
         [
@@ -45,7 +45,7 @@ def schema(table: str) -> pa.Schema:
                 nullable=not column.required,
                 metadata={"unit": column.unit, "meaning": column.meaning},
             )
-            for column in columns_of(table)
+            for column in get_columns(table)
         ]
     )
 
@@ -58,7 +58,7 @@ def build(table: str, rows: Iterable[AnyRow]) -> pa.Table:
     required value.
     """
     listed = [row.columns() if isinstance(row, TableRow) else row for row in rows]
-    columns = columns_of(table)
+    columns = get_columns(table)
     unknown = {name for row in listed for name in row} - {column.name for column in columns}
     if unknown:
         raise TableError(f"table {table}: unknown columns {sorted(unknown)}")
@@ -78,13 +78,13 @@ def build(table: str, rows: Iterable[AnyRow]) -> pa.Table:
         if column.required and array.null_count:
             raise TableError(f"table {table}: column {column.name} has {array.null_count} nulls")
         arrays.append(array)
-    return pa.Table.from_arrays(arrays, schema=schema(table))
+    return pa.Table.from_arrays(arrays, schema=make_schema(table))
 
 
 def _plain(value: Any) -> Any:
     """Return a value as Arrow takes it: texts are printable, structs are mappings."""
     if isinstance(value, str):  # a reason may have several lines
-        return "\n".join(map(printable, value.split("\n")))
+        return "\n".join(map(escape_invisible, value.split("\n")))
     if isinstance(value, (tuple, list)):
         return [_plain_part(part) for part in value]
     return value
@@ -113,7 +113,7 @@ def _not_finite(table: pa.Table) -> str:
 
 
 @contextlib.contextmanager
-def replacing(path: Path) -> Iterator[Path]:
+def replace_file(path: Path) -> Iterator[Path]:
     """Give a temporary name beside ``path``, renamed to it when the block ends without error."""
     path.parent.mkdir(parents=True, exist_ok=True)
     # The temporary name is longer, and must not be too long where the name itself is not.
@@ -133,7 +133,7 @@ def replacing(path: Path) -> Iterator[Path]:
 
 
 @contextlib.contextmanager
-def making(folder: Path) -> Iterator[Path]:
+def make_folder(folder: Path) -> Iterator[Path]:
     """Give the name of a folder to fill, renamed to ``folder`` when the block ends without error.
 
     ``folder`` must be missing or empty.
@@ -169,29 +169,29 @@ def write_arrow(table: pa.Table, path: Path) -> None:
     """
     if fault := _not_finite(table):
         raise TableError(f"{path}: {fault}; expected a finite number or null")
-    with replacing(path) as temporary:
+    with replace_file(path) as temporary:
         if path.suffix == ".csv":
             # Arrow ignores that a file which it opened itself cannot be closed.
             with temporary.open("wb") as file:
-                pacsv.write_csv(with_safe_cells(table), file)
+                pacsv.write_csv(escape_cells(table), file)
         else:
             # A small file is read in half the time by snappy, and thousands of them are.
             compression = "zstd" if table.nbytes > _SMALL else "snappy"
             write_sealed(table, temporary, compression)
 
 
-def tables_folder(results: Path) -> Path:
+def find_tables_folder(results: Path) -> Path:
     """Return the folder of the tables of a run; ``results`` may be that folder itself."""
     inside = results / "tables"
     return inside if inside.is_dir() else results
 
 
-def tables_of_run(results: Path, names: Iterable[str]) -> dict[str, Path]:
-    """Return the paths of tables of a run, by name; ``results`` as `tables_folder` takes it.
+def find_tables(results: Path, names: Iterable[str]) -> dict[str, Path]:
+    """Return the paths of tables of a run, by name; ``results`` as `find_tables_folder` takes it.
 
     Raises a `TableError` if one is missing.
     """
-    folder = tables_folder(results)
+    folder = find_tables_folder(results)
     paths = {name: folder / f"{name}.parquet" for name in names}
     if missing := [name for name, path in paths.items() if not path.is_file()]:
         raise TableError(
@@ -203,12 +203,12 @@ def tables_of_run(results: Path, names: Iterable[str]) -> dict[str, Path]:
 
 def read(table: str, paths: Sequence[Path]) -> pa.Table:
     """Read and join files of one table, in the order given."""
-    return joined(table, [read_part(table, path) for path in paths])
+    return join_tables(table, [read_part(table, path) for path in paths])
 
 
-def joined(table: str, parts: Sequence[pa.Table]) -> pa.Table:
+def join_tables(table: str, parts: Sequence[pa.Table]) -> pa.Table:
     """Join parts of one table, in the order given."""
-    expected = schema(table)
+    expected = make_schema(table)
     plain = [part.replace_schema_metadata(None) for part in parts] or [expected.empty_table()]
     return pa.concat_tables(plain).cast(expected)
 
@@ -218,13 +218,13 @@ def read_part(table: str, path: Path) -> pa.Table:
 
     Raises a `TableError` if it is damaged, has other columns, or a number that is NaN or infinite.
     """
-    expected = schema(table)
+    expected = make_schema(table)
     try:
         if path.exists() and not path.is_file():  # a pipe never answers
             raise pa.ArrowInvalid("it is no file")
-        if seal_broken(path):
+        if is_seal_broken(path):
             raise pa.ArrowInvalid("its metadata are not those that were written")
-        with checked_parquet(path) as file:
+        with open_parquet(path) as file:
             part = file.read(use_threads=False)
         metadata = {key: text for key, text in (part.schema.metadata or {}).items() if key != SEAL}
         part = part.replace_schema_metadata(metadata)
@@ -270,7 +270,7 @@ def _other_columns(actual: pa.Schema, expected: pa.Schema) -> str:
 
 def write_content(content: str | bytes, path: Path) -> None:
     """Write a text or bytes, atomically."""
-    with replacing(path) as temporary:
+    with replace_file(path) as temporary:
         temporary.write_bytes(content.encode() if isinstance(content, str) else content)
 
 
@@ -284,5 +284,5 @@ def read_json(path: Path) -> Any:
 
 def write_json(data: object, path: Path) -> None:
     """Write JSON, atomically."""
-    with replacing(path) as temporary:
+    with replace_file(path) as temporary:
         temporary.write_text(json.dumps(data, indent=1, allow_nan=False) + "\n", encoding="utf-8")

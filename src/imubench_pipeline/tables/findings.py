@@ -53,12 +53,12 @@ def find(
     return Finding(data.code, severity, detail, value, *where, affects, json.dumps(asdict(data)))
 
 
-def finding_of(row: FindingRow) -> Finding:
+def make_finding(row: FindingRow) -> Finding:
     """Return the finding of a row of the table ``findings``."""
     return Finding(**{field.name: getattr(row, field.name) for field in fields(Finding)})
 
 
-def without_addresses(reason: str) -> str:
+def remove_addresses(reason: str) -> str:
     """Return a text without addresses of objects, which are others in each run."""
     return _ADDRESS.sub("", reason)
 
@@ -72,7 +72,7 @@ class RecordingError(ValueError):
     def __init__(self, reason: str) -> None:
         if not reason.isprintable():
             reason = "".join(sign if sign.isprintable() else "?" for sign in reason)
-        reason = without_addresses(reason)
+        reason = remove_addresses(reason)
         if len(reason) > 2 * _HALF_REASON:
             reason = f"{reason[:_HALF_REASON]} [...] {reason[-_HALF_REASON:]}"
         super().__init__(reason)

@@ -17,7 +17,7 @@ class Key:
     channel: str
 
 
-def divided(table: pa.Table, *names: str) -> dict[tuple[str, ...], pa.Table]:
+def split_table(table: pa.Table, *names: str) -> dict[tuple[str, ...], pa.Table]:
     """Divide a table by the values of columns, in the order in which they appear."""
     keys = list(zip(*(table[name].to_pylist() for name in names), strict=True))
     order = dict.fromkeys(keys)

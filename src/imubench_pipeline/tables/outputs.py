@@ -25,8 +25,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from imubench_pipeline.tables.files import making, replacing
-from imubench_pipeline.tables.texts import printable
+from imubench_pipeline.tables.files import make_folder, replace_file
+from imubench_pipeline.tables.texts import escape_invisible
 
 
 class OutputError(ValueError):
@@ -42,7 +42,7 @@ class Place:
     holds: str  # in words, such as "the logs"
 
     def __str__(self) -> str:
-        return f"{self.holds} ({printable(str(self.path))})"
+        return f"{self.holds} ({escape_invisible(str(self.path))})"
 
 
 @dataclass
@@ -56,7 +56,7 @@ class Output:
     inputs: Sequence[Path] = ()  # files that the command reads
 
     def __str__(self) -> str:
-        return printable(str(self.path))
+        return escape_invisible(str(self.path))
 
     def check(self) -> Path:
         """Return the path that is written, links followed; raises an `OutputError`."""
@@ -77,7 +77,9 @@ class Output:
             raise OutputError(f"{self}: has no name in a folder; name a file")
         there = next(folder for folder in (real, *real.parents) if folder.exists())
         if status is None and not there.is_dir():
-            raise OutputError(f"{self}: {printable(str(there))} is no folder; name another place")
+            raise OutputError(
+                f"{self}: {escape_invisible(str(there))} is no folder; name another place"
+            )
         if not os.access(there.parent if status is not None else there, os.W_OK | os.X_OK):
             raise OutputError(f"{self}: {explain(PermissionError(errno.EACCES, 'Not writable'))}")
         return real, status
@@ -135,7 +137,7 @@ class OutputFile(Output):
     @contextmanager
     def replacing(self) -> Iterator[Path]:
         """Give a temporary name, renamed to the output when the block ends without error."""
-        with self._explaining(), replacing(self.check()) as temporary:
+        with self._explaining(), replace_file(self.check()) as temporary:
             yield temporary
             self.check()
 
@@ -187,7 +189,7 @@ class OutputFolder(Output):
         """
         real = self.check()
         if not real.exists():
-            with self._explaining(), making(real) as made:
+            with self._explaining(), make_folder(real) as made:
                 yield made
                 self.check()
             return
@@ -266,7 +268,7 @@ _MENDED = {
 def explain(error: OSError) -> str:
     """Return the fault of a file, and how to mend it, as one line."""
     mended = _MENDED.get(error.errno or 0, "name another place")
-    return f"{printable(error.strerror or str(error))}; {mended}"
+    return f"{escape_invisible(error.strerror or str(error))}; {mended}"
 
 
 def check_outputs(options: argparse.Namespace, places: Callable[[Path], Iterable[Place]]) -> None:

@@ -23,15 +23,13 @@ _UNSEALED = b"0" * 64
 _PLACE = re.compile(re.escape(SEAL) + rb"\x18\x40([0-9a-f]{64})")
 
 
-def checked_parquet(path: Path) -> pq.ParquetFile:
+def open_parquet(path: Path) -> pq.ParquetFile:
     """Open a Parquet file so that the checksums of its pages are verified when they are read."""
     return pq.ParquetFile(path, page_checksum_verification=True)
 
 
-def checked_row_group(
-    file: pq.ParquetFile, number: int, columns: list[str] | None = None
-) -> pa.Table:
-    """Read a row group of a file that `checked_parquet` has opened, whole.
+def read_row_group(file: pq.ParquetFile, number: int, columns: list[str] | None = None) -> pa.Table:
+    """Read a row group of a file that `open_parquet` has opened, whole.
 
     Raises a `pyarrow.ArrowInvalid` if rows are missing: checksums do not cover the header of a
     page, and PyArrow before version 22 silently omits rows where it is damaged.
@@ -50,7 +48,7 @@ def write_sealed(table: pa.Table, path: Path, compression: str) -> None:
     ) as writer:
         writer.write_table(table)
         writer.add_key_value_metadata({SEAL: _UNSEALED})
-    footer = end_of(path)
+    footer = read_footer(path)
     place = _PLACE.search(footer)
     if place is None:
         raise RuntimeError(f"{path}: its metadata are not laid out as expected")
@@ -59,9 +57,9 @@ def write_sealed(table: pa.Table, path: Path, compression: str) -> None:
         file.write(hashlib.sha256(footer).hexdigest().encode())
 
 
-def seal_broken(path: Path) -> bool:
+def is_seal_broken(path: Path) -> bool:
     """Return whether the metadata are not as `write_sealed` wrote them; False without a digest."""
-    footer = end_of(path)
+    footer = read_footer(path)
     place = _PLACE.search(footer)
     if place is None:
         return False
@@ -69,7 +67,7 @@ def seal_broken(path: Path) -> bool:
     return hashlib.sha256(unsealed).hexdigest().encode() != place[1]
 
 
-def end_of(path: Path) -> bytes:
+def read_footer(path: Path) -> bytes:
     """Return the metadata at the end of a Parquet file; empty if its end is another."""
     with path.open("rb") as file:
         size = file.seek(0, 2)

@@ -20,7 +20,7 @@ _EXTENSIONS = re.compile(r"""\b(Hook|with_blocks|blocks|files_of)\(["'](\w+)["']
 _TEXT = re.compile(r"""["'](\w[\w.]*\*?)["']""", re.ASCII)
 
 
-def source_digest(*modules: str) -> str:
+def digest_sources(*modules: str) -> str:
     """Return a digest of modules of this package and of all other code and files that they use.
 
     These are their imports, extensions of it (`imubench_pipeline.registry`), and modules and files

@@ -12,7 +12,7 @@ from dataclasses import asdict, dataclass
 from functools import cache
 from pathlib import Path, PurePosixPath
 
-from imubench_pipeline.tables.digests import digest_of, read_sealed_json, write_sealed_json
+from imubench_pipeline.tables.digests import compute_digest, read_sealed_json, write_sealed_json
 from imubench_pipeline.tables.schemas import PARTS_OF, TABLES
 
 FOLDER = "seals"
@@ -21,7 +21,7 @@ _LAYOUT = 1  # version of the layout of results other than tables
 
 
 @cache
-def form() -> str:
+def compute_form_digest() -> str:
     """Return a digest of the columns of all tables and of the layout of other results."""
     columns = {
         name: [(column.name, str(column.type), column.unit) for column in table]
@@ -43,7 +43,7 @@ class SealedFile:
     def of(cls, path: Path) -> SealedFile:
         """Read a file."""
         about = path.stat()
-        return cls(about.st_size, digest_of(path), about.st_mtime_ns)
+        return cls(about.st_size, compute_digest(path), about.st_mtime_ns)
 
     def fault(self, path: Path, *, whole: bool) -> str | None:
         """Return the fault of a file; None without one.
@@ -56,7 +56,7 @@ class SealedFile:
                 return f"expected {self.size} bytes, found {about.st_size}"
             if not whole and about.st_mtime_ns == self.changed:
                 return None
-            if (digest := digest_of(path)) != self.sha256:
+            if (digest := compute_digest(path)) != self.sha256:
                 return f"expected SHA-256 {self.sha256[:12]}…, found {digest[:12]}…"
         except (FileNotFoundError, NotADirectoryError):
             return f"expected {self.size} bytes, found no such file"
@@ -69,29 +69,29 @@ class SealedFile:
 class Seal:
     """The inputs and outputs of a step."""
 
-    place: str  # as of `place_of`
-    form: str  # as `form` gave it
+    place: str  # as of `name_place`
+    form: str  # as `compute_form_digest` gave it
     inputs: dict[str, str]  # digests by place below the results
     outputs: dict[str, SealedFile]
     settings: str = ""  # digest of the settings and the code
 
     def write(self, results: Path) -> None:
         """Keep it, atomically."""
-        write_sealed_json(asdict(self), results / seal_file(self.place))
+        write_sealed_json(asdict(self), results / name_seal_file(self.place))
 
 
 class SealError(ValueError):
     """A seal that is not as it was written."""
 
 
-def place_of(step: str, sensor: str | None = None, recording: str | None = None) -> str:
+def name_place(step: str, sensor: str | None = None, recording: str | None = None) -> str:
     """Return the place of the seal of a step, of a recording, a sensor, or all of them."""
     if recording is not None:
         return f"recordings/{sensor}/{recording}/{step}"
     return f"sensors/{sensor}/{step}" if sensor is not None else step
 
 
-def night_place(name: str) -> str:
+def name_night_place(name: str) -> str:
     """Return the place of the seal of the results of a nightly run."""
     return f"{NIGHTS}/{name}"
 
@@ -105,11 +105,11 @@ def seal_files(
 ) -> None:
     """Seal the outputs of a step: files, or folders with all their files.
 
-    ``place`` is as of `place_of`, ``inputs`` as of `digests`; ``settings`` is a digest of the
-    settings and the code of the step.
+    ``place`` is as of `name_place`, ``inputs`` as of `compute_digests`; ``settings`` is a digest of
+    the settings and the code of the step.
     """
     left = {name: SealedFile.of(path) for name, path in sorted(_below(results, outputs))}
-    Seal(place, form(), dict(inputs), left, settings).write(results)
+    Seal(place, compute_form_digest(), dict(inputs), left, settings).write(results)
 
 
 def seal_again(results: Path, place: str, outputs: Iterable[Path]) -> None:
@@ -118,11 +118,11 @@ def seal_again(results: Path, place: str, outputs: Iterable[Path]) -> None:
         before = read_seal(results, place)
     except (FileNotFoundError, SealError):
         return
-    inputs = digests(results, (results / name for name in before.inputs))
+    inputs = compute_digests(results, (results / name for name in before.inputs))
     seal_files(results, place, outputs, inputs, before.settings)
 
 
-def lost_inputs(results: Path, place: str) -> list[str]:
+def list_missing_inputs(results: Path, place: str) -> list[str]:
     """Return the missing inputs of a step; empty without a seal."""
     try:
         inputs = read_seal(results, place).inputs
@@ -131,9 +131,9 @@ def lost_inputs(results: Path, place: str) -> list[str]:
     return [name for name in inputs if not (results / name).is_file()]
 
 
-def digests(results: Path, paths: Iterable[Path]) -> dict[str, str]:
+def compute_digests(results: Path, paths: Iterable[Path]) -> dict[str, str]:
     """Return the digests of files below the results, and in folders there, by their places."""
-    return {name: digest_of(path) for name, path in sorted(_below(results, paths))}
+    return {name: compute_digest(path) for name, path in sorted(_below(results, paths))}
 
 
 def read_seal(results: Path, place: str) -> Seal:
@@ -142,7 +142,7 @@ def read_seal(results: Path, place: str) -> Seal:
     Raises a FileNotFoundError without one, and a `SealError` if it is damaged or of another place.
     """
     try:
-        data = read_sealed_json(results / seal_file(place))
+        data = read_sealed_json(results / name_seal_file(place))
         outputs = {name: SealedFile(**file) for name, file in data["outputs"].items()}
         seal = Seal(**{**data, "outputs": outputs})
         texts = [seal.place, seal.form, seal.settings, *seal.inputs.values()]
@@ -166,7 +166,7 @@ def read_seal(results: Path, place: str) -> Seal:
     return seal
 
 
-def places(results: Path) -> list[str]:
+def list_places(results: Path) -> list[str]:
     """Return the places of all seals, in order."""
     folder = results / FOLDER
     files = (
@@ -175,12 +175,12 @@ def places(results: Path) -> list[str]:
     return sorted(name.removesuffix(".json") for name in files)
 
 
-def visible(path: Path) -> bool:
+def is_visible(path: Path) -> bool:
     """Return whether no part of a path begins with a dot."""
     return not any(part.startswith(".") for part in path.parts)
 
 
-def seal_file(place: str) -> str:
+def name_seal_file(place: str) -> str:
     """Return where below the results a seal is kept."""
     return f"{FOLDER}/{place}.json"
 
@@ -191,5 +191,5 @@ def _below(results: Path, paths: Iterable[Path]) -> Iterator[tuple[str, Path]]:
         if path.is_relative_to(results):
             inside = path.rglob("*") if path.is_dir() else [path]
             for file in inside:
-                if visible(file.relative_to(path)) and not file.is_dir():
+                if is_visible(file.relative_to(path)) and not file.is_dir():
                     yield file.relative_to(results).as_posix(), file

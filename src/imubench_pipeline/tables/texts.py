@@ -16,7 +16,7 @@ _FORMULA = re.compile(r"((?:^|;)[\s\"]*)('*[=+\-@\uff1d\uff0b\uff0d\uff20])")
 """The signs, and their full-width forms, with the apostrophes that stand before them already."""
 
 
-def printable(text: str) -> str:
+def escape_invisible(text: str) -> str:
     r"""Return a text with all invisible characters escaped, as ``\x1b`` and ``\u2028``."""
     if text.isprintable():
         return text
@@ -26,16 +26,17 @@ def printable(text: str) -> str:
     )
 
 
-def as_cell(text: str) -> str:
+def escape_cell(text: str) -> str:
     """Return a text as a cell of a CSV file that no spreadsheet takes for a formula.
 
-    It is `printable`, and each sign that would begin a formula has one more apostrophe before it.
+    It is `escape_invisible`, and each sign that would begin a formula has one more apostrophe
+    before it.
     """
-    return _FORMULA.sub(r"\1'\2", printable(text))
+    return _FORMULA.sub(r"\1'\2", escape_invisible(text))
 
 
-def with_safe_cells(table: pa.Table) -> pa.Table:
-    """Return a table with its texts as `as_cell` gives them, and lists as texts."""
+def escape_cells(table: pa.Table) -> pa.Table:
+    """Return a table with its texts as `escape_cell` gives them, and lists as texts."""
     for place, field in enumerate(table.schema):
         if pa.types.is_list(field.type):
             texts = [
@@ -53,7 +54,7 @@ def with_safe_cells(table: pa.Table) -> pa.Table:
         field = table.schema[place]
         column = table.column(place).combine_chunks().dictionary_encode()
         texts = column.dictionary.to_pylist()
-        safe = [as_cell(text) for text in texts]
+        safe = [escape_cell(text) for text in texts]
         if safe != texts:
             column = pa.DictionaryArray.from_arrays(column.indices, pa.array(safe, pa.string()))
             table = table.set_column(place, field, column.cast(pa.string()))

@@ -20,7 +20,7 @@ from imubench_pipeline.model.verdicts import (
     UnitFactor,
 )
 from imubench_pipeline.settings.printed import SENSORS
-from imubench_pipeline.units import from_si
+from imubench_pipeline.units import convert_from_si
 from imubench_pipeline.words.doubts import doubt_text
 from imubench_pipeline.words.numbers import (
     counted,
@@ -148,7 +148,7 @@ def condition_text(condition: Condition) -> str:
         return f"it has a {name}" if owned else f"its {name} meets the requirement"
     _, *units = _NOUNS[condition.figure]
     unit = units[condition.subject == "accel"]
-    largest = _round_down(from_si(condition.largest or 0.0, unit, _DIMENSIONS[unit]))
+    largest = _round_down(convert_from_si(condition.largest or 0.0, unit, _DIMENSIONS[unit]))
     return f"its {subject_text(condition)} is below {largest:g} {unit} (1σ)"
 
 
@@ -182,7 +182,7 @@ def shortfall_text(shortfall: Shortfall) -> str:
         unit, dimension = _FULL_SCALES[shortfall.subject]
     if not shortfall.has:
         return f"no {name}"
-    own = " to ".join(f"{from_si(value, unit, dimension):.4g}" for value in shortfall.has)
+    own = " to ".join(f"{convert_from_si(value, unit, dimension):.4g}" for value in shortfall.has)
     return f"{name} {own} {unit}, required {shortfall.asked}"
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 from playwright.sync_api import Browser, Locator, sync_playwright
 
-from imubench_pipeline.report.publish import one_file, publish
+from imubench_pipeline.report.publish import publish, render_one_file
 from imubench_pipeline.report.site import Site
 from tests.report.browser import made
 from tests.report.browser.made import Report, Rows
@@ -115,5 +115,5 @@ def alone(of_bench: tuple[Site, Rows], tmp_path_factory: pytest.TempPathFactory)
     """The same report as one file, in a folder of its own."""
     site, _ = of_bench
     path = tmp_path_factory.mktemp("empty") / "report.html"
-    path.write_text(one_file(site), encoding="utf-8")
+    path.write_text(render_one_file(site), encoding="utf-8")
     return path

@@ -17,27 +17,31 @@ from unittest import mock
 import numpy as np
 import pyarrow as pa
 
-from imubench_pipeline.datasheets.comparable import comparables
+from imubench_pipeline.datasheets.comparable import read_comparables
 from imubench_pipeline.datasheets.coverage import by_vendor, coverage
 from imubench_pipeline.datasheets.deltas import bias_deltas, curve_rms, deltas
-from imubench_pipeline.estimators.curve_bias import averaging_times, of_model
+from imubench_pipeline.estimators.curve_bias import compute_curve_figures, make_averaging_times
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
-from imubench_pipeline.estimators.rows import parameter_rows
-from imubench_pipeline.extensions.fusion.fusion import NEEDED, fusion_rows
+from imubench_pipeline.estimators.rows import make_parameter_rows
+from imubench_pipeline.extensions.fusion.fusion import NEEDED, yield_fusion_rows
 from imubench_pipeline.model.estimates import FixedBiasRow, ParameterRow
 from imubench_pipeline.model.recordings import RecordingRow
 from imubench_pipeline.navigation.compared import ComparedChannel
 from imubench_pipeline.navigation.drift import drift_rows
-from imubench_pipeline.navigation.error_growth import growth_rows
-from imubench_pipeline.navigation.expected_errors import error_rows, of_requirement, standard
-from imubench_pipeline.navigation.pooled import pooled_rows
-from imubench_pipeline.navigation.ratios import deviation_rows
+from imubench_pipeline.navigation.error_growth import list_growth_rows
+from imubench_pipeline.navigation.expected_errors import (
+    list_error_rows,
+    list_requirement_questions,
+    list_standard_questions,
+)
+from imubench_pipeline.navigation.pooled import list_pooled_rows
+from imubench_pipeline.navigation.ratios import list_deviation_rows
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.simulate import channel_rng, simulate
 from imubench_pipeline.recordings.overview import overview
 from imubench_pipeline.recordings.recording import LogWriter
 from imubench_pipeline.report import publish as publishing
-from imubench_pipeline.report.publish import publish, site_of
+from imubench_pipeline.report.publish import make_site, publish
 from imubench_pipeline.report.site import Site
 from imubench_pipeline.settings.config import FusionSettings, Run
 from imubench_pipeline.settings.requirements import Requirement
@@ -147,7 +151,9 @@ class Log:
 
 def _curve_of(parameters: Mapping[str, Parameter]) -> dict[str, Parameter]:
     """Return the figures of the curve, with limits as wide as those of B."""
-    found = of_model(Estimate("", parameters).model, averaging_times(10.0, 36_000.0))
+    found = compute_curve_figures(
+        Estimate("", parameters).model, make_averaging_times(10.0, 36_000.0)
+    )
     known = {
         name: replace(one, lower=0.9 * one.value, upper=1.13 * one.value)
         for name, one in found.items()
@@ -215,7 +221,8 @@ def channel_rows(log: Log, channel: str) -> Rows:
         "parameters": [
             row
             for one in every
-            for row in parameter_rows(log.key(channel), one, recommended=one.method == best.method)
+            for row in make_parameter_rows(log.key(channel), one, recommended=one.method ==
+            best.method)
         ],
         "models": [
             key | {"model": name, "chosen": not place, "free": 4, "log_likelihood": 0.0,
@@ -257,7 +264,7 @@ def channel_rows(log: Log, channel: str) -> Rows:
                    "N": one.noise.value if one.noise else None,
                    "floor": one.floor.value if one.floor else None,
                    "rms": one.rms, "rms_log10": one.rms_log10}
-            for one in curve_rms(list(comparables(sheet, channel)), TAU, adev)
+            for one in curve_rms(list(read_comparables(sheet, channel)), TAU, adev)
         ],
         "simulated_truth": [
             key | {"parameter": name, "component": 1, "value": log.level * value, "unit": "SI",
@@ -291,11 +298,11 @@ def rows_of(logs: Sequence[Log], rejected: Sequence[tuple[str, str]] = ()) -> Ro
             for table, found in channel_rows(log, channel).items():
                 rows[table] += found
         names = {"sensor": log.sensor, "recording": log.recording}
-        questions = [*standard([10.0, 60.0], 60.0, 45 * DEGREE, ["worst"])]
+        questions = [*list_standard_questions([10.0, 60.0], 60.0, 45 * DEGREE, ["worst"])]
         for name, one in REQUIREMENTS.items():
-            questions += of_requirement(name, one)
+            questions += list_requirement_questions(name, one)
         estimates = {channel: log.recommended(channel) for channel in log.channels}
-        rows["error_budget"] += error_rows(names, estimates, questions, **BUDGET)
+        rows["error_budget"] += list_error_rows(names, estimates, questions, **BUDGET)
     for sensor, recording in rejected:
         rows["recordings"].append(rejected_row(sensor, recording))
         rows["findings"].append(Finding("rejected", "fatal", REASON, 1.0).row(sensor, recording))
@@ -303,12 +310,12 @@ def rows_of(logs: Sequence[Log], rejected: Sequence[tuple[str, str]] = ()) -> Ro
     devices = {(row["sensor"], row["recording"]): row["device"] for row in rows["recordings"]}
     estimated, biases = typed(ParameterRow, best), typed(FixedBiasRow, rows["fixed_bias"])
     rows["drift"] = [*drift_rows(estimated, biases, typed(RecordingRow, rows["recordings"]))]
-    rows["pooled"] = [*pooled_rows(estimated, biases, devices)]
+    rows["pooled"] = [*list_pooled_rows(estimated, biases, devices)]
     prices = {name: {"price_class": one.price_class} for name, one in SENSORS.items()}
     errors = build("error_budget", rows["error_budget"]).to_pylist()
     rows["ranking"] = [*ranking_rows(errors, REQUIREMENTS, prices, parameters=best)]
     tables = {name: build(name, rows.get(name, [])) for name in NEEDED}
-    rows["fusion"] = [*fusion_rows(tables, FusionSettings(draws=100))]
+    rows["fusion"] = [*yield_fusion_rows(tables, FusionSettings(draws=100))]
     covered = coverage(SENSORS)
     rows["coverage"] = [asdict(one) for one in covered]
     rows["coverage_by_vendor"] = [asdict(one) for one in by_vendor(covered)]
@@ -355,7 +362,7 @@ def growth_of(log: Log) -> list[Mapping[str, Any]]:
     if log in DATED[1:]:  # nobody asks for theirs
         return [row | names for row in growth_of(DATED[0])]
     estimates = {channel: log.recommended(channel) for channel in log.channels}
-    return [*growth_rows(names, estimates, times=[10.0, 60.0], window=60.0, **BUDGET)]
+    return [*list_growth_rows(names, estimates, times=[10.0, 60.0], window=60.0, **BUDGET)]
 
 
 def write_compared(log: Log, folder: Path) -> None:
@@ -364,7 +371,7 @@ def write_compared(log: Log, folder: Path) -> None:
     deviations = [
         row
         for channel in log.channels
-        for row in deviation_rows(fused(log, channel), RATE, longest=1 / 9, **DRAWN)
+        for row in list_deviation_rows(fused(log, channel), RATE, longest=1 / 9, **DRAWN)
     ]
     write("drawn_deviations", deviations, folder / "drawn_deviations.parquet")
 
@@ -428,7 +435,7 @@ def bench(results: Path) -> tuple[Site, Rows]:
         write_samples(log, results)
         write_compared(log, results / "recordings" / log.sensor / log.recording)
     rows = rows_of(LOGS, REJECTED)
-    return site_of(tables_of(rows), settings_of(SENSORS, REQUIREMENTS), results), rows
+    return make_site(tables_of(rows), settings_of(SENSORS, REQUIREMENTS), results), rows
 
 
 def single(results: Path) -> Site:
@@ -436,7 +443,7 @@ def single(results: Path) -> Site:
     log = Log("beta", "alone")
     write_samples(log, results)
     settings = settings_of({"beta": SENSORS["beta"]}, REQUIREMENTS)
-    return site_of(tables_of(rows_of([log])), settings, results)
+    return make_site(tables_of(rows_of([log])), settings, results)
 
 
 OF_SENSORS = ("ranking", "fusion", "coverage", "coverage_by_vendor", "pooled", "drift")
@@ -461,7 +468,7 @@ def many(results: Path, sensors: int, each: int) -> Site:
         f"sensor_{s:02d}": SENSORS["alpha"].model_copy(update={"model": f"model {s:02d}"})
         for s in range(sensors)
     }
-    return site_of(tables, settings_of(catalogue, {}), results)
+    return make_site(tables, settings_of(catalogue, {}), results)
 
 
 def named(results: Path, names: Sequence[str]) -> Site:
@@ -475,7 +482,7 @@ def named(results: Path, names: Sequence[str]) -> Site:
         tables[table] = pa.concat_tables(copies)
     for name in names:
         write_samples(replace(log, sensor=name, recording=name), results)
-    return site_of(tables, settings_of({}, REQUIREMENTS), results)
+    return make_site(tables, settings_of({}, REQUIREMENTS), results)
 
 
 def _copy(table: pa.Table, sensor: str, recording: str, factor: float) -> pa.Table:
@@ -493,6 +500,6 @@ def _copy(table: pa.Table, sensor: str, recording: str, factor: float) -> pa.Tab
 
 def publish_some(site: Site, folder: Path, paths: Sequence[str]) -> None:
     """Write a few pages of a large report, which alone are opened."""
-    chosen = [page for page in publishing.pages(site) if page.path in paths]
-    with mock.patch.object(publishing, "pages", lambda _: chosen):
+    chosen = [page for page in publishing.list_pages(site) if page.path in paths]
+    with mock.patch.object(publishing, "list_pages", lambda _: chosen):
         publish(site, folder)

@@ -13,9 +13,9 @@ import pytest
 from playwright.sync_api import Locator
 
 from imubench_pipeline.estimators.estimate import COMPARED
-from imubench_pipeline.navigation.ratios import Ratio, ratio_of_deviations, ratio_of_parameters
-from imubench_pipeline.report.parameters import digits_of
-from imubench_pipeline.report.practical import page_unit
+from imubench_pipeline.navigation.ratios import Ratio, compare_deviations, compare_parameters
+from imubench_pipeline.report.parameters import count_digits
+from imubench_pipeline.report.practical import choose_page_unit
 from imubench_pipeline.settings.sensor import quantity_of
 from tests.report.browser import made
 from tests.report.browser.factors import ARC
@@ -71,18 +71,18 @@ def test_ratios_and_verdicts_are_those_of_the_library(read: Open, bench: Report)
         a, b = (log.recommended(channel) for log in (first, second))
         for symbol in COMPARED:
             own, other = ({**one.parameters, **one.curve}[symbol] for one in (a, b))
-            ratio = ratio_of_parameters(own, other)
+            ratio = compare_parameters(own, other)
             same(rows[symbol]["ratios"][0], ratio, 1e-5)
             assert words(ratio) in rows[symbol]["texts"][1]
             # With the digits that other pages print of it.
-            unit = page_unit(quantity_of(channel), symbol, "practical")
+            unit = choose_page_unit(quantity_of(channel), symbol, "practical")
             shown = (own.value, own.lower, own.upper)
             kept = (float(f"{number:.7g}") for number in shown)
-            value, *ends = (unit.text(number, digits_of(unit, *shown)) for number in kept)
+            value, *ends = (unit.text(number, count_digits(unit, *shown)) for number in kept)
             assert rows[symbol]["texts"][3] == f"{value} {unit.sign}{' to '.join(ends)}"
         for tau in (1.0, 10.0, 100.0):
             pair = (made.fused(log, channel) for log in (first, second))
-            ratio = ratio_of_deviations(*pair, tau, longest=1 / 9, **made.DRAWN)
+            ratio = compare_deviations(*pair, tau, longest=1 / 9, **made.DRAWN)
             same(rows[f"adev {tau:g}"]["ratios"][0], ratio, DRAWN)
             assert words(ratio) in rows[f"adev {tau:g}"]["texts"][1]
     # Three times the noise, and no doubt of it.

@@ -5,7 +5,7 @@ from urllib.parse import quote
 
 import pytest
 
-from imubench_pipeline.report.publish import one_file, publish
+from imubench_pipeline.report.publish import publish, render_one_file
 from imubench_pipeline.report.site import Site
 from tests.conftest import few
 from tests.report.browser import made
@@ -85,7 +85,7 @@ def test_any_two_names_are_set_side_by_side(read: Open, folder: Path) -> None:
 
 @pytest.mark.release
 def test_one_file_shows_a_page_of_any_name(read: Open, odd: Site, tmp_path: Path) -> None:
-    (tmp_path / "report.html").write_text(one_file(odd), encoding="utf-8")
+    (tmp_path / "report.html").write_text(render_one_file(odd), encoding="utf-8")
     for name in ("__proto__", NAMES[-3]):
         page = quote(f"recordings/{name}/{name}.html")
         reader = read(tmp_path, f"report.html#/{page}")

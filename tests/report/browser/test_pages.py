@@ -10,8 +10,8 @@ import pytest
 from playwright.sync_api import Browser
 
 from imubench_pipeline.report.payload import FOREST
-from imubench_pipeline.report.static_figures.files import cross_figures
-from imubench_pipeline.report.view import recording_views
+from imubench_pipeline.report.static_figures.files import list_cross_figures
+from imubench_pipeline.report.view import gather_recordings
 from imubench_pipeline.tables.schemas import OF_ONE_RECORDING, TABLES
 from tests.conftest import few
 from tests.report.browser import made
@@ -84,11 +84,13 @@ def test_every_figure_of_the_others_is_drawn(read: Open, seen: Seen, bench: Repo
 
 
 def test_every_link_leads_somewhere(seen: Seen, bench: Report) -> None:
-    views = recording_views(made.tables_of(bench.rows))
+    views = gather_recordings(made.tables_of(bench.rows))
     channels = [channel for view in views for channel in view.channels()]
     tables = TABLES.keys() - set(OF_ONE_RECORDING)
     beside = {f"../tables/{name}.{kind}" for name in tables for kind in ("csv", "parquet")}
-    beside |= {f"figures/{n}.{kind}" for n, _ in cross_figures(channels) for kind in ("svg", "pdf")}
+    beside |= {
+        f"figures/{n}.{kind}" for n, _ in list_cross_figures(channels) for kind in ("svg", "pdf")
+    }
     lost = []
     for path, page in seen.pages.items():
         for link in page["links"]:

@@ -3,7 +3,7 @@
 import pytest
 from playwright.sync_api import Locator, expect
 
-from imubench_pipeline.report.glossary import glossary
+from imubench_pipeline.report.glossary import read_glossary
 from tests.report.browser import made
 from tests.report.browser.made import Report
 from tests.report.browser.reader import Open, Reader
@@ -18,7 +18,7 @@ def test_a_term_explains_itself_under_the_pointer(read: Open, bench: Report) -> 
     term = reader.page.locator("main [data-term=allan_deviation]").first
     expect(tip(reader)).to_have_count(0)
     reader.show(term).hover()
-    expect(tip(reader)).to_have_text(glossary()["allan_deviation"].short)
+    expect(tip(reader)).to_have_text(read_glossary()["allan_deviation"].short)
     assert term.get_attribute("aria-describedby") == "tip"
     assert tip(reader).get_attribute("id") == "tip"
     reader.page.mouse.move(0, 0)
@@ -30,13 +30,13 @@ def test_a_term_explains_itself_under_the_keyboard(read: Open, bench: Report) ->
     reader = read(bench.folder)
     term = reader.page.locator("main [data-term=requirement]").first
     term.focus()
-    expect(tip(reader)).to_have_text(glossary()["requirement"].short)
+    expect(tip(reader)).to_have_text(read_glossary()["requirement"].short)
     reader.page.keyboard.press("Escape")
     expect(tip(reader)).to_have_count(0)
     assert reader.page.evaluate("document.activeElement.dataset.term") == "requirement"
     reader.page.keyboard.press("Tab")
     following = reader.page.evaluate("document.activeElement.dataset.term")
-    expect(tip(reader)).to_have_text(glossary()[following].short)
+    expect(tip(reader)).to_have_text(read_glossary()[following].short)
     term.focus()
     assert term.get_attribute("aria-describedby") == "tip"
 
@@ -68,11 +68,11 @@ def test_every_term_leads_to_the_theory(read: Open, bench: Report) -> None:
         )
         for key, page, section in links:
             assert page == "theory.html" and section[1:] in ids, key
-            assert glossary()[key].section == section[1:]
+            assert read_glossary()[key].section == section[1:]
             found.add(key)
     assert {"missing_samples", "N", "not_identified", "absent", "likelihood", "tau"} <= found
     reader.open("index.html")
     reader.show(reader.page.locator("main a[data-term=missing_samples]").first).click()
     row = reader.page.locator("tr#missing_samples, tr:target").first
     expect(row).to_be_in_viewport()
-    expect(row).to_contain_text(glossary()["missing_samples"].short)
+    expect(row).to_contain_text(read_glossary()["missing_samples"].short)

@@ -10,11 +10,15 @@ from typing import Literal
 import numpy as np
 
 from imubench_pipeline.allan.phase import Span
-from imubench_pipeline.estimators.deterministic.means import Means, block_means
+from imubench_pipeline.estimators.deterministic.means import Means, average_blocks
 from imubench_pipeline.estimators.deterministic.ordinates import Fit, Ordinates, average_covariance
 from imubench_pipeline.estimators.deterministic.regressors import Regressor
 from imubench_pipeline.estimators.deterministic.scores import MIN_CYCLES, Gain
-from imubench_pipeline.estimators.deterministic.search import SearchResult, move_regressors, search
+from imubench_pipeline.estimators.deterministic.search import (
+    SearchResult,
+    move_regressors,
+    search_signals,
+)
 from imubench_pipeline.estimators.estimate import SIGMAS
 from imubench_pipeline.typing import Array
 from imubench_pipeline.words.reasons import estimates as texts
@@ -154,11 +158,11 @@ def find_deterministic_signals(
     first and one-past-last sample of each; ``highest`` is the highest frequency without effect of
     a filter, Hz.
     """
-    means = block_means(blocks(), samples, rate, segments)
+    means = average_blocks(blocks(), samples, rate, segments)
     ordinates = Ordinates(means, highest) if means.parts else None
     if ordinates is None or not ordinates.is_usable:
         return DeterministicSignals((), None, None)
-    searched = search(ordinates)
+    searched = search_signals(ordinates)
     if searched.many:
         steps = sum(x.kind in ("step", "restart") for x in searched.fit.regressors)
         # Bursts of noise look like pulses, and have a finding of their own.

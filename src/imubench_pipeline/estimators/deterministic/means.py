@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from imubench_pipeline.allan.phase import Span, spans_of, split
+from imubench_pipeline.allan.phase import Span, list_spans, split
 from imubench_pipeline.typing import Array
 
 _MAX_BLOCKS = 1 << 14  # approximate; it is the resolution of the place of a small step
@@ -68,14 +68,14 @@ class Means:
         return max(self.parts, key=lambda part: len(part.mean))
 
 
-def block_means(
+def average_blocks(
     blocks: Iterable[Array], samples: int, rate: float, segments: Sequence[Span] | None = None
 ) -> Means:
     """Return the block means of a log in one pass, in bounded memory.
 
     The blocks are the log in order, in SI, NaN where a sample is missing.
     """
-    spans = spans_of(segments, samples)
+    spans = list_spans(segments, samples)
     total = sum(stop - start for start, stop in spans)
     size = max(-(-total // _MAX_BLOCKS), min(_MIN_BLOCK_SAMPLES, max(total // _MIN_BLOCKS, 1)))
     gathered: list[list[Array]] = [[] for _ in spans]

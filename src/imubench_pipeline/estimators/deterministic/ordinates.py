@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 
 from imubench_pipeline.estimators.deterministic.means import Means
 from imubench_pipeline.estimators.deterministic.regressors import Regressor
-from imubench_pipeline.estimators.spectrum import Spectrum, bin_edges
-from imubench_pipeline.estimators.whittle import COARSE, Maximum, Terms, Whittle, whittle_of
+from imubench_pipeline.estimators.spectrum import Spectrum, make_bin_edges
+from imubench_pipeline.estimators.whittle import COARSE, Maximum, Terms, Whittle, make_whittle
 from imubench_pipeline.typing import Array
 
 NOISE_TERMS = Terms("NFK", 1)  # includes the models of logs without regressors
@@ -88,7 +88,7 @@ class Ordinates:
 
     @cached_property
     def _edges(self) -> NDArray[np.int64]:
-        return bin_edges(self.frequency[self._order])
+        return make_bin_edges(self.frequency[self._order])
 
     def spectrum(self, residual: Array, weight: Array) -> Spectrum:
         """Return the binned spectrum of coefficients, each counted with its ``weight``."""
@@ -117,7 +117,7 @@ class Ordinates:
     @cached_property
     def _whittle(self) -> Whittle:
         highest = min(0.5 / self.means.interval, float(self.frequency[self.used].max()))
-        return whittle_of(
+        return make_whittle(
             self.spectrum(self.coefficient, np.ones_like(self.length)), highest, COARSE
         )
 

@@ -232,7 +232,7 @@ class SearchResult:
     rival: Rival | None = None  # fits the log about as well without a random walk
 
 
-def search(ordinates: Ordinates) -> SearchResult:
+def search_signals(ordinates: Ordinates) -> SearchResult:
     """Find the deterministic signals that noise does not explain."""
     fit = without = ordinates.fit(())
     rival: Rival | None = None

@@ -201,7 +201,7 @@ def assess_signals(channel: str, signals: DeterministicSignals) -> Verdict:
     return Verdict(tuple(findings), caveats, widening, growth, scatter)
 
 
-def deterministic_rows(
+def tabulate_signals(
     key: Mapping[str, str], unit: str, signals: DeterministicSignals
 ) -> Iterator[DeterministicRow]:
     """Yield the rows of the table ``deterministic``; the key is sensor, recording and channel."""

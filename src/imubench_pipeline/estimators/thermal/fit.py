@@ -19,9 +19,14 @@ from imubench_pipeline.estimators import likelihood
 from imubench_pipeline.estimators.estimate import SIGMAS, Parameter
 from imubench_pipeline.estimators.frame import FitSelection, select_for_fit
 from imubench_pipeline.estimators.likelihood import Likelihood
-from imubench_pipeline.estimators.missing import block_means, split_at_gaps
+from imubench_pipeline.estimators.missing import average_blocks, split_at_gaps
 from imubench_pipeline.estimators.model_choice import Candidate, compare_models
-from imubench_pipeline.estimators.spectrum import LineSpectrum, Spectrum, block_of, spectra
+from imubench_pipeline.estimators.spectrum import (
+    LineSpectrum,
+    Spectrum,
+    choose_block_size,
+    compute_spectra,
+)
 from imubench_pipeline.estimators.thermal.path import TemperaturePath
 from imubench_pipeline.estimators.thermal.regression import (
     BlockSeries,
@@ -42,7 +47,7 @@ from imubench_pipeline.estimators.thermal.uncertainty import (
     subtract_path_errors,
     weigh_models,
 )
-from imubench_pipeline.estimators.whittle import Maximum, Whittle, model_of
+from imubench_pipeline.estimators.whittle import Maximum, Whittle, make_noise_model
 from imubench_pipeline.typing import Array
 from imubench_pipeline.words.reasons import estimates as texts
 
@@ -115,7 +120,7 @@ def fit_temperature(
 
     varies = path.range > 0.0 and path.range >= 2.0 * float(np.median(path.deviation))
     if holes:
-        means = block_means(blocks(), spans)
+        means = average_blocks(blocks(), spans)
         spans = split_at_gaps(means, spans)
         plain = plain or likelihood.fit_blocks(
             blocks,
@@ -136,7 +141,10 @@ def fit_temperature(
             if not (fit.possible and varies):
                 break
             settled = fit.settle(quadratic)
-            model, effect = model_of(settled.noise), settled.regressors.effect(settled.regression)
+            model, effect = (
+                make_noise_model(settled.noise),
+                settled.regressors.effect(settled.regression),
+            )
     else:
         fit = _Fit(blocks(), samples, rate, spans, path, frame, longest_lag)
         plain = plain or likelihood.fit_spectrum(fit.spectrum, fit.frame, rng=rng, stretch=None)
@@ -155,8 +163,10 @@ def fit_temperature(
     def spectra_left() -> tuple[Spectrum, list[LineSpectrum]]:
         effect, log = settled.regressors.effect(settled.regression), blocks()
         if holes:
-            log = complete_log(blocks, spans, model_of(settled.noise), path, effect, rate, rng)
-        return spectra(remove_temperature_effect(log, path, effect), samples, rate, spans)
+            log = complete_log(
+                blocks, spans, make_noise_model(settled.noise), path, effect, rate, rng
+            )
+        return compute_spectra(remove_temperature_effect(log, path, effect), samples, rate, spans)
 
     lines = fit.lines
     if verdict.compensated:
@@ -198,10 +208,10 @@ class _Fit:
         frame: Callable[[Spectrum, list[LineSpectrum]], FitSelection],
         longest_lag: float | None,
     ) -> None:
-        series = BlockSeries(spans, block_of(spans))
+        series = BlockSeries(spans, choose_block_size(spans))
         self.spectrum: Spectrum
         self.lines: list[LineSpectrum]
-        self.spectrum, self.lines = spectra(series.watch(blocks), samples, rate, spans)
+        self.spectrum, self.lines = compute_spectra(series.watch(blocks), samples, rate, spans)
         self.series = series
         self.frame = frame(self.spectrum, self.lines)
         self.used = self.frame.used
@@ -396,7 +406,7 @@ def _mean_error(candidates: Sequence[Candidate], fitted: Likelihood, spectrum: S
     noises = [
         (add_likely_walk(model, K) if "K" in candidate.terms.linear else model, share)
         for candidate, share in (weigh_models(candidates) if candidates else [])
-        for model in [model_of(candidate.maximum)]
+        for model in [make_noise_model(candidate.maximum)]
     ]
     return compute_mean_error(noises or [(estimate.model, 1.0)], spectrum)
 

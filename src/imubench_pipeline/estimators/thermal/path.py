@@ -103,7 +103,7 @@ class TemperaturePath:
         return np.asarray(np.diff(integral, axis=-1) / block)
 
 
-def temperature_path(
+def estimate_temperature_path(
     blocks: Iterable[Array], segments: Sequence[Span], rng: np.random.Generator
 ) -> TemperaturePath:
     """Return the path of a temperature from the readings of its register.
@@ -302,7 +302,7 @@ def _lagged(times: Array, values: Array, lag: float) -> Array:
     return result
 
 
-def lagged(times: Array, values: Array, lag: float) -> Array:
+def apply_lag(times: Array, values: Array, lag: float) -> Array:
     """Return a temperature, shape (k,), behind a first-order lag: L dT_lag/dt = T - T_lag.
 
     Exact at the ascending knots ``times``, s, for a temperature that is linear between them and in
@@ -321,11 +321,11 @@ def lagged(times: Array, values: Array, lag: float) -> Array:
     return np.asarray(_lagged(np.asarray(times, dtype=np.float64), values, lag))
 
 
-def lagged_path(path: TemperaturePath, values: Array, rate: float, lag: float) -> Array:
-    """Return temperatures at the knots, shape (k,), behind a lag in s (see `lagged`).
+def apply_lag_to_path(path: TemperaturePath, values: Array, rate: float, lag: float) -> Array:
+    """Return temperatures at the knots, shape (k,), behind a lag in s (see `apply_lag`).
 
     Each segment begins in equilibrium.
     """
     return np.concatenate(
-        [lagged(path.sample[part] / rate, values[part], lag) for part in path.parts]
+        [apply_lag(path.sample[part] / rate, values[part], lag) for part in path.parts]
     )

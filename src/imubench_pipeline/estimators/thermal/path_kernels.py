@@ -24,7 +24,9 @@ _FAR = 30.0
 
 
 @njit(cache=True)
-def cell_moments(m: float, v: float, low: float, high: float, noise: float) -> tuple[float, ...]:
+def compute_cell_moments(
+    m: float, v: float, low: float, high: float, noise: float
+) -> tuple[float, ...]:
     """Return log P, mean and variance of x ~ N(m, v), given that x + noise lies in a cell.
 
     ``low`` and ``high`` are the edges of the cell, ``noise`` is the variance of the noise.
@@ -220,7 +222,7 @@ def propagate(
                 x, a, b, c = _ahead(x, s, a, b, c, steps[i], q)
             if cell[i]:
                 m, v = _joined(x, s, a, b, c, future[i])
-                _, mean, var = cell_moments(m, v, low[i], high[i], noise[i])
+                _, mean, var = compute_cell_moments(m, v, low[i], high[i], noise[i])
                 wanted = max(1.0 / var - 1.0 / v, 1e-12 / (high[i] - low[i]) ** 2)
                 wanted_shift = mean * (wanted + 1.0 / v) - m / v
                 before = (m / v + shift[i]) / (1.0 / v + precision[i])
@@ -236,7 +238,7 @@ def propagate(
             rest = 1.0 / variance[i] - precision[i]
             v = 1.0 / max(rest, 1e-9 / variance[i])
             m = v * (path[i] / variance[i] - shift[i])
-            log_p = cell_moments(m, v, low[i], high[i], noise[i])[0]
+            log_p = compute_cell_moments(m, v, low[i], high[i], noise[i])[0]
             evidence += log_p - _log_mass(m, v, precision[i], shift[i])
     return path, variance, evidence if settled and np.isfinite(evidence) else -np.inf
 

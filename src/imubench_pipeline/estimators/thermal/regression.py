@@ -19,7 +19,7 @@ from scipy.optimize import minimize_scalar
 
 from imubench_pipeline.allan.phase import Span
 from imubench_pipeline.estimators.spectrum import BLOCK_BAND, Spectrum
-from imubench_pipeline.estimators.thermal.path import TemperaturePath, lagged_path
+from imubench_pipeline.estimators.thermal.path import TemperaturePath, apply_lag_to_path
 from imubench_pipeline.typing import Array
 
 _LAG_GRID_SIZE = 16
@@ -216,7 +216,7 @@ class Regressors:
 
     def knots(self, lag: float) -> Array:
         """Return T_lag - T_0 at the knots of the path, shape (k,), K, for a lag in s."""
-        return lagged_path(self.path, self.path.value, self.rate, lag) - self.reference
+        return apply_lag_to_path(self.path, self.path.value, self.rate, lag) - self.reference
 
     def effect(self, regression: Regression) -> Array:
         """Return the effect of temperature at the knots of the path, shape (k,), SI."""

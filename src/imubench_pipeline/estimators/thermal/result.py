@@ -10,7 +10,7 @@ import numpy as np
 from imubench_pipeline.allan.phase import Span
 from imubench_pipeline.estimators.estimate import Parameter
 from imubench_pipeline.estimators.likelihood import Likelihood
-from imubench_pipeline.estimators.missing import block_means, draw_slow_part, fill_missing
+from imubench_pipeline.estimators.missing import average_blocks, draw_slow_part, fill_missing
 from imubench_pipeline.estimators.thermal.path import TemperaturePath
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.typing import Array
@@ -48,7 +48,7 @@ def complete_log(
     ``spans`` are the parts with gaps that can be filled, the model is the noise of the residual,
     and ``effect``, shape (k,), as in `add_temperature_effect`.
     """
-    means = block_means(remove_temperature_effect(blocks(), path, effect), spans)
+    means = average_blocks(remove_temperature_effect(blocks(), path, effect), spans)
     slow = draw_slow_part(means, spans, model, rate, rng)
     without = remove_temperature_effect(blocks(), path, effect)
     return add_temperature_effect(fill_missing(without, slow, model, rate, rng), path, effect)

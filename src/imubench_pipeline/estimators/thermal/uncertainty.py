@@ -22,7 +22,7 @@ from imubench_pipeline.estimators.estimate import SIGMAS, Parameter
 from imubench_pipeline.estimators.model_choice import Candidate
 from imubench_pipeline.estimators.posterior import sample
 from imubench_pipeline.estimators.spectrum import Spectrum
-from imubench_pipeline.estimators.thermal.path import lagged_path
+from imubench_pipeline.estimators.thermal.path import apply_lag_to_path
 from imubench_pipeline.estimators.thermal.regression import Regression, Regressors
 from imubench_pipeline.estimators.whittle import Terms, Whittle
 from imubench_pipeline.noise import NoiseModel
@@ -109,7 +109,7 @@ def assess_fit(
     return Verdict(
         s,
         q,
-        lag_parameter(regression.lag, drawn_lags, float(lags[-1]), compensated),
+        assess_lag(regression.lag, drawn_lags, float(lags[-1]), compensated),
         compensated,
         reason,
         float(np.std(betas @ at_mean)),
@@ -123,7 +123,7 @@ def _make_parameter(value: float, lower: float, upper: float, confused: str | No
     return Parameter(value, "ok", None, lower, upper)
 
 
-def lag_parameter(value: float, draws: Array, longest: float, compensated: bool) -> Parameter:
+def assess_lag(value: float, draws: Array, longest: float, compensated: bool) -> Parameter:
     """Return the lag with the shortest interval that contains 95 % of its draws, shape (d,), s.
 
     Equal tails would exclude a lag of 0 in half of the logs without a lag. ``value`` is the most
@@ -310,7 +310,7 @@ def compute_path_errors(
     # A poorly determined lag must not absorb the error of the path.
     inverse = np.linalg.inv(information / np.outer(scale, scale) + 1e-6 * np.eye(len(scale)))
     errors = [
-        slope * lagged_path(path, draw - path.value, regressors.rate, regression.lag)
+        slope * apply_lag_to_path(path, draw - path.value, regressors.rate, regression.lag)
         for draw in path.draws
     ]
     moved, density = [], np.zeros(len(full))

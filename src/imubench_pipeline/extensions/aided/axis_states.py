@@ -29,7 +29,7 @@ class AxisStates:
     scale: float = 0.0  # SD of the relative scale-factor error; 0 if it is not a state
 
 
-def axis_states(
+def make_axis_states(
     model: NoiseModel,
     sampling: float,
     *,
@@ -46,10 +46,10 @@ def axis_states(
     """
     terms = model.realised(shortest, longest)
     spaces = [term.state_space(1.0 / sampling) for term in terms]
-    return AxisStates(with_turn_on(StateSpace.together(spaces), turn_on), scale)
+    return AxisStates(add_turn_on_bias(StateSpace.together(spaces), turn_on), scale)
 
 
-def with_turn_on(space: StateSpace, turn_on: float) -> StateSpace:
+def add_turn_on_bias(space: StateSpace, turn_on: float) -> StateSpace:
     """Return a state space with a turn-on bias of this standard deviation, in SI.
 
     It is added to the initial variance of a random walk, or else becomes a constant state.
@@ -91,7 +91,9 @@ class StackedStates(NamedTuple):
         return 9 + int(self.first[-1]) + int(np.count_nonzero(self.scale))
 
 
-def stack(axes: Sequence[AxisStates], sampling: float, width: int, steps: int) -> StackedStates:
+def stack_axes(
+    axes: Sequence[AxisStates], sampling: float, width: int, steps: int
+) -> StackedStates:
     """Return the states of six axes over ``steps`` steps of ``width`` samples, at a rate in Hz.
 
     The covariance between the sum over a step and the states after it is included.

@@ -18,11 +18,11 @@ from numpy.typing import NDArray
 from imubench_pipeline.extensions.aided.axis_states import StackedStates
 from imubench_pipeline.extensions.aided.strapdown import (
     GRAVITY_GRADIENT,
+    compute_rotation_vector,
     copy,
     multiply,
-    rotation,
-    step,
-    turn_between,
+    propagate_sample,
+    write_rotation,
 )
 from imubench_pipeline.typing import Array
 
@@ -63,7 +63,7 @@ def _normalise_square(P: Array, e: Array, first: int, n: int) -> float:
 
 
 @njit(cache=True, nogil=True)
-def run(
+def run_filter(
     rate: Array,
     force: Array,
     T: float,
@@ -169,11 +169,11 @@ def run(
                         f[i] -= force[k, i] * x[of_scale[3 + i] - NAVIGATION_STATES]
                 if sample == width // 2:
                     if width % 2 == 1:  # the middle of the step is in a sample
-                        rotation(0.5 * T * w[0], 0.5 * T * w[1], 0.5 * T * w[2], turn)
+                        write_rotation(0.5 * T * w[0], 0.5 * T * w[1], 0.5 * T * w[2], turn)
                         multiply(C, turn, C_mid)
                     else:
                         copy(C, C_mid)
-                step(p, v, C, w, f, T, earth, room)
+                propagate_sample(p, v, C, w, f, T, earth, room)
                 for i in range(3):
                     mean_force[i] += room[3, 0, i] / width
                 k += 1
@@ -275,7 +275,7 @@ def run(
             for i in range(3):
                 p[i] += x_error[i]
                 v[i] += x_error[3 + i]
-            rotation(x_error[6], x_error[7], x_error[8], turn)
+            write_rotation(x_error[6], x_error[7], x_error[8], turn)
             multiply(turn, C, turned)
             copy(turned, C)
             for j in range(n_states):
@@ -289,7 +289,7 @@ def run(
         for i in range(3):
             for j in range(3):
                 turn[i, j], turned[i, j] = C[j, i], attitude[epoch, j, i]
-        turn_between(turn, turned, error)
+        compute_rotation_vector(turn, turned, error)
         for i in range(3):
             whole[6 + i] = -error[i]
         for i in range(NAVIGATION_STATES):

@@ -27,7 +27,7 @@ _AXIS_FACTORS = {"position": math.sqrt(2.0), "velocity": math.sqrt(2.0), "headin
 _LIMITS_NOTE = "simulated drives; the limits are those of the runs, not of the estimate"
 
 
-def outage_rows(
+def yield_outage_rows(
     navigation: pa.Table,
     recordings: Iterable[RecordingRow],
     requirements: Mapping[str, Requirement],

@@ -42,7 +42,7 @@ class Share:
     error: float
 
 
-def within(drive: Drive, length: float | None) -> NDArray[np.bool_]:
+def select_epochs(drive: Drive, length: float | None) -> NDArray[np.bool_]:
     """Return a mask of the epochs in outages of this length, s; None: fixes after warm-up."""
     if length is None:
         return np.asarray(drive.available & (drive.times > WARM_UP))
@@ -51,7 +51,7 @@ def within(drive: Drive, length: float | None) -> NDArray[np.bool_]:
     return chosen
 
 
-def squares(drive: Drive, outcome: Outcome, error: str, length: float | None) -> Array:
+def compute_mean_squares(drive: Drive, outcome: Outcome, error: str, length: float | None) -> Array:
     """Return the mean square of an error of each run, shape (R,), at the end of outages.
 
     They have this length, s; None: at all fixes.
@@ -59,8 +59,10 @@ def squares(drive: Drive, outcome: Outcome, error: str, length: float | None) ->
     return _average_epochs(drive, outcome.errors[:, :, _ERROR_COLUMNS[error]] ** 2, length)
 
 
-def predicted(drive: Drive, outcome: Outcome, error: str, length: float | None) -> float:
-    """Return the root mean square of an error by the variances of the filter, as `squares`."""
+def predict_root_mean_square(
+    drive: Drive, outcome: Outcome, error: str, length: float | None
+) -> float:
+    """Return the root mean square of an error by the variances of the filter."""
     return math.sqrt(
         _average_epochs(drive, outcome.variances[:, :, _ERROR_COLUMNS[error]], length).mean()
     )
@@ -73,19 +75,19 @@ def _average_epochs(drive: Drive, parts: Array, length: float | None) -> Array:
     """
     total = parts.sum(axis=2)
     if length is None:
-        return np.asarray(total[:, within(drive, None)].mean(axis=1))
+        return np.asarray(total[:, select_epochs(drive, None)].mean(axis=1))
     last = drive.of_outages(length)[:, -1]
     beyond = (last[0] - drive.of_outages(length)[0, 0] + 1) - length / drive.period
     return np.asarray(((1.0 - beyond) * total[:, last] + beyond * total[:, last - 1]).mean(axis=1))
 
 
-def root_mean_square(of_runs: Array) -> Interval:
+def compute_root_mean_square(of_runs: Array) -> Interval:
     """Return the root of the mean of mean squares, shape (R,), with limits from their scatter."""
     mean = float(of_runs.mean())
     return _compute_interval(math.sqrt(mean), of_runs / mean)
 
 
-def ratio(of_runs: Array, others: Array) -> Interval:
+def compute_ratio(of_runs: Array, others: Array) -> Interval:
     """Return the ratio of two such roots of the same runs, shapes (R,)."""
     square = float(of_runs.mean() / others.mean())
     return _compute_interval(math.sqrt(square), (of_runs - square * others) / of_runs.mean())
@@ -99,10 +101,12 @@ def _compute_interval(value: float, relative: Array) -> Interval:
     return Interval(value, value / factor, value * factor)
 
 
-def inside(drive: Drive, outcome: Outcome, group: str, length: float | None) -> Share | None:
+def compute_nees_share(
+    drive: Drive, outcome: Outcome, group: str, length: float | None
+) -> Share | None:
     """Return the share of epochs whose NEES of a group is within 95 % bounds; None if unknown."""
     place = GROUPS.index(group)
-    nees = outcome.normalised[:, within(drive, length), place]
+    nees = outcome.normalised[:, select_epochs(drive, length), place]
     if np.isnan(nees).any():
         return None
     low, high = (float(chi2.ppf(chance, DEGREES_OF_FREEDOM[place])) for chance in (0.025, 0.975))

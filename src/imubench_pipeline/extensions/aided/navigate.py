@@ -16,17 +16,17 @@ from typing import Any
 
 import numpy as np
 
-from imubench_pipeline.estimators.rows import recommended_estimates
-from imubench_pipeline.extensions.aided.axis_states import axis_states
+from imubench_pipeline.estimators.rows import read_recommended_estimates
+from imubench_pipeline.extensions.aided.axis_states import make_axis_states
 from imubench_pipeline.extensions.aided.error_state import GROUPS
 from imubench_pipeline.extensions.aided.measures import (
     ERRORS,
     Share,
-    inside,
-    predicted,
-    ratio,
-    root_mean_square,
-    squares,
+    compute_mean_squares,
+    compute_nees_share,
+    compute_ratio,
+    compute_root_mean_square,
+    predict_root_mean_square,
 )
 from imubench_pipeline.extensions.aided.runs import (
     FIX_INTERVAL,
@@ -34,34 +34,34 @@ from imubench_pipeline.extensions.aided.runs import (
     WARM_UP,
     Drive,
     Outcome,
-    schedule,
+    schedule_outages,
 )
 from imubench_pipeline.extensions.aided.settings import NavigateSettings
-from imubench_pipeline.extensions.aided.signals import Signals, Spreads, signals
+from imubench_pipeline.extensions.aided.signals import Signals, Spreads, simulate_signals
 from imubench_pipeline.extensions.aided.tables import NavigationRow
-from imubench_pipeline.extensions.aided.trajectories import trajectory
+from imubench_pipeline.extensions.aided.trajectories import simulate_trajectory
 from imubench_pipeline.extensions.aided.tunings import (
     TRUE,
     Models,
-    all_axes,
+    collect_tunings,
     complete_axes,
-    scaled,
-    tunings,
+    complete_noise_models,
+    scale_model,
 )
 from imubench_pipeline.model.estimates import LowPassRow
 from imubench_pipeline.model.recordings import RecordingRow
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.low_pass import LowPass
-from imubench_pipeline.recordings.kept import kept_static_logs
+from imubench_pipeline.recordings.kept import load_static_logs
 from imubench_pipeline.settings.requirements import Trajectory
 from imubench_pipeline.settings.sensor import CHANNELS, Sensor, quantity_of
 from imubench_pipeline.settings.simulated_recordings import SimulatedRecording
 from imubench_pipeline.simulate.model import SensorModel, before_the_filter, in_the_log
-from imubench_pipeline.simulate.models import imu_model
-from imubench_pipeline.steps.noise_source import static_recordings
+from imubench_pipeline.simulate.models import make_imu_model
+from imubench_pipeline.steps.noise_source import find_static_recordings
 from imubench_pipeline.tables import read
 from imubench_pipeline.typing import Array
-from imubench_pipeline.units import difference_to_si, quantity_to_si
+from imubench_pipeline.units import parse_difference, parse_quantity
 
 _MIN_PIECES = 4
 """Min. number of runs for which a log must be long enough."""
@@ -103,9 +103,9 @@ def navigate(folders: Sequence[Path], sensor: str, settings: str) -> Iterator[Na
         for entry in map(SimulatedRecording.model_validate, sections["truths"])
     }
     # A measured recording before a simulated one, the longest of several.
-    for about, folder in static_recordings(folders, lambda row: (row.simulated,)):
-        best = recommended_estimates(folder / "parameters.parquet")
-        fitted = {name: scaled(each.model, 1.0) for name, each in best.items()}
+    for about, folder in find_static_recordings(folders, lambda row: (row.simulated,)):
+        best = read_recommended_estimates(folder / "parameters.parquet")
+        fitted = {name: scale_model(each.model, 1.0) for name, each in best.items()}
         if not fitted:
             continue
         rate = about.rate or 0.0
@@ -113,12 +113,12 @@ def navigate(folders: Sequence[Path], sensor: str, settings: str) -> Iterator[Na
         if not any(
             quantity_of(name) == "accel" and model.N > 0.0 for name, model in fitted.items()
         ):
-            stand_in = {"accel_x": NoiseModel(N=quantity_to_si(how.accel_noise, "accel_density"))}
+            stand_in = {"accel_x": NoiseModel(N=parse_quantity(how.accel_noise, "accel_density"))}
         fitted |= stand_in
         lacking = None
         if rate < _MIN_RATE:
             lacking = f"samples of {rate:.3g} Hz; expected {_MIN_RATE:g} Hz or more"
-        elif all_axes(fitted) is None:
+        elif complete_noise_models(fitted) is None:
             lacking = "the recording tells no white noise of a gyro"
         if lacking is not None:
             for course in how.trajectories:
@@ -130,8 +130,8 @@ def navigate(folders: Sequence[Path], sensor: str, settings: str) -> Iterator[Na
                     reason=lacking,
                 )
             return
-        longest = max(quantity_to_si(length, "time") for length in how.outages)
-        tuned, lacking_of = tunings(folder, sensor, declared, longest, stand_in)
+        longest = max(parse_quantity(length, "time") for length in how.outages)
+        tuned, lacking_of = collect_tunings(folder, sensor, declared, longest, stand_in)
         truth = truths.get(about.recording)
         methods = [each.method for each in best.values()]
         chosen = max(sorted(set(methods)), key=methods.count)
@@ -150,12 +150,12 @@ def _add_requirements(
     how: NavigateSettings, asked: Sequence[tuple[Trajectory, str]]
 ) -> NavigateSettings:
     """Return settings with the outages of the requirements, and sufficiently long runs."""
-    lengths = {quantity_to_si(length, "time"): length for length in how.outages}
+    lengths = {parse_quantity(length, "time"): length for length in how.outages}
     for _, length in asked:
-        lengths.setdefault(quantity_to_si(length, "time"), length)
+        lengths.setdefault(parse_quantity(length, "time"), length)
     courses = dict.fromkeys([*how.trajectories, *(course for course, _ in asked)])
     least = WARM_UP + sum(lengths) + RECOVERY_TIME * (len(lengths) - 1) + FIX_INTERVAL
-    longer = max(quantity_to_si(how.duration, "time"), least)
+    longer = max(parse_quantity(how.duration, "time"), least)
     return how.model_copy(
         update={
             "outages": tuple(lengths.values()),
@@ -178,7 +178,9 @@ def _list_sources(
     axes: dict[str, SensorModel] = {}
     known = truth is not None and not truth.simulated_sensors
     if known and truth is not None:
-        axes = {str(name): model for name, model in imu_model(truth.channels, truth).axes.items()}
+        axes = {
+            str(name): model for name, model in make_imu_model(truth.channels, truth).axes.items()
+        }
     else:
         low_pass = {
             row.channel: LowPass(row.value, row.order)
@@ -197,17 +199,17 @@ def _list_sources(
         for channel, model in axes.items()
     }
     change = (
-        difference_to_si(how.temperature_change, "temperature") if how.temperature_change else 0.0
+        parse_difference(how.temperature_change, "temperature") if how.temperature_change else 0.0
     )
     reference = next((m.drift.reference for m in axes.values() if m.drift is not None), 25.0)
-    block = max(math.ceil(logged / quantity_to_si(how.rate, "frequency") - 1e-6), 1)
+    block = max(math.ceil(logged / parse_quantity(how.rate, "frequency") - 1e-6), 1)
     sampling = logged / block
 
     def of_run(
         drive: Drive, course: str, number: int, pieces: Sequence[Mapping[str, Array]] = ()
     ) -> Signals:
         samples = len(drive.trajectory.rate) * block
-        return signals(
+        return simulate_signals(
             drive.trajectory,
             axes,
             _make_spreads(how),
@@ -225,7 +227,7 @@ def _list_sources(
 
     yield _Source("truth" if known else "estimate", sampling, how.runs, of_run, true)
     if not about.simulated:
-        pieces = _cut_pieces(folder, block, round(quantity_to_si(how.duration, "time") * sampling))
+        pieces = _cut_pieces(folder, block, round(parse_quantity(how.duration, "time") * sampling))
         if len(pieces) >= _MIN_PIECES:
             runs = min(len(pieces), how.runs)
             yield _Source("log", sampling, runs, partial(of_run, pieces=pieces), None)
@@ -233,8 +235,8 @@ def _list_sources(
 
 def _make_spreads(how: NavigateSettings) -> Spreads:
     return Spreads(
-        quantity_to_si(how.gyro_bias, "angular_rate"),
-        quantity_to_si(how.accel_bias, "acceleration"),
+        parse_quantity(how.gyro_bias, "angular_rate"),
+        parse_quantity(how.accel_bias, "acceleration"),
         how.gyro_scale,
         how.accel_scale,
     )
@@ -246,7 +248,7 @@ def _cut_pieces(folder: Path, block: int, size: int) -> list[dict[str, Array]]:
     A channel with a hole is absent from the piece.
     """
     pieces: list[dict[str, Array]] = []
-    for channel, log in kept_static_logs(folder).items():
+    for channel, log in load_static_logs(folder).items():
         values = np.concatenate([*log.blocks()])
         values -= np.nanmean(values)
         means = values[: len(values) // block * block].reshape(-1, block).mean(axis=1)
@@ -266,13 +268,13 @@ def _make_rows(
     tuned: Mapping[str, Models],
     lacking: Mapping[str, str],
 ) -> Iterator[NavigationRow]:
-    lengths = [quantity_to_si(length, "time") for length in how.outages]
-    duration = quantity_to_si(how.duration, "time")
+    lengths = [parse_quantity(length, "time") for length in how.outages]
+    duration = parse_quantity(how.duration, "time")
     spreads = _make_spreads(how)
     models = dict(tuned) | ({TRUE: source.true} if source.true is not None else {})
     states = {
         name: [
-            axis_states(
+            make_axis_states(
                 model[channel],
                 source.sampling,
                 turn_on=spreads.bias(channel),
@@ -285,7 +287,10 @@ def _make_rows(
         for name, model in models.items()
     }
     for course in how.trajectories:
-        drive = Drive(trajectory(course, duration, source.sampling), schedule(duration, lengths))
+        drive = Drive(
+            simulate_trajectory(course, duration, source.sampling),
+            schedule_outages(duration, lengths),
+        )
         outcomes = drive.repeat(states, partial(source.of_run, drive, course), source.runs)
         about: dict[str, Any] = dict(names) | {
             "trajectory": course,
@@ -330,12 +335,14 @@ def _describe_tuning(
         "states": outcome.states,
     }
     for error in ERRORS:
-        of_runs = squares(drive, outcome, error, length)
-        size = root_mean_square(of_runs)
+        of_runs = compute_mean_squares(drive, outcome, error, length)
+        size = compute_root_mean_square(of_runs)
         row |= {error: size.value, f"{error}_lower": size.lower, f"{error}_upper": size.upper}
-        row[f"{error}_predicted"] = predicted(drive, outcome, error, length)
+        row[f"{error}_predicted"] = predict_root_mean_square(drive, outcome, error, length)
         if TRUE in outcomes:
-            against = ratio(of_runs, squares(drive, outcomes[TRUE], error, length))
+            against = compute_ratio(
+                of_runs, compute_mean_squares(drive, outcomes[TRUE], error, length)
+            )
             row |= {
                 f"{error}_ratio": against.value,
                 f"{error}_ratio_lower": against.lower,
@@ -344,7 +351,7 @@ def _describe_tuning(
     # A bank of processes has none shorter than an epoch: its states are no true bias.
     of_bank = {quantity_of(c) for c, model in models.items() if "F" in model.name.split("+")}
     for group in GROUPS:
-        share = inside(drive, outcome, group, length)
+        share = compute_nees_share(drive, outcome, group, length)
         if group != "navigation":
             row[f"nees_{group}"] = share.value if share and group not in of_bank else None
         elif share is not None:

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from imubench_pipeline.extensions.aided.tables import NavigationRow
-from imubench_pipeline.recordings.fitness import left_out
+from imubench_pipeline.recordings.fitness import list_excluded
 from imubench_pipeline.report.site import Entry, Site
 from imubench_pipeline.words.numbers import NO_VALUE, counted, number_text, percent_text
 from imubench_pipeline.words.verdicts import doubts_text
@@ -45,21 +45,21 @@ def _make_context(site: Site) -> dict[str, Any]:
     rows = site.rows(NavigationRow)
     shown = [row for row in rows if row.position is not None]
     recordings = [view.row for view in site.views]
-    apart = left_out(recordings)
+    apart = list_excluded(recordings)
     doubts = {(row.sensor, row.recording): doubts_text(row.doubts) for row in recordings}
     deciding = [row for row in shown if (row.sensor, row.recording) not in apart]
     return {
         "answers": [
             answer | {"doubts": doubts.get((answer["sensor"], answer["recording"]))}
-            for answer in answers(shown)
+            for answer in describe_tunings(shown)
         ],
-        "ranking": list(ranking(deciding)),
+        "ranking": list(rank_sensors(deciding)),
         "apart": {
             row.sensor: f"{row.recording} is not used: {doubts_text(apart[key])}"
             for row in shown
             if (key := (row.sensor, row.recording)) in apart
         },
-        "lines": [line_of(row) for row in shown],
+        "lines": [describe_row(row) for row in shown],
         "lacking": [row.columns() | {"tuning": TUNINGS[row.tuning]} for row in rows if row.reason],
         "filters": {
             "trajectory": list(dict.fromkeys(row.trajectory for row in shown)),
@@ -81,7 +81,7 @@ NAVIGATION = Entry(
 """The page of navigation filters with different tunings."""
 
 
-def answers(rows: Sequence[NavigationRow]) -> Iterator[dict[str, Any]]:
+def describe_tunings(rows: Sequence[NavigationRow]) -> Iterator[dict[str, Any]]:
     """Yield, for each sensor, trajectory and kind of signals, whether the tuning matters.
 
     The criterion is the position error after the longest outage, relative to the true model on the
@@ -141,7 +141,7 @@ def _describe_effect(rows: Sequence[NavigationRow]) -> str:
     return f"{text[0].upper()}{text[1:]}."
 
 
-def ranking(rows: Sequence[NavigationRow]) -> Iterator[dict[str, Any]]:
+def rank_sensors(rows: Sequence[NavigationRow]) -> Iterator[dict[str, Any]]:
     """Yield the sensors by the position error after the longest outage, recommended tuning."""
     for trajectory in dict.fromkeys(row.trajectory for row in rows):
         chosen = [
@@ -160,10 +160,10 @@ def ranking(rows: Sequence[NavigationRow]) -> Iterator[dict[str, Any]]:
                 for other, (low, high) in zip(last, limits, strict=True)
                 if other is not row and low <= upper and lower <= high
             ]
-            yield line_of(row) | {"place": place, "ties": ties, "trajectory": trajectory}
+            yield describe_row(row) | {"place": place, "ties": ties, "trajectory": trajectory}
 
 
-def line_of(row: NavigationRow) -> dict[str, Any]:
+def describe_row(row: NavigationRow) -> dict[str, Any]:
     """Return a row as the page shows it."""
     inside, error = row.nees_inside, row.nees_error
     return {

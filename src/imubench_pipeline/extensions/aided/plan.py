@@ -8,7 +8,7 @@ from imubench_pipeline.extensions.aided.settings import NavigateSettings
 from imubench_pipeline.run.plan import Plan, to_json
 
 
-def navigated(plan: Plan) -> list[str]:
+def list_navigated_sensors(plan: Plan) -> list[str]:
     """Sensors with static recordings that the settings select for navigation."""
     of = plan.run.section(NavigateSettings).of
     return [
@@ -19,7 +19,7 @@ def navigated(plan: Plan) -> list[str]:
     ]
 
 
-def navigate_settings(plan: Plan, sensor: str) -> str:
+def dump_navigate_settings(plan: Plan, sensor: str) -> str:
     """Return the settings of the navigation of a sensor."""
     declared = plan.sensors.get(sensor)
     return to_json(

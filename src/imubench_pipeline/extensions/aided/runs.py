@@ -10,10 +10,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from imubench_pipeline.extensions.aided.axis_states import AxisStates, StackedStates, stack
-from imubench_pipeline.extensions.aided.error_state import run
+from imubench_pipeline.extensions.aided.axis_states import AxisStates, StackedStates, stack_axes
+from imubench_pipeline.extensions.aided.error_state import run_filter
 from imubench_pipeline.extensions.aided.signals import Signals
-from imubench_pipeline.extensions.aided.strapdown import rotation
+from imubench_pipeline.extensions.aided.strapdown import write_rotation
 from imubench_pipeline.extensions.aided.trajectories import Trajectory
 from imubench_pipeline.typing import Array
 
@@ -41,7 +41,7 @@ class Outage:
     length: float
 
 
-def schedule(duration: float, lengths: Sequence[float]) -> list[Outage]:
+def schedule_outages(duration: float, lengths: Sequence[float]) -> list[Outage]:
     """Return outages with these lengths, s, repeated until a run of this duration, s, ends."""
     outages: list[Outage] = []
     begin = WARM_UP
@@ -108,15 +108,15 @@ class Drive:
 
     def stacked(self, axes: Sequence[AxisStates]) -> StackedStates:
         """Return the states of six axes over the steps of this drive."""
-        return stack(axes, self.trajectory.sampling, self.width, self.steps)
+        return stack_axes(axes, self.trajectory.sampling, self.width, self.steps)
 
     def filter(self, stacked: StackedStates, signals: Signals) -> tuple[Array, Array, Array, Array]:
         """Run the filter once; the result is as in `error_state.run`."""
         way = self.trajectory
         off = self._sigmas * signals.start
         turn = np.empty((3, 3))
-        rotation(-off[6], -off[7], -off[8], turn)
-        return run(
+        write_rotation(-off[6], -off[7], -off[8], turn)
+        return run_filter(
             signals.rate,
             signals.force,
             1.0 / way.sampling,

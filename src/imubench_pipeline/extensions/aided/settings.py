@@ -14,23 +14,23 @@ from imubench_pipeline.settings.validation import (
     RateFromZero,
     Strict,
     Text,
-    checked,
+    make_validator,
 )
-from imubench_pipeline.units import difference_to_si, quantity_to_si
+from imubench_pipeline.units import parse_difference, parse_quantity
 
-_difference = checked("temperature", "a difference, such as 10 K", to_si=difference_to_si)
+_difference = make_validator("temperature", "a difference, such as 10 K", to_si=parse_difference)
 
-_AccelerationDensity = Annotated[Text, checked("accel_density", "a density above 0")]
+_AccelerationDensity = Annotated[Text, make_validator("accel_density", "a density above 0")]
 
 
 def _of_drive(text: str) -> str:
-    if quantity_to_si(text, "time") > 36_000.0:
+    if parse_quantity(text, "time") > 36_000.0:
         raise ValueError(f"found {text}; expected a drive of at most 10 h")
     return text
 
 
 def _of_filter(text: str) -> str:
-    if not 10.0 <= quantity_to_si(text, "frequency") <= 1000.0:
+    if not 10.0 <= parse_quantity(text, "frequency") <= 1000.0:
         raise ValueError(f"found {text}; expected 10 Hz to 1 kHz")
     return text
 

@@ -8,7 +8,7 @@ from functools import partial
 
 import numpy as np
 
-from imubench_pipeline.extensions.aided.trajectories import Trajectory, headings
+from imubench_pipeline.extensions.aided.trajectories import Trajectory, compute_headings
 from imubench_pipeline.noise.simulate import channel_rng
 from imubench_pipeline.settings.sensor import CHANNELS
 from imubench_pipeline.simulate.model import SensorModel
@@ -45,7 +45,7 @@ class Signals:
     start: Array  # (9,); initial errors in standard deviations
 
 
-def signals(
+def simulate_signals(
     trajectory: Trajectory,
     axes: Mapping[str, SensorModel],
     spreads: Spreads,
@@ -102,7 +102,7 @@ def signals(
             log = simulate(model, rate, L * block, rng, true=motion, temperature=temperature)
             measured[i] = _average_blocks(log, block)
     rng = channel_rng(seed, *names, "gnss")
-    heading = headings(trajectory.attitude[at])[:, None]
+    heading = compute_headings(trajectory.attitude[at])[:, None]
     exact = np.concatenate([trajectory.position[at], trajectory.velocity[at], heading], axis=1)
     given = np.isfinite(spread := trajectory.gnss.spread)
     fixes = exact + np.where(given, spread, 0.0) * rng.standard_normal(exact.shape)

@@ -10,8 +10,9 @@ Gravity points to the centre of the Earth and decreases with height, to first or
 from the start. This includes Schuler feedback, and holds for a drive of some 10 km.
 
 A sample is the mean of w and f over the interval that it ends, as of an integrating sensor. In an
-interval the mechanisation (`step`) is of second order, and `inverse` is its exact inverse up to
-rounding. Therefore navigation errors come from sensors, GNSS or the start alone.
+interval the mechanisation (`propagate_sample`) is of second order, and `invert_mechanisation` is
+its exact inverse up to rounding. Therefore navigation errors come from sensors, GNSS or the start
+alone.
 
 Kernels loop over scalars, since numba compiles assignments to slices and sums of arrays into code
 that takes longer than the kernel itself.
@@ -35,7 +36,7 @@ GRAVITY_GRADIENT = STANDARD_GRAVITY / EARTH_RADIUS
 
 
 @njit(cache=True, nogil=True)
-def rotation(x: float, y: float, z: float, into: Array) -> None:
+def write_rotation(x: float, y: float, z: float, into: Array) -> None:
     """Write the matrix of a turn by a vector in rad, shape (3, 3): exp([r x])."""
     square = x * x + y * y + z * z
     if square > 1e-8:
@@ -70,7 +71,7 @@ def copy(a: Array, into: Array) -> None:
 
 
 @njit(cache=True, nogil=True)
-def step(
+def propagate_sample(
     p: Array, v: Array, C: Array, w: Array, f: Array, T: float, earth: Array, room: Array
 ) -> None:
     """Propagate by one sampling interval T, s; p, v, C are changed in place.
@@ -80,9 +81,9 @@ def step(
     """
     middle, half, other = room[0], room[1], room[2]
     force, back = room[3, 0], -0.5 * T
-    rotation(0.5 * T * w[0], 0.5 * T * w[1], 0.5 * T * w[2], half)
+    write_rotation(0.5 * T * w[0], 0.5 * T * w[1], 0.5 * T * w[2], half)
     multiply(C, half, other)
-    rotation(back * earth[0], back * earth[1], back * earth[2], C)
+    write_rotation(back * earth[0], back * earth[1], back * earth[2], C)
     multiply(C, other, middle)
     multiply(middle, half, other)
     copy(C, half)
@@ -102,7 +103,7 @@ def step(
 
 
 @njit(cache=True, nogil=True)
-def turn_between(C: Array, after: Array, into: Array) -> None:
+def compute_rotation_vector(C: Array, after: Array, into: Array) -> None:
     """Write the rotation vector from one matrix to another, rad: log(C^T after)."""
     trace = x = y = z = 0.0
     for i in range(3):
@@ -117,7 +118,7 @@ def turn_between(C: Array, after: Array, into: Array) -> None:
 
 
 @njit(cache=True, nogil=True)
-def inverse(
+def invert_mechanisation(
     start: Array, velocity: Array, attitude: Array, T: float, earth: Array
 ) -> tuple[Array, Array, Array]:
     """Return the positions, shape (L + 1, 3), and ideal rates and forces, shapes (L, 3).
@@ -130,12 +131,12 @@ def inverse(
         position[0, i] = start[i]
     a = np.empty(3)
     back, on, half, middle, lifted = np.empty((5, 3, 3))
-    rotation(T * earth[0], T * earth[1], T * earth[2], back)
-    rotation(-0.5 * T * earth[0], -0.5 * T * earth[1], -0.5 * T * earth[2], on)
+    write_rotation(T * earth[0], T * earth[1], T * earth[2], back)
+    write_rotation(-0.5 * T * earth[0], -0.5 * T * earth[1], -0.5 * T * earth[2], on)
     for k in range(L):
         multiply(back, attitude[k + 1], lifted)  # without the turn of the Earth
-        turn_between(attitude[k], lifted, rate[k])
-        rotation(0.5 * rate[k, 0], 0.5 * rate[k, 1], 0.5 * rate[k, 2], half)
+        compute_rotation_vector(attitude[k], lifted, rate[k])
+        write_rotation(0.5 * rate[k, 0], 0.5 * rate[k, 1], 0.5 * rate[k, 2], half)
         multiply(attitude[k], half, lifted)
         multiply(on, lifted, middle)
         v, p = velocity[k], position[k]

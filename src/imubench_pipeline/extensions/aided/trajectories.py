@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from imubench_pipeline.earth import EARTH_RATE, STANDARD_GRAVITY
-from imubench_pipeline.extensions.aided.strapdown import inverse
+from imubench_pipeline.extensions.aided.strapdown import invert_mechanisation
 from imubench_pipeline.typing import Array
 
 DEFAULT_LATITUDE = math.radians(45.0)
@@ -130,7 +130,7 @@ TRAJECTORY_NAMES = tuple(_MOTIONS)
 """Names of the trajectories."""
 
 
-def trajectory(name: str, duration: float, sampling: float) -> Trajectory:
+def simulate_trajectory(name: str, duration: float, sampling: float) -> Trajectory:
     """Return a trajectory of `TRAJECTORY_NAMES`, with a length in s, at a rate in Hz."""
     moves, gnss = _MOTIONS[name]
     time = np.arange(round(duration * sampling) + 1) / sampling
@@ -138,13 +138,15 @@ def trajectory(name: str, duration: float, sampling: float) -> Trajectory:
     velocity = np.column_stack(
         [motion.speed * np.cos(motion.course), motion.speed * np.sin(motion.course), -motion.climb]
     )
-    attitude = attitudes(motion.roll, motion.pitch, motion.course)
+    attitude = make_attitudes(motion.roll, motion.pitch, motion.course)
     earth = EARTH_RATE * np.array([math.cos(DEFAULT_LATITUDE), 0.0, -math.sin(DEFAULT_LATITUDE)])
-    position, rate, force = inverse(np.zeros(3), velocity, attitude, 1.0 / sampling, earth)
+    position, rate, force = invert_mechanisation(
+        np.zeros(3), velocity, attitude, 1.0 / sampling, earth
+    )
     return Trajectory(position, velocity, attitude, rate, force, sampling, earth, gnss)
 
 
-def attitudes(roll: Array, pitch: Array, heading: Array) -> Array:
+def make_attitudes(roll: Array, pitch: Array, heading: Array) -> Array:
     """Return the matrices of angles in rad, shape (L, 3, 3): heading, then pitch, then roll."""
     sr, cr, sp, cp = np.sin(roll), np.cos(roll), np.sin(pitch), np.cos(pitch)
     sh, ch = np.sin(heading), np.cos(heading)
@@ -156,6 +158,6 @@ def attitudes(roll: Array, pitch: Array, heading: Array) -> Array:
     return np.ascontiguousarray(np.moveaxis(np.array(rows), 2, 0))
 
 
-def headings(attitude: Array) -> Array:
+def compute_headings(attitude: Array) -> Array:
     """Return the headings of matrices in rad, shape (L,)."""
     return np.arctan2(attitude[:, 1, 0], attitude[:, 0, 0])

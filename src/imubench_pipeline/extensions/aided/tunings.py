@@ -10,9 +10,9 @@ from typing import TypeVar
 
 import pyarrow.compute as pc
 
-from imubench_pipeline.datasheets.comparable import comparables
+from imubench_pipeline.datasheets.comparable import read_comparables
 from imubench_pipeline.estimators.estimate import Estimate
-from imubench_pipeline.estimators.rows import estimates, recommended_estimates
+from imubench_pipeline.estimators.rows import read_estimates, read_recommended_estimates
 from imubench_pipeline.export.overbound import overbound
 from imubench_pipeline.export.request import curve_of
 from imubench_pipeline.model.estimates import AllanRow
@@ -45,14 +45,14 @@ def complete_axes(models: Mapping[str, T]) -> dict[str, T]:
     return whole
 
 
-def all_axes(models: Mapping[str, NoiseModel]) -> Models | None:
+def complete_noise_models(models: Mapping[str, NoiseModel]) -> Models | None:
     """Return models of all six channels; None if gyros or accelerometers have no white noise."""
     usable = {name: model for name, model in models.items() if model.N > 0.0}
     quantities = {quantity_of(name) for name in usable}
     return complete_axes(usable) if quantities >= {"gyro", "accel"} else None
 
 
-def tunings(
+def collect_tunings(
     folder: Path, sensor: str, declared: Sensor | None, horizon: float, stand_in: Models
 ) -> tuple[dict[str, Models], dict[str, str]]:
     """Return the tunings from a recording and the datasheet of its sensor, by name.
@@ -60,11 +60,13 @@ def tunings(
     The second mapping has the reasons of missing tunings. ``horizon``, s, is for the overbound;
     ``stand_in`` replaces the channels of a quantity that the recording does not have.
     """
-    every = estimates(folder / "parameters.parquet", folder / "draws.parquet")
-    best = recommended_estimates(folder / "parameters.parquet", folder / "draws.parquet")
+    every = read_estimates(folder / "parameters.parquet", folder / "draws.parquet")
+    best = read_recommended_estimates(folder / "parameters.parquet", folder / "draws.parquet")
     named = _make_printed_models(sensor, declared)
     lacking: dict[str, str] = {}
-    ten = {channel: scaled(estimate.model, _TENFOLD_FACTOR) for channel, estimate in best.items()}
+    ten = {
+        channel: scale_model(estimate.model, _TENFOLD_FACTOR) for channel, estimate in best.items()
+    }
     named |= {TENFOLD: ten, TABLE_1: _select_method(every, "authors")}
     named |= {method: _select_method(every, method) for method in _ESTIMATION_METHODS}
     try:
@@ -77,7 +79,7 @@ def tunings(
         if not models:
             continue
         own = {c: m for c, m in models.items() if quantity_of(c) not in replaced}
-        whole = all_axes(own | stand_in)
+        whole = complete_noise_models(own | stand_in)
         if whole is None:
             lacking[name] = "it tells no white noise of a gyro or of an accelerometer"
         else:
@@ -85,7 +87,7 @@ def tunings(
     return found, lacking
 
 
-def scaled(model: NoiseModel, factor: float) -> NoiseModel:
+def scale_model(model: NoiseModel, factor: float) -> NoiseModel:
     """Return the model of a signal that is a factor larger; a ramp and lines are left out."""
     return NoiseModel(
         Q=model.Q * factor,
@@ -100,7 +102,7 @@ def scaled(model: NoiseModel, factor: float) -> NoiseModel:
 def _select_method(every: Mapping[str, Sequence[Estimate]], method: str) -> Models:
     """Return the models of a method without a ramp and lines: no filter expects them to go on."""
     return {
-        channel: scaled(estimate.model, 1.0)
+        channel: scale_model(estimate.model, 1.0)
         for channel, own in every.items()
         for estimate in own
         if estimate.method == method
@@ -135,7 +137,7 @@ def _make_printed_models(sensor: str, declared: Sensor | None) -> dict[str, Mode
     for channel, noise in right.items():
         halved = any(
             row.statistic == "N" and row.sidedness == "one-sided" and row.quantity == "N"
-            for row in comparables(declared.datasheet, channel)
+            for row in read_comparables(declared.datasheet, channel)
             if row.value == noise.N
         )
         # A one-sided density for N, and the lowest point of the curve for B.

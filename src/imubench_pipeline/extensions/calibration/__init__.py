@@ -30,9 +30,9 @@ EXTENSION = Extension(
         Block("simulated", "pointing", "calibration.settings:SimulatedRest"),
     ),
     motions={
-        "rate_table": "calibration.simulated:on_table",
-        "positions": "calibration.simulated:in_positions",
-        "pointing": "calibration.simulated:at_rest",
+        "rate_table": "calibration.simulated:simulate_rate_table",
+        "positions": "calibration.simulated:simulate_positions",
+        "pointing": "calibration.simulated:simulate_rest",
     },
     rules="rules.smk",
     recording_pages={
@@ -40,7 +40,7 @@ EXTENSION = Extension(
         "positions": "calibration.pages:POSITIONS",
     },
     sections=("calibration.pages:NOT_CALIBRATED",),
-    recording_sections=("calibration.pages:at_rest",),
+    recording_sections=("calibration.pages:make_rest_section",),
     templates="templates",
     static="static",
 )

@@ -59,7 +59,7 @@ class BlockFilter:
             before[:a, :a] = np.diag([axis.white[k] for axis in axes])
             before[:a, a:] = self._seen[k] @ predicted
             before[a:, a:] = predicted
-            after = triangle(before)
+            after = triangularise(before)
             self.innovation_roots[k] = after[:a, :a]
             self.gains[k] = np.linalg.solve(after[:a, :a].T, after[a:, :a].T).T
             root = self.roots[k] = after[a:, a:]
@@ -101,11 +101,11 @@ class BlockFilter:
         return transition, noise
 
 
-def triangle(root: Array) -> Array:
+def triangularise(root: Array) -> Array:
     """Return a lower triangular root, shape (n, n), of a covariance with a root (n, r)."""
     return np.asarray(np.linalg.qr(root.T, mode="r")).T
 
 
-def deviation(roots: Array, state: int) -> Array:
+def compute_deviation(roots: Array, state: int) -> Array:
     """Return the standard deviation of a state, shape (...), from roots of shape (..., n, n)."""
     return np.asarray(np.linalg.norm(roots[..., state, :], axis=-1))

@@ -38,22 +38,22 @@ from imubench_pipeline.extensions.calibration.tables import (
     CalibrationPointRow,
     CalibrationRow,
 )
-from imubench_pipeline.extensions.earth_rate.outlook import noise_at_rest
+from imubench_pipeline.extensions.earth_rate.outlook import load_noise_at_rest
 from imubench_pipeline.model.table import TableRow
-from imubench_pipeline.recordings.kept import kept_logs
-from imubench_pipeline.recordings.recording import ChannelLog, on_grid, read_metadata
+from imubench_pipeline.recordings.kept import load_logs
+from imubench_pipeline.recordings.recording import ChannelLog, place_on_grid, read_metadata
 from imubench_pipeline.settings.sensor import Sensor
 from imubench_pipeline.settings.simulated_recordings import SimulatedRecording
 from imubench_pipeline.steps.noise_source import (
     NO_MODEL,
     NoiseSource,
-    from_printed,
-    noise_source,
-    segments_reason,
+    explain_segments,
+    find_noise_source,
+    take_printed_noise,
 )
 from imubench_pipeline.tables.keys import Key
 from imubench_pipeline.typing import Array
-from imubench_pipeline.units import quantity_to_si
+from imubench_pipeline.units import parse_quantity
 
 UNITS = {
     "bias": "rad/s",
@@ -72,7 +72,7 @@ _Z_95 = 1.96  # standard deviations of a 95 % limit
 _RUN_PARAMETERS = {"rate_table": ("bias", "scale_factor"), "at_rest": ("bias", "present_bias")}
 
 
-def calibration_tables(
+def make_calibration_tables(
     folder: Path, static: Sequence[Path], sensor: str, recording: str, settings: str
 ) -> dict[str, Sequence[TableRow]]:
     """Return the rows of the tables of a gyro on a rate table, or at rest with a known direction.
@@ -81,7 +81,7 @@ def calibration_tables(
     of `imubench_pipeline.run.plan.Plan.experiment_settings`. A rejected recording has no rows.
     """
     rows: dict[str, Sequence[TableRow]] = {name: [] for name in CALIBRATED}
-    logs = kept_logs(folder)
+    logs = load_logs(folder)
     if not logs:
         return rows
     sections = json.loads(settings)
@@ -109,7 +109,7 @@ def calibration_tables(
     log = GyroLog(
         key,
         logs[channel],
-        noise_source(folder, static, key, stated),
+        find_noise_source(folder, static, key, stated),
         metadata.get("begins", 0.0),
         _truth(simulated, channel),
     )
@@ -144,7 +144,7 @@ def _truth(simulated: SimulatedRecording | None, channel: str) -> dict[str, floa
     truth = {}
     for name, axis in simulated.channels.items():
         if name == channel and axis.bias is not None:
-            truth["bias"] = quantity_to_si(axis.bias, "angular_rate")
+            truth["bias"] = parse_quantity(axis.bias, "angular_rate")
     if (table := simulated.block(SimulatedTable)) is not None:
         truth |= {"scale_factor": table.scale_factor, "quadratic": 0.0, "asymmetry": 0.0}
     return truth
@@ -203,14 +203,14 @@ def _attitude(
         return
     axes = [logs[name] for name in TRIAD]
     if any(len(log.segments) > 1 for log in axes):
-        yield from without("not_shown", segments_reason(axes[0]))
+        yield from without("not_shown", explain_segments(axes[0]))
         return
-    at_rest = noise_at_rest(static)
+    at_rest = load_noise_at_rest(static)
     if at_rest is not None and any(channel.startswith("accel") for channel in at_rest.models):
         models = [*at_rest.three("gyro").values(), *at_rest.three("accel").values()]
         words = f"static recording {at_rest.recording}"
     else:
-        printed = [from_printed(key.sensor, sensor, channel) for channel in TRIAD]
+        printed = [take_printed_noise(key.sensor, sensor, channel) for channel in TRIAD]
         known = [source for source in printed if source is not None]
         if len(known) < 6:
             yield from without("no_model", NO_MODEL)
@@ -222,8 +222,8 @@ def _attitude(
         triad = Triad(
             gyros=models[:3],
             accelerometers=models[3:],
-            gyro_bias=quantity_to_si(declared.gyro_bias, "angular_rate"),
-            accelerometer_bias=quantity_to_si(declared.accelerometer_bias, "acceleration"),
+            gyro_bias=parse_quantity(declared.gyro_bias, "angular_rate"),
+            accelerometer_bias=parse_quantity(declared.accelerometer_bias, "acceleration"),
         )
         aligned, fine = align(means, triad, positions, Site(latitude=declared.latitude_si))
     except NotObservableError as error:
@@ -283,10 +283,10 @@ def _at_rest(gyro: GyroLog, declared: AtRest) -> Rows:
     pointing = declared.pointing
     names = gyro.names("at_rest", pointing)
     if len(gyro.log.segments) > 1:
-        return _without(names, "not_shown", segments_reason(gyro.log))
+        return _without(names, "not_shown", explain_segments(gyro.log))
     if gyro.source is None:
         return _without(names, "no_model", NO_MODEL)
-    samples = on_grid(gyro.log.blocks(), gyro.log.grid)
+    samples = place_on_grid(gyro.log.blocks(), gyro.log.grid)
     try:
         bias = bias_at_rest(samples, gyro.log.rate, gyro.source.model, pointing)
     except ValueError as error:
@@ -310,7 +310,7 @@ def _on_rate_table(gyro: GyroLog, declared: OnRateTable) -> Rows:
     pointing = None if declared.axis is None else declared.axis.pointing
     names = gyro.names("rate_table", pointing)
     if len(gyro.log.segments) > 1:
-        return _without(names, "not_shown", segments_reason(gyro.log))
+        return _without(names, "not_shown", explain_segments(gyro.log))
     try:
         schedule = _schedule(gyro, declared)
     except ValueError as error:
@@ -319,7 +319,7 @@ def _on_rate_table(gyro: GyroLog, declared: OnRateTable) -> Rows:
         return _without(names, "no_model", NO_MODEL)
     model = gyro.source.model
     setting = declared.si("setting_sigma", "angular_rate")
-    samples = on_grid(gyro.log.blocks(), gyro.log.grid)
+    samples = place_on_grid(gyro.log.blocks(), gyro.log.grid)
     try:
         fit, measured = calibrate(samples, schedule, model, pointing, setting_sigma=setting)
     except NotObservableError as error:
@@ -367,7 +367,7 @@ def _schedule(gyro: GyroLog, declared: OnRateTable) -> Schedule:
             )
         try:
             return Schedule.from_column(
-                on_grid(log.table_rates(), log.grid),
+                place_on_grid(log.table_rates(), log.grid),
                 log.rate,
                 tolerance=declared.si("tolerance", "angular_rate"),
                 shortest=declared.si("shortest", "time"),
@@ -388,7 +388,7 @@ def _schedule(gyro: GyroLog, declared: OnRateTable) -> Schedule:
                 f"steps within the log, which is used from {gyro.begins:g} to {ends:g} s: mend "
                 "the step, or 'use:' beside the log"
             )
-        rate = quantity_to_si(step.rate, "angular_rate")
+        rate = parse_quantity(step.rate, "angular_rate")
         steps.append((start - gyro.begins, min(stop, ends) - gyro.begins, rate))
     return Schedule.from_steps(steps, log.rate, settling=settling)
 

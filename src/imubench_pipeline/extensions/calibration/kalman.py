@@ -26,9 +26,13 @@ from functools import cached_property
 import numpy as np
 from scipy.linalg import solve_triangular
 
-from imubench_pipeline.extensions.calibration.block_filter import BlockFilter, deviation, triangle
+from imubench_pipeline.extensions.calibration.block_filter import (
+    BlockFilter,
+    compute_deviation,
+    triangularise,
+)
 from imubench_pipeline.extensions.calibration.experiment import Blocks
-from imubench_pipeline.extensions.calibration.states import UNINFORMATIVE_SIGMA, block_states
+from imubench_pipeline.extensions.calibration.states import UNINFORMATIVE_SIGMA, discretise_blocks
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.typing import Array
 
@@ -117,7 +121,7 @@ class RateFilter:
         if not (math.isfinite(rate_sigma) and rate_sigma >= 0):
             raise ValueError(f"rate_sigma is {rate_sigma}, expected a number from 0")
         self.blocks = blocks
-        self._states = block_states(model, blocks, turn_on_bias)
+        self._states = discretise_blocks(model, blocks, turn_on_bias)
         start = np.array([[rate_sigma]])
         self._filter = BlockFilter((self._states,), blocks.seen[:, None, None], start)
 
@@ -129,7 +133,7 @@ class RateFilter:
     @property
     def rate_sigma(self) -> Array:
         """Standard deviation of the rate after each block, rad/s, shape (b,); needs no data."""
-        return deviation(self._filter.roots, 0)
+        return compute_deviation(self._filter.roots, 0)
 
     def run(self, means: Array) -> Filtered:
         """Filter runs of one design from block means, rad/s, shape (runs, b).
@@ -145,7 +149,7 @@ class RateFilter:
             states[:, :, 0],
             self.rate_sigma,
             states[:, :, -1],
-            deviation(roots, -1),
+            compute_deviation(roots, -1),
             innovation[:, :, 0],
             np.abs(self._filter.innovation_roots[:, 0, 0]),
             states,
@@ -170,20 +174,20 @@ class RateFilter:
         root = self._filter.roots[-1]
         gains = np.empty((len(self.blocks) - 1, *root.shape))
         sigma = np.empty(len(self.blocks))
-        sigma[-1] = deviation(root, -1)
+        sigma[-1] = compute_deviation(root, -1)
         n = len(root)
         for k in range(len(gains) - 1, -1, -1):
             transition, noise = self._filter.matrices(k + 1)
             filtered = self._filter.roots[k]
             joint = np.zeros((2 * n, n + noise.shape[1]))
             joint[:n, :n], joint[:n, n:], joint[n:, :n] = transition @ filtered, noise, filtered
-            after = triangle(joint)
+            after = triangularise(joint)
             predicted, shared, rest = after[:n, :n], after[n:, :n], after[n:, n:]
             # Without process noise the mean of a block depends on the states: no plain inverse.
             scale = np.linalg.norm(predicted, axis=1)
             unit = np.where(scale > 0.0, scale, 1.0)
             inverse = np.linalg.pinv(predicted / unit[:, None], rcond=_SINGULAR_TOLERANCE)
             gains[k] = shared @ inverse / unit
-            root = triangle(np.concatenate([rest, gains[k] @ root], axis=1))
-            sigma[k] = deviation(root, -1)
+            root = triangularise(np.concatenate([rest, gains[k] @ root], axis=1))
+            sigma[k] = compute_deviation(root, -1)
         return gains, sigma

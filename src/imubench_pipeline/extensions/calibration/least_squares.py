@@ -79,19 +79,19 @@ class Fit:
 
     def interval(self) -> Limits:
         """Return confidence limits, by the noise model, shapes (runs, p)."""
-        return limits(self.value, self.sigma)
+        return compute_limits(self.value, self.sigma)
 
 
-def limits(value: Array, sigma: Array | float) -> Limits:
+def compute_limits(value: Array, sigma: Array | float) -> Limits:
     """Return the 95 % limits, lower and upper, of estimates with normal errors.
 
     The standard errors have the unit of the values, and a shape that broadcasts with theirs.
     """
-    half = half_width() * sigma
+    half = compute_half_width() * sigma
     return value - half, value + half
 
 
-def half_width(level: float = CONFIDENCE_LEVEL) -> float:
+def compute_half_width(level: float = CONFIDENCE_LEVEL) -> float:
     """Return half of a two-sided interval of the normal distribution, in standard deviations.
 
     A level of 0.95 gives 1.96. Raises ValueError if it is not between 0 and 1.
@@ -161,7 +161,7 @@ class LeastSquares:
         )
 
 
-def block_length(
+def choose_block_length(
     experiment: Experiment, model: NoiseModel, regressors: Callable[[Blocks], Array]
 ) -> int:
     """Return the longest block, in samples, whose means keep the information of the samples.

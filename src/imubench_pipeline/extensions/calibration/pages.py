@@ -10,8 +10,8 @@ from typing import Any
 from imubench_pipeline.extensions.calibration.tables import CalibrationPointRow, CalibrationRow
 from imubench_pipeline.extensions.earth_rate.tables import EarthRateRow
 from imubench_pipeline.report.payload import Arrays
-from imubench_pipeline.report.practical import System, page_unit
-from imubench_pipeline.report.recording import about_of, summary_words
+from imubench_pipeline.report.practical import System, choose_page_unit
+from imubench_pipeline.report.recording import describe_recording, summarise_recording
 from imubench_pipeline.report.site import RecordingPage, Section, Site
 from imubench_pipeline.report.view import RecordingView
 from imubench_pipeline.words.numbers import (
@@ -50,7 +50,7 @@ _MIN_LINEARITY_P_VALUE = 0.05  # p-value below which the response of a gyro coun
 _MIN_SCATTER_P_VALUE = 0.01
 
 
-def answer(rows: Sequence[CalibrationRow], system: System) -> str:
+def summarise_calibration(rows: Sequence[CalibrationRow], system: System) -> str:
     """Return scale factor and bias of a recording in a sentence, or the reason without them.
 
     ``rows`` are those of the recording in the table ``calibration``, as in all functions below.
@@ -61,7 +61,7 @@ def answer(rows: Sequence[CalibrationRow], system: System) -> str:
         return "This recording has no result."
     if bias.value is None:
         return sentence(bias.reason)
-    unit = page_unit("gyro", "adev", system)
+    unit = choose_page_unit("gyro", "adev", system)
     size = _format_half_width((bias.value, bias.lower, bias.upper), unit.text)
     text = f"The bias is {size} {unit.sign} (95 %)"
     scale = by_parameter.get("scale_factor")
@@ -92,7 +92,7 @@ def _format_half_width(
     return f"{as_text(value, limit_digits(lower, upper, 3))} ± {as_text(half, 2)}"
 
 
-def lines(rows: Sequence[CalibrationRow]) -> Iterator[dict[str, Any]]:
+def format_estimates(rows: Sequence[CalibrationRow]) -> Iterator[dict[str, Any]]:
     """Yield the lines of the table of results; dimensionless quantities as text."""
     for row in rows:
         if row.status == "not_observable" and row.parameter in ("earth_rate", "heading"):
@@ -131,7 +131,7 @@ def _format_ratio(row: CalibrationRow) -> dict[str, str]:
     }
 
 
-def not_observable(rows: Sequence[CalibrationRow]) -> list[dict[str, Any]]:
+def list_not_observable(rows: Sequence[CalibrationRow]) -> list[dict[str, Any]]:
     """Return the quantities that a recording cannot determine, each with the reason."""
     return [
         {"words": WORDS[row.parameter], "why": sentence(row.reason), **row.columns()}
@@ -140,7 +140,7 @@ def not_observable(rows: Sequence[CalibrationRow]) -> list[dict[str, Any]]:
     ]
 
 
-def scatter_words(rows: Sequence[CalibrationRow]) -> str:
+def describe_scatter(rows: Sequence[CalibrationRow]) -> str:
     """Return whether the scatter agrees with the noise model, in a sentence."""
     chance = next((row.scatter for row in rows if row.scatter is not None), None)
     if chance is None:
@@ -154,12 +154,12 @@ def scatter_words(rows: Sequence[CalibrationRow]) -> str:
     return f"The scatter of the means agrees with the noise model (p = {text})."
 
 
-def earth_words(rows: Sequence[CalibrationRow], system: System) -> str:
+def describe_earth_rate(rows: Sequence[CalibrationRow], system: System) -> str:
     """Return the correction for the Earth's rate, in a sentence."""
     row = next((row for row in rows if row.earth_rate is not None), None)
     if row is None:
         return "The bias includes the Earth's rate along the axis."
-    unit = page_unit("gyro", "adev", system)
+    unit = choose_page_unit("gyro", "adev", system)
     text = (
         f"The Earth's rate along the axis, {unit.text(row.earth_rate, 4)} {unit.sign} (latitude "
         f"{degrees_text(row.latitude)}, {_describe_direction(row)}), is subtracted"
@@ -184,7 +184,7 @@ def _describe_direction(row: CalibrationRow) -> str:
 Estimated = CalibrationRow | EarthRateRow
 
 
-def calibrated(site: Site) -> list[RecordingView]:
+def select_calibrated(site: Site) -> list[RecordingView]:
     """Return the recordings on a rate table, in positions, or at rest with a direction."""
     named = site.named_in(CalibrationRow)
     return [
@@ -194,7 +194,7 @@ def calibrated(site: Site) -> list[RecordingView]:
     ]
 
 
-def without_result(
+def list_without_result(
     views: Sequence[RecordingView], rows_of: Callable[[RecordingView], Sequence[Estimated]]
 ) -> Iterator[dict[str, Any]]:
     """Yield the recordings of an experiment without an estimate, with the reasons."""
@@ -208,49 +208,50 @@ NOT_CALIBRATED = Section(
     page="index.html",
     template="not_calibrated.html.jinja",
     context=lambda site: (
-        list(without_result(calibrated(site), lambda view: view.rows(CalibrationRow))) or None
+        list(list_without_result(select_calibrated(site), lambda view: view.rows(CalibrationRow)))
+        or None
     ),
 )
 """The recordings without a calibration result, on the start page."""
 
 
-def at_rest(site: Site, view: RecordingView) -> tuple[str, dict[str, Any]] | None:
+def make_rest_section(site: Site, view: RecordingView) -> tuple[str, dict[str, Any]] | None:
     """Return the bias of a static recording for its page; None without a known direction."""
     rows = [row for row in view.rows(CalibrationRow) if row.run == "at_rest"]
     if not rows:
         return None
     return "at_rest.html.jinja", {
         "channel": rows[0].channel,
-        "lines": [line for line in lines(rows) if line["status"] != "not_observable"],
-        "open": not_observable(rows),
-        "noise": noise_words(rows),
-        "scatter": scatter_words(rows),
-        "earth": earth_words(rows, site.system),
+        "lines": [line for line in format_estimates(rows) if line["status"] != "not_observable"],
+        "open": list_not_observable(rows),
+        "noise": describe_noise_model(rows),
+        "scatter": describe_scatter(rows),
+        "earth": describe_earth_rate(rows, site.system),
     }
 
 
-def of_all(site: Site) -> dict[str, list[dict[str, Any]]]:
+def group_by_run(site: Site) -> dict[str, list[dict[str, Any]]]:
     """Return the lines of all calibrated recordings, by kind of run."""
     by_run: dict[str, list[dict[str, Any]]] = {"rate_table": [], "at_rest": [], "positions": []}
-    for view in calibrated(site):
+    for view in select_calibrated(site):
         rows = view.rows(CalibrationRow)
         if not rows:
             continue
         if rows[0].run == "positions":
-            by_run["positions"].append({"view": view, "lines": list(attitude_lines(rows))})
+            by_run["positions"].append({"view": view, "lines": list(format_attitude(rows))})
             continue
         by_run[rows[0].run].append(
             {
                 "view": view,
-                "lines": {line["parameter"]: line for line in lines(rows)},
-                "answer": answer(rows, site.system),
-                "earth": earth_words(rows, site.system),
+                "lines": {line["parameter"]: line for line in format_estimates(rows)},
+                "answer": summarise_calibration(rows, site.system),
+                "earth": describe_earth_rate(rows, site.system),
             }
         )
     return by_run
 
 
-def attitude_lines(rows: Sequence[CalibrationRow]) -> Iterator[dict[str, Any]]:
+def format_attitude(rows: Sequence[CalibrationRow]) -> Iterator[dict[str, Any]]:
     """Yield roll, pitch and heading in degrees, of rows of ``calibration`` of one recording."""
     for row in rows:
         value, lower, upper, truth = (
@@ -273,7 +274,7 @@ def attitude_lines(rows: Sequence[CalibrationRow]) -> Iterator[dict[str, Any]]:
         }
 
 
-def noise_words(rows: Sequence[Estimated]) -> str:
+def describe_noise_model(rows: Sequence[Estimated]) -> str:
     """Return the noise model that weights the data, in a sentence."""
     fitted = next((row for row in rows if row.model), None)
     if fitted is None:
@@ -292,14 +293,14 @@ def _rate_table(site: Site, view: RecordingView, folder: Path) -> dict[str, Any]
         rates = counted(len(points), "constant rate")
         summary = [f"{rates} up to {number_text(most)} °/s"]
     return {
-        **about_of(site, view, [], folder),
-        "summary": summary_words(view, summary),
-        "answer": answer(rows, site.system),
-        "lines": list(lines(rows)),
-        "open": not_observable(rows),
-        "noise": noise_words(rows),
-        "scatter": scatter_words(rows),
-        "earth": earth_words(rows, site.system),
+        **describe_recording(site, view, [], folder),
+        "summary": summarise_recording(view, summary),
+        "answer": summarise_calibration(rows, site.system),
+        "lines": list(format_estimates(rows)),
+        "open": list_not_observable(rows),
+        "noise": describe_noise_model(rows),
+        "scatter": describe_scatter(rows),
+        "earth": describe_earth_rate(rows, site.system),
         "points": points,
         "findings": view.findings,
         "command": site.again(view, "calibration"),
@@ -329,10 +330,10 @@ def _positions(site: Site, view: RecordingView, folder: Path) -> dict[str, Any]:
     rows = view.rows(CalibrationRow)
     number = rows[0].rates if rows else None
     return {
-        **about_of(site, view, [], folder),
-        "summary": summary_words(view, [] if number is None else [f"{number} positions"]),
-        "lines": list(attitude_lines(rows)),
-        "noise": noise_words(rows),
+        **describe_recording(site, view, [], folder),
+        "summary": summarise_recording(view, [] if number is None else [f"{number} positions"]),
+        "lines": list(format_attitude(rows)),
+        "noise": describe_noise_model(rows),
         "findings": view.findings,
         "command": site.again(view, "calibration"),
         "page": {"looks": {}, "channels": [], "findings": []},

@@ -43,9 +43,9 @@ from imubench_pipeline.extensions.calibration.least_squares import (
     Limits,
     NotObservable,
     NotObservableError,
-    block_length,
-    half_width,
-    limits,
+    choose_block_length,
+    compute_half_width,
+    compute_limits,
 )
 from imubench_pipeline.extensions.calibration.pointing import Pointing
 from imubench_pipeline.extensions.calibration.schedule import Schedule
@@ -73,7 +73,7 @@ class Term:
 
     def interval(self) -> Limits:
         """Return confidence limits, shapes (runs,)."""
-        return limits(self.value, self.sigma)
+        return compute_limits(self.value, self.sigma)
 
 
 @dataclass(frozen=True)
@@ -97,7 +97,7 @@ class Linearity:
         The limits hold for all rates together (Bonferroni), since noise alone makes the largest of
         many deviations large.
         """
-        half = half_width(1.0 - (1.0 - CONFIDENCE_LEVEL) / self.sigma.size) * self.sigma
+        half = compute_half_width(1.0 - (1.0 - CONFIDENCE_LEVEL) / self.sigma.size) * self.sigma
         size = np.abs(self.deviation)
         return np.maximum(size - half, 0.0).max(axis=1), (size + half).max(axis=1)
 
@@ -133,11 +133,11 @@ class Calibration:
 
     def bias_interval(self) -> Limits:
         """Return confidence limits of the bias, rad/s, shapes (runs,)."""
-        return limits(self.bias, self.bias_sigma)
+        return compute_limits(self.bias, self.bias_sigma)
 
     def scale_factor_interval(self) -> Limits:
         """Return confidence limits of the scale factor, shapes (runs,)."""
-        return limits(self.scale_factor, self.scale_factor_sigma)
+        return compute_limits(self.scale_factor, self.scale_factor_sigma)
 
 
 class RateTable:
@@ -258,7 +258,7 @@ class RateTable:
             return None
         fit = self._asymmetry.fit(means)
         scale = fit.value[:, 1]
-        if np.any(np.abs(scale) <= half_width() * fit.sigma[1]):
+        if np.any(np.abs(scale) <= compute_half_width() * fit.sigma[1]):
             return None
         # The error of the scale factor is of second order.
         sigma = float(self._asymmetry.sigma[-1] / np.abs(scale).mean())
@@ -282,7 +282,7 @@ def calibrate(
     run = schedule.experiment
     whole = max(stretch.stop - stretch.start for stretch in schedule.stretches)
     _ = RateTable(schedule, run.blocks(whole), model, pointing)
-    longest = block_length(
+    longest = choose_block_length(
         run,
         model,
         lambda blocks: np.column_stack([np.ones(len(blocks)), schedule.of_blocks(blocks)]),

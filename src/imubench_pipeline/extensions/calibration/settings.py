@@ -22,7 +22,7 @@ from imubench_pipeline.settings.validation import (
     Text,
     TimeFromZero,
 )
-from imubench_pipeline.units import quantity_to_si
+from imubench_pipeline.units import parse_quantity
 
 # Largest uncertainty of the Earth's rate about an axis without a heading, rad/s
 _MAX_UNKNOWN_EARTH_RATE = 1e-9
@@ -64,10 +64,10 @@ class Direction(Strict):
     def pointing(self) -> Pointing:
         """The same in rad."""
         angles = {
-            name: quantity_to_si(getattr(self, name), "angle")
+            name: parse_quantity(getattr(self, name), "angle")
             for name in ("latitude", "elevation", "heading_sigma", "elevation_sigma")
         }
-        heading = None if self.heading is None else quantity_to_si(self.heading, "angle")
+        heading = None if self.heading is None else parse_quantity(self.heading, "angle")
         return Pointing(heading=heading, **angles)
 
 
@@ -101,7 +101,7 @@ class Step(Strict):
     @property
     def seconds(self) -> tuple[float, float]:
         """Start and end, s."""
-        return quantity_to_si(self.start, "time"), quantity_to_si(self.end, "time")
+        return parse_quantity(self.start, "time"), parse_quantity(self.end, "time")
 
 
 class OnRateTable(Experiment):
@@ -136,7 +136,7 @@ class OnRateTable(Experiment):
 
     @model_validator(mode="after")
     def _check_steps(self) -> Self:
-        settling = quantity_to_si(self.settling, "time")
+        settling = parse_quantity(self.settling, "time")
         for number, step in enumerate(self.steps, 1):
             if step.seconds[1] - step.seconds[0] <= settling:
                 raise ValueError(
@@ -149,7 +149,7 @@ class OnRateTable(Experiment):
                     f"steps: step {number} starts at {after.start}, before step {number - 1} ends "
                     f"at {before.end}; expected steps in their order"
                 )
-        if not self.steps and quantity_to_si(self.shortest, "time") <= settling:
+        if not self.steps and parse_quantity(self.shortest, "time") <= settling:
             raise ValueError(
                 f"shortest is {self.shortest}; expected more than the settling of {self.settling}"
             )
@@ -169,7 +169,7 @@ class OnRateTable(Experiment):
 
     def si(self, name: str, dimension: str) -> float:
         """Return one of its figures in SI."""
-        return quantity_to_si(getattr(self, name), dimension)
+        return parse_quantity(getattr(self, name), dimension)
 
     def moved_gyro(self, channels: Sequence[str], *, column: bool) -> str:
         """Return the one of the log's channels that is along the axis of the table.
@@ -220,19 +220,19 @@ class InPositions(Experiment):
 
     def seconds(self, name: str) -> float:
         """Return one of its times in s."""
-        return quantity_to_si(getattr(self, name), "time")
+        return parse_quantity(getattr(self, name), "time")
 
     @property
     def latitude_si(self) -> float:
         """The latitude, rad."""
-        return quantity_to_si(self.latitude, "angle")
+        return parse_quantity(self.latitude, "angle")
 
     def angle(self, number: int) -> float:
         """Return the angle of a position, counted from 0, from the first one, rad.
 
         It grows where the next one is less far round, so that all turns go the same way.
         """
-        angles = [quantity_to_si(text, "angle") for text in self.turned]
+        angles = [parse_quantity(text, "angle") for text in self.turned]
         return angles[number % len(angles)] + 2.0 * math.pi * (number // len(angles))
 
     def moved_gyro(self, channels: Sequence[str], *, column: bool = False) -> None:
@@ -274,7 +274,7 @@ class SimulatedPositions(InPositions):
     def true_angles(self) -> dict[str, float]:
         """Roll, pitch and heading, rad, the heading from -pi to pi."""
         roll, pitch, heading = (
-            quantity_to_si(angle, "angle") for angle in (self.roll, self.pitch, self.heading)
+            parse_quantity(angle, "angle") for angle in (self.roll, self.pitch, self.heading)
         )
         heading = math.remainder(heading, 2.0 * math.pi)
         return {"roll": roll, "pitch": pitch, "heading": heading}
@@ -301,5 +301,5 @@ class SimulatedRest(AtRest):
         """Where the axis points, exactly."""
         stated, heading = self.pointing, self.pointing.heading
         if heading is None:
-            heading = quantity_to_si(self.true_heading, "angle")
+            heading = parse_quantity(self.true_heading, "angle")
         return Pointing(latitude=stated.latitude, heading=heading, elevation=stated.elevation)

@@ -17,29 +17,29 @@ from imubench_pipeline.extensions.calibration.settings import (
 from imubench_pipeline.settings.simulated_recordings import SimulatedRecording
 from imubench_pipeline.simulate.profiles import Constant, SampledProfile
 from imubench_pipeline.typing import Array
-from imubench_pipeline.units import quantity_to_si
+from imubench_pipeline.units import parse_quantity
 
 
-def at_rest(recording: SimulatedRecording, rate: float) -> dict[str, Constant]:
+def simulate_rest(recording: SimulatedRecording, rate: float) -> dict[str, Constant]:
     """Return the part of the Earth's rate that a gyro at rest senses."""
     rest = recording.block(SimulatedRest)
     assert rest is not None
     return {str(recording.moved_gyro): Constant(rest.true.rate)}
 
 
-def on_table(recording: SimulatedRecording, rate: float) -> dict[str, SampledProfile]:
+def simulate_rate_table(recording: SimulatedRecording, rate: float) -> dict[str, SampledProfile]:
     """Return the readings of a gyro on a table that ramps linearly from rate to rate."""
     table = recording.block(SimulatedTable)
     assert table is not None
     times = [time for step in table.steps for time in step.seconds]
-    rates = np.repeat([quantity_to_si(step.rate, "angular_rate") for step in table.steps], 2)
+    rates = np.repeat([parse_quantity(step.rate, "angular_rate") for step in table.steps], 2)
     true = np.interp(np.arange(recording.samples) / rate, times, rates)
     earth = 0.0 if table.axis is None else table.axis.pointing.rate
     indicated = SampledProfile(table.scale_factor * (true + earth), rate)
     return {str(recording.moved_gyro): indicated}
 
 
-def in_positions(recording: SimulatedRecording, rate: float) -> dict[str, SampledProfile]:
+def simulate_positions(recording: SimulatedRecording, rate: float) -> dict[str, SampledProfile]:
     """Return the readings of a triad that turns at a steady rate between its positions."""
     positions, samples = recording.block(SimulatedPositions), recording.samples
     assert positions is not None
@@ -53,11 +53,11 @@ def in_positions(recording: SimulatedRecording, rate: float) -> dict[str, Sample
     angle = np.interp(at, times, angles)
     turned = np.diff(np.interp(at[0] + (np.arange(samples + 1) - 0.5) / rate, times, angles)) * rate
     attitude = matrix(**positions.true_angles)
-    true = sensed(Site(latitude=positions.latitude_si), attitude, angle, turned)
+    true = compute_readings(Site(latitude=positions.latitude_si), attitude, angle, turned)
     return {name: SampledProfile(true[:, k], rate) for k, name in enumerate(TRIAD)}
 
 
-def sensed(site: Site, attitude: Array, angle: Array, turning: Array) -> Array:
+def compute_readings(site: Site, attitude: Array, angle: Array, turning: Array) -> Array:
     """Return rate and specific force in the body frame, rad/s and m/s^2, shape (n, 6).
 
     Gyros and accelerometers x, y, z are without errors, and the turns are about the accelerometers.

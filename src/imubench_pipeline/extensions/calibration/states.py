@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from imubench_pipeline.extensions.calibration.experiment import Blocks, longest_tau
 from imubench_pipeline.noise import NoiseModel, Role
 from imubench_pipeline.noise.block_means import of_block_means
-from imubench_pipeline.noise.state_space import StateSpace, repeat_step, root_of
+from imubench_pipeline.noise.state_space import StateSpace, factor_covariance, repeat_step
 from imubench_pipeline.typing import Array
 
 # Standard deviation of an uninformative prior, rad/s: 14,000 times the Earth's rate
@@ -47,7 +47,7 @@ class BlockStates:
     white: Array  # shape (b,); standard deviation of the white noise of each mean, rad/s
 
 
-def block_states(
+def discretise_blocks(
     model: NoiseModel, blocks: Blocks, turn_on_bias: float = UNINFORMATIVE_SIGMA
 ) -> BlockStates:
     """Return the states of a noise model over blocks.
@@ -86,7 +86,7 @@ def block_states(
     steps = tuple(_build_step(whole, int(gap), int(size)) for gap, size in kinds.T)
     return BlockStates(
         tuple(names),
-        root_of(whole.initial_variance),
+        factor_covariance(whole.initial_variance),
         steps,
         which.ravel(),
         np.sqrt(white / blocks.count),

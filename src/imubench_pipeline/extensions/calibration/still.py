@@ -27,9 +27,9 @@ from imubench_pipeline.extensions.calibration.least_squares import (
     LeastSquares,
     Limits,
     NotObservable,
-    block_length,
-    half_width,
-    limits,
+    choose_block_length,
+    compute_half_width,
+    compute_limits,
 )
 from imubench_pipeline.extensions.calibration.pointing import Pointing
 from imubench_pipeline.noise import NoiseModel
@@ -83,8 +83,8 @@ class StillBias:
 
     def _interval(self, value: Array, noise: float) -> Limits:
         if self.bound is None:
-            return limits(value, math.hypot(noise, self.rate_sigma))
-        half = half_width() * math.hypot(noise, self.tilt_sigma) + self.bound
+            return compute_limits(value, math.hypot(noise, self.rate_sigma))
+        half = compute_half_width() * math.hypot(noise, self.tilt_sigma) + self.bound
         return value - half, value + half
 
 
@@ -167,6 +167,6 @@ def bias_at_rest(
     """
     run = Experiment((Dwell(0, len(log), 1),), rate, 0.0)
     if longest is None:
-        longest = block_length(run, model, lambda blocks: np.ones((len(blocks), 1)))
+        longest = choose_block_length(run, model, lambda blocks: np.ones((len(blocks), 1)))
     measured = block_means([log], run, longest)
     return StillRun(measured.blocks, model, pointing).fit(measured.means)

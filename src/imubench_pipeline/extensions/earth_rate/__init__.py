@@ -17,7 +17,7 @@ EXTENSION = Extension(
         ),
         Block("simulated", "two_position", "earth_rate.settings:SimulatedTurns"),
     ),
-    motions={"two_position": "earth_rate.simulation:turned"},
+    motions={"two_position": "earth_rate.simulation:simulate_turned_gyro"},
     rules="rules.smk",
     pages=("earth_rate.page:EARTH_RATE_PAGE",),
     recording_pages={"two_position": "earth_rate.page:TURNED_PAGE"},

@@ -29,7 +29,7 @@ from imubench_pipeline.extensions.calibration.experiment import (
     Experiment,
     block_mean_covariance,
 )
-from imubench_pipeline.extensions.calibration.states import block_states
+from imubench_pipeline.extensions.calibration.states import discretise_blocks
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.typing import Array
 
@@ -45,7 +45,7 @@ def whiten(model: NoiseModel, blocks: Blocks, columns: Array) -> Array:
     The model must have some noise in every sample. Raises ValueError if a mean has no noise, given
     those before it.
     """
-    states = block_states(model, blocks, turn_on_bias=0.0)
+    states = discretise_blocks(model, blocks, turn_on_bias=0.0)
     innovations = _compute_innovations(
         np.stack([step.transition for step in states.steps]),
         np.stack([step.factor @ step.factor.T for step in states.steps]),
@@ -109,7 +109,9 @@ def _compute_innovations(
     return innovations
 
 
-def cramer_rao(blocks: Blocks, model: NoiseModel, turn_on_bias: float = math.inf) -> Array:
+def compute_cramer_rao_bounds(
+    blocks: Blocks, model: NoiseModel, turn_on_bias: float = math.inf
+) -> Array:
     """Return the least standard deviation of the rate that the data up to each block allow.
 
     In rad/s, shape (b,); infinite where the rate and the bias are not separable. The standard
@@ -117,13 +119,13 @@ def cramer_rao(blocks: Blocks, model: NoiseModel, turn_on_bias: float = math.inf
     sample: N, or a process with such noise. Raises ValueError if the turn-on bias is negative, or
     NaN.
     """
-    return sigma_of(information(blocks, model, turn_on_bias))
+    return convert_to_sigma(compute_information(blocks, model, turn_on_bias))
 
 
-def information(blocks: Blocks, model: NoiseModel, turn_on_bias: float = math.inf) -> Array:
+def compute_information(blocks: Blocks, model: NoiseModel, turn_on_bias: float = math.inf) -> Array:
     """Return the Fisher information of the rate in the data up to each block, (rad/s)^-2, (b,).
 
-    The parameters and errors are as in `cramer_rao`.
+    The parameters and errors are as in `compute_cramer_rao_bounds`.
     """
     # The root of the leading blocks is the leading part of the root.
     root = cholesky(block_mean_covariance(model, blocks), lower=True, overwrite_a=True)
@@ -131,8 +133,8 @@ def information(blocks: Blocks, model: NoiseModel, turn_on_bias: float = math.in
     return _eliminate_bias(solve_triangular(root, design, lower=True), turn_on_bias)
 
 
-def information_by_states(blocks: Blocks, model: NoiseModel, turn_on_bias: float) -> Array:
-    """Return the same as `information`, faster for many blocks."""
+def compute_information_by_states(blocks: Blocks, model: NoiseModel, turn_on_bias: float) -> Array:
+    """Return the same as `compute_information`, faster for many blocks."""
     design = np.column_stack([blocks.seen, np.ones(len(blocks))])
     return _eliminate_bias(whiten(model, blocks, design), turn_on_bias)
 
@@ -149,12 +151,12 @@ def _eliminate_bias(white: Array, turn_on_bias: float) -> Array:
     return np.asarray(np.where(left > 1e-9 * rate, left, 0.0))
 
 
-def bound(blocks: Blocks, model: NoiseModel, turn_on_bias: float = math.inf) -> float:
-    """Return `cramer_rao` at the end of a run, rad/s, faster for many blocks."""
-    return float(sigma_of(information_by_states(blocks, model, turn_on_bias))[-1])
+def compute_final_bound(blocks: Blocks, model: NoiseModel, turn_on_bias: float = math.inf) -> float:
+    """Return `compute_cramer_rao_bounds` at the end of a run, rad/s, faster for many blocks."""
+    return float(convert_to_sigma(compute_information_by_states(blocks, model, turn_on_bias))[-1])
 
 
-def block_length(experiment: Experiment, model: NoiseModel) -> int:
+def choose_block_length(experiment: Experiment, model: NoiseModel) -> int:
     """Return the longest block, in samples, whose means keep the information of the samples.
 
     Blocks are shortened, by halves, until a fourth of their length would lower the bound by less
@@ -168,7 +170,7 @@ def block_length(experiment: Experiment, model: NoiseModel) -> int:
 
     @cache
     def sigma(longest: int) -> float:
-        return bound(tried.blocks(longest), model)
+        return compute_final_bound(tried.blocks(longest), model)
 
     while length > 4 and len(tried.blocks(length // 4)) <= MAX_BLOCKS:
         if sigma(length // 4) > (1.0 - _MAX_SIGMA_INCREASE) * sigma(length):
@@ -177,7 +179,7 @@ def block_length(experiment: Experiment, model: NoiseModel) -> int:
     return length
 
 
-def sigma_of(fisher: Array) -> Array:
+def convert_to_sigma(fisher: Array) -> Array:
     """Return the standard deviations, rad/s, of information, 1/(rad/s)², both of shape (n,).
 
     They are infinite where there is no information.

@@ -1,6 +1,6 @@
 """Find turns by the events of a log, and by the schedule where there are none.
 
-The events that are turns are chosen by dynamic programming with the schedule (`choose`).
+The events that are turns are chosen by dynamic programming with the schedule (`choose_turns`).
 """
 
 from __future__ import annotations
@@ -19,8 +19,8 @@ from imubench_pipeline.extensions.earth_rate.transients import (
 )
 from imubench_pipeline.extensions.earth_rate.turns import (
     Turn,
-    alternation,
-    best_shift,
+    estimate_alternation,
+    find_best_shift,
     split_at_turns,
 )
 from imubench_pipeline.typing import Array
@@ -89,9 +89,9 @@ def find_turns(
     are the start and stop of further times to leave out, s. Raises ValueError if there is no
     evidence of turns, and the schedule is not trusted.
     """
-    chosen = choose(events, schedule.dwell, schedule.tolerance, schedule.duration)
+    chosen = choose_turns(events, schedule.dwell, schedule.tolerance, schedule.duration)
     declared = schedule.dwell
-    pace = shorter_dwell(events, chosen, declared)
+    pace = find_shorter_dwell(events, chosen, declared)
     if pace is not None:
         schedule = replace(
             schedule,
@@ -99,7 +99,7 @@ def find_turns(
             tolerance=schedule.tolerance * pace / declared,
             turning=min(schedule.turning, 0.4 * pace),
         )
-        chosen = choose(events, schedule.dwell, schedule.tolerance, schedule.duration)
+        chosen = choose_turns(events, schedule.dwell, schedule.tolerance, schedule.duration)
     expected = max(1.0, round((schedule.duration - schedule.start) / schedule.dwell) - 1.0)
     doubts: list[str] = []
     if len(chosen) >= _MIN_SEEN_SHARE * expected:
@@ -122,7 +122,7 @@ def find_turns(
     usual = float(np.median(np.diff([turn.time for turn in seen]))) if len(seen) > 1 else declared
     if abs(usual / declared - 1.0) > 0.25:
         doubts.append(f"the usual dwell is {usual:.1f} s, not {declared:g} s")
-    return seen, disturbances(quick), doubts
+    return seen, list_disturbances(quick), doubts
 
 
 def _merge_into_turns(
@@ -167,7 +167,7 @@ def _fill_gaps(
     chosen: list[Event], turns: list[Turn], schedule: TurnSchedule, blocks: LevelBlocks
 ) -> list[Turn]:
     """Insert scheduled turns where turns may be missed: too weak, or without samples."""
-    silent = may_be_silent(chosen)
+    silent = is_detection_uncertain(chosen)
     time = np.array([turn.time for turn in turns])
     gaps = np.diff(time)
     single = gaps[(gaps > 0.5 * schedule.dwell) & (gaps < 1.5 * schedule.dwell)]
@@ -219,9 +219,9 @@ def _follow_schedule(
     slots = slots[(slots > half) & (slots < longest)]
     if len(slots) == 0:
         raise ValueError("the schedule has no turn within the log")
-    calm = leave_out_knocks(blocks, disturbances([e for e in events if e.kind == "transient"]))
+    calm = leave_out_knocks(blocks, list_disturbances([e for e in events if e.kind == "transient"]))
     longest_shift = min(schedule.dwell / 3.0, 3.0 * schedule.tolerance)
-    shift, z, unshifted = best_shift(
+    shift, z, unshifted = find_best_shift(
         calm, slots, 0.5 * schedule.turning, longest_shift, schedule.duration
     )
     doubts: list[str] = []
@@ -232,7 +232,7 @@ def _follow_schedule(
         doubts.append(f"the level alternates {shift:+.1f} s from the schedule: that is used")
     else:
         # At the used shift, not the best one: a search exceeds 3 in one of 50 logs at rest.
-        size = abs(alternation(calm, split_at_turns(slots, half, schedule.duration)).z)
+        size = abs(estimate_alternation(calm, split_at_turns(slots, half, schedule.duration)).z)
         if not (size >= _MIN_ALTERNATION_SIGMAS or trust):
             raise ValueError(
                 f"nothing shows that the log was turned every {schedule.dwell:g} s: no transients, "
@@ -263,7 +263,7 @@ def _follow_schedule(
     return turns, [e for k, e in enumerate(events) if k not in used], doubts
 
 
-def disturbances(events: Sequence[Event]) -> list[tuple[float, float]]:
+def list_disturbances(events: Sequence[Event]) -> list[tuple[float, float]]:
     """Return start and stop, s, of transients to leave out: neither turns nor noise."""
     return [
         (event.start - _KNOCK_MARGIN, event.stop + _KNOCK_MARGIN)
@@ -286,7 +286,9 @@ def compute_min_calm(dwell: float) -> float:
     return min(max(_MIN_CALM, _MIN_CALM_PER_DWELL * dwell), _MAX_REQUIRED_CALM, 0.5 * dwell)
 
 
-def choose(events: Sequence[Event], dwell: float, tolerance: float, duration: float) -> list[int]:
+def choose_turns(
+    events: Sequence[Event], dwell: float, tolerance: float, duration: float
+) -> list[int]:
     """Choose the turns among events in order of time; return their indices, in order.
 
     An event is a turn, a disturbance, or noise. The density of an interval between turns is a
@@ -311,7 +313,7 @@ def choose(events: Sequence[Event], dwell: float, tolerance: float, duration: fl
         if len(chosen) < 3:
             break
         dwell, tolerance = _estimate_dwell(time[chosen, 1], *planned)
-        usual, scatter = strength([events[k] for k in chosen])
+        usual, scatter = estimate_strength([events[k] for k in chosen])
         weak = np.minimum(np.array([event.strength for event in events]) - usual, 0.0) / scatter
         clear = np.array([event.likelihood > CLEAR_LOG_LIKELIHOOD for event in events])
         cost = np.minimum(0.5 * weak**2, np.where(clear, _MAX_WEAKNESS_COST, np.inf))
@@ -319,7 +321,9 @@ def choose(events: Sequence[Event], dwell: float, tolerance: float, duration: fl
     return chosen
 
 
-def shorter_dwell(events: Sequence[Event], chosen: Sequence[int], dwell: float) -> float | None:
+def find_shorter_dwell(
+    events: Sequence[Event], chosen: Sequence[int], dwell: float
+) -> float | None:
     """Return the dwell of the clear transients, s, if it is far shorter than nominal.
 
     If turns come at twice the declared pace, each second turn is taken for a knock, halfway
@@ -330,7 +334,7 @@ def shorter_dwell(events: Sequence[Event], chosen: Sequence[int], dwell: float) 
     turns = [events[k] for k in chosen]
     if len(turns) < 2:
         return None
-    usual, scatter = strength(turns)
+    usual, scatter = estimate_strength(turns)
     alike = [
         event
         for event in events
@@ -368,7 +372,7 @@ def _find_best_sequence(
     for k in range(len(time)):
         total[k] = _compute_edge_log_density(float(time[k, 1]), dwell)
         if k:
-            density = interval_density(time[k, 1] - time[:k, 1], dwell, tolerance)
+            density = compute_interval_log_density(time[k, 1] - time[:k, 1], dwell, tolerance)
             calm = time[k, 0] - time[:k, 2]
             reached = total[:k] + np.where(calm < compute_min_calm(dwell), -np.inf, density)
             best = int(np.argmax(reached))
@@ -385,7 +389,7 @@ def _find_best_sequence(
     return chosen[::-1]
 
 
-def interval_density(interval: Array, dwell: float, tolerance: float) -> Array:
+def compute_interval_log_density(interval: Array, dwell: float, tolerance: float) -> Array:
     """Return the logarithm of the density, 1/s, of the interval between two turns, shape (n,).
 
     The intervals, the nominal dwell, and the standard deviation for one dwell (for k dwells it is
@@ -417,7 +421,7 @@ def _compute_edge_log_density(interval: float, dwell: float) -> float:
     return -math.log(dwell) + more * math.log(_DOUBLE_DWELL_SHARE)
 
 
-def strength(turns: Sequence[Event]) -> tuple[float, float]:
+def estimate_strength(turns: Sequence[Event]) -> tuple[float, float]:
     """Return the median strength of turns, and its standard deviation.
 
     The standard deviation follows from the median absolute deviation.
@@ -429,13 +433,13 @@ def strength(turns: Sequence[Event]) -> tuple[float, float]:
     return usual, max(least, float(np.median(np.abs(values - usual))) / 0.6745)
 
 
-def may_be_silent(turns: Sequence[Event]) -> bool:
+def is_detection_uncertain(turns: Sequence[Event]) -> bool:
     """Return whether a turn like these may be too weak to detect.
 
     It follows from the median and scatter of their strengths, or from the share of turns that are
     hardly above the detection limit.
     """
-    usual, scatter = strength(turns)
+    usual, scatter = estimate_strength(turns)
     weak = np.mean(
         [event.kind == "transient" and event.strength < _WEAK_STRENGTH for event in turns]
     )

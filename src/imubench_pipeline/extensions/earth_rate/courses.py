@@ -1,8 +1,8 @@
 """Estimates of an Earth-rate experiment by every method, over time.
 
 The noise model is an estimate with limits, so that the standard deviations have a range, too
-(`sigma_ranges`): 95 % of the values for models drawn from these limits. The effect of weights from
-a wrong model is of second order and neglected.
+(`compute_sigma_ranges`): 95 % of the values for models drawn from these limits. The effect of
+weights from a wrong model is of second order and neglected.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from imubench_pipeline.extensions.calibration.experiment import (
 )
 from imubench_pipeline.extensions.calibration.kalman import RateFilter
 from imubench_pipeline.extensions.calibration.states import UNINFORMATIVE_SIGMA
-from imubench_pipeline.extensions.earth_rate.bound import block_length, bound
+from imubench_pipeline.extensions.earth_rate.bound import choose_block_length, compute_final_bound
 from imubench_pipeline.extensions.earth_rate.known_rate import STARTS, settled, track
 from imubench_pipeline.extensions.earth_rate.pairs import by_pairs, by_triples
 from imubench_pipeline.noise import NoiseModel
@@ -70,7 +70,7 @@ class Courses:
     drift_sigma: Array
 
 
-def white_sigma(model: NoiseModel, blocks: Blocks) -> float:
+def compute_white_sigma(model: NoiseModel, blocks: Blocks) -> float:
     """Return the lower limit of sigma, N / sqrt(T) / cos(latitude), rad/s, for T s of data.
 
     T is the total time of the samples in the blocks.
@@ -95,7 +95,7 @@ def estimate_courses(
     """
     if len({dwell.sense for dwell in experiment.dwells}) < 2:
         raise ValueError("all dwells are of one position: the rate cannot be told from the bias")
-    longest = block_length(experiment, model)
+    longest = choose_block_length(experiment, model)
     measured = block_means([log], experiment, longest)
     blocks, means = measured.blocks, measured.means
     first = blocks.start[0] / blocks.rate
@@ -152,7 +152,7 @@ def thin(points: int) -> Iterator[int]:
     yield from np.unique(np.rint(np.concatenate([even, early])).astype(np.int64)).tolist()
 
 
-def sigma_ranges(
+def compute_sigma_ranges(
     blocks: Blocks, model: NoiseModel, drawn: Sequence[NoiseModel], turn_on_bias: float | None
 ) -> dict[str, Range]:
     """Return the limits of the standard deviation of each method at the end of a run.
@@ -168,7 +168,7 @@ def sigma_ranges(
     methods: dict[str, Callable[[NoiseModel], float]] = {
         "pairs": lambda one: float(by_pairs(zeros, blocks, one).sigma[-1]),
         "triples": lambda one: float(by_triples(zeros, blocks, one).sigma[-1]),
-        "filter": lambda one: bound(blocks, one, bias),
+        "filter": lambda one: compute_final_bound(blocks, one, bias),
     }
     ranges: dict[str, Range] = {}
     for method, sigma in methods.items():

@@ -19,13 +19,13 @@ from imubench_pipeline.extensions.earth_rate.courses import (
     Course,
     Courses,
     Range,
+    compute_sigma_ranges,
+    compute_white_sigma,
     estimate_courses,
-    sigma_ranges,
     thin,
-    white_sigma,
 )
 from imubench_pipeline.extensions.earth_rate.prediction import Outlook, prediction_rows
-from imubench_pipeline.extensions.earth_rate.published import RunDesign, published_row
+from imubench_pipeline.extensions.earth_rate.published import RunDesign, make_published_row
 from imubench_pipeline.extensions.earth_rate.settings import (
     EarthRateSettings,
     SimulatedTurns,
@@ -43,20 +43,20 @@ from imubench_pipeline.extensions.earth_rate.turning import find_turning
 from imubench_pipeline.extensions.earth_rate.turns import FoundDwell, Turning
 from imubench_pipeline.model.table import TableRow
 from imubench_pipeline.noise import NoiseModel
-from imubench_pipeline.recordings.kept import kept_logs
-from imubench_pipeline.recordings.recording import ChannelLog, on_grid, read_metadata
+from imubench_pipeline.recordings.kept import load_logs
+from imubench_pipeline.recordings.recording import ChannelLog, place_on_grid, read_metadata
 from imubench_pipeline.settings.sensor import Sensor
 from imubench_pipeline.settings.simulated_recordings import SimulatedRecording
-from imubench_pipeline.simulate.models import axis_model
+from imubench_pipeline.simulate.models import make_axis_model
 from imubench_pipeline.steps.noise_source import (
     NO_MODEL,
     NoiseSource,
-    noise_source,
-    segments_reason,
+    explain_segments,
+    find_noise_source,
 )
 from imubench_pipeline.tables.keys import Key
 from imubench_pipeline.typing import Array
-from imubench_pipeline.units import quantity_to_si
+from imubench_pipeline.units import parse_quantity
 
 WHOLE = "whole"  # name of the part that is a whole recording
 
@@ -75,7 +75,7 @@ _POSITION_CLOCK_REASON = (
 )
 
 
-def earth_rate_tables(
+def make_earth_rate_tables(
     folder: Path, static: Sequence[Path], sensor: str, recording: str, settings: str
 ) -> dict[str, list[TableRow]]:
     """Return the rows of the tables of a gyro that was turned; none of a rejected recording.
@@ -85,7 +85,7 @@ def earth_rate_tables(
     """
     rows: dict[str, list[TableRow]] = {name: [] for name in TURNED}
     sections = json.loads(settings)
-    logs = kept_logs(folder)
+    logs = load_logs(folder)
     if not logs:
         return rows
     simulated = turns = None
@@ -101,7 +101,9 @@ def earth_rate_tables(
         rows["earth_rate"] = list(_without(_names(key, declared), WHOLE, "not_shown", reason))
         return rows
     how = EarthRateSettings.model_validate(sections["earth_rate"])
-    source = noise_source(folder, static, key, Sensor.model_validate(sections["sensor"]), how.draws)
+    source = find_noise_source(
+        folder, static, key, Sensor.model_validate(sections["sensor"]), how.draws
+    )
     begins = metadata.get("begins", 0.0)
     found = _earth_rate(key, logs[channel], declared, source, how, begins)
     rows |= vars(found)
@@ -118,21 +120,21 @@ def _published(
     estimates: Sequence[EarthRateRow],
 ) -> Iterator[EarthRatePublishedRow]:
     """Yield the printed estimates of a simulated recording, with the estimates from its log."""
-    rate = quantity_to_si(simulated.rate, "frequency")
+    rate = parse_quantity(simulated.rate, "frequency")
     schedule = RunDesign(turns.seconds("dwell"), turns.seconds("turning"), rate, turns.latitude_si)
     axes = {str(name): axis for name, axis in simulated.channels.items()}
-    noise = axis_model(axes[key.channel], key.channel).noise
+    noise = make_axis_model(axes[key.channel], key.channel).noise
     values = {(row.part, row.method): row.value for row in estimates}
     for figure in turns.published:
         part = figure.part
         text = simulated.duration if part == WHOLE else part.removeprefix("last ")
-        value = quantity_to_si(figure.printed, "angular_rate")
+        value = parse_quantity(figure.printed, "angular_rate")
         yield EarthRatePublishedRow(
             **asdict(key),
             part=part,
             place=figure.where,
             printed=figure.printed,
-            **published_row(value, schedule, quantity_to_si(text, "time"), noise),
+            **make_published_row(value, schedule, parse_quantity(text, "time"), noise),
             simulated=values.get((part, "pairs")),
             simulated_filter=values.get((part, "filter")),
             assumed=", ".join(turns.assumed) or None,
@@ -174,12 +176,12 @@ def _earth_rate(
     tables = EarthRate()
     names = _names(key, declared, source)
     if len(log.segments) > 1 or log.position_elsewhere:
-        reason = segments_reason(log) if len(log.segments) > 1 else _POSITION_CLOCK_REASON
+        reason = explain_segments(log) if len(log.segments) > 1 else _POSITION_CLOCK_REASON
         tables.earth_rate += _without(names, WHOLE, "not_shown", reason)
         return tables
     if source is not None:
         tables.earth_rate_prediction += _predict(key, log.rate, declared, source, settings)
-    samples = on_grid(log.blocks(), log.grid)
+    samples = place_on_grid(log.blocks(), log.grid)
     try:
         turning = find_turning(
             samples,
@@ -188,9 +190,9 @@ def _earth_rate(
             turning=declared.seconds("turning"),
             start=declared.seconds("start"),
             first_sense=declared.first_sense,
-            position=on_grid(log.positions(), log.grid) if log.position else None,
+            position=place_on_grid(log.positions(), log.grid) if log.position else None,
             model=source.model if source else None,
-            margin=quantity_to_si(settings.margin, "time"),
+            margin=parse_quantity(settings.margin, "time"),
             trust_schedule=declared.trust_schedule,
         )
     except ValueError as error:
@@ -213,7 +215,7 @@ def _earth_rate(
     model, *drawn = (_add_drift(each, declared.drift_si) for each in (source.model, *source.drawn))
     parts = {WHOLE: 0.0}  # start of each part in the log, s
     for text in declared.last:
-        parts[f"last {text}"] = max(len(samples) / log.rate - quantity_to_si(text, "time"), 0.0)
+        parts[f"last {text}"] = max(len(samples) / log.rate - parse_quantity(text, "time"), 0.0)
     for part, start in parts.items():
         chosen = tuple(dwell for _, dwell in dwells if dwell.start >= start * log.rate)
         if len(chosen) < 2:
@@ -228,7 +230,7 @@ def _earth_rate(
             tables.earth_rate += _without(names, part, "too_short", str(error))
             continue
         about = names | {"part": part, "dwells": len(chosen), "turns": len(chosen) - 1}
-        ranges = sigma_ranges(courses.measured.blocks, model, drawn, bias)
+        ranges = compute_sigma_ranges(courses.measured.blocks, model, drawn, bias)
         unsure = _unsure(turning, declared.trust_schedule)
         tables.earth_rate += _estimates(about, courses, source, unsure, ranges)
         tables.earth_rate_series += _series(key, part, courses, begins)
@@ -249,7 +251,7 @@ def _predict(
     outlook = Outlook(
         source.model, declared.latitude_si, turning, rate, math.inf if bias is None else bias
     )
-    run_time = max(quantity_to_si(settings.run_time, "time"), 3.0 * dwell + turning)
+    run_time = max(parse_quantity(settings.run_time, "time"), 3.0 * dwell + turning)
     for row in prediction_rows(outlook, dwell - turning, settings.goals, run_time):
         yield EarthRatePredictionRow(**asdict(key), **row)
 
@@ -335,7 +337,7 @@ def _estimates(
         "parameter": "earth_rate",
         "unit": "rad/s",
         "truth": EARTH_RATE,
-        "white": white_sigma(source.model, blocks),
+        "white": compute_white_sigma(source.model, blocks),
         "duration": blocks.duration,
         "samples": int(blocks.count.sum()),
         "missing": measured.missing + measured.left_out,

@@ -14,7 +14,7 @@ from functools import partial
 from itertools import product
 from pathlib import Path
 
-from imubench_pipeline.estimators.rows import recommended_estimates
+from imubench_pipeline.estimators.rows import read_recommended_estimates
 from imubench_pipeline.extensions.calibration.alignment.accuracy import accuracies
 from imubench_pipeline.extensions.calibration.alignment.fine import UNIFORM_HEADING_SIGMA
 from imubench_pipeline.extensions.calibration.alignment.triad import Site, Triad
@@ -26,8 +26,8 @@ from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.simulate import channel_rng
 from imubench_pipeline.settings.printed import Datasheet, QuantityDatasheet
 from imubench_pipeline.settings.sensor import QUANTITIES
-from imubench_pipeline.steps.noise_source import static_recordings
-from imubench_pipeline.units import quantity_to_si
+from imubench_pipeline.steps.noise_source import find_static_recordings
+from imubench_pipeline.units import parse_quantity
 
 TIMES = (10.0, 30.0, 60.0, 120.0, 300.0, 600.0, 1200.0, 1800.0, 3600.0)  # durations of rest, s
 DWELL = 28.0  # length of each dwell of the predicted turns, s; with the turn half a minute
@@ -61,29 +61,29 @@ class Noise:
         return models
 
 
-def noise_at_rest(folders: Sequence[Path]) -> Noise | None:
+def load_noise_at_rest(folders: Sequence[Path]) -> Noise | None:
     """Return the noise of a sensor from its static recordings; None if none has an estimate."""
-    for row, folder in static_recordings(folders, lambda row: (row.simulated,)):
-        best = recommended_estimates(folder / "parameters.parquet")
+    for row, folder in find_static_recordings(folders, lambda row: (row.simulated,)):
+        best = read_recommended_estimates(folder / "parameters.parquet")
         models = {name: estimate.model for name, estimate in best.items() if estimate.model.N}
         if row.rate is not None and any(name.startswith("gyro_") for name in models):
             return Noise(row.recording, row.rate, models)
     return None
 
 
-def outlook_tables(
+def make_outlook_tables(
     folders: Sequence[Path], sensor: str, settings: str
 ) -> dict[str, Sequence[TableRow]]:
     """Return the rows of ``alignment`` and ``earth_rate_prediction`` of a sensor at rest.
 
     `folders` are those of its static recordings; `settings`: of
-    `imubench_pipeline.extensions.earth_rate.plan.outlook_settings`. There are no rows without the
-    noise of a gyro, and none of ``alignment`` without an accelerometer.
+    `imubench_pipeline.extensions.earth_rate.plan.select_outlook_settings`. There are no rows
+    without the noise of a gyro, and none of ``alignment`` without an accelerometer.
     """
     rows: dict[str, Sequence[TableRow]] = {"alignment": [], "earth_rate_prediction": []}
     sections = json.loads(settings)
     how = EarthRateSettings.model_validate(sections["earth_rate"])
-    noise = noise_at_rest(folders)
+    noise = load_noise_at_rest(folders)
     if noise is None:
         return rows
     rows["earth_rate_prediction"] = list(_predict_earth_rate(sensor, noise, how))
@@ -103,9 +103,9 @@ def _predict_earth_rate(
     }
     # The gyro with the median Allan deviation over a dwell; there is at least one.
     gyro = sorted(variances, key=variances.__getitem__)[len(variances) // 2]
-    latitude = quantity_to_si(how.latitude, "angle")
+    latitude = parse_quantity(how.latitude, "angle")
     outlook = Outlook(noise.models[gyro], latitude, TURN_TIME, noise.rate)
-    run_time = max(quantity_to_si(how.run_time, "time"), 3.0 * DWELL)
+    run_time = max(parse_quantity(how.run_time, "time"), 3.0 * DWELL)
     row = partial(EarthRatePredictionRow, sensor=sensor, recording=noise.recording, channel=gyro)
     for predicted in prediction_rows(outlook, DWELL, how.goals, run_time):
         yield row(**predicted)
@@ -123,7 +123,7 @@ def _predict_alignment(
         gyro_bias=gyro_bias,
         accelerometer_bias=accelerometer_bias,
     )
-    site = Site(latitude=quantity_to_si(how.latitude, "angle"))
+    site = Site(latitude=parse_quantity(how.latitude, "angle"))
     rng = channel_rng(_CHECK_SEED, repr(triad), "alignment")
     for accuracy in accuracies(triad, site, noise.rate, TIMES, runs=_SIMULATED_TRIADS, rng=rng):
         roll, pitch, heading = (float(value) for value in accuracy.sigma)
@@ -164,7 +164,7 @@ def _find_bias(printed: Datasheet, quantity: str, how: EarthRateSettings) -> tup
             value = figure.on_axis("x")
             if figure.kind == kind and isinstance(value, float):
                 source = f"{name.replace('_', ' ')} {value:g} {figure.unit} ({kind}), datasheet"
-                return quantity_to_si(f"{value!r} {figure.unit}", dimension), source
+                return parse_quantity(f"{value!r} {figure.unit}", dimension), source
     key = {"gyro": "gyro_bias", "accel": "accelerometer_bias"}[quantity]
     assumed = getattr(how, key)
-    return quantity_to_si(assumed, dimension), f"{assumed} (earth_rate.{key}), assumed"
+    return parse_quantity(assumed, dimension), f"{assumed} (earth_rate.{key}), assumed"

@@ -11,10 +11,10 @@ import numpy as np
 
 from imubench_pipeline.earth import EARTH_RATE
 from imubench_pipeline.extensions.calibration.pages import (
-    calibrated,
-    noise_words,
-    of_all,
-    without_result,
+    describe_noise_model,
+    group_by_run,
+    list_without_result,
+    select_calibrated,
 )
 from imubench_pipeline.extensions.earth_rate.tables import (
     AlignmentRow,
@@ -25,9 +25,13 @@ from imubench_pipeline.extensions.earth_rate.tables import (
     TurningRow,
 )
 from imubench_pipeline.model.estimates import EnvelopeRow
-from imubench_pipeline.report.payload import Arrays, numbers, samples_payload
-from imubench_pipeline.report.practical import System, page_unit
-from imubench_pipeline.report.recording import about_of, rows_of_samples, summary_words
+from imubench_pipeline.report.payload import Arrays, fill_missing, pack_samples
+from imubench_pipeline.report.practical import System, choose_page_unit
+from imubench_pipeline.report.recording import (
+    describe_recording,
+    read_sample_rows,
+    summarise_recording,
+)
 from imubench_pipeline.report.site import Entry, RecordingPage, Section, Site
 from imubench_pipeline.report.view import RecordingView
 from imubench_pipeline.words.numbers import (
@@ -54,7 +58,7 @@ ESTIMATES = ("filter", "pairs", "triples")
 """The methods that estimate the rate, the recommended one first; filter and smoother agree."""
 
 
-def context(site: Site, view: RecordingView, folder: Path) -> dict[str, Any]:
+def make_turned_context(site: Site, view: RecordingView, folder: Path) -> dict[str, Any]:
     """Return what the template needs; ``folder`` is the recording's."""
     arrays = Arrays()
     rows = view.rows(EarthRateRow)
@@ -62,7 +66,7 @@ def context(site: Site, view: RecordingView, folder: Path) -> dict[str, Any]:
     whole = [row for row in rows if row.part == "whole"]
     turning = view.rows(TurningRow)
     parts = list(dict.fromkeys(row.part for row in rows if row.value is not None))
-    envelope = rows_of_samples(folder, EnvelopeRow)
+    envelope = read_sample_rows(folder, EnvelopeRow)
     prediction = view.rows(EarthRatePredictionRow)
     latitude = degrees_text(rows[0].latitude) if rows else ""
     # Dwells, turns and knocks in the order of time.
@@ -74,22 +78,22 @@ def context(site: Site, view: RecordingView, folder: Path) -> dict[str, Any]:
     turns = counted(sum(event.what == "turn" for event in turning), "turn")
     summary = [f"{turns} between north and south", *[f"at latitude {latitude}"] * bool(rows)]
     return {
-        **about_of(site, view, [], folder),
+        **describe_recording(site, view, [], folder),
         "channel": channel,
-        "summary": summary_words(view, summary),
-        "answer": answer(whole, site.system),
+        "summary": summarise_recording(view, summary),
+        "answer": summarise_earth_rate(whole, site.system),
         "doubts": [sentence(row.doubts) for row in turning if row.what == "doubt"],
         "findings": view.findings,
-        "lines": [line(row) for row in rows],
-        "given": given_words(rows),
-        "noise": noise_words(rows),
+        "lines": [format_estimate(row) for row in rows],
+        "given": describe_settling(rows),
+        "noise": describe_noise_model(rows),
         "has_range": any(row.sigma_lower is not None for row in rows),
         "latitude": latitude,
         "parts": parts,
         "has_samples": any(row.channel == channel for row in envelope),
         "has_drift": any(row.quantity == "drift" for row in view.rows(EarthRateSeriesRow)),
-        "published": list(published_lines(view.rows(EarthRatePublishedRow))),
-        "needs": needs(prediction),
+        "published": list(format_published(view.rows(EarthRatePublishedRow))),
+        "needs": summarise_needs(prediction),
         "has_prediction": bool(prediction),
         "stretches": stretches,
         "command": site.again(view, "earth_rate"),
@@ -97,19 +101,19 @@ def context(site: Site, view: RecordingView, folder: Path) -> dict[str, Any]:
             "looks": {},
             "channels": [],
             "findings": [],
-            "samples": samples_payload(envelope, [], arrays),
+            "samples": pack_samples(envelope, [], arrays),
             "turned": _pack_figures(view, rows, turning, arrays),
-            "prediction": prediction_payload(prediction, arrays),
+            "prediction": pack_prediction(prediction, arrays),
             "arrays": arrays.texts,
         },
     }
 
 
-TURNED_PAGE = RecordingPage("turned.html.jinja", context, "two positions")
+TURNED_PAGE = RecordingPage("turned.html.jinja", make_turned_context, "two positions")
 """The page of a gyro that was turned between north and south."""
 
 
-def answer(rows: Sequence[EarthRateRow], system: System) -> str:
+def summarise_earth_rate(rows: Sequence[EarthRateRow], system: System) -> str:
     """Return the filter's estimate in a sentence, or the reason why there is none.
 
     ``rows`` are those of the whole recording in the table ``earth_rate``.
@@ -120,7 +124,7 @@ def answer(rows: Sequence[EarthRateRow], system: System) -> str:
         return "This recording has no estimate of the Earth's rate."
     if best.value is None:
         return sentence(best.reason)
-    unit = page_unit("gyro", "adev", system)
+    unit = choose_page_unit("gyro", "adev", system)
     value, truth = (unit.text(number, 4) for number in (best.value, best.truth))
     size = None if best.upper is None else best.upper - best.value
     away = None if best.off_sigma is None else abs(best.off_sigma)
@@ -137,7 +141,7 @@ def answer(rows: Sequence[EarthRateRow], system: System) -> str:
     return text + (f" {sentence(best.reason)}" if best.reason else "")
 
 
-def given_words(rows: Sequence[EarthRateRow]) -> str:
+def describe_settling(rows: Sequence[EarthRateRow]) -> str:
     """Return the settling time of the filter that is given the rate, in a sentence.
 
     ``rows`` are those of ``earth_rate``, of one or several recordings; empty without this filter.
@@ -166,7 +170,7 @@ def given_words(rows: Sequence[EarthRateRow]) -> str:
 _MAX_NOISE_ERROR = 4.0
 
 
-def line(row: EarthRateRow) -> dict[str, Any]:
+def format_estimate(row: EarthRateRow) -> dict[str, Any]:
     """Return a line of the table of estimates, from a row of ``earth_rate``."""
     return {
         **row.columns(),
@@ -179,7 +183,7 @@ def line(row: EarthRateRow) -> dict[str, Any]:
     }
 
 
-def published_lines(rows: Sequence[EarthRatePublishedRow]) -> Iterator[dict[str, Any]]:
+def format_published(rows: Sequence[EarthRatePublishedRow]) -> Iterator[dict[str, Any]]:
     """Yield the lines of the table of published estimates."""
     for row in rows:
         yield {
@@ -189,7 +193,7 @@ def published_lines(rows: Sequence[EarthRatePublishedRow]) -> Iterator[dict[str,
         }
 
 
-def needs(rows: Sequence[EarthRatePredictionRow]) -> dict[str, Any] | None:
+def summarise_needs(rows: Sequence[EarthRatePredictionRow]) -> dict[str, Any] | None:
     """Return the recordings required to find the Earth's rate, for a table and a sentence.
 
     ``rows`` are those of one recording in the table ``earth_rate_prediction``.
@@ -259,12 +263,12 @@ def _pack_figures(
         "latitude": rows[0].latitude if rows else None,
         "simulated": view.simulated,
         "dwells": {
-            "start": arrays.exact(numbers(row.start for row in dwells)),
-            "stop": arrays.exact(numbers(row.stop for row in dwells)),
-            "mean": arrays.exact(numbers(row.mean for row in dwells)),
+            "start": arrays.exact(fill_missing(row.start for row in dwells)),
+            "stop": arrays.exact(fill_missing(row.stop for row in dwells)),
+            "mean": arrays.exact(fill_missing(row.mean for row in dwells)),
             "north": [row.sense == 1 for row in dwells],
         },
-        "turns": arrays.exact(numbers(row.time for row in turns)),
+        "turns": arrays.exact(fill_missing(row.time for row in turns)),
         "found_by": [row.found_by for row in turns],
         "parts": {
             part: {
@@ -284,7 +288,7 @@ def _pack_courses(series: Sequence[EarthRateSeriesRow], arrays: Arrays) -> dict[
             "name": "drift" if name[0] == "drift" else _METHODS[name[1]][1],
             "time": arrays.exact([row.time for row in own]),
             "value": arrays.exact([row.value for row in own]),
-            "sigma": arrays.exact(numbers(row.sigma for row in own)),
+            "sigma": arrays.exact(fill_missing(row.sigma for row in own)),
         }
     return courses
 
@@ -300,7 +304,7 @@ def _find_range(series: Sequence[EarthRateSeriesRow], truth: float) -> list[floa
     return [truth - 1.1 * high, truth + 1.1 * high]
 
 
-def prediction_payload(rows: Sequence[EarthRatePredictionRow], arrays: Arrays) -> dict[str, Any]:
+def pack_prediction(rows: Sequence[EarthRatePredictionRow], arrays: Arrays) -> dict[str, Any]:
     """Return the data of the figures of the prediction of a recording."""
     goals = [row.goal for row in rows if row.of == "goal"]
     payload: dict[str, Any] = {"goals": goals, "truth": EARTH_RATE}
@@ -308,7 +312,7 @@ def prediction_payload(rows: Sequence[EarthRatePredictionRow], arrays: Arrays) -
         own = sorted((row for row in rows if row.of == of and row.sigma is not None), key=x)
         payload[of] = {
             "x": arrays.exact([x(row) for row in own]),
-            "sigma": arrays.exact(numbers(row.sigma for row in own)),
+            "sigma": arrays.exact(fill_missing(row.sigma for row in own)),
             "turns": [row.turns for row in own],
             "run": own[0].time if own else None,
             "length": own[0].dwell if own else None,
@@ -318,12 +322,12 @@ def prediction_payload(rows: Sequence[EarthRatePredictionRow], arrays: Arrays) -
     return payload
 
 
-def turned(site: Site) -> list[RecordingView]:
+def select_turned(site: Site) -> list[RecordingView]:
     """Return the recordings of gyros that were turned between north and south."""
     return [view for view in site.views if view.row.kind == "two_position"]
 
 
-def predicted(site: Site) -> list[RecordingView]:
+def select_predicted(site: Site) -> list[RecordingView]:
     """Return the static recordings with a prediction for the Earth's rate from their noise."""
     named = site.named_in(EarthRatePredictionRow)
     return [view for view in site.views if view.static and view.full_name in named]
@@ -331,25 +335,27 @@ def predicted(site: Site) -> list[RecordingView]:
 
 def _make_context(site: Site) -> dict[str, Any]:
     arrays = Arrays()
-    turned_gyros = turned(site)
+    turned_gyros = select_turned(site)
     published = [row for view in turned_gyros for row in view.rows(EarthRatePublishedRow)]
     predicted = list(_list_predictions(site))
-    aligned = alignments(site, arrays)
+    aligned = summarise_alignments(site, arrays)
     return {
         "truth": EARTH_RATE,
         "runs": [_describe_run(site, view) for view in turned_gyros],
-        "given": given_words([row for view in turned_gyros for row in view.rows(EarthRateRow)]),
+        "given": describe_settling(
+            [row for view in turned_gyros for row in view.rows(EarthRateRow)]
+        ),
         "rejected": [view for view in turned_gyros if view.left_out],
         "published": [
             {**line, "view": view}
             for view in turned_gyros
-            for line in published_lines(view.rows(EarthRatePublishedRow))
+            for line in format_published(view.rows(EarthRatePublishedRow))
         ],
-        "verdict": published_words(published),
+        "verdict": describe_published(published),
         "needs": predicted,
         "alignments": aligned,
-        "calibrations": of_all(site),
-        "not_calibrated": [view for view in calibrated(site) if view.left_out],
+        "calibrations": group_by_run(site),
+        "not_calibrated": [view for view in select_calibrated(site) if view.left_out],
         "page": {
             "looks": {},
             "channels": [],
@@ -364,7 +370,7 @@ def _make_context(site: Site) -> dict[str, Any]:
                 for row in published
             ],
             "predictions": {
-                line["place"]: prediction_payload(line["rows"], arrays) for line in predicted
+                line["place"]: pack_prediction(line["rows"], arrays) for line in predicted
             },
             "alignments": {line["view"].sensor: line["drawn"] for line in aligned},
             "arrays": arrays.texts,
@@ -373,7 +379,7 @@ def _make_context(site: Site) -> dict[str, Any]:
 
 
 def _select_recordings(site: Site) -> list[RecordingView]:
-    return [*turned(site), *calibrated(site), *predicted(site)]
+    return [*select_turned(site), *select_calibrated(site), *select_predicted(site)]
 
 
 EARTH_RATE_PAGE = Entry(
@@ -390,7 +396,7 @@ NOT_FOUND = Section(
     page="index.html",
     template="not_found.html.jinja",
     context=lambda site: (
-        list(without_result(turned(site), lambda view: view.rows(EarthRateRow))) or None
+        list(list_without_result(select_turned(site), lambda view: view.rows(EarthRateRow))) or None
     ),
 )
 """The recordings without an estimate of the Earth's rate, on the start page."""
@@ -402,12 +408,12 @@ def _describe_run(site: Site, view: RecordingView) -> dict[str, Any]:
     shown = [row for row in rows if row.method in ESTIMATES]
     return {
         "view": view,
-        "answer": view.row.reason if view.left_out else answer(whole, site.system),
+        "answer": view.row.reason if view.left_out else summarise_earth_rate(whole, site.system),
         "parts": [
             {
                 "part": part,
                 "duration": next(row.duration for row in shown if row.part == part),
-                "lines": {row.method: line(row) for row in shown if row.part == part},
+                "lines": {row.method: format_estimate(row) for row in shown if row.part == part},
             }
             for part in dict.fromkeys(row.part for row in shown)
         ],
@@ -417,9 +423,9 @@ def _describe_run(site: Site, view: RecordingView) -> dict[str, Any]:
 def _list_predictions(site: Site) -> Iterator[dict[str, Any]]:
     """Yield the recordings that each sensor would need, without duplicates."""
     yielded: list[tuple[str, Any]] = []
-    for view in [*turned(site), *predicted(site)]:
+    for view in [*select_turned(site), *select_predicted(site)]:
         rows = view.rows(EarthRatePredictionRow)
-        needed = needs(rows)
+        needed = summarise_needs(rows)
         if needed is None or (view.sensor, needed) in yielded:
             continue
         yielded.append((view.sensor, needed))
@@ -427,7 +433,7 @@ def _list_predictions(site: Site) -> Iterator[dict[str, Any]]:
         yield needed | {"view": view, "place": place, "rows": rows, "latitude": latitude}
 
 
-def published_words(rows: Sequence[EarthRatePublishedRow]) -> str:
+def describe_published(rows: Sequence[EarthRatePublishedRow]) -> str:
     """Return whether noise explains the errors of published estimates, in sentences."""
     if not rows:
         return ""
@@ -476,10 +482,13 @@ _TABLE_TIMES = (60.0, 600.0, 3600.0)  # times at rest that the table shows, s; t
 _POSITION_TEXTS = {1: "one position", 2: "two opposite positions"}
 
 
-def alignments(site: Site, arrays: Arrays) -> list[dict[str, Any]]:
+def summarise_alignments(site: Site, arrays: Arrays) -> list[dict[str, Any]]:
     """Return the section of each sensor with gyros and accelerometers; ``arrays`` gets its data."""
     entries = []
-    unit, fine = page_unit("gyro", "adev", site.system), page_unit("accel", "adev", "si")
+    unit, fine = (
+        choose_page_unit("gyro", "adev", site.system),
+        choose_page_unit("accel", "adev", "si"),
+    )
     for view in site.views:
         rows = view.rows(AlignmentRow)
         if rows:

@@ -6,7 +6,7 @@ from imubench_pipeline.extensions.earth_rate.settings import EarthRateSettings
 from imubench_pipeline.run.plan import Plan, to_json
 
 
-def outlook_settings(plan: Plan, sensor: str) -> str:
+def select_outlook_settings(plan: Plan, sensor: str) -> str:
     """Return the settings of the predictions for a sensor at rest."""
     declared = plan.sensors.get(sensor)
     biases = {key: {"bias_repeatability", "offset"} for key in ("gyro", "accel")}

@@ -18,9 +18,9 @@ from imubench_pipeline.earth import EARTH_RATE
 from imubench_pipeline.extensions.calibration.experiment import Experiment
 from imubench_pipeline.extensions.earth_rate.bound import (
     MAX_BLOCKS,
-    block_length,
-    information_by_states,
-    sigma_of,
+    choose_block_length,
+    compute_information_by_states,
+    convert_to_sigma,
 )
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.typing import Array
@@ -97,7 +97,7 @@ class Outlook:
         information = self._compute_information(dwell, turns + 1)
         number = np.arange(1, turns + 1)
         time = (number + 1) * dwell + number * self.turning
-        return Prediction(number, time, sigma_of(information[1:]))
+        return Prediction(number, time, convert_to_sigma(information[1:]))
 
     def turns_needed(self, dwell: float, relative: float) -> int | None:
         """Return the number of turns for a relative standard deviation of the Earth's rate.
@@ -126,7 +126,7 @@ class Outlook:
         last = information[min(turns, _MAX_COMPUTED_DWELLS - 1)] + (
             _compute_growth(information) * beyond if beyond else 0.0
         )
-        return float(sigma_of(np.array([last]))[0])
+        return float(convert_to_sigma(np.array([last]))[0])
 
     def time_needed(self, dwell: float, relative: float) -> float:
         """Return the run time for a relative standard deviation of the Earth's rate, s.
@@ -163,7 +163,7 @@ class Outlook:
         """Return the bound of a run for these numbers of dwells, shape (k,)."""
         lengths = ((run_time - (n - 1) * self.turning) / n for n in dwells.tolist())
         pairs = zip(lengths, dwells.tolist(), strict=True)
-        return sigma_of(np.array([self._compute_information(*pair)[-1] for pair in pairs]))
+        return convert_to_sigma(np.array([self._compute_information(*pair)[-1] for pair in pairs]))
 
     def heading(self, dwell: float, turns: int) -> Array:
         """Return the least standard deviation of the heading by gyrocompassing after each turn.
@@ -186,12 +186,12 @@ class Outlook:
             rate=self.rate,
             latitude=self.latitude,
         )
-        longest = block_length(design, self.model)
+        longest = choose_block_length(design, self.model)
         each = -(-design.samples_in_dwells // len(design.dwells) // longest)
         summed = max(MAX_BLOCKS // each, _MIN_COMPUTED_DWELLS)
         blocks = replace(design, dwells=design.dwells[:summed]).blocks(longest)
         last = np.flatnonzero(np.diff(blocks.dwell, append=-1))
-        information = information_by_states(blocks, self.model, self.turn_on_bias)[last]
+        information = compute_information_by_states(blocks, self.model, self.turn_on_bias)[last]
         more = np.arange(1, dwells - len(information) + 1)
         if not len(more):
             return information

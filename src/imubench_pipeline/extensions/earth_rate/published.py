@@ -31,8 +31,8 @@ import numpy as np
 from imubench_pipeline.earth import EARTH_RATE
 from imubench_pipeline.extensions.calibration.experiment import Experiment
 from imubench_pipeline.extensions.calibration.kalman import RateFilter
-from imubench_pipeline.extensions.earth_rate.bound import block_length
-from imubench_pipeline.extensions.earth_rate.courses import white_sigma
+from imubench_pipeline.extensions.earth_rate.bound import choose_block_length
+from imubench_pipeline.extensions.earth_rate.courses import compute_white_sigma
 from imubench_pipeline.extensions.earth_rate.pairs import by_pairs
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.typing import Array
@@ -63,29 +63,29 @@ class RunDesign:
         )
 
 
-def allowed_sigmas(run: RunDesign, duration: float, model: NoiseModel) -> Row:
+def compute_allowed_sigmas(run: RunDesign, duration: float, model: NoiseModel) -> Row:
     """Return the standard deviations by noise of the estimates of a run, rad/s; duration in s.
 
     ``white``: by white noise alone; ``sigma``: of the mean over pairs; ``sigma_filter``: of the
     filter.
     """
     design = run.experiment(duration)
-    blocks = design.blocks(block_length(design, model))
+    blocks = design.blocks(choose_block_length(design, model))
     zero_means = np.zeros((1, len(blocks)))
     return {
-        "white": white_sigma(model, blocks),
+        "white": compute_white_sigma(model, blocks),
         "sigma": float(by_pairs(zero_means, blocks, model).sigma[-1]),
         "sigma_filter": float(RateFilter(blocks, model).rate_sigma[-1]),
     }
 
 
-def published_row(value: float, run: RunDesign, duration: float, model: NoiseModel) -> Row:
+def make_published_row(value: float, run: RunDesign, duration: float, model: NoiseModel) -> Row:
     """Return the columns of ``earth_rate_published`` for a published estimate.
 
     The value is in rad/s; the duration of the run, or of a part of it, in s; the noise model as
     published.
     """
-    noise = allowed_sigmas(run, duration, model)
+    noise = compute_allowed_sigmas(run, duration, model)
     off = (value - EARTH_RATE) / noise["sigma"]
     verdict = "within the noise" if abs(off) <= _Z_95 else "beyond the noise"
     return noise | {
@@ -114,7 +114,7 @@ class PrintedRun:
         return PrintedRun(rest, value, math.sqrt(max(squares, 0.0)) / rest)
 
 
-def drift_needed(off: float, period: float, latitude: float) -> float:
+def compute_needed_drift(off: float, period: float, latitude: float) -> float:
     """Return the drift of the bias that causes the error of pairs, rad/s^2, north first.
 
     ``off``: error, rad/s; ``period``: from turn to turn, s; the latitude in rad.
@@ -122,23 +122,23 @@ def drift_needed(off: float, period: float, latitude: float) -> float:
     return -2.0 * math.cos(latitude) * off / period
 
 
-def angle_needed(off: float, dwell: float, latitude: float) -> float:
+def compute_needed_angle(off: float, dwell: float, latitude: float) -> float:
     """Return the angle of turning, rad, that must remain in each dwell of this length, s."""
     return off * dwell * math.cos(latitude)
 
 
-def wrong_part(value: float, true: float) -> float | None:
+def compute_wrong_share(value: float, true: float) -> float | None:
     """Return the part of a run with the wrong sense; None if no part explains the value."""
     part = 0.5 * (1.0 - value / true)
     return part if 0.0 <= part <= 1.0 else None
 
 
-def heading_needed(value: float, true: float) -> float | None:
+def compute_needed_heading(value: float, true: float) -> float | None:
     """Return the angle between axis and meridian, rad; None if no angle explains the value."""
     return math.acos(value / true) if abs(value) <= abs(true) else None
 
 
-def apart(one: PrintedRun, other: PrintedRun) -> float:
+def compute_separation(one: PrintedRun, other: PrintedRun) -> float:
     """Return the difference of two estimates from disjoint pairs, in standard deviations."""
     return (one.value - other.value) / math.hypot(one.sigma, other.sigma)
 
@@ -151,7 +151,7 @@ class WarmUp:
     total: float  # change of the bias over the run, rad/s
 
 
-def warm_up(first: float, last: float, duration: float, last_duration: float) -> WarmUp | None:
+def fit_warm_up(first: float, last: float, duration: float, last_duration: float) -> WarmUp | None:
     """Return the warm-up with mean drift ``last`` in the last part of a run, ``first`` before.
 
     Drifts in rad/s^2, durations in s; None if the drift does not decrease, or changes its sign.
@@ -173,7 +173,7 @@ def warm_up(first: float, last: float, duration: float, last_duration: float) ->
     return WarmUp(low, first * rest + last * last_duration)
 
 
-def one_miscount(whole: PrintedRun, last: PrintedRun, true: float) -> float:
+def fit_single_miscount(whole: PrintedRun, last: PrintedRun, true: float) -> float:
     """Return the misfit of the best single miscount to both printed values, in sigma.
 
     The senses are right up to a turn and wrong after it, or vice versa. The misfit is the root of
@@ -193,12 +193,12 @@ def one_miscount(whole: PrintedRun, last: PrintedRun, true: float) -> float:
     return float(min(misfits))
 
 
-def slipped(slip: Array) -> Array:
+def compute_slipped_share(slip: Array) -> Array:
     """Return the remaining share of the rate, shape (n,), if dwells begin ``slip`` dwells late."""
     return np.asarray(np.abs(2.0 * np.mod(slip, 2.0) - 2.0) - 1.0)
 
 
-def slip_needed(parts: Sequence[PrintedRun], period: float, true: float) -> tuple[float, float]:
+def fit_clock_error(parts: Sequence[PrintedRun], period: float, true: float) -> tuple[float, float]:
     """Return the relative clock error that best explains consecutive parts, and its misfit.
 
     Errors up to a twentieth are tested; both signs are equivalent. The misfit is the root of the
@@ -218,6 +218,6 @@ def slip_needed(parts: Sequence[PrintedRun], period: float, true: float) -> tupl
 
 
 def _integrate_slipped(slip: Array) -> Array:
-    """Return the integral of `slipped` from 0 on."""
+    """Return the integral of `compute_slipped_share` from 0 on."""
     place = np.mod(slip, 2.0)
     return np.where(place <= 1.0, place - place**2, (place - 1.0) * (place - 2.0))

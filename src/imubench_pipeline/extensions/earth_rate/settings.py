@@ -14,16 +14,16 @@ from imubench_pipeline.settings.validation import (
     RateFromZero,
     Strict,
     Text,
-    checked,
+    make_validator,
 )
-from imubench_pipeline.units import quantity_to_si
+from imubench_pipeline.units import parse_quantity
 
 
 def _from_zero(dimension: str, what: str = "a standard deviation") -> AfterValidator:
-    return checked(dimension, f"{what} from 0", from_zero=True)
+    return make_validator(dimension, f"{what} from 0", from_zero=True)
 
 
-_Rate = Annotated[Text, checked("angular_rate")]
+_Rate = Annotated[Text, make_validator("angular_rate")]
 TimeFromZero = Annotated[Text, _from_zero("time", "a time"), Field(examples=["2 s"])]
 
 _REQUIRED_KEYS = {
@@ -80,7 +80,7 @@ class TwoPosition(Experiment):
     @field_validator("latitude")
     @classmethod
     def _check_latitude(cls, latitude: str) -> str:
-        if abs(quantity_to_si(latitude, "angle")) > quantity_to_si("89 deg", "angle"):
+        if abs(parse_quantity(latitude, "angle")) > parse_quantity("89 deg", "angle"):
             raise ValueError(
                 "expected at most 89 deg: at a pole a horizontal axis sees nothing of the Earth's "
                 "rate"
@@ -97,12 +97,12 @@ class TwoPosition(Experiment):
 
     def seconds(self, name: Literal["dwell", "turning", "start"]) -> float:
         """Return one of its times in s."""
-        return quantity_to_si(getattr(self, name), "time")
+        return parse_quantity(getattr(self, name), "time")
 
     @property
     def latitude_si(self) -> float:
         """Latitude, rad."""
-        return quantity_to_si(self.latitude, "angle")
+        return parse_quantity(self.latitude, "angle")
 
     @property
     def first_sense(self) -> int | None:
@@ -112,12 +112,12 @@ class TwoPosition(Experiment):
     @property
     def turn_on_bias_si(self) -> float | None:
         """Standard deviation of the fixed bias, rad/s; None where it is not known."""
-        return quantity_to_si(self.turn_on_bias, "angular_rate") if self.turn_on_bias else None
+        return parse_quantity(self.turn_on_bias, "angular_rate") if self.turn_on_bias else None
 
     @property
     def drift_si(self) -> float:
         """Standard deviation of a steady drift, rad/s^2."""
-        return quantity_to_si(self.drift, "gyro_ramp") if self.drift else 0.0
+        return parse_quantity(self.drift, "gyro_ramp") if self.drift else 0.0
 
     def moved_gyro(self, channels: Sequence[str], *, column: bool = False) -> str:
         """Return the one of the log's channels that was turned, as of `stated_gyro`."""

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 
 from imubench_pipeline.earth import EARTH_RATE
 from imubench_pipeline.extensions.calibration.experiment import Blocks, Experiment
-from imubench_pipeline.extensions.calibration.states import block_states
+from imubench_pipeline.extensions.calibration.states import discretise_blocks
 from imubench_pipeline.extensions.earth_rate.settings import SimulatedTurns
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.simulate import channel_rng
@@ -24,7 +24,7 @@ from imubench_pipeline.simulate.model import SensorModel
 from imubench_pipeline.simulate.profiles import SampledProfile
 from imubench_pipeline.simulate.simulation import simulate
 from imubench_pipeline.typing import Array
-from imubench_pipeline.units import quantity_to_si
+from imubench_pipeline.units import parse_quantity
 
 PAPER_MODEL = NoiseModel(
     N=math.radians(0.0122), B=math.radians(0.0027), T_B=238.1, K=math.radians(6.8314e-5)
@@ -40,7 +40,7 @@ ASSUMED_LATITUDE = math.radians(-23.3)
 ASSUMED_TURNING = 2.0  # time of a turn within each 30 s, s: the paper prints none
 
 
-def paper_run(minutes: float) -> Experiment:
+def design_paper_run(minutes: float) -> Experiment:
     """Return the design of a run of Silva et al.: north first, a turn every 30 s."""
     return Experiment.regular(
         dwell=PAPER_PERIOD - ASSUMED_TURNING,
@@ -76,7 +76,7 @@ def simulate_runs(
     The Earth's rate is in rad/s, and so is the standard deviation of the fixed bias, which is drawn
     for each run.
     """
-    block_model = block_states(model, blocks, turn_on_bias)
+    block_model = discretise_blocks(model, blocks, turn_on_bias)
     m = len(block_model.names)
     state = rng.standard_normal((runs, m)) @ block_model.initial.T
     states, drift = np.empty((runs, len(blocks), m)), np.empty((runs, len(blocks)))
@@ -103,13 +103,13 @@ def simulate_log(
     the Earth's rate times the cosine of the angle. The turn is about a perpendicular axis: only
     misalignment makes it visible, as a pulse peak sin^2(pi t / turning). The log begins with the
     first sample at 0 and ends with the last dwell. The bias of the model is the fixed bias of this
-    run. The other parameters are as in `true_rate`.
+    run. The other parameters are as in `compute_true_rate`.
     """
-    true = true_rate(experiment, earth_rate, transient)
+    true = compute_true_rate(experiment, earth_rate, transient)
     return simulate(model, experiment.rate, len(true), rng, true=lambda a, b: true[a:b])
 
 
-def true_rate(experiment: Experiment, earth_rate: float, transient: ArrayLike) -> Array:
+def compute_true_rate(experiment: Experiment, earth_rate: float, transient: ArrayLike) -> Array:
     """Return the readings of an error-free gyro in an experiment, rad/s, shape (samples,).
 
     They end with the last dwell. ``transient`` is the peak of the pulse of turns, one value or one
@@ -136,7 +136,7 @@ def true_rate(experiment: Experiment, earth_rate: float, transient: ArrayLike) -
     return true
 
 
-def turned(recording: SimulatedRecording, rate: float) -> dict[str, SampledProfile]:
+def simulate_turned_gyro(recording: SimulatedRecording, rate: float) -> dict[str, SampledProfile]:
     """Return the readings of a gyro that is turned by the clock; the transients differ."""
     turns, samples = recording.block(SimulatedTurns), recording.samples
     assert turns is not None
@@ -152,8 +152,8 @@ def turned(recording: SimulatedRecording, rate: float) -> dict[str, SampledProfi
     rng = channel_rng(recording.seed, recording.sensor, recording.recording, "turns")
     number = len(design.dwells) - 1
     peaks = rng.choice([-1.0, 1.0], number) * rng.uniform(0.7, 1.3, number)
-    peaks = peaks * quantity_to_si(turns.transient, "angular_rate")
-    true = true_rate(design, EARTH_RATE, peaks)
+    peaks = peaks * parse_quantity(turns.transient, "angular_rate")
+    true = compute_true_rate(design, EARTH_RATE, peaks)
     before = np.full(round(turns.seconds("start") * rate), true[0])
     after = np.full(samples, true[-1])
     sensed = np.concatenate([before, true, after])[:samples]

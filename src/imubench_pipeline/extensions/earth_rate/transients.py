@@ -86,7 +86,7 @@ class Event:
         return 0.5 * (self.start + self.stop)
 
 
-def blocks_of(
+def average_log_blocks(
     log: Array, rate: float, dwell: float, model: NoiseModel | None = None
 ) -> LevelBlocks:
     """Average a log over blocks, with their level and noise.
@@ -138,14 +138,14 @@ def _estimate_sigma(residual: Array) -> float:
     return sigma
 
 
-def transients(blocks: LevelBlocks, log: Array, rate: float) -> list[Event]:
+def detect_transients(blocks: LevelBlocks, log: Array, rate: float) -> list[Event]:
     """Return the transients in order of time.
 
     A window of n blocks with a mean square of r times the noise has the log-likelihood ratio
     (n/2) (r - 1 - ln r) of a larger variance, maximised over its length and place. If blocks of
     the calm parts are correlated, n is divided by an upper bound on the largest eigenvalue of their
     correlation, 1 + 2 sum (1 - k/n) rho_k, which sets the decay of the tail of r. The log is the
-    one given to `blocks_of`, in shape and units.
+    one given to `average_log_blocks`, in shape and units.
     """
     correlation = _estimate_correlation(blocks)
     lag = np.arange(1, len(correlation) + 1)
@@ -243,10 +243,11 @@ def _merge_events(
         yield Event(start, stop, "transient", likelihood, peak, strength, haste)
 
 
-def outliers(blocks: LevelBlocks, log: Array, rate: float) -> list[tuple[float, float]]:
+def find_outliers(blocks: LevelBlocks, log: Array, rate: float) -> list[tuple[float, float]]:
     """Return the start and stop of outliers, s, which the mean of a block may hide.
 
-    Outliers closer than a block are merged. The log has the shape and units of `blocks_of`.
+    Outliers closer than a block are merged. The log has the shape and units of
+    `average_log_blocks`.
     """
     size = round(blocks.length * rate)
     residual = log - np.repeat(blocks.level, size)[: len(log)]
@@ -259,7 +260,7 @@ def outliers(blocks: LevelBlocks, log: Array, rate: float) -> list[tuple[float, 
     return [(float(group[0]) / rate, float(group[-1] + 1) / rate) for group in groups]
 
 
-def steps(
+def detect_steps(
     blocks: LevelBlocks, dwell: float, model: NoiseModel | None = None, rate: float | None = None
 ) -> list[Event]:
     """Return significant steps of the level, in order of time.
@@ -273,7 +274,7 @@ def steps(
     width = round(dwell / 3.0 / blocks.length)
     if width < 4 or 2 * width >= len(blocks.z):
         return []
-    value = calm_means(blocks)
+    value = clip_block_means(blocks)
     count = _sum_windows(blocks.present.astype(float), width)
     mean = _sum_windows(value, width) / np.maximum(count, 1.0)
     difference = mean[width:] - mean[:-width]
@@ -293,7 +294,7 @@ def steps(
     return sorted(events, key=lambda event: event.start)
 
 
-def calm_means(blocks: LevelBlocks) -> Array:
+def clip_block_means(blocks: LevelBlocks) -> Array:
     """Return the means of the blocks, rad/s, shape (b,), clipped to 4 standard deviations.
 
     0 where a block has no samples.

@@ -2,8 +2,8 @@
 
 Turning a sensitive axis end for end is a rotation about an axis perpendicular to it: the gyro
 senses cross-axis coupling and handling, which may be much or nothing. A column with the position
-decides if there is one, else the events in the log, and without these the schedule. `stays` reads
-turns from such a column.
+decides if there is one, else the events in the log, and without these the schedule. `find_stays`
+reads turns from such a column.
 """
 
 from __future__ import annotations
@@ -18,26 +18,26 @@ from numpy.typing import NDArray
 from imubench_pipeline.extensions.earth_rate.choice_of_turns import (
     EDGE_DWELL_FRACTION,
     TurnSchedule,
-    disturbances,
     find_turns,
     leave_out_knocks,
+    list_disturbances,
 )
 from imubench_pipeline.extensions.earth_rate.transients import (
     CLEAR_LOG_LIKELIHOOD,
     Event,
     LevelBlocks,
-    blocks_of,
-    outliers,
-    steps,
-    transients,
+    average_log_blocks,
+    detect_steps,
+    detect_transients,
+    find_outliers,
 )
 from imubench_pipeline.extensions.earth_rate.turns import (
     DETECTION_ORDER,
     FoundDwell,
     Turn,
     Turning,
-    alternation,
-    contradiction,
+    estimate_alternation,
+    find_contradiction,
 )
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.typing import Array
@@ -61,7 +61,7 @@ class Stays:
     away: bool
 
 
-def stays(position: Array, rate: float, shortest: float) -> Stays:
+def find_stays(position: Array, rate: float, shortest: float) -> Stays:
     """Find the stays in two positions.
 
     The positions are the medians of the column's lower and upper half, by range. A sample within a
@@ -123,10 +123,10 @@ def find_turning(
     """Find the dwells and the turning points of a log.
 
     A column with the position decides if there is one. Else the transients and steps that fit the
-    schedule best are chosen (`extensions.earth_rate.choice_of_turns.choose`): a missed turn makes
-    a dwell twice as long, an overshoot belongs to its turn, a knock is left out. Turns that are too
-    weak to detect are inserted from the schedule between the detected ones. If fewer than 40 % of
-    the scheduled turns are detected, the schedule gives all of them.
+    schedule best are chosen (`extensions.earth_rate.choice_of_turns.choose_turns`): a missed turn
+    makes a dwell twice as long, an overshoot belongs to its turn, a knock is left out. Turns that
+    are too weak to detect are inserted from the schedule between the detected ones. If fewer than
+    40 % of the scheduled turns are detected, the schedule gives all of them.
 
     A transient within a fifth of a dwell of an end of the log is handling, and cut off with that
     end. Only the schedule separates handling as long as a turn (0.2 s and more) from a turn: if the
@@ -147,14 +147,14 @@ def find_turning(
     the nominal time from the start of a turn to the start of the next, ``margin`` is left out on
     both sides of a detected turn. ``turning``, the time that a turn takes, and ``start``, the start
     of the first dwell of the schedule after the first sample, are only for turns that are not
-    detected; all in s. ``position``, shape (n,), is the position of the sensor (`stays`). ``model``
-    is the noise of the sensor at rest, SI, by default estimated from the log. Raises ValueError if
-    an argument is out of range; if the log is shorter than two dwells; if there is no evidence of
-    turns.
+    detected; all in s. ``position``, shape (n,), is the position of the sensor (`find_stays`).
+    ``model`` is the noise of the sensor at rest, SI, by default estimated from the log. Raises
+    ValueError if an argument is out of range; if the log is shorter than two dwells; if there is no
+    evidence of turns.
     """
     log = np.asarray(log, dtype=np.float64)
     schedule = _check_schedule(log, rate, dwell, turning, start, first_sense, margin)
-    blocks = blocks_of(log, rate, dwell, model)
+    blocks = average_log_blocks(log, rate, dwell, model)
     events = _detect_events(blocks, log, rate, dwell, model)
     doubts = []
     if blocks.rough:
@@ -171,17 +171,17 @@ def find_turning(
     short = sum(stop - start < 0.1 * dwell for start, stop in stretches)
     if short:
         doubts.append(f"{short} dwells are shorter than a tenth of {dwell:g} s")
-    knocks = sorted([*knocks, *_select_outliers(outliers(blocks, log, rate), turns, knocks)])
+    knocks = sorted([*knocks, *_select_outliers(find_outliers(blocks, log, rate), turns, knocks)])
     knocks = [(max(start, 0.0), min(stop, schedule.duration)) for start, stop in knocks]
     signs = leave_out_knocks(blocks, knocks)
-    size = alternation(signs, stretches)
+    size = estimate_alternation(signs, stretches)
     first = column_sense or first_sense or 1
     if first_sense not in (None, first):
         doubts.append(f"the first sense is {first:+d} by the column, {first_sense:+d} was given")
     ambiguous = first_sense is None and column_sense is None
     if ambiguous:
         doubts.append("the sense of the first dwell is assumed: all may be the other way round")
-    place = contradiction(signs, stretches)
+    place = find_contradiction(signs, stretches)
     if place is not None:
         doubts.append(
             f"from {stretches[place][0]:.0f} s on the log alternates the other way: "
@@ -229,9 +229,9 @@ def _detect_events(
     blocks: LevelBlocks, log: Array, rate: float, dwell: float, model: NoiseModel | None
 ) -> list[Event]:
     """Return transients and steps in order of time; of near ones, the greater."""
-    events = transients(blocks, log, rate)
+    events = detect_transients(blocks, log, rate)
     near = max(3.0, 0.1 * dwell)
-    for step in steps(blocks, dwell, model, rate):
+    for step in detect_steps(blocks, dwell, model, rate):
         beside = [e for e in events if e.start - near < step.time < e.stop + near]
         # The level follows a step at once, except in the blocks of the step itself.
         greater = [e for e in beside if e.kind == "transient" and e.peak > 1.5 * step.peak]
@@ -248,7 +248,7 @@ def _find_turns_in_column(
         raise ValueError(
             f"the position has the shape {np.shape(position)}, the log {np.shape(log)}"
         )
-    column_stays = stays(np.asarray(position, dtype=np.float64), rate, 0.1 * schedule.dwell)
+    column_stays = find_stays(np.asarray(position, dtype=np.float64), rate, 0.1 * schedule.dwell)
     turns, used = [], set()
     for stop, start in zip(column_stays.stop[:-1], column_stays.start[1:], strict=True):
         first, last, peak = float(stop), float(start), None
@@ -265,7 +265,7 @@ def _find_turns_in_column(
     )
     rest = [e for k, e in enumerate(events) if k not in used and e.kind == "transient"]
     sense = (1 if column_stays.high[0] else -1) if column_stays.senses else None
-    return turns, disturbances(rest), sense, doubts
+    return turns, list_disturbances(rest), sense, doubts
 
 
 def _select_outliers(

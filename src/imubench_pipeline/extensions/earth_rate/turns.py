@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from imubench_pipeline.extensions.calibration.experiment import Dwell
-from imubench_pipeline.extensions.earth_rate.transients import LevelBlocks, calm_means
+from imubench_pipeline.extensions.earth_rate.transients import LevelBlocks, clip_block_means
 from imubench_pipeline.typing import Array
 
 FoundBy = Literal["transient", "step", "schedule", "column"]
@@ -110,7 +110,7 @@ def _find_first_sample(time: float, rate: float) -> int:
     return int(np.ceil(time * rate - 1e-6))
 
 
-def differences(
+def compute_differences(
     blocks: LevelBlocks, stretches: Sequence[tuple[float, float]]
 ) -> tuple[Array, Array]:
     """Return the A-B-A differences of the dwells, with equal signs.
@@ -121,7 +121,7 @@ def differences(
     dwells from the noise of the blocks alone, (rad/s)^2, shape (n,). ``stretches`` are start and
     stop of the dwells, s, at least two.
     """
-    total = np.concatenate(([0.0], np.cumsum(calm_means(blocks))))
+    total = np.concatenate(([0.0], np.cumsum(clip_block_means(blocks))))
     present = np.concatenate(([0], np.cumsum(blocks.present)))
     edges = np.clip(np.rint(np.asarray(stretches) / blocks.length), 0, len(blocks.z)).astype(int)
     count = present[edges[:, 1]] - present[edges[:, 0]]
@@ -135,12 +135,14 @@ def differences(
     return sign * (2.0 * mean[1:-1] - mean[:-2] - mean[2:]) / 4.0, white
 
 
-def alternation(blocks: LevelBlocks, stretches: Sequence[tuple[float, float]]) -> Alternation:
+def estimate_alternation(
+    blocks: LevelBlocks, stretches: Sequence[tuple[float, float]]
+) -> Alternation:
     """Return the mean of the A-B-A differences, with its standard error.
 
     The error assumes white noise with the observed scatter, and at least the noise of the blocks.
     """
-    return _average(*differences(blocks, stretches))
+    return _average(*compute_differences(blocks, stretches))
 
 
 def _average(difference: Array, white: Array) -> Alternation:
@@ -157,12 +159,12 @@ def _average(difference: Array, white: Array) -> Alternation:
     return Alternation(float(difference[finite].mean()), math.sqrt(variance))
 
 
-def contradiction(blocks: LevelBlocks, stretches: Sequence[tuple[float, float]]) -> int | None:
+def find_contradiction(blocks: LevelBlocks, stretches: Sequence[tuple[float, float]]) -> int | None:
     """Return the dwell from which the alternation has the opposite sign, or None.
 
     An extra or a missed turn inverts the sign of all later dwells. The result only raises a doubt.
     """
-    difference, white = differences(blocks, stretches)
+    difference, white = compute_differences(blocks, stretches)
     if len(difference) < 6:
         return None
     worst, place = _MIN_CONTRADICTION_SIGMAS, None
@@ -175,7 +177,7 @@ def contradiction(blocks: LevelBlocks, stretches: Sequence[tuple[float, float]])
     return place
 
 
-def best_shift(
+def find_best_shift(
     blocks: LevelBlocks, turns: Array, half_width: float, longest: float, duration: float
 ) -> tuple[float, float, float]:
     """Return the delay of the turns that maximises the alternation.
@@ -190,7 +192,9 @@ def best_shift(
     for shift in shifts:
         moved = turns + shift
         moved = moved[(moved > half_width) & (moved < duration - half_width)]
-        alternations.append(alternation(blocks, split_at_turns(moved, half_width, duration)))
+        alternations.append(
+            estimate_alternation(blocks, split_at_turns(moved, half_width, duration))
+        )
     z = np.array([shifted.value for shifted in alternations]) / np.median(
         [shifted.sigma for shifted in alternations]
     )

@@ -7,7 +7,7 @@ from typing import Any
 
 from imubench_pipeline.extensions.fusion.tables import PublishedFigureRow
 from imubench_pipeline.report import thermal
-from imubench_pipeline.report.payload import Arrays, channel_payload, looks
+from imubench_pipeline.report.payload import Arrays, pack_channel, pack_styles
 from imubench_pipeline.report.site import Entry, Site
 from imubench_pipeline.report.view import RecordingView
 from imubench_pipeline.words.numbers import limit_digits, number_text
@@ -30,14 +30,14 @@ def _make_context(site: Site) -> dict[str, Any]:
             rows = view.rows(PublishedFigureRow)
             channels = []
             for channel in view.channels():
-                payloads.append(channel_payload(channel, arrays))
+                payloads.append(pack_channel(channel, arrays))
                 own = (row for row in rows if row.channel == channel.channel)
                 channels.append(
                     {
                         "view": channel,
                         "figures": board["sensors"][view.sensor].get(channel.channel),
-                        "answer": thermal.answer(channel, site.system),
-                        "lines": list(published_lines(own)),
+                        "answer": thermal.describe_thermal(channel, site.system),
+                        "lines": list(make_published_lines(own)),
                     }
                 )
             sensors.append({"view": view, "name": site.names[view.sensor], "channels": channels})
@@ -55,7 +55,7 @@ def _make_context(site: Site) -> dict[str, Any]:
             }
         )
     used = {channel["sensor"]: site.looks[channel["sensor"]] for channel in payloads}
-    page = {"looks": looks(used), "channels": payloads, "arrays": arrays.texts}
+    page = {"looks": pack_styles(used), "channels": payloads, "arrays": arrays.texts}
     return {"boards": boards, "page": page}
 
 
@@ -85,7 +85,7 @@ BOARDS = Entry(
 """The page that shows every board."""
 
 
-def published_lines(rows: Iterable[PublishedFigureRow]) -> Iterator[dict[str, Any]]:
+def make_published_lines(rows: Iterable[PublishedFigureRow]) -> Iterator[dict[str, Any]]:
     """Yield the lines of the printed figures of a channel, from rows of ``published_figures``."""
     for row in rows:
         quantity = row.channel.split("_")[0]

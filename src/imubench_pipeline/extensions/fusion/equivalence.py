@@ -11,7 +11,7 @@ import numpy as np
 
 from imubench_pipeline.extensions.fusion.board import divided
 from imubench_pipeline.extensions.fusion.tables import FusionRow
-from imubench_pipeline.navigation.compared import ComparedChannel, number_needed
+from imubench_pipeline.navigation.compared import ComparedChannel, compute_number_needed
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.simulate import channel_rng
 from imubench_pipeline.typing import Array
@@ -134,8 +134,8 @@ def _compare_pair(row: FusionRow, a: Answer | str, b: Answer | str) -> FusionRow
         )
     if isinstance(a, str) or isinstance(b, str):
         return replace(row, reason="; ".join(reasons))
-    number = float(number_needed(a.own, a.common, b.own + b.common))
-    drawn = number_needed(a.drawn_own, a.drawn_common, b.drawn_own + b.drawn_common)
+    number = float(compute_number_needed(a.own, a.common, b.own + b.common))
+    drawn = compute_number_needed(a.drawn_own, a.drawn_common, b.drawn_own + b.drawn_common)
     # Infinite numbers cannot be interpolated.
     tails = [_TAIL_PROBABILITY, 1.0 - _TAIL_PROBABILITY]
     low, high = np.quantile(drawn, tails, method="inverted_cdf")

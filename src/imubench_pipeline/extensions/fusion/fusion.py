@@ -11,26 +11,26 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from imubench_pipeline.estimators.estimate import JointDraws
-from imubench_pipeline.estimators.rows import draws, estimate_of
+from imubench_pipeline.estimators.rows import make_estimate, read_draws
 from imubench_pipeline.extensions.fusion.equivalence import equivalence_rows
-from imubench_pipeline.extensions.fusion.grades import Grade, grade_rows
+from imubench_pipeline.extensions.fusion.grades import Grade, yield_grade_rows
 from imubench_pipeline.extensions.fusion.tables import RECORDINGS_OF_A_PAIR, FusionRow, GradeRow
 from imubench_pipeline.model.estimates import CompensatedAllanRow, ParameterRow, TemperatureRow
 from imubench_pipeline.model.recordings import RecordingRow
 from imubench_pipeline.model.table import ChannelRow, TableRow
 from imubench_pipeline.navigation.compared import ComparedChannel, TemperaturePart
 from imubench_pipeline.navigation.error_budget.printed_errors import SIGMAS
-from imubench_pipeline.recordings.fitness import left_out, with_doubts
+from imubench_pipeline.recordings.fitness import attach_doubts, list_excluded
 from imubench_pipeline.settings.config import FusionSettings
 from imubench_pipeline.settings.sensor import Sensor, sensors_of
 from imubench_pipeline.tables import build, read, write_arrow
-from imubench_pipeline.units import quantity_to_si
+from imubench_pipeline.units import parse_quantity
 
 NEEDED = ("recordings", "parameters", "allan_compensated", "temperature")
 """The tables of a run that the step reads."""
 
 
-def candidates(
+def yield_candidates(
     tables: Mapping[str, pa.Table],
     joint: Mapping[tuple[str, str], Path] | None,
     besides: Container[str] = (),
@@ -51,8 +51,8 @@ def candidates(
     for row in used:
         groups.setdefault((*_channel(row), row.method), []).append(row)
     about = {(row.sensor, row.recording): row for row in RecordingRow.rows_of(tables["recordings"])}
-    apart = left_out(about.values())
-    read = cache(draws)
+    apart = list_excluded(about.values())
+    read = cache(read_draws)
 
     def drawn(path: Path, channel: str, method: str) -> JointDraws | None:
         return read(path).get((channel, method))
@@ -68,7 +68,7 @@ def candidates(
             channel,
             of.simulated,
             of.duration or 0.0,
-            estimate_of(method, rows),
+            make_estimate(method, rows),
             warm.get((sensor, recording, channel)),
             partial(drawn, path, channel, method) if path else None,
         )
@@ -98,28 +98,28 @@ def _channel(row: ChannelRow) -> tuple[str, str, str]:
     return row.sensor, row.recording, row.channel
 
 
-def fusion_rows(
+def yield_fusion_rows(
     tables: Mapping[str, pa.Table],
     how: FusionSettings,
     joint: Mapping[tuple[str, str], Path] | None = None,
 ) -> Iterator[FusionRow]:
-    """Return the rows of the table ``fusion``; `tables` and `joint` as in `candidates`."""
+    """Return the rows of the table ``fusion``; `tables` and `joint` as in `yield_candidates`."""
     rows = equivalence_rows(
-        candidates(tables, joint),
-        [quantity_to_si(tau, "time") for tau in how.tau],
+        yield_candidates(tables, joint),
+        [parse_quantity(tau, "time") for tau in how.tau],
         how.common.model_dump(),
         longest=how.longest,
         draws=how.draws,
         seed=how.seed,
     )
-    return with_doubts(rows, RecordingRow.rows_of(tables["recordings"]), RECORDINGS_OF_A_PAIR)
+    return attach_doubts(rows, RecordingRow.rows_of(tables["recordings"]), RECORDINGS_OF_A_PAIR)
 
 
 TACTICAL_CLASS = "tactical"
 """First word of the price class of the target datasheets."""
 
 
-def grades_of_run(
+def yield_grades_of_run(
     tables: Mapping[str, pa.Table], sensors: Mapping[str, Sensor]
 ) -> Iterator[GradeRow]:
     """Return the rows of the table ``grades``, with sensors that are not sold, such as boards."""
@@ -129,7 +129,7 @@ def grades_of_run(
         if (sensor.price_class or "").split(" ")[0].strip(",") == TACTICAL_CLASS
     ]
     not_sold = {name for name, sensor in sensors.items() if not sensor.sold}
-    return grade_rows(candidates(tables, None, not_sold), grades)
+    return yield_grade_rows(yield_candidates(tables, None, not_sold), grades)
 
 
 def write_fusion(
@@ -147,8 +147,8 @@ def write_fusion(
     tables = {name: read(name, [Path(inputs[name])]) for name in NEEDED}
     of_recording = {(path.parts[-3], path.parts[-2]): path for path in joint}
     rows: dict[str, Iterator[TableRow]] = {
-        "fusion": fusion_rows(tables, how, of_recording),
-        "grades": grades_of_run(tables, sensors_of(catalogue)),
+        "fusion": yield_fusion_rows(tables, how, of_recording),
+        "grades": yield_grades_of_run(tables, sensors_of(catalogue)),
     }
     for name, own in rows.items():
         table = build(name, own)

@@ -11,7 +11,7 @@ import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
-from imubench_pipeline.datasheets.comparable import Comparable, comparables
+from imubench_pipeline.datasheets.comparable import Comparable, read_comparables
 from imubench_pipeline.estimators.estimate import Parameter
 from imubench_pipeline.extensions.fusion.tables import GradeRow
 from imubench_pipeline.navigation.compared import ComparedChannel
@@ -39,13 +39,13 @@ class Grade:
         options = dict.fromkeys(figure.option for figure in figures) or {None: None}
         for option in options:
             chosen = self.datasheet.model_copy(update={"options": [option] if option else []})
-            for one in comparables(chosen, channel):
+            for one in read_comparables(chosen, channel):
                 of_option = one.figure is None or one.figure.option in (None, option)
                 if one.statistic in PARAMETER_OF_STATISTIC and of_option:
                     yield option, one
 
 
-def grade_rows(
+def yield_grade_rows(
     candidates: Iterable[ComparedChannel], grades: Sequence[Grade]
 ) -> Iterator[GradeRow]:
     """Yield the rows of the table ``grades``: each sensor against each printed figure.

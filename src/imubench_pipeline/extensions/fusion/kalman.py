@@ -16,7 +16,7 @@ from scipy.linalg import block_diag, schur
 from scipy.sparse import csr_array
 
 from imubench_pipeline.extensions.fusion.board import Board, stochastic
-from imubench_pipeline.noise import GaussMarkov, bias_instability
+from imubench_pipeline.noise import GaussMarkov, compute_bias_instability
 from imubench_pipeline.noise.block_means import of_block_means
 from imubench_pipeline.typing import Array
 
@@ -187,7 +187,7 @@ def _build_state_space(board: Board) -> tuple[Array, Array, Array, Array]:
         noise = stochastic(model)
         if noise.K:  # the walk is replaced by a slow stable process
             time = _WALK_SURROGATE_TIME_RATIO * _MAX_FLICKER_TAU
-            walk = GaussMarkov(bias_instability(noise.K**2, time), time)
+            walk = GaussMarkov(compute_bias_instability(noise.K**2, time), time)
             noise = replace(noise, K=0.0, further=[*noise.further, walk])
         space = of_block_means(noise.state_space(rate, _MAX_FLICKER_TAU), size)
         spaces.append(space)

@@ -15,20 +15,20 @@ _PARAMETER_TEXTS = {"N": "white noise", "B": "bias instability", "K": "random wa
 
 
 def _make_context(site: Site) -> dict[str, Any]:
-    lines = list(equal_numbers(site.rows(FusionRow)))
+    lines = list(make_pair_lines(site.rows(FusionRow)))
     sensors = site.settings["sensors"]
     return {
         "lines": lines,
-        "matrices": list(matrices(lines)),
-        "grades": list(grade_lines(site.rows(GradeRow))),
-        "unprinted": unprinted_grades(site.rows(GradeRow)),
+        "matrices": list(make_matrices(lines)),
+        "grades": list(make_grade_lines(site.rows(GradeRow))),
+        "unprinted": find_unprinted_grades(site.rows(GradeRow)),
         "filters": {
             "tau": list(dict.fromkeys(line["tau"] for line in lines)),
             "quantity": list(dict.fromkeys(line["quantity"] for line in lines)),
             "wanted": list(dict.fromkeys(site.names[line["other"]] for line in lines)),
             "sensor": list(dict.fromkeys(site.names[line["sensor"]] for line in lines)),
         },
-        "shared": shared_words(site.settings["settings"]["fusion"]["common"]),
+        "shared": describe_common_errors(site.settings["settings"]["fusion"]["common"]),
         "price_classes": {name: sensors.get(name, {}).get("price_class") for name in site.sensors},
     }
 
@@ -39,7 +39,7 @@ FUSION = Entry(
 """The page that shows how many of one sensor match one of another."""
 
 
-def shared_words(common: Mapping[str, float]) -> str:
+def describe_common_errors(common: Mapping[str, float]) -> str:
     """Return the assumptions on common errors: the common shares of the variance of N, B, K, R."""
     named = [
         f"{percent_text(share)} of the variance of the {_PARAMETER_TEXTS[name]} ({name})"
@@ -55,7 +55,7 @@ def shared_words(common: Mapping[str, float]) -> str:
     )
 
 
-def equal_numbers(rows: Sequence[FusionRow]) -> Iterator[dict[str, Any]]:
+def make_pair_lines(rows: Sequence[FusionRow]) -> Iterator[dict[str, Any]]:
     """Yield the lines of the table: pairs whose first sensor is the noisier one, or unknown."""
     for row in rows:
         if row.adev is not None and row.other_adev is not None:
@@ -86,8 +86,8 @@ def equal_numbers(rows: Sequence[FusionRow]) -> Iterator[dict[str, Any]]:
         }
 
 
-def matrices(lines: Sequence[Mapping[str, Any]]) -> Iterator[dict[str, Any]]:
-    """Yield a matrix for each quantity and averaging time, from the lines of `equal_numbers`.
+def make_matrices(lines: Sequence[Mapping[str, Any]]) -> Iterator[dict[str, Any]]:
+    """Yield a matrix for each quantity and averaging time, from the lines of `make_pair_lines`.
 
     A cell has the number of row sensors that match one column sensor; the quietest come first.
     """
@@ -114,7 +114,7 @@ _MAX_MATRIX_SENSORS = 40
 """Largest number of sensors for which a matrix is readable."""
 
 
-def grade_lines(rows: Sequence[GradeRow]) -> Iterator[dict[str, Any]]:
+def make_grade_lines(rows: Sequence[GradeRow]) -> Iterator[dict[str, Any]]:
     """Yield the lines of the table of classes: one per sensor and option with printed figures."""
     groups: dict[tuple[str, ...], dict[str, GradeRow]] = {}
     for row in rows:
@@ -147,7 +147,7 @@ def grade_lines(rows: Sequence[GradeRow]) -> Iterator[dict[str, Any]]:
         }
 
 
-def unprinted_grades(rows: Sequence[GradeRow]) -> dict[str, str]:
+def find_unprinted_grades(rows: Sequence[GradeRow]) -> dict[str, str]:
     """Return the sensors of the class without printed figures of a quantity, and the reasons."""
     groups: dict[tuple[str, str], list[GradeRow]] = {}
     for row in rows:

@@ -40,7 +40,7 @@ _MAX_TAU_OVER_LENGTH = 1.0 / 9.0
 """Longest tau at which a curve is read, over the length of the log."""
 
 
-def published_rows(
+def yield_published_figures(
     truths: str, truth: Iterable[SimulatedTruthRow], tables: Mapping[str, pa.Table]
 ) -> Iterator[PublishedFigureRow]:
     """Yield the rows of the table ``published_figures`` of a sensor.

@@ -21,18 +21,18 @@ from imubench_pipeline.noise.simulate import channel_rng
 from imubench_pipeline.settings.sensor import TEMPERATURE
 from imubench_pipeline.settings.simulated_recordings import SimulatedRecording
 from imubench_pipeline.simulate.imu import ImuModel, simulate_imu
-from imubench_pipeline.simulate.models import Simulation, imu_model
+from imubench_pipeline.simulate.models import Simulation, make_imu_model
 from imubench_pipeline.simulate.profiles import Profile
 from imubench_pipeline.typing import Array
-from imubench_pipeline.units import quantity_to_si
+from imubench_pipeline.units import parse_quantity
 
 _SPREAD_PARAMETERS = ("N", "B", "K")
 """Parameters that differ between specimens."""
 
 
-def specimens_of(recording: SimulatedRecording) -> list[ImuModel]:
+def make_specimens(recording: SimulatedRecording) -> list[ImuModel]:
     """Return the models of the specimens of a recording: one where none are declared."""
-    whole = imu_model(recording.channels, recording)
+    whole = make_imu_model(recording.channels, recording)
     stated = recording.block(Specimens)
     if stated is None:
         return [whole]
@@ -48,13 +48,13 @@ def specimens_of(recording: SimulatedRecording) -> list[ImuModel]:
     return made
 
 
-def weights_of(models: Sequence[NoiseModel], rate: float) -> tuple[Board, Constant]:
+def make_board(models: Sequence[NoiseModel], rate: float) -> tuple[Board, Constant]:
     """Return the board of noise models at one rate, Hz, and the weights that fuse them."""
     board = Board(list(models), [rate] * len(models))
     return board, best_constant(board)
 
 
-def fused_model(models: Sequence[NoiseModel], weights: Constant) -> NoiseModel:
+def fuse_models(models: Sequence[NoiseModel], weights: Constant) -> NoiseModel:
     """Return the noise of fused specimens with equal correlation times: roots of sum w^2 p^2."""
     ratios = [
         np.linalg.norm(weights.values * [getattr(model, name) for model in models])
@@ -70,16 +70,16 @@ def _scale_model(model: NoiseModel, factors: Array) -> NoiseModel:
     return replace(model, N=n * model.N, B=b * model.B, K=k * model.K)
 
 
-def fused_blocks(
+def simulate_fused_blocks(
     recording: SimulatedRecording,
     motion: Mapping[str, Profile],
     temperature: Profile | None,
 ) -> Iterator[dict[str, Array]]:
     """Yield the blocks of a log of fused specimens, SI, and of their temperature, if any, °C."""
-    rate = quantity_to_si(recording.rate, "frequency")
-    models = specimens_of(recording)
+    rate = parse_quantity(recording.rate, "frequency")
+    models = make_specimens(recording)
     fusing = {
-        channel: weights_of([model.axes[channel].noise for model in models], rate)
+        channel: make_board([model.axes[channel].noise for model in models], rate)
         for channel in models[0].axes
     }
     logs = [
@@ -104,12 +104,12 @@ def fused_blocks(
         yield blocks
 
 
-def factors_of_fused(recording: SimulatedRecording, channel: str) -> dict[str, float]:
+def compute_fusion_factors(recording: SimulatedRecording, channel: str) -> dict[str, float]:
     """Return the noise of fused specimens, over the noise of one, by parameter."""
-    models = [model.axes[channel].noise for model in specimens_of(recording)]
-    of_kind = imu_model(recording.channels, recording).axes[channel].noise
-    _, weights = weights_of(models, quantity_to_si(recording.rate, "frequency"))
-    fused = fused_model(models, weights)
+    models = [model.axes[channel].noise for model in make_specimens(recording)]
+    of_kind = make_imu_model(recording.channels, recording).axes[channel].noise
+    _, weights = make_board(models, parse_quantity(recording.rate, "frequency"))
+    fused = fuse_models(models, weights)
     return {
         name: getattr(fused, name) / getattr(of_kind, name)
         for name in _SPREAD_PARAMETERS
@@ -117,5 +117,5 @@ def factors_of_fused(recording: SimulatedRecording, channel: str) -> dict[str, f
     }
 
 
-SPECIMENS = Simulation(fused_blocks, factors_of_fused)
+SPECIMENS = Simulation(simulate_fused_blocks, compute_fusion_factors)
 """How specimens on a board are simulated."""

@@ -7,10 +7,15 @@ import sys
 from importlib import import_module
 from pathlib import Path
 
-from imubench_pipeline.settings.command_line import LONGEST, Command, number, seconds
-from imubench_pipeline.settings.extras import extra
+from imubench_pipeline.settings.command_line import (
+    LONGEST,
+    Command,
+    make_number_type,
+    parse_seconds,
+)
+from imubench_pipeline.settings.extras import require_extra
 
-_TIME_TYPE = number(0.0, LONGEST, "a time, such as 10 s", seconds)
+_TIME_TYPE = make_number_type(0.0, LONGEST, "a time, such as 10 s", parse_seconds)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -48,10 +53,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Run the workflow on the logs that are complete; return the exit status."""
-    with extra("workflow", "run the workflow"):
+    with require_extra("workflow", "run the workflow"):
         import_module("snakemake")
     from imubench_pipeline.extensions.nightly.night import Night, TakenError
-    from imubench_pipeline.extensions.nightly.summary import STATUS, in_words
+    from imubench_pipeline.extensions.nightly.summary import STATUS, format_summary
     from imubench_pipeline.settings.validation import ConfigError
 
     try:
@@ -68,7 +73,7 @@ def run(options: argparse.Namespace) -> int:
         return 2
     status = STATUS[summary.outcome]
     if status or not options.quiet:
-        print(in_words(summary), end="", file=sys.stderr if status == 2 else sys.stdout)
+        print(format_summary(summary), end="", file=sys.stderr if status == 2 else sys.stdout)
     return status
 
 

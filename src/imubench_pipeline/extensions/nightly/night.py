@@ -14,24 +14,35 @@ from typing import Any
 
 import yaml
 
-from imubench_pipeline.extensions.nightly.running import errors, last_lines, run_snakemake
-from imubench_pipeline.extensions.nightly.settling import Found, Skip, look, moved, settled
+from imubench_pipeline.extensions.nightly.running import find_errors, read_last_lines, run_snakemake
+from imubench_pipeline.extensions.nightly.settling import (
+    Found,
+    Skip,
+    find_changed_logs,
+    find_settled_logs,
+    scan_drop_zone,
+)
 from imubench_pipeline.extensions.nightly.state import (
     State,
     StateError,
     load_tables,
+    make_state,
     read_state,
-    state_of,
 )
-from imubench_pipeline.extensions.nightly.summary import Skipped, Summary, compared, in_words
-from imubench_pipeline.report.drop_zone import drop_zone_lines
+from imubench_pipeline.extensions.nightly.summary import (
+    Skipped,
+    Summary,
+    compare_states,
+    format_summary,
+)
+from imubench_pipeline.report.drop_zone import describe_drop_zone
 from imubench_pipeline.run import recovery
-from imubench_pipeline.run.lock import Lock, TakenError, lock_of
-from imubench_pipeline.run.project import snakefile_of
+from imubench_pipeline.run.lock import Lock, TakenError, locate_lock
+from imubench_pipeline.run.project import find_snakefile
 from imubench_pipeline.settings.config import read_config, read_run
 from imubench_pipeline.settings.validation import ConfigError
 from imubench_pipeline.tables import write_content, write_json
-from imubench_pipeline.tables.seals import night_place, seal_files
+from imubench_pipeline.tables.seals import name_night_place, seal_files
 
 __all__ = ["Night", "TakenError"]
 
@@ -52,7 +63,7 @@ class Night:
 
     def __init__(self, project: Path, config: Sequence[str], flags: Sequence[str] = ()) -> None:
         self.project = project.absolute()
-        self._snakefile = snakefile_of(self.project)
+        self._snakefile = find_snakefile(self.project)
         if own := set(flags) & _OWN_FLAGS:
             raise ConfigError(f"{', '.join(own)}: expected --config of imubench nightly instead")
         file = self.project / "config/config.yaml"
@@ -80,7 +91,7 @@ class Night:
         another run, s (then a TakenError).
         """
         until = time.monotonic() + wait
-        with Lock(lock_of(self.results)) as lock, _interrupt_on_signals():
+        with Lock(locate_lock(self.results)) as lock, _interrupt_on_signals():
             lock.acquire(wait)
             self._began = datetime.now(UTC)
             self._log = self.folder / f"{self._began:%Y%m%dT%H%M%SZ}.log"
@@ -91,7 +102,7 @@ class Night:
                 before = None
                 self._put_right.append(str(error))
             self._recover(lock)
-            seen, skips = settled(self.logs, settle, before.logs if before else {})
+            seen, skips = find_settled_logs(self.logs, settle, before.logs if before else {})
             try:
                 failure = self._run_snakemake(cores, skips, lock)
             except OSError as error:
@@ -109,8 +120,8 @@ class Night:
 
     def _wait_for_others(self, until: float) -> None:
         """Wait for a Snakemake that a user runs on these results."""
-        while locks := recovery.snakemake_locks(self.project, self.results):
-            process = recovery.owner(locks, self.project, self.results)
+        while locks := recovery.find_snakemake_locks(self.project, self.results):
+            process = recovery.find_lock_owner(locks, self.project, self.results)
             if process is None:
                 return
             if time.monotonic() >= until:
@@ -118,7 +129,7 @@ class Night:
             time.sleep(min(_RETRY_INTERVAL, max(until - time.monotonic(), 0.0)))
 
     def _recover(self, lock: Lock) -> None:
-        locks = recovery.snakemake_locks(self.project, self.results)
+        locks = recovery.find_snakemake_locks(self.project, self.results)
         note = lock.left_over
         if locks and not note:
             since = datetime.fromtimestamp(locks[0].stat().st_mtime, UTC)
@@ -129,7 +140,7 @@ class Night:
             self._put_right.append(f"steps that still ran, and were ended: {ended}")
         for path in locks:
             path.unlink(missing_ok=True)
-        if recovery.restarted(note) and (doubtful := recovery.remove_doubtful(self.results)):
+        if recovery.was_restarted(note) and (doubtful := recovery.remove_doubtful(self.results)):
             self._put_right.append(
                 f"the machine was restarted: files of its last minute made again: {doubtful}"
             )
@@ -150,9 +161,9 @@ class Night:
         status = run_snakemake(arguments, self.project, self._log, lock)
         if status == 0:
             return []
-        messages = [f"a step said: {error}" for error in errors(self._log)[:_MAX_ERRORS]]
+        messages = [f"a step said: {error}" for error in find_errors(self._log)[:_MAX_ERRORS]]
         why = f"Snakemake ended with exit status {status}; the last lines of its log:"
-        return [*messages, why, *last_lines(self._log)]
+        return [*messages, why, *read_last_lines(self._log)]
 
     def _summarise(
         self,
@@ -171,15 +182,15 @@ class Night:
             except (OSError, ValueError) as error:
                 failure = [f"the tables cannot be read: {error}"]
         held_back = {skip.recording for skip in skips if skip.held_back}
-        late = sorted(moved(seen, look(self.logs)) - held_back)
+        late = sorted(find_changed_logs(seen, scan_drop_zone(self.logs)) - held_back)
         skips = [*skips, *(Skip(name, _CHANGED_WHILE_READ, held_back=False) for name in late)]
         was_skipped = before.skipped if before else {}
         since = {skip.recording: was_skipped.get(skip.recording, self._began) for skip in skips}
         if tables is not None:
             logs = {name: log.files for name, log in seen.items() if name not in held_back}
-            after = state_of(tables, finished, logs, since)
-            fields = compared(before, after, tables, late)
-            fields["files"] = drop_zone_lines(self.results)
+            after = make_state(tables, finished, logs, since)
+            fields = compare_states(before, after, tables, late)
+            fields["files"] = describe_drop_zone(self.results)
             analysed = after.recordings
             after = after.without(late, before)
         fields["skipped"] = [
@@ -213,13 +224,13 @@ class Night:
         for name in (self._log.stem, "latest"):
             files = [self.folder / f"{name}.{kind}" for kind in ("json", "txt")]
             write_content(summary.model_dump_json(indent=1) + "\n", files[0])
-            write_content(in_words(summary), files[1])
+            write_content(format_summary(summary), files[1])
             log = [self._log] if name != "latest" and self._log.is_file() else []
-            seal_files(self.results, night_place(name), [*files, *log], {})
+            seal_files(self.results, name_night_place(name), [*files, *log], {})
         # Last: if the summary was not written, the next run reports the same news.
         if after is not None:
             after.write(self._state)
-            seal_files(self.results, night_place("state"), [self._state], {})
+            seal_files(self.results, name_night_place("state"), [self._state], {})
 
 
 @contextmanager

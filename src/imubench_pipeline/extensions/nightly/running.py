@@ -105,12 +105,12 @@ class _Terminal:
         self._last = text if text or not _ERASED_LINE.match(line) else None
 
 
-def errors(path: Path) -> list[str]:
+def find_errors(path: Path) -> list[str]:
     """Return the errors of failed steps from the output of a run, each once."""
     return list(dict.fromkeys(_TRACEBACK.findall(_read_output(path))))
 
 
-def last_lines(path: Path) -> list[str]:
+def read_last_lines(path: Path) -> list[str]:
     """Return the last lines of the output of a run, without empty ones."""
     lines = [line.rstrip() for line in _read_output(path).splitlines() if line.strip()]
     return lines[-_MAX_LAST_LINES:]

@@ -18,8 +18,13 @@ from pathlib import Path
 
 import psutil
 
-from imubench_pipeline.recordings.drop_zone import PARTIAL, found_logs, name_of, sensor_of
-from imubench_pipeline.report.run_summary import one_line
+from imubench_pipeline.recordings.drop_zone import (
+    PARTIAL,
+    find_logs,
+    get_recording_name,
+    get_sensor_name,
+)
+from imubench_pipeline.report.run_summary import fold_text
 
 Signature = tuple[tuple[str, int, int], ...]
 """Path, size in bytes and last change in ns of each file of a recording."""
@@ -48,28 +53,28 @@ class Skip:
     held_back: bool = True  # False: there is a complete log, too, or the transfer was given up
 
 
-def look(logs: Path) -> dict[str, Found]:
+def scan_drop_zone(logs: Path) -> dict[str, Found]:
     """Scan a drop zone, which may be missing; return its files by sensor and recording."""
     recordings: dict[str, Found] = {}
     if not logs.is_dir():
         return recordings
-    for log in found_logs(logs):
+    for log in find_logs(logs):
         key = f"{log.sensor}/{log.name}"
         before = recordings.get(key, Found())
         partial = next(_find_partial_files(log.path), before.partial)
         files = tuple(_stat_file(path) for path in log.files or [log.path])
         recordings[key] = Found(before.files + files, partial, partial is not None)
     for path in sorted(logs.glob("*/*")):
-        whole = complete_name(path.name)
+        whole = find_complete_name(path.name)
         if whole is not None and path.is_file():
-            key = f"{sensor_of(path.parent)}/{name_of(whole)}"
+            key = f"{get_sensor_name(path.parent)}/{get_recording_name(whole)}"
             before = recordings.get(key, Found())
             if not before.incomplete:
                 recordings[key] = Found(before.files, _stat_file(path, path.parent))
     return recordings
 
 
-def complete_name(name: str) -> str | None:
+def find_complete_name(name: str) -> str | None:
     """Return the name that a file will have once it is complete; None if it is complete.
 
     It may be ``run.csv.part``, ``.run.csv.Xy12Zq`` (rsync) or ``.run.csv``.
@@ -85,7 +90,7 @@ def complete_name(name: str) -> str | None:
     return whole if whole != name and Path(whole).suffix else None
 
 
-def settled(
+def find_settled_logs(
     logs: Path, settle: float, earlier: Mapping[str, Signature]
 ) -> tuple[dict[str, Found], list[Skip]]:
     """Return the last scan of a drop zone, and the logs that are still being written.
@@ -93,14 +98,16 @@ def settled(
     A complete log has not changed for ``settle``, s. Logs that are as they were at an ``earlier``
     run need no second scan.
     """
-    first = second = look(logs)
+    first = second = scan_drop_zone(logs)
     if settle and any(earlier.get(key) != recording.files for key, recording in first.items()):
         time.sleep(min(settle, _MAX_PAUSE))
-        second = look(logs)
-    return second, list(unsettled(first, second, settle, time.time(), writers(second)))
+        second = scan_drop_zone(logs)
+    return second, list(
+        find_unsettled_logs(first, second, settle, time.time(), find_writers(second))
+    )
 
 
-def unsettled(
+def find_unsettled_logs(
     first: Mapping[str, Found],
     second: Mapping[str, Found],
     settle: float,
@@ -109,7 +116,7 @@ def unsettled(
 ) -> Iterator[Skip]:
     """Yield the logs that are still being written, from two scans.
 
-    ``settle`` is as in `settled`, ``now`` the time of the second scan, s since 1970, and
+    ``settle`` is as in `find_settled_logs`, ``now`` the time of the second scan, s since 1970, and
     ``writing`` has the files that are open for writing, with their process.
     """
     for key in sorted(first.keys() | second.keys()):
@@ -134,11 +141,11 @@ def _describe_transfer(partial: tuple[str, int, int], now: float) -> str:
     path, _, stamp = partial
     days = (now - stamp * 1e-9) / _MAX_TRANSFER_PAUSE
     if days < 1.0:
-        return one_line(f"{path} is still being transferred")
-    return one_line(f"{path} is not complete, and nothing was written to it for {days:.0f} days")
+        return fold_text(f"{path} is still being transferred")
+    return fold_text(f"{path} is not complete, and nothing was written to it for {days:.0f} days")
 
 
-def writers(recordings: Mapping[str, Found]) -> dict[Path, str]:
+def find_writers(recordings: Mapping[str, Found]) -> dict[Path, str]:
     """Return the files of recordings that are open for writing, with their process.
 
     Only accessible processes are checked: the user's own, or all for an administrator.
@@ -149,11 +156,13 @@ def writers(recordings: Mapping[str, Found]) -> dict[Path, str]:
         with contextlib.suppress(psutil.Error, OSError):
             for file in process.open_files():
                 if getattr(file, "mode", "r") != "r" and Path(file.path) in looked_for:
-                    writing[Path(file.path)] = one_line(f"process {process.pid} ({process.name()})")
+                    writing[Path(file.path)] = fold_text(
+                        f"process {process.pid} ({process.name()})"
+                    )
     return writing
 
 
-def moved(before: Mapping[str, Found], after: Mapping[str, Found]) -> set[str]:
+def find_changed_logs(before: Mapping[str, Found], after: Mapping[str, Found]) -> set[str]:
     """Return the recordings whose logs changed or appeared between two scans."""
     return {key for key, log in after.items() if before.get(key, Found()).files != log.files}
 
@@ -179,5 +188,5 @@ def _find_partial_files(path: Path) -> Iterator[tuple[str, int, int]]:
         for file in sorted(path.rglob("*")):
             # Other hidden files are no part of a recording.
             named = file.suffix.lower() in PARTIAL or _RSYNC_NAME.fullmatch(file.name)
-            if named and complete_name(file.name) and file.is_file():
+            if named and find_complete_name(file.name) and file.is_file():
                 yield _stat_file(file, path.parent)

@@ -17,7 +17,7 @@ from imubench_pipeline.model.comparisons import DriftRow, RankingRow
 from imubench_pipeline.model.estimates import FixedBiasRow, ParameterRow
 from imubench_pipeline.model.recordings import FailureRow, FindingRow, RecordingRow
 from imubench_pipeline.model.table import OfRecordingRow, R
-from imubench_pipeline.report.run_summary import serious
+from imubench_pipeline.report.run_summary import select_warnings
 from imubench_pipeline.tables import read
 from imubench_pipeline.tables.digests import read_sealed_json, write_sealed_json
 
@@ -140,7 +140,7 @@ def load_tables(results: Path) -> RunRows:
     )
 
 
-def state_of(
+def make_state(
     tables: RunRows,
     finished: datetime,
     logs: Mapping[str, Signature],
@@ -148,17 +148,17 @@ def state_of(
 ) -> State:
     """Return the state after a run, of tables as of `load_tables` and the logs that were read."""
     rejected = {
-        name_in(row): row.reason or "no reason is kept"
+        get_recording_name(row): row.reason or "no reason is kept"
         for row in tables.recordings
         if row.status == "rejected"
     }
     # The digest of the rows of a recording changes with its outcome.
-    digests = {name_in(row): hashlib.sha256() for row in tables.recordings}
+    digests = {get_recording_name(row): hashlib.sha256() for row in tables.recordings}
     rows: list[RecordingRow | ParameterRow | FixedBiasRow]
     rows = [*tables.recordings, *tables.parameters, *tables.fixed_bias]
     for row in rows:
         columns = json.dumps(row.columns(), sort_keys=True, default=asdict)
-        digests[name_in(row)].update(columns.encode())
+        digests[get_recording_name(row)].update(columns.encode())
     return State(
         finished=finished,
         logs=dict(logs),
@@ -166,34 +166,34 @@ def state_of(
             name: Known(digest.hexdigest()[:16], rejected.get(name))
             for name, digest in digests.items()
         },
-        warned=sorted({warned(row) for row in serious(tables.findings)}, key=str),
-        drifted=sorted({drifted(row) for row in changes(tables.drift)}),
-        leaders=leading(tables.ranking),
+        warned=sorted({make_warning_key(row) for row in select_warnings(tables.findings)}, key=str),
+        drifted=sorted({make_drift_key(row) for row in select_changed_devices(tables.drift)}),
+        leaders=find_leaders(tables.ranking),
         skipped=dict(skipped),
     )
 
 
-def name_in(row: OfRecordingRow | RecordingRow | FailureRow | DriftRow) -> str:
+def get_recording_name(row: OfRecordingRow | RecordingRow | FailureRow | DriftRow) -> str:
     """Return sensor and name of the recording of a row."""
     return f"{row.sensor}/{row.recording}"
 
 
-def warned(row: FindingRow) -> Warned:
+def make_warning_key(row: FindingRow) -> Warned:
     """Return the key of a finding."""
-    return Warned(name_in(row), row.channel, row.finding)
+    return Warned(get_recording_name(row), row.channel, row.finding)
 
 
-def changes(drift: Iterable[DriftRow]) -> list[DriftRow]:
+def select_changed_devices(drift: Iterable[DriftRow]) -> list[DriftRow]:
     """Return the rows of devices that have changed."""
     return [row for row in drift if row.verdict == "changed"]
 
 
-def drifted(row: DriftRow) -> Drifted:
+def make_drift_key(row: DriftRow) -> Drifted:
     """Return the key of a row of the table ``drift``."""
     return Drifted(row.sensor, row.device, row.channel, row.parameter, row.recording)
 
 
-def leading(ranking: Iterable[RankingRow]) -> dict[str, Leader | None]:
+def find_leaders(ranking: Iterable[RankingRow]) -> dict[str, Leader | None]:
     """Return the best sensor for each requirement; None if no sensor can be ranked."""
     first: dict[str, Leader | None] = {}
     margins: dict[str, float] = {}

@@ -12,12 +12,17 @@ from imubench_pipeline.extensions.nightly.state import (
     Known,
     RunRows,
     State,
-    changes,
-    drifted,
-    name_in,
-    warned,
+    get_recording_name,
+    make_drift_key,
+    make_warning_key,
+    select_changed_devices,
 )
-from imubench_pipeline.report.run_summary import leaders, left_out, one_line, serious
+from imubench_pipeline.report.run_summary import (
+    fold_text,
+    list_best_sensors,
+    list_failures,
+    select_warnings,
+)
 
 Outcome = Literal["fine", "flagged", "failed"]
 
@@ -119,7 +124,7 @@ class Summary(BaseModel):
     log: str = ""
 
 
-def compared(
+def compare_states(
     before: State | None, after: State, tables: RunRows, without: Iterable[str]
 ) -> dict[str, Any]:
     """Return the changes of a state since the last successful run, as fields of the summary.
@@ -140,7 +145,7 @@ def compared(
                     requirement=name,
                     sensor=leader and leader.sensor,
                     before=old and f"{old.sensor}{', which failed it' * (not old.fulfils)}",
-                    said=next(leaders(of_it, tables.recordings)),
+                    said=next(list_best_sensors(of_it, tables.recordings)),
                 )
             )
     fields: dict[str, Any] = {
@@ -161,7 +166,7 @@ def compared(
         "failed": [
             Failed(**row.columns())
             for row in tables.failures
-            if row.recording is None or name_in(row) not in written_to
+            if row.recording is None or get_recording_name(row) not in written_to
         ],
         "rejected": [
             Rejected(
@@ -173,14 +178,15 @@ def compared(
             if outcome.rejected is not None
         ],
         "warnings": [
-            NewWarning.model_validate({**row.columns(), "recording": name_in(row)})
-            for row in serious(tables.findings)
-            if name_in(row) not in written_to and warned(row) not in known_warnings
+            NewWarning.model_validate({**row.columns(), "recording": get_recording_name(row)})
+            for row in select_warnings(tables.findings)
+            if get_recording_name(row) not in written_to
+            and make_warning_key(row) not in known_warnings
         ],
         "drift": [
             Drift.model_validate(row.columns())
-            for row in changes(tables.drift)
-            if name_in(row) not in written_to and drifted(row) not in known_drift
+            for row in select_changed_devices(tables.drift)
+            if get_recording_name(row) not in written_to and make_drift_key(row) not in known_drift
         ],
         "first": first,
     }
@@ -190,7 +196,7 @@ def compared(
     return fields | {"outcome": outcome}
 
 
-def in_words(summary: Summary) -> str:
+def format_summary(summary: Summary) -> str:
     """Return a summary as text."""
     new = sum(rejection.new for rejection in summary.rejected)
     counts = (
@@ -208,13 +214,13 @@ def in_words(summary: Summary) -> str:
     finished = _format_time(summary.finished)
     lines = [f"imubench nightly: {summary.outcome}, {finished}, took {took}"]
     if summary.failure:
-        lines += ["", "why it failed:", *(f"  {one_line(line, 500)}" for line in summary.failure)]
+        lines += ["", "why it failed:", *(f"  {fold_text(line, 500)}" for line in summary.failure)]
     else:
         lines.append(f"recordings, {since}: {counts}")
     rejected = sorted(summary.rejected, key=lambda rejection: not rejection.new)
     sections = {
         "failed, left out of a report that is there, and tried again next time": [
-            *left_out(summary.failed)
+            *list_failures(summary.failed)
         ],
         "new": summary.new,
         "analysed again": [f"{change.recording}: {change.because}" for change in summary.changed],
@@ -243,7 +249,7 @@ def in_words(summary: Summary) -> str:
         if entries:
             more = len(entries) - _MAX_LINES
             shown = entries if more <= 1 else [*entries[:_MAX_LINES], f"and {more} more"]
-            lines += ["", f"{title}:", *(f"  {one_line(line, 300)}" for line in shown)]
+            lines += ["", f"{title}:", *(f"  {fold_text(line, 300)}" for line in shown)]
     lines += ["", f"report: {summary.report}", f"log: {summary.log}"]
     return "\n".join(lines) + "\n"
 

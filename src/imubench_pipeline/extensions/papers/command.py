@@ -43,15 +43,15 @@ def run(arguments: argparse.Namespace) -> int:
     from imubench_pipeline.report.show import show
 
     if arguments.results is None:
-        from imubench_pipeline.extensions.papers.papers import rows_without_a_run
+        from imubench_pipeline.extensions.papers.papers import make_rows_without_run
 
-        rows = list(rows_without_a_run())
+        rows = list(make_rows_without_run())
         expected = "without the results of a run: what needs no log"
     else:
-        from imubench_pipeline.tables import read, tables_of_run
+        from imubench_pipeline.tables import find_tables, read
 
         try:
-            path = tables_of_run(arguments.results, ["published"])["published"]
+            path = find_tables(arguments.results, ["published"])["published"]
             rows = PublishedRow.rows_of(read("published", [path]))
         except (OSError, ValueError) as error:
             print(error, file=sys.stderr)
@@ -83,20 +83,20 @@ def _make_parts(title: str, rows: Sequence[PublishedRow], width: int) -> Iterato
     """Yield the table of a paper, and the reasons for differences."""
     from rich.text import Text
 
-    from imubench_pipeline.extensions.papers.page import cells
+    from imubench_pipeline.extensions.papers.page import format_cells
     from imubench_pipeline.extensions.papers.printed import read_terms
-    from imubench_pipeline.report.terminal_table import fitting
+    from imubench_pipeline.report.terminal_table import fit_table
 
     reasons = list(dict.fromkeys(row.reason for row in rows if row.reason))
     lines: list[list[str | Text]] = []
     for row in rows:
-        shown = cells(row)
+        shown = format_cells(row)
         note = f" [{reasons.index(row.reason) + 1}]" if row.reason else ""
         ratio = f"{shown['ratio_text']} {shown['tolerance_text']}".strip()
         texts = [row.place, row.quantity, row.printed_as, shown["found_text"], ratio]
         lines.append([*texts, row.verdict + note])
     heads = ["Place", "Quantity", "Printed", "Result", "Ratio", "Verdict"]
-    yield fitting(title, heads, lines, width, names=1)
+    yield fit_table(title, heads, lines, width, names=1)
     yield Text()
     yield Text(_RATIO_LEGEND)
     for number, reason in enumerate(reasons, start=1):

@@ -16,9 +16,9 @@ from imubench_pipeline.extensions.papers.maia_draws import (
     GRIDS,
     MTI_GYRO,
     Grid,
-    lottery,
-    lowest_point,
-    readings,
+    find_lowest_point,
+    simulate_lottery,
+    simulate_readings,
 )
 from imubench_pipeline.extensions.papers.printed import parse_number, read_paper
 from imubench_pipeline.model.estimates import ParameterRow, ScoreRow
@@ -30,11 +30,11 @@ from imubench_pipeline.noise import (
     NoiseModel,
     RandomWalk,
     WhiteNoise,
-    driving_density,
+    compute_driving_density,
 )
-from imubench_pipeline.noise.variance_covariance import variance_covariance
+from imubench_pipeline.noise.variance_covariance import compute_variance_covariance
 from imubench_pipeline.settings.sensor import quantity_of
-from imubench_pipeline.units import to_si
+from imubench_pipeline.units import convert_to_si
 
 _SUPERSCRIPTS = str.maketrans("0123456789-", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻")
 _FIGURES = read_paper("maia").figures
@@ -90,14 +90,14 @@ def read_curve(run: Evidence, key: str, symbol: str) -> Result:
     """Return the value read from the curve of Table 2: of the model, and of single logs."""
     channel = CHANNELS[key]
     model = channel.table_2
-    tau, level = lowest_point(model)
+    tau, level = find_lowest_point(model)
     read = {
         "N": math.sqrt(float(model.allan_variance(1.0))),
         "B": level / FLOOR,
         "T_B": tau / PEAK_TAU,
         "K": math.sqrt(float(model.allan_variance(DURATION / 9.0)) * 3.0 / (DURATION / 9.0)),
     }[symbol]
-    lower, _, upper = readings(channel)[symbol]
+    lower, _, upper = simulate_readings(channel)[symbol]
     simulated = _describe(run.parameter(channel.log, symbol, "curve"), "; in the simulated log")
     return Result(value=read, lower=lower, upper=upper, fields={"simulated": simulated})
 
@@ -106,7 +106,7 @@ def find_lowest_of_table_1(_: Evidence, key: str, quantity: str) -> Result:
     """Return tau or deviation of the lowest point of Table 1, with 1.89 T_B or 0.664 B, SI."""
     model = CHANNELS[key].table_1
     assert model.T_B is not None
-    tau, level = lowest_point(model)
+    tau, level = find_lowest_point(model)
     peak, floor = 1.89 * model.T_B, FLOOR * model.B
     process = math.sqrt(float(NoiseModel(B=model.B, T_B=model.T_B).allan_variance(tau)))
     fields = {
@@ -145,7 +145,7 @@ def compute_error_in_use(_: Evidence, key: str, quantity: Quantity) -> Result:
 
 def summarise_draws(_: Evidence, key: str, table: str, grid: Grid) -> Result:
     """Return the median and 90 % range of the RMS of single reconstructions."""
-    spread = lottery(CHANNELS[key], grid)
+    spread = simulate_lottery(CHANNELS[key], grid)
     place = ("table_1", "table_2").index(table)
     lower, median, upper = spread.ranges[place]
     return Result(
@@ -168,7 +168,7 @@ def _count_in_range() -> dict[str, int]:
     """Return how many figures of Table 3 are within the range of each grid."""
     inside: dict[str, int] = dict.fromkeys(GRIDS, 0)
     for grid, channel in product(GRIDS, CHANNELS.values()):
-        spread = lottery(channel, grid)
+        spread = simulate_lottery(channel, grid)
         for (lower, _, upper), printed in zip(spread.ranges, channel.table_3, strict=True):
             inside[grid] += lower <= printed <= upper
     return inside
@@ -176,7 +176,7 @@ def _count_in_range() -> dict[str, int]:
 
 def compute_chance_of_order(_: Evidence, key: str) -> Result:
     """Return the chance that a reconstruction by Table 1 has the lower RMS."""
-    steps, every = (lottery(CHANNELS[key], grid) for grid in GRIDS)
+    steps, every = (simulate_lottery(CHANNELS[key], grid) for grid in GRIDS)
     return Result(
         value=round(steps.beats, 2),  # so few draws do not tell it finer
         verdict="agrees" if steps.beats < 0.05 else "differs",
@@ -199,7 +199,7 @@ def get_weighted_rms(run: Evidence, key: str, method: str) -> Result | None:
 def convert_vendor_figure(_: Evidence, symbol: str, key: str) -> float:
     """Return the figure of the vendor behind one of Table 4, SI."""
     row = _TABLE_4[symbol][key]
-    return to_si(float(row["vendor"]), row["in"], row["dimension"])
+    return convert_to_si(float(row["vendor"]), row["in"], row["dimension"])
 
 
 def compare_with_vendor(run: Evidence, symbol: str, key: str, table: str) -> Result:
@@ -209,7 +209,7 @@ def compare_with_vendor(run: Evidence, symbol: str, key: str, table: str) -> Res
     if symbol == "N":
         value = model.N / (vendor / math.sqrt(2.0))
     else:
-        value = lowest_point(model)[1] / vendor
+        value = find_lowest_point(model)[1] / vendor
     printed = float(getattr(model, symbol)) / read_manufacturer(symbol, key)
     own = f"{printed:.2f}".replace(".", ",")
     return Result(value=value, printed=printed, fields={"own": own})
@@ -268,7 +268,7 @@ def compute_datasheet_floor(_: Evidence, key: str) -> Result:
     floor = FLOOR * read_manufacturer("B", key)
     shown = _format_power(floor, 2).replace(".", ",")
     return Result(
-        value=lowest_point(CHANNELS[key].table_2)[1], printed=floor, fields={"floor": shown}
+        value=find_lowest_point(CHANNELS[key].table_2)[1], printed=floor, fields={"floor": shown}
     )
 
 
@@ -295,7 +295,7 @@ def evaluate_as_printed(model: NoiseModel, tau: float) -> float:
     assert model.T_B is not None
     T_B, x = model.T_B, tau / model.T_B
     bracket = 1.0 - (3.0 - 4.0 * math.exp(x) + math.exp(-2.0 * x)) / (2.0 * x)
-    driven = driving_density(model.B, T_B) * T_B**2 / tau * bracket
+    driven = compute_driving_density(model.B, T_B) * T_B**2 / tau * bracket
     return model.N**2 / tau + driven + model.K**2 * tau / 3.0
 
 
@@ -307,7 +307,7 @@ def compute_weight_ratios(tau: float) -> tuple[float, float]:
     """
     samples, n = round(DURATION * _RATE), round(tau * _RATE)
     variance = float(_MODEL.allan_variance(tau, _RATE))
-    spread = math.sqrt(variance_covariance(_MODEL, _RATE, samples, np.array([n]))[0, 0])
+    spread = math.sqrt(compute_variance_covariance(_MODEL, _RATE, samples, np.array([n]))[0, 0])
     meant = 2.0 * math.sqrt(n / (2.0 * samples)) * variance
     return spread / meant, spread / (meant / math.sqrt(variance))
 
@@ -321,7 +321,7 @@ def evaluate_equation(_: Evidence, number: str) -> Result:
 def _evaluate_equations() -> dict[str, Result]:
     N, B, K, T_B, T = _MODEL.N, _MODEL.B, _MODEL.K, _PROCESS.T_B, 1.0 / _RATE
     f, omega = np.array(1e-3), 2.0 * math.pi * 1e-3
-    space, driven = _MODEL.state_space(_RATE), driving_density(B, T_B)
+    space, driven = _MODEL.state_space(_RATE), compute_driving_density(B, T_B)
     parts = [NoiseModel(N=N), NoiseModel(B=B, T_B=T_B), NoiseModel(K=K)]
     of_parts = sum(part.allan_variance(_DEFAULT_TAU) for part in parts)
     decay = _PROCESS.state_space(T_B).transition[0, 0]

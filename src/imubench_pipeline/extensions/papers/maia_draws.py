@@ -91,7 +91,7 @@ class Lottery:
     slow: float  # share of the mean square that comes of tau beyond 300 s, by Table 2
 
 
-def sizes(channel: Channel, grid: str) -> NDArray[np.int64]:
+def choose_cluster_sizes(channel: Channel, grid: str) -> NDArray[np.int64]:
     """Return the cluster sizes of a grid of `GRIDS`, or ("read") of reading a curve, shape (m,)."""
     longest = round(DURATION * channel.rate) // 2
     if grid == "steps":
@@ -105,13 +105,13 @@ def sizes(channel: Channel, grid: str) -> NDArray[np.int64]:
 
 
 @cache
-def lottery(channel: Channel, grid: Grid) -> Lottery:
+def simulate_lottery(channel: Channel, grid: Grid) -> Lottery:
     """Return the spread of Table 3 for logs with the model of Table 2.
 
     Each of `MEMBERS` logs stands for the measured one, and is held against as many reconstructions
     by Table 1 and, of other draws, by Table 2.
     """
-    n = sizes(channel, grid)
+    n = choose_cluster_sizes(channel, grid)
     measured, *drawn = (curves[grid] for curves in _simulate_deviations(channel))
     of_each = [rms(one[:, None, :], measured[None, :, :]) for one in drawn]
     chances = [
@@ -131,12 +131,12 @@ def lottery(channel: Channel, grid: Grid) -> Lottery:
 
 
 @cache
-def readings(channel: Channel) -> dict[str, Range]:
+def simulate_readings(channel: Channel) -> dict[str, Range]:
     """Return what reading the curves of single logs of Table 2 gives of N, B, K and T_B.
 
     N is read at 1 s, K at a ninth of the log, B and T_B at the lowest point between them.
     """
-    tau = sizes(channel, "read") / channel.rate
+    tau = choose_cluster_sizes(channel, "read") / channel.rate
     curves = _simulate_deviations(channel)[0]["read"]
     return {
         "N": _compute_range(curves[:, 0] * math.sqrt(tau[0])),
@@ -149,7 +149,7 @@ def readings(channel: Channel) -> dict[str, Range]:
 @cache
 def _simulate_deviations(channel: Channel) -> tuple[dict[str, Array], ...]:
     """Return Allan deviations: of logs of Table 2, of draws by Table 1, of others by Table 2."""
-    grids = {grid: sizes(channel, grid) for grid in (*GRIDS, "read")}
+    grids = {grid: choose_cluster_sizes(channel, grid) for grid in (*GRIDS, "read")}
     together = np.unique(np.concatenate(list(grids.values())))
     samples = round(DURATION * channel.rate)
 
@@ -171,7 +171,7 @@ def _compute_range(values: Array) -> Range:
 
 
 @cache
-def lowest_point(model: NoiseModel) -> tuple[float, float]:
+def find_lowest_point(model: NoiseModel) -> tuple[float, float]:
     """Return tau, s, and Allan deviation, SI, of the lowest point of a curve from 1 s on."""
     tau = np.geomspace(1.0, DURATION / 2.0, 20_001)
     variance = model.allan_variance(tau)

@@ -8,7 +8,7 @@ from typing import Any
 
 from imubench_pipeline.extensions.papers.printed import Drawn, Paper, read_papers, read_terms
 from imubench_pipeline.extensions.papers.tables import AccuracyRow, PublishedRow
-from imubench_pipeline.report.payload import Arrays, channel_payload, looks
+from imubench_pipeline.report.payload import Arrays, pack_channel, pack_styles
 from imubench_pipeline.report.search import Found
 from imubench_pipeline.report.site import Entry, Section, Site
 from imubench_pipeline.report.view import ChannelView, RecordingView
@@ -21,7 +21,7 @@ def _make_context(site: Site) -> dict[str, Any]:
     rows = site.rows(PublishedRow)
     arrays = Arrays()
     drawn = _select_curves(site)
-    payloads = [channel_payload(channel, arrays) for _, _, channel in drawn]
+    payloads = [pack_channel(channel, arrays) for _, _, channel in drawn]
     used = {channel["sensor"]: site.looks[channel["sensor"]] for channel in payloads}
     return {
         "bases": read_terms().bases,
@@ -33,7 +33,7 @@ def _make_context(site: Site) -> dict[str, Any]:
             for paper in read_papers()
             if (own := [row for row in rows if row.paper == paper.name])
         ],
-        "page": {"looks": looks(used), "channels": payloads, "arrays": arrays.texts},
+        "page": {"looks": pack_styles(used), "channels": payloads, "arrays": arrays.texts},
     }
 
 
@@ -109,7 +109,7 @@ def _describe_paper(paper: Paper, rows: Sequence[PublishedRow], there: set[str])
             {
                 **row.columns(),
                 "page": row.page if (row.page or "").split("#")[0] in there else None,
-                **cells(row),
+                **format_cells(row),
             }
             for row in rows
         ],
@@ -125,7 +125,7 @@ def _describe_paper(paper: Paper, rows: Sequence[PublishedRow], there: set[str])
     }
 
 
-def cells(row: PublishedRow) -> dict[str, str]:
+def format_cells(row: PublishedRow) -> dict[str, str]:
     """Return result, ratio and tolerance of a row of ``published``, as texts.
 
     The result is in the unit of the paper, so that it can be compared with the printed value.
@@ -160,13 +160,13 @@ def find_lines(site: Site) -> Iterator[Found]:
 READING = Section(
     page="theory.html",
     template="reading.html.jinja",
-    context=lambda site: words_of_reading(site.rows(AccuracyRow)) or None,
+    context=lambda site: describe_reading(site.rows(AccuracyRow)) or None,
     tables=("accuracy",),
 )
 """The result of reading the curve, on the page of the theory."""
 
 
-def words_of_reading(rows: Sequence[AccuracyRow]) -> str:
+def describe_reading(rows: Sequence[AccuracyRow]) -> str:
     """Return the result of reading the curve, from the table ``accuracy``; empty without rows."""
     of_curve = {row.parameter: row for row in rows if row.method == "curve"}
     if not of_curve:

@@ -16,10 +16,10 @@ from imubench_pipeline.allan import allan_variance
 from imubench_pipeline.estimators import curve as reading
 from imubench_pipeline.estimators import least_squares
 from imubench_pipeline.estimators.estimate import PARAMETERS
-from imubench_pipeline.estimators.identifiability import bounds_of
+from imubench_pipeline.estimators.identifiability import compute_cramer_rao_bounds
 from imubench_pipeline.estimators.model_choice import PAPERS_MODEL
-from imubench_pipeline.estimators.spectrum import spectra
-from imubench_pipeline.estimators.whittle import Whittle, whittle_of
+from imubench_pipeline.estimators.spectrum import compute_spectra
+from imubench_pipeline.estimators.whittle import Whittle, make_whittle
 from imubench_pipeline.extensions.papers.maia_draws import DURATION, MTI_GYRO
 from imubench_pipeline.extensions.papers.tables import AccuracyRow
 from imubench_pipeline.noise.simulate import channel_rng, simulate
@@ -34,13 +34,13 @@ _FIT_METHODS: tuple[Literal["paper", "weighted"], ...] = ("paper", "weighted")
 Values = Mapping[str, float | None]
 
 
-def panel_rows(logs: int = LOGS) -> Iterator[AccuracyRow]:
+def make_accuracy_rows(logs: int = LOGS) -> Iterator[AccuracyRow]:
     """Yield the rows of the table ``accuracy``.
 
     The likelihood uses the model of the papers, up to half of the sampling rate.
     """
     model = MTI_GYRO.table_2
-    bounds = bounds_of(model, _RATE, DURATION, _RATE / 2.0)
+    bounds = compute_cramer_rao_bounds(model, _RATE, DURATION, _RATE / 2.0)
     by_method: dict[str, list[Values]] = {}
     whittle: Whittle | None = None
     for number in range(logs):
@@ -80,8 +80,8 @@ def _estimate_log(number: int, before: Whittle | None) -> tuple[dict[str, Values
     log = simulate(MTI_GYRO.table_2, _RATE, samples, rng)
     curve = allan_variance(log, _RATE, overlap="octave")
     estimates = [reading.read(curve), *(least_squares.solve(curve, method=m) for m in _FIT_METHODS)]
-    spectrum, _ = spectra([log], samples, _RATE)
-    whittle = before.of(spectrum) if before else whittle_of(spectrum, _RATE / 2.0)
+    spectrum, _ = compute_spectra([log], samples, _RATE)
+    whittle = before.of(spectrum) if before else make_whittle(spectrum, _RATE / 2.0)
     best = whittle.maximum(PAPERS_MODEL)
     powers = [best.parameter("N"), float(best.biases[0]), float(best.times[0]), best.parameter("K")]
     by_likelihood = {

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from imubench_pipeline.extensions.papers import engers, maia, silva
 from imubench_pipeline.extensions.papers.evidence import Evidence, Result
-from imubench_pipeline.extensions.papers.panel import panel_rows
+from imubench_pipeline.extensions.papers.panel import make_accuracy_rows
 from imubench_pipeline.extensions.papers.printed import (
     Line,
     Paper,
@@ -55,7 +55,7 @@ def judge(printed: float | None, result: Result, tolerance: float) -> Verdict:
     return "agrees" if inside or near else "differs"
 
 
-def rows_of(paper: Paper, evidence: Evidence) -> Iterator[PublishedRow]:
+def make_rows(paper: Paper, evidence: Evidence) -> Iterator[PublishedRow]:
     """Yield the rows of the table ``published`` of a paper."""
     for line in paper.lines:
         result = evaluate(line, evidence)
@@ -109,23 +109,23 @@ def write_published(tables: Iterable[Path], outputs: Iterable[Path]) -> None:
     evidence = Evidence({name: read(name, paths) for name, paths in parts.items()})
     of_maia = any(evidence.has(*log) for log in read_paper("maia").logs)
     made = {
-        "published": build("published", published_rows(evidence)),
-        "accuracy": build("accuracy", panel_rows() if of_maia else ()),
+        "published": build("published", make_published_rows(evidence)),
+        "accuracy": build("accuracy", make_accuracy_rows() if of_maia else ()),
     }
     for output in outputs:
         write_arrow(made[output.stem], output)
 
 
-def published_rows(evidence: Evidence) -> Iterator[PublishedRow]:
+def make_published_rows(evidence: Evidence) -> Iterator[PublishedRow]:
     """Yield the rows of the table ``published`` for the papers with logs in the run."""
     for paper in read_papers():
         if any(evidence.has(*log) for log in paper.logs):
-            yield from rows_of(paper, evidence)
+            yield from make_rows(paper, evidence)
 
 
-def rows_without_a_run() -> Iterator[PublishedRow]:
+def make_rows_without_run() -> Iterator[PublishedRow]:
     """Yield the rows that need printed figures and closed forms only, and no log."""
     for paper in read_papers():
-        for row in rows_of(paper, Evidence()):
+        for row in make_rows(paper, Evidence()):
             if row.basis in ("computed", "checked"):
                 yield row

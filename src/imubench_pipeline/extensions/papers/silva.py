@@ -21,7 +21,11 @@ from imubench_pipeline.extensions.earth_rate.known_rate import (
     settled,
     track,
 )
-from imubench_pipeline.extensions.earth_rate.published import PrintedRun, RunDesign, allowed_sigmas
+from imubench_pipeline.extensions.earth_rate.published import (
+    PrintedRun,
+    RunDesign,
+    compute_allowed_sigmas,
+)
 from imubench_pipeline.extensions.earth_rate.simulation import (
     ASSUMED_LATITUDE,
     ASSUMED_TURNING,
@@ -29,7 +33,7 @@ from imubench_pipeline.extensions.earth_rate.simulation import (
     PAPER_MODEL,
     PAPER_PERIOD,
     PAPER_RATE,
-    paper_run,
+    design_paper_run,
     simulate_log,
 )
 from imubench_pipeline.extensions.earth_rate.tables import EarthRateRow
@@ -102,7 +106,7 @@ def count_turns(evidence: Evidence, run: str) -> float | None:
 def make_printed_run(run: str) -> PrintedRun:
     """Return a run as printed, with the sigma that the printed noise gives the mean over pairs."""
     duration = 60.0 * PAPER_MINUTES[run]
-    sigma = allowed_sigmas(_DESIGN, duration, PAPER_MODEL)["sigma"]
+    sigma = compute_allowed_sigmas(_DESIGN, duration, PAPER_MODEL)["sigma"]
     return PrintedRun(duration, PRINTED[run] * DEGREE, float(sigma))
 
 
@@ -134,30 +138,33 @@ def explain_errors(_: Evidence) -> Result:
     first = runs["4"].without(last)
 
     def drift(run: PrintedRun) -> float:
-        return causes.drift_needed(_off(run), PAPER_PERIOD, ASSUMED_LATITUDE)
+        return causes.compute_needed_drift(_off(run), PAPER_PERIOD, ASSUMED_LATITUDE)
 
     fields: dict[str, object] = {}
     for name, run in runs.items():
         parts = [first, last] if name == "4" else [run]
-        angle = causes.angle_needed(_off(run), PAPER_PERIOD - ASSUMED_TURNING, ASSUMED_LATITUDE)
+        angle = causes.compute_needed_angle(
+            _off(run), PAPER_PERIOD - ASSUMED_TURNING, ASSUMED_LATITUDE
+        )
         fields |= {
             f"drift_{name}": drift(run) * run.duration / DEGREE,  # deg/s over the run
-            f"wrong_{name}": 100 * (causes.wrong_part(run.value, EARTH_RATE) or 0.0),  # %
+            f"wrong_{name}": 100 * (causes.compute_wrong_share(run.value, EARTH_RATE) or 0.0),  # %
             f"angle_{name}": abs(angle) / DEGREE,
-            f"clock_{name}": 100 * causes.slip_needed(parts, PAPER_PERIOD, EARTH_RATE)[0],  # %
-            f"heading_{name}": (causes.heading_needed(run.value, EARTH_RATE) or 0.0) / DEGREE,
+            f"clock_{name}": 100 * causes.fit_clock_error(parts, PAPER_PERIOD, EARTH_RATE)[0],  # %
+            f"heading_{name}": (causes.compute_needed_heading(run.value, EARTH_RATE) or 0.0)
+            / DEGREE,
             f"noise_{name}": abs(_off(run)) / run.sigma / _Z_95,
             f"factor_{name}": run.value / EARTH_RATE,
         }
-    warmed = causes.warm_up(drift(first), drift(last), runs["4"].duration, last.duration)
+    warmed = causes.fit_warm_up(drift(first), drift(last), runs["4"].duration, last.duration)
     assert warmed is not None  # of the printed numbers
     return Result(
         fields=fields
         | {
             "minutes": warmed.time_constant / 60.0,
             "samples": warmed.total / PAPER_MODEL.N / math.sqrt(PAPER_RATE),
-            "apart": causes.apart(last, first),
-            "alone": causes.one_miscount(runs["4"], last, EARTH_RATE),
+            "apart": causes.compute_separation(last, first),
+            "alone": causes.fit_single_miscount(runs["4"], last, EARTH_RATE),
             "least": math.cos(ASSUMED_LATITUDE),
         }
     )
@@ -166,7 +173,7 @@ def explain_errors(_: Evidence) -> Result:
 @cache
 def simulate_settling_times(run: str) -> Mapping[str, tuple[float, ...]]:
     """Return the settling time of each simulated run, s, by the unit of P_0; inf: not settled."""
-    design = paper_run(PAPER_MINUTES[run])
+    design = design_paper_run(PAPER_MINUTES[run])
     model = SensorModel(noise=PAPER_MODEL, bias=_ASSUMED_BIAS)
     times: dict[str, list[float]] = {name: [] for name in STARTS}
     for number in range(RUNS):
@@ -232,7 +239,7 @@ def compute_error_of_mean(_: Evidence) -> Result:
         name: float(mean_sigma(PAPER_MODEL, PAPER_RATE, 1000, start, 0.0)[-1])
         for name, start in STARTS.items()
     }
-    pair = float(allowed_sigmas(_DESIGN, 2.0 * PAPER_PERIOD, PAPER_MODEL)["sigma"])
+    pair = float(compute_allowed_sigmas(_DESIGN, 2.0 * PAPER_PERIOD, PAPER_MODEL)["sigma"])
     errors = {name: one / math.cos(ASSUMED_LATITUDE) / hour for name, one in along_axis.items()}
     return Result(fields=errors | {"rate": EARTH_RATE / hour, "pair": pair / hour})
 
@@ -241,7 +248,7 @@ def compute_filter_gain(_: Evidence) -> Result:
     """Return the least and greatest reduction of sigma by a filter with unknown rate, %."""
     gains = []
     for run in PRINTED:
-        sigmas = allowed_sigmas(_DESIGN, 60.0 * PAPER_MINUTES[run], PAPER_MODEL)
+        sigmas = compute_allowed_sigmas(_DESIGN, 60.0 * PAPER_MINUTES[run], PAPER_MODEL)
         gains.append(100.0 * float(1.0 - sigmas["sigma_filter"] / sigmas["sigma"]))
     return Result(fields={"least": min(gains), "most": max(gains)})
 

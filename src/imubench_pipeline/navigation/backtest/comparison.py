@@ -31,7 +31,7 @@ from scipy.special import gammaincc, gammaincinv
 from imubench_pipeline.model.estimates import BacktestRow
 from imubench_pipeline.model.recordings import FindingRow
 from imubench_pipeline.navigation.backtest.covariance import Spread, WindowCovariance
-from imubench_pipeline.navigation.backtest.windows import Window, errors
+from imubench_pipeline.navigation.backtest.windows import Window, compute_window_errors
 from imubench_pipeline.navigation.error_budget.budget import of_sensor
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.growth import Calibrated
@@ -174,7 +174,7 @@ def compare(
     # Draws of an absent term are above 0: extend the limits to the value.
     budget = (predicted, min(float(lower), predicted), max(float(upper), predicted))
     covariance = WindowCovariance(cut, asked.order, asked.factor)
-    window_errors = errors(means, covariance.weights, covariance.lags)
+    window_errors = compute_window_errors(means, covariance.weights, covariance.lags)
     if window_errors.count <= (MIN_WINDOWS - 1) * cut.blocks:
         return Comparison(
             window_errors.count,

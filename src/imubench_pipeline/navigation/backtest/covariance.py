@@ -13,7 +13,7 @@ from functools import cached_property
 
 import numpy as np
 
-from imubench_pipeline.navigation.backtest.windows import Errors, Window, correlated
+from imubench_pipeline.navigation.backtest.windows import Errors, Window, correlate
 from imubench_pipeline.noise import Deterministic, NoiseModel, Term
 from imubench_pipeline.typing import Array
 
@@ -70,7 +70,7 @@ class WindowCovariance:
             if not isinstance(term, Deterministic):
                 power, unit = term.as_unit()
                 if unit not in self._unit_covariances:
-                    covariance = correlated(
+                    covariance = correlate(
                         unit.block_covariance(lags, self.window.block), self._autocorrelation
                     )
                 else:

@@ -9,13 +9,13 @@ from imubench_pipeline.earth import STANDARD_GRAVITY
 from imubench_pipeline.estimators.estimate import Estimate
 from imubench_pipeline.model.estimates import BacktestRow, DeterministicRow
 from imubench_pipeline.navigation.backtest.comparison import DeadReckoning, compare
-from imubench_pipeline.navigation.backtest.windows import block_means, window
-from imubench_pipeline.navigation.error_budget import draw_models, drawn_jointly
+from imubench_pipeline.navigation.backtest.windows import average_blocks, choose_window
+from imubench_pipeline.navigation.error_budget import draw_models, has_joint_draws
 from imubench_pipeline.noise.simulate import channel_rng
 from imubench_pipeline.recordings.recording import ChannelLog
 from imubench_pipeline.settings.requirements import DIMENSIONS, Error, Requirement
 from imubench_pipeline.settings.sensor import quantity_of
-from imubench_pipeline.units import SI_UNITS, quantity_to_si
+from imubench_pipeline.units import SI_UNITS, parse_quantity
 from imubench_pipeline.words.reasons import pools as texts
 
 CONTRADICTION_LEVEL = 0.01
@@ -37,7 +37,7 @@ _INTEGRATIONS: Mapping[tuple[str, Error], tuple[int, float]] = {
 attitude error of a gyro projects gravity into velocity and position."""
 
 
-def backtest_rows(
+def list_backtest_rows(
     names: Mapping[str, str],
     logs: Mapping[str, ChannelLog],
     estimates: Mapping[str, Estimate],
@@ -100,7 +100,7 @@ def _test_channel(
                 asked = texts.noise_not_known()
             else:
                 order, factor = _INTEGRATIONS[key]
-                rest = quantity_to_si(requirement.static_window, "time")
+                rest = parse_quantity(requirement.static_window, "time")
                 asked = DeadReckoning(order, rest, limit.seconds, factor)
             about = BacktestRow(
                 sensor=names["sensor"],
@@ -113,16 +113,16 @@ def _test_channel(
             )
             listed.append((about, asked))
     cuts = {
-        asked: window(asked.rest, asked.time, log.rate)
+        asked: choose_window(asked.rest, asked.time, log.rate)
         for _, asked in listed
         if isinstance(asked, DeadReckoning)
     }
     lengths = {cut.block for cut in cuts.values() if cut}
-    means = block_means(log.blocks(), log.segments, log.rate, lengths)
+    means = average_blocks(log.blocks(), log.segments, log.rate, lengths)
     drawn = draw_models(
         estimate, draws, channel_rng(seed, repr(estimate.model), channel, "backtest")
     )
-    jointly = drawn_jointly(estimate)
+    jointly = has_joint_draws(estimate)
     for about, asked in listed:
         if not isinstance(asked, DeadReckoning):
             yield replace(about, reason=asked)

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from imubench_pipeline.allan.phase import finite_mean
+from imubench_pipeline.allan.phase import average_finite
 from imubench_pipeline.typing import Array
 
 BLOCK_COUNTS = range(8, 25)
@@ -66,7 +66,7 @@ class Window:
         return np.concatenate((np.full(self.resting, -grown[0] / self.resting), -np.diff(grown)))
 
 
-def window(rest: float, time: float, rate: float) -> Window | None:
+def choose_window(rest: float, time: float, rate: float) -> Window | None:
     """Return a window in blocks that divide both its parts as evenly as possible.
 
     Its parts W and t are in s, the rate in Hz. None if the shorter part has no sample.
@@ -101,7 +101,7 @@ class Errors:
     pairs: Array
 
 
-def errors(means: Sequence[Array], weights: Array, lags: int) -> Errors:
+def compute_window_errors(means: Sequence[Array], weights: Array, lags: int) -> Errors:
     """Return the errors of all windows of a log.
 
     ``means`` are the block means of each segment, NaN where one is missing; ``weights``, shape
@@ -115,7 +115,7 @@ def errors(means: Sequence[Array], weights: Array, lags: int) -> Errors:
         gaps = ~np.isfinite(segment)
         # A constant cancels in the error: subtract it to keep precision.
         level = float(np.mean(segment[~gaps])) if not gaps.all() else 0.0
-        window_errors = correlated(np.where(gaps, 0.0, segment - level), weights)
+        window_errors = correlate(np.where(gaps, 0.0, segment - level), weights)
         before = np.concatenate(([0], np.cumsum(gaps)))
         whole = before[len(weights) :] == before[: -len(weights)]
         total += float(np.sum(window_errors[whole] ** 2))
@@ -128,7 +128,7 @@ def errors(means: Sequence[Array], weights: Array, lags: int) -> Errors:
     return Errors(total / count if count else math.nan, count, pairs)
 
 
-def correlated(values: Array, weights: Array) -> Array:
+def correlate(values: Array, weights: Array) -> Array:
     """Return the correlation of values with weights at every full overlap.
 
     Values have the shape (n,), weights (p,) with p <= n, and the result (n - p + 1,).
@@ -139,7 +139,7 @@ def correlated(values: Array, weights: Array) -> Array:
     return np.fft.irfft(product, length)[: len(values) - len(weights) + 1]
 
 
-def block_means(
+def average_blocks(
     parts: Iterable[NDArray[np.floating[Any]]],
     segments: Sequence[Span],
     rate: float,
@@ -198,7 +198,7 @@ def _sum_parts(
     for part in parts:
         if level is None and not np.isnan(part).all():
             # Subtract gravity: it would cost precision in the sum.
-            level = finite_mean(part)
+            level = average_finite(part)
         values = part - (level or 0.0)
         gaps = np.isnan(values)
         holes = bool(gaps.any())

@@ -12,10 +12,10 @@ from imubench_pipeline.navigation.error_budget.in_use import (
 )
 from imubench_pipeline.navigation.error_budget.parts import Budget, Contribution, Missing, Quantity
 from imubench_pipeline.navigation.error_budget.uncertainty import (
-    chance_within,
+    compute_chance_within,
+    compute_interval,
     draw_models,
-    drawn_jointly,
-    interval,
+    has_joint_draws,
 )
 from imubench_pipeline.noise.growth import Calibrated, Uncalibrated
 
@@ -36,9 +36,9 @@ __all__ = [
     "Uncalibrated",
     "Use",
     "budget",
-    "chance_within",
+    "compute_chance_within",
+    "compute_interval",
     "draw_models",
-    "drawn_jointly",
-    "interval",
+    "has_joint_draws",
     "time_until",
 ]

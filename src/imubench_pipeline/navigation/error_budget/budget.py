@@ -40,7 +40,7 @@ from imubench_pipeline.navigation.error_budget.parts import (
     Contribution,
     Missing,
     Quantity,
-    of_figure,
+    compute_figure_contribution,
 )
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.growth import Calibrated, SensorStart, Uncalibrated, of_constant
@@ -226,7 +226,7 @@ def budget(
     assumptions: list[str] = []
     for measured, cause, source, lever in _list_levers(quantity, time, start, use):
         figures = gyro_figures if measured == "gyro" else accel_figures
-        part = of_figure(measured, cause, source, lever, figures)
+        part = compute_figure_contribution(measured, cause, source, lever, figures)
         if isinstance(part, Contribution):
             contributions.append(part)
         elif part is not None:

@@ -24,7 +24,12 @@ from imubench_pipeline.navigation.error_budget.in_use import (
     Figures,
     check_not_negative,
 )
-from imubench_pipeline.navigation.error_budget.parts import Budget, Contribution, Missing, of_figure
+from imubench_pipeline.navigation.error_budget.parts import (
+    Budget,
+    Contribution,
+    Missing,
+    compute_figure_contribution,
+)
 from imubench_pipeline.noise import NoiseModel, Sinusoid
 from imubench_pipeline.words.reasons import budgets as texts
 
@@ -145,7 +150,7 @@ class Gyrocompass:
             sigma = self.bias / self._north_rate
             return [Contribution("gyro turn-on bias", sigma, "turn_on_bias", STATED_FIGURE)]
         parts = (
-            of_figure(
+            compute_figure_contribution(
                 "gyro", cause, f"gyro {CAUSE_NAMES[cause]}", 1.0 / self._north_rate, self.figures
             )
             for cause in BIAS_CAUSES

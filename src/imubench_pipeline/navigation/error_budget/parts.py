@@ -58,7 +58,7 @@ class Budget:
         return math.hypot(*(contribution.sigma for contribution in self.contributions))
 
 
-def of_figure(
+def compute_figure_contribution(
     measured: Measured, cause: Cause, source: str, lever: float, figures: Figures
 ) -> Contribution | Missing | None:
     """Return the contribution of a figure of a sensor to an error, or that it is missing.

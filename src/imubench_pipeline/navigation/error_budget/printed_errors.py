@@ -44,7 +44,7 @@ _CAUSE_OF_COEFFICIENT: Mapping[str, Cause] = {
 }
 
 
-def of_datasheet(datasheet: Datasheet, channel: str) -> dict[Cause, Figure]:
+def read_datasheet_figures(datasheet: Datasheet, channel: str) -> dict[Cause, Figure]:
     """Return the datasheet figures of the errors in use of a channel, SI."""
     axis = PrintedAxis.of(datasheet, channel)
     names = FIGURE_DIMENSIONS[axis.quantity]
@@ -73,7 +73,7 @@ def of_datasheet(datasheet: Datasheet, channel: str) -> dict[Cause, Figure]:
     return figures
 
 
-def of_log(rows: Iterable[TemperatureRow]) -> dict[Cause, Figure]:
+def read_log_figures(rows: Iterable[TemperatureRow]) -> dict[Cause, Figure]:
     """Return the figures of the errors in use that the thermal fit of a channel determines, SI."""
     figures: dict[Cause, Figure] = {}
     for row in rows:
@@ -91,13 +91,13 @@ def of_log(rows: Iterable[TemperatureRow]) -> dict[Cause, Figure]:
     return figures
 
 
-def in_use(
+def collect_figures_in_use(
     datasheet: Datasheet, channels: Iterable[str], temperature: Iterable[TemperatureRow]
 ) -> dict[str, dict[Cause, Figure]]:
     """Return the figures of the errors in use by channel, from datasheet and log."""
     rows = list(temperature)
     return {
-        channel: of_datasheet(datasheet, channel)
-        | of_log(row for row in rows if row.channel == channel)
+        channel: read_datasheet_figures(datasheet, channel)
+        | read_log_figures(row for row in rows if row.channel == channel)
         for channel in channels
     }

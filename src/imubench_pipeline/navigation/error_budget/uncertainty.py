@@ -14,7 +14,7 @@ from imubench_pipeline.navigation.error_budget.printed_errors import SIGMAS
 from imubench_pipeline.noise import GaussMarkov, NoiseModel, Sinusoid
 
 
-def interval(budgets: Sequence[Budget], level: float = 0.95) -> tuple[float, float]:
+def compute_interval(budgets: Sequence[Budget], level: float = 0.95) -> tuple[float, float]:
     """Return the limits of the total over budgets of drawn noise models, rad, m/s or m.
 
     ``budgets`` are for one quantity and time, one a draw; ``level`` is the fraction of the totals
@@ -30,7 +30,7 @@ def interval(budgets: Sequence[Budget], level: float = 0.95) -> tuple[float, flo
     return float(lower), float(upper)
 
 
-def chance_within(limit: float, budgets: Sequence[Budget]) -> float:
+def compute_chance_within(limit: float, budgets: Sequence[Budget]) -> float:
     """Return the probability that a total is within a limit, over budgets of drawn noise models.
 
     It is the integral of a kernel density estimate in log total, with a normal kernel (B. W.
@@ -83,7 +83,7 @@ def draw_models(estimate: Estimate, draws: int, rng: np.random.Generator) -> lis
     ]
 
 
-def drawn_jointly(estimate: Estimate) -> bool:
+def has_joint_draws(estimate: Estimate) -> bool:
     """Return whether `draw_models` draws the parameters of an estimate together."""
     return estimate.draws is not None
 

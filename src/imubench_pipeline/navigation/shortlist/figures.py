@@ -13,11 +13,11 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Literal
 
-from imubench_pipeline.datasheets.comparable import Comparable, comparables
+from imubench_pipeline.datasheets.comparable import Comparable, read_comparables
 from imubench_pipeline.model.estimates import ParameterRow
 from imubench_pipeline.model.recordings import RecordingRow
 from imubench_pipeline.noise import FLOOR, NoiseModel
-from imubench_pipeline.recordings.fitness import left_out
+from imubench_pipeline.recordings.fitness import list_excluded
 from imubench_pipeline.settings.printed import SENSORS, Datasheet, QuantityDatasheet
 from imubench_pipeline.settings.sensor import Sensor, quantity_of
 from imubench_pipeline.words.reasons import budgets as texts
@@ -62,7 +62,7 @@ class MeasuredRanges:
             by_sensor = {name: ends for (name, of), ends in self.printed.items() if of == quantity}
         if not by_sensor:
             return None
-        wanted = class_of(price_class)
+        wanted = parse_price_class(price_class)
         own = {s: ends for s, ends in by_sensor.items() if wanted and self.classes.get(s) == wanted}
         used = own or by_sensor
         low, high = min(ends[0] for ends in used.values()), max(ends[1] for ends in used.values())
@@ -70,12 +70,12 @@ class MeasuredRanges:
         return Span(low, high, source)
 
 
-def class_of(price_class: str | None) -> str:
+def parse_price_class(price_class: str | None) -> str:
     """Return the name in a price class, such as ``consumer`` in ``consumer, about US$8``."""
     return re.split(r"[,(]", price_class or "")[0].strip().lower()
 
 
-def measured_ranges(
+def collect_measured_ranges(
     parameters: Iterable[ParameterRow],
     recordings: Iterable[RecordingRow],
     price_classes: Mapping[str, str | None],
@@ -86,7 +86,7 @@ def measured_ranges(
     log may be 0; its upper limit is used only if no log of the sensor determines one.
     """
     about = list(recordings)
-    apart = left_out(about)
+    apart = list_excluded(about)
     real = {
         place
         for row in about
@@ -113,7 +113,7 @@ def measured_ranges(
         high = max(ends[1] for ends in several)
         if math.isfinite(high):
             ranges[key] = (low, high)
-    classes = {sensor: class_of(text) for sensor, text in price_classes.items() if text}
+    classes = {sensor: parse_price_class(text) for sensor, text in price_classes.items() if text}
     return MeasuredRanges(ranges, classes)
 
 
@@ -151,7 +151,7 @@ class Figures:
         return [NoiseModel(N=N, B=B, T_B=T_B, K=K) for T_B in self.times]
 
 
-def figures_of(sensor: Sensor, quantity: str, ranges: MeasuredRanges) -> Figures | str:
+def read_figure_ranges(sensor: Sensor, quantity: str, ranges: MeasuredRanges) -> Figures | str:
     """Return the ranges that a datasheet allows for a quantity, or why there are none."""
     if getattr(sensor.datasheet, quantity) is None:
         return texts.no_quantity(quantity)
@@ -196,7 +196,9 @@ def figures_of(sensor: Sensor, quantity: str, ranges: MeasuredRanges) -> Figures
     return Figures(N, B, K, tuple(dict.fromkeys(times)), tuple(assumed))
 
 
-def printed_ranges(sensors: Mapping[str, Sensor]) -> dict[tuple[str, str], tuple[float, float]]:
+def collect_printed_ranges(
+    sensors: Mapping[str, Sensor],
+) -> dict[tuple[str, str], tuple[float, float]]:
     """Return the range of B, SI, by (sensor, quantity), that each datasheet prints."""
     ranges = {}
     for name, sensor in sensors.items():
@@ -230,5 +232,5 @@ def _read_printed(datasheet: Datasheet, quantity: str) -> tuple[list[Comparable]
     if named and not datasheet.options:  # select all of them
         options = sorted(named)
         datasheet = datasheet.model_copy(update={"options": tuple(options)})
-    rows = [row for axis in "xyz" for row in comparables(datasheet, f"{quantity}_{axis}")]
+    rows = [row for axis in "xyz" for row in read_comparables(datasheet, f"{quantity}_{axis}")]
     return [row for row in rows if row.value is not None], options

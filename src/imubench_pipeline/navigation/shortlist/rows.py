@@ -15,10 +15,19 @@ from imubench_pipeline.model.recordings import RecordingRow
 from imubench_pipeline.model.verdicts import Shortfall
 from imubench_pipeline.navigation.error_budget.in_use import BIAS_CAUSES, Figure
 from imubench_pipeline.navigation.error_budget.in_use import Figures as InUse
-from imubench_pipeline.navigation.error_budget.printed_errors import of_datasheet
-from imubench_pipeline.navigation.expected_errors import AxisErrors, Question, of_requirement
-from imubench_pipeline.navigation.shortlist.figures import End, Figures, MeasuredRanges, figures_of
-from imubench_pipeline.navigation.suitability.abilities import abilities, judge
+from imubench_pipeline.navigation.error_budget.printed_errors import read_datasheet_figures
+from imubench_pipeline.navigation.expected_errors import (
+    AxisErrors,
+    Question,
+    list_requirement_questions,
+)
+from imubench_pipeline.navigation.shortlist.figures import (
+    End,
+    Figures,
+    MeasuredRanges,
+    read_figure_ranges,
+)
+from imubench_pipeline.navigation.suitability.abilities import judge, read_abilities
 from imubench_pipeline.settings.requirements import Requirement
 from imubench_pipeline.settings.sensor import Sensor
 from imubench_pipeline.words.reasons import budgets as texts
@@ -29,7 +38,7 @@ _NO_ERRORS = dict.fromkeys(_QUANTITIES, AxisErrors())
 _CALIBRATED_BIASES: InUse = dict.fromkeys(BIAS_CAUSES, Figure(sigma=0.0))
 
 
-def shortlist_rows(
+def list_shortlist_rows(
     requirements: Mapping[str, Requirement],
     sensors: Mapping[str, Sensor],
     ranges: MeasuredRanges,
@@ -44,11 +53,13 @@ def shortlist_rows(
     simulated = {(row.sensor, row.recording): row.simulated for row in recordings}
     measured = {(row.requirement, row.sensor): row for row in ranking if row.decides}
     by_sensor = {
-        name: {quantity: figures_of(sensor, quantity, ranges) for quantity in ("gyro", "accel")}
+        name: {
+            quantity: read_figure_ranges(sensor, quantity, ranges) for quantity in ("gyro", "accel")
+        }
         for name, sensor in sensors.items()
     }
     for name, requirement in requirements.items():
-        questions = list(of_requirement(name, requirement))
+        questions = list(list_requirement_questions(name, requirement))
         if not questions:
             continue  # a datasheet gives no errors in outages
         rows = []
@@ -80,7 +91,7 @@ def _judge(
         requirement=names[0], sensor=names[1], price_class=price_class, verdict="not_judged"
     )
     # The sensor has all axes of its quantities, logged or not.
-    has = abilities(sensor)
+    has = read_abilities(sensor)
     channels = tuple(f"{q}_{axis}" for q in _QUANTITIES if q not in has.without for axis in "xyz")
     has = has.model_copy(update={"channels": channels, "logged_rate": None})
     lacking, unknown = judge(requirement.must, has)
@@ -91,7 +102,10 @@ def _judge(
     if len(published) < len(needed):
         why = "; ".join(entry for q in needed if isinstance(entry := figures[q], str))
         return replace(row, reason=why)
-    in_use = {quantity: of_datasheet(sensor.datasheet, f"{quantity}_x") for quantity in published}
+    in_use = {
+        quantity: read_datasheet_figures(sensor.datasheet, f"{quantity}_x")
+        for quantity in published
+    }
     best, missing = _compute_margins(questions, published, in_use, "best")
     least = min(range(len(best)), key=best.__getitem__)
     worst = None

@@ -19,7 +19,7 @@ from imubench_pipeline.settings.printed import (
 from imubench_pipeline.settings.requirements import Must
 from imubench_pipeline.settings.sensor import QUANTITIES, Sensor
 from imubench_pipeline.settings.validation import Strict
-from imubench_pipeline.units import quantity_to_si, to_si
+from imubench_pipeline.units import convert_to_si, parse_quantity
 
 _ROUNDING_MARGIN = 1.0 + 1e-9
 """Tolerance for figures that are equal to the required ones in another unit."""
@@ -53,7 +53,7 @@ class _Point:
     has: tuple[float, ...] = ()
 
 
-def abilities(sensor: Sensor) -> Abilities:
+def read_abilities(sensor: Sensor) -> Abilities:
     """Return the properties of a sensor from its file."""
     quantities: tuple[Measured, ...] = ("gyro", "accel")
     printed = {
@@ -71,7 +71,7 @@ def abilities(sensor: Sensor) -> Abilities:
         logged_rate=sensor.log.rate_hz,
         rate=_convert_to_si(sensor.rate, "frequency"),
         temperature=(
-            (quantity_to_si(ends[0], "temperature"), quantity_to_si(ends[1], "temperature"))
+            (parse_quantity(ends[0], "temperature"), parse_quantity(ends[1], "temperature"))
             if ends
             else None
         ),
@@ -85,7 +85,7 @@ def abilities(sensor: Sensor) -> Abilities:
 
 
 def _convert_to_si(text: str | None, dimension: str) -> float | None:
-    return None if text is None else quantity_to_si(text, dimension)
+    return None if text is None else parse_quantity(text, dimension)
 
 
 def _find_largest(datasheet: Datasheet, quantity: Measured, name: str) -> float | None:
@@ -100,7 +100,7 @@ def _find_largest(datasheet: Datasheet, quantity: Measured, name: str) -> float 
     for axis in "xyz":
         printed = [(figure, figure.on_axis(axis)) for figure in figures]
         values = [
-            to_si(size, figure.unit or "", FIGURE_DIMENSIONS[quantity][name][0])
+            convert_to_si(size, figure.unit or "", FIGURE_DIMENSIONS[quantity][name][0])
             for figure, value in printed
             if value is not None
             for size in (value if isinstance(value, tuple) else (value,))
@@ -142,14 +142,14 @@ def _compare(must: Must, has: Abilities) -> Iterator[_Point]:
     if must.bandwidth is not None:
         # Of the quantities with required axes, or else of all.
         asked = {axes.split("_")[0] for axes in must.axes} or set(SENSORS)
-        lowest = quantity_to_si(must.bandwidth, "frequency")
+        lowest = parse_quantity(must.bandwidth, "frequency")
         for measured in get_args(Measured):
             if measured in asked and measured not in has.without:
                 width = has.bandwidth.get(measured)
                 wide = None if width is None else width >= lowest
                 yield _Point("bandwidth", measured, wide, must.bandwidth, _list_known(width))
     if must.rate is not None:
-        least = quantity_to_si(must.rate, "frequency")
+        least = parse_quantity(must.rate, "frequency")
         if has.logged_rate is not None and has.logged_rate >= least:
             yield _Point("rate", "", True, must.rate)
         else:
@@ -157,7 +157,7 @@ def _compare(must: Must, has: Abilities) -> Iterator[_Point]:
             fast = None if has.rate is None else has.rate >= least
             yield _Point("rate", "", fast, must.rate, _list_known(has.rate))
     if must.temperature is not None:
-        low, high = (quantity_to_si(end, "temperature") for end in must.temperature)
+        low, high = (parse_quantity(end, "temperature") for end in must.temperature)
         own = has.temperature
         within = None if own is None else own[0] <= low and high <= own[1]
         yield _Point("temperature", "", within, " to ".join(must.temperature), own or ())
@@ -167,7 +167,7 @@ def _compare(must: Must, has: Abilities) -> Iterator[_Point]:
     )
     for name, most, size in sizes:
         if most is not None:
-            small = None if size is None else size <= quantity_to_si(most, name) * _ROUNDING_MARGIN
+            small = None if size is None else size <= parse_quantity(most, name) * _ROUNDING_MARGIN
             yield _Point(name, "", small, most, _list_known(size))
 
 
@@ -187,6 +187,6 @@ def _compare_full_scales(must: Must, has: Abilities) -> Iterator[_Point]:
             yield _Point("quantity", measured, False, text)
             continue
         largest = has.full_scale.get(measured)
-        least = quantity_to_si(text, QUANTITIES[measured])
+        least = parse_quantity(text, QUANTITIES[measured])
         enough = None if largest is None else largest * _ROUNDING_MARGIN >= least
         yield _Point("full_scale", measured, enough, text, _list_known(largest))

@@ -72,7 +72,7 @@ def is_condition(row: ErrorBudgetRow) -> bool:
     return row.largest_unit is not None and row.cause in FIGURES
 
 
-def once_calibrated(
+def judge_once_calibrated(
     verdict: Verdict,
     limit: float | None,
     sigma: float | None,
@@ -85,7 +85,7 @@ def once_calibrated(
     limit, sigma and upper belong to the error; conditions are the sources that the verdict depends
     on.
     """
-    squares = [size**2 for _, size in with_sigma(conditions)]
+    squares = [size**2 for _, size in select_known_errors(conditions)]
     if not squares or verdict in _PASSING or limit is None:
         return verdict
     for size, better in zip((upper, sigma), _PASSING, strict=True):
@@ -94,12 +94,12 @@ def once_calibrated(
     return verdict
 
 
-def with_sigma(rows: Iterable[ErrorBudgetRow]) -> list[tuple[ErrorBudgetRow, float]]:
+def select_known_errors(rows: Iterable[ErrorBudgetRow]) -> list[tuple[ErrorBudgetRow, float]]:
     """Return the rows with a figure, each with its standard deviation."""
     return [(row, row.sigma) for row in rows if row.sigma is not None]
 
 
-def shares_of(
+def compute_variance_shares(
     total: float, sources: Iterable[ErrorBudgetRow], least: float = 0.01
 ) -> tuple[Share, ...]:
     """Return the sources of an error with their shares of the variance, the largest first.
@@ -110,7 +110,7 @@ def shares_of(
         return ()
     shares = (
         Share(row.source, (sigma / total) ** 2, row.kind if row.origin == "datasheet" else None)
-        for row, sigma in with_sigma(sources)
+        for row, sigma in select_known_errors(sources)
     )
     kept = (share for share in shares if share.share >= least)
     return tuple(sorted(kept, key=lambda share: -share.share))

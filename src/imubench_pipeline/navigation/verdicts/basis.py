@@ -11,7 +11,7 @@ from imubench_pipeline.model.estimates import BacktestRow, ParameterRow
 from imubench_pipeline.model.recordings import DoubtRow, RecordingRow
 from imubench_pipeline.model.table import OfRecordingRow
 from imubench_pipeline.model.verdicts import DoubtMark
-from imubench_pipeline.recordings.fitness import left_out
+from imubench_pipeline.recordings.fitness import list_excluded
 from imubench_pipeline.settings.sensor import quantity_of
 
 Key = tuple[str, str]  # sensor, recording
@@ -51,7 +51,7 @@ class Basis:
         shown = {
             _make_backtest_key(test, test.requirement, test.channel): test for test in backtests
         }
-        return cls(about, doubted, channels, left_out(about.values()), shown)
+        return cls(about, doubted, channels, list_excluded(about.values()), shown)
 
     def backtest(
         self, of: ErrorBudgetRow, requirement: str, channel: str | None

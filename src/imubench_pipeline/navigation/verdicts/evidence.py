@@ -16,7 +16,7 @@ from imubench_pipeline.navigation.verdicts.standing import Standing
 from imubench_pipeline.noise import TERMS
 from imubench_pipeline.noise.terms.traits import Role
 from imubench_pipeline.settings.requirements import Requirement
-from imubench_pipeline.units import quantity_to_si
+from imubench_pipeline.units import parse_quantity
 
 _PARAMETERS_OF_SOURCE: dict[str, frozenset[str]] = {}
 """Noise parameters by the first word of a term's name (`Term.source`). Bias instability determines
@@ -41,7 +41,7 @@ MAX_TIME_SHARE = 1 / 9
 _AXIS_COUNT = 3
 
 
-def quantity_behind(source: str) -> str | None:
+def find_noise_quantity(source: str) -> str | None:
     """Return gyro or accel if a source is sensor noise estimated from the log; else None.
 
     Sources are those of the table ``error_budget``, such as ``gyro N`` or ``initial tilt by accel
@@ -52,14 +52,14 @@ def quantity_behind(source: str) -> str | None:
     return words[0] if noise else None
 
 
-def parameters_behind(source: str) -> frozenset[str]:
+def find_noise_parameters(source: str) -> frozenset[str]:
     """Return the noise parameters of a source; empty if it is not noise of the log."""
-    if quantity_behind(source) is None:
+    if find_noise_quantity(source) is None:
         return frozenset()
     return _PARAMETERS_OF_SOURCE[source.removeprefix("initial tilt by ").split()[1]]
 
 
-def weaknesses(standing: Standing, requirement: Requirement, basis: Basis) -> list[str]:
+def list_weaknesses(standing: Standing, requirement: Requirement, basis: Basis) -> list[str]:
     """Return the reasons for weak evidence on a limit that has a figure; empty if it is strong.
 
     They are `WEAKNESS_REASONS` and codes of the table ``doubts``. Axes and doubts count if at least
@@ -69,7 +69,7 @@ def weaknesses(standing: Standing, requirement: Requirement, basis: Basis) -> li
     if standing.expected.specimens == 1:
         reasons.append("one_specimen")
     longest = basis.longest(standing.totals)
-    asked = longest_asked(standing.total, requirement)
+    asked = find_longest_time(standing.total, requirement)
     if longest is not None and asked > MAX_TIME_SHARE * longest:
         reasons.append("short_log")
     if standing.wide:
@@ -84,8 +84,8 @@ def weaknesses(standing: Standing, requirement: Requirement, basis: Basis) -> li
             if requirement.axis == "worst" and axes is not None and axes < _AXIS_COUNT:
                 own.append("few_axes")
         if standing.source is not None:
-            behind = parameters_behind(standing.source)
-            channel = answering[quantity_behind(standing.source) or "gyro"]
+            behind = find_noise_parameters(standing.source)
+            channel = answering[find_noise_quantity(standing.source) or "gyro"]
             for doubt in basis.doubts.get(key, ()):
                 affected = behind.intersection(doubt.parameters) if doubt.parameters else behind
                 if doubt.channel in (None, channel) and affected:
@@ -97,9 +97,9 @@ def weaknesses(standing: Standing, requirement: Requirement, basis: Basis) -> li
     return sorted(reasons, key=order.index)
 
 
-def longest_asked(total: ErrorBudgetRow, requirement: Requirement) -> float:
+def find_longest_time(total: ErrorBudgetRow, requirement: Requirement) -> float:
     """Return the longest time in a limit, s: its own, or its static window."""
     window = requirement.static_window
     # North-finding has no static window before it.
-    before = quantity_to_si(window, "time") if window and total.error != "north" else 0.0
+    before = parse_quantity(window, "time") if window and total.error != "north" else 0.0
     return max(total.time, before)

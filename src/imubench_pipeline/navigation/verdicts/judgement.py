@@ -16,13 +16,18 @@ from imubench_pipeline.navigation.pooled import NORMAL_QUANTILE
 from imubench_pipeline.navigation.suitability.abilities import Abilities
 from imubench_pipeline.navigation.suitability.conditions import (
     Conditions,
-    once_calibrated,
-    with_sigma,
+    judge_once_calibrated,
+    select_known_errors,
 )
 from imubench_pipeline.navigation.verdicts.basis import Basis, Key
-from imubench_pipeline.navigation.verdicts.evidence import quantity_behind, weaknesses
-from imubench_pipeline.navigation.verdicts.specimens import Spread, usual_spread
-from imubench_pipeline.navigation.verdicts.standing import Standing, deciding, limit_of, standings
+from imubench_pipeline.navigation.verdicts.evidence import find_noise_quantity, list_weaknesses
+from imubench_pipeline.navigation.verdicts.specimens import Spread, pool_spreads
+from imubench_pipeline.navigation.verdicts.standing import (
+    Standing,
+    find_deciding_limit,
+    list_standings,
+    make_limit_key,
+)
 from imubench_pipeline.settings.requirements import Requirement
 from imubench_pipeline.words.reasons import pools as texts
 from imubench_pipeline.words.verdicts import doubts_text
@@ -41,7 +46,9 @@ class Unless:
     doubts: Mapping[Key, tuple[DoubtMark, ...]]  # by sensor and recording
 
 
-def unless(sensor: str, rows: Sequence[ErrorBudgetRow], basis: Basis) -> Unless | None:
+def judge_with_corrected_units(
+    sensor: str, rows: Sequence[ErrorBudgetRow], basis: Basis
+) -> Unless | None:
     """Return the verdict on a sensor with doubtful units corrected.
 
     The rows are those of one requirement. None without a figure, or if the verdict would not
@@ -56,19 +63,19 @@ def unless(sensor: str, rows: Sequence[ErrorBudgetRow], basis: Basis) -> Unless 
         return None
     own = [row for row in rows if unjudged or (sensor, row.recording) not in apart]
     devices = {name: basis.device((of, name)) for of, name in keys}
-    logged = deciding(standings(own, devices))
+    logged = find_deciding_limit(list_standings(own, devices))
     factors = {key: basis.factors(key) for key in doubted}
     corrected = None
     if factors:
         by_total: dict[tuple[str, tuple[Any, ...]], list[ErrorBudgetRow]] = {}
         for row in own:
-            by_total.setdefault((row.recording, limit_of(row)), []).append(row)
+            by_total.setdefault((row.recording, make_limit_key(row)), []).append(row)
         in_other_unit = [
             row
             for (recording, _), parts in by_total.items()
-            for row in scaled(parts, factors.get((sensor, recording), {}))
+            for row in scale_errors(parts, factors.get((sensor, recording), {}))
         ]
-        corrected = deciding(standings(in_other_unit, devices))
+        corrected = find_deciding_limit(list_standings(in_other_unit, devices))
     if corrected is not None and not unjudged and corrected.verdict == logged.verdict:
         corrected = None
     if not logged.known or (corrected is None and not unjudged):
@@ -78,12 +85,12 @@ def unless(sensor: str, rows: Sequence[ErrorBudgetRow], basis: Basis) -> Unless 
     return Unless(logged if unjudged else None, corrected, together, doubts)
 
 
-def scaled(parts: Sequence[ErrorBudgetRow], factors: Factors) -> list[ErrorBudgetRow]:
+def scale_errors(parts: Sequence[ErrorBudgetRow], factors: Factors) -> list[ErrorBudgetRow]:
     """Return the rows of one error of one recording, with quantities multiplied by factors."""
     own = [row for row in parts if row.source != "total"]
     sources = [
-        (row, factors.get(quantity_behind(row.source) or "", 1.0) * sigma)
-        for row, sigma in with_sigma(own)
+        (row, factors.get(find_noise_quantity(row.source) or "", 1.0) * sigma)
+        for row, sigma in select_known_errors(own)
     ]
     missing = [row for row in own if row.sigma is None]
     (total,) = (row for row in parts if row.source == "total")
@@ -152,7 +159,7 @@ class Judgement:
     def _verdict_on_errors(self) -> Verdict:
         """Verdict on the known errors: by the deciding limit, or by all after calibration."""
         once = [
-            once_calibrated(
+            judge_once_calibrated(
                 each.verdict,
                 each.total.limit,
                 each.expected.sigma,
@@ -177,7 +184,7 @@ class Judgement:
         return next(weak for standing, weak in pairs if standing is self.decides)
 
 
-def judgements(
+def judge_sensors(
     errors: Iterable[ErrorBudgetRow],
     requirements: Mapping[str, Requirement],
     sensors: Mapping[str, Mapping[str, Any]],
@@ -197,7 +204,7 @@ def judgements(
         usual = {made: _pool_spreads(of_sensors, basis, simulated=made) for made in (False, True)}
         for sensor, rows in of_sensors.items():
             devices, made = _map_specimens(sensor, rows, basis)
-            by_limit = standings(_select_deciding_rows(rows, basis), devices, usual[made])
+            by_limit = list_standings(_select_deciding_rows(rows, basis), devices, usual[made])
             price_class, price = sensors[sensor]["price_class"], None
             if not requirement.admits(price_class):
                 asked = " or ".join(requirement.price_class or ())
@@ -207,15 +214,18 @@ def judgements(
                 requirement,
                 sensor,
                 by_limit,
-                deciding(by_limit),
-                [weaknesses(each, requirement, basis) if each.known else [] for each in by_limit],
+                find_deciding_limit(by_limit),
+                [
+                    list_weaknesses(each, requirement, basis) if each.known else []
+                    for each in by_limit
+                ],
                 price,
                 Conditions.of(
                     requirement.must,
                     Abilities.model_validate(sensors[sensor].get("abilities", {})),
                     [row for each in by_limit for row in each.conditions],
                 ),
-                unless(sensor, rows, basis),
+                judge_with_corrected_units(sensor, rows, basis),
             )
 
 
@@ -251,8 +261,10 @@ def _pool_spreads(
         devices, made = _map_specimens(sensor, rows, basis)
         if made is not simulated:
             continue
-        for standing in standings(_select_deciding_rows(rows, basis), devices):
+        for standing in list_standings(_select_deciding_rows(rows, basis), devices):
             if standing.expected.spread is not None and standing.expected.spread_of == "specimens":
-                by_limit.setdefault(limit_of(standing.total), []).append(standing.expected.spread)
-    usual = {key: usual_spread(spreads) for key, spreads in by_limit.items()}
+                by_limit.setdefault(make_limit_key(standing.total), []).append(
+                    standing.expected.spread
+                )
+    usual = {key: pool_spreads(spreads) for key, spreads in by_limit.items()}
     return {key: spread for key, spread in usual.items() if spread is not None}

@@ -16,7 +16,7 @@ from imubench_pipeline.navigation.verdicts.basis import Basis, Key
 from imubench_pipeline.navigation.verdicts.evidence import (
     MAX_TIME_SHARE,
     WEAKNESS_REASONS,
-    longest_asked,
+    find_longest_time,
 )
 from imubench_pipeline.navigation.verdicts.judgement import Judgement
 from imubench_pipeline.navigation.verdicts.specimens import Expected
@@ -50,7 +50,7 @@ class _Step:
     doubts: tuple[str, ...] = ()
 
 
-def next_step_rows(judged: Sequence[Judgement], basis: Basis) -> list[NextStepRow]:
+def list_next_step_rows(judged: Sequence[Judgement], basis: Basis) -> list[NextStepRow]:
     """Return the rows of the table ``next_steps``, sorted by the number of changed verdicts."""
     groups: dict[tuple[tuple[str, str | None], Action], list[_Step]] = {}
     for judgement in judged:
@@ -125,7 +125,7 @@ def _find_settling_steps(judgement: Judgement, basis: Basis) -> Iterator[_Step]:
     decides, sensor, name = judgement.decides, judgement.sensor, judgement.name
     away = abs(math.log(decides.margin))
     if decides.expected.spread is not None:
-        more = specimens_needed(decides.expected, away)
+        more = count_specimens_needed(decides.expected, away)
         if more:
             yield _Step("add_specimens", (sensor, None), name, True, specimens=more)
         return
@@ -142,7 +142,7 @@ def _find_settling_steps(judgement: Judgement, basis: Basis) -> Iterator[_Step]:
         yield _Step("log_longer", key, name, True, duration=needed)
 
 
-def specimens_needed(expected: Expected, away: float) -> int | None:
+def count_specimens_needed(expected: Expected, away: float) -> int | None:
     """Return how many more specimens would bring the limits of an error within a distance.
 
     ``away`` is the logarithm of the margin, the maximum half width t sqrt(tau^2 (1 + 1/n)) of the
@@ -188,7 +188,7 @@ def _find_longest(sensor: str, standing: Standing, basis: Basis) -> tuple[Key, f
 
 def _compute_duration_needed(judgement: Judgement) -> float:
     """Return the length of a log that can determine the error of the deciding limit, s."""
-    return longest_asked(judgement.decides.total, judgement.requirement) / MAX_TIME_SHARE
+    return find_longest_time(judgement.decides.total, judgement.requirement) / MAX_TIME_SHARE
 
 
 def _unite(values: Iterable[T]) -> tuple[T, ...]:

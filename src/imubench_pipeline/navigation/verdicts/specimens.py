@@ -27,7 +27,7 @@ from scipy.special import stdtr, stdtrit
 
 from imubench_pipeline.model.comparisons import ErrorBudgetRow
 from imubench_pipeline.model.states import SpreadOf
-from imubench_pipeline.navigation.pooled import NORMAL_QUANTILE, bounded_exp, pool
+from imubench_pipeline.navigation.pooled import NORMAL_QUANTILE, compute_bounded_exp, pool
 
 Limits = tuple[float, float, float]  # value, lower, upper
 
@@ -65,7 +65,7 @@ class Expected:
     spread_of: SpreadOf | None = None
 
 
-def expected(
+def predict_error(
     totals: Sequence[ErrorBudgetRow], devices: Mapping[str, str], usual: Spread | None = None
 ) -> Expected:
     """Return the predicted error of the next specimen of a sensor.
@@ -114,7 +114,7 @@ def expected(
     return Expected(*prediction, *counts, spread, of)
 
 
-def usual_spread(spreads: Iterable[Spread]) -> Spread | None:
+def pool_spreads(spreads: Iterable[Spread]) -> Spread | None:
     """Return the pooled spread of several sensors; None with too few degrees of freedom."""
     listed = list(spreads)
     freedom = sum(spread.freedom for spread in listed)
@@ -139,4 +139,9 @@ def _predict(
     within = None
     if limit is not None:
         within = float(stdtr(freedom, (math.log(limit) - mean) / scale))
-    return bounded_exp(mean), bounded_exp(mean - half), bounded_exp(mean + half), within
+    return (
+        compute_bounded_exp(mean),
+        compute_bounded_exp(mean - half),
+        compute_bounded_exp(mean + half),
+        within,
+    )

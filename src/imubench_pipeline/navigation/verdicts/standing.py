@@ -11,8 +11,12 @@ from imubench_pipeline.model import table
 from imubench_pipeline.model.comparisons import ErrorBudgetRow
 from imubench_pipeline.model.states import SURE_PROBABILITY, Verdict
 from imubench_pipeline.model.verdicts import Share
-from imubench_pipeline.navigation.suitability.conditions import is_condition, shares_of, with_sigma
-from imubench_pipeline.navigation.verdicts.specimens import Expected, Spread, expected
+from imubench_pipeline.navigation.suitability.conditions import (
+    compute_variance_shares,
+    is_condition,
+    select_known_errors,
+)
+from imubench_pipeline.navigation.verdicts.specimens import Expected, Spread, predict_error
 from imubench_pipeline.words.reasons import budgets as texts
 
 MAX_LIMIT_RATIO = 4.0
@@ -26,7 +30,7 @@ class OutageErrorRow(ErrorBudgetRow):
     trajectory: Annotated[str | None, table.Column("of the outages")]
 
 
-def trajectory_of(total: ErrorBudgetRow) -> str | None:
+def get_trajectory(total: ErrorBudgetRow) -> str | None:
     """Return the trajectory of an error in outages; None for an error of dead reckoning."""
     return total.trajectory if isinstance(total, OutageErrorRow) else None
 
@@ -90,7 +94,7 @@ class Standing:
         return "likely_meets" if self.chance >= 0.5 else "likely_fails"
 
 
-def standings(
+def list_standings(
     rows: Iterable[ErrorBudgetRow],
     devices: Mapping[str, str],
     usual: Mapping[tuple[Any, ...], Spread] | None = None,
@@ -98,7 +102,7 @@ def standings(
     """Return the standing of one sensor for each limit of one requirement.
 
     The arguments are rows of the table ``error_budget``, the specimen of each recording, and the
-    spread of other sensors by `limit_of`.
+    spread of other sensors by `make_limit_key`.
     """
     by_limit: dict[tuple[Any, ...], list[ErrorBudgetRow]] = {}
     for row in rows:
@@ -109,15 +113,15 @@ def standings(
             if missing:
                 reason = row.reason or texts.missing_numbers(missing)
                 row = replace(row, sigma=None, reason=reason)
-        by_limit.setdefault(limit_of(row), []).append(row)
+        by_limit.setdefault(make_limit_key(row), []).append(row)
     listed = []
     for key, parts in by_limit.items():
         totals = [row for row in parts if row.source == "total"]
         if not totals:
             continue
-        figures = with_sigma(totals)
+        figures = select_known_errors(totals)
         with_figure = [row for row, _ in figures]
-        prediction = expected(with_figure, devices, (usual or {}).get(key))
+        prediction = predict_error(with_figure, devices, (usual or {}).get(key))
         if prediction.sigma is None:
             listed.append(Standing(totals[0], with_figure, prediction))
             continue
@@ -126,10 +130,10 @@ def standings(
         own = [row for row in parts if row.source != "total" and row.recording == answer.recording]
         conditions = tuple(row for row in own if is_condition(row))
         standing = Standing(answer, with_figure, prediction, conditions=conditions)
-        sources = with_sigma(own)
+        sources = select_known_errors(own)
         if sources and sigma > 0.0:
             largest, size = max(sources, key=lambda source: source[1])
-            share, shares = (size / sigma) ** 2, shares_of(sigma, own)
+            share, shares = (size / sigma) ** 2, compute_variance_shares(sigma, own)
             standing = replace(standing, source=largest.source, share=share, parts=shares)
         listed.append(standing)
     return listed
@@ -140,12 +144,12 @@ def _compute_distance(sigma: float, median: float) -> float:
     return abs(math.log(sigma / median)) if median and sigma else abs(sigma - median)
 
 
-def limit_of(row: ErrorBudgetRow) -> tuple[Any, ...]:
+def make_limit_key(row: ErrorBudgetRow) -> tuple[Any, ...]:
     """Return the key of the limit of a row."""
-    return row.error, row.time, row.limit, trajectory_of(row)
+    return row.error, row.time, row.limit, get_trajectory(row)
 
 
-def deciding(by_limit: Sequence[Standing]) -> Standing:
+def find_deciding_limit(by_limit: Sequence[Standing]) -> Standing:
     """Return the deciding limit: the worst known one; an unknown one unless that one fails."""
     known = [standing for standing in by_limit if standing.known]
     worst = min(known, key=lambda standing: standing.margin, default=by_limit[0])

@@ -10,10 +10,10 @@ from imubench_pipeline.noise.terms.gauss_markov import (
     FLOOR,
     PEAK_TAU,
     GaussMarkov,
-    bias_instability,
-    driving_density,
-    gauss_markov_shape,
-    sampled_gauss_markov_shape,
+    compute_bias_instability,
+    compute_driving_density,
+    evaluate_gauss_markov_shape,
+    evaluate_sampled_shape,
 )
 from imubench_pipeline.noise.terms.quantization import Quantization
 from imubench_pipeline.noise.terms.ramp import Ramp
@@ -39,10 +39,10 @@ __all__ = [
     "Term",
     "TermParameter",
     "WhiteNoise",
-    "bias_instability",
-    "driving_density",
-    "gauss_markov_shape",
-    "sampled_gauss_markov_shape",
+    "compute_bias_instability",
+    "compute_driving_density",
+    "evaluate_gauss_markov_shape",
+    "evaluate_sampled_shape",
 ]
 
 TERMS = register_terms(Quantization, WhiteNoise, Flicker, GaussMarkov, RandomWalk, Ramp, Sinusoid)

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, ClassVar, Self
 import numpy as np
 
 from imubench_pipeline.noise.growth import SensorStart, Uncalibrated
-from imubench_pipeline.noise.state_space import ContinuousSpace, StateSpace, root_of
+from imubench_pipeline.noise.state_space import ContinuousSpace, StateSpace, factor_covariance
 from imubench_pipeline.noise.terms.traits import (
     Drive,
     Process,
@@ -189,7 +189,7 @@ class Term(ABC):
     def start(self, rng: np.random.Generator, interval: float) -> Array:
         """Draw the first state, shape (m,)."""
         space = self.state_space(interval)
-        root = root_of(space.initial_variance)
+        root = factor_covariance(space.initial_variance)
         return space.initial_mean + root @ rng.standard_normal(len(root))
 
 

@@ -59,7 +59,7 @@ _MAX_EXACT_SIZE = 1 << 12  # largest cluster with an exact sum for the Allan var
 class Flicker(Term):
     """Flicker noise, 1/f: bias instability B as IEEE Std 952 defines it.
 
-    It has no finite state space; `bank` approximates it.
+    It has no finite state space; `fit_flicker_bank` approximates it.
     """
 
     B: float
@@ -116,8 +116,8 @@ class Flicker(Term):
         return Drive(flicker=self.B)
 
     def realised(self, interval: float, longest: float) -> Sequence[Term]:
-        """Return its `bank`."""
-        return bank(self.B, interval, longest)
+        """Return its `fit_flicker_bank`."""
+        return fit_flicker_bank(self.B, interval, longest)
 
     def as_unit(self) -> tuple[float, Term]:
         """B^2 and B = 1."""
@@ -126,17 +126,17 @@ class Flicker(Term):
     def growth(self, order: int, time: float, start: SensorStart) -> float:
         """B^2 t^(2m+2) times a function of the window, or the time since switch-on, over t.
 
-        See `after_window` and `since_switch_on`.
+        See `integrate_after_window` and `integrate_since_switch_on`.
         """
         scale = self.B**2 * time ** (2 * order + 2)
         if isinstance(start, Calibrated):
-            return scale * after_window(order, start.window / time)
-        return scale * since_switch_on(order, start.on_time / time)
+            return scale * integrate_after_window(order, start.window / time)
+        return scale * integrate_since_switch_on(order, start.on_time / time)
 
     def growth_from_known(self, time: Array) -> tuple[Array, Array]:
         """0: flicker noise has no finite state that could be known.
 
-        A filter predicts with the `bank`, see `realised`.
+        A filter predicts with the `fit_flicker_bank`, see `realised`.
         """
         return np.zeros_like(time), np.zeros_like(time)
 
@@ -178,7 +178,7 @@ def _integrate_logarithm_twice(x: Array) -> Array:
     return x**2 * (np.log(np.maximum(x, 1e-300)) - 1.5)
 
 
-def bank(B: float, interval: float, longest: float) -> list[Term]:
+def fit_flicker_bank(B: float, interval: float, longest: float) -> list[Term]:
     """Return Gauss-Markov processes whose samples have the Allan variance of flicker noise.
 
     Their correlation times are spaced evenly on a log scale from half a sampling interval, five in
@@ -197,13 +197,13 @@ def bank(B: float, interval: float, longest: float) -> list[Term]:
     return [*terms, WhiteNoise(B * white * math.sqrt(interval))] if white else terms
 
 
-def ripple(interval: float, longest: float) -> tuple[float, float]:
+def compute_bank_ripple(interval: float, longest: float) -> tuple[float, float]:
     """Return the largest relative errors of a bank within its band.
 
     The first is for the sampled Allan variance, the second for the spectrum of the samples at
     frequencies from 1 / (2 longest) to Nyquist, both relative to sampled flicker noise.
     """
-    terms = bank(1.0, interval, longest)
+    terms = fit_flicker_bank(1.0, interval, longest)
     points = math.ceil(math.log10(longest / interval) * _POINTS_PER_DECADE * 2)
     n = np.unique(np.rint(np.geomspace(1.0, longest / interval, points)))
     omega = np.pi / n
@@ -252,7 +252,7 @@ def _tabulate_sums() -> Array:
     return np.concatenate(([0.0, 0.0], np.cumsum(steps)[1:]))  # of m = 0, 1, 2 ...
 
 
-def since_switch_on(order: int, on_time: float) -> float:
+def integrate_since_switch_on(order: int, on_time: float) -> float:
     """Return the variance of the (m+1)-fold integral over a unit of time, for B = 1, m to 2.
 
     It is 1 / ((2m+2) Gamma(m+3/2)^2) from the driving noise during the motion, and a combination of
@@ -267,7 +267,7 @@ def since_switch_on(order: int, on_time: float) -> float:
     return _integrate_during_motion(order) + before
 
 
-def after_window(order: int, window: float) -> float:
+def integrate_after_window(order: int, window: float) -> float:
     """Return the variance of the (m+1)-fold integral less the mean over a window, for B = 1.
 
     The integral is over a unit of time directly after the window; m is 0 to 2. For m = 0 and a
@@ -278,7 +278,7 @@ def after_window(order: int, window: float) -> float:
     which is 4 ln 2 / pi, twice the Allan variance, for r = 1.
     """
     # Minus the double integral of k(s) k(s') ln|s - s'| with k = (1 - s)^m / m!: the constant of
-    # `since_switch_on` long after switch-on, 3/2 for m = 0 and 7/16 for m = 1.
+    # `integrate_since_switch_on` long after switch-on, 3/2 for m = 0 and 7/16 for m = 1.
     _, decaying = _expand_before_motion(order)
     rates = 2.0 * np.arange(1, len(decaying) + 1)
     motion = math.pi * (_integrate_during_motion(order) + float(np.sum(decaying / rates)))
@@ -288,13 +288,13 @@ def after_window(order: int, window: float) -> float:
 
 
 def _integrate_during_motion(order: int) -> float:
-    """Return the part of `since_switch_on` from the driving noise during the motion."""
+    """Return the part of `integrate_since_switch_on` from the driving noise during the motion."""
     return 1.0 / ((2 * order + 2) * math.gamma(order + 1.5) ** 2)
 
 
 @lru_cache(maxsize=3)
 def _expand_before_motion(order: int) -> tuple[float, Array]:
-    """Return the coefficients of a, and of e^-2a ..., in d/da of `since_switch_on`."""
+    """Return the coefficients of a, and of e^-2a ..., in d/da of `integrate_since_switch_on`."""
     response = np.array(_RESPONSE_COEFFICIENTS[order])
     coefficients = np.convolve(np.convolve(response, response), [1.0, 0.0, -1.0]) / (2.0 * math.pi)
     return float(coefficients[0]), coefficients[1:]

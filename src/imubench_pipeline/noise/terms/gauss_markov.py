@@ -9,7 +9,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import ArrayLike
 
-from imubench_pipeline.noise.exponentials import decay, squared_response
+from imubench_pipeline.noise.exponentials import evaluate_decay, integrate_squared_response
 from imubench_pipeline.noise.growth import SensorStart, Uncalibrated, of_constant
 from imubench_pipeline.noise.state_space import ContinuousSpace, StateSpace, draw_block_sums
 from imubench_pipeline.noise.terms.base import Term
@@ -72,7 +72,7 @@ class GaussMarkov(Term):
     @property
     def density(self) -> float:
         """S_B = 2 B^2 ln 2 / (pi 0.4365^2 T_B), density of the driving white noise."""
-        return driving_density(self.B, self.T_B)
+        return compute_driving_density(self.B, self.T_B)
 
     @property
     def _variance(self) -> float:
@@ -85,11 +85,11 @@ class GaussMarkov(Term):
 
     def allan_variance(self, tau: Array) -> Array:
         """Maia et al., eq. 26, with the sign corrected: e^(-tau/T_B)."""
-        return self.density * gauss_markov_shape(tau, self.T_B)
+        return self.density * evaluate_gauss_markov_shape(tau, self.T_B)
 
     def sampled_allan_variance(self, n: Array, interval: float) -> Array:
         """Exact for samples of the process, from the sum of its covariances."""
-        return self.density * sampled_gauss_markov_shape(n, interval, self.T_B)
+        return self.density * evaluate_sampled_shape(n, interval, self.T_B)
 
     def sampled_spectrum(self, omega: Array, interval: float) -> Array:
         """(S_B T_B / 2) (1 - p^2) / (1 - 2 p cos(omega) + p^2) with p = e^(-T/T_B)."""
@@ -138,14 +138,16 @@ class GaussMarkov(Term):
         not calibrated S_B (T_B^(2m+3) P_m(x) + c^2 T_B (1 - d_x)^2 / 2).
         """
         x, constant = time / self.T_B, of_constant(order, time)
-        driven = time ** (2 * order + 3) * squared_response(order, x)
+        driven = time ** (2 * order + 3) * integrate_squared_response(order, x)
         if isinstance(start, Uncalibrated):
-            remaining = math.factorial(order + 1) * decay(order + 1, x)
+            remaining = math.factorial(order + 1) * evaluate_decay(order + 1, x)
             return self.density * (driven + (constant * remaining) ** 2 * self.T_B / 2.0)
         y = start.window / self.T_B
         # The losses are subtracted, not the retained parts, which would cancel for long T_B.
-        lost = math.factorial(order + 1) * x * decay(order + 2, x) - y * decay(2, y)
-        in_window = start.window * squared_response(0, y)
+        lost = math.factorial(order + 1) * x * evaluate_decay(order + 2, x) - y * evaluate_decay(
+            2, y
+        )
+        in_window = start.window * integrate_squared_response(0, y)
         return self.density * (driven + constant**2 * (in_window + self.T_B * lost**2 / 2.0))
 
     def growth_from_known(self, time: Array) -> tuple[Array, Array]:
@@ -220,17 +222,17 @@ class GaussMarkov(Term):
         return f"{self.word} {self.T_B:.4g} s"
 
 
-def driving_density(B: float, T_B: float) -> float:
+def compute_driving_density(B: float, T_B: float) -> float:
     """Return S_B of a bias instability B with correlation time T_B (Maia et al., eq. 8)."""
     return 2.0 * B**2 * math.log(2.0) / (math.pi * PEAK**2 * T_B)
 
 
-def bias_instability(density: float, T_B: float) -> float:
+def compute_bias_instability(density: float, T_B: float) -> float:
     """Return B of a Gauss-Markov process with driving density S_B (Maia et al., eq. 8)."""
     return math.sqrt(density * T_B * math.pi * PEAK**2 / (2.0 * math.log(2.0)))
 
 
-def gauss_markov_shape(tau: Array, T_B: float | Array) -> Array:
+def evaluate_gauss_markov_shape(tau: Array, T_B: float | Array) -> Array:
     """Return the Allan variance of a Gauss-Markov process over S_B, s.
 
     Maia et al., eq. 26; Farrell et al. 2022, eq. 63. Tau and T_B may be arrays that broadcast.
@@ -248,7 +250,7 @@ def gauss_markov_shape(tau: Array, T_B: float | Array) -> Array:
     return np.asarray(T_B * shape)
 
 
-def sampled_gauss_markov_shape(n: ArrayLike, interval: float, T_B: float) -> Array:
+def evaluate_sampled_shape(n: ArrayLike, interval: float, T_B: float) -> Array:
     """Return the Allan variance of a sampled Gauss-Markov process over S_B, s.
 
     (T_B / (2 n^2)) (n (1+p)/(1-p) - p (3 - 4 p^n + p^(2n)) / (1-p)^2) with p = e^(-T/T_B);
@@ -265,5 +267,5 @@ def sampled_gauss_markov_shape(n: ArrayLike, interval: float, T_B: float) -> Arr
     # sampling is added from the moments sum_ij w_i w_j |i - j|^m of the samples.
     h = interval / T_B
     added = h / (3.0 * n) - h**3 / 6.0 * (n / 3.0 + 1.0 / (15.0 * n))
-    continuous = 2.0 / T_B * gauss_markov_shape(n * interval, T_B) + added
+    continuous = 2.0 / T_B * evaluate_gauss_markov_shape(n * interval, T_B) + added
     return T_B / 2.0 * np.where(x < 3e-3, continuous, closed)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from imubench_pipeline.noise.exponentials import phi
+from imubench_pipeline.noise.exponentials import evaluate_phi
 from imubench_pipeline.noise.growth import SensorStart, Uncalibrated, of_constant
 from imubench_pipeline.noise.state_space import ContinuousSpace, StateSpace
 from imubench_pipeline.noise.terms.base import Deterministic
@@ -81,12 +81,13 @@ class Sinusoid(Deterministic):
         constant, x = of_constant(order, time), omega * time
         factorial = math.factorial(order + 1)
         if isinstance(start, Uncalibrated):
-            gain = constant * abs(factorial * phi(order + 1, 1j * x))
+            gain = constant * abs(factorial * evaluate_phi(order + 1, 1j * x))
         else:
             y = omega * start.window
             # Both less 1: the difference itself would cancel for slow lines.
             gain = constant * abs(
-                factorial * 1j * x * phi(order + 2, 1j * x) + 1j * y * phi(2, -1j * y)
+                factorial * 1j * x * evaluate_phi(order + 2, 1j * x)
+                + 1j * y * evaluate_phi(2, -1j * y)
             )
         return 0.5 * (self.amplitude * gain) ** 2
 

@@ -261,7 +261,7 @@ def check_pages(path: Path, metadata: pq.FileMetaData, names: Sequence[str]) -> 
             together = 0
             for place in places:
                 largest = 0
-                for unpacked in pages(file, metadata.row_group(group).column(place)):
+                for unpacked in list_page_sizes(file, metadata.row_group(group).column(place)):
                     number += 1
                     largest = max(largest, unpacked)
                     if number > most:
@@ -278,7 +278,7 @@ def check_pages(path: Path, metadata: pq.FileMetaData, names: Sequence[str]) -> 
                 )
 
 
-def pages(file: BinaryIO, column: pq.ColumnChunkMetaData) -> Iterator[int]:
+def list_page_sizes(file: BinaryIO, column: pq.ColumnChunkMetaData) -> Iterator[int]:
     """Yield the unpacked size of each page of a column, bytes."""
     at = column.data_page_offset
     if column.has_dictionary_page and 0 < column.dictionary_page_offset < at:

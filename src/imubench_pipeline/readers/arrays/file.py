@@ -34,7 +34,7 @@ from imubench_pipeline.readers.arrays.table import (
     Table,
     UnusableError,
 )
-from imubench_pipeline.readers.batch import Batch, LogFile, stated_in
+from imubench_pipeline.readers.batch import Batch, LogFile, name_settings_file
 from imubench_pipeline.readers.bounds import (
     MAX_ARRAYS,
     MAX_BLOCK_BYTES,
@@ -51,10 +51,10 @@ from imubench_pipeline.readers.file_format import (
     Kind,
     LogColumn,
     LogTable,
-    shown,
+    format_first_numbers,
 )
-from imubench_pipeline.readers.stamps import Clock, date_of_nanoseconds, date_of_stamp
-from imubench_pipeline.readers.stated_units import stated
+from imubench_pipeline.readers.stamps import Clock, format_date_of_stamp, format_nanoseconds
+from imubench_pipeline.readers.stated_units import find_stated_unit
 from imubench_pipeline.settings.sensor import TimeSource
 from imubench_pipeline.settings.validation import cut
 from imubench_pipeline.tables.findings import RecordingError
@@ -85,12 +85,14 @@ class ArrayFile(LogFile):
                     seconds = None if time is None else time.seconds(block.pop(_TIME_KEY))
                 except UnusableError as error:
                     raise RecordingError(f"{self.path.name}: {error}") from None
-                columns = {name: self.to_si(name, numbers(raw)) for name, raw in block.items()}
+                columns = {
+                    name: self.to_si(name, convert_to_float(raw)) for name, raw in block.items()
+                }
             yield Batch(seconds, columns)
 
     def _blocks(self) -> Iterator[dict[str, NDArray[Any]]]:
         """Yield the blocks as written; exceptions of the libraries become `RecordingError`."""
-        with explained(self.path), ExitStack() as stack:
+        with explain_errors(self.path), ExitStack() as stack:
             yield from self._read(self._places(list(islice(self.tables(stack), MAX_ARRAYS + 1))))
 
     def _read(self, places: dict[str, _Place]) -> Iterator[dict[str, NDArray[Any]]]:
@@ -115,7 +117,7 @@ class ArrayFile(LogFile):
                 f"{MAX_CHUNK_BYTES}: repack the file with smaller chunks"
             )
         row_bytes = sum(table.row_bytes(wanted[table]) for table in tables)
-        rows = rows_of_block(row_bytes, MAX_BLOCK_BYTES)
+        rows = count_block_rows(row_bytes, MAX_BLOCK_BYTES)
         read, size = 0, self.path.stat().st_size
         most = max(MIN_CHECKED_EXPANSION, MAX_EXPANSION_RATIO * size)
         streams = [table.blocks(wanted[table], rows) for table in tables]
@@ -155,7 +157,7 @@ class ArrayFile(LogFile):
             table, position = places[key]
             label = table.column(position).label or table.name.rpartition("/")[2]
             where = f"an attribute of {table.shown}"
-            if unit := stated(key, table.unit(position), where, label):
+            if unit := find_stated_unit(key, table.unit(position), where, label):
                 self.units[key] = unit
         if self.log.time is not None:
             places[_TIME_KEY] = self._time_place(by_name)
@@ -193,7 +195,7 @@ class ArrayFile(LogFile):
         return place
 
 
-def rows_of_block(row_bytes: int, most: int) -> int:
+def count_block_rows(row_bytes: int, most: int) -> int:
     """Return the records of a block of ``most`` bytes; `UnusableError` if one is larger."""
     if row_bytes > most:
         raise UnusableError(
@@ -217,7 +219,7 @@ def check_not_empty(path: Path) -> None:
 
 
 @contextmanager
-def explained(path: Path) -> Iterator[None]:
+def explain_errors(path: Path) -> Iterator[None]:
     """Convert all exceptions of the libraries about a file to `RecordingError`."""
     try:
         yield
@@ -232,7 +234,7 @@ def explained(path: Path) -> Iterator[None]:
         ) from error
 
 
-def numbers(raw: NDArray[Any]) -> NDArray[np.float64]:
+def convert_to_float(raw: NDArray[Any]) -> NDArray[np.float64]:
     """Return a column as float64, with NaN where a value is missing."""
     return np.ma.filled(np.ma.asanyarray(raw, np.float64), np.nan)
 
@@ -273,11 +275,12 @@ def _find_column(
         has = _join_names(table.labels) or f"{table.width} columns without names: give a number"
         raise UnusableError(
             f"no column {column!r} for {key}; {table.shown} has {has}; mend 'column' of {key} in "
-            f"{stated_in(key)}"
+            f"{name_settings_file(key)}"
         )
     raise UnusableError(
         f"no variable or column {column!r} for {key}; the file has "
-        f"{_describe_contents(tables, labels=True)}; mend 'column' of {key} in {stated_in(key)}"
+        f"{_describe_contents(tables, labels=True)}; mend 'column' of {key} in "
+        f"{name_settings_file(key)}"
     )
 
 
@@ -312,7 +315,7 @@ def _find_table(tables: dict[str, Table], variable: str | None, key: str) -> Tab
             )
         raise UnusableError(
             f"no variable {variable!r} for {key}; the file has {_describe_contents(tables)}; mend "
-            f"'variable' of {key} in {stated_in(key)}"
+            f"'variable' of {key} in {name_settings_file(key)}"
         )
     usable = [table for table in tables.values() if table.fault is None]
     # Single values, such as the rate, are not counted.
@@ -337,7 +340,7 @@ def _take_numbered(table: Table, column: int, key: str) -> _Place:
         names = f" ({_join_names(table.labels)})" if table.labels else ""
         raise UnusableError(
             f"no column {column} for {key}; {table.shown} has {table.width} columns{samples}"
-            f"{names}; mend 'column' of {key} in {stated_in(key)}"
+            f"{names}; mend 'column' of {key} in {name_settings_file(key)}"
         )
     return table, column - 1
 
@@ -395,12 +398,12 @@ _RATE_NAMES = frozenset(
 _MAX_RATE = 1e6
 
 
-def tables(path: Path, file_format: FileFormat) -> list[LogTable]:
+def list_tables(path: Path, file_format: FileFormat) -> list[LogTable]:
     """Return the first thousand tables of a file; raise `RecordingError` if it cannot be read."""
     check_not_empty(path)
     file = file_format.load().log_file(path, NOTHING_STATED, {})
     assert isinstance(file, ArrayFile)  # the readers of these files
-    with explained(path), ExitStack() as stack:
+    with explain_errors(path), ExitStack() as stack:
         tables = list(islice(file.tables(stack), _MAX_TABLES))
         described = [_describe_table(path, file_format, table) for table in tables]
     rates = set()
@@ -439,7 +442,7 @@ def _describe_table(path: Path, file_format: FileFormat, table: Table) -> LogTab
     described = [table.column(place) for place in range(min(table.width, MAX_SEARCHED_COLUMNS))]
     usable = [n for n, column in enumerate(described) if column.kind in NUMBER_KINDS + DATE_KIND]
     try:
-        with explained(path):
+        with explain_errors(path):
             values = _read_first_records(table, usable)
             units = [table.unit(place) for place in range(len(described))]
     except RecordingError as error:
@@ -460,7 +463,7 @@ def _describe_table(path: Path, file_format: FileFormat, table: Table) -> LogTab
             address = f"{table.name}[{place + 1}]"
         raw = values.get(place, np.empty(0))
         dated = column.kind == DATE_KIND
-        first = tuple(map(str, raw[:MAX_SHOWN_VALUES])) if dated else shown(raw)
+        first = tuple(map(str, raw[:MAX_SHOWN_VALUES])) if dated else format_first_numbers(raw)
         if dated:
             dates = raw.astype("M8[ns]")
             raw = np.where(np.isnat(dates), np.nan, dates.astype(np.int64).astype(np.float64))
@@ -470,7 +473,7 @@ def _describe_table(path: Path, file_format: FileFormat, table: Table) -> LogTab
                 column.label or (table.name if table.width == 1 else ""),
                 kinds.get(column.kind, "other"),
                 first,
-                numbers(raw),
+                convert_to_float(raw),
                 units[place],
                 ("iso8601",) if dated else (),
                 address,
@@ -486,7 +489,7 @@ def _read_first_records(table: Table, places: Sequence[int]) -> dict[int, NDArra
     """Return the first records of some columns, by position."""
     if not places:
         return {}
-    rows = min(MAX_EXAMINED_RECORDS, rows_of_block(table.row_bytes(places), _MAX_EXAMINED_BYTES))
+    rows = min(MAX_EXAMINED_RECORDS, count_block_rows(table.row_bytes(places), _MAX_EXAMINED_BYTES))
     for block in table.blocks(places, rows):
         if len(block[0]):
             return {place: values[:rows] for place, values in zip(places, block, strict=True)}
@@ -537,4 +540,6 @@ class ArrayTime:
         return self._clock.seconds(stamps, ~missing)
 
     def _started(self, first: Any) -> str | None:
-        return date_of_nanoseconds(first) if self._dated else date_of_stamp(first, self._source)
+        return (
+            format_nanoseconds(first) if self._dated else format_date_of_stamp(first, self._source)
+        )

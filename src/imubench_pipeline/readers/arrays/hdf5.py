@@ -46,10 +46,10 @@ class Hdf5File(ArrayFile):
                 "not an HDF5 file, or its beginning is damaged; mend 'reader' in the sensor file, "
                 "or copy the file again"
             )
-        return data_sets(stack.enter_context(h5py.File(self.path, "r")))
+        return list_data_sets(stack.enter_context(h5py.File(self.path, "r")))
 
 
-def data_sets(file: h5py.File, time_axis: int = 0, passed_over: str = "\0") -> list[DataSet]:
+def list_data_sets(file: h5py.File, time_axis: int = 0, passed_over: str = "\0") -> list[DataSet]:
     """Return the data sets of a file by name; only hard links are followed.
 
     ``passed_over``: prefix of the names in the root group that are not data. Raise `UnusableError`

@@ -23,7 +23,7 @@ import numpy as np
 
 from imubench_pipeline.readers.arrays import hdf5
 from imubench_pipeline.readers.arrays.file import ArrayFile
-from imubench_pipeline.readers.arrays.matlab_4 import HEADER_BYTES, header_of
+from imubench_pipeline.readers.arrays.matlab_4 import HEADER_BYTES, parse_header
 from imubench_pipeline.readers.arrays.table import (
     MAX_DEFLATE_RATIO,
     StreamedArray,
@@ -31,7 +31,7 @@ from imubench_pipeline.readers.arrays.table import (
     UnsupportedArray,
     UnusableError,
     describe_shape,
-    exactly,
+    read_exactly,
     skip,
 )
 from imubench_pipeline.readers.bounds import MAX_DIMENSIONS, MAX_MATLAB_NAME, MAX_STRUCTURE_DEPTH
@@ -52,7 +52,7 @@ class MatlabFile(ArrayFile):
         order = _BYTE_ORDERS.get(begin[126:_HEADER_5_BYTES])
         if order is not None and struct.unpack(f"{order}H", begin[124:126])[0] >> 8 == _VERSION:
             return _list_variables_of_5(self.path)
-        if header_of(begin[:HEADER_BYTES]) is not None:
+        if parse_header(begin[:HEADER_BYTES]) is not None:
             return _list_variables_of_4(self.path)
         raise UnusableError(
             "not a MATLAB file of version 4, 5 or 7.3, or its beginning is damaged; save it with "
@@ -63,7 +63,7 @@ class MatlabFile(ArrayFile):
 def _list_variables_of_7(file: h5py.File) -> Iterator[Table]:
     """Yield the variables of version 7.3, where matrices are stored transposed."""
     # Parts of cells, objects and sparse matrices are not variables.
-    for data_set in hdf5.data_sets(file, time_axis=1, passed_over="#"):
+    for data_set in hdf5.list_data_sets(file, time_axis=1, passed_over="#"):
         attributes = data_set.data.attrs
         if "MATLAB_sparse" in data_set.data.parent.attrs:
             continue
@@ -92,7 +92,7 @@ def _list_variables_of_4(path: Path) -> Iterator[Table]:
     with path.open("rb") as file:
         while start < size:
             file.seek(start)
-            header = header_of(file.read(HEADER_BYTES))
+            header = parse_header(file.read(HEADER_BYTES))
             if header is None:
                 raise _make_damaged_error("no header of a variable of version 4", start)
             begin, end = start + header.begin, start + header.begin + header.size
@@ -149,7 +149,7 @@ def _list_variables_of_5(path: Path) -> Iterator[Table]:
         start = _HEADER_5_BYTES
         while start < size:
             file.seek(start)
-            kind, length = struct.unpack(f"{order}II", exactly(file, 8))
+            kind, length = struct.unpack(f"{order}II", read_exactly(file, 8))
             begin, end = start + 8, start + 8 + length
             if end > size:
                 raise _make_truncated_error(end, size)
@@ -210,7 +210,7 @@ class _Elements:
 
     def _read(self, size: int) -> bytes:
         self.at += size
-        return exactly(self.stream, size)
+        return read_exactly(self.stream, size)
 
     def _check(self, length: int) -> None:
         if self.at + length > self.end:

@@ -43,7 +43,7 @@ class Header:
     """Reason why they cannot be read, as the end of a sentence."""
 
 
-def header_of(begin: bytes) -> Header | None:
+def parse_header(begin: bytes) -> Header | None:
     """Return the header in the first `HEADER_BYTES` bytes; None if there is none.
 
     Random bytes are not accepted: most of the first 16 bytes must be zero, and the name valid.

@@ -26,10 +26,10 @@ from imubench_pipeline.readers.arrays.table import (
     Table,
     UnusableError,
     describe_shape,
-    exactly,
+    read_exactly,
 )
 from imubench_pipeline.readers.bounds import MAX_NPY_HEADER
-from imubench_pipeline.readers.compressed import opened_archive
+from imubench_pipeline.readers.compressed import open_archive
 
 _SUFFIX = ".npy"
 _HEADER_SIZE_FORMATS = {(1, 0): "<H", (2, 0): "<I", (3, 0): "<I"}
@@ -50,7 +50,7 @@ class NumpyFile(ArrayFile):
                 "not a NumPy file, or its beginning is damaged; expected what numpy.save or "
                 "numpy.savez writes: mend 'reader' in the sensor file, or copy the file again"
             )
-        archive = stack.enter_context(opened_archive(self.path))
+        archive = stack.enter_context(open_archive(self.path))
         size = self.path.stat().st_size
         tables = []
         for info in archive.infolist():
@@ -85,7 +85,7 @@ def _read_array_header(
             raise UnusableError(
                 f"{shown} has format version {version}; expected 1.0 to 3.0: save again"
             )
-        length = exactly(stream, struct.calcsize(_HEADER_SIZE_FORMATS[version]))
+        length = read_exactly(stream, struct.calcsize(_HEADER_SIZE_FORMATS[version]))
         (header_size,) = struct.unpack(_HEADER_SIZE_FORMATS[version], length)
         if header_size > MAX_NPY_HEADER:
             raise UnusableError(
@@ -93,7 +93,7 @@ def _read_array_header(
                 f"{MAX_NPY_HEADER}: save fewer fields, or copy the file again"
             )
         read = npy.read_array_header_1_0 if version == (1, 0) else npy.read_array_header_2_0
-        shape, fortran, dtype = read(io.BytesIO(length + exactly(stream, header_size)))
+        shape, fortran, dtype = read(io.BytesIO(length + read_exactly(stream, header_size)))
         offset = stream.tell()
     if version == (3, 0) and dtype.names is not None:  # differs from 2.0 by UTF-8
         dtype.names = tuple(name.encode("latin1").decode("utf-8") for name in dtype.names)

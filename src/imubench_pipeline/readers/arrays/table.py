@@ -244,12 +244,14 @@ class StreamedArray(Array):
                 count = min(rows, self.rows - start)
                 if self._by_record:
                     size = count * self._across * self.dtype.itemsize
-                    block = np.frombuffer(exactly(streams[0], size), self.dtype)
+                    block = np.frombuffer(read_exactly(streams[0], size), self.dtype)
                     if not self._leaves:
                         block = block.reshape(count, self._across)
                     yield [self.column_in(block, position) for position in positions]
                 else:
-                    parts = [exactly(stream, count * self.dtype.itemsize) for stream in streams]
+                    parts = [
+                        read_exactly(stream, count * self.dtype.itemsize) for stream in streams
+                    ]
                     yield [np.frombuffer(part, self.dtype) for part in parts]
             if self._checked:
                 last = streams[0 if self._by_record else int(np.argmax(positions))]
@@ -270,10 +272,10 @@ def skip(stream: IO[bytes], size: int, *, seek: bool = True) -> None:
         stream.seek(size, io.SEEK_CUR)
         return
     while size > 0:
-        size -= len(exactly(stream, min(size, _SKIP_BLOCK)))
+        size -= len(read_exactly(stream, min(size, _SKIP_BLOCK)))
 
 
-def exactly(stream: IO[bytes], size: int) -> bytes:
+def read_exactly(stream: IO[bytes], size: int) -> bytes:
     """Return the next bytes of a stream; raise `UnusableError` if it ends early."""
     read = stream.read(size)
     if len(read) < size:

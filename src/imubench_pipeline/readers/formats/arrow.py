@@ -11,7 +11,7 @@ _MAGIC = re.compile(rb"(?:PAR1|FEA1|ARROW1)(?:[\0-\x08\x0e-\x1f]|\Z)")
 def _code() -> Code:
     from imubench_pipeline.readers.arrays import arrow, file
 
-    return Code(arrow.ArrowFile, file.tables)
+    return Code(arrow.ArrowFile, file.list_tables)
 
 
 FORMAT = FileFormat(

@@ -6,7 +6,7 @@ from imubench_pipeline.readers.file_format import Code, FileFormat, Signature
 def _code() -> Code:
     from imubench_pipeline.readers.text import csv
 
-    return Code(csv.CsvFile, csv.tables)
+    return Code(csv.CsvFile, csv.describe_table)
 
 
 FORMAT = FileFormat(

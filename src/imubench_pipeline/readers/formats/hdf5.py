@@ -6,7 +6,7 @@ from imubench_pipeline.readers.file_format import Code, FileFormat, Signature
 def _code() -> Code:
     from imubench_pipeline.readers.arrays import file, hdf5
 
-    return Code(hdf5.Hdf5File, file.tables)
+    return Code(hdf5.Hdf5File, file.list_tables)
 
 
 FORMAT = FileFormat(

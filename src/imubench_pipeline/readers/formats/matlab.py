@@ -1,13 +1,13 @@
 """MATLAB files of version 4, 5 and 7.3."""
 
-from imubench_pipeline.readers.arrays.matlab_4 import HEADER_BYTES, header_of
+from imubench_pipeline.readers.arrays.matlab_4 import HEADER_BYTES, parse_header
 from imubench_pipeline.readers.file_format import Code, FileFormat, Signature
 
 
 def _code() -> Code:
     from imubench_pipeline.readers.arrays import file, matlab
 
-    return Code(matlab.MatlabFile, file.tables)
+    return Code(matlab.MatlabFile, file.list_tables)
 
 
 FORMAT = FileFormat(
@@ -16,7 +16,7 @@ FORMAT = FileFormat(
     endings=(".mat",),
     signature=Signature(
         begins=(b"MATLAB 5.0 MAT-file", b"MATLAB 7.3 MAT-file"),
-        tells=lambda begin: header_of(begin[:HEADER_BYTES]) is not None,
+        tells=lambda begin: parse_header(begin[:HEADER_BYTES]) is not None,
     ),
     streamed=False,
     clock_of="length",

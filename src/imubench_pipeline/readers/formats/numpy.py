@@ -6,7 +6,7 @@ from imubench_pipeline.readers.file_format import Code, FileFormat, Signature
 def _code() -> Code:
     from imubench_pipeline.readers.arrays import file, npy
 
-    return Code(npy.NumpyFile, file.tables)
+    return Code(npy.NumpyFile, file.list_tables)
 
 
 FORMAT = FileFormat(

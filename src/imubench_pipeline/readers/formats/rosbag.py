@@ -6,7 +6,7 @@ from imubench_pipeline.readers.file_format import Code, FileFormat, Signature
 def _code() -> Code:
     from imubench_pipeline.readers.rosbag import file
 
-    return Code(file.RosbagFile, file.tables)
+    return Code(file.RosbagFile, file.list_topics)
 
 
 FORMAT = FileFormat(

@@ -18,7 +18,7 @@ def _has_messages(begin: bytes) -> bool:
 def _code() -> Code:
     from imubench_pipeline.readers import ubx
 
-    return Code(ubx.UbxFile, ubx.tables)
+    return Code(ubx.UbxFile, ubx.list_messages)
 
 
 FORMAT = FileFormat(

@@ -11,7 +11,7 @@ _SENTENCE = re.compile(rb"\$VN[A-Z]{3},[-+.,\d]{8}")
 def _code() -> Code:
     from imubench_pipeline.readers import vectornav
 
-    return Code(vectornav.VectorNavFile, vectornav.tables)
+    return Code(vectornav.VectorNavFile, vectornav.list_sentences)
 
 
 FORMAT = FileFormat(

@@ -13,17 +13,17 @@ from numpy.typing import NDArray
 
 from imubench_pipeline.earth import STANDARD_GRAVITY
 from imubench_pipeline.readers import LogFile, read
-from imubench_pipeline.readers.contents import Contents, contents
+from imubench_pipeline.readers.contents import Contents, list_contents
 from imubench_pipeline.readers.file_format import LogTable
-from imubench_pipeline.readers.inspection.clock import typical_step
-from imubench_pipeline.readers.inspection.draft import UNKNOWN, Draft, block, printable
-from imubench_pipeline.readers.inspection.drafting import draft
-from imubench_pipeline.readers.inspection.names import meaning
-from imubench_pipeline.readers.stated_units import bracketed
+from imubench_pipeline.readers.inspection.clock import estimate_step
+from imubench_pipeline.readers.inspection.draft import UNKNOWN, Draft, format_draft, make_printable
+from imubench_pipeline.readers.inspection.drafting import draft_sensor_file
+from imubench_pipeline.readers.inspection.names import interpret_label
+from imubench_pipeline.readers.stated_units import find_bracketed
 from imubench_pipeline.settings.sensor import CHANNELS, LogFormat, Sensor
 from imubench_pipeline.settings.validation import ConfigError, parse
 from imubench_pipeline.tables.findings import RecordingError
-from imubench_pipeline.units import from_si
+from imubench_pipeline.units import convert_from_si
 
 __all__ = ["Draft", "Inspection", "Proof", "inspect"]
 
@@ -66,9 +66,14 @@ def inspect(path: Path, model: str | None = None) -> Inspection:
     """
     # Numbers in a damaged file may overflow.
     with np.errstate(all="ignore"):
-        log = contents(path)
-        drafted = draft(log, model)
-        return Inspection(listing(log), block(drafted, path.name), drafted, proof(path, drafted))
+        log = list_contents(path)
+        drafted = draft_sensor_file(log, model)
+        return Inspection(
+            format_contents(log),
+            format_draft(drafted, path.name),
+            drafted,
+            check_draft(path, drafted),
+        )
 
 
 _MAX_LINES = 40  # largest number of tables, and of columns of a table, that are listed
@@ -76,9 +81,9 @@ _MAX_NAME_WIDTH, _MAX_VALUES_WIDTH = 44, 60
 _NOT_STATED = "-"
 
 
-def listing(contents: Contents) -> str:
+def format_contents(contents: Contents) -> str:
     """Return the tables of a recording with their columns, as text."""
-    lines = [f"{printable(contents.path.name)}: {printable(contents.about)}"]
+    lines = [f"{make_printable(contents.path.name)}: {make_printable(contents.about)}"]
     stated: set[object] = set()
     for table in contents.tables[:_MAX_LINES]:
         rate = (table.file, table.rate)
@@ -92,7 +97,7 @@ def listing(contents: Contents) -> str:
 
 
 def _list_table(table: LogTable, with_rate: bool) -> Iterator[str]:
-    title = " ".join(printable(text) for text in (table.file, table.name) if text)
+    title = " ".join(make_printable(text) for text in (table.file, table.name) if text)
     about = [table.about] if table.about else []
     if table.rows is not None and " x " not in table.about:
         about.append(f"{table.rows} records")
@@ -102,16 +107,16 @@ def _list_table(table: LogTable, with_rate: bool) -> Iterator[str]:
         about.append(f"started {table.started}")
     if table.fault is not None:
         about = [table.fault]
-    yield "  " + ": ".join(text for text in (title, printable("; ".join(about))) if text)
+    yield "  " + ": ".join(text for text in (title, make_printable("; ".join(about))) if text)
     for note in table.notes:
-        yield f"    | {printable(note)}"
+        yield f"    | {make_printable(note)}"
     rows = []
     for column in table.columns[:_MAX_LINES]:
-        name = printable(column.label) or f"column {column.source}"
-        meant = meaning(column.label)
-        in_name = (meant and meant.unit) or ", ".join(bracketed(column.label))
-        unit = _shorten(printable(column.unit or in_name or _NOT_STATED), 12)
-        values = _shorten(", ".join(map(printable, column.first)), _MAX_VALUES_WIDTH)
+        name = make_printable(column.label) or f"column {column.source}"
+        meant = interpret_label(column.label)
+        in_name = (meant and meant.unit) or ", ".join(find_bracketed(column.label))
+        unit = _shorten(make_printable(column.unit or in_name or _NOT_STATED), 12)
+        values = _shorten(", ".join(map(make_printable, column.first)), _MAX_VALUES_WIDTH)
         rows.append((_shorten(name, _MAX_NAME_WIDTH), column.kind, unit, values))
     widths = [max((len(row[place]) for row in rows), default=0) for place in range(3)]
     for row in rows:
@@ -151,7 +156,7 @@ class _FirstRecords:
     started: str | None = None
 
 
-def proof(path: Path, draft: Draft) -> Proof:
+def check_draft(path: Path, draft: Draft) -> Proof:
     """Read the first records with a draft, and arbitrary units and rates for missing ones."""
     unfilled = draft.unfilled()
     if any(key.endswith(".column") for key in unfilled):
@@ -169,7 +174,7 @@ def proof(path: Path, draft: Draft) -> Proof:
         log = parse(LogFormat, filled, "log")
         files = [_read_first_records(file) for file in read(path, log)]
     except (RecordingError, ConfigError) as error:
-        return Proof(False, printable(f"not read so: {error}"))
+        return Proof(False, make_printable(f"not read so: {error}"))
     names = [name for file in files for name in file.columns]
     count = sum(name in CHANNELS for name in names)
     channels = f"{count} channel" + ("s" if count != 1 else "")
@@ -196,7 +201,7 @@ def _read_first_records(file: LogFile) -> _FirstRecords:
             break
     if not rows:
         raise RecordingError(f"{file.path.name}: no record in its beginning")
-    interval = typical_step(np.concatenate(times)) if times else None
+    interval = estimate_step(np.concatenate(times)) if times else None
     return _FirstRecords(
         {name: np.concatenate(values) for name, values in parts.items()},
         None if interval is None else 1 / interval,
@@ -236,7 +241,7 @@ def _describe_vectors(files: list[_FirstRecords], unfilled: list[str]) -> list[s
             continue
         length = float(np.linalg.norm(axes))
         dimension = "angular_rate" if quantity == "gyro" else "acceleration"
-        shown = from_si(length, unit, dimension)
+        shown = convert_from_si(length, unit, dimension)
         far = quantity == "accel" and abs(length / STANDARD_GRAVITY - 1) > _GRAVITY_TOLERANCE
         wrong = f" (gravity is {STANDARD_GRAVITY:.2f}: is the unit right?)" if far else ""
         lengths.append(f"|{quantity}| = {shown:.3g} {unit}{wrong}")

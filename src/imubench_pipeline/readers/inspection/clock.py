@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from imubench_pipeline.readers.batch import SECONDS
 from imubench_pipeline.readers.file_format import LogColumn, LogTable
 from imubench_pipeline.readers.inspection.draft import UNKNOWN, Entry
-from imubench_pipeline.readers.inspection.names import words_of
-from imubench_pipeline.readers.stamps import date_of
-from imubench_pipeline.readers.stated_units import divided, unit_of
+from imubench_pipeline.readers.inspection.names import split_label
+from imubench_pipeline.readers.stamps import format_date
+from imubench_pipeline.readers.stated_units import parse_unit, split_unit
 from imubench_pipeline.readers.text.stamps import DAY
 
 _TIME_WORDS = frozenset(
@@ -63,7 +63,7 @@ class Clock:
     """Sort key; a lower one is more plausible."""
 
 
-def clocks(table: LogTable, columns: Sequence[LogColumn]) -> list[Clock]:
+def find_clocks(table: LogTable, columns: Sequence[LogColumn]) -> list[Clock]:
     """Return the columns that may be the time of a table, the most plausible first."""
     likely = []
     for place, column in enumerate(columns):
@@ -83,7 +83,7 @@ def _get_source(column: LogColumn) -> str | int:
 
 def _recognise_date(column: LogColumn, table: LogTable) -> Clock | None:
     form = column.forms[0]
-    if not _has_hour(form) or not advances(column.values, DAY):
+    if not _has_hour(form) or not is_advancing(column.values, DAY):
         return None
     value: dict[str, Any] = {"column": _get_source(column), "format": form}
     day = column
@@ -105,9 +105,9 @@ def _has_hour(form: str) -> bool:
 
 def _recognise_number(column: LogColumn, table: LogTable) -> Clock | None:
     """Return a column of numbers as a clock; None if it is none."""
-    if column.kind != "number" or not advances(column.values):
+    if column.kind != "number" or not is_advancing(column.values):
         return None
-    words = words_of(column.label)
+    words = split_label(column.label)
     joined = "".join(words)
     if joined.endswith(_XSENS_TICKS):
         return _recognise_xsens_ticks(column)
@@ -116,9 +116,9 @@ def _recognise_number(column: LogColumn, table: LogTable) -> Clock | None:
         not _TIME_WORDS.intersection(words) and _COUNTER_WORDS.intersection(words)
     ):
         return _recognise_counter(column, value, joined == _XSENS_PACKETS)
-    unit = unit_of(column.unit or "", "time") or divided(column.label, "time")[1]
+    unit = parse_unit(column.unit or "", "time") or split_unit(column.label, "time")[1]
     if unit is None:
-        units = [unit_of(word, "time") for word in words if len(word) > 1]
+        units = [parse_unit(word, "time") for word in words if len(word) > 1]
         unit = next((word for word in reversed(units) if word), None)
     scale = _SECONDS_PER_UNIT.get(unit or "", 1)
     wrap = _guess_wrap(column.values)
@@ -161,7 +161,7 @@ def _recognise_counter(column: LogColumn, value: dict[str, Any], of_16_bits: boo
 
 def _recognise_xsens_ticks(column: LogColumn) -> Clock:
     """Return the tick clock of Xsens: 0.1 ms in motion trackers, 1 us in wearables."""
-    step = typical_step(column.values)
+    step = estimate_step(column.values)
     value: dict[str, Any] = {"column": _get_source(column)}
     in_microseconds = step is not None and step > 8000
     value |= {"unit": "us"} if in_microseconds else {"unit": "ms", "scale": 0.1}
@@ -174,12 +174,12 @@ def _recognise_xsens_ticks(column: LogColumn) -> Clock:
 def _guess_unit(values: NDArray[np.float64], rate: float | None) -> tuple[str, str]:
     """Return the guessed unit of stamps, or `UNKNOWN`, and the reason."""
     first = float(values[np.isfinite(values)][0])
-    step = typical_step(values)
+    step = estimate_step(values)
     if step is None:
         return UNKNOWN, _UNIT_HINT
     for unit, seconds in SECONDS.items():
         nanoseconds = first * seconds * 1e9
-        date = date_of(round(nanoseconds)) if abs(nanoseconds) < 1e19 else None
+        date = format_date(round(nanoseconds)) if abs(nanoseconds) < 1e19 else None
         if date is not None:
             return unit, f"guessed: since 1970 it is {date[:16]} then"
     rates = {unit: 1 / (step * seconds) for unit, seconds in SECONDS.items()}
@@ -199,7 +199,7 @@ def _take_steps(values: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.diff(values[np.isfinite(values)])
 
 
-def typical_step(values: NDArray[np.float64]) -> float | None:
+def estimate_step(values: NDArray[np.float64]) -> float | None:
     """Return the step from sample to sample; None if the stamps do not advance.
 
     If most steps are equal, steps over missing samples are left out. If they scatter, as stamps of
@@ -223,7 +223,7 @@ def typical_step(values: NDArray[np.float64]) -> float | None:
 
 def _guess_wrap(values: NDArray[np.float64]) -> int | None:
     """Return the value at which stamps wrap to 0; None if they do not, or at no usual value."""
-    steps, step = _take_steps(values), typical_step(values)
+    steps, step = _take_steps(values), estimate_step(values)
     falls = steps[steps < 0]
     if not len(falls) or step is None:
         return None
@@ -233,7 +233,7 @@ def _guess_wrap(values: NDArray[np.float64]) -> int | None:
     )
 
 
-def advances(values: NDArray[np.float64], wrap: float | None = None) -> bool:
+def is_advancing(values: NDArray[np.float64], wrap: float | None = None) -> bool:
     """Return whether stamps increase, except for a few wraps or restarts."""
     steps = _take_steps(values)
     if wrap is not None:

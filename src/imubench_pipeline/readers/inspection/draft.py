@@ -85,9 +85,9 @@ def _represent_text(dumper: yaml.SafeDumper, value: str) -> yaml.ScalarNode:
 _Dumper.add_representer(str, _represent_text)
 
 
-def block(draft: Draft, file: str) -> str:
+def format_draft(draft: Draft, file: str) -> str:
     """Return a sensor file as YAML; ``file``: name of the log, for the first line."""
-    lines = [f"# drafted from the log {printable(file)}"]
+    lines = [f"# drafted from the log {make_printable(file)}"]
     lines += _format_entries([("vendor", draft.vendor), ("model", draft.model)], "")
     lines += ["log:", *_format_entries(draft.known, "  "), "  channels:"]
     lines += _format_entries(list(draft.channels.items()), "    ")
@@ -95,13 +95,13 @@ def block(draft: Draft, file: str) -> str:
         lines += _format_entries([("temperature", draft.temperature)], "  ")
     lines += ["datasheet:", "  document: null  # its name; and below, the figures as printed"]
     lines += ["  gyro: {}", "  accel: {}"]
-    lines += [f"# {printable(text)}" for text in draft.left_over[:_MAX_REMARKS]]
+    lines += [f"# {make_printable(text)}" for text in draft.left_over[:_MAX_REMARKS]]
     if len(draft.left_over) > _MAX_REMARKS:
         lines.append(f"# ... and {len(draft.left_over) - _MAX_REMARKS} more")
     return "\n".join(lines) + "\n"
 
 
-def printable(text: str) -> str:
+def make_printable(text: str) -> str:
     """Return a text as one shortened line without control characters."""
     shown = "".join(sign if sign.isprintable() else "?" for sign in text[: _MAX_TEXT_LENGTH + 1])
     return shown if len(shown) <= _MAX_TEXT_LENGTH else shown[:_MAX_TEXT_LENGTH] + " ..."
@@ -110,7 +110,7 @@ def printable(text: str) -> str:
 def _format_entries(entries: Sequence[tuple[str, Entry]], margin: str) -> list[str]:
     """Return the lines of entries with aligned comments, or with long comments above them."""
     written = [f"{margin}{key}: {_format_value(entry.value)}" for key, entry in entries]
-    comments = [printable(entry.comment) for _, entry in entries]
+    comments = [make_printable(entry.comment) for _, entry in entries]
     behind = [len(line) for line, comment in zip(written, comments, strict=True) if comment]
     width = max(behind, default=0)
     above = width + max(map(len, comments), default=0) > _MAX_LINE_LENGTH

@@ -13,7 +13,7 @@ import numpy as np
 from imubench_pipeline.earth import STANDARD_GRAVITY
 from imubench_pipeline.readers.contents import Contents
 from imubench_pipeline.readers.file_format import LogColumn, LogTable
-from imubench_pipeline.readers.inspection.clock import Clock, advances, clocks
+from imubench_pipeline.readers.inspection.clock import Clock, find_clocks, is_advancing
 from imubench_pipeline.readers.inspection.draft import UNKNOWN, Draft, Entry
 from imubench_pipeline.readers.inspection.names import (
     DERIVED,
@@ -23,12 +23,12 @@ from imubench_pipeline.readers.inspection.names import (
     WITHOUT_GRAVITY,
     Meaning,
     Quantity,
-    meaning,
-    quantity_of_text,
+    find_quantity,
+    interpret_label,
 )
-from imubench_pipeline.readers.stated_units import bracketed, unit_of
+from imubench_pipeline.readers.stated_units import find_bracketed, parse_unit
 from imubench_pipeline.settings.sensor import CHANNELS
-from imubench_pipeline.units import conversion
+from imubench_pipeline.units import find_conversion
 
 _AXES = "xyz"
 GRAVITY_BY_UNIT: Mapping[str, float] = {"g": 1.0, "m/s^2": STANDARD_GRAVITY, "mg": 1000.0}
@@ -86,7 +86,7 @@ class Group:
         if length is None:
             return None
         if self.unit is not None:
-            in_si = length * conversion(self.unit, DIMENSIONS["accel"])[0]
+            in_si = length * find_conversion(self.unit, DIMENSIONS["accel"])[0]
             is_gravity = abs(in_si / STANDARD_GRAVITY - 1) < _STATED_GRAVITY_TOLERANCE
             return self.unit if is_gravity else None
         return next(
@@ -95,7 +95,7 @@ class Group:
         )
 
 
-def groups(contents: Contents) -> list[Group]:
+def group_columns(contents: Contents) -> list[Group]:
     """Return all groups of a recording, in the order of its tables."""
     recognised: list[Group] = []
     for table in contents.tables:
@@ -109,24 +109,24 @@ def _group_by_name(table: LogTable, contents: Contents) -> list[Group]:
     # The most specific name of the table or its file that contains a quantity.
     file = PurePosixPath(table.file or contents.path.name)
     titles = (table.name.rpartition("/")[2], table.name, file.name.partition(".")[0])
-    context = next((title for title in titles if title and quantity_of_text(title)), "")
+    context = next((title for title in titles if title and find_quantity(title)), "")
     together: dict[tuple[Quantity, str, bool], dict[str, tuple[LogColumn, Meaning]]] = {}
     for column in table.columns:
         if column.kind != "number":
             continue
         label = column.label or f"{context}[{column.source}]"
-        meant = meaning(label, context)
+        meant = interpret_label(label, context)
         if meant is not None:
             if meant.quantity != "temperature":
                 key = meant.quantity, meant.stem, meant.axis.isdecimal()
                 together.setdefault(key, {}).setdefault(meant.axis, (column, meant))
-            elif column.label or not advances(column.values):
+            elif column.label or not is_advancing(column.values):
                 together["temperature", label, False] = {"": (column, meant)}
     result = []
     for (quantity, _, counted), axes in together.items():
         if counted:  # three numbered columns are axes, without a time before them
             columns = [axes[number] for number in sorted(axes, key=int)]
-            if len(columns) == 4 and advances(columns[0][0].values):
+            if len(columns) == 4 and is_advancing(columns[0][0].values):
                 columns = columns[1:]
             axes = dict(zip(_AXES, columns, strict=True)) if len(columns) == 3 else {}
         if axes:
@@ -141,11 +141,11 @@ def _make_group(
     meanings = [meaning for _, meaning in axes.values()]
     column = next(iter(columns.values()))
     beside = column.unit or ""
-    unit = unit_of(beside, DIMENSIONS[quantity]) or meanings[0].unit
-    same = {unit_of(c.unit or "", DIMENSIONS[quantity]) or m.unit for c, m in axes.values()} == {
+    unit = parse_unit(beside, DIMENSIONS[quantity]) or meanings[0].unit
+    same = {parse_unit(c.unit or "", DIMENSIONS[quantity]) or m.unit for c, m in axes.values()} == {
         unit
     }
-    written = beside or ", ".join(bracketed(column.label))
+    written = beside or ", ".join(find_bracketed(column.label))
     rank = max(meaning.rank for meaning in meanings)
     if table.file_format.measured_by_name:
         rank = DERIVED if rank == DERIVED else PLAIN
@@ -159,7 +159,10 @@ def _find_roll_pitch_yaw(table: LogTable, named: list[Group]) -> Iterator[Group]
     by_name = {re.split(r"[\s(\[]", c.label)[0].lower(): c for c in table.columns}
     if {"p", "q", "r"} <= set(by_name):
         meanings = {
-            axis: (by_name[name], meaning(by_name[name].label.lower().replace(name, f"w{axis}", 1)))
+            axis: (
+                by_name[name],
+                interpret_label(by_name[name].label.lower().replace(name, f"w{axis}", 1)),
+            )
             for axis, name in zip(_AXES, "pqr", strict=True)
         }
         axes = {axis: (column, meant) for axis, (column, meant) in meanings.items() if meant}
@@ -173,7 +176,7 @@ def _group_without_names(table: LogTable) -> list[Group]:
     columns = [c for c in table.columns if c.kind == "number"]
     if any(column.label for column in columns) or len(columns) > 8:
         return []
-    if columns and advances(columns[0].values):
+    if columns and is_advancing(columns[0].values):
         columns = columns[1:]
     threes = [
         Group("accel", table, dict(zip(_AXES, columns[n : n + 3], strict=True)), None, "", WEAK)
@@ -219,9 +222,9 @@ class Choice:
     """Number columns of the used tables that were not recognised."""
 
 
-def chosen(contents: Contents) -> Choice:
+def choose_columns(contents: Contents) -> Choice:
     """Choose the channels, the temperature and the time of a recording."""
-    recognised = groups(contents)
+    recognised = group_columns(contents)
     left = [(g, _explain_rejection(g)) for g in recognised if _explain_rejection(g)]
     able = [group for group in recognised if not _explain_rejection(group)]
     gyro = _select_best([g for g in able if g.quantity == "gyro"], None, able)
@@ -239,7 +242,7 @@ def chosen(contents: Contents) -> Choice:
             for other in contents.tables:
                 if other is not table and other.file == table.file and other.rows == table.rows:
                     columns += other.columns
-        return clocks(table, [column for column in columns if id(column) not in in_groups])
+        return find_clocks(table, [column for column in columns if id(column) not in in_groups])
 
     ours = [] if anchor is None else find_table_clocks(anchor)
     others = {id(g.table): find_table_clocks(g.table) for g in able}
@@ -353,9 +356,9 @@ _COUNTS_PER_G = tuple(1 << bits for bits in range(8, 20))
 _COUNT_TOLERANCE = 0.06
 
 
-def draft(contents: Contents, model: str | None = None) -> Draft:
+def draft_sensor_file(contents: Contents, model: str | None = None) -> Draft:
     """Draft a sensor file from the contents of a recording; ``model``: name of the sensor."""
-    choice = chosen(contents)
+    choice = choose_columns(contents)
     usable = (table.file_format for table in contents.tables if table.fault is None)
     vendor = next((made.vendor for made in usable if made.vendor), "unknown")
     drafted = Draft(

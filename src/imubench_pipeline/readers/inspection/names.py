@@ -6,7 +6,7 @@ import re
 from dataclasses import dataclass
 from typing import Literal
 
-from imubench_pipeline.readers.stated_units import divided
+from imubench_pipeline.readers.stated_units import split_unit
 from imubench_pipeline.settings.sensor import QUANTITIES
 
 Quantity = Literal["gyro", "accel", "temperature"]
@@ -68,18 +68,18 @@ class Meaning:
     """`PLAIN`, `WEAK`, `WITHOUT_GRAVITY` or `DERIVED`."""
 
 
-def meaning(label: str, context: str = "") -> Meaning | None:
+def interpret_label(label: str, context: str = "") -> Meaning | None:
     """Return the meaning of the name of a column; None if it is not of an inertial sensor.
 
     ``context``: name of its table or file, for a label that is an axis only.
     """
     label = label[:_MAX_LABEL_LENGTH].replace("ω", "omega").replace("Ω", "omega")
     for quantity, dimension in DIMENSIONS.items():
-        name, unit = divided(label, dimension)
+        name, unit = split_unit(label, dimension)
         meant = _interpret_name(name)
         words = _split_words(name)
         if meant is None and len(words) == 1 and (words[0] in _AXES or _is_axis_number(words[0])):
-            by_context = quantity_of_text(context)
+            by_context = find_quantity(context)
             if by_context is not None:
                 meant = Meaning(by_context[0], words[0], "", None, by_context[1])
         if meant is None and unit is not None:
@@ -89,9 +89,9 @@ def meaning(label: str, context: str = "") -> Meaning | None:
     return None
 
 
-def quantity_of_text(text: str) -> tuple[Quantity, int] | None:
+def find_quantity(text: str) -> tuple[Quantity, int] | None:
     """Return the only quantity in a text, such as the name of a file, and its rank."""
-    words = words_of(text)
+    words = split_label(text)
     joined = "".join(words)
     quantities = [quantity for quantity, pattern in _PATTERNS.items() if pattern.search(joined)]
     if len(quantities) != 1 or _OTHER_QUANTITIES.search(joined):
@@ -99,7 +99,7 @@ def quantity_of_text(text: str) -> tuple[Quantity, int] | None:
     return quantities[0], _rank_name(words, joined)
 
 
-def words_of(label: str) -> list[str]:
+def split_label(label: str) -> list[str]:
     """Return the words of a name in lower case: ang, vel and x for ``AngVelX``."""
     return _split_words(label[:_MAX_LABEL_LENGTH])
 

@@ -29,11 +29,11 @@ from imubench_pipeline.readers.file_format import (
     FileFormat,
     LogColumn,
     LogTable,
-    shown,
+    format_first_numbers,
 )
 from imubench_pipeline.readers.rosbag.version_1 import Bag
 from imubench_pipeline.readers.rosbag.version_2 import Bag2, check_database, check_folder
-from imubench_pipeline.readers.stamps import Clock, date_of
+from imubench_pipeline.readers.stamps import Clock, format_date
 from imubench_pipeline.settings.validation import cut
 from imubench_pipeline.tables.findings import RecordingError
 from imubench_pipeline.words.findings import files
@@ -79,7 +79,7 @@ LAYOUTS: dict[str, Layout] = {
 """The messages that are read, by type."""
 
 
-def figures_of(
+def decode_messages(
     messages: Sequence[bytes], layout: Layout, ros_1: bool
 ) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.bool_]]:
     """Return stamps, numbers and soundness of messages, serialised as in ROS 1 or as CDR.
@@ -150,7 +150,7 @@ class RosbagFile(LogFile):
                 f"{self.path.name}: {time.column} is {time.unit or time.format} in the sensor "
                 "file; a ROS bag gives ns; expected 'unit: ns' of 'time'"
             )
-        source = opened(self.path)
+        source = open_bag(self.path)
         try:
             topic, kind = self._topic(source)
             yield from self._read(source, topic, LAYOUTS[kind])
@@ -161,9 +161,9 @@ class RosbagFile(LogFile):
         sound = damaged = 0
         absent = dict.fromkeys(layout.covariances, 0)
         wraps = None if self.log.time is None else self.log.time.wraps
-        clock = Clock(self, wraps, lambda first: date_of(int(first)))
+        clock = Clock(self, wraps, lambda first: format_date(int(first)))
         for times, messages in self._blocks(source, topic):
-            stamps, figures, good = figures_of(messages, layout, source.ros_1)
+            stamps, figures, good = decode_messages(messages, layout, source.ros_1)
             sound += int(good.sum())
             damaged += int(np.count_nonzero(~good))
             self._blank(figures, layout, absent)
@@ -209,7 +209,7 @@ class RosbagFile(LogFile):
             times: list[int] = []
             messages: list[bytes] = []
             size = 0
-            with explained(self.path):
+            with explain_errors(self.path):
                 for time, message in incoming:
                     times.append(time)
                     messages.append(message)
@@ -223,7 +223,7 @@ class RosbagFile(LogFile):
 
     def _topic(self, source: Source) -> tuple[str, str]:
         """Return the topic with the columns, and its type."""
-        with explained(self.path):
+        with explain_errors(self.path):
             topics = source.topics()
         stated = {source.variable for source in self.sources.values() if source.variable}
         if len(stated) > 1:
@@ -284,7 +284,7 @@ def _join_names(names: Iterable[str]) -> str:
 
 
 @contextmanager
-def explained(path: Path) -> Iterator[None]:
+def explain_errors(path: Path) -> Iterator[None]:
     """Convert all exceptions of the libraries about a bag to `RecordingError`."""
     try:
         yield
@@ -302,12 +302,12 @@ def explained(path: Path) -> Iterator[None]:
         ) from None
 
 
-def opened(path: Path) -> Source:
+def open_bag(path: Path) -> Source:
     """Open a bag, a file or the folder of a ROS 2 bag; its kind is recognised by its content.
 
     Raise `RecordingError` if the path cannot be opened, or is no bag.
     """
-    with explained(path):
+    with explain_errors(path):
         try:
             if path.is_dir():
                 for database in sorted(path.glob("*.db3")):
@@ -331,11 +331,11 @@ def opened(path: Path) -> Source:
 _MAX_SLOW_MESSAGES = 20  # largest number of messages of a slow topic that are examined
 
 
-def tables(path: Path, file_format: FileFormat) -> list[LogTable]:
+def list_topics(path: Path, file_format: FileFormat) -> list[LogTable]:
     """Return a table for each topic; raise `RecordingError` if there is none."""
-    source = opened(path)
+    source = open_bag(path)
     try:
-        with explained(path):
+        with explain_errors(path):
             topics, counts = source.topics(), source.counts()
             if not topics:
                 raise RecordingError(f"{path.name}: the bag has no topic; expected sensor_msgs/Imu")
@@ -358,18 +358,20 @@ def _describe_topic(
     layout = LAYOUTS[kind]
     count = MAX_EXAMINED_RECORDS if layout.covariances else _MAX_SLOW_MESSAGES
     messages = [] if rows == 0 else list(islice(source.messages(topic), count))
-    stamps, figures, sound = figures_of([data for _, data in messages], layout, source.ros_1)
+    stamps, figures, sound = decode_messages([data for _, data in messages], layout, source.ros_1)
     columns = []
     for name, place in layout.columns.items():
         values = figures[sound, place]
         covariance = layout.covariances.get(name.partition(".")[0])
         if covariance is None or (figures[sound, covariance] != -1).any():  # it is measured
             unit = layout.units[name]
-            columns.append(LogColumn(name, name, "number", shown(values), values, unit))
+            columns.append(
+                LogColumn(name, name, "number", format_first_numbers(values), values, unit)
+            )
     logged = np.array([time for time, _ in messages], np.int64)
     for name, times in ((HEADER_STAMP, stamps[sound]), (LOG_TIME, logged[sound])):
         values = times.astype(np.float64)
-        columns.append(LogColumn(name, name, "number", shown(times), values, "ns"))
+        columns.append(LogColumn(name, name, "number", format_first_numbers(times), values, "ns"))
     fault = None if sound.any() else "has no message that can be read"
     described = tuple(columns) if sound.any() else ()
     return LogTable(file_format, topic, described, topic, rows=rows, about=kind, fault=fault)

@@ -28,7 +28,7 @@ from imubench_pipeline.readers.bounds import (
     MAX_TOPICS,
     MIN_CHECKED_EXPANSION,
 )
-from imubench_pipeline.readers.compressed import open_bytes, unpacked_zstd
+from imubench_pipeline.readers.compressed import open_bytes, unpack_zstd
 from imubench_pipeline.settings.validation import cut
 from imubench_pipeline.tables.findings import RecordingError
 
@@ -48,7 +48,7 @@ storage_mcap.DECOMPRESSORS.update(
         "lz4": lambda data, size: lz4.frame.LZ4FrameDecompressor().decompress(
             data, _check_chunk_size(size) + 1
         ),
-        "zstd": lambda data, size: unpacked_zstd(data, _check_chunk_size(size) + 1),
+        "zstd": lambda data, size: unpack_zstd(data, _check_chunk_size(size) + 1),
     }
 )
 
@@ -104,7 +104,7 @@ class Bag2:
                 # A damaged database may contain any type.
                 data = message if isinstance(message, bytes) else b""
                 if packed:
-                    data = unpacked_zstd(data, MAX_MESSAGE + 1)
+                    data = unpack_zstd(data, MAX_MESSAGE + 1)
                 yield time, data if len(data) <= MAX_MESSAGE else b""
 
     def close(self) -> None:

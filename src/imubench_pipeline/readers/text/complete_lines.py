@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from imubench_pipeline.readers.bounds import MAX_LINE_LENGTH
-from imubench_pipeline.readers.compressed import ended_early, open_bytes
+from imubench_pipeline.readers.compressed import make_truncation_finding, open_bytes
 from imubench_pipeline.readers.holes import ZeroRuns
 from imubench_pipeline.tables.findings import Finding, RecordingError, find
 from imubench_pipeline.words.findings.files import IncompleteLastRecord
@@ -184,7 +184,7 @@ class CompleteLines:
             cut = len(self.rest)
         lines, self.rest = self.rest[:cut].replace(b"\r", b"\n"), self.rest[cut:]
         if self._text.bytes.ended_early:
-            self._findings.append(ended_early(self._path))
+            self._findings.append(make_truncation_finding(self._path))
         if self.rest.strip(b"\0\r\n\t "):
             shown = self.rest.strip(b"\0")[:60].decode("utf-8", "replace")
             self._findings.append(find(IncompleteLastRecord(self._path.name, shown), "note", 1))
@@ -206,7 +206,7 @@ def describe_missing_text(path: Path) -> str:
     return "the file has no more lines"
 
 
-def first_lines(path: Path, most: int | None = None) -> Iterator[bytes]:
+def read_first_lines(path: Path, most: int | None = None) -> Iterator[bytes]:
     """Yield the lines of a log, the last perhaps without line break; ``most``: bytes to read."""
     with CompleteLines(path, [], most=most) as lines:
         while block := lines.read(_READ_BLOCK):

@@ -20,23 +20,23 @@ from imubench_pipeline.readers.file_format import (
     LogColumn,
     LogTable,
 )
-from imubench_pipeline.readers.stated_units import stated
+from imubench_pipeline.readers.stated_units import find_stated_unit
 from imubench_pipeline.readers.text.cells import MISSING_CELLS, is_missing, is_number
-from imubench_pipeline.readers.text.complete_lines import CompleteLines, Records, first_lines
+from imubench_pipeline.readers.text.complete_lines import CompleteLines, Records, read_first_lines
 from imubench_pipeline.readers.text.header import (
-    completed,
-    says_units,
-    stated_rate,
-    stated_start,
-    states_simulated,
+    complete_names,
+    find_stated_rate,
+    find_stated_start,
+    has_units,
+    is_simulated,
 )
 from imubench_pipeline.readers.text.layout import TextLayout, find_layout
 from imubench_pipeline.readers.text.stamps import (
     StampError,
     TextTime,
-    stamp_forms,
-    stamps_of,
-    time_columns,
+    find_stamp_forms,
+    list_time_columns,
+    parse_stamps,
 )
 from imubench_pipeline.tables.findings import RecordingError
 from imubench_pipeline.words.findings import files
@@ -64,7 +64,7 @@ class CsvFile(LogFile):
     def batches(self) -> Iterator[Batch]:
         """Yield the records in the order of the file (see `LogFile.batches`)."""
         figures = [source.column for source in self.sources.values()]
-        layout = find_layout(self.path, self.log, figures, time_columns(self.log.time))
+        layout = find_layout(self.path, self.log, figures, list_time_columns(self.log.time))
         columns = {
             name: layout.position(source.column, name) for name, source in self.sources.items()
         }
@@ -72,14 +72,14 @@ class CsvFile(LogFile):
             [line.decode("utf-8", "replace") for line in lines]
             for lines in (layout.preamble, layout.skipped)
         )
-        self.rate, self.started = stated_rate(preamble), stated_start(preamble)
-        self.simulated = states_simulated([*preamble, *skipped])
+        self.rate, self.started = find_stated_rate(preamble), find_stated_start(preamble)
+        self.simulated = is_simulated([*preamble, *skipped])
         time = None if self.log.time is None else TextTime(self, layout)
-        beside, _ = line_of_units(layout)
+        beside, _ = find_unit_line(layout)
         for name, at in columns.items():
             label = layout.names[at] if layout.header else ""
             where = f"the line of units, column {at + 1}"
-            if unit := stated(name, beside.get(at), where, label):
+            if unit := find_stated_unit(name, beside.get(at), where, label):
                 self.units[name] = unit
             if time is not None and at in time.types:
                 raise RecordingError(
@@ -212,7 +212,7 @@ class CsvFile(LogFile):
         """Return the line number of a record; ``blank``: lines of spaces count as records."""
         stripped = b"\r\n" if blank else b"\r\n\t "
         records, count = layout.records(), 0
-        for number, raw in enumerate(first_lines(self.path), start=1):
+        for number, raw in enumerate(read_first_lines(self.path), start=1):
             if number > layout.lines_before:
                 count += sum(bool(line.strip(stripped)) for line in records(raw).split(b"\n"))
             if count >= row:
@@ -263,7 +263,7 @@ class _WrongWidth:
         return "skip"
 
 
-def line_of_units(layout: TextLayout) -> tuple[dict[int, str], bytes]:
+def find_unit_line(layout: TextLayout) -> tuple[dict[int, str], bytes]:
     """Return the units in a line before the records, by column position, and the line."""
     for raw in layout.preamble:
         if raw == layout.header:
@@ -271,7 +271,7 @@ def line_of_units(layout: TextLayout) -> tuple[dict[int, str], bytes]:
         text = raw.decode("utf-8", "replace")
         sign = next((sign for sign in layout.comments if text.startswith(sign)), "")
         cells = layout.split.names(text.lstrip(sign) if sign else text, len(layout.names))
-        if completed(cells, layout.names) and says_units(cells):
+        if complete_names(cells, layout.names) and has_units(cells):
             return {place: cell.strip("()[]{}<> ") for place, cell in enumerate(cells)}, raw
     return {}, b""
 
@@ -279,11 +279,11 @@ def line_of_units(layout: TextLayout) -> tuple[dict[int, str], bytes]:
 _MAX_NOTES = 12
 
 
-def tables(path: Path, file_format: FileFormat) -> list[LogTable]:
+def describe_table(path: Path, file_format: FileFormat) -> list[LogTable]:
     """Return the only table of a text log; raise `RecordingError` if it has no records."""
     layout = find_layout(path, NOTHING_STATED, [], [])
     before = [line.decode("utf-8", "replace") for line in layout.preamble]
-    units, units_line = line_of_units(layout)
+    units, units_line = find_unit_line(layout)
     rows = [row for row in layout.rows[:MAX_EXAMINED_RECORDS] if len(row) >= len(layout.names)]
     rows = rows[:-1] or rows  # the last one may be cut short
     named = layout.names != [str(number) for number in range(1, len(layout.names) + 1)]
@@ -303,8 +303,8 @@ def tables(path: Path, file_format: FileFormat) -> list[LogTable]:
                 for cell in cells
             ]
             columns.append(LogColumn(source, name, "number", first, np.array(figures), unit))
-        elif forms := stamp_forms(present):
-            values = stamps_of(forms[0], cells)
+        elif forms := find_stamp_forms(present):
+            values = parse_stamps(forms[0], cells)
             columns.append(LogColumn(source, name, "date", first, values, None, forms))
         else:
             columns.append(LogColumn(source, name, "text", first, unit=unit))
@@ -313,8 +313,8 @@ def tables(path: Path, file_format: FileFormat) -> list[LogTable]:
         LogTable(
             file_format,
             columns=tuple(columns),
-            rate=stated_rate(before),
-            started=stated_start(before),
+            rate=find_stated_rate(before),
+            started=find_stated_start(before),
             about=f"delimiter {layout.split}, decimal sign {layout.decimal!r}, {names}",
             notes=tuple(
                 text.strip().replace("\t", " ")

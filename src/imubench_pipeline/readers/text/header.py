@@ -18,7 +18,7 @@ _UNIT_CELL = re.compile(
 _WORDS_ONLY = re.compile(r"[^\W\d]*(?:[\s./()\[\]-]+[^\W\d]+)*[.)\]]?")
 
 
-def likely_header(lines: Sequence[Sequence[str]]) -> int | None:
+def find_header(lines: Sequence[Sequence[str]]) -> int | None:
     """Return the index of the line with the names of the columns, as opposed to units.
 
     The line with the most names is returned, the first of equals; None if no line has names.
@@ -28,7 +28,7 @@ def likely_header(lines: Sequence[Sequence[str]]) -> int | None:
     """
     best, header = 0, None
     for index, cells in enumerate(lines):
-        if any(is_number(cell) for cell in cells) or says_units(cells):
+        if any(is_number(cell) for cell in cells) or has_units(cells):
             continue
         names = len({cell for cell in cells if not is_missing(cell)})
         if 2 * names >= len(cells) and names > best:
@@ -36,7 +36,7 @@ def likely_header(lines: Sequence[Sequence[str]]) -> int | None:
     return header
 
 
-def says_units(cells: Sequence[str]) -> bool:
+def has_units(cells: Sequence[str]) -> bool:
     """Return whether most cells of a line are units."""
     texts = [cell.strip() for cell in cells if cell.strip()]
     units = sum(_UNIT_CELL.fullmatch(text) is not None for text in texts)
@@ -44,7 +44,7 @@ def says_units(cells: Sequence[str]) -> bool:
     return bool(named) and 2 * units > len(texts)
 
 
-def completed(names: list[str], record: list[str]) -> list[str]:
+def complete_names(names: list[str], record: list[str]) -> list[str]:
     """Return a name for each cell of a record, or nothing; one may end with a delimiter."""
     if len(names) == len(record) + 1 and not names[-1]:
         return names[:-1]
@@ -57,7 +57,7 @@ def is_heading(cells: Sequence[str]) -> bool:
     """Return whether a line below the names has units or words, or is a ruling line."""
     texts = [cell.strip() for cell in cells]
     ruled = all(_RULE.fullmatch(text) for text in texts)
-    return ruled or says_units(texts) or all(_WORDS_ONLY.fullmatch(text) for text in texts)
+    return ruled or has_units(texts) or all(_WORDS_ONLY.fullmatch(text) for text in texts)
 
 
 def are_units(row: list[str], places: set[int]) -> bool:
@@ -76,7 +76,7 @@ _SIMULATED_MARKS = {SIMULATED, "SIMULATED, not measured"}
 """The second one was written by earlier versions."""
 
 
-def states_simulated(lines: Iterable[str]) -> bool:
+def is_simulated(lines: Iterable[str]) -> bool:
     """Return whether a line is the mark of a simulated log, but for quotes and empty cells."""
     return any(
         line.strip().strip("\"',;\t").lstrip("#%;!/ ").rstrip() in _SIMULATED_MARKS
@@ -96,7 +96,7 @@ _START_STATEMENT = re.compile(
 )
 
 
-def stated_rate(lines: Iterable[str]) -> float | None:
+def find_stated_rate(lines: Iterable[str]) -> float | None:
     """Return the only rate that lines such as ``// Update Rate: 100.0Hz`` state, Hz, or None."""
     rates = set()
     for line in lines:
@@ -107,7 +107,7 @@ def stated_rate(lines: Iterable[str]) -> float | None:
     return rate or None
 
 
-def stated_start(lines: Iterable[str]) -> str | None:
+def find_stated_start(lines: Iterable[str]) -> str | None:
     """Return the start (ISO 8601) in lines such as ``// Start Time: 2024-05-01 12:00``."""
     for line in lines:
         if match := _START_STATEMENT.search(line):

@@ -13,7 +13,7 @@ from itertools import pairwise
 from pathlib import Path
 
 from imubench_pipeline.readers import bounds
-from imubench_pipeline.readers.batch import stated_in
+from imubench_pipeline.readers.batch import name_settings_file
 from imubench_pipeline.readers.text.cells import (
     MAX_COLUMNS,
     Decimal,
@@ -25,9 +25,9 @@ from imubench_pipeline.readers.text.cells import (
 from imubench_pipeline.readers.text.complete_lines import (
     Records,
     describe_missing_text,
-    first_lines,
+    read_first_lines,
 )
-from imubench_pipeline.readers.text.header import are_units, completed, is_heading, likely_header
+from imubench_pipeline.readers.text.header import are_units, complete_names, find_header, is_heading
 from imubench_pipeline.settings.sensor import LogFormat
 from imubench_pipeline.tables.findings import RecordingError
 
@@ -77,13 +77,13 @@ class TextLayout:
                 raise RecordingError(
                     f"{self.file}: no column {column} for {key}; found {len(self.names)} columns "
                     f"({present}) with delimiter {self.split}; mend 'column' of {key}, or "
-                    f"'delimiter', in {stated_in(key)}"
+                    f"'delimiter', in {name_settings_file(key)}"
                 )
             return column - 1
         if column not in self.names:
             raise RecordingError(
                 f"{self.file}: no column {column!r} for {key}; found {present} with delimiter "
-                f"{self.split}; mend 'column' of {key} in {stated_in(key)}"
+                f"{self.split}; mend 'column' of {key} in {name_settings_file(key)}"
             )
         if self.names.count(column) > 1:
             raise RecordingError(
@@ -199,7 +199,7 @@ class _Search:
         number, start, line_bytes, comment_bytes = 0, 0, 0, 0
         # A semicolon may begin a comment or be the delimiter, which is not yet known.
         signs = tuple(sign for sign in self._signs(None) if sign != ";")
-        for raw in first_lines(path, bounds.MAX_BYTES_BEFORE):
+        for raw in read_first_lines(path, bounds.MAX_BYTES_BEFORE):
             number, here, start = number + 1, start, start + len(raw)
             if number > bounds.MAX_LINES_BEFORE + self._log.skip_lines:
                 break
@@ -275,7 +275,7 @@ class _Search:
             names = self._names_in(split, line, width)
             count = sum(name in names for name in self._names)
             if count > shown:
-                shown, fits = count, any(completed(names, row) for row in even)
+                shown, fits = count, any(complete_names(names, row) for row in even)
             if count == len(self._names):
                 break
         cells = [cell for row in even for cell in row[:_SCORED_CELLS]]
@@ -294,7 +294,7 @@ class _Search:
         """Return the names of all columns; positions if no names are required and none fit."""
         if header is not None:
             names = self._names_in(split, header, len(record))
-            whole = completed(names, record)
+            whole = complete_names(names, record)
             if whole or self._names:
                 return whole or names
         return [str(number) for number in range(1, len(record) + 1)]
@@ -317,8 +317,8 @@ class _Search:
                 )
             record = rows[first]
             near = [line for line in comments if line.number < lines[first].number] + lines[:first]
-            place = likely_header(
-                [completed(self._names_in(split, line, len(record)), record) for line in near]
+            place = find_header(
+                [complete_names(self._names_in(split, line, len(record)), record) for line in near]
             )
             return (None if place is None else near[place]), first
         if self._names:

@@ -14,7 +14,7 @@ import pyarrow.compute as pc
 from numpy.typing import NDArray
 
 from imubench_pipeline.readers.batch import LogFile
-from imubench_pipeline.readers.stamps import Clock, date_of_nanoseconds, date_of_stamp
+from imubench_pipeline.readers.stamps import Clock, format_date_of_stamp, format_nanoseconds
 from imubench_pipeline.readers.text.cells import is_missing
 from imubench_pipeline.readers.text.layout import TextLayout
 from imubench_pipeline.settings.sensor import TimeSource
@@ -190,7 +190,7 @@ def _group_forms_by_signs() -> dict[str, list[str]]:
 _FORMS_BY_SIGNS = _group_forms_by_signs()
 
 
-def stamp_forms(texts: Sequence[str]) -> tuple[str, ...]:
+def find_stamp_forms(texts: Sequence[str]) -> tuple[str, ...]:
     """Return the patterns that all stamps match, the most plausible first; empty if there are none.
 
     A pattern may have a date only or a time of day only. If day and month are ambiguous, the
@@ -216,7 +216,7 @@ def stamp_forms(texts: Sequence[str]) -> tuple[str, ...]:
     return tuple(form for form, span in spans.items() if span == min(spans.values()))
 
 
-def stamps_of(form: str, texts: Sequence[str]) -> NDArray[np.float64]:
+def parse_stamps(form: str, texts: Sequence[str]) -> NDArray[np.float64]:
     """Return stamps in a pattern as ns since 1970 or since midnight; NaN where missing."""
     times, present = TextStamps(form).nanoseconds(pa.array(texts))
     return np.where(present, times, np.nan)
@@ -239,7 +239,7 @@ class TextTime:
         assert file.log.time is not None  # constructed only for logs with stamps
         source = file.log.time
         self._source = source
-        positions = [layout.position(column, "time") for column in time_columns(source)]
+        positions = [layout.position(column, "time") for column in list_time_columns(source)]
         self.position = positions[-1]
         stamps = [row[self.position] for row in layout.rows if self.position < len(row)]
         present = [stamp for stamp in stamps if not is_missing(stamp)]
@@ -287,11 +287,11 @@ class TextTime:
 
     def _started(self, first: Any) -> str | None:
         if self._source.format is not None:
-            return date_of_nanoseconds(first) if self._text is None or self._text.dated else None
-        return date_of_stamp(first, self._source)
+            return format_nanoseconds(first) if self._text is None or self._text.dated else None
+        return format_date_of_stamp(first, self._source)
 
 
-def time_columns(source: TimeSource | None) -> list[str | int]:
+def list_time_columns(source: TimeSource | None) -> list[str | int]:
     """Return the columns of the stamps: a separate date, if any, and the time."""
     if source is None:
         return []

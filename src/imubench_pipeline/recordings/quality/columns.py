@@ -1,6 +1,6 @@
 """Check each column of a recording; return findings with a severity and a time.
 
-`repeats_beyond_chance` counts samples that equal their predecessor more often than a coarse
+`estimate_excess_repeats` counts samples that equal their predecessor more often than a coarse
 register explains.
 """
 
@@ -11,7 +11,7 @@ from collections.abc import Iterator, Mapping
 
 from imubench_pipeline.model.states import Severity
 from imubench_pipeline.recordings.quality import copies, held, joined, levels, stationarity
-from imubench_pipeline.recordings.quality.copies import shared_noise
+from imubench_pipeline.recordings.quality.copies import find_shared_noise
 from imubench_pipeline.recordings.quality.summary import MAX_MEASUREMENT, ColumnSummary
 from imubench_pipeline.recordings.recording import BESIDE
 from imubench_pipeline.settings.quality import QualitySettings
@@ -32,7 +32,7 @@ _MIN_STEP_WHERE_ROUNDING_DOMINATES = 1.5
 """Ratio of step to noise above which rounding makes most of the noise."""
 
 
-def repeats_beyond_chance(column: ColumnSummary) -> tuple[float, float]:
+def estimate_excess_repeats(column: ColumnSummary) -> tuple[float, float]:
     """Return the share of samples that repeat for another reason than rounding.
 
     A register that is read faster than it is updated repeats samples, and between the repeats it
@@ -94,7 +94,7 @@ def _expect_excess(x: float, deviation: float) -> float:
     return deviation * density - 0.5 * x * math.erfc(z / math.sqrt(2.0))
 
 
-def column_findings(
+def check_columns(
     columns: Mapping[str, ColumnSummary],
     rate: float,
     settings: QualitySettings,
@@ -120,25 +120,25 @@ def column_findings(
         findings += _find_missing_cells(channel, column, rate)
         if fatal is None:
             usable[channel] = column
-    steps = {channel: levels.quantisation(column) for channel, column in usable.items()}
+    steps = {channel: levels.detect_quantisation(column) for channel, column in usable.items()}
     for channel, column in usable.items():
         findings += _find_bad_values(channel, column, steps[channel], rate, settings)
         if static:
             findings += _find_changes(channel, column, steps[channel], rate, settings)
             if not _has_only_rounding(steps[channel], settings):
-                findings += joined.joined(channel, column, rate)
-                findings += joined.interleaved(channel, column)
-        regularly = list(held.held_samples(channel, column))
+                findings += joined.find_joined_logs(channel, column, rate)
+                findings += joined.find_interleaved_samples(channel, column)
+        regularly = list(held.find_held_samples(channel, column))
         findings += regularly
         rounded = _is_rounding_dominant(steps[channel]) or _has_few_levels(steps[channel], settings)
-        beyond, chance = repeats_beyond_chance(column)
+        beyond, chance = estimate_excess_repeats(column)
         if beyond > settings.repeated and not (regularly or rounded):
             share = column.repeats / max(column.present - 1, 1)
             repeated = samples.RepeatedSamples(share, chance)
             findings.append(find(repeated, "warning", share, channel))
-    findings += copies.repeated_stretches(usable, steps, rate)
+    findings += copies.find_repeated_stretches(usable, steps, rate)
     if static:
-        findings += shared_noise(usable)
+        findings += find_shared_noise(usable)
     return findings
 
 
@@ -185,18 +185,20 @@ def _find_bad_values(
         quantised = samples.Quantised(steps.step, over_noise, is_rounded=steps.hidden)
         yield find(quantised, "note", steps.step, channel)
     length, end = column.longest_run
-    stuck = length > max(3.0 * levels.longest_by_chance(column), settings.longest_stuck * rate)
+    stuck = length > max(
+        3.0 * levels.compute_longest_chance_run(column), settings.longest_stuck * rate
+    )
     # A level midway between two edges of a register can stay at one value for any time.
     if stuck and not _has_only_rounding(steps, settings):
         seconds, start = length / rate, (end - length) / rate
         constant = samples.StuckForAWhile(seconds, length)
         yield find(constant, "warning", seconds, channel, start, end / rate)
-    at_end = levels.saturated(column, steps, settings.saturated)
+    at_end = levels.find_saturation(column, steps, settings.saturated)
     if at_end is not None:
         side, number = at_end
         value = column.low if side == "lowest" else column.high
         yield find(samples.Saturated(number, value, side), "warning", number, channel)
-    heap = None if stuck else levels.piled(column, steps)
+    heap = None if stuck else levels.find_piled_value(column, steps)
     if heap is not None:
         value, share = heap
         yield find(samples.PiledUp(share, value), "warning", share, channel)
@@ -211,11 +213,11 @@ def _find_changes(
 ) -> Iterator[Finding]:
     """Yield findings about motion, steps of the mean, warm-up and changes of the noise."""
     blocks = column.blocks()
-    moves = stationarity.steps(blocks, settings.step)
+    moves = stationarity.find_steps(blocks, settings.step)
     # On the edge between two values of a coarse register the spread is half a step, and the mean
     # of a block moves by up to one step.
     step_size = steps.step if steps is not None and _is_rounding_dominant(steps) else 0.0
-    for first, last in stationarity.motions(blocks, settings.motion, 0.75 * step_size):
+    for first, last in stationarity.find_motion(blocks, settings.motion, 0.75 * step_size):
         if any(first - step.window <= step.sample <= last + step.window for step in moves):
             continue  # the spread is large because of the step
         begin, end, length = first / rate, last / rate, (last - first) / rate
@@ -225,13 +227,13 @@ def _find_changes(
             continue
         at = step.sample / rate
         yield find(samples.Step(step.size, at, step.sigmas), "warning", step.size, channel, at, at)
-    warm = stationarity.warm_up(blocks, settings.warm_up)
+    warm = stationarity.find_warm_up(blocks, settings.warm_up)
     if warm is not None and abs(warm.drift) >= 1.5 * step_size:
         # Behind a coarse register the usual drift may be 0.
         usual = abs(warm.drift) / warm.usual if warm.usual > 0.0 else None
         data = samples.WarmUp(warm.drift, warm.end / rate, usual)
         yield find(data, "warning", warm.drift, channel, 0.0, warm.end / rate)
-    change = stationarity.variance_change(blocks)
+    change = stationarity.find_variance_change(blocks)
     if change is None or _is_rounding_dominant(steps):
         return
     ratio, begin, end = change[0], change[1] / rate, change[2] / rate

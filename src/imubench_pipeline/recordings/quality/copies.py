@@ -19,7 +19,7 @@ from imubench_pipeline.model.recordings import FindingRow
 from imubench_pipeline.model.table import ChannelRow
 from imubench_pipeline.recordings.quality import levels
 from imubench_pipeline.recordings.quality.repeats import WINDOW, Stretch
-from imubench_pipeline.recordings.quality.summary import ColumnSummary, Excerpt, common_samples
+from imubench_pipeline.recordings.quality.summary import ColumnSummary, Excerpt, pair_common_samples
 from imubench_pipeline.tables.findings import Finding, find
 from imubench_pipeline.typing import Array
 from imubench_pipeline.words.findings.base import FindingData
@@ -53,7 +53,7 @@ _MIN_SHARE_LOG_TWICE = 0.1
 _FINGERPRINT_FORMAT = ".8e"  # nine digits, to find copies of a log
 
 
-def copied_channels(columns: Mapping[str, ColumnSummary]) -> Iterator[Finding]:
+def find_copied_channels(columns: Mapping[str, ColumnSummary]) -> Iterator[Finding]:
     """Yield a finding for each channel with the samples of another one, also in another unit.
 
     ``columns``: all channels of a recording; no other columns.
@@ -100,7 +100,7 @@ def _pair_increments(
     first: list[Excerpt], other: list[Excerpt]
 ) -> Iterator[tuple[Array, Array, Array, Array]]:
     """Yield samples and increments of two columns, for pieces with enough nonzero increments."""
-    for x, y in common_samples(first, other):
+    for x, y in pair_common_samples(first, other):
         dx, dy = np.diff(x), np.diff(y)
         if min(np.count_nonzero(dx), np.count_nonzero(dy)) >= _MIN_NONZERO_INCREMENTS:
             yield x, y, dx, dy
@@ -112,7 +112,7 @@ def _find_step(values: Array) -> float:
     return float(np.min(gaps[gaps > 1e-12 * np.abs(values).max()], initial=np.inf))
 
 
-def repeated_stretches(
+def find_repeated_stretches(
     columns: Mapping[str, ColumnSummary],
     steps: Mapping[str, levels.Quantisation | None],
     rate: float,
@@ -156,7 +156,7 @@ def _describe_repeats(
     return find(data, "warning", total, channel, begin, end)
 
 
-def recorded_twice(
+def find_copied_recordings(
     models: Iterable[ModelRow], biases: Iterable[FixedBiasRow]
 ) -> Iterator[FindingRow]:
     """Yield rows of the table ``findings`` about recordings that are copies of another one.
@@ -197,7 +197,7 @@ _CORRELATION_SIGMAS = 4.0
 """The correlation must exceed `_MIN_SHARED_CORRELATION` by this number of standard errors."""
 
 
-def shared_noise(columns: Mapping[str, ColumnSummary]) -> Iterator[Finding]:
+def find_shared_noise(columns: Mapping[str, ColumnSummary]) -> Iterator[Finding]:
     """Yield findings about axes of one sensor with correlated increments.
 
     Increments suppress slow signals, such as a temperature effect on all axes. The standard error

@@ -29,7 +29,7 @@ class Held:
     share: float  # share of repeats among the other samples
 
 
-def regular_repeats(pieces: list[Excerpt]) -> Held | None:
+def find_regular_repeats(pieces: list[Excerpt]) -> Held | None:
     """Return the period at which samples repeat their predecessor; None if there is none."""
     whole = [piece.values for piece in pieces if len(piece.values) >= PIECE_SIZE // 4]
     whole = whole[:: max(1, len(whole) // _MAX_PIECES)][:_MAX_PIECES]
@@ -75,11 +75,11 @@ def _count_phases(repeats: NDArray[np.int64], counts: NDArray[np.int64]) -> None
         counts[every, 0], counts[every, 1] = most, second
 
 
-def held_samples(channel: str, column: ColumnSummary) -> Iterator[Finding]:
+def find_held_samples(channel: str, column: ColumnSummary) -> Iterator[Finding]:
     """Yield a finding if every n-th sample of a channel repeats its predecessor."""
     if column.repeats < column.present / (2 * _MAX_PERIOD):
         return
-    regular = regular_repeats(column.excerpts())
+    regular = find_regular_repeats(column.excerpts())
     if regular is None:
         return
     data = HeldSamples(regular.every, regular.share)

@@ -13,7 +13,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from imubench_pipeline.recordings.quality.register import hidden_step
+from imubench_pipeline.recordings.quality.register import find_hidden_step
 from imubench_pipeline.recordings.quality.summary import PIECE_SIZE, ColumnSummary, Excerpt
 from imubench_pipeline.tables.findings import Finding, find
 from imubench_pipeline.typing import Array
@@ -44,7 +44,7 @@ _MEDIAN_SD_OVER_MEAN_SD = 1.2533
 _SD_OVER_MAD = 1.4826  # standard deviation over the median absolute deviation, of normal noise
 
 
-def joined(channel: str, column: ColumnSummary, rate: float) -> Iterator[Finding]:
+def find_joined_logs(channel: str, column: ColumnSummary, rate: float) -> Iterator[Finding]:
     """Yield a finding if the data of another sensor seem to begin in the log.
 
     ``rate``: Hz.
@@ -75,7 +75,9 @@ def joined(channel: str, column: ColumnSummary, rate: float) -> Iterator[Finding
                 begin, end = (max(record - piece.first + m, 0) for m in (-margin, margin))
                 before.append(Excerpt(piece.first, piece.values[:begin]))
                 after.append(Excerpt(piece.first, piece.values[end:]))
-            changes["steps"] = _has_different_steps(register_of(before), register_of(after))
+            changes["steps"] = _has_different_steps(
+                detect_register_step(before), detect_register_step(after)
+            )
         changed = [name for name, differs in changes.items() if differs]
         if len(changed) < 2:
             continue
@@ -124,7 +126,7 @@ def _is_lasting(logs: Array, place: int) -> bool:
     )
 
 
-def register_of(pieces: Sequence[Excerpt]) -> tuple[float, float] | None:
+def detect_register_step(pieces: Sequence[Excerpt]) -> tuple[float, float] | None:
     """Return the step of a register, and the finest detectable step, SI; None without data.
 
     The step is infinite if none is detected.
@@ -140,7 +142,7 @@ def register_of(pieces: Sequence[Excerpt]) -> tuple[float, float] | None:
     if len(gaps) == 0 or spread == 0.0:
         return None
     seen = 20.0 * spread / len(joint)
-    step = hidden_step(whole) or float(gaps.min())
+    step = find_hidden_step(whole) or float(gaps.min())
     return (step if step > seen else math.inf), seen
 
 
@@ -157,7 +159,7 @@ def _has_different_steps(
     return coarse > _MIN_STEP_RATIO * fine
 
 
-def interleaved(channel: str, column: ColumnSummary) -> Iterator[Finding]:
+def find_interleaved_samples(channel: str, column: ColumnSummary) -> Iterator[Finding]:
     """Yield a finding if every other sample seems to be of another sensor."""
     levels, noises, units, sizes = [], [], [], []
     pieces = [piece for piece in column.excerpts() if len(piece.values) >= PIECE_SIZE // 4]
@@ -181,7 +183,7 @@ def interleaved(channel: str, column: ColumnSummary) -> Iterator[Finding]:
     }
     if any(changes.values()):
         even, odd = (
-            register_of([Excerpt(piece.first, piece.values[first::2]) for piece in pieces])
+            detect_register_step([Excerpt(piece.first, piece.values[first::2]) for piece in pieces])
             for first in (0, 1)
         )
         changes["steps"] = _has_different_steps(even, odd)

@@ -34,10 +34,10 @@ class Knock:
     first: int
     last: int
     """First and one-past-last record to leave out."""
-    size: float  # largest distance from the level, in units of the noise that `suspects` returns
+    size: float  # largest distance from the level, over the noise of `find_outlier_blocks`
 
 
-def suspects(
+def find_outlier_blocks(
     blocks: BlockStatistics, sigmas: float, step: float | None = None
 ) -> tuple[NDArray[np.int64], Array, Array]:
     """Return the blocks with an outlier, and the level and the noise around them.
@@ -75,7 +75,7 @@ def suspects(
     return np.array(number, dtype=np.int64), np.array(levels), np.array(noises)
 
 
-def knocks(
+def find_knocks(
     pieces: Iterable[Array],
     blocks: BlockStatistics,
     sigmas: float,
@@ -85,9 +85,9 @@ def knocks(
     """Yield the knocks of a column.
 
     ``pieces``: the column in order, SI; NaN where a sample is missing. ``longest``: longest knock,
-    records; a longer event is motion. For the other parameters see `suspects`.
+    records; a longer event is motion. For the other parameters see `find_outlier_blocks`.
     """
-    number, level, noise = suspects(blocks, sigmas, step)
+    number, level, noise = find_outlier_blocks(blocks, sigmas, step)
     if len(number) == 0:
         return
     wanted = {int(k): i for i, k in enumerate(number)}

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from imubench_pipeline.recordings.quality.register import hidden_step
-from imubench_pipeline.recordings.quality.summary import ColumnSummary, present_median
+from imubench_pipeline.recordings.quality.register import find_hidden_step
+from imubench_pipeline.recordings.quality.summary import ColumnSummary, compute_finite_median
 from imubench_pipeline.typing import Array
 
 _MAX_RUN_PROBABILITY = 1e-9  # probability that a longer run of one value occurs by chance
@@ -48,12 +48,12 @@ class Quantisation:
     """The values were rounded again, so their differences are no multiples of the step."""
 
 
-def quantisation(column: ColumnSummary) -> Quantisation | None:
+def detect_quantisation(column: ColumnSummary) -> Quantisation | None:
     """Return the quantisation of a column, or None if no steps are found."""
-    spread = noise_of(column)
+    spread = estimate_noise(column)
     if not (0.0 < column.step < np.inf):
         return None
-    hidden = hidden_step(column.excerpts())
+    hidden = find_hidden_step(column.excerpts())
     step = column.step if hidden is None else hidden
     # The least difference between n continuous samples is about spread / n.
     if step < 20.0 * spread / column.present:
@@ -63,12 +63,14 @@ def quantisation(column: ColumnSummary) -> Quantisation | None:
     return Quantisation(step, levels, over_noise, hidden is not None)
 
 
-def noise_of(column: ColumnSummary) -> float:
+def estimate_noise(column: ColumnSummary) -> float:
     """Return the median standard deviation of the samples of a block, SI."""
-    return present_median(column.blocks().spread)
+    return compute_finite_median(column.blocks().spread)
 
 
-def piled(column: ColumnSummary, steps: Quantisation | None) -> tuple[float, float] | None:
+def find_piled_value(
+    column: ColumnSummary, steps: Quantisation | None
+) -> tuple[float, float] | None:
     """Return a value that is far more frequent than its neighbours; None if there is none.
 
     Neighbouring levels of a fine register are about equally frequent. A constant that replaces lost
@@ -98,20 +100,20 @@ def _count_values(column: ColumnSummary) -> tuple[Array, NDArray[np.int64]]:
     return np.unique(np.concatenate([np.empty(0), *pieces]), return_counts=True)
 
 
-def kept_level(
+def summarise_level(
     column: ColumnSummary, rate: float, unit: str, *, timed: bool = True
 ) -> dict[str, Any]:
     """Return the level and noise of a channel, to be compared with its datasheet.
 
     ``mean`` is the median of the block means, SI, which is robust to knocks; for ``density`` see
-    `density_of`. ``unit``: as stated in the sensor file. ``timed``: the log has stamps; otherwise
-    the rate, Hz, is the stated one.
+    `bound_noise_density`. ``unit``: as stated in the sensor file. ``timed``: the log has stamps;
+    otherwise the rate, Hz, is the stated one.
     """
-    level, density = present_median(column.blocks().mean), density_of(column, rate)
+    level, density = compute_finite_median(column.blocks().mean), bound_noise_density(column, rate)
     return {"mean": level, "density": density, "unit": unit, "rate": rate, "timed": timed}
 
 
-def density_of(column: ColumnSummary, rate: float) -> tuple[float, float | None]:
+def bound_noise_density(column: ColumnSummary, rate: float) -> tuple[float, float | None]:
     """Return approximate bounds of the white noise density of a column.
 
     Two estimates are used. The standard deviation within blocks over √rate is too small behind a
@@ -120,7 +122,7 @@ def density_of(column: ColumnSummary, rate: float) -> tuple[float, float | None]
     are too few blocks. The bounds are of N, SI/√Hz, two-sided; the rate is in Hz.
     """
     blocks = column.blocks()
-    spread = noise_of(column) / math.sqrt(rate)
+    spread = estimate_noise(column) / math.sqrt(rate)
     steps = np.diff(np.where(blocks.count > 0.9 * blocks.size, blocks.mean, np.nan))
     steps = steps[np.isfinite(steps)]
     if len(steps) < _MIN_BLOCK_STEPS:
@@ -131,7 +133,7 @@ def density_of(column: ColumnSummary, rate: float) -> tuple[float, float | None]
     return min(spread, slow), max(spread, slow, least_bit / math.sqrt(12.0 * rate))
 
 
-def longest_by_chance(column: ColumnSummary) -> float:
+def compute_longest_chance_run(column: ColumnSummary) -> float:
     """Return the longest run of one value that may occur by chance, in samples."""
     share = min(column.repeats / max(column.present - 1, 1), 0.999)
     if share == 0.0:
@@ -139,7 +141,7 @@ def longest_by_chance(column: ColumnSummary) -> float:
     return 1.0 + math.log(_MAX_RUN_PROBABILITY / column.present) / math.log(share)
 
 
-def saturated(
+def find_saturation(
     column: ColumnSummary, steps: Quantisation | None, share: float
 ) -> tuple[str, int] | None:
     """Return the extreme where a column is saturated; None if it is not.

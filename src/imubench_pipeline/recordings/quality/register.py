@@ -48,7 +48,7 @@ _MIN_CENTRAL_LEVELS = 8
 all levels are used."""
 
 
-def hidden_step(pieces: Sequence[Excerpt]) -> float | None:
+def find_hidden_step(pieces: Sequence[Excerpt]) -> float | None:
     """Return the least significant bit, SI, of a register whose values were rounded again.
 
     None: the least difference of values is the step, or there is no step.

@@ -30,7 +30,7 @@ class GravityTurn:
     swept: float  # angle of rotation over the log, rad
 
 
-def gravity_turn(axes: Sequence[BlockStatistics], rate: float) -> GravityTurn | None:
+def detect_gravity_turn(axes: Sequence[BlockStatistics], rate: float) -> GravityTurn | None:
     """Return the steady rotation in the block means of an accelerometer; None if there is none.
 
     In the frame of a sensor with the angular rate ω, gravity changes by dg/dt = -ω × g. The mean of

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from imubench_pipeline.recordings.quality.summary import BlockStatistics, present_median
+from imubench_pipeline.recordings.quality.summary import BlockStatistics, compute_finite_median
 
 _NUMBER_OF_PARTS = 20
 _MIN_BLOCKS_PER_PART = 8  # least number of blocks in a part; a shorter recording is not tested
@@ -40,7 +40,7 @@ class WarmUp:
     usual: float  # median change over a part of the rest, SI
 
 
-def steps(blocks: BlockStatistics, sigmas: float) -> list[Step]:
+def find_steps(blocks: BlockStatistics, sigmas: float) -> list[Step]:
     """Find sudden changes of the mean.
 
     ``sigmas``: least size of a step, in robust standard deviations of all steps.
@@ -49,12 +49,12 @@ def steps(blocks: BlockStatistics, sigmas: float) -> list[Step]:
     # Medians are robust to knocks. The means of blocks with few samples scatter too much.
     mean = np.where(2 * blocks.count >= blocks.size, blocks.mean, np.nan)
     grouped = mean[: len(mean) // size * size].reshape(-1, size)
-    means = np.array([present_median(group) for group in grouped])
+    means = np.array([compute_finite_median(group) for group in grouped])
     if len(means) < 16:
         return []
     # Difference over two windows, so that a step inside a window counts in full.
     away = means[2:] - means[:-2]
-    scale = _SD_OVER_MAD * present_median(np.abs(away - present_median(away)))
+    scale = _SD_OVER_MAD * compute_finite_median(np.abs(away - compute_finite_median(away)))
     if not scale > 0.0:
         return []
     far = np.flatnonzero(np.abs(away) > sigmas * scale)
@@ -64,8 +64,8 @@ def steps(blocks: BlockStatistics, sigmas: float) -> list[Step]:
     for group in np.split(far, np.flatnonzero(np.diff(far) > 3) + 1):
         peak = group[np.argmax(np.abs(away[group]))]
         # A step lasts; a change that reverses at once is a knock.
-        before = present_median(means[max(0, group[0] - 4) : group[0] + 1])
-        after = present_median(means[group[-1] + 2 : group[-1] + 7])
+        before = compute_finite_median(means[max(0, group[0] - 4) : group[0] + 1])
+        after = compute_finite_median(means[group[-1] + 2 : group[-1] + 7])
         change = after - before
         if abs(change) > 0.5 * abs(float(away[peak])):
             sample = (int(peak) + 1) * size * blocks.size + size * blocks.size // 2
@@ -73,7 +73,7 @@ def steps(blocks: BlockStatistics, sigmas: float) -> list[Step]:
     return moves
 
 
-def warm_up(blocks: BlockStatistics, times: float) -> WarmUp | None:
+def find_warm_up(blocks: BlockStatistics, times: float) -> WarmUp | None:
     """Find a beginning that drifts more than the rest.
 
     ``times``: least ratio of the first drift to the median drift of the later parts.
@@ -85,9 +85,9 @@ def warm_up(blocks: BlockStatistics, times: float) -> WarmUp | None:
     for k in range(_NUMBER_OF_PARTS):
         part = blocks.mean[k * size : (k + 1) * size]
         third = size // 3
-        drifts[k] = present_median(part[-third:]) - present_median(part[:third])
+        drifts[k] = compute_finite_median(part[-third:]) - compute_finite_median(part[:third])
     rest = np.abs(drifts[_NUMBER_OF_PARTS // 2 :])
-    usual, first = present_median(rest), float(drifts[0])
+    usual, first = compute_finite_median(rest), float(drifts[0])
     most = float(np.max(rest[np.isfinite(rest)], initial=0.0))
     # Later parts of a coarse register may not drift at all; then there is no reference.
     if not (usual > 0.0 and abs(first) > times * usual and abs(first) > 2.0 * most):
@@ -98,7 +98,7 @@ def warm_up(blocks: BlockStatistics, times: float) -> WarmUp | None:
     return WarmUp(end * size * blocks.size, drift, usual)
 
 
-def variance_change(blocks: BlockStatistics) -> tuple[float, int, int] | None:
+def find_variance_change(blocks: BlockStatistics) -> tuple[float, int, int] | None:
     """Return the ratio of the largest to the smallest noise of a part; None if it is too short.
 
     The ratio is followed by the first and one-past-last record of the noisiest part.
@@ -107,7 +107,7 @@ def variance_change(blocks: BlockStatistics) -> tuple[float, int, int] | None:
     if size < _MIN_BLOCKS_PER_PART:
         return None
     parts = blocks.spread[: size * _NUMBER_OF_PARTS].reshape(_NUMBER_OF_PARTS, size)
-    spreads = np.array([present_median(part) for part in parts])
+    spreads = np.array([compute_finite_median(part) for part in parts])
     calm = float(np.min(spreads[spreads > 0.0], initial=np.inf))
     noisy = int(np.argmax(np.nan_to_num(spreads)))
     if not np.isfinite(calm):
@@ -116,13 +116,13 @@ def variance_change(blocks: BlockStatistics) -> tuple[float, int, int] | None:
     return float(spreads[noisy]) / calm, noisy * records, (noisy + 1) * records
 
 
-def motions(blocks: BlockStatistics, times: float, least: float = 0.0) -> list[tuple[int, int]]:
+def find_motion(blocks: BlockStatistics, times: float, least: float = 0.0) -> list[tuple[int, int]]:
     """Return the parts with motion: a large standard deviation that no knock explains.
 
     ``times``, ``least``: lower limits of the standard deviation, over its median and in SI. A part
     is its first and one-past-last record.
     """
-    usual = present_median(blocks.spread)
+    usual = compute_finite_median(blocks.spread)
     if not usual > 0.0:
         return []
     reach = np.maximum(blocks.high - blocks.mean, blocks.mean - blocks.low)

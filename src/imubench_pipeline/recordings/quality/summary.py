@@ -85,7 +85,7 @@ def _merge_blocks(rows: Array, together: int) -> Array:
     return np.column_stack([total, united, deviation, *extremes])
 
 
-def present_median(values: Array) -> float:
+def compute_finite_median(values: Array) -> float:
     """Return the median of the finite values, shape (n,); NaN if there are none."""
     present = values[np.isfinite(values)]
     return float(np.median(present)) if len(present) else float("nan")
@@ -147,7 +147,7 @@ class Excerpts:
         return [Excerpt(k * self._stride * PIECE_SIZE, values) for k, values in enumerate(pieces)]
 
 
-def common_samples(first: list[Excerpt], other: list[Excerpt]) -> list[tuple[Array, Array]]:
+def pair_common_samples(first: list[Excerpt], other: list[Excerpt]) -> list[tuple[Array, Array]]:
     """Return the samples of two columns of one table that are present in both.
 
     There are two arrays of equal shape for each excerpt that both columns have.

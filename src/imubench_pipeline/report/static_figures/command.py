@@ -13,8 +13,8 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from imubench_pipeline.model.recordings import RecordingRow
-from imubench_pipeline.settings.extras import extra
-from imubench_pipeline.tables import read, tables_folder, tables_of_run
+from imubench_pipeline.settings.extras import require_extra
+from imubench_pipeline.tables import find_tables, find_tables_folder, read
 from imubench_pipeline.tables.outputs import OutputFolder, add_output
 from imubench_pipeline.tables.schemas import TABLES
 
@@ -101,10 +101,10 @@ def run(arguments: argparse.Namespace) -> int:
 
 def _load(results: Path) -> dict[str, pa.Table]:
     """Read the tables of a run; ``results`` may be the folder ``tables`` itself."""
-    folder = tables_folder(results)
+    folder = find_tables_folder(results)
     paths = {name: folder / f"{name}.parquet" for name in TABLES}
     try:
-        tables_of_run(results, NEEDED)
+        find_tables(results, NEEDED)
         return {name: read(name, [path] if path.is_file() else []) for name, path in paths.items()}
     except (OSError, ValueError) as error:
         raise SelectionError(str(error)) from error
@@ -156,7 +156,7 @@ def _write(
 ) -> int:
     """Write the figures, and say which; return how many files."""
     # Matplotlib is loaded only if there is something to draw.
-    with extra("workflow", "draw figures"):
+    with require_extra("workflow", "draw figures"):
         from imubench_pipeline.report.static_figures.files import save
 
     # The figures that were drawn beside the tables before are drawn again.
@@ -185,23 +185,23 @@ def _list_figures(
     from imubench_pipeline.report.static_figures.files import (
         CHANNEL_KINDS,
         CROSS_KINDS,
-        channel_figures,
-        cross_figures,
+        list_channel_figures,
+        list_cross_figures,
     )
-    from imubench_pipeline.report.static_figures.theory import theory_figure
-    from imubench_pipeline.report.view import recording_views
+    from imubench_pipeline.report.static_figures.theory import draw_theory_figure
+    from imubench_pipeline.report.view import gather_recordings
 
     cross = [kind for kind in arguments.kind if kind in CROSS_KINDS]
     of_channel = [kind for kind in arguments.kind if kind in CHANNEL_KINDS]
     if "theory" in arguments.kind:
-        yield "theory", partial(theory_figure, arguments.units)
+        yield "theory", partial(draw_theory_figure, arguments.units)
     views = []
     if cross or of_channel:
-        views = [view for recording in recording_views(chosen) for view in recording.channels()]
+        views = [view for recording in gather_recordings(chosen) for view in recording.channels()]
     # A figure of some sensors must not replace the figure of all sensors.
     part = "".join(f"{name}/" for name in (arguments.sensor, arguments.recording) if name)
-    for name, make in cross_figures(views, arguments.units, sensors=sensors, kinds=cross):
+    for name, make in list_cross_figures(views, arguments.units, sensors=sensors, kinds=cross):
         yield part + name, make
     for number, view in enumerate(views if of_channel else [], start=1):
         print(f"channel {number} of {len(views)}: {view.label} {view.channel}", file=sys.stderr)
-        yield from channel_figures(view, arguments.units, kinds=of_channel)
+        yield from list_channel_figures(view, arguments.units, kinds=of_channel)

@@ -15,22 +15,22 @@ from matplotlib.lines import Line2D
 from matplotlib.path import Path
 
 from imubench_pipeline.estimators.estimate import COMPARED
-from imubench_pipeline.report.palette import Appearance, sensor_appearances
-from imubench_pipeline.report.practical import System, page_unit
+from imubench_pipeline.report.palette import Appearance, assign_sensor_styles
+from imubench_pipeline.report.practical import System, choose_page_unit
 from imubench_pipeline.report.static_figures.style import (
     DOUBLE,
     SINGLE,
     SYMBOLS,
-    channel_name,
-    extent,
-    legend_below,
-    line_look,
-    marker_look,
-    new_figure,
+    compute_limits,
+    convert_line_style,
+    convert_marker_style,
+    draw_legend_below,
+    fix_layout,
+    make_figure,
+    name_channel,
     set_log_axis,
-    settled,
-    shortened,
-    style,
+    set_style,
+    shorten_name,
 )
 from imubench_pipeline.report.view import ChannelView
 from imubench_pipeline.words.estimates import status_text
@@ -62,8 +62,8 @@ _ARROW_MARKER = Path(
 _ARROW_SIZE = 4.5  # of a dot
 
 
-@style()
-def comparison_figure(
+@set_style()
+def draw_comparison_figure(
     views: Sequence[ChannelView], sensors: Sequence[str], system: System = "practical"
 ) -> Figure:
     """Draw the Allan deviation of one channel of several sensors (Maia et al., Figures 6 and 7).
@@ -71,16 +71,16 @@ def comparison_figure(
     A sensor has the same colour, dash and marker in every figure, by its place among all sensors of
     the run; a marker of a simulated log is hollow.
     """
-    looks = sensor_appearances(list(sensors))
+    looks = assign_sensor_styles(list(sensors))
     groups: dict[tuple[str, bool], list[ChannelView]] = {}
     for view in views:
         groups.setdefault((view.sensor, view.simulated), []).append(view)
     ordered = sorted(groups, key=lambda group: (sensors.index(group[0]), group[1]))
 
-    unit = page_unit(views[0].quantity, "adev", system)
-    name = channel_name(views[0].channel)
+    unit = choose_page_unit(views[0].quantity, "adev", system)
+    name = name_channel(views[0].channel)
     wide = len(groups) > _MAX_SENSORS_IN_COLUMN or len(views) > _MOST_CURVES_IN_A_COLUMN
-    figure = new_figure(DOUBLE if wide else SINGLE, 95.0 if wide else 68.0, f"{name}: all sensors")
+    figure = make_figure(DOUBLE if wide else SINGLE, 95.0 if wide else 68.0, f"{name}: all sensors")
     axes = figure.add_subplot()
     handles = []
     for place, (sensor, simulated) in enumerate(ordered):
@@ -89,21 +89,25 @@ def comparison_figure(
         _draw_sensor(axes, of_group, looks[sensor], unit.per_si, place, bands=bands)
         recordings = len(of_group)
         words = [f"{recordings} recordings"] * (recordings > 1) + ["simulated"] * simulated
-        label = shortened(figure, sensor, _MAX_NAME_WIDTH)
+        label = shorten_name(figure, sensor, _MAX_NAME_WIDTH)
         label += f" ({', '.join(words)})" if words else ""
-        look = line_look(looks[sensor]) | marker_look(looks[sensor], hollow=simulated)
+        look = convert_line_style(looks[sensor]) | convert_marker_style(
+            looks[sensor], hollow=simulated
+        )
         handles.append(Line2D([], [], label=label, **look))
     if any(len(each) > _MAX_EQUAL_RECORDINGS for each in groups.values()):
         handles.append(Line2D([], [], color="black", label="median of several recordings"))
         pale: dict[str, Any] = {"alpha": _PALE_OPACITY, "linewidth": _THIN_WIDTH}
         handles.append(Line2D([], [], color="black", label="other recordings", **pale))
-    set_log_axis(axes, "x", extent(*(view.tau for view in views)))
-    set_log_axis(axes, "y", extent(*(view.adev * unit.per_si for view in views), margin=1.5))
+    set_log_axis(axes, "x", compute_limits(*(view.tau for view in views)))
+    set_log_axis(
+        axes, "y", compute_limits(*(view.adev * unit.per_si for view in views), margin=1.5)
+    )
     axes.set_xlabel("averaging time τ (s)")
     axes.set_ylabel(f"Allan deviation ({unit.sign})")
     axes.set_title(name, loc="left")
-    legend_below(figure, handles)
-    return settled(figure)
+    draw_legend_below(figure, handles)
+    return fix_layout(figure)
 
 
 def _draw_sensor(
@@ -116,7 +120,7 @@ def _draw_sensor(
     bands: bool,
 ) -> None:
     """Draw the recordings of a sensor; if there are many, all but the middle one are thin."""
-    lines = line_look(look)
+    lines = convert_line_style(look)
     marked = views
     if len(views) > _MAX_EQUAL_RECORDINGS:
         # Its level is the median at the middle of the common averaging times.
@@ -147,7 +151,7 @@ def _draw_sensor(
             view.tau,
             view.adev * scale,
             **lines,
-            **marker_look(look, hollow=view.simulated),
+            **convert_marker_style(look, hollow=view.simulated),
             linewidth=1.0 if len(marked) == 1 else 0.8,
             markevery=(start, step),
             zorder=2.5,
@@ -165,7 +169,7 @@ class Mark:
     upper: float | None = None
 
 
-def marks(view: ChannelView, symbol: str, place: float, spread: float = 0.0) -> Iterator[Mark]:
+def make_marks(view: ChannelView, symbol: str, place: float, spread: float = 0.0) -> Iterator[Mark]:
     """Yield a mark for each component of a parameter of the model.
 
     ``spread`` is the height for these about the place of the recording, in the same unit.
@@ -207,8 +211,8 @@ class _Block:
         return [self.top + step * (number + 0.75) for number in range(len(self.views))]
 
 
-@style()
-def forest_figure(
+@set_style()
+def draw_forest_figure(
     views: Sequence[ChannelView],
     sensors: Sequence[str],
     symbol: str | Sequence[str] = COMPARED,
@@ -219,11 +223,11 @@ def forest_figure(
     A panel each; the look is by the place among all sensors of the run.
     """
     symbols = [symbol] if isinstance(symbol, str) else list(symbol)
-    looks = sensor_appearances(list(sensors))
+    looks = assign_sensor_styles(list(sensors))
     blocks = _make_blocks(views, sensors)
     total = blocks[-1].bottom
-    name = channel_name(views[0].channel)
-    figure = new_figure(
+    name = name_channel(views[0].channel)
+    figure = make_figure(
         SINGLE if len(symbols) == 1 else DOUBLE,
         total + _FRAME_HEIGHT,
         f"{name}: {', '.join(symbols)} of all sensors",
@@ -243,14 +247,14 @@ def forest_figure(
         if simulated:
             words.append("simulated" if simulated == count else f"{simulated} simulated")
         about = f" ({', '.join(words)})" if words else ""
-        names.append(shortened(figure, block.sensor, 110.0) + about)
+        names.append(shorten_name(figure, block.sensor, 110.0) + about)
     first.set_yticklabels(names)
     for panel in panels:
         panel.tick_params(axis="y", length=0, which="both")
         panel.grid(visible=False, axis="y")
     first.set_title(name, loc="left")
-    legend_below(figure, _make_legend(kinds))
-    return settled(figure)
+    draw_legend_below(figure, _make_legend(kinds))
+    return fix_layout(figure)
 
 
 def _make_blocks(views: Sequence[ChannelView], sensors: Sequence[str]) -> list[_Block]:
@@ -281,7 +285,7 @@ def _draw_panel(
     ticks: int,
 ) -> set[str]:
     """Draw one parameter of all sensors; return the kinds of marks there are."""
-    unit = page_unit(blocks[0].views[0].quantity, symbol, system)
+    unit = choose_page_unit(blocks[0].views[0].quantity, symbol, system)
     drawn: list[Mark] = []
     truths: list[tuple[float, float]] = []
     for number, block in enumerate(blocks):
@@ -291,7 +295,7 @@ def _draw_panel(
         of_block = [
             mark
             for view, place in zip(block.views, block.places, strict=True)
-            for mark in marks(view, symbol, place, 0.8 * step)
+            for mark in make_marks(view, symbol, place, 0.8 * step)
         ]
         truths += [
             (place, view.truth[symbol].value * unit.per_si)
@@ -338,7 +342,7 @@ def _set_limits(
         return
     reach = 10.0**_MAX_INTERVAL_DECADES
     near = np.clip(ends, min(values) / reach, max(values) * reach)
-    set_log_axis(axes, "x", extent(values, near, margin=1.6), ticks=ticks)
+    set_log_axis(axes, "x", compute_limits(values, near, margin=1.6), ticks=ticks)
 
 
 def _draw_marks(
@@ -348,9 +352,9 @@ def _draw_marks(
     size = float(np.clip(step * 72.0 / 25.4 * 0.8, 1.2, 4.0))
     width = min(1.0, 0.3 * size)
     dots: dict[Kind, dict[str, Any]] = {
-        "estimate": marker_look(look),
-        "not identified": marker_look(look, hollow=True),
-        "limit": marker_look(look) | {"marker": _ARROW_MARKER, "markerfacecolor": "none"},
+        "estimate": convert_marker_style(look),
+        "not identified": convert_marker_style(look, hollow=True),
+        "limit": convert_marker_style(look) | {"marker": _ARROW_MARKER, "markerfacecolor": "none"},
     }
     for kind, dot in dots.items():
         chosen = [mark for mark in of_block if mark.kind == kind]

@@ -13,8 +13,8 @@ from matplotlib.figure import Figure
 
 from imubench_pipeline.model.comparisons import DatasheetRow
 from imubench_pipeline.noise import NoiseModel, Term
-from imubench_pipeline.report.palette import method_appearance
-from imubench_pipeline.report.practical import System, page_unit
+from imubench_pipeline.report.palette import get_method_style
+from imubench_pipeline.report.practical import System, choose_page_unit
 from imubench_pipeline.report.static_figures.style import (
     MEASURED,
     SINGLE,
@@ -22,15 +22,15 @@ from imubench_pipeline.report.static_figures.style import (
     SYMBOLS,
     TERM_LOOKS,
     TERM_NAMES,
-    channel_name,
-    extent,
-    legend_below,
-    line_look,
-    log_name,
-    new_figure,
+    compute_limits,
+    convert_line_style,
+    draw_legend_below,
+    fix_layout,
+    make_figure,
+    name_channel,
+    name_log,
     set_log_axis,
-    settled,
-    style,
+    set_style,
     write_title,
 )
 from imubench_pipeline.report.view import METHOD_NAMES, ChannelView
@@ -56,12 +56,12 @@ _LINE_DASHES = ((0, (4, 2)), (0, (1, 1.4)), (0, (5, 1.5, 1, 1.5)), (0, (8, 2)))
 _UNIT_SIGNS = {"deg": "°", "sqrt(Hz)": "√Hz", "sqrt(h)": "√h", "sqrt(s)": "√s", "ug": "µg"}
 
 
-def channel_axes(view: ChannelView, system: System, what: str) -> tuple[Figure, Axes, float]:
+def make_channel_axes(view: ChannelView, system: System, what: str) -> tuple[Figure, Axes, float]:
     """Return a figure of a channel, its axes, and the factor from SI to their unit."""
-    unit = page_unit(view.quantity, "adev", system)
-    name, of = f"{view.sensor} / {view.recording}", channel_name(view.channel)
+    unit = choose_page_unit(view.quantity, "adev", system)
+    name, of = f"{view.sensor} / {view.recording}", name_channel(view.channel)
     rest = " (simulated)" * view.simulated + f": {of[0].lower()}{of[1:]}"
-    figure = new_figure(SINGLE, 68.0, f"{name}{rest}: {what}")
+    figure = make_figure(SINGLE, 68.0, f"{name}{rest}: {what}")
     axes = figure.add_subplot()
     axes.set_xlabel("averaging time τ (s)")
     axes.set_ylabel(f"Allan deviation ({unit.sign})")
@@ -82,7 +82,7 @@ def draw_measured(axes: Axes, view: ChannelView, scale: float, *, limits: bool =
         marker="o",
         markersize=2.2,
         linewidth=0.6,
-        label=log_name(view),
+        label=name_log(view),
         zorder=2.5,
     )
 
@@ -91,22 +91,22 @@ def finish(figure: Figure, axes: Axes, view: ChannelView, scale: float, *more: f
     """Set axis limits for the curve, further levels and, within bounds, the 95 % limits."""
     limits = (view.lower, view.upper)
     near = [np.clip(limit, view.adev / 2.0, view.adev * 2.0) * scale for limit in limits]
-    set_log_axis(axes, "x", extent(view.tau))
-    set_log_axis(axes, "y", extent(view.adev * scale, *near, list(more), margin=1.4))
-    legend_below(figure, axes.get_legend_handles_labels()[0])
-    return settled(figure)
+    set_log_axis(axes, "x", compute_limits(view.tau))
+    set_log_axis(axes, "y", compute_limits(view.adev * scale, *near, list(more), margin=1.4))
+    draw_legend_below(figure, axes.get_legend_handles_labels()[0])
+    return fix_layout(figure)
 
 
-@style()
-def allan_figure(view: ChannelView, system: System = "practical") -> Figure:
+@set_style()
+def draw_allan_figure(view: ChannelView, system: System = "practical") -> Figure:
     """Draw the Allan deviation with its 95 % limits alone (Silva et al., Figure 2)."""
-    figure, axes, scale = channel_axes(view, system, "Allan deviation")
+    figure, axes, scale = make_channel_axes(view, system, "Allan deviation")
     draw_measured(axes, view, scale)
     return finish(figure, axes, view, scale)
 
 
-@style()
-def methods_figure(view: ChannelView, system: System = "practical") -> Figure | None:
+@set_style()
+def draw_methods_figure(view: ChannelView, system: System = "practical") -> Figure | None:
     """Draw the model of each method, and the reconstruction from the recommended one.
 
     The lower panel has the ratio of models and measured curve (Maia et al., Figures 2 to 5). None
@@ -116,7 +116,7 @@ def methods_figure(view: ChannelView, system: System = "practical") -> Figure | 
     models = {method: model for method, model in models.items() if model.terms}
     if not models:
         return None
-    figure, axes, scale = channel_axes(view, system, "models of the methods")
+    figure, axes, scale = make_channel_axes(view, system, "models of the methods")
     label = axes.get_ylabel()
     axes.remove()
     figure.set_figheight(92.0 / 25.4)
@@ -133,13 +133,13 @@ def methods_figure(view: ChannelView, system: System = "practical") -> Figure | 
         deviation = np.sqrt(model.allan_variance(view.tau))
         best = method == view.recommended
         width, order = (1.3, 3.0) if best else (0.9, 2.8)
-        look = line_look(method_appearance(method)) | {"linewidth": width, "zorder": order}
+        look = convert_line_style(get_method_style(method)) | {"linewidth": width, "zorder": order}
         label = METHOD_NAMES[method] + " (recommended)" * best
         axes.plot(view.tau, deviation * scale, label=label, **look)
         ratio.plot(view.tau, deviation / view.adev, **look)
         relative.append(deviation / view.adev)
     near = np.clip(relative, 1 / _MAX_RATIO, _MAX_RATIO)
-    set_log_axis(ratio, "y", extent(near, view.lower / view.adev, margin=1.1), ticks=5)
+    set_log_axis(ratio, "y", compute_limits(near, view.lower / view.adev, margin=1.1), ticks=5)
     figure.align_ylabels()
     return finish(figure, axes, view, scale)
 
@@ -149,7 +149,7 @@ def _draw_reconstruction(axes: Axes, ratio: Axes, view: ChannelView, scale: floa
     curve = view.reconstruction.get(view.recommended)
     if curve is None:
         return
-    colour = method_appearance(view.recommended).light
+    colour = get_method_style(view.recommended).light
     for panel, unit, name in (
         (axes, np.full_like(curve["tau"], scale), "95 % of reconstructions"),
         (ratio, 1.0 / np.interp(curve["tau"], view.tau, view.adev), None),
@@ -176,8 +176,8 @@ def _draw_reconstruction(axes: Axes, ratio: Axes, view: ChannelView, scale: floa
         )
 
 
-@style()
-def terms_figure(view: ChannelView, system: System = "practical") -> Figure | None:
+@set_style()
+def draw_terms_figure(view: ChannelView, system: System = "practical") -> Figure | None:
     """Draw every term of the recommended model, their sum, and where N, B and K are read.
 
     N is the white noise at tau = 1 s, 0.664 B the plateau of flicker noise or the peak of a
@@ -189,7 +189,7 @@ def terms_figure(view: ChannelView, system: System = "practical") -> Figure | No
     model = view.model(view.recommended)
     if not model.terms:
         return None
-    figure, axes, scale = channel_axes(view, system, "terms of the noise model")
+    figure, axes, scale = make_channel_axes(view, system, "terms of the noise model")
     draw_measured(axes, view, scale, limits=False)
     # Lines fold at the averaging times of the curve; between them they would be a smear.
     tau = view.tau if model.sinusoids else np.geomspace(view.tau[0], view.tau[-1], 200)
@@ -250,7 +250,7 @@ def _label_term(view: ChannelView, term: Term, system: System) -> str:
     values = ", ".join(
         f"{SYMBOLS[symbol]} = {unit.text(abs(value), 3)} {unit.sign}"
         for symbol, value in term.values.items()
-        for unit in [page_unit(view.quantity, symbol, system)]
+        for unit in [choose_page_unit(view.quantity, symbol, system)]
     )
     doubts = {
         status_text(row.status)
@@ -264,8 +264,8 @@ def _label_term(view: ChannelView, term: Term, system: System) -> str:
     )
 
 
-@style()
-def datasheet_figure(view: ChannelView, system: System = "practical") -> Figure | None:
+@set_style()
+def draw_datasheet_figure(view: ChannelView, system: System = "practical") -> Figure | None:
     """Draw the curve and the recommended model with the lines that the datasheet prints.
 
     N is a line of slope -1/2, K one of +1/2; a bias instability is the level of the minimum, as
@@ -279,11 +279,11 @@ def datasheet_figure(view: ChannelView, system: System = "practical") -> Figure 
     }
     if not printed:
         return None
-    figure, axes, scale = channel_axes(view, system, "with the datasheet")
+    figure, axes, scale = make_channel_axes(view, system, "with the datasheet")
     draw_measured(axes, view, scale)
     model = view.model(view.recommended)
     if model.terms:
-        look = line_look(method_appearance(view.recommended)) | {"zorder": 2.8}
+        look = convert_line_style(get_method_style(view.recommended)) | {"zorder": 2.8}
         deviation = np.sqrt(model.allan_variance(view.tau)) * scale
         axes.plot(view.tau, deviation, label=METHOD_NAMES[view.recommended], **look)
     levels = []

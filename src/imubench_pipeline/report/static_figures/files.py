@@ -13,33 +13,36 @@ import pyarrow as pa
 from matplotlib.figure import Figure
 
 from imubench_pipeline.report.practical import System
-from imubench_pipeline.report.static_figures.comparison import comparison_figure, forest_figure
-from imubench_pipeline.report.static_figures.curves import (
-    allan_figure,
-    datasheet_figure,
-    methods_figure,
-    terms_figure,
+from imubench_pipeline.report.static_figures.comparison import (
+    draw_comparison_figure,
+    draw_forest_figure,
 )
-from imubench_pipeline.report.static_figures.spectrum import spectrum_figure
-from imubench_pipeline.report.static_figures.style import style
-from imubench_pipeline.report.view import ChannelView, recording_views
-from imubench_pipeline.tables import replacing, schema
+from imubench_pipeline.report.static_figures.curves import (
+    draw_allan_figure,
+    draw_datasheet_figure,
+    draw_methods_figure,
+    draw_terms_figure,
+)
+from imubench_pipeline.report.static_figures.spectrum import draw_spectrum_figure
+from imubench_pipeline.report.static_figures.style import set_style
+from imubench_pipeline.report.view import ChannelView, gather_recordings
+from imubench_pipeline.tables import make_schema, replace_file
 from imubench_pipeline.tables.schemas import BY_RECORDING
 
 Make = Callable[[], Figure | None]
 
 CROSS_KINDS: dict[str, Callable[[Sequence[ChannelView], Sequence[str], System], Figure]] = {
-    "comparison": comparison_figure,
-    "forest": lambda views, sensors, system: forest_figure(views, sensors, system=system),
+    "comparison": draw_comparison_figure,
+    "forest": lambda views, sensors, system: draw_forest_figure(views, sensors, system=system),
 }
 """Figures of one channel of all sensors."""
 
 CHANNEL_KINDS: dict[str, Callable[[ChannelView, System], Figure | None]] = {
-    "allan": allan_figure,
-    "methods": methods_figure,
-    "terms": terms_figure,
-    "datasheet": datasheet_figure,
-    "spectrum": spectrum_figure,
+    "allan": draw_allan_figure,
+    "methods": draw_methods_figure,
+    "terms": draw_terms_figure,
+    "datasheet": draw_datasheet_figure,
+    "spectrum": draw_spectrum_figure,
 }
 """Figures of one channel of one recording; None where there is nothing to show."""
 
@@ -51,7 +54,7 @@ _MARKS_PATTERN = re.compile(
 _LEADING_SPACE_PATTERN = re.compile(rb"\n\s+")
 
 
-def cross_figures(
+def list_cross_figures(
     views: Sequence[ChannelView],
     system: System = "practical",
     *,
@@ -70,7 +73,7 @@ def cross_figures(
             yield f"{name}_{channel}", partial(CROSS_KINDS[kind], chosen, every, system)
 
 
-def channel_figures(
+def list_channel_figures(
     view: ChannelView,
     system: System = "practical",
     *,
@@ -88,11 +91,11 @@ def draw_comparison(tables: Mapping[str, pa.Table], system: System, folder: Path
 
     Missing tables of recordings count as empty.
     """
-    for draw in figures_of(tables, system, folder):
+    for draw in list_drawings(tables, system, folder):
         draw()
 
 
-def figures_of(
+def list_drawings(
     tables: Mapping[str, pa.Table],
     system: System,
     folder: Path,
@@ -101,8 +104,8 @@ def figures_of(
 ) -> Sequence[Callable[[], None]]:
     """Return a function for each figure of all sensors that writes it."""
     folder.mkdir(parents=True, exist_ok=True)
-    unused = {name: schema(name).empty_table() for name in BY_RECORDING}
-    views = recording_views(unused | dict(tables))
+    unused = {name: make_schema(name).empty_table() for name in BY_RECORDING}
+    views = gather_recordings(unused | dict(tables))
     channels = [channel for view in views for channel in view.channels()]
     sensors = sorted({view.sensor for view in views})
 
@@ -113,17 +116,17 @@ def figures_of(
 
     return [
         partial(draw, make, folder / name)
-        for name, make in cross_figures(channels, system, sensors=sensors, kinds=kinds)
+        for name, make in list_cross_figures(channels, system, sensors=sensors, kinds=kinds)
     ]
 
 
 def save(figure: Figure, path: Path) -> None:
     """Write a figure atomically, in the format of its suffix; equal figures have equal bytes."""
-    with replacing(path) as temporary:
+    with replace_file(path) as temporary:
         temporary.write_bytes(_write_bytes(figure, path.suffix[1:]))
 
 
-def figure_text(figure: Figure) -> str:
+def encode_figure(figure: Figure) -> str:
     """Return a figure as SVG in a data URI, which a page can hold."""
     return "data:image/svg+xml;base64," + base64.b64encode(_write_bytes(figure, "svg")).decode()
 
@@ -134,7 +137,7 @@ def _write_bytes(figure: Figure, kind: str) -> bytes:
         {"Date": None} if kind == "svg" else {"Producer": None, "CreationDate": None}
     )
     buffer = io.BytesIO()
-    with style():
+    with set_style():
         figure.savefig(buffer, format=kind, metadata=metadata)
     data = buffer.getvalue()
     if kind != "svg":

@@ -8,19 +8,19 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from imubench_pipeline.report.practical import System, page_unit
-from imubench_pipeline.report.static_figures.curves import channel_axes
+from imubench_pipeline.report.practical import System, choose_page_unit
+from imubench_pipeline.report.static_figures.curves import make_channel_axes
 from imubench_pipeline.report.static_figures.style import (
     MEASURED,
     SUM_LOOK,
     TERM_LOOKS,
     TERM_NAMES,
-    extent,
-    legend_below,
-    log_name,
+    compute_limits,
+    draw_legend_below,
+    fix_layout,
+    name_log,
     set_log_axis,
-    settled,
-    style,
+    set_style,
 )
 from imubench_pipeline.report.view import ChannelView
 
@@ -32,16 +32,16 @@ _LABEL_OFFSET = 0.05  # of the frequency axis: the height of a letter, and more
 _TERM_POINTS = 200  # points of a term: it is smooth
 
 
-@style()
-def spectrum_figure(view: ChannelView, system: System = "practical") -> Figure | None:
+@set_style()
+def draw_spectrum_figure(view: ChannelView, system: System = "practical") -> Figure | None:
     """Draw the root of the two-sided spectrum with the model of the likelihood.
 
     None where there is no spectrum.
     """
     if not view.spectrum:
         return None
-    unit = page_unit(view.quantity, "psd", system)
-    figure, axes, _ = channel_axes(view, system, "spectrum")
+    unit = choose_page_unit(view.quantity, "psd", system)
+    figure, axes, _ = make_channel_axes(view, system, "spectrum")
     axes.set_xlabel("frequency (Hz)")
     axes.set_ylabel(f"root of the two-sided density ({unit.sign})")
     spectrum = view.spectrum
@@ -57,7 +57,7 @@ def spectrum_figure(view: ChannelView, system: System = "practical") -> Figure |
     used = spectrum["used"] > 0
     dot = {"ls": "none", "marker": "o", "markersize": 1.8, "markeredgewidth": 0.4, "zorder": 2.4}
     for chosen, face, edge, label in (
-        (used, MEASURED, MEASURED, f"{log_name(view)}, bins used"),
+        (used, MEASURED, MEASURED, f"{name_log(view)}, bins used"),
         (~used, "white", "0.6", "bins left out"),
     ):
         if chosen.any():
@@ -77,12 +77,12 @@ def spectrum_figure(view: ChannelView, system: System = "practical") -> Figure |
         name = next((f": {row.model}" for row in view.models if row.chosen), "")
         axes.plot(frequency, fitted, label=f"fit by likelihood{name}", zorder=3.0, **SUM_LOOK)
     _draw_lines(axes, view)
-    set_log_axis(axes, "x", extent(frequency))
+    set_log_axis(axes, "x", compute_limits(frequency))
     # Single ordinates scatter to almost 0; limits for them would hide the rest.
     low, high = np.nanquantile(level, [0.01, 1.0])
-    set_log_axis(axes, "y", extent([low, high], fitted, margin=1.6))
-    legend_below(figure, axes.get_legend_handles_labels()[0])
-    return settled(figure)
+    set_log_axis(axes, "y", compute_limits([low, high], fitted, margin=1.6))
+    draw_legend_below(figure, axes.get_legend_handles_labels()[0])
+    return fix_layout(figure)
 
 
 def _draw_lines(axes: Axes, view: ChannelView) -> None:

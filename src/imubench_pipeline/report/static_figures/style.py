@@ -136,19 +136,19 @@ SYMBOLS |= {"tau_min": r"$\tau_\mathrm{min}$"}
 """The parameters as they are set; a logarithmic axis has no sign of R."""
 
 
-def channel_name(channel: str) -> str:
+def name_channel(channel: str) -> str:
     """Return a channel in words, such as ``Gyroscope, x axis``."""
     quantity, axis = channel.split("_", maxsplit=1)
     return f"{QUANTITY_NAMES[quantity]}, {axis} axis"
 
 
-def log_name(view: ChannelView) -> str:
+def name_log(view: ChannelView) -> str:
     """Return the name of the curve of a log: measured or simulated."""
     return "simulated log" if view.simulated else "measured"
 
 
 @contextlib.contextmanager
-def style() -> Iterator[None]:
+def set_style() -> Iterator[None]:
     """Set the look of figures that are made or saved inside; settings of the user do not count."""
     with mpl.rc_context():
         mpl.rcdefaults()
@@ -156,12 +156,12 @@ def style() -> Iterator[None]:
         yield
 
 
-def line_look(look: Appearance) -> Look:
+def convert_line_style(look: Appearance) -> Look:
     """Return colour and dash of an appearance as Matplotlib names them."""
     return {"color": look.light, "linestyle": _DASHES[look.dash]}
 
 
-def marker_look(look: Appearance, *, hollow: bool = False) -> Look:
+def convert_marker_style(look: Appearance, *, hollow: bool = False) -> Look:
     """Return the marker of an appearance as Matplotlib names it."""
     return {
         "marker": _MARKERS[look.marker],
@@ -170,7 +170,7 @@ def marker_look(look: Appearance, *, hollow: bool = False) -> Look:
     }
 
 
-def new_figure(width: float, height: float, title: str) -> Figure:
+def make_figure(width: float, height: float, title: str) -> Figure:
     """Return an empty figure, its sides in mm; a legend adds to the height.
 
     The title is for the metadata of its files.
@@ -180,7 +180,7 @@ def new_figure(width: float, height: float, title: str) -> Figure:
     return figure
 
 
-def text_width(figure: Figure, text: str) -> float:
+def measure_text(figure: Figure, text: str) -> float:
     """Return the width of a text in the figure, pt."""
     drawn = figure.text(0.0, 0.0, text)
     width = drawn.get_window_extent().width * 72.0 / figure.dpi
@@ -188,10 +188,10 @@ def text_width(figure: Figure, text: str) -> float:
     return float(width)
 
 
-def shortened(figure: Figure, name: str, width: float) -> str:
+def shorten_name(figure: Figure, name: str, width: float) -> str:
     """Return a name as plain text, shortened in the middle if it is wider than ``width`` pt."""
     text, length = name.replace("$", r"\$"), len(name)
-    while length > 2 and (excess := text_width(figure, text) / width) > 1.0:
+    while length > 2 and (excess := measure_text(figure, text) / width) > 1.0:
         length = min(length - 1, int(length / excess))
         half = length // 2
         text = f"{name[: length - half]}…{name[len(name) - half :]}".replace("$", r"\$")
@@ -202,22 +202,25 @@ def write_title(figure: Figure, name: str, rest: str) -> None:
     """Write a name of the user and the rest of the title above all axes."""
     width = figure.get_figwidth() * 72.0
     enlarged = _TITLE_SIZE / FONT_SIZE
-    room = (width - 2.0 * _EDGE_WIDTH) / enlarged - text_width(figure, rest)
+    room = (width - 2.0 * _EDGE_WIDTH) / enlarged - measure_text(figure, rest)
     figure.suptitle(
-        shortened(figure, name, room) + rest, x=_EDGE_WIDTH / width, ha="left", fontsize=_TITLE_SIZE
+        shorten_name(figure, name, room) + rest,
+        x=_EDGE_WIDTH / width,
+        ha="left",
+        fontsize=_TITLE_SIZE,
     )
 
 
-def legend_below(figure: Figure, handles: Sequence[Artist]) -> None:
+def draw_legend_below(figure: Figure, handles: Sequence[Artist]) -> None:
     """Name lines below the axes, in as many columns as fit; the figure grows by the rows."""
     width, height = figure.get_size_inches()
     room = width * 72.0 - 2.0 * _EDGE_WIDTH
     labels = []
     for label in (str(handle.get_label()) for handle in handles):
         head, bracket, remark = label.rpartition(" (")
-        fits = not bracket or text_width(figure, label) <= room - _HANDLE_WIDTH
+        fits = not bracket or measure_text(figure, label) <= room - _HANDLE_WIDTH
         labels.append(label if fits else f"{head}\n({remark}")
-    widths = [text_width(figure, label) + _HANDLE_WIDTH for label in labels]
+    widths = [measure_text(figure, label) + _HANDLE_WIDTH for label in labels]
     for columns in range(len(handles), 0, -1):
         # Matplotlib fills a legend column by column.
         parts = np.array_split(np.asarray(widths), columns)
@@ -231,14 +234,14 @@ def legend_below(figure: Figure, handles: Sequence[Artist]) -> None:
     figure.legend(handles, labels, loc="outside lower center", ncols=columns)
 
 
-def settled(figure: Figure) -> Figure:
+def fix_layout(figure: Figure) -> Figure:
     """Return a figure whose layout is made and stays: it is the same in every format."""
     # A figure that has an engine of its own is laid out, and drawn twice, whenever it is saved.
     ConstrainedLayoutEngine().execute(figure)
     return figure
 
 
-def extent(*values: ArrayLike, margin: float = 1.25) -> tuple[float, float]:
+def compute_limits(*values: ArrayLike, margin: float = 1.25) -> tuple[float, float]:
     """Return limits of a logarithmic axis that holds all values above 0, and some margin."""
     joined = np.concatenate([np.ravel(np.asarray(each, dtype=np.float64)) for each in values])
     positive = joined[np.isfinite(joined) & (joined > 0)]

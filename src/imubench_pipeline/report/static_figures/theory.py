@@ -8,18 +8,18 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from imubench_pipeline.noise import FLOOR, NoiseModel
-from imubench_pipeline.report.practical import System, page_unit
+from imubench_pipeline.report.practical import System, choose_page_unit
 from imubench_pipeline.report.static_figures.curves import mark_point
 from imubench_pipeline.report.static_figures.style import (
     SINGLE,
     SUM_LOOK,
     TERM_LOOKS,
-    extent,
-    legend_below,
-    new_figure,
+    compute_limits,
+    draw_legend_below,
+    fix_layout,
+    make_figure,
     set_log_axis,
-    settled,
-    style,
+    set_style,
 )
 
 DEGREE_PER_HOUR = math.pi / 180.0 / 3600.0
@@ -32,12 +32,12 @@ CHARACTERISTIC = NoiseModel(
 _DRAWN_TAU = np.geomspace(1e-2, 1e5, 281)
 
 
-@style()
-def theory_figure(system: System = "practical") -> Figure:
+@set_style()
+def draw_theory_figure(system: System = "practical") -> Figure:
     """Draw a curve with white noise, bias instability and random walk, with the reading points."""
-    unit = page_unit("gyro", "adev", system)
+    unit = choose_page_unit("gyro", "adev", system)
     model = CHARACTERISTIC
-    figure = new_figure(SINGLE, 68.0, "Characteristic curve of the Allan deviation")
+    figure = make_figure(SINGLE, 68.0, "Characteristic curve of the Allan deviation")
     axes = figure.add_subplot()
     total = np.sqrt(model.allan_variance(_DRAWN_TAU)) * unit.per_si
     for symbol, label, term in (
@@ -49,7 +49,7 @@ def theory_figure(system: System = "practical") -> Figure:
         axes.plot(_DRAWN_TAU, deviation, label=label, lw=0.8, **TERM_LOOKS[symbol])
     axes.plot(_DRAWN_TAU, total, label="Allan deviation of the sum", zorder=2.8, **SUM_LOOK)
     set_log_axis(axes, "x", (float(_DRAWN_TAU[0]), float(_DRAWN_TAU[-1])))
-    set_log_axis(axes, "y", extent(total, model.K * unit.per_si, margin=2.0))
+    set_log_axis(axes, "y", compute_limits(total, model.K * unit.per_si, margin=2.0))
     axes.set_xlabel("averaging time τ (s)")
     axes.set_ylabel(f"Allan deviation σ(τ) ({unit.sign})")
     # The curve is flat where N / sqrt(tau) = K sqrt(tau / 3).
@@ -61,8 +61,8 @@ def theory_figure(system: System = "practical") -> Figure:
     end = (float(_DRAWN_TAU[-1]), plateau)
     text = f"{FLOOR:.3f} $B$"
     mark_point(axes, "F", (flat, plateau), text, (-4.0, -6.0), beside=end, va="center")
-    legend_below(figure, axes.get_legend_handles_labels()[0])
-    settled(figure)
+    draw_legend_below(figure, axes.get_legend_handles_labels()[0])
+    fix_layout(figure)
     # The angle of a slope on paper is known when the layout is.
     for tau, slope, text in ((0.05, -0.5, "−1/2"), (flat, 0.0, "0"), (2e4, 0.5, "+1/2")):
         level = math.sqrt(float(model.allan_variance(tau))) * unit.per_si

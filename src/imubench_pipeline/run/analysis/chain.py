@@ -18,22 +18,22 @@ from typing import TypeVar
 import pyarrow as pa
 
 from imubench_pipeline.model.table import TableRow
-from imubench_pipeline.readers.bounded import BoundError, bounded
+from imubench_pipeline.readers.bounded import BoundError, run_bounded
 from imubench_pipeline.recordings.ingest import write_failed
-from imubench_pipeline.recordings.recording import static_logs
-from imubench_pipeline.report.run_summary import one_line
+from imubench_pipeline.recordings.recording import open_static_logs
+from imubench_pipeline.report.run_summary import fold_text
 from imubench_pipeline.run.analysis.compilation import Compilation
 from imubench_pipeline.run.plan import Plan
-from imubench_pipeline.run.resources import limits_of_steps
+from imubench_pipeline.run.resources import make_step_limits
 from imubench_pipeline.settings.config import AllanSettings, ReconstructionSettings
 from imubench_pipeline.steps import allan as allan_step
-from imubench_pipeline.steps.datasheet import datasheet_tables
-from imubench_pipeline.steps.error_budget import error_tables
-from imubench_pipeline.steps.estimate import Estimation, estimation
+from imubench_pipeline.steps.datasheet import compare_with_datasheet
+from imubench_pipeline.steps.error_budget import compute_error_tables
+from imubench_pipeline.steps.estimate import Estimation, estimate_recording
 from imubench_pipeline.steps.ingest import write_recording
-from imubench_pipeline.steps.reconstruct import ReconstructionRows, reconstruction_rows
-from imubench_pipeline.steps.sensor_tables import joined_tables
-from imubench_pipeline.steps.tables import tables_of_all
+from imubench_pipeline.steps.reconstruct import ReconstructionRows, reconstruct_recording
+from imubench_pipeline.steps.sensor_tables import join_tables
+from imubench_pipeline.steps.tables import join_all_tables
 from imubench_pipeline.tables import build, write, write_arrow, write_each
 from imubench_pipeline.tables.failures import Failure, describe_error, write_empty
 from imubench_pipeline.tables.schemas import OF_ONE_RECORDING, TABLES
@@ -70,7 +70,7 @@ class Analysis:
 
     def __init__(self, plan: Plan, compiling: Compilation, cores: int, say: Say) -> None:
         self._plan, self._compiling, self._cores, self._say = plan, compiling, cores, say
-        self._limits = limits_of_steps(plan)
+        self._limits = make_step_limits(plan)
         self._failed: dict[tuple[str, str], Failure] = {}
         self._series: list[tuple[str, str, str]] = []
 
@@ -105,13 +105,17 @@ class Analysis:
         settings = self._plan.ingest_settings(sensor, recording)
         write_recording(source, settings, sensor, recording, folder)
         how = AllanSettings.model_validate_json(self._plan.settings("allan"))
-        write("allan", allan_step.curves(folder, sensor, recording, how), folder / "curve.parquet")
-        return list(static_logs(folder))
+        write(
+            "allan",
+            allan_step.yield_allan_rows(folder, sensor, recording, how),
+            folder / "curve.parquet",
+        )
+        return list(open_static_logs(folder))
 
     def _estimate(self, sensor: str, recording: str, channel: str) -> Estimation:
         folder = self._get_folder(sensor, recording)
         settings = self._plan.estimate_settings(sensor, recording)
-        rows = estimation(folder, sensor, recording, settings, {channel})
+        rows = estimate_recording(folder, sensor, recording, settings, {channel})
         rows.paths.clear()
         return rows
 
@@ -136,15 +140,15 @@ class Analysis:
         folder, plan = self._get_folder(sensor, recording), self._plan
         stated = plan.datasheet_settings(sensor)
         tables: dict[str, Iterable[TableRow]] = {
-            **datasheet_tables(folder, sensor, recording, stated),
-            **error_tables(folder, sensor, recording, plan.error_budget_settings(sensor)),
+            **compare_with_datasheet(folder, sensor, recording, stated),
+            **compute_error_tables(folder, sensor, recording, plan.error_budget_settings(sensor)),
         }
         write_each(tables, (folder / f"{name}.parquet" for name in tables))
 
     def _reconstruct(self, sensor: str, recording: str, channel: str) -> ReconstructionRows:
         folder = self._get_folder(sensor, recording)
         settings = ReconstructionSettings.model_validate_json(self._plan.settings("reconstruction"))
-        return reconstruction_rows(folder, settings, {channel})
+        return reconstruct_recording(folder, settings, {channel})
 
     def _join_tables(self, made: Sequence[str]) -> dict[str, pa.Table]:
         """Join the tables that were made, by sensor and of all sensors; the others are empty."""
@@ -155,7 +159,7 @@ class Analysis:
             folders = [self._get_folder(*key) for key in plan.recordings if key[0] == sensor]
             own = {name: [folder / f"{name}.parquet" for folder in folders] for name in names}
             own["quality"] = [folder / "quality.json" for folder in folders]
-            tables = joined_tables(
+            tables = join_tables(
                 own,
                 plan.truths(sensor),
                 plan.sensor_file(sensor, "price_class", "sold"),
@@ -166,7 +170,7 @@ class Analysis:
                 path = plan.run.results / "sensors" / sensor / f"{name}.parquet"
                 write_arrow(table, path)
                 parts.setdefault(name, []).append(path)
-        every = tables_of_all(parts)
+        every = join_all_tables(parts)
         absent = (name for name in TABLES if name not in every and name not in OF_ONE_RECORDING)
         return every | {name: build(name, ()) for name in absent}
 
@@ -190,11 +194,11 @@ class Analysis:
         limit = self._limits(sensor, recording)
         begun = time.monotonic()
         try:
-            value = bounded(limit.seconds, limit.memory, function, *key)
+            value = run_bounded(limit.seconds, limit.memory, function, *key)
         except BoundError as error:
             failure = Failure(sensor, recording, step, "time", f"the step {step} {error}")
         except Exception as error:  # the others go on
-            words = one_line(f"the step {step} failed: {describe_error(error)}")
+            words = fold_text(f"the step {step} failed: {describe_error(error)}")
             failure = Failure(sensor, recording, step, "error", words)
         else:
             if time.monotonic() - begun > _MIN_REPORTED_TIME:

@@ -14,8 +14,8 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from imubench_pipeline.settings.command_line import MOST_WHOLE, whole_number
-from imubench_pipeline.settings.extras import extra
+from imubench_pipeline.settings.command_line import MOST_WHOLE, make_integer_type
+from imubench_pipeline.settings.extras import require_extra
 from imubench_pipeline.tables.outputs import OutputFolder, add_output
 
 if TYPE_CHECKING:
@@ -71,7 +71,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "-c",
         "--cores",
-        type=whole_number(1, MOST_WHOLE, "at least 1"),
+        type=make_integer_type(1, MOST_WHOLE, "at least 1"),
         default=os.cpu_count() or 1,
         metavar="N",
         help="default: all",
@@ -87,27 +87,27 @@ def run(arguments: argparse.Namespace) -> int:
     gc.set_threshold(100_000, 50, 50)
     with Compilation(_say) as compiling:  # while this process imports all else
         if arguments.output is not None:
-            with extra("workflow", "write pages and figures (--output)"):
+            with require_extra("workflow", "write pages and figures (--output)"):
                 import_module("imubench_pipeline.report.publish")
         return _run(arguments, compiling)
 
 
 def _run(arguments: argparse.Namespace, compiling: Compilation) -> int:
     from imubench_pipeline.model.recordings import FailureRow
-    from imubench_pipeline.report.run_summary import left_out
+    from imubench_pipeline.report.run_summary import list_failures
     from imubench_pipeline.report.show import show
-    from imubench_pipeline.report.terminal import logs
+    from imubench_pipeline.report.terminal import render_logs
     from imubench_pipeline.run.analysis.chain import Analysis
     from imubench_pipeline.run.analysis.project import Stated, lay_out
     from imubench_pipeline.run.plan import Plan
     from imubench_pipeline.settings.config import Run, read_config
-    from imubench_pipeline.settings.shipped import folders
+    from imubench_pipeline.settings.shipped import list_folders
     from imubench_pipeline.settings.validation import ConfigError
 
     with tempfile.TemporaryDirectory(prefix="imubench.") as folder:
         try:
             stated = Stated(arguments.rate, arguments.gyro_unit, arguments.accel_unit)
-            catalogue = folders(Run().sensors, "sensors")
+            catalogue = list_folders(Run().sensors, "sensors")
             paths = lay_out(arguments.logs, arguments.sensor, stated, catalogue, Path(folder))
             plan = Plan(read_config(arguments.config) | paths)
         except ConfigError as error:
@@ -115,13 +115,13 @@ def _run(arguments: argparse.Namespace, compiling: Compilation) -> int:
             return 2
         analysis = Analysis(plan, compiling, arguments.cores, _say)
         tables = analysis.estimates()
-        show(lambda width: logs(tables, arguments.units, width))
+        show(lambda width: render_logs(tables, arguments.units, width))
         if arguments.output is not None:
             _say("making the page and the figures: some seconds")
             printed = FailureRow.rows_of(tables["failures"])
             tables = analysis.for_pages()
             later = [row for row in FailureRow.rows_of(tables["failures"]) if row not in printed]
-            for line in left_out(later):
+            for line in list_failures(later):
                 _say(f"left out of the page: {line}")
             _write(plan, tables, arguments)
     statuses = set(tables["recordings"]["status"].to_pylist())
@@ -147,8 +147,8 @@ def _say(text: str) -> None:
 
 def _write(plan: Plan, tables: Mapping[str, pa.Table], arguments: argparse.Namespace) -> None:
     """Write the page, the figures and the tables."""
-    from imubench_pipeline.report.publish import one_file, site_of
-    from imubench_pipeline.report.static_figures.files import figures_of
+    from imubench_pipeline.report.publish import make_site, render_one_file
+    from imubench_pipeline.report.static_figures.files import list_drawings
     from imubench_pipeline.tables import write_arrow, write_content
 
     output: OutputFolder = arguments.output
@@ -157,10 +157,10 @@ def _write(plan: Plan, tables: Mapping[str, pa.Table], arguments: argparse.Names
     # The results are temporary: this command makes them again.
     told = json.loads(plan.report_settings()) | {"at_once": _describe_command(arguments)}
     with output.filling() as folder:
-        figures = figures_of(tables, arguments.units, folder / "figures", kinds=kinds)
+        figures = list_drawings(tables, arguments.units, folder / "figures", kinds=kinds)
         with _draw_in_parallel(figures, arguments.cores):
-            site = site_of(tables, json.dumps(told), plan.run.results)
-            write_content(one_file(site), folder / "report.html")
+            site = make_site(tables, json.dumps(told), plan.run.results)
+            write_content(render_one_file(site), folder / "report.html")
             for name in ("recordings", "findings", "doubts", "parameters", "allan", "models"):
                 write_arrow(tables[name], folder / f"{name}.csv")
     print(f"{output.path / 'report.html'}: open it in a browser")

@@ -9,13 +9,13 @@ from copy import deepcopy
 from dataclasses import dataclass
 from pathlib import Path
 
-from imubench_pipeline.readers.bounded import BoundError, bounded
+from imubench_pipeline.readers.bounded import BoundError, run_bounded
 from imubench_pipeline.readers.inspection import Inspection, inspect
 from imubench_pipeline.readers.inspection.draft import UNKNOWN
-from imubench_pipeline.recordings.drop_zone import name_of, sensor_of
+from imubench_pipeline.recordings.drop_zone import get_recording_name, get_sensor_name
 from imubench_pipeline.settings.sensor import Sensor, quantity_of
 from imubench_pipeline.settings.validation import ConfigError, parse
-from imubench_pipeline.settings.yaml_files import files_in, read_settings
+from imubench_pipeline.settings.yaml_files import list_files, read_settings
 from imubench_pipeline.tables import write_json
 from imubench_pipeline.tables.findings import RecordingError
 
@@ -86,7 +86,7 @@ def lay_out(
     for log, name in zip(logs, _name_recordings(logs), strict=True):
         path = log.resolve()
         if declared is not None:
-            of, described = sensor_of(declared.with_suffix("")), declared
+            of, described = get_sensor_name(declared.with_suffix("")), declared
             target = folder / "sensors" / f"{of}.yaml"
             if not target.is_symlink():
                 target.symlink_to(described.resolve())
@@ -96,8 +96,8 @@ def lay_out(
             write_json(_draft_sensor(log, stated), target)  # which is YAML, too
         place = folder / "logs" / of
         place.mkdir(parents=True, exist_ok=True)
-        (place / (name + path.name.removeprefix(name_of(path.name)))).symlink_to(path)
-        notes = path.with_name(f"{name_of(path.name)}.yaml")
+        (place / (name + path.name.removeprefix(get_recording_name(path.name)))).symlink_to(path)
+        notes = path.with_name(f"{get_recording_name(path.name)}.yaml")
         if notes.is_file() and (declared is None or notes != declared.resolve()):
             (place / f"{name}.yaml").symlink_to(notes)
     return {
@@ -112,7 +112,7 @@ def lay_out(
 def _find_sensor_file(sensor: Path, catalogue: Sequence[Path]) -> Path:
     """Return the file of a sensor that is given by its path, or by its name in the catalogue."""
     if not sensor.is_file():
-        named = files_in(catalogue, "sensor").get(str(sensor))
+        named = list_files(catalogue, "sensor").get(str(sensor))
         if named is None:
             places = " or ".join(map(str, catalogue))
             raise ConfigError(
@@ -126,10 +126,10 @@ def _find_sensor_file(sensor: Path, catalogue: Sequence[Path]) -> Path:
 
 def _name_recordings(logs: Sequence[Path]) -> list[str]:
     """Return the names of the recordings: with that of their folder where two are alike."""
-    names = [name_of(log.resolve().name) for log in logs]
+    names = [get_recording_name(log.resolve().name) for log in logs]
     times = Counter(names)
     longer = [
-        f"{name_of(log.resolve().parent.name)}_{name}" if times[name] > 1 else name
+        f"{get_recording_name(log.resolve().parent.name)}_{name}" if times[name] > 1 else name
         for log, name in zip(logs, names, strict=True)
     ]
     for name, count in Counter(longer).items():
@@ -145,7 +145,7 @@ def _name_recordings(logs: Sequence[Path]) -> list[str]:
 def _draft_sensor(log: Path, stated: Stated) -> Mapping[str, object]:
     """Return the sensor file drafted from a log, completed by the stated properties."""
     try:
-        inspected: Inspection = bounded(INSPECTED_S, INSPECTED_BYTES, inspect, log)
+        inspected: Inspection = run_bounded(INSPECTED_S, INSPECTED_BYTES, inspect, log)
     except BoundError as error:
         raise ConfigError(
             f"{log}: to look into it {error}; expected the log of an inertial sensor"

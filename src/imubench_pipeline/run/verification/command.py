@@ -25,10 +25,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Print what is wrong; return the exit status."""
     # Arrow is loaded for this command only: the others answer at once.
-    from imubench_pipeline.report.drop_zone import drop_zone_lines
+    from imubench_pipeline.report.drop_zone import describe_drop_zone
     from imubench_pipeline.run.verification.results import Results
     from imubench_pipeline.tables.seals import FOLDER
-    from imubench_pipeline.tables.texts import printable
+    from imubench_pipeline.tables.texts import escape_invisible
 
     folder: Path = options.results
     made = [name for name in ("recordings", "tables", "report") if (folder / name).is_dir()]
@@ -52,8 +52,8 @@ def run(options: argparse.Namespace) -> int:
         for fault in results.faults():
             number += 1
             line = f"{folder / fault.path}: {fault.found}; to mend: {fault.mend}"
-            print(printable(line), flush=True)
-    for line in drop_zone_lines(folder):
+            print(escape_invisible(line), flush=True)
+    for line in describe_drop_zone(folder):
         print(line)
     if waiting := results.waiting():
         print(f"{len(waiting)} steps are still to be done by the next run: {results.run_again}")

@@ -15,7 +15,7 @@ import pyarrow.parquet as pq
 from imubench_pipeline.recordings.kept import Quality
 from imubench_pipeline.recordings.known_logs import KNOWN
 from imubench_pipeline.run.project import has_snakefile
-from imubench_pipeline.run.recovery import temporary
+from imubench_pipeline.run.recovery import find_unfinished
 from imubench_pipeline.tables import read
 from imubench_pipeline.tables.digests import read_sealed_json
 from imubench_pipeline.tables.findings import RecordingError
@@ -25,11 +25,11 @@ from imubench_pipeline.tables.seals import (
     Seal,
     SealedFile,
     SealError,
-    form,
-    places,
+    compute_form_digest,
+    is_visible,
+    list_places,
+    name_seal_file,
     read_seal,
-    seal_file,
-    visible,
 )
 
 _SEALED_FOLDERS = ("recordings", "sensors", "tables", "simulated", "report", "exports")
@@ -58,7 +58,7 @@ class Results:
     _broken: dict[str, str] = field(default_factory=dict, init=False)
 
     def __post_init__(self) -> None:
-        for place in places(self.folder):
+        for place in list_places(self.folder):
             try:
                 self.seals[place] = read_seal(self.folder, place)
             except (FileNotFoundError, SealError) as error:
@@ -110,9 +110,11 @@ class Results:
     def _every(self) -> Iterator[Fault]:
         for place, error in self._broken.items():
             words = f"expected the seal of {place}, found one that {error}"
-            yield Fault(seal_file(place), words, self._mended(seal_file(place), place))
-        if older := sum(seal.form != form() for seal in self.seals.values()):
-            words = f"expected the form {form()}, found {older} steps of another version"
+            yield Fault(name_seal_file(place), words, self._mended(name_seal_file(place), place))
+        if older := sum(seal.form != compute_form_digest() for seal in self.seals.values()):
+            words = (
+                f"expected the form {compute_form_digest()}, found {older} steps of another version"
+            )
             yield Fault("seals", words, self.run_again)
         for place, seal in self.seals.items():
             yield from self._changed(place, seal)
@@ -128,14 +130,14 @@ class Results:
         for place in self._current:  # made from other inputs that are not newer
             others = [name for name, newer in self._others_now(self.seals[place]) if not newer]
             if others:
-                first = next(iter(self.seals[place].outputs), seal_file(place))
+                first = next(iter(self.seals[place].outputs), name_seal_file(place))
                 words = (
                     f"expected it made of the {others[0]} that is there, found it made of another"
                 )
                 yield Fault(first, words, self._mended(first, place))
         yield from self._unsealed()
         yield from self._strange_rows()
-        for path in temporary(self.folder):
+        for path in find_unfinished(self.folder):
             place = path.relative_to(self.folder).as_posix()
             words = "expected nothing, found what a run had not completed that was killed"
             yield Fault(place, words, f"where no run goes on: rm -r {self._quoted(place)}")
@@ -214,7 +216,7 @@ class Results:
                 place = path.relative_to(self.folder)
                 own = any(place.match(f"recordings/*/*/{name}") for name in (KNOWN, _SAMPLE_FILES))
                 declared = own or path.is_dir() or place.as_posix() in self._left
-                if not declared and visible(place):
+                if not declared and is_visible(place):
                     yield self._stray(place.as_posix())
         for path in sorted((self.folder / NIGHTS).glob("[ls]*.*")):  # the latest, and the state
             name = path.relative_to(self.folder).as_posix()
@@ -255,7 +257,9 @@ class Results:
     def _mended(self, name: str, place: str) -> str:
         """Return how a file is made again that a step left."""
         if place.startswith(f"{NIGHTS}/"):
-            files = [name] if place == f"{NIGHTS}/" else dict.fromkeys([name, seal_file(place)])
+            files = (
+                [name] if place == f"{NIGHTS}/" else dict.fromkeys([name, name_seal_file(place)])
+            )
             rm = " ".join(["rm -f", *map(self._quoted, files)])
             return f"restore it, or {rm}: the next night writes its own"
         if place.startswith("recordings/") and place not in self._current:

@@ -7,7 +7,7 @@ from math import ceil
 from typing import Literal
 
 from imubench_pipeline.settings.sensor import QUANTITIES, TEMPERATURE, quantity_of
-from imubench_pipeline.units import from_si
+from imubench_pipeline.units import convert_from_si
 from imubench_pipeline.words.findings.base import ALL, NONE, SLOW, WHITE, FindingData, channel_name
 from imubench_pipeline.words.numbers import counted, join_names, number_text, percent_text
 
@@ -25,7 +25,7 @@ def _value_text(channel: str, value: float) -> str:
     """Return a value of a channel, SI, in the unit of its quantity."""
     quantity = quantity_of(channel)
     unit, sign = _UNITS[quantity]
-    return f"{number_text(from_si(value, unit, QUANTITIES[quantity]), 3)} {sign}"
+    return f"{number_text(convert_from_si(value, unit, QUANTITIES[quantity]), 3)} {sign}"
 
 
 def _at(seconds: float) -> str:

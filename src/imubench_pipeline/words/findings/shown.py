@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from functools import cache
 from typing import Literal
 
-from imubench_pipeline.units import from_si
+from imubench_pipeline.units import convert_from_si
 from imubench_pipeline.words.numbers import Unit, interval_text
 
 Kind = Literal["signal", "level", "density"]
@@ -26,7 +26,7 @@ _UNITS: Mapping[tuple[str, Kind], tuple[str, str]] = {
 def unit_of(channel: str, kind: Kind) -> Unit:
     """Return the unit in which values of a channel, or of ``gyro`` or ``accel``, are shown."""
     sign, dimension = _UNITS[channel.partition("_")[0], kind]
-    return Unit(sign, from_si(1.0, sign, dimension))
+    return Unit(sign, convert_from_si(1.0, sign, dimension))
 
 
 def value_text(value: float, channel: str, kind: Kind, digits: int = 3) -> str:

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 from imubench_pipeline.model.states import Status
 from imubench_pipeline.settings.printed import SENSORS
-from imubench_pipeline.units import from_si
+from imubench_pipeline.units import convert_from_si
 from imubench_pipeline.words.estimates import STATUS_WORDS
 from imubench_pipeline.words.findings.base import channel_name
 from imubench_pipeline.words.numbers import Unit, interval_text, join_names
@@ -132,7 +132,7 @@ def assumed_range(quantity: str, symbol: str, low: float, high: float, source: s
     unit = Unit("s", 1.0)
     if symbol != "T_B":
         sign, dimension = _FIGURE_UNITS[quantity, symbol]
-        unit = Unit(sign, from_si(1.0, sign, dimension))
+        unit = Unit(sign, convert_from_si(1.0, sign, dimension))
     limits = interval_text(low, high, unit, 2) if high > low else unit.text(low, 2)
     return f"{SENSORS[quantity]} {symbol}: {limits} {unit.sign}, {source}"
 

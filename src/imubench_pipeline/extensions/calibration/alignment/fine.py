@@ -32,7 +32,7 @@ from imubench_pipeline.extensions.calibration.alignment.coarse import coarse_ali
 from imubench_pipeline.extensions.calibration.alignment.triad import Positions, Site, Triad
 from imubench_pipeline.extensions.calibration.block_filter import BlockFilter
 from imubench_pipeline.extensions.calibration.least_squares import NotObservable, NotObservableError
-from imubench_pipeline.extensions.calibration.states import block_states
+from imubench_pipeline.extensions.calibration.states import discretise_blocks
 from imubench_pipeline.typing import Array
 
 INITIAL_ANGLE_SIGMA = 10.0
@@ -70,7 +70,7 @@ class FineAlignment:
 
     def __init__(self, triad: Triad, positions: Positions, site: Site, attitude: Array) -> None:
         self.positions, self.site, self.attitude = positions, site, attitude
-        axes = [block_states(model, positions.blocks, bias) for model, bias in triad.axes]
+        axes = [discretise_blocks(model, positions.blocks, bias) for model, bias in triad.axes]
         to_body = np.swapaxes(attitude @ positions.of_blocks, 1, 2)
         self._to_body = to_body
         seen = np.concatenate(

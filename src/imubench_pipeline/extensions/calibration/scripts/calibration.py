@@ -2,12 +2,12 @@
 
 from pathlib import Path
 
-from imubench_pipeline.extensions.calibration.calibration import calibration_tables
+from imubench_pipeline.extensions.calibration.calibration import make_calibration_tables
 from imubench_pipeline.tables import write
 
 if __name__ == "__main__":
     names = snakemake.wildcards
-    found = calibration_tables(
+    found = make_calibration_tables(
         Path(snakemake.input.quality).parent,
         [Path(path).parent for path in snakemake.input.static_quality],
         names.sensor,

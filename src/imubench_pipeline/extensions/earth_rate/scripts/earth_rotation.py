@@ -2,12 +2,12 @@
 
 from pathlib import Path
 
-from imubench_pipeline.extensions.earth_rate.earth_rotation import earth_rate_tables
+from imubench_pipeline.extensions.earth_rate.earth_rotation import make_earth_rate_tables
 from imubench_pipeline.tables import write
 
 if __name__ == "__main__":
     names = snakemake.wildcards
-    found = earth_rate_tables(
+    found = make_earth_rate_tables(
         Path(snakemake.input.quality).parent,
         [Path(path).parent for path in snakemake.input.static_quality],
         names.sensor,

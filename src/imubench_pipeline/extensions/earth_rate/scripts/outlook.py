@@ -2,11 +2,11 @@
 
 from pathlib import Path
 
-from imubench_pipeline.extensions.earth_rate.outlook import outlook_tables
+from imubench_pipeline.extensions.earth_rate.outlook import make_outlook_tables
 from imubench_pipeline.tables import write
 
 if __name__ == "__main__":
-    found = outlook_tables(
+    found = make_outlook_tables(
         [Path(path).parent for path in snakemake.input.quality],
         snakemake.wildcards.sensor,
         snakemake.params.settings,
