@@ -30,7 +30,7 @@ def search(log: np.ndarray, model: NoiseModel | None) -> tuple[list[Line], Spect
     """The lines of a log beside a model, which is fitted where it is not given."""
     spectrum, line_spectra = compute_spectra([log], len(log), RATE)
     if model is None:
-        model = model_of(make_whittle(spectrum, RATE / 2, 2).maximum(Terms("NFK")))
+        model = make_noise_model(make_whittle(spectrum, RATE / 2, 2).maximum(Terms("NFK")))
     return find_lines(line_spectra, model, RATE, crossover_of(spectrum)), spectrum
 
 
