@@ -30,24 +30,30 @@ onstart:
     from imubench_pipeline.run.progress import follow
 
     take_lock()
-    follow(jobs_of_recordings(workflow.dag), partial(outcome, plan.run.results))
+    follow(
+        jobs_of_recordings(workflow.dag),
+        partial(describe_outcome, plan.run.results),
+    )
     remove_temporary(plan.run.results, BEGUN)
 
 
 # Tables are read at the end of a run alone: a run should begin at once.
 onsuccess:
-    from imubench_pipeline.report.run_summary import summary, without_pages
+    from imubench_pipeline.report.run_summary import (
+        summarise_run,
+        list_failed_pages,
+    )
     from imubench_pipeline.run.progress import OURS
 
     remove_temporary(plan.run.results, BEGUN + STILL_WRITTEN)
-    logger.info(summary(plan.run.results), extra=OURS)
-    incomplete = [plan.faults.left_out(), without_pages(plan.run.results)]
+    logger.info(summarise_run(plan.run.results), extra=OURS)
+    incomplete = [plan.faults.left_out(), list_failed_pages(plan.run.results)]
     if any(incomplete):
         raise WorkflowError("\n".join(filter(None, incomplete)))
 
 
 onerror:
-    from imubench_pipeline.report.run_summary import failure
+    from imubench_pipeline.report.run_summary import describe_failure
 
     remove_temporary(plan.run.results, BEGUN + STILL_WRITTEN)
-    logger.error(failure(log, plan.run.results))
+    logger.error(describe_failure(log, plan.run.results))

@@ -165,7 +165,7 @@ def test_a_step_that_fails_leaves_its_log_out_and_no_number_waits_for_the_pages(
         monkeypatch.setattr(publish, "make_site", lambda *given: asked.update(page=given[0]))
         monkeypatch.setattr(publish, "render_one_file", lambda site: "a page")
         monkeypatch.setattr(
-            static_files, "figures_of", lambda *given, kinds: asked.update(kinds=kinds) or []
+            static_files, "list_drawings", lambda *given, kinds: asked.update(kinds=kinds) or []
         )
     for name in ("whole", "unread", "unrebuilt"):
         path = tmp_path / f"{name}.csv"

@@ -150,7 +150,7 @@ def test_a_parameter_that_is_not_known_leaves_no_number_where_it_matters() -> No
     assert short["n"] == pytest.approx(9.0, rel=1e-3) and short["reason"] is None
     long = rows_of(candidate("a", vague), other, tau=1000.0)["a", "b"]
     assert long["n"] is None
-    assert long["reason"] == "K of a/r gyro_x is not determined"
+    assert long["reason"] == "K of a/r gyro x is not determined"
     assert long["upper"] > 1.5 * long["lower"] > 9.0
 
 
@@ -159,7 +159,7 @@ def test_an_unknown_correlation_time_is_a_matter_of_its_process() -> None:
     other = candidate("b", known(N=1e-4))
     assert rows_of(candidate("a", vague), other, tau=1.0)["a", "b"]["n"] is not None
     row = rows_of(candidate("a", vague), other, tau=100.0)["a", "b"]
-    assert row["reason"] == "T_B of a/r gyro_x is bounded"
+    assert row["reason"] == "T_B of a/r gyro x is bounded"
 
 
 def test_the_median_measured_channel_answers() -> None:

@@ -9,8 +9,8 @@ from imubench_pipeline.report import publish as publishing
 ONCE = {
     (module, name): cache(getattr(module, name))
     for module, names in {
-        publishing: ("environment", "source_digest"),
-        theory: ("theory_figure", "figure_text"),
+        publishing: ("make_templates", "digest_sources"),
+        theory: ("draw_theory_figure", "encode_figure"),
         made: ("version",),
         site: ("version",),
     }.items()

@@ -10,20 +10,25 @@ from snakemake.iocontainers import Wildcards
 from snakemake.sourcecache import infer_source_file
 from snakemake.utils import update_config
 
-from imubench_pipeline.recordings.kept import outcome
+from imubench_pipeline.recordings.kept import describe_outcome
 from imubench_pipeline.registry import files_of, references
-from imubench_pipeline.report.drop_zone import drop_zone_lines
-from imubench_pipeline.report.folder import attempt_at_pages
-from imubench_pipeline.run.lock import Lock, TakenError, lock_of
+from imubench_pipeline.report.drop_zone import describe_drop_zone
+from imubench_pipeline.report.folder import count_attempt
+from imubench_pipeline.run.lock import Lock, TakenError, locate_lock
 from imubench_pipeline.run.recovery import STILL_WRITTEN, remove_temporary
 from imubench_pipeline.run.plan import Plan
-from imubench_pipeline.run.resources import OfMany, OfRecording, asked, limits_of_steps
+from imubench_pipeline.run.resources import (
+    OfMany,
+    OfRecording,
+    make_resource_functions,
+    make_step_limits,
+)
 from imubench_pipeline.run.scripts import Scripts
-from imubench_pipeline.run.sealing import settings_digest, unsound
+from imubench_pipeline.run.sealing import digest_settings, find_unsound_jobs
 from imubench_pipeline.settings.config import read_config
 from imubench_pipeline.settings.validation import ConfigError
 from imubench_pipeline.tables.schemas import OF_ONE_RECORDING, SAMPLES, TABLES
-from imubench_pipeline.tables.seals import place_of
+from imubench_pipeline.tables.seals import get_seal_place
 
 # The graph of a thousand recordings is millions of objects, which live as long as the run: to look
 # for garbage among them as often as Python does, and at the end, takes a fourth of the time.
@@ -64,10 +69,10 @@ for reason in plan.unusable.values():
 
 # What a rule does is named by its `script:`, and Snakemake calls the function of this name for it.
 # This one forks a process that has the imports. On a cluster what fails is tried again by Snakemake.
-script = Scripts(plan.faults, None if workflow.remote_exec else limits_of_steps(plan))
-cost = asked(plan)
+script = Scripts(plan.faults, None if workflow.remote_exec else make_step_limits(plan))
+cost = make_resource_functions(plan)
 
-run_lock = Lock(lock_of(plan.run.results))
+run_lock = Lock(locate_lock(plan.run.results))
 
 
 def take_lock():
@@ -84,7 +89,7 @@ def say_if_idle():
         workflow.is_main_process and workflow.executor_plugin and not workflow.dryrun
     )
     if is_run and not len(workflow.dag):
-        for line in drop_zone_lines(plan.run.results):
+        for line in describe_drop_zone(plan.run.results):
             print(line, file=sys.stderr)
 
 
@@ -195,9 +200,9 @@ def jobs():
                 for name, value in rule.params.items()
                 if name != "attempt"
             }
-            found[place_of(step, *of.values())] = (
+            found[get_seal_place(step, *of.values())] = (
                 str(rule.output[0].apply_wildcards(of)),
-                settings_digest(params),
+                digest_settings(params),
             )
     return found
 
@@ -231,14 +236,14 @@ def made_again(wildcards):
     """
     every = jobs()
     held_back = {
-        place_of("ingest", *key)
+        get_seal_place("ingest", *key)
         for key, log in plan.recordings.items()
         if log.held_back
     }
     settings = {place: digest for place, (_, digest) in every.items()}
     files = [
         every[place][0]
-        for place in unsound(plan.run.results, settings)
+        for place in find_unsound_jobs(plan.run.results, settings)
         if place not in held_back
     ]
     workflow.dag.forcefiles.update(files)

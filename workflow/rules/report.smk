@@ -23,7 +23,7 @@ rule report:
     params:
         settings=plan.report_settings(),
         code=plan.code("report"),
-        pages_attempt=attempt_at_pages(plan.run.results / "report"),
+        pages_attempt=count_attempt(plan.run.results / "report"),
     script:
         "../scripts/report.py"
 

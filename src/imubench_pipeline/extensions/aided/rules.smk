@@ -1,6 +1,9 @@
 """Filters on simulated drives, tuned by all that is known of a sensor."""
 
-from imubench_pipeline.extensions.aided.plan import navigate_settings, navigated
+from imubench_pipeline.extensions.aided.plan import (
+    dump_navigate_settings,
+    list_navigated_sensors,
+)
 
 
 rule navigate:
@@ -27,14 +30,15 @@ rule navigate:
             )
         ),
     params:
-        settings=lambda w: navigate_settings(plan, w.sensor),
+        settings=lambda w: dump_navigate_settings(plan, w.sensor),
         code=plan.code("navigate", "extensions.aided"),
         attempt=tried("navigate"),
     script:
         "scripts/navigate.py"
 
 
-JOBS["navigate"] = [{"sensor": sensor} for sensor in navigated(plan)]
+JOBS["navigate"] = [{"sensor": sensor} for sensor in list_navigated_sensors(plan)]
 ADDED_TABLES |= {
-    name: of_each_sensor(name, navigated(plan)) for name in tables_of(rules.navigate)
+    name: of_each_sensor(name, list_navigated_sensors(plan))
+    for name in tables_of(rules.navigate)
 }

@@ -1,6 +1,6 @@
 """Gyros that were turned between north and south, and what sensors at rest could find."""
 
-from imubench_pipeline.extensions.earth_rate.plan import outlook_settings
+from imubench_pipeline.extensions.earth_rate.plan import select_outlook_settings
 
 TURNED = plan.of_experiment("two_position")
 
@@ -51,7 +51,7 @@ rule outlook:
             )
         ),
     params:
-        settings=lambda w: outlook_settings(plan, w.sensor),
+        settings=lambda w: select_outlook_settings(plan, w.sensor),
         code=plan.code("outlook", "extensions.earth_rate"),
         attempt=tried("outlook"),
     script:
