@@ -28,7 +28,7 @@ from imubench_pipeline.run.sealing import digest_settings, find_unsound_jobs
 from imubench_pipeline.settings.config import read_config
 from imubench_pipeline.settings.validation import ConfigError
 from imubench_pipeline.tables.schemas import OF_ONE_RECORDING, SAMPLES, TABLES
-from imubench_pipeline.tables.seals import get_seal_place
+from imubench_pipeline.tables.seals import name_place
 
 # The graph of a thousand recordings is millions of objects, which live as long as the run: to look
 # for garbage among them as often as Python does, and at the end, takes a fourth of the time.
@@ -200,7 +200,7 @@ def jobs():
                 for name, value in rule.params.items()
                 if name != "attempt"
             }
-            found[get_seal_place(step, *of.values())] = (
+            found[name_place(step, *of.values())] = (
                 str(rule.output[0].apply_wildcards(of)),
                 digest_settings(params),
             )
@@ -236,7 +236,7 @@ def made_again(wildcards):
     """
     every = jobs()
     held_back = {
-        get_seal_place("ingest", *key)
+        name_place("ingest", *key)
         for key, log in plan.recordings.items()
         if log.held_back
     }
