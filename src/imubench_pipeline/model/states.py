@@ -40,7 +40,7 @@ that the requirement demands.
 """
 
 SURE_PROBABILITY = 0.975
-"""Minimum probability of ``meets``; that of ``fails`` is at most 1 minus this."""
+"""Minimum probability of ``meets``; 1 minus this is the maximum of ``fails``."""
 
 Evidence = Literal["strong", "weak"]
 

@@ -53,7 +53,7 @@ class FindingData:
     affects: ClassVar[frozenset[str]]
     """Parameters whose estimates it puts in doubt; `NONE`: it is no doubt."""
     unfit: ClassVar[bool]
-    """Whether the log may not be that of one sensor at rest in the stated unit."""
+    """Whether the log may come from several sensors, from motion, or have another unit."""
     scales: ClassVar[Mapping[str, float]]
     """If its value is a factor that corrects samples or times: the power for each parameter."""
     doubt: ClassVar[str]

@@ -215,7 +215,7 @@ class SlowNoiseChanges(
     """End of the first half, s from the first sample."""
     first: float
     second: float
-    """Amplitude of the slow noise of each half over that of the log."""
+    """Amplitude of the slow noise of each half, relative to the log."""
 
     def text(self, channel: str) -> str:
         """Return the finding in sentences."""

@@ -63,12 +63,12 @@ class StrongLine(
     affects=frozenset({"S"}),
     doubt="a vibration of {channels} adds much to the white-noise error",
 ):
-    """A sinusoid whose integral is comparable to that of white noise."""
+    """A sinusoid whose integral is comparable to the integral of white noise."""
 
     frequency: float
     """Hz."""
     ratio: float
-    """Its integral over that of white noise after 1 s."""
+    """Ratio of its integral to the integral of white noise, after 1 s."""
 
     def text(self, channel: str) -> str:
         """Return the finding in sentences."""
@@ -148,7 +148,7 @@ class SlowNoiseMissing(
     highest: float
     """Frequency up to which power is missing, Hz."""
     ratio: float
-    """Density up to there over that of white noise."""
+    """Ratio of the density up to there to the white noise."""
 
     def text(self, channel: str) -> str:
         """Return the finding in sentences."""

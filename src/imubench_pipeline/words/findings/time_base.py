@@ -184,7 +184,7 @@ class RateContradictsStamps(
     affects=_TIMED,
     doubt="the stated rate contradicts the time stamps",
 ):
-    """The stated rate is another one than that of the stamps, which is used."""
+    """The stated rate contradicts the stamps, whose rate is used."""
 
     stated: float
     rate: float
@@ -256,7 +256,7 @@ class IrregularStamps(
         return (
             f"{counted(self.stamps, 'stamp has', 'stamps have')} more or fewer samples than the "
             "others: the clock was set, or samples are lost. The rate, "
-            f"{_rate_text(self.rate)}, is that of the others"
+            f"{_rate_text(self.rate)}, is taken from the others"
         )
 
 
