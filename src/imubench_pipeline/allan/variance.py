@@ -238,7 +238,7 @@ def of_blocks(
     One pass; the memory grows with L/64 only. The result has the same bits for any number of
     threads and any blocks. ``samples`` is L, the length of all blocks, and with ``holes`` samples
     may be missing (NaN), as counted in ``gaps``. The sizes are rounded to the stride of their
-    octave. The other arguments and the errors are those of `allan_variance`.
+    octave. The other arguments and the errors are as in `allan_variance`.
     """
     spans = list_spans(segments, samples)
     wanted = round_octave_sizes(_check_arguments(rate, sizes, samples, spans))

@@ -180,7 +180,7 @@ def select_for_fit(
 ) -> FitSelection:
     """Find the spectral lines and the low-pass filter, and select the bins to fit.
 
-    ``line_spectra`` are those of `imubench_pipeline.estimators.spectrum.compute_spectra`; ``band``
+    ``line_spectra`` are as in `imubench_pipeline.estimators.spectrum.compute_spectra`; ``band``
     is the highest frequency to use, Hz, by default all, behind the low-pass filter if one is found;
     ``bandwidth`` the configured cut-off of the sensor's filter, Hz, if known; ``resolution`` the
     step of the register, SI, or 0.

@@ -85,7 +85,7 @@ def compute_cramer_rao_bounds(
 ) -> dict[str, float]:
     """Return the Cramér-Rao bounds of a model's parameters in a log, relative to their values.
 
-    The keys are those of `list_parameter_names`. Rate and highest frequency used are in Hz.
+    The keys are as in `list_parameter_names`. Rate and highest frequency used are in Hz.
     """
     values = {"Q": model.Q, "N": model.N, "F": 0.0 if model.T_B else model.B, "K": model.K}
     letters = "".join(letter for letter, value in values.items() if value > 0)

@@ -103,7 +103,7 @@ def fit_if_possible(curve: AllanCurve, *, method: Method, longest: float) -> Est
 def solve(curve: AllanCurve, *, method: Method = "weighted", longest: float = 1 / 9) -> Estimate:
     """Fit N, B, T_B and K as `fit` does, without limits, which take most of its time.
 
-    Parameters, errors and statuses are those of `fit`, except for ``not_identified``.
+    Parameters, errors and statuses are as in `fit`, except for ``not_identified``.
     """
     return _solved(curve, method, longest)[0]
 

@@ -1,6 +1,6 @@
 """Growth of the errors of a recording after static windows of several lengths: rows of a table.
 
-The errors are those of `expected_errors`, at more times and windows. The variances of all drawn
+The errors are as in `expected_errors`, at more times and windows. The variances of all drawn
 models are computed at once: separate budgets would take a thousand times as long.
 """
 

@@ -165,7 +165,7 @@ def format_repeatability(
 ) -> Iterator[Json]:
     """Yield the scatter of the fixed biases of each device of a sensor, and the printed figure.
 
-    ``rows`` are those of the table ``repeatability``.
+    ``rows`` belong to the table ``repeatability``.
     """
     for row in rows:
         if row.sensor != sensor:

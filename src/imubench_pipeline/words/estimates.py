@@ -39,7 +39,8 @@ _MAX_SYMMETRIC = 0.3
 
 def status_text(status: str) -> str:
     """Return the status of an estimate, or of a result of an experiment, in words."""
-    return {**STATUS_WORDS}.get(status, status.replace("_", " "))  # type: ignore[call-overload]
+    known = (words for code, words in STATUS_WORDS.items() if code == status)
+    return next(known, status.replace("_", " "))
 
 
 def symbol_text(symbol: str) -> str:

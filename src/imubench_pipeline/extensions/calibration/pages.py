@@ -53,7 +53,7 @@ _MIN_SCATTER_P_VALUE = 0.01
 def summarise_calibration(rows: Sequence[CalibrationRow], system: System) -> str:
     """Return scale factor and bias of a recording in a sentence, or the reason without them.
 
-    ``rows`` are those of the recording in the table ``calibration``, as in all functions below.
+    ``rows`` belong to the recording in the table ``calibration``, as in all functions below.
     """
     by_parameter = {row.parameter: row for row in rows}
     bias = by_parameter.get("bias")

@@ -116,7 +116,7 @@ TURNED_PAGE = RecordingPage("turned.html.jinja", make_turned_context, "two posit
 def summarise_earth_rate(rows: Sequence[EarthRateRow], system: System) -> str:
     """Return the filter's estimate in a sentence, or the reason why there is none.
 
-    ``rows`` are those of the whole recording in the table ``earth_rate``.
+    ``rows`` belong to the whole recording in the table ``earth_rate``.
     """
     by_method = {row.method: row for row in rows}
     best = by_method.get("filter")
@@ -196,7 +196,7 @@ def format_published(rows: Sequence[EarthRatePublishedRow]) -> Iterator[dict[str
 def summarise_needs(rows: Sequence[EarthRatePredictionRow]) -> dict[str, Any] | None:
     """Return the recordings required to find the Earth's rate, for a table and a sentence.
 
-    ``rows`` are those of one recording in the table ``earth_rate_prediction``.
+    ``rows`` belong to one recording in the table ``earth_rate_prediction``.
     """
     goals = [row for row in rows if row.of == "goal"]
     if not goals:

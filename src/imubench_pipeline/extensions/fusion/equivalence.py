@@ -88,7 +88,7 @@ def equivalence_rows(
 ) -> Iterator[FusionRow]:
     """Yield the rows of the table ``fusion``: every ordered pair of sensors at every tau, s.
 
-    The candidates are the channels of all sensors; the other parameters are those of `answer`.
+    The candidates are the channels of all sensors; the other parameters are as in `answer`.
     """
     listed = sorted(candidates, key=lambda channel: channel.sensor)
     for quantity in ("gyro", "accel"):

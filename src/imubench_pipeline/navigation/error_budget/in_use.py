@@ -156,7 +156,7 @@ def of_rise(order: int, time: float, over: float) -> float:
     """Return the growth of an error that rises linearly to 1 in a time T, and remains there.
 
     (c'(t) - c'(t - T)) / T with c' of ``order + 1`` (see `of_constant`): t^(m+1) / (m+2)! at t = T,
-    1 / (m+2) of the growth of a constant 1. The arguments are those of `of_pulse`.
+    1 / (m+2) of the growth of a constant 1. The arguments are as in `of_pulse`.
     """
     return of_pulse(order + 1, time, over) / over
 

@@ -44,7 +44,7 @@ _AXIS_COUNT = 3
 def find_noise_quantity(source: str) -> str | None:
     """Return gyro or accel if a source is sensor noise estimated from the log; else None.
 
-    Sources are those of the table ``error_budget``, such as ``gyro N`` or ``initial tilt by accel
+    Sources belong to the table ``error_budget``, such as ``gyro N`` or ``initial tilt by accel
     GM 89.5 s``. A turn-on bias is stated, and not estimated from the log.
     """
     words = source.removeprefix("initial tilt by ").split()

@@ -51,7 +51,7 @@ def judge_with_corrected_units(
 ) -> Unless | None:
     """Return the verdict on a sensor with doubtful units corrected.
 
-    The rows are those of one requirement. None without a figure, or if the verdict would not
+    The rows belong to one requirement. None without a figure, or if the verdict would not
     change. If all recordings were left out, the verdict from their figures as logged is returned
     too.
     """
@@ -192,7 +192,7 @@ def judge_sensors(
 ) -> Iterator[Judgement]:
     """Yield the judgement of each sensor by each requirement.
 
-    ``errors`` are those of all recordings; ``sensors`` have ``price_class`` and, if known,
+    ``errors`` belong to all recordings; ``sensors`` have ``price_class`` and, if known,
     ``abilities``; ``basis`` has the recordings. Recordings that do not decide are left out.
     """
     by_requirement: dict[str | None, dict[str, list[ErrorBudgetRow]]] = {}

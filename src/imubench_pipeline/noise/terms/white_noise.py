@@ -59,7 +59,7 @@ class WhiteNoise(Term):
         return StateSpace.without_states(self.N**2 / interval)
 
     def continuous_space(self) -> ContinuousSpace:
-        """No state: the density of the measurement is that of `drive`."""
+        """No state: the density of the measurement is as in `drive`."""
         return ContinuousSpace.without_states()
 
     @property

@@ -1,7 +1,7 @@
 """The formats of log files that can be read: one module each, with the name of the ``reader``.
 
 A module declares its format as ``FORMAT``, with a function that imports the code that reads it. The
-names are those of `imubench_pipeline.settings.sensor.Reader`: a module without a name there, or a
+names are as in `imubench_pipeline.settings.sensor.Reader`: a module without a name there, or a
 name without a module, fails the import of this one.
 """
 
