@@ -105,7 +105,7 @@ def test_functions_of_arrays_say_their_shapes(module: str) -> None:
         annotations = [ast.unparse(one.annotation) for one in arguments if one.annotation]
         if any(re.match(r"(Array|NDArray|ArrayLike)\b", one) for one in annotations):
             text = ast.get_docstring(function) or ""
-            said = re.search(r"shape|: as of `|are those of `|\(see `|ndarray", text)
+            said = re.search(r"shape|: as of `|are as in `|\(see `|ndarray", text)
             assert said, f"{module}.{function.name}"
 
 
