@@ -78,7 +78,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 COMMAND = Command(
-    "run on the logs that are complete, and say what is new: for timers",
+    "analyse the complete logs, and report changes (for timers)",
     add_arguments,
     run,
     (

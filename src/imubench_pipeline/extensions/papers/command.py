@@ -108,7 +108,7 @@ def _make_parts(title: str, rows: Sequence[PublishedRow], width: int) -> Iterato
 
 
 COMMAND = Command(
-    "print what the papers say, line by line, beside what is found",
+    "print the figures of the papers, line by line, with the computed ones",
     add_arguments,
     run,
     ("printed", "", NO_RESULTS),

@@ -1,4 +1,4 @@
-"""What the papers print, beside what is found."""
+"""Rows of the printed figures of papers, with the computed ones."""
 
 from __future__ import annotations
 
