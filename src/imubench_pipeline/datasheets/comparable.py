@@ -140,11 +140,11 @@ class PrintedAxis:
         if figure.option is not None and figure.option not in self.options:
             return texts.other_option(figure.option, self.options)
         if figure.kind == "min":
-            return texts.only_minimum()
+            return texts.ONLY_MINIMUM
         if name == "rms_noise" and figure.bandwidth is None:
-            return texts.rms_without_bandwidth()
+            return texts.RMS_WITHOUT_BANDWIDTH
         if name == "allan_deviation" and figure.tau is None:
-            return texts.deviation_without_time()
+            return texts.DEVIATION_WITHOUT_TIME
         return None
 
     def unpublished(self, like: Comparable, *names: str) -> Comparable:
@@ -159,7 +159,7 @@ def read_comparables(datasheet: Datasheet, channel: str) -> Iterator[Comparable]
     Rows have no figure if none is published or looked up.
     """
     axis = PrintedAxis.of(datasheet, channel)
-    walk = Comparable("N", "N", None, reason=texts.walk_is_density())
+    walk = Comparable("N", "N", None, reason=texts.WALK_IS_DENSITY)
     rms_to_si = axis.si("rms_noise")
 
     def convert_rms(value: float, figure: PrintedFigure) -> float:
@@ -180,14 +180,14 @@ def read_comparables(datasheet: Datasheet, channel: str) -> Iterator[Comparable]
     names = ("noise_density", "random_walk", "rms_noise")
     yield from noise or [axis.unpublished(Comparable("N", "N", None), *names)]
     for name, quantity, statistic, reason in (
-        ("bias_instability", "bias_instability", "adev_minimum", texts.curve_minimum()),
+        ("bias_instability", "bias_instability", "adev_minimum", texts.CURVE_MINIMUM),
         ("bias_instability", "bias_instability", "plateau", texts.curve_plateau(FLOOR)),
         ("rate_random_walk", "K", "K", None),
         ("correlation_time", "T_B", "T_B", None),
     ):
         like = Comparable(quantity, statistic, None, reason=reason)
         yield from axis.read(name, like, axis.si(name)) or [axis.unpublished(like, name)]
-    like = Comparable("allan_deviation", "adev", None, reason=texts.curve_at_time())
+    like = Comparable("allan_deviation", "adev", None, reason=texts.CURVE_AT_TIME)
     yield from axis.read("allan_deviation", like, axis.si("allan_deviation"))
 
 

@@ -21,7 +21,7 @@ from imubench_pipeline.words.reasons import datasheets as texts
 _MAX_GRAVITY_DEVIATION = 0.027
 """m/s²; maximum deviation of gravity on the ground from its standard value."""
 
-NO_TEMPERATURE_READINGS = Parameter(None, "not_shown", texts.no_temperature())
+NO_TEMPERATURE_READINGS = Parameter(None, "not_shown", texts.NO_TEMPERATURE)
 """Sensitivity of a log without temperature readings."""
 
 _MIN_VERTICAL_COSINE = math.cos(math.radians(15.0))
@@ -87,17 +87,17 @@ def compute_fixed_bias(channel: str, means: Mapping[str, float]) -> Parameter:
     gravity.
     """
     if channel.startswith("gyro"):
-        return _bound_size(means[channel], EARTH_RATE, texts.earth_rate_in_mean())
+        return _bound_size(means[channel], EARTH_RATE, texts.EARTH_RATE_IN_MEAN)
     axes = [means.get(f"accel_{axis}") for axis in "xyz"]
     if any(value is None for value in axes):
-        return Parameter(None, "not_shown", texts.gravity_needs_three_axes())
+        return Parameter(None, "not_shown", texts.GRAVITY_NEEDS_THREE_AXES)
     norm = math.hypot(*(value or 0.0 for value in axes))
     if abs(norm / STANDARD_GRAVITY - 1.0) > _MAX_NORM_ERROR_AT_REST:
         return Parameter(None, "not_shown", texts.mean_is_not_gravity(norm))
     if abs(means[channel]) < _MIN_VERTICAL_COSINE * norm:
-        return Parameter(None, "not_shown", texts.axis_not_vertical())
+        return Parameter(None, "not_shown", texts.AXIS_NOT_VERTICAL)
     deviation = norm - STANDARD_GRAVITY
-    return _bound_size(deviation, _MAX_GRAVITY_DEVIATION, texts.norm_less_gravity())
+    return _bound_size(deviation, _MAX_GRAVITY_DEVIATION, texts.NORM_LESS_GRAVITY)
 
 
 def _bound_size(value: float, unknown: float, reason: str) -> Parameter:
@@ -124,7 +124,7 @@ def compute_sensitivity(
     at = texts.slope_at(reference, lowest, highest, bends=bends)
     lower, upper = row.lower, row.upper
     if row.value is None or lower is None or upper is None:
-        return Parameter(None, "not_identified", row.reason or texts.no_interval())
+        return Parameter(None, "not_identified", row.reason or texts.NO_INTERVAL)
     largest = max(abs(lower), abs(upper))
     if not row.compensated:
         return Parameter(None, "not_identified", f"{row.reason}; {at}", 0.0, largest)

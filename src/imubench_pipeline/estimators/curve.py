@@ -73,7 +73,7 @@ def read(curve: AllanCurve, *, longest: float = 1 / 9) -> Estimate:
     """
     used = curve.cluster_size <= longest * curve.samples
     if not (curve.variance[used] > 0).all():
-        return not_shown("curve", texts.repeated_samples())
+        return not_shown("curve", texts.REPEATED_SAMPLES)
     # Where samples are missing, white noise is averaged over fewer than n: as at a shorter tau.
     thinned = np.sqrt(curve.cluster_size / curve.averaged)[used]
     points = _Curve(
@@ -105,7 +105,7 @@ def _read_white(points: _Curve, thinned: Array) -> Parameter:
             if error < 0.25:
                 slopes[i] = slope
     if not np.isfinite(slopes).any():
-        return Parameter(None, "not_shown", texts.short_curve())
+        return Parameter(None, "not_shown", texts.SHORT_CURVE)
     # The ends have one-sided windows; the first run of the right slope is the white noise.
     close = np.abs(slopes + 0.5) <= _WHITE_TOLERANCE
     edges = np.flatnonzero(np.diff(np.concatenate(([0], close.astype(np.int8), [0]))))
@@ -125,7 +125,7 @@ def _read_minimum(points: _Curve) -> tuple[Parameter, Parameter]:
     fall = points.deviation[0] - points.deviation[lowest]
     reason = None
     if lowest == 0 or fall < _RISE_SIGMAS * math.hypot(points.error[0], points.error[lowest]):
-        reason = texts.no_fall()
+        reason = texts.NO_FALL
     elif not (rise > _RISE_SIGMAS * error).any():
         reason = texts.no_rise(float(10.0 ** points.tau[lowest]), _RISE_SIGMAS)
     if reason:
@@ -134,7 +134,7 @@ def _read_minimum(points: _Curve) -> tuple[Parameter, Parameter]:
     return (
         Parameter(
             float(10.0 ** points.deviation[lowest]) / FLOOR,
-            reason=texts.read_at_minimum(),
+            reason=texts.READ_AT_MINIMUM,
         ),
         Parameter(float(10.0 ** points.tau[lowest]) / PEAK_TAU),
     )

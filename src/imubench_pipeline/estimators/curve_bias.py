@@ -192,7 +192,7 @@ def _estimate_bias(
     value, at = (float(of_one[0]) for of_one in compute_curve_bias(model, longest))
     lower, upper = _compute_limits(parts, value)
     if value == 0.0:
-        return Parameter(None, "absent", estimates.absent_below(), 0.0, upper)
+        return Parameter(None, "absent", estimates.ABSENT_BELOW, 0.0, upper)
     reason = None
     if model.terms.gauss_markov and at >= longest * (1.0 - 1e-9):
         reason = curves.rises_to_end(longest)
@@ -211,22 +211,22 @@ def _estimate_bias(
 def _describe_weak_bias(drawn: Sequence[Models], as_good: bool, longest: float) -> Parameter:
     """Return the bias instability of a curve whose chosen model has none."""
     if not drawn:
-        return Parameter(None, "absent", estimates.absent())
+        return Parameter(None, "absent", estimates.ABSENT)
     upper = max(
         float(np.quantile(compute_curve_bias(models, longest)[0], 0.975)) for models in drawn
     )
     if as_good:
-        return Parameter(None, "not_identified", estimates.bias_models_alike(), 0.0, upper)
-    return Parameter(None, "absent", estimates.absent_below(), 0.0, upper)
+        return Parameter(None, "not_identified", estimates.BIAS_MODELS_ALIKE, 0.0, upper)
+    return Parameter(None, "absent", estimates.ABSENT_BELOW, 0.0, upper)
 
 
 def compute_curve_figures(model: NoiseModel, tau: Array) -> dict[str, Parameter]:
     """Return the figures of the curve of a model as it is, at `make_averaging_times`."""
     models = convert_noise_model(model)
     if not models.terms.parameters:
-        nothing = Parameter(None, "not_shown", curves.no_noise())
+        nothing = Parameter(None, "not_shown", curves.NO_NOISE)
         return dict.fromkeys(CURVE, nothing)
-    bias = Parameter(None, "absent", curves.no_bias_terms())
+    bias = Parameter(None, "absent", curves.NO_BIAS_TERMS)
     if any(models.terms.biases):
         bias = Parameter(float(compute_curve_bias(models, float(tau[-1]))[0][0]))
     return {"B_curve": bias} | estimate_lowest_point(models, [], tau)
@@ -263,7 +263,7 @@ def estimate_lowest_point(
         for weight, (_, _, minimum) in zip(weights, points, strict=True)
     )
     if outside > 0.025 * sum(weights):
-        reason = curves.minimum_beyond()
+        reason = curves.MINIMUM_BEYOND
         lowest_time = Parameter(None, "not_identified", reason, limits[1][0], None, fitted=time)
     return {"sigma_min": Parameter(sigma, "ok", None, *limits[0]), "tau_min": lowest_time}
 

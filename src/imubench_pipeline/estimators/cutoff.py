@@ -248,7 +248,7 @@ def _describe_filter(
 
 def _describe_no_filter(N_alone: float, gained: float, doubt: tuple[str, float] | None) -> Cutoff:
     """Return a result without a filter, or, with a ``doubt``, with an ambiguous one and its N."""
-    absent = Parameter(None, "absent", texts.no_filter())
+    absent = Parameter(None, "absent", texts.NO_FILTER)
     if doubt is None:
         return Cutoff(absent, None, Parameter(N_alone), 0.0, gained)
     reason, before = doubt

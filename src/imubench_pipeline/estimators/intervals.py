@@ -50,7 +50,7 @@ def add_upper_limits(
             if is_as_good(other, alike[0]) and powers.get(name, 0.0) > 0.0:
                 good.append(other)
         if not good:
-            parameters[name] = Parameter(None, "absent", texts.absent_below(), 0.0, upper)
+            parameters[name] = Parameter(None, "absent", texts.ABSENT_BELOW, 0.0, upper)
             continue
         reason = texts.models_alike([c.terms.name for c in good], alike[0].terms.name)
         parameters[name] = Parameter(None, "not_identified", reason, 0.0, upper)
@@ -101,7 +101,7 @@ def describe(
         own = [(_draws_of(name, chosen.terms, draws), 1.0)]
         lower, upper = compute_mixture_limits(_over_models(name, chosen, alike, draws), own)
         if value == 0.0:
-            described[name] = Parameter(None, "absent", texts.absent_below(), 0.0, upper)
+            described[name] = Parameter(None, "absent", texts.ABSENT_BELOW, 0.0, upper)
             continue
         # At the end of a search, or where draws are few, the best value lies at the edge.
         limits = min(lower, float(value)), max(upper, float(value))
@@ -121,10 +121,10 @@ def describe(
         if f"B{number}" in described and described[f"B{number}"].status == "absent":
             bias = described[f"B{number}"]
             described[f"T_B{number}"] = replace(bias, lower=None, upper=None, duration_needed=None)
-    absent = Parameter(None, "absent", texts.absent())
+    absent = Parameter(None, "absent", texts.ABSENT)
     parameters = {name: described.get(name, absent) for name in FAMILY}
     if "B" in described and "T_B" not in described:
-        parameters["T_B"] = Parameter(None, "absent", texts.flicker_without_time())
+        parameters["T_B"] = Parameter(None, "absent", texts.FLICKER_WITHOUT_TIME)
     second = "B 2" in described
     further = [{"B": described["B 2"], "T_B": described["T_B 2"]}] if second else []
     return Estimate(method, parameters, further)

@@ -116,7 +116,7 @@ def _solved(
     if used.sum() < _MIN_POINTS:
         raise UnfitCurveError(texts.few_points(int(used.sum()), longest, _MIN_POINTS))
     if not (curve.variance[used] > 0).all():
-        raise UnfitCurveError(texts.repeated_samples())
+        raise UnfitCurveError(texts.REPEATED_SAMPLES)
     if method not in ("weighted", "paper"):
         raise ValueError(f"method {method!r} is not known, expected 'weighted' or 'paper'")
     used &= curve.cluster_size >= _find_first_unbent(curve, used, method)
@@ -269,7 +269,7 @@ class _Search:
             name: bool((part > _MIN_VARIANCE_FRACTION * self._variance).any())
             for name, part in parts.items()
         }
-        absent = Parameter(None, "absent", texts.fit_without_term())
+        absent = Parameter(None, "absent", texts.FIT_WITHOUT_TERM)
         bias = Parameter(compute_bias_instability(drive, T_B)) if present["B"] else absent
         time = Parameter(T_B) if present["B"] else absent
         at_end = None

@@ -165,7 +165,7 @@ def add_limits(estimate: Estimate, curve: AllanCurve, used: NDArray[np.bool_]) -
     """
     model = estimate.model
     if not model.terms:
-        nothing = Parameter(None, "not_shown", texts.no_noise())
+        nothing = Parameter(None, "not_shown", texts.NO_NOISE)
         return replace(
             estimate,
             curve={"B_curve": estimate.parameters["B"], "sigma_min": nothing, "tau_min": nothing},

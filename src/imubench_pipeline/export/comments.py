@@ -29,7 +29,7 @@ def describe_model(
     """
     statements = [f"Noise of the {imu.sensor} for {program}, by imubench."]
     if imu.simulated:
-        statements.append(f"{texts.simulated_recordings()}.")
+        statements.append(f"{texts.SIMULATED_RECORDINGS}.")
     statements += [f"CAUTION: {caution}." for caution in imu.cautions]
     statements.append(convention)
     units = {"gyro": "rad, s", "accel": "m, s"}
@@ -48,9 +48,9 @@ def describe_model(
             for name, effect in imu.temperature.items()
             for note in effect.notes
         ]
-        statements.append(f"{texts.biases_not_included()}.")
+        statements.append(f"{texts.BIASES_NOT_INCLUDED}.")
     else:
-        statements.append(f"{texts.noise_only()}.")
+        statements.append(f"{texts.NOISE_ONLY}.")
     if imu.inflation != 1.0:
         statements.append(f"{texts.inflated(imu.inflation, imu.because or '')}.")
     printed = [_join_lines(words) for words in statements]

@@ -77,7 +77,7 @@ def as_walk(
     """
     slow = _select_slow_terms(model)
     if not slow:
-        words = texts.upper_walk_used(least_walk) if least_walk else texts.no_walk_known()
+        words = texts.upper_walk_used(least_walk) if least_walk else texts.NO_WALK_KNOWN
         replacement = NoiseModel(N=model.N, K=least_walk or 0.0)
         return Mapped(replacement, [words, *_describe_omitted_terms(model)])
     if all(term.role is Role.RANDOM_WALK for term in slow):

@@ -101,7 +101,7 @@ def _map_temperature(
     """Return the settings of the effect of temperature on a bias, and remarks on omitted axes."""
     if effect is None:
         return [], []
-    words = [texts.axis_not_included(axis, texts.bias_not_linear()) for axis in effect.square]
+    words = [texts.axis_not_included(axis, texts.BIAS_NOT_LINEAR) for axis in effect.square]
     slopes = [0.0 if axis in effect.square else effect.slope.get(axis, 0.0) for axis in AXES]
     if not any(slopes):
         return [], words

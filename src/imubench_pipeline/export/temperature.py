@@ -65,7 +65,7 @@ def find_temperature_effect(
     notes = [texts.temperature_range(reference, recording.recording, recording.device, low, high)]
     for axis in AXES:
         if axis not in by_axis:
-            notes.append(texts.axis_not_included(axis, texts.no_temperature_fit()))
+            notes.append(texts.axis_not_included(axis, texts.NO_TEMPERATURE_FIT))
             continue
         fit = by_axis[axis]
         reason = _find_objection(fit, high - low, horizon)

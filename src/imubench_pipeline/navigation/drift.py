@@ -172,7 +172,7 @@ def _make_rows(
             if changed:
                 reasons.append(texts.level_changed(round(count), above=changed > 0.0))
                 if not noise and key[0].startswith("accel"):
-                    reasons.append(texts.tilt_changed())
+                    reasons.append(texts.TILT_CHANGED)
             p_value: float | None = None
             verdict: DriftVerdict | None = None
             if not math.isnan(p):
@@ -230,12 +230,12 @@ def _explain_no_verdict(row: Estimated | None, count: float) -> str:
         reason = row.reason if isinstance(row, ParameterRow) else None
         return texts.status_reason(status, reason)
     if count < 0.0:
-        return texts.value_without_limits()
+        return texts.VALUE_WITHOUT_LIMITS
     if count == 0.0:
         return texts.first_value(_get_bias_terms(row))
     if count < _MIN_RECORDINGS:
         return texts.few_earlier(round(count))
-    return texts.narrow_limits() if isinstance(row, ParameterRow) else texts.equal_earlier()
+    return texts.NARROW_LIMITS if isinstance(row, ParameterRow) else texts.EQUAL_EARLIER
 
 
 class _Levels:

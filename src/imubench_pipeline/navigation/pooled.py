@@ -337,7 +337,7 @@ def _make_parameter_row(
     if pooled.verdict == "differ":
         reasons.append(texts.recordings_differ(of_devices=of_devices))
     elif pooled.spread_upper == 0.0:
-        reasons.append(texts.close_agreement())
+        reasons.append(texts.CLOSE_AGREEMENT)
     spread = (pooled.spread, pooled.spread_lower, pooled.spread_upper)
     in_unit = [None if part is None else part * (pooled.value or 0.0) for part in spread]
     return PooledRow(
@@ -366,9 +366,9 @@ def _make_bias_row(
     sensor, device, channel, parameter = group
     pairs = [(row.value, of) for of, row in present]
     bias = estimate_turn_on_bias(value for value, _ in pairs)
-    reasons = [texts.not_pooled(bias.left_out, texts.without_mean())] * (bias.left_out > 0)
+    reasons = [texts.not_pooled(bias.left_out, texts.WITHOUT_MEAN)] * (bias.left_out > 0)
     if channel.startswith("accel"):
-        reasons.append(texts.gravity_in_mean())
+        reasons.append(texts.GRAVITY_IN_MEAN)
     reasons += _describe_device_effects(pairs, several and device is None)
     return PooledRow(
         sensor=sensor,

@@ -126,7 +126,7 @@ def compare_deviations(
     if tau > longest_tau:
         return Ratio(None, None, None, texts.tau_beyond(longest_tau))
     if not first.model.terms or not second.model.terms:
-        return Ratio(None, None, None, texts.no_model())
+        return Ratio(None, None, None, texts.NO_MODEL)
     value = math.sqrt(float(compute_number_needed(first.variance(tau), 0.0, second.variance(tau))))
     own, other = (_draw_variances(channel, draws, seed, [tau])[0] for channel in (first, second))
     ratios = np.sqrt(compute_number_needed(own[:, None], 0.0, other[None, :]))

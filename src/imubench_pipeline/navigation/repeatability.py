@@ -40,11 +40,11 @@ def repeatability_rows(
         # The first recording of a device has no previous one: its flag does not matter.
         unknown = sum(row.power_cycled is None for row, _ in several) > 1
         if channel.startswith("accel"):
-            spread = Parameter(None, "not_shown", texts.gravity_in_mean())
+            spread = Parameter(None, "not_shown", texts.GRAVITY_IN_MEAN)
         else:
-            assumptions = [texts.same_heading_assumed()]
+            assumptions = [texts.SAME_HEADING_ASSUMED]
             if unknown:
-                assumptions.append(texts.power_cycles_assumed())
+                assumptions.append(texts.POWER_CYCLES_ASSUMED)
             reason = "; ".join(assumptions)
             bias = estimate_turn_on_bias(value for _, value in several)
             limits = bias.deviation_lower, bias.deviation_upper

@@ -122,7 +122,7 @@ def account_for(
         if owner := owners.get(file):
             found.append(FoundFile(place, owner.sensor, owner.name))
         elif file in waiting:
-            found.append(FoundFile(place, reason=texts.still_written()))
+            found.append(FoundFile(place, reason=texts.STILL_WRITTEN))
         else:
             found.append(FoundFile(place, reason=_why_skipped(file, logs)))
     return found
@@ -156,25 +156,25 @@ def _why_skipped(file: Path, logs: Path) -> str:
     if dotted := next((part for part in file.relative_to(logs).parts if part.startswith(".")), ""):
         return texts.hidden(dotted)
     if "__MACOSX" in file.parts:
-        return texts.archive_attributes()
+        return texts.ARCHIVE_ATTRIBUTES
     if suffix == ".md":
-        return texts.documentation()
+        return texts.DOCUMENTATION
     if suffix in _MISNAMED_NOTES:
         if file.parent == logs:
-            return texts.settings_beside_sensors()
+            return texts.SETTINGS_BESIDE_SENSORS
         if suffix == file.suffix == _NOTES:
             return texts.notes_without_log(file.stem)
         return texts.misnamed_notes(f"{file.stem}{_NOTES}")
     try:
         if file.is_symlink() and file.is_dir():
-            return texts.linked_folder()
+            return texts.LINKED_FOLDER
         if file.is_dir():
-            return texts.closed_folder()
+            return texts.CLOSED_FOLDER
         if is_endless(file):
-            return texts.neither_file_nor_folder()
+            return texts.NEITHER_FILE_NOR_FOLDER
     except OSError as error:
         return texts.unreadable(error.strerror)
-    return texts.no_recording()
+    return texts.NO_RECORDING
 
 
 def _logs_of(folder: Path) -> Iterator[Recording]:

@@ -114,7 +114,7 @@ def derive_doubts(
         if row.chosen and row.verdict == "not explained"
     ]
     every += [
-        Doubt(*_place(row), "doubtful", row.reason or texts.estimate_doubtful(), (row.parameter,))
+        Doubt(*_place(row), "doubtful", row.reason or texts.ESTIMATE_DOUBTFUL, (row.parameter,))
         for row in parameters
         if row.status == "doubtful"
     ]
@@ -127,7 +127,7 @@ def doubt_unsold_sensors(
     """Yield a doubt for each recording of sensors that cannot be bought: they decide nothing."""
     for row in recordings:
         if row.sensor in sensors:
-            yield Doubt(*_key(row), None, "not_sold", texts.not_sold(), unfit=True)
+            yield Doubt(*_key(row), None, "not_sold", texts.NOT_SOLD, unfit=True)
 
 
 def doubt_simulated_recordings(recordings: Sequence[RecordingRow]) -> Iterator[Doubt]:
@@ -135,7 +135,7 @@ def doubt_simulated_recordings(recordings: Sequence[RecordingRow]) -> Iterator[D
 
     ``recordings``: of one sensor or of all.
     """
-    reason = texts.simulated_beside_measured()
+    reason = texts.SIMULATED_BESIDE_MEASURED
     if any(row.status == "ok" and not row.simulated for row in recordings):
         for row in recordings:
             if row.simulated:

@@ -72,7 +72,7 @@ class _Printed:
             return None
         self._note("N", density)
         if density.is_side_assumed:
-            self._assume("noise", texts.one_sided_density())
+            self._assume("noise", texts.ONE_SIDED_DENSITY)
         B = T_B = K = None
         floor = _select_best([row for row in rows if row.statistic == "adev_minimum"])
         time = _select_best([row for row in rows if row.statistic == "T_B"])
@@ -82,29 +82,29 @@ class _Printed:
             B, T_B = floor.value / FLOOR, time.value if time else None
             self._assume("noise", texts.bias_instability_printed(FLOOR, timed=bool(T_B)))
         else:
-            self._assume("noise", texts.no_bias_instability())
+            self._assume("noise", texts.NO_BIAS_INSTABILITY)
         if walk is not None and walk.value:
             self._note("K", walk)
             K = walk.value
         else:
-            self._assume("noise", texts.no_random_walk())
+            self._assume("noise", texts.NO_RANDOM_WALK)
         return NoiseModel(N=density.value, B=B or 0.0, T_B=T_B, K=K or 0.0)
 
     def model(self, noise: NoiseModel, signs: Sequence[float]) -> SensorModel:
         bias = self._single("offset", "bias", "bias")
         if bias is not None:
-            self._assume("bias", texts.bias_sign_drawn())
+            self._assume("bias", texts.BIAS_SIGN_DRAWN)
         slope = self._single("temperature_coefficient", "drift", "temperature sensitivity")
         drift = None
         if slope is not None:
             drift = TemperatureDrift(sensitivity=signs[1] * slope)
-            self._assume("drift", texts.drift_sign_drawn())
+            self._assume("drift", texts.DRIFT_SIGN_DRAWN)
         else:
-            self._assume("drift", texts.no_drift())
+            self._assume("drift", texts.NO_DRIFT)
         steps = (self._single(name, "register", name) for name in ("sensitivity", "resolution"))
         step = next((each for each in steps if each is not None), None)
         if step is None:
-            self._assume("register", texts.not_rounded())
+            self._assume("register", texts.NOT_ROUNDED)
         stated = self._sensor.log.bandwidth
         if stated is not None:
             self._remarks.append(Remark("low-pass", texts.stated_cutoff(stated)))
@@ -138,7 +138,7 @@ class _Printed:
             if len(ranges) > 1:
                 self._assume("register", texts.chosen_range(values[chosen], figure.unit))
             return ranges[chosen]
-        self._assume("register", texts.no_saturation())
+        self._assume("register", texts.NO_SATURATION)
         return None
 
     def _assume(self, topic: Topic, text: str) -> None:

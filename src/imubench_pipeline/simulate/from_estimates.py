@@ -76,7 +76,7 @@ def with_estimates(
     if recorded.simulated:
         origin.assume("log", texts.log_is_simulated(f"{name}/{chosen}"))
     if any(quantity_of(channel) == "accel" for channel in axes):
-        origin.assume("bias", texts.gravity_is_no_bias())
+        origin.assume("bias", texts.GRAVITY_IS_NO_BIAS)
     return origin
 
 

@@ -400,7 +400,7 @@ def estimate_recording(
         estimate_channel(key, log, measured[channel], how, sections["bandwidth"], into)
         if read := sections.get("authors", {}).get(channel):
             # The authors read their own log; they do not print every parameter.
-            unread = Parameter(None, "not_shown", texts.not_printed_by_source())
+            unread = Parameter(None, "not_shown", texts.NOT_PRINTED_BY_SOURCE)
             figures = {
                 name: Parameter(read[name]) if name in read else unread for name in PARAMETERS
             }

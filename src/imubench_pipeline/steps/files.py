@@ -41,7 +41,7 @@ def list_files(
         elif row := outcome.get((file.sensor, file.recording)):
             yield replace(file, status=_STATUS[row.status], reason=row.reason)
         else:
-            reason = of_sensor.get(file.sensor, texts.in_no_table())
+            reason = of_sensor.get(file.sensor, texts.IN_NO_TABLE)
             yield replace(file, status="failed", reason=reason)
 
 

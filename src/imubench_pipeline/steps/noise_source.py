@@ -25,7 +25,7 @@ from imubench_pipeline.simulate.from_datasheet import from_datasheet
 from imubench_pipeline.tables.keys import Key
 from imubench_pipeline.words.reasons import simulations as texts
 
-NO_MODEL = texts.no_noise_model()
+NO_MODEL = texts.NO_NOISE_MODEL
 """Reason of missing results without a `NoiseSource`."""
 
 Kept = tuple[RecordingRow, Path]

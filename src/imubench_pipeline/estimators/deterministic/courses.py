@@ -119,7 +119,7 @@ class DeterministicSignals:
         if rival is not None:
             return texts.signal_or_walk(_describe_alternative(rival.signals, self.means))
         if self.signals and _compute_walk_leverage(self.searched.fit) > _MAX_WALK_LEVERAGE:
-            return texts.signals_hide_walk()
+            return texts.SIGNALS_HIDE_WALK
         return None
 
 

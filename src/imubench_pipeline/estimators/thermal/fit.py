@@ -149,7 +149,7 @@ def fit_temperature(
         fit = _Fit(blocks(), samples, rate, spans, path, frame, longest_lag)
         plain = plain or likelihood.fit_spectrum(fit.spectrum, fit.frame, rng=rng, stretch=None)
     if not fit.possible:
-        return _nothing(plain, path, fit, texts.short_log())
+        return _nothing(plain, path, fit, texts.SHORT_LOG)
     if not varies:
         return _nothing(plain, path, fit, texts.small_temperature_range(path.range))
     settled = fit.settle(quadratic)

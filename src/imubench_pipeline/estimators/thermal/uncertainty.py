@@ -97,13 +97,13 @@ def assess_fit(
     excluded = any(lower[i] > 0.0 or upper[i] < 0.0 for i in range(1 + regressors.quadratic))
     confused = _explain_confusion(regressors, regression, weights, excluded)
     compensated = excluded and confused is None and gained > _MIN_DELTA_BIC
-    reason = confused or texts.sensitivity_with_zero()
+    reason = confused or texts.SENSITIVITY_WITH_ZERO
     if excluded and confused is None:
         reason = texts.temperature_preferred(gained, enough=gained > _MIN_DELTA_BIC)
     if regressors.settling > 0.0:
         reason += f"; {texts.settling_excluded(regressors.settling)}"
     s = _make_parameter(float(regression.beta[0]), float(lower[0]), float(upper[0]), confused)
-    q = Parameter(None, "absent", texts.absent())
+    q = Parameter(None, "absent", texts.ABSENT)
     if regressors.quadratic:
         q = _make_parameter(float(regression.beta[1]), float(lower[1]), float(upper[1]), confused)
     return Verdict(
@@ -130,9 +130,9 @@ def assess_lag(value: float, draws: Array, longest: float, compensated: bool) ->
     likely lag, ``longest`` the longest that was tried, s.
     """
     if longest == 0.0:
-        return Parameter(None, "absent", texts.lag_not_asked())
+        return Parameter(None, "absent", texts.LAG_NOT_ASKED)
     if not compensated:
-        return Parameter(None, "not_identified", texts.no_effect_to_lag())
+        return Parameter(None, "not_identified", texts.NO_EFFECT_TO_LAG)
     ordered, inside = np.sort(draws), math.ceil(0.95 * len(draws))
     first = int(np.argmin(ordered[inside - 1 :] - ordered[: len(ordered) - inside + 1]))
     lower, upper = float(ordered[first]), float(ordered[first + inside - 1])
@@ -163,12 +163,12 @@ def _explain_confusion(
     if abs(value[-1] - value[0]) > _MIN_MONOTONE_RANGE * regressors.path.range:
         z = both.beta[0] / both.error
         if excluded and abs(z) < SIGMAS:
-            return texts.monotone_temperature()
+            return texts.MONOTONE_TEMPERATURE
     if (
         not excluded
         and _compute_explained_fraction(regressors, regression) > _MIN_EXPLAINED_FRACTION
     ):
-        return texts.temperature_by_chance()
+        return texts.TEMPERATURE_BY_CHANCE
     return None
 
 

@@ -91,13 +91,13 @@ def _test_channel(
             # The error that the limit needs, or why the log cannot show it.
             asked: DeadReckoning | str
             if key == ("gyro", "north"):
-                asked = texts.north_not_tested()
+                asked = texts.NORTH_NOT_TESTED
             elif key not in _INTEGRATIONS:
                 continue
             elif requirement.static_window is None:
-                asked = texts.turn_on_not_tested()
+                asked = texts.TURN_ON_NOT_TESTED
             elif not estimate.model.terms:
-                asked = texts.noise_not_known()
+                asked = texts.NOISE_NOT_KNOWN
             else:
                 order, factor = _INTEGRATIONS[key]
                 rest = parse_quantity(requirement.static_window, "time")

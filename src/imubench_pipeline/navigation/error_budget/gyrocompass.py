@@ -94,7 +94,7 @@ class Gyrocompass:
                 *self._list_noise_errors(time, swings=True),
                 *(part for part in biases if isinstance(part, Contribution)),
             ],
-            [texts.heading_bias_not_known()] if missing else [],
+            [texts.HEADING_BIAS_NOT_KNOWN] if missing else [],
             missing,
         )
 

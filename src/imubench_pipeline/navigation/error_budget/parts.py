@@ -66,11 +66,11 @@ def compute_figure_contribution(
     ``lever`` is the error from a figure of 1 SI unit. None if no figure is required, or another is
     used.
     """
-    figure = figures.get(cause, Figure(reason=texts.not_stated()))
+    figure = figures.get(cause, Figure(reason=texts.NOT_STATED))
     if figure.sigma is not None:
         return Contribution(source, lever * figure.sigma, cause, figure, measured)
     if needed(measured, cause, figures):
-        return Missing(source, measured, cause, lever, figure.reason or texts.not_known())
+        return Missing(source, measured, cause, lever, figure.reason or texts.NOT_KNOWN)
     return None
 
 

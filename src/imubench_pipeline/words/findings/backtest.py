@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from imubench_pipeline.words.findings.base import SLOW, FindingData, channel_name
 from imubench_pipeline.words.numbers import counted, join_names, number_text
 
 
-@dataclass(frozen=True)
 class BacktestContradicts(
     FindingData,
     code="backtest_contradicts",
@@ -35,7 +32,6 @@ class BacktestContradicts(
     """Kinds of the deterministic signals that are in the log and not in the noise."""
 
     def text(self, channel: str) -> str:
-        """Return the finding in sentences."""
         rest = "" if self.window is None else f" (bias from {number_text(self.window)} s at rest)"
         removed = join_names([name.replace("_", " ") for name in self.removed])
         why = (

@@ -1,8 +1,7 @@
 """Base class of findings: their data, the parameters that they affect, and their sentence.
 
-A finding is declared as a dataclass of its data:
+A finding is a class of its data, which the base class makes a dataclass:
 
-    @dataclass(frozen=True)
     class Stuck(FindingData, code="stuck", affects=ALL, unfit=True):
         value: float
         def text(self, channel: str) -> str:
@@ -15,7 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import ClassVar, dataclass_transform
 
 SLOW = frozenset({"B", "B_curve", "sigma_min", "tau_min", "T_B", "K", "R"})
 """Parameters of slow noise."""
@@ -45,9 +44,10 @@ FINDINGS: dict[str, type[FindingData]] = {}
 """The class of each finding, by its code."""
 
 
+@dataclass_transform(frozen_default=True)
 @dataclass(frozen=True)
 class FindingData:
-    """Data of a finding about a recording or a channel."""
+    """Data of a finding about a recording or a channel; each subclass is a frozen dataclass."""
 
     code: ClassVar[str]
     affects: ClassVar[frozenset[str]]
@@ -68,7 +68,8 @@ class FindingData:
         scales: Mapping[str, float] | None = None,
         doubt: str = "",
     ) -> None:
-        """Register a finding by its code."""
+        """Make a finding a dataclass, and register it by its code."""
+        dataclass(frozen=True)(cls)
         cls.code, cls.affects, cls.unfit, cls.scales = code, affects, unfit, scales or {}
         cls.doubt = doubt or code.replace("_", " ") + " ({channels})"
         FINDINGS[code] = cls

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from imubench_pipeline.words.findings.base import NONE, SLOW, WHITE, FindingData, channel_name
 from imubench_pipeline.words.findings.shown import estimate_text, unit_of
 from imubench_pipeline.words.numbers import Unit, number_text, percent_text
@@ -11,7 +9,6 @@ from imubench_pipeline.words.numbers import Unit, number_text, percent_text
 _SECONDS = Unit("s", 1.0)
 
 
-@dataclass(frozen=True)
 class BiasStep(
     FindingData,
     code="bias_step",
@@ -30,7 +27,6 @@ class BiasStep(
     """Half width of the 95 % interval of the time, s."""
 
     def text(self, channel: str) -> str:
-        """Return the finding in sentences."""
         size = estimate_text(self.size, self.size_lower, self.size_upper, unit_of(channel, "level"))
         return (
             f"The bias of {channel_name(channel)} steps by {size} at {number_text(self.time, 6)} s "
@@ -39,7 +35,6 @@ class BiasStep(
         )
 
 
-@dataclass(frozen=True)
 class WarmUpDrift(
     FindingData,
     code="warm_up_drift",
@@ -58,7 +53,6 @@ class WarmUpDrift(
     """Time constant, with 95 % limits, s."""
 
     def text(self, channel: str) -> str:
-        """Return the finding in sentences."""
         size = estimate_text(self.size, self.size_lower, self.size_upper, unit_of(channel, "level"))
         time = estimate_text(self.time, self.time_lower, self.time_upper, _SECONDS)
         return (
@@ -68,7 +62,6 @@ class WarmUpDrift(
         )
 
 
-@dataclass(frozen=True)
 class PeriodicDrift(
     FindingData,
     code="periodic_drift",
@@ -87,7 +80,6 @@ class PeriodicDrift(
     """Period, with 95 % limits, s."""
 
     def text(self, channel: str) -> str:
-        """Return the finding in sentences."""
         size = estimate_text(self.size, self.size_lower, self.size_upper, unit_of(channel, "level"))
         time = estimate_text(self.time, self.time_lower, self.time_upper, _SECONDS)
         return (
@@ -97,7 +89,6 @@ class PeriodicDrift(
         )
 
 
-@dataclass(frozen=True)
 class TelegraphNoise(
     FindingData,
     code="telegraph_noise",
@@ -110,7 +101,6 @@ class TelegraphNoise(
     """Minimum number of steps."""
 
     def text(self, channel: str) -> str:
-        """Return the finding in sentences."""
         return (
             f"The bias of {channel_name(channel)} steps at least {self.steps} times, as telegraph "
             "noise does. The steps remain in the noise, so B, T_B and K are doubtful. "
@@ -118,7 +108,6 @@ class TelegraphNoise(
         )
 
 
-@dataclass(frozen=True)
 class HeavyTails(FindingData, code="heavy_tails", affects=NONE):
     """Large samples are more frequent than in normal noise."""
 
@@ -128,7 +117,6 @@ class HeavyTails(FindingData, code="heavy_tails", affects=NONE):
     """Factor on the interval of N."""
 
     def text(self, channel: str) -> str:
-        """Return the finding in sentences."""
         return (
             f"The white noise of {channel_name(channel)} has heavier tails than a normal "
             f"distribution: its excess kurtosis is {number_text(self.kurtosis, 3)}. The interval "
@@ -137,7 +125,6 @@ class HeavyTails(FindingData, code="heavy_tails", affects=NONE):
         )
 
 
-@dataclass(frozen=True)
 class NoiseTrend(
     FindingData,
     code="noise_grows",
@@ -152,7 +139,6 @@ class NoiseTrend(
     """Half width of the 95 % interval of the trend."""
 
     def text(self, channel: str) -> str:
-        """Return the finding in sentences."""
         verb = "grows" if self.trend > 0.0 else "falls"
         return (
             f"The white noise of {channel_name(channel)} {verb} by "
@@ -161,7 +147,6 @@ class NoiseTrend(
         )
 
 
-@dataclass(frozen=True)
 class NoiseVaries(
     FindingData,
     code="noise_varies",
@@ -174,7 +159,6 @@ class NoiseVaries(
     """Relative standard deviation of N between sixteenths of the log."""
 
     def text(self, channel: str) -> str:
-        """Return the finding in sentences."""
         return (
             f"The white noise of {channel_name(channel)} varies by {percent_text(self.spread)} "
             "(one standard deviation) between sixteenths of the log, more than by chance. "
@@ -182,7 +166,6 @@ class NoiseVaries(
         )
 
 
-@dataclass(frozen=True)
 class RandomWalkChanges(
     FindingData,
     code="K_differs",
@@ -198,11 +181,9 @@ class RandomWalkChanges(
     """K of each half over K of the log."""
 
     def text(self, channel: str) -> str:
-        """Return the finding in sentences."""
         return _halves_text(f"K of {channel_name(channel)}", self.middle, self.first, self.second)
 
 
-@dataclass(frozen=True)
 class SlowNoiseChanges(
     FindingData,
     code="slow_noise_differs",
@@ -218,7 +199,6 @@ class SlowNoiseChanges(
     """Amplitude of the slow noise of each half, relative to the log."""
 
     def text(self, channel: str) -> str:
-        """Return the finding in sentences."""
         noise = f"The slow noise of {channel_name(channel)}"
         return _halves_text(noise, self.middle, self.first, self.second)
 

@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from imubench_pipeline.words.findings.base import ALL, FindingData, channel_name
 from imubench_pipeline.words.numbers import join_names, number_text, percent_text
 
 
-@dataclass(frozen=True)
 class ChannelTwice(
     FindingData,
     code="channel_twice",
@@ -23,7 +20,6 @@ class ChannelTwice(
     """Factor from the other channel, SI."""
 
     def text(self, channel: str) -> str:
-        """Return the finding in sentences."""
         scaled = ""
         if abs(self.factor - 1.0) >= 1e-6:
             scaled = f", multiplied by {number_text(self.factor, 6)} in SI units"
@@ -43,7 +39,6 @@ def _describe_repeat(channel: str, start: float, end: float, original: float, nu
     return f"{repeats}: {span} {where}"
 
 
-@dataclass(frozen=True)
 class LogTwice(
     FindingData, code="log_twice", affects=ALL, unfit=True, doubt="the log repeats itself"
 ):
@@ -58,7 +53,6 @@ class LogTwice(
     """Share of copies in the log."""
 
     def text(self, channel: str) -> str:
-        """Return the finding in sentences."""
         return (
             f"{_describe_repeat(channel, self.start, self.end, self.original, self.repeats)}. "
             f"{percent_text(self.share, 2)} of the log are copies, as if it had been appended to "
@@ -66,7 +60,6 @@ class LogTwice(
         )
 
 
-@dataclass(frozen=True)
 class RepeatedStretch(
     FindingData, code="repeated_stretch", affects=ALL, doubt="a part of {channels} is a copy"
 ):
@@ -79,14 +72,12 @@ class RepeatedStretch(
     repeats: int
 
     def text(self, channel: str) -> str:
-        """Return the finding in sentences."""
         return (
             f"{_describe_repeat(channel, self.start, self.end, self.original, self.repeats)}. Find "
             "out why it was written twice (a buffer, a paste), or use a part without it"
         )
 
 
-@dataclass(frozen=True)
 class RecordingTwice(
     FindingData,
     code="recording_twice",
@@ -101,7 +92,6 @@ class RecordingTwice(
     channels: tuple[str, ...]
 
     def text(self, channel: str) -> str:
-        """Return the finding in sentences."""
         names = join_names([channel_name(name) for name in self.channels])
         return (
             f"{self.recording} has the samples of {self.original} ({names}). One log lies in the "
@@ -109,7 +99,6 @@ class RecordingTwice(
         )
 
 
-@dataclass(frozen=True)
 class SharedNoise(
     FindingData, code="shared_noise", affects=ALL, doubt="correlated noise of {channels}"
 ):
@@ -119,7 +108,6 @@ class SharedNoise(
     correlation: float
 
     def text(self, channel: str) -> str:
-        """Return the finding in sentences."""
         return (
             f"The noise of {channel_name(channel)} and {channel_name(self.other)} is correlated "
             f"({number_text(self.correlation, 2)}). It comes from a vibration, from the supply, or "

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Literal
 
 from imubench_pipeline.words.findings.base import (
@@ -17,45 +16,38 @@ from imubench_pipeline.words.findings.base import (
 from imubench_pipeline.words.numbers import counted, duration_text, join_names, number_text
 
 
-@dataclass(frozen=True)
 class Rejected(FindingData, code="rejected", affects=ALL, doubt="the recording was rejected"):
     """A recording that cannot be used."""
 
     reason: str
 
     def text(self, channel: str) -> str:
-        """Return the reason."""
         return self.reason
 
 
-@dataclass(frozen=True)
 class Failed(FindingData, code="failed", affects=ALL, doubt="the analysis failed"):
     """A recording of which a step failed."""
 
     reason: str
 
     def text(self, channel: str) -> str:
-        """Return the reason, and what becomes of the recording."""
         return (
             f"{self.reason.rstrip('.')}. The recording is left out, and tried again by the next run"
         )
 
 
-@dataclass(frozen=True)
 class WarmUpTrimmed(FindingData, code="warm_up_trimmed", affects=NONE):
     """A warm-up that is left out."""
 
     end: float
 
     def text(self, channel: str) -> str:
-        """Return the finding in a sentence."""
         return (
             f"The first {number_text(self.end, 5)} s, a warm-up, are left out "
             "(quality.trim_warm_up)"
         )
 
 
-@dataclass(frozen=True)
 class ShortRecording(
     FindingData, code="short_recording", affects=SLOW, doubt="the recording is short"
 ):
@@ -64,14 +56,12 @@ class ShortRecording(
     duration: float
 
     def text(self, channel: str) -> str:
-        """Return the finding in sentences."""
         return (
             f"The recording lasts {duration_text(self.duration)}. This is enough for white noise, "
             "but bias instability and random walk take hours"
         )
 
 
-@dataclass(frozen=True)
 class Knocks(FindingData, code="knocks", affects=WHITE, doubt="knocks in {channels}"):
     """Short disturbances, which are left out."""
 
@@ -84,7 +74,6 @@ class Knocks(FindingData, code="knocks", affects=WHITE, doubt="knocks in {channe
     """Samples that are left out."""
 
     def text(self, channel: str) -> str:
-        """Return the finding in sentences."""
         at = ", ".join(number_text(time, 5) for time in self.times)
         more = ", ..." if self.knocks > len(self.times) else ""
         samples = counted(self.samples, "sample", "samples")
@@ -96,7 +85,6 @@ class Knocks(FindingData, code="knocks", affects=WHITE, doubt="knocks in {channe
         )
 
 
-@dataclass(frozen=True)
 class SimulatedByMark(
     FindingData,
     code="simulated_by_mark",
@@ -108,14 +96,12 @@ class SimulatedByMark(
     file: str
 
     def text(self, channel: str) -> str:
-        """Return the finding in sentences."""
         return (
             f"The notes say 'simulated: false', but {self.file} has the mark of a simulated log, "
             "and is treated as simulated. Remove the key from the notes, or the mark if it is wrong"
         )
 
 
-@dataclass(frozen=True)
 class UnusedFiles(FindingData, code="unused_files", affects=NONE):
     """Files of a folder from which no channel is read."""
 
@@ -126,7 +112,6 @@ class UnusedFiles(FindingData, code="unused_files", affects=NONE):
     folder: str
 
     def text(self, channel: str) -> str:
-        """Return the finding in sentences."""
         more = self.number - len(self.files)
         names = join_names([*self.files, *([f"{more} more"] if more else [])])
         return (
@@ -136,7 +121,6 @@ class UnusedFiles(FindingData, code="unused_files", affects=NONE):
         )
 
 
-@dataclass(frozen=True)
 class UnequalLength(
     FindingData, code="unequal_length", affects=NONE, doubt="files may be cut short"
 ):
@@ -146,7 +130,6 @@ class UnequalLength(
     samples: tuple[int, ...]
 
     def text(self, channel: str) -> str:
-        """Return the finding in sentences."""
         lengths = zip(self.files, self.samples, strict=True)
         listed = join_names(
             [f"{counted(samples, 'sample')} in {file}" for file, samples in lengths]
@@ -157,7 +140,6 @@ class UnequalLength(
         )
 
 
-@dataclass(frozen=True)
 class NotUsed(FindingData, code="not_used", affects=NONE):
     """Samples outside of the part to use."""
 
@@ -165,14 +147,12 @@ class NotUsed(FindingData, code="not_used", affects=NONE):
     samples: int
 
     def text(self, channel: str) -> str:
-        """Return the finding in a sentence."""
         return (
             f"{self.file}: {counted(self.samples, 'sample lies', 'samples lie')} outside the part "
             "to use"
         )
 
 
-@dataclass(frozen=True)
 class UnitContradicts(
     FindingData,
     code="unit_contradicts",
@@ -194,7 +174,6 @@ class UnitContradicts(
     """Unit of the log over the one that is used."""
 
     def text(self, channel: str) -> str:
-        """Return the finding in sentences."""
         scaled = "" if self.scale == 1.0 else f", times {number_text(self.scale)}"
         return (
             f"{self.file} states {self.in_log} for {channel_name(channel)} ({self.where}). The "
@@ -204,7 +183,6 @@ class UnitContradicts(
         )
 
 
-@dataclass(frozen=True)
 class ZeroBytes(FindingData, code="zero_bytes", affects=ALL, doubt="the file has zero bytes"):
     """Runs of zero bytes, which are left out."""
 
@@ -221,7 +199,6 @@ class ZeroBytes(FindingData, code="zero_bytes", affects=ALL, doubt="the file has
     """Later samples are shifted in time, since no stamps are read."""
 
     def text(self, channel: str) -> str:
-        """Return the finding in sentences."""
         zeros = f"{self.file}: {counted(self.zeros, 'zero byte')}"
         if self.is_at_end:
             return (
@@ -240,7 +217,6 @@ class ZeroBytes(FindingData, code="zero_bytes", affects=ALL, doubt="the file has
         return text
 
 
-@dataclass(frozen=True)
 class TruncatedFile(
     FindingData, code="truncated_file", affects=NONE, doubt="the end of the file is missing"
 ):
@@ -251,7 +227,6 @@ class TruncatedFile(
     journal: str = ""
 
     def text(self, channel: str) -> str:
-        """Return the finding in sentences."""
         if self.what == "journal":
             return (
                 f"{self.file}: {self.journal} has records that are not yet in the bag and are not "
@@ -263,7 +238,6 @@ class TruncatedFile(
         return f"{self.file}: {what}; read as far as possible"
 
 
-@dataclass(frozen=True)
 class IncompleteLastRecord(FindingData, code="incomplete_last_record", affects=NONE):
     """A last record that is cut short, and left out."""
 
@@ -280,7 +254,6 @@ class IncompleteLastRecord(FindingData, code="incomplete_last_record", affects=N
     """Number of messages that are cut short, and their name."""
 
     def text(self, channel: str) -> str:
-        """Return the finding in sentences."""
         if self.messages is not None:
             number = counted(self.messages, f"{self.message} message")
             verb = "is" if self.messages == 1 else "are"
@@ -296,7 +269,6 @@ class IncompleteLastRecord(FindingData, code="incomplete_last_record", affects=N
         return f"{self.file}: {why}; left out: {self.shown!r}"
 
 
-@dataclass(frozen=True)
 class IncompleteFirstRecord(FindingData, code="incomplete_first_record", affects=NONE):
     """First lines that are only parts of records, and left out."""
 
@@ -308,7 +280,6 @@ class IncompleteFirstRecord(FindingData, code="incomplete_first_record", affects
     """Its first letters."""
 
     def text(self, channel: str) -> str:
-        """Return the finding in a sentence."""
         return (
             f"{self.file}: {counted(self.lines, 'line')} from line {self.first} on "
             f"{'lacks' if self.lines == 1 else 'lack'} a part of the record; left out: "
@@ -316,7 +287,6 @@ class IncompleteFirstRecord(FindingData, code="incomplete_first_record", affects
         )
 
 
-@dataclass(frozen=True)
 class NotRecords(FindingData, code="not_records", affects=NONE):
     """Lines under the names of columns that are neither units nor records."""
 
@@ -328,7 +298,6 @@ class NotRecords(FindingData, code="not_records", affects=NONE):
     """Its first letters."""
 
     def text(self, channel: str) -> str:
-        """Return the finding in a sentence."""
         verb, are = ("follows", "is") if self.lines == 1 else ("follow", "are")
         return (
             f"{self.file}: {counted(self.lines, 'line')} from line {self.first} on {verb} the "
@@ -336,7 +305,6 @@ class NotRecords(FindingData, code="not_records", affects=NONE):
         )
 
 
-@dataclass(frozen=True)
 class RestartedLog(FindingData, code="restarted_log", affects=NONE):
     """Headers within a log."""
 
@@ -346,7 +314,6 @@ class RestartedLog(FindingData, code="restarted_log", affects=NONE):
     """Places where a record before the header is cut short."""
 
     def text(self, channel: str) -> str:
-        """Return the finding in sentences."""
         cut = ""
         if self.cut:
             cut = f", after a record that is cut short in {counted(self.cut, 'place')}"
@@ -356,7 +323,6 @@ class RestartedLog(FindingData, code="restarted_log", affects=NONE):
         )
 
 
-@dataclass(frozen=True)
 class LeapSecond(FindingData, code="leap_second", affects=NONE):
     """Time stamps that count leap seconds."""
 
@@ -364,11 +330,9 @@ class LeapSecond(FindingData, code="leap_second", affects=NONE):
     seconds: int
 
     def text(self, channel: str) -> str:
-        """Return the finding in a sentence."""
         return f"{self.file}: the time stamps count {counted(self.seconds, 'leap second')}"
 
 
-@dataclass(frozen=True)
 class DamagedMessage(
     FindingData, code="damaged_message", affects=ALL, doubt="messages are damaged"
 ):
@@ -381,7 +345,6 @@ class DamagedMessage(
     """Otherwise they are missing samples."""
 
     def text(self, channel: str) -> str:
-        """Return the finding in a sentence."""
         verb = "message of {} does" if self.messages == 1 else "messages of {} do"
         return (
             f"{self.file}: {self.messages} {verb.format(self.topic)} not match "
@@ -389,7 +352,6 @@ class DamagedMessage(
         )
 
 
-@dataclass(frozen=True)
 class NotMeasured(
     FindingData, code="not_measured", affects=ALL, doubt="messages without a measurement"
 ):
@@ -401,7 +363,6 @@ class NotMeasured(
     quantity: str
 
     def text(self, channel: str) -> str:
-        """Return the finding in a sentence."""
         messages = "message of {} states" if self.messages == 1 else "messages of {} state"
         return (
             f"{self.file}: {self.messages} {messages.format(self.topic)} (covariance -1) that "
@@ -409,7 +370,6 @@ class NotMeasured(
         )
 
 
-@dataclass(frozen=True)
 class WrongChecksum(
     FindingData, code="wrong_checksum", affects=ALL, doubt="messages have a wrong checksum"
 ):
@@ -426,7 +386,6 @@ class WrongChecksum(
     """Later samples are shifted in time, since no stamps are read."""
 
     def text(self, channel: str) -> str:
-        """Return the finding in sentences."""
         kind = "sentence" if self.is_sentence else "message"
         number = counted(self.number, f"{self.name} {kind}")
         has = "has" if self.number == 1 else "have"
@@ -441,7 +400,6 @@ class WrongChecksum(
         return text
 
 
-@dataclass(frozen=True)
 class UnreadableSentence(
     FindingData, code="unreadable_sentence", affects=ALL, doubt="sentences are not readable"
 ):
@@ -454,7 +412,6 @@ class UnreadableSentence(
     """Numbers of a sentence."""
 
     def text(self, channel: str) -> str:
-        """Return the finding in sentences."""
         return (
             f"{self.file}: {counted(self.sentences, f'{self.name} sentence')} "
             f"{'has' if self.sentences == 1 else 'have'} a right checksum, but not the "
@@ -462,7 +419,6 @@ class UnreadableSentence(
         )
 
 
-@dataclass(frozen=True)
 class OtherSentences(FindingData, code="other_sentences", affects=NONE):
     """Sentences of other kinds, which are not read."""
 
@@ -472,14 +428,12 @@ class OtherSentences(FindingData, code="other_sentences", affects=NONE):
     """Names of the first kinds."""
 
     def text(self, channel: str) -> str:
-        """Return the finding in a sentence."""
         return (
             f"{self.file}: {counted(self.sentences, 'other sentence')} ({', '.join(self.names)}) "
             "not read"
         )
 
 
-@dataclass(frozen=True)
 class NotSentences(FindingData, code="not_sentences", affects=NONE):
     """Lines that are no sentence, and not read."""
 
@@ -487,7 +441,6 @@ class NotSentences(FindingData, code="not_sentences", affects=NONE):
     lines: int
 
     def text(self, channel: str) -> str:
-        """Return the finding in a sentence."""
         lines = counted(self.lines, "line or part of one", "lines or parts of them")
         are = "is no sentence" if self.lines == 1 else "are no sentences"
         return f"{self.file}: {lines} {are}; not read"

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 from imubench_pipeline.earth import STANDARD_GRAVITY
 from imubench_pipeline.settings.printed import SENSORS
@@ -22,7 +21,6 @@ _OF_UNIT = frozenset(POWERS_OF_UNIT)
 _CORRECT_UNIT = "If so, correct 'unit' in the sensor file"
 
 
-@dataclass(frozen=True)
 class RateImplausible(
     FindingData,
     code="rate_implausible",
@@ -43,7 +41,6 @@ class RateImplausible(
     """Whether the rate is plausible once the sensor file states it."""
 
     def text(self, channel: str) -> str:
-        """Return the finding in sentences."""
         times, size = (self.factor, "long") if self.factor > 1.0 else (1.0 / self.factor, "short")
         text = (
             f"The sampling rate is {number_text(self.rate)} Hz; expected "
@@ -58,7 +55,6 @@ class RateImplausible(
         return text
 
 
-@dataclass(frozen=True)
 class SuspiciousUnit(
     FindingData,
     code="suspicious_unit",
@@ -84,7 +80,6 @@ class SuspiciousUnit(
     """Whether they are from the data sheet of the sensor, and not of any."""
 
     def text(self, channel: str) -> str:
-        """Return the finding in sentences."""
         name = channel_name(channel)
         if self.gravity is not None:
             seen = f"the mean acceleration is {number_text(self.gravity)} m/s²"
@@ -105,7 +100,6 @@ class SuspiciousUnit(
         )
 
 
-@dataclass(frozen=True)
 class GravityNorm(
     FindingData,
     code="gravity_norm",
@@ -120,7 +114,6 @@ class GravityNorm(
     """Whether gravity seems to be subtracted."""
 
     def text(self, channel: str) -> str:
-        """Return the finding in sentences."""
         advice = (
             "Gravity seems to be subtracted already (linear acceleration): use the raw data"
             if self.removed
@@ -132,7 +125,6 @@ class GravityNorm(
         )
 
 
-@dataclass(frozen=True)
 class NoiseUnlikeDatasheet(
     FindingData,
     code="noise_unlike_datasheet",
@@ -150,7 +142,6 @@ class NoiseUnlikeDatasheet(
     """Hz, if the log has no time stamps: it may be the cause."""
 
     def text(self, channel: str) -> str:
-        """Return the finding in sentences."""
         name, unit = channel_name(self.measured_on), unit_of(self.measured_on, "density")
         rate = f"the stated rate of {number_text(self.stated_rate)} Hz, " * bool(self.stated_rate)
         return (
@@ -161,7 +152,6 @@ class NoiseUnlikeDatasheet(
         )
 
 
-@dataclass(frozen=True)
 class AxisUnlike(
     FindingData,
     code="axis_unlike",
@@ -180,7 +170,6 @@ class AxisUnlike(
     """Units as the sensor file writes them; None: no unit explains it."""
 
     def text(self, channel: str) -> str:
-        """Return the finding in sentences."""
         unit = (
             f"A unit of {self.likely} instead of {self.stated} would explain it. "
             if self.likely
@@ -194,7 +183,6 @@ class AxisUnlike(
         )
 
 
-@dataclass(frozen=True)
 class Turning(FindingData, code="turning", affects=ALL, unfit=True, doubt="the sensor was turning"):
     """The mean rate of a gyro, or a steady turn of gravity, shows a rotation."""
 
@@ -210,7 +198,6 @@ class Turning(FindingData, code="turning", affects=ALL, unfit=True, doubt="the s
     """Mean rate of the gyros about the axis of gravity's turn, if it agrees, rad/s."""
 
     def text(self, channel: str) -> str:
-        """Return the finding in sentences."""
         rate = number_text(math.degrees(self.rate), 3)
         if self.largest is not None:
             limit = {None: "of any gyro", "data sheet": "by its data sheet"}.get(
@@ -256,7 +243,6 @@ UNIT_MISTAKES: Mapping[str, Sequence[tuple[float, str]]] = {
 """Common unit mistakes: the factor that corrects a figure, and the mistake in words."""
 
 
-@dataclass(frozen=True)
 class UnusualFigure(
     FindingData,
     code="unusual_figure",
@@ -281,7 +267,6 @@ class UnusualFigure(
     estimated: bool = False
 
     def text(self, channel: str) -> str:
-        """Return the finding in sentences."""
         symbol = "σ_min" if self.figure == "B" and self.estimated else self.figure
         unit = unit_of(self.quantity, "density" if self.figure == "N" else "level")
         digits = unit.digits(self.value, self.lower, self.upper)

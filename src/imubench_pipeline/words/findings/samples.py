@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from math import ceil
 from typing import Literal
 
@@ -33,7 +32,6 @@ def _at(seconds: float) -> str:
     return f"{number_text(seconds, 5)} s"
 
 
-@dataclass(frozen=True)
 class Quantised(FindingData, code="quantised", affects=NONE):
     """The values are multiples of a visible step."""
 
@@ -46,7 +44,6 @@ class Quantised(FindingData, code="quantised", affects=NONE):
     """The values were rounded again, so their differences are no multiples of the step."""
 
     def text(self, channel: str) -> str:
-        """Return the finding in sentences."""
         if channel == TEMPERATURE:
             return (
                 f"The temperature has steps of {number_text(self.step, 3)} °C, from "
@@ -58,7 +55,6 @@ class Quantised(FindingData, code="quantised", affects=NONE):
         return text + (_ROUNDED if self.is_rounded else "")
 
 
-@dataclass(frozen=True)
 class Coarse(FindingData, code="coarse", affects=ALL, doubt="coarse resolution of {channels}"):
     """The noise is rounding noise."""
 
@@ -68,7 +64,6 @@ class Coarse(FindingData, code="coarse", affects=ALL, doubt="coarse resolution o
     is_rounded: bool
 
     def text(self, channel: str) -> str:
-        """Return the finding in sentences."""
         rounded = _ROUNDED if self.is_rounded else ""
         return (
             f"{channel_name(channel)} has {counted(round(self.levels), 'level')}, "
@@ -77,7 +72,6 @@ class Coarse(FindingData, code="coarse", affects=ALL, doubt="coarse resolution o
         )
 
 
-@dataclass(frozen=True)
 class RepeatedSamples(
     FindingData, code="repeated_samples", affects=WHITE, doubt="repeated samples in {channels}"
 ):
@@ -87,7 +81,6 @@ class RepeatedSamples(
     share_by_chance: float
 
     def text(self, channel: str) -> str:
-        """Return the finding in sentences."""
         return (
             f"{channel_name(channel)} repeats its previous sample in {percent_text(self.share, 2)} "
             f"of the records; rounding explains {percent_text(self.share_by_chance, 2)}. The "
@@ -96,7 +89,6 @@ class RepeatedSamples(
         )
 
 
-@dataclass(frozen=True)
 class HeldSamples(
     FindingData, code="held_samples", affects=WHITE, doubt="repeated samples in {channels}"
 ):
@@ -106,7 +98,6 @@ class HeldSamples(
     share_by_chance: float
 
     def text(self, channel: str) -> str:
-        """Return the finding in sentences."""
         return (
             f"One sample in {self.period} of {channel_name(channel)} repeats its predecessor, at "
             f"regular intervals; of the others, {percent_text(self.share_by_chance, 2)} do by "
@@ -115,16 +106,13 @@ class HeldSamples(
         )
 
 
-@dataclass(frozen=True)
 class NoSamples(FindingData, code="no_samples", affects=ALL, doubt="no samples in {channels}"):
     """A channel without a number."""
 
     def text(self, channel: str) -> str:
-        """Return the finding in a sentence."""
         return f"{channel_name(channel)} contains no number"
 
 
-@dataclass(frozen=True)
 class TooShort(FindingData, code="too_short", affects=ALL, doubt="too few samples in {channels}"):
     """Too few samples, or too few adjacent ones for an Allan variance."""
 
@@ -136,7 +124,6 @@ class TooShort(FindingData, code="too_short", affects=ALL, doubt="too few sample
     """Rate of the grid, Hz, if no Allan variance can be estimated."""
 
     def text(self, channel: str) -> str:
-        """Return the finding in sentences."""
         name = channel_name(channel)
         if self.rate is None:
             return (
@@ -150,7 +137,6 @@ class TooShort(FindingData, code="too_short", affects=ALL, doubt="too few sample
         )
 
 
-@dataclass(frozen=True)
 class Stuck(FindingData, code="stuck", affects=ALL, unfit=True, doubt="{channels} did not change"):
     """A channel that never changes."""
 
@@ -158,7 +144,6 @@ class Stuck(FindingData, code="stuck", affects=ALL, unfit=True, doubt="{channels
     samples: int
 
     def text(self, channel: str) -> str:
-        """Return the finding in sentences."""
         stays = f"stays at {_value_text(channel, self.value)}" if self.value else "is exactly 0"
         return (
             f"{channel_name(channel)} never changes: it {stays} in all {self.samples} samples. The "
@@ -166,7 +151,6 @@ class Stuck(FindingData, code="stuck", affects=ALL, unfit=True, doubt="{channels
         )
 
 
-@dataclass(frozen=True)
 class EmptyCells(
     FindingData, code="empty_cells", affects=ALL, doubt="missing samples in {channels}"
 ):
@@ -181,14 +165,12 @@ class EmptyCells(
     """Its start, s."""
 
     def text(self, channel: str) -> str:
-        """Return the finding in sentences."""
         return (
             f"{channel_name(channel)} has {counted(self.cells, 'record')} without a number, "
             f"treated as missing samples. {_longest_run(self.longest, self.duration, self.start)}"
         )
 
 
-@dataclass(frozen=True)
 class NotFinite(
     FindingData, code="not_finite", affects=ALL, doubt="values of {channels} that are not finite"
 ):
@@ -204,7 +186,6 @@ class NotFinite(
     """Its start, s."""
 
     def text(self, channel: str) -> str:
-        """Return the finding in sentences."""
         return (
             f"{channel_name(channel)} has {counted(self.cells, 'value')} that are infinite or "
             f"above {number_text(self.limit)}, treated as missing samples. "
@@ -220,7 +201,6 @@ def _longest_run(records: int, duration: float, start: float) -> str:
     )
 
 
-@dataclass(frozen=True)
 class StuckForAWhile(
     FindingData,
     code="stuck_for_a_while",
@@ -233,14 +213,12 @@ class StuckForAWhile(
     samples: int
 
     def text(self, channel: str) -> str:
-        """Return the finding in a sentence."""
         return (
             f"{channel_name(channel)} stays at one value for {number_text(self.duration)} s "
             f"({self.samples} samples)"
         )
 
 
-@dataclass(frozen=True)
 class Saturated(
     FindingData, code="saturated", affects=ALL, doubt="saturated samples in {channels}"
 ):
@@ -252,14 +230,12 @@ class Saturated(
     """``lowest`` or ``highest``."""
 
     def text(self, channel: str) -> str:
-        """Return the finding in sentences."""
         return (
             f"{channel_name(channel)} has {self.samples} samples at its {self.side} value, "
             f"{_value_text(channel, self.value)}: it is saturated. Use a wider range"
         )
 
 
-@dataclass(frozen=True)
 class PiledUp(
     FindingData, code="piled_up", affects=ALL, doubt="one value is too frequent in {channels}"
 ):
@@ -269,7 +245,6 @@ class PiledUp(
     value: float
 
     def text(self, channel: str) -> str:
-        """Return the finding in sentences."""
         return (
             f"{percent_text(self.share, 2)} of the samples of {channel_name(channel)} are exactly "
             f"{_value_text(channel, self.value)}, many times more than at neighbouring values. "
@@ -278,7 +253,6 @@ class PiledUp(
         )
 
 
-@dataclass(frozen=True)
 class Motion(FindingData, code="motion", affects=ALL, unfit=True, doubt="the sensor was moved"):
     """The sensor was shaken."""
 
@@ -286,14 +260,12 @@ class Motion(FindingData, code="motion", affects=ALL, unfit=True, doubt="the sen
     end: float
 
     def text(self, channel: str) -> str:
-        """Return the finding in sentences."""
         return (
             f"{channel_name(channel)} was shaken from {_at(self.start)} to {_at(self.end)}. Leave "
             "this part out: 'use:' in the notes beside the log"
         )
 
 
-@dataclass(frozen=True)
 class Step(FindingData, code="step", affects=SLOW | {"bias"}, doubt="a step in {channels}"):
     """A sudden change of the mean."""
 
@@ -303,7 +275,6 @@ class Step(FindingData, code="step", affects=SLOW | {"bias"}, doubt="a step in {
     """Size over the standard deviation of all changes of the mean."""
 
     def text(self, channel: str) -> str:
-        """Return the finding in sentences."""
         return (
             f"The mean of {channel_name(channel)} changes by {_value_text(channel, self.size)} at "
             f"{_at(self.at)}, {number_text(self.sigmas, 3)} times its usual change. The sensor was "
@@ -311,7 +282,6 @@ class Step(FindingData, code="step", affects=SLOW | {"bias"}, doubt="a step in {
         )
 
 
-@dataclass(frozen=True)
 class WarmUp(
     FindingData, code="warm_up", affects=SLOW | {"bias"}, doubt="warm-up drift of {channels}"
 ):
@@ -323,7 +293,6 @@ class WarmUp(
     """Drift over the usual one in the rest; None if there is none."""
 
     def text(self, channel: str) -> str:
-        """Return the finding in sentences."""
         later = "; later it does not drift"
         if self.ratio is not None:
             later = f", {number_text(self.ratio, 2)} times as much as later"
@@ -334,7 +303,6 @@ class WarmUp(
         )
 
 
-@dataclass(frozen=True)
 class NotStationary(
     FindingData, code="not_stationary", affects=ALL, doubt="the noise of {channels} changes"
 ):
@@ -345,7 +313,6 @@ class NotStationary(
     end: float
 
     def text(self, channel: str) -> str:
-        """Return the finding in a sentence."""
         return (
             f"The noise of {channel_name(channel)} is not stationary: from {_at(self.start)} to "
             f"{_at(self.end)} it is {number_text(self.ratio, 3)} times as large as in the calmest "
@@ -353,7 +320,6 @@ class NotStationary(
         )
 
 
-@dataclass(frozen=True)
 class Joined(FindingData, code="joined", affects=ALL, unfit=True, doubt="two logs are joined"):
     """The data of another sensor, or of another range, begin within the log."""
 
@@ -363,7 +329,6 @@ class Joined(FindingData, code="joined", affects=ALL, unfit=True, doubt="two log
     """Noise after the change over the noise before."""
 
     def text(self, channel: str) -> str:
-        """Return the finding in sentences."""
         changed = join_names([_CHANGES[change] for change in self.changes])
         return (
             f"The {changed} of {channel_name(channel)} change at once at {_at(self.at)}. The noise "
@@ -373,7 +338,6 @@ class Joined(FindingData, code="joined", affects=ALL, unfit=True, doubt="two log
         )
 
 
-@dataclass(frozen=True)
 class Interleaved(
     FindingData,
     code="interleaved",
@@ -389,7 +353,6 @@ class Interleaved(
     noise_ratio: float
 
     def text(self, channel: str) -> str:
-        """Return the finding in sentences."""
         changed = join_names([_CHANGES[change] for change in self.changes])
         verb = "alternates" if len(self.changes) == 1 else "alternate"
         return (

@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from imubench_pipeline.words.findings.base import NONE, SLOW, FindingData, channel_name
 from imubench_pipeline.words.findings.shown import value_text
 from imubench_pipeline.words.numbers import counted, number_text, percent_text
 
 
-@dataclass(frozen=True)
 class MethodsDiffer(FindingData, code="N_differs", affects=NONE):
     """N of the curve fit and N of the likelihood exclude each other."""
 
@@ -17,7 +14,6 @@ class MethodsDiffer(FindingData, code="N_differs", affects=NONE):
     """N of the curve fit over N of the likelihood."""
 
     def text(self, channel: str) -> str:
-        """Return the finding in sentences."""
         return (
             f"N of {channel_name(channel)} from the fit of the Allan variance is "
             f"{number_text(self.ratio, 3)} times N of the likelihood, outside both intervals. "
@@ -26,7 +22,6 @@ class MethodsDiffer(FindingData, code="N_differs", affects=NONE):
         )
 
 
-@dataclass(frozen=True)
 class Lines(FindingData, code="lines", affects=NONE):
     """Spectral lines that the noise fit excludes."""
 
@@ -39,7 +34,6 @@ class Lines(FindingData, code="lines", affects=NONE):
     """Density of the strongest over the noise floor."""
 
     def text(self, channel: str) -> str:
-        """Return the finding in sentences."""
         kinds = [
             counted(number, noun)
             for number, noun in ((self.sinusoids, "spectral line"), (self.bands, "noise band"))
@@ -56,7 +50,6 @@ class Lines(FindingData, code="lines", affects=NONE):
         )
 
 
-@dataclass(frozen=True)
 class StrongLine(
     FindingData,
     code="strong_line",
@@ -71,7 +64,6 @@ class StrongLine(
     """Ratio of its integral to the integral of white noise, after 1 s."""
 
     def text(self, channel: str) -> str:
-        """Return the finding in sentences."""
         return (
             f"A sinusoid of {channel_name(channel)} at {number_text(self.frequency, 5)} Hz adds "
             f"{number_text(self.ratio, 3)} times the white-noise error over 1 s. "
@@ -80,7 +72,6 @@ class StrongLine(
         )
 
 
-@dataclass(frozen=True)
 class TooManyLines(
     FindingData,
     code="too_many_lines",
@@ -100,7 +91,6 @@ class TooManyLines(
     """Of the others, SI."""
 
     def text(self, channel: str) -> str:
-        """Return the finding in sentences."""
         return (
             f"{channel_name(channel)} has {self.lines} sinusoids, too many for a noise model. "
             f"Error budgets, simulations and filters use the {self.single} strongest individually. "
@@ -111,7 +101,6 @@ class TooManyLines(
         )
 
 
-@dataclass(frozen=True)
 class BandLimit(FindingData, code="band_limit", affects=NONE):
     """The fit uses only frequencies below a limit."""
 
@@ -121,7 +110,6 @@ class BandLimit(FindingData, code="band_limit", affects=NONE):
     """Whether the spectrum follows a noise model up to there."""
 
     def text(self, channel: str) -> str:
-        """Return the finding in sentences."""
         name, limit = channel_name(channel), f"{number_text(self.highest)} Hz"
         if not self.follows_model:
             return (
@@ -136,7 +124,6 @@ class BandLimit(FindingData, code="band_limit", affects=NONE):
         )
 
 
-@dataclass(frozen=True)
 class SlowNoiseMissing(
     FindingData,
     code="slow_noise_missing",
@@ -151,7 +138,6 @@ class SlowNoiseMissing(
     """Ratio of the density up to there to the white noise."""
 
     def text(self, channel: str) -> str:
-        """Return the finding in sentences."""
         return (
             f"Up to {number_text(self.highest, 3)} Hz the spectrum of {channel_name(channel)} has "
             f"{number_text(self.ratio, 2)} times the density of its white noise. "

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 from imubench_pipeline.words.findings.base import (
     ALL,
@@ -35,7 +34,6 @@ def _change_of_n(correct: float, used: float) -> str:
     return f"{percent_text(abs(change), 2)} {'higher' if change > 0.0 else 'lower'}"
 
 
-@dataclass(frozen=True)
 class RateChanges(
     FindingData, code="rate_changes", affects=WHITE, doubt="the sampling rate changes"
 ):
@@ -50,7 +48,6 @@ class RateChanges(
     """Rate at which all are analysed, Hz."""
 
     def text(self, channel: str) -> str:
-        """Return the finding in sentences."""
         of = f" of {channel_name(channel)}" if channel else ""
         low = 1.0 - math.sqrt(self.lower_rate / self.rate)
         return (
@@ -62,7 +59,6 @@ class RateChanges(
         )
 
 
-@dataclass(frozen=True)
 class CoarseStamps(
     FindingData, code="coarse_stamps", affects=_TIMED, doubt="the sampling rate is ambiguous"
 ):
@@ -73,7 +69,6 @@ class CoarseStamps(
     """Rate if the stamps are not rounded, Hz."""
 
     def text(self, channel: str) -> str:
-        """Return the finding in sentences."""
         what, cause = "repeat", "records are written twice"
         if self.other_rate > self.rate:
             what, cause = "have double steps", "samples are lost"
@@ -85,7 +80,6 @@ class CoarseStamps(
         )
 
 
-@dataclass(frozen=True)
 class MissingSamples(FindingData, code="missing_samples", affects=ALL, doubt="samples are missing"):
     """Points of the grid without a sample."""
 
@@ -102,7 +96,6 @@ class MissingSamples(FindingData, code="missing_samples", affects=ALL, doubt="sa
     """N at that rate over N."""
 
     def text(self, channel: str) -> str:
-        """Return the finding in sentences."""
         longest = f"{number_text(self.longest, 3)} s, from {_at(self.start)} on"
         gaps = (
             f"1 gap of {longest}" if self.gaps == 1 else f"{self.gaps} gaps, the longest {longest}"
@@ -122,7 +115,6 @@ class MissingSamples(FindingData, code="missing_samples", affects=ALL, doubt="sa
         return text
 
 
-@dataclass(frozen=True)
 class Segments(
     FindingData, code="segments", affects=SLOW | {"bias"}, doubt="the recording was interrupted"
 ):
@@ -137,7 +129,6 @@ class Segments(
     """Duration of the samples before it, s."""
 
     def text(self, channel: str) -> str:
-        """Return the finding in sentences."""
         what = "The clock jumps or stops" if self.has_grid else "The stamps stop or run backwards"
         direction = "backwards" if self.longest < 0.0 else "forward"
         step = f"{number_text(abs(self.longest), 5)} s {direction}, after {_at(self.at)} of samples"
@@ -145,14 +136,12 @@ class Segments(
         return f"{what} {often} {step}. The recording is analysed as {self.pauses + 1} segments"
 
 
-@dataclass(frozen=True)
 class RepeatedStamps(FindingData, code="repeated_stamps", affects=NONE):
     """Records with the stamp of an earlier one, which are left out."""
 
     records: int
 
     def text(self, channel: str) -> str:
-        """Return the finding in sentences."""
         one = self.records == 1
         records = "record repeats a stamp or goes" if one else "records repeat a stamp or go"
         return (
@@ -161,7 +150,6 @@ class RepeatedStamps(FindingData, code="repeated_stamps", affects=NONE):
         )
 
 
-@dataclass(frozen=True)
 class MissingStamps(
     FindingData, code="missing_stamps", affects=_TIMED, doubt="time stamps are missing"
 ):
@@ -170,14 +158,12 @@ class MissingStamps(
     records: int
 
     def text(self, channel: str) -> str:
-        """Return the finding in a sentence."""
         return (
             f"{counted(self.records, 'record has', 'records have')} no time stamp, or one far from "
             "its neighbours; taken as consecutive"
         )
 
 
-@dataclass(frozen=True)
 class RateContradictsStamps(
     FindingData,
     code="rate_contradicts_stamps",
@@ -190,14 +176,12 @@ class RateContradictsStamps(
     rate: float
 
     def text(self, channel: str) -> str:
-        """Return the finding in sentences."""
         return (
             f"The sensor file or the log states {_rate_text(self.stated)}, but the time stamps "
             f"have {_rate_text(self.rate)}, which is used. Correct 'rate', or remove it"
         )
 
 
-@dataclass(frozen=True)
 class RateDrifts(FindingData, code="rate_drifts", affects=_TIMED, doubt="the clock drifts"):
     """The sampling interval differs between the halves of a log."""
 
@@ -205,7 +189,6 @@ class RateDrifts(FindingData, code="rate_drifts", affects=_TIMED, doubt="the clo
     """Relative change of the interval."""
 
     def text(self, channel: str) -> str:
-        """Return the finding in sentences."""
         return (
             f"The sampling interval is {number_text(1e6 * abs(self.drift), 3)} ppm "
             f"{'longer' if self.drift > 0.0 else 'shorter'} in the second half of the recording: "
@@ -213,7 +196,6 @@ class RateDrifts(FindingData, code="rate_drifts", affects=_TIMED, doubt="the clo
         )
 
 
-@dataclass(frozen=True)
 class JitteredStamps(
     FindingData, code="jittered_stamps", affects=_TIMED, doubt="the time stamps are irregular"
 ):
@@ -229,7 +211,6 @@ class JitteredStamps(
     rate: float
 
     def text(self, channel: str) -> str:
-        """Return the finding in sentences."""
         return (
             f"The time stamps lie on no uniform grid: {percent_text(self.share, 2)} are off it, "
             f"with {counted(self.pauses, 'pause')}, and intervals up to "
@@ -239,7 +220,6 @@ class JitteredStamps(
         )
 
 
-@dataclass(frozen=True)
 class IrregularStamps(
     FindingData,
     code="irregular_stamps",
@@ -252,7 +232,6 @@ class IrregularStamps(
     rate: float
 
     def text(self, channel: str) -> str:
-        """Return the finding in sentences."""
         return (
             f"{counted(self.stamps, 'stamp has', 'stamps have')} more or fewer samples than the "
             "others: the clock was set, or samples are lost. The rate, "
@@ -260,7 +239,6 @@ class IrregularStamps(
         )
 
 
-@dataclass(frozen=True)
 class OwnRate(FindingData, code="own_rate", affects=NONE):
     """Channels with fewer numbers than the log has records."""
 
@@ -270,7 +248,6 @@ class OwnRate(FindingData, code="own_rate", affects=NONE):
     rate: float
 
     def text(self, channel: str) -> str:
-        """Return the finding in sentences."""
         one = len(self.channels) == 1
         return (
             f"{join_names([channel_name(name) for name in self.channels])} "

@@ -37,54 +37,40 @@ MAXIMUM_AS_SIGMAS = "maximum taken as 3σ"
 OF_THIS_UNIT = "of this unit, at the mean temperature of the log"
 
 
+NOT_STATED = "the sensor file does not state it"
+NOT_KNOWN = "not known"
+
+
 def bias_not_known(quantity: str) -> str:
     """Return that a budget has no turn-on bias of ``gyro`` or ``accel``."""
     return f"the turn-on bias of the {SENSORS[quantity]} is not known and not included"
 
 
-def heading_bias_not_known() -> str:
-    """Return that the error of north-finding has no turn-on bias."""
-    return f"{bias_not_known('gyro')}. The heading error is at least this"
-
-
-def not_stated() -> str:
-    """Return why a figure is not known that the sensor file does not have."""
-    return "the sensor file does not state it"
-
-
-def not_known() -> str:
-    """Return that a figure is not known, without a reason."""
-    return "not known"
+HEADING_BIAS_NOT_KNOWN = f"{bias_not_known('gyro')}. The heading error is at least this"
 
 
 def figure_not_known(name: str, reason: str = "") -> str:
-    """Return which figure or source is not known, and why."""
     return f"{name}: not known" + (f" ({reason})" if reason else "")
 
 
 def not_recorded(quantity: str) -> str:
-    """Return why there is no budget without a gyro or accelerometer."""
     return f"the recording has no {SENSORS[quantity]}"
 
 
 def noise_not_known(channels: Sequence[str], reason: str | None) -> str:
-    """Return why there is no budget, with the reason of the first channel."""
     names = join_names(list(map(channel_name, channels)))
     return f"the noise of {names} is not known: {reason or 'the log does not show it'}"
 
 
 def channel_not_used(channel: str, reason: str | None) -> str:
-    """Return why a channel is not used for a budget."""
     return f"{channel_name(channel)} is not used, as {noise_not_known([channel], reason)}"
 
 
 def parameter_status(symbol: str, channel: str, status: Status) -> str:
-    """Return that a parameter of a budget has no plain value."""
     return f"{symbol} of {channel_name(channel)} is {STATUS_WORDS[status]}"
 
 
 def independent_draws(method: str, channel: str) -> str:
-    """Return why an interval is too wide."""
     return (
         f"method {method} gives separate intervals for the parameters of {channel_name(channel)}: "
         "the interval of the error may be too wide"
@@ -97,22 +83,18 @@ def missing_numbers(names: Sequence[str]) -> str:
 
 
 def no_quantity(quantity: str) -> str:
-    """Return why a sensor is not judged."""
     return f"it has no {SENSORS[quantity]}"
 
 
 def no_density(quantity: str) -> str:
-    """Return why a sensor is not judged by its data sheet."""
     return f"no noise density of the {SENSORS[quantity]} is published"
 
 
 def any_option(quantity: str, options: Sequence[str]) -> str:
-    """Return that all options of a sensor are considered."""
     return f"{SENSORS[quantity]}: any of the options {', '.join(options)}"
 
 
 def either_side(quantity: str, symbol: str) -> str:
-    """Return that both readings of a density are considered."""
     return (
         f"{SENSORS[quantity]} {symbol}: the data sheet does not say whether the density is one- or "
         "two-sided, so both are considered"
@@ -120,7 +102,6 @@ def either_side(quantity: str, symbol: str) -> str:
 
 
 def only_maximum(quantity: str, symbol: str) -> str:
-    """Return that a figure may be better than printed."""
     return (
         f"{SENSORS[quantity]} {symbol}: only a maximum is printed, and the typical figure may be "
         "better"
@@ -145,7 +126,6 @@ def range_source(sensors: Sequence[str], price_class: str, *, measured: bool) ->
 
 
 def floor_and_minimum(quantity: str) -> str:
-    """Return how a printed bias instability is used."""
     return (
         f"{SENSORS[quantity]} B: the printed figure in the best case, and as the minimum of the "
         "curve in the worst"
@@ -153,7 +133,6 @@ def floor_and_minimum(quantity: str) -> str:
 
 
 def neither_printed_nor_measured(quantity: str, symbols: Sequence[str]) -> str:
-    """Return which figures are not known of any sensor."""
     return (
         f"{SENSORS[quantity]} {join_names(list(symbols))}: not published, and not measured of any "
         "sensor"
@@ -161,5 +140,4 @@ def neither_printed_nor_measured(quantity: str, symbols: Sequence[str]) -> str:
 
 
 def flicker_assumed(quantity: str) -> str:
-    """Return what B is without a T_B."""
     return f"{SENSORS[quantity]} B: flicker noise, as no T_B is known"

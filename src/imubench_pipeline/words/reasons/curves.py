@@ -10,12 +10,17 @@ _MAX_PRINTED_ERROR = 10.0
 """Maximum relative standard error that is printed as a number."""
 
 
-def repeated_samples() -> str:
-    """Return why a curve is not used whose Allan variance is 0."""
-    return (
-        "the Allan variance is 0 at some τ because samples repeat exactly. "
-        "Check the log for stuck values"
-    )
+REPEATED_SAMPLES = (
+    "the Allan variance is 0 at some τ because samples repeat exactly. "
+    "Check the log for stuck values"
+)
+SHORT_CURVE = "the curve is too short to show a slope. Record a longer log"
+NO_FALL = "the curve has no minimum: it is lowest at its shortest τ"
+READ_AT_MINIMUM = "read at the minimum of the whole curve, where N and K add to B"
+FIT_WITHOUT_TERM = "the curve is fitted best without this term"
+NO_NOISE = "the model has no noise"
+NO_BIAS_TERMS = "the model has no flicker noise and no Gauss-Markov process"
+MINIMUM_BEYOND = "some models that fit the log have no minimum within a ninth of it"
 
 
 def few_points(points: int, longest: float, needed: int) -> str:
@@ -26,22 +31,11 @@ def few_points(points: int, longest: float, needed: int) -> str:
     )
 
 
-def short_curve() -> str:
-    """Return why no slope is read."""
-    return "the curve is too short to show a slope. Record a longer log"
-
-
 def no_white_slope(lowest: float, highest: float) -> str:
-    """Return why N is not read, with the range of the slopes."""
     return (
         "no part of the curve has the slope −1/2 of white noise: its slopes are between "
         f"{number_text(lowest, 2)} and {number_text(highest, 2)}"
     )
-
-
-def no_fall() -> str:
-    """Return why a curve that does not fall first has no minimum."""
-    return "the curve has no minimum: it is lowest at its shortest τ"
 
 
 def no_rise(tau: float, sigmas: float) -> str:
@@ -52,22 +46,12 @@ def no_rise(tau: float, sigmas: float) -> str:
     )
 
 
-def read_at_minimum() -> str:
-    """Return what B includes that is read at the minimum."""
-    return "read at the minimum of the whole curve, where N and K add to B"
-
-
 def no_walk_slope(steepest: float | None) -> str:
     """Return why K is not read; ``steepest``: slope of the steepest end, None if it has none."""
     text = "the curve does not end with the slope +1/2 of a random walk: its "
     if steepest is None:
         return f"{text}lowest point is near its end"
     return f"{text}steepest end has the slope {number_text(steepest, 2)}"
-
-
-def fit_without_term() -> str:
-    """Return why a term is absent from a fit to the curve."""
-    return "the curve is fitted best without this term"
 
 
 def no_peak(longest: float) -> str:
@@ -94,19 +78,12 @@ def fitted_from(tau: float) -> str:
     )
 
 
-def no_noise() -> str:
-    """Return why a model without terms has no figures."""
-    return "the model has no noise"
-
-
 def large_error(symbol: str, error: float, most: float | None = None) -> str:
-    """Return the relative standard error of a parameter, and the limit that it exceeds."""
     above = "" if most is None else f", above {percent_text(most)}"
     return f"the relative standard error of {symbol} is {_error_text(error)}{above}"
 
 
 def no_significant_peak(error_of_time: float, error: float | None = None) -> str:
-    """Return why T_B, or, with its own relative standard error, B is not identified."""
     of_time = _error_text(error_of_time)
     text = "no peak of a Gauss-Markov process is significant: the relative standard error of "
     if error is None:
@@ -145,13 +122,7 @@ def rises_to_end(tau: float) -> str:
 
 
 def time_at_bound(reason: str) -> str:
-    """Return why B_curve is not identified, with the reason of a T_B at its bound."""
     return f"a correlation time is not determined: {reason}"
-
-
-def no_bias_terms() -> str:
-    """Return why the curve of a model has no bias instability."""
-    return "the model has no flicker noise and no Gauss-Markov process"
 
 
 def no_model_minimum(falls_to: float | None) -> str:
@@ -162,13 +133,7 @@ def no_model_minimum(falls_to: float | None) -> str:
     return f"{text}still falls at {number_text(falls_to)} s, a ninth of the log"
 
 
-def minimum_beyond() -> str:
-    """Return why tau_min is not identified."""
-    return "some models that fit the log have no minimum within a ninth of it"
-
-
 def white_level_of_model(decades: float) -> str:
-    """Return which N is given where no stretch of the curve is long enough."""
     return (
         f"the Allan deviation has no slope of −1/2 over {number_text(decades, 2)} decades: N is "
         "the white noise of the fitted model"

@@ -32,6 +32,23 @@ ONE_LOG_OBSTACLES: Mapping[str, str] = {
 """Why figures cannot be compared with one log."""
 
 
+ONLY_MINIMUM = "only a minimum is printed"
+RMS_WITHOUT_BANDWIDTH = "an rms without its bandwidth does not give a density"
+DEVIATION_WITHOUT_TIME = "an Allan deviation without its averaging time cannot be compared"
+WALK_IS_DENSITY = "the printed random walk is N"
+CURVE_MINIMUM = "compared with the minimum of the curve"
+CURVE_AT_TIME = "compared with the curve at this averaging time"
+EARTH_RATE_IN_MEAN = "mean of the recording, which includes up to ±15 °/h of the Earth's rotation"
+GRAVITY_NEEDS_THREE_AXES = "three axes are needed to subtract gravity"
+AXIS_NOT_VERTICAL = "the axis is not vertical, so its offset cannot be separated from tilt"
+NORM_LESS_GRAVITY = (
+    "norm of the three axes less standard gravity. It includes the scale factor error, and "
+    "local gravity differs by up to 0.027 m/s²"
+)
+NO_TEMPERATURE = "the log has no temperature readings"
+NO_INTERVAL = "it has no interval"
+
+
 def other_option(option: str, stated: Sequence[str]) -> str:
     """Return why a figure of an option is not compared; ``stated``: options in the sensor file."""
     if stated:
@@ -39,40 +56,13 @@ def other_option(option: str, stated: Sequence[str]) -> str:
     return f"printed for the option {option}. State the options of the logged sensor in its file"
 
 
-def only_minimum() -> str:
-    """Return why a printed minimum is not compared."""
-    return "only a minimum is printed"
-
-
-def rms_without_bandwidth() -> str:
-    """Return why a printed rms is not compared."""
-    return "an rms without its bandwidth does not give a density"
-
-
-def deviation_without_time() -> str:
-    """Return why a printed Allan deviation is not compared."""
-    return "an Allan deviation without its averaging time cannot be compared"
-
-
 def unpublished(*, looked_up: bool) -> str:
-    """Return why there is no printed figure."""
     return "the vendor does not publish it" if looked_up else "the sensor file does not state it"
 
 
-def walk_is_density() -> str:
-    """Return how a printed random walk is compared."""
-    return "the printed random walk is N"
-
-
 def density_of_rms(bandwidth: str | None = None, low_pass: str | None = None) -> str:
-    """Return how a printed rms is compared, with its bandwidth and filter."""
     text = "N is the printed rms / √(2 bandwidth)"
     return text if bandwidth is None else f"{text}, with {bandwidth} ({low_pass})"
-
-
-def curve_minimum() -> str:
-    """Return what a printed bias instability is compared with."""
-    return "compared with the minimum of the curve"
 
 
 def curve_plateau(floor: float) -> str:
@@ -80,25 +70,17 @@ def curve_plateau(floor: float) -> str:
     return f"compared with the plateau of the bias instability, {number_text(floor, 3)} B"
 
 
-def curve_at_time() -> str:
-    """Return what a printed Allan deviation is compared with."""
-    return "compared with the curve at this averaging time"
-
-
 def density_side(sidedness: str, *, assumed: bool) -> str:
-    """Return how a printed density is compared."""
     unsure = " (assumed, as the data sheet does not state it)" if assumed else ""
     root = " / √2" if sidedness == "one-sided" else ""
     return f"{sidedness} density{unsure}: N is the density{root}"
 
 
 def limits_decide(reason: str) -> str:
-    """Return that a verdict follows from limits, as there is no value for a reason."""
     return f"{reason}; the verdict follows from the limits"
 
 
 def interval_spans(least: str, largest: str) -> str:
-    """Return which verdicts the ends of an interval have."""
     return f"the 95 % interval extends from “{least}” to “{largest}”"
 
 
@@ -107,42 +89,9 @@ def curve_not_shown(tau: float) -> str:
     return f"the log does not show the curve at {number_text(tau)} s"
 
 
-def earth_rate_in_mean() -> str:
-    """Return how well the bias of a gyro is known."""
-    return "mean of the recording, which includes up to ±15 °/h of the Earth's rotation"
-
-
-def gravity_needs_three_axes() -> str:
-    """Return why the bias of an accelerometer is not known."""
-    return "three axes are needed to subtract gravity"
-
-
 def mean_is_not_gravity(norm: float) -> str:
     """Return why the bias of an accelerometer is not known; ``norm`` in m/s²."""
     return f"the mean acceleration is {number_text(norm)} m/s², which is not gravity"
-
-
-def axis_not_vertical() -> str:
-    """Return why the bias of an accelerometer is not known."""
-    return "the axis is not vertical, so its offset cannot be separated from tilt"
-
-
-def norm_less_gravity() -> str:
-    """Return how well the bias of an accelerometer is known."""
-    return (
-        "norm of the three axes less standard gravity. It includes the scale factor error, and "
-        "local gravity differs by up to 0.027 m/s²"
-    )
-
-
-def no_temperature() -> str:
-    """Return why the temperature sensitivity is not known."""
-    return "the log has no temperature readings"
-
-
-def no_interval() -> str:
-    """Return why the temperature sensitivity is not known."""
-    return "it has no interval"
 
 
 def slope_at(reference: float, lowest: float | None, highest: float | None, *, bends: bool) -> str:

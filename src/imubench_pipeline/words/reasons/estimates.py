@@ -8,19 +8,28 @@ from imubench_pipeline.model.states import Status
 from imubench_pipeline.words.estimates import STATUS_WORDS
 from imubench_pipeline.words.numbers import join_names, number_text, percent_text
 
-
-def absent() -> str:
-    """Return why a term is not in the model."""
-    return "the data do not support it"
-
-
-def absent_below() -> str:
-    """Return why a term with an upper limit is not in the model."""
-    return f"{absent()}; the upper limit is at 95 %"
+ABSENT = "the data do not support it"
+ABSENT_BELOW = f"{ABSENT}; the upper limit is at 95 %"
+BIAS_MODELS_ALIKE = "models with a bias instability fit about as well: only the interval is given"
+FLICKER_WITHOUT_TIME = (
+    "the bias instability of this model is flicker noise, which has no correlation time"
+)
+SIGNALS_HIDE_WALK = "the deterministic signals contain most of the information on a random walk"
+SHORT_LOG = "the log is too short"
+SENSITIVITY_WITH_ZERO = "the 95 % interval of the temperature sensitivity includes 0"
+LAG_NOT_ASKED = "no lag was asked for"
+NO_EFFECT_TO_LAG = "no effect of the temperature is shown that could lag"
+MONOTONE_TEMPERATURE = (
+    "the temperature only rises or only falls, and a drift with time explains as much. "
+    "Vary it up and down"
+)
+TEMPERATURE_BY_CHANCE = (
+    "temperature follows most of the slow drift, but a random walk as strong as in this log "
+    "would do so by chance"
+)
 
 
 def models_alike(others: Sequence[str], chosen: str) -> str:
-    """Return why a parameter that only other models have is not identified."""
     include, fit = ("includes", "fits") if len(others) == 1 else ("include", "fit")
     return (
         f"{join_names(others)}, which {include} it, {fit} about as well as {chosen}: only the "
@@ -28,20 +37,10 @@ def models_alike(others: Sequence[str], chosen: str) -> str:
     )
 
 
-def bias_models_alike() -> str:
-    """Return why B_curve is not identified where the chosen model has no bias instability."""
-    return "models with a bias instability fit about as well: only the interval is given"
-
-
 def correlation_bound(bound: float, *, longest: bool) -> str:
     """Return why T_B is at a bound, s."""
     end = "longest" if longest else "shortest"
     return f"the {end} correlation time that this log can show is {number_text(bound)} s"
-
-
-def flicker_without_time() -> str:
-    """Return why there is no T_B."""
-    return "the bias instability of this model is flicker noise, which has no correlation time"
 
 
 def wide_interval(ratio: float) -> str:
@@ -53,13 +52,11 @@ def wide_interval(ratio: float) -> str:
 
 
 def interval_with_zero(*, at_limit: bool) -> str:
-    """Return why no value is given where 0 is inside the interval or its lower limit."""
     where = "the lower 95 % limit is 0" if at_limit else "the 95 % interval includes 0"
     return f"{where}: only the interval is given"
 
 
 def excluded_by_likelihood(symbol: str, lower: float, upper: float) -> str:
-    """Return why a value is doubtful; limits of the likelihood over this value."""
     return (
         f"the likelihood excludes this value: its 95 % interval of {symbol} is "
         f"{number_text(lower, 3)} to {number_text(upper, 3)} times this value. "
@@ -68,12 +65,10 @@ def excluded_by_likelihood(symbol: str, lower: float, upper: float) -> str:
 
 
 def no_reference(symbol: str, status: Status, reason: str | None) -> str:
-    """Return why a value is doubtful that the likelihood does not give."""
     return f"the likelihood gives no {symbol}: {reason or STATUS_WORDS[status]}"
 
 
 def criteria_disagree(by_aic: str, delta_aic: float, by_bic: str, delta_bic: float) -> str:
-    """Return that AIC and BIC prefer different models, each by a difference."""
     return (
         f"AIC prefers {by_aic} by {number_text(delta_aic, 2)}, BIC prefers {by_bic} by "
         f"{number_text(delta_bic, 2)}"
@@ -81,12 +76,10 @@ def criteria_disagree(by_aic: str, delta_aic: float, by_bic: str, delta_bic: flo
 
 
 def model_disfavoured(chosen: str, papers: str, delta_bic: float) -> str:
-    """Return why parameters of the papers' model are doubtful."""
     return f"BIC prefers {chosen} to {papers} by {number_text(delta_bic, 3)}"
 
 
 def hardly_worse_without(symbol: str, without: str, chosen: str, delta_bic: float) -> str:
-    """Return why a term that a simpler model does not need is doubtful."""
     return (
         f"{without}, without {symbol}, fits almost as well as {chosen}: its BIC is only "
         f"{number_text(delta_bic, 2)} higher"
@@ -103,14 +96,12 @@ def hardly_worse_bias(other: str, chosen: str, delta_bic: float, *, several: boo
 
 
 def other_bias_terms(other: str, delta_aic: float) -> str:
-    """Return why B is doubtful where AIC prefers other terms."""
     return (
         f"AIC prefers {other}, with other terms of bias instability, by {number_text(delta_aic, 2)}"
     )
 
 
 def slow_process(other: str, delta_aic: float) -> str:
-    """Return why K is doubtful where AIC prefers a model without it."""
     return (
         f"AIC prefers {other}, which has no random walk, by {number_text(delta_aic, 2)}: a process "
         "as slow as the log may look like a random walk"
@@ -126,7 +117,6 @@ def ramp_explains(other: str, delta_aic: float, ratio: float) -> str:
 
 
 def drift_or_walk(lowest: int, without: str) -> str:
-    """Return why K is doubtful that only the lowest frequencies show."""
     return (
         f"without the {lowest} lowest frequencies, {without} fits as well. In these, drift with "
         "temperature or time may look like a random walk"
@@ -134,7 +124,6 @@ def drift_or_walk(lowest: int, without: str) -> str:
 
 
 def smooth_drift(without: str, delta_aic: float) -> str:
-    """Return why K is doubtful where the spectrum is steeper than that of a random walk."""
     return (
         f"AIC prefers {without} and a smooth drift, with a spectrum falling as f⁻⁴, by "
         f"{number_text(delta_aic, 2)}. Drift with temperature or time may look like a random walk"
@@ -142,7 +131,6 @@ def smooth_drift(without: str, delta_aic: float) -> str:
 
 
 def few_frequencies(lowest: int) -> str:
-    """Return why K is doubtful in a short log."""
     return (
         f"the log has too few frequencies above the {lowest} lowest, which drift affects as well. "
         "Record a longer log"
@@ -150,17 +138,10 @@ def few_frequencies(lowest: int) -> str:
 
 
 def signal_or_walk(signal: str) -> str:
-    """Return why K is doubtful beside a deterministic signal."""
     return f"{signal} explains the log about as well as a random walk"
 
 
-def signals_hide_walk() -> str:
-    """Return why K is doubtful beside the signals that were removed."""
-    return "the deterministic signals contain most of the information on a random walk"
-
-
 def pause_steps(number: int) -> str:
-    """Return steps at pauses of the log as a deterministic signal."""
     if number == 1:
         return "a step of the bias at a pause of the log"
     return f"a series of bias steps at {number} pauses of the log"
@@ -182,7 +163,6 @@ def periodic_drift(period: float) -> str:
 
 
 def curve_bias_unknown(reason: str | None) -> str:
-    """Return why B is doubtful where B_curve is not identified."""
     text = "the bias instability of the curve is not determined"
     return f"{text}: {reason}" if reason else text
 
@@ -195,23 +175,11 @@ def band_excluded(highest: float) -> str:
     )
 
 
-def short_log() -> str:
-    """Return why nothing is fitted to the temperature."""
-    return "the log is too short"
-
-
 def small_temperature_range(kelvin: float) -> str:
-    """Return why nothing is fitted to the temperature."""
     return f"the temperature changes by only {number_text(kelvin, 2)} K"
 
 
-def sensitivity_with_zero() -> str:
-    """Return why the effect of the temperature is not shown."""
-    return "the 95 % interval of the temperature sensitivity includes 0"
-
-
 def temperature_preferred(delta_bic: float, *, enough: bool) -> str:
-    """Return by how much BIC prefers the noise with temperature."""
     short = "" if enough else ", which is not enough"
     return f"BIC prefers the model with temperature by {number_text(delta_bic, 3)}{short}"
 
@@ -224,16 +192,6 @@ def settling_excluded(seconds: float) -> str:
     )
 
 
-def lag_not_asked() -> str:
-    """Return why there is no lag."""
-    return "no lag was asked for"
-
-
-def no_effect_to_lag() -> str:
-    """Return why a lag is not identified where there is no effect."""
-    return "no effect of the temperature is shown that could lag"
-
-
 def lag_range(lower: float, upper: float) -> str:
     """Return which lags, s, fit the log."""
     return f"lags from {number_text(lower, 3)} to {number_text(upper, 3)} s fit the log"
@@ -244,20 +202,4 @@ def temperature_like_ramp(share: float) -> str:
     return (
         f"the temperature is close to a ramp: time alone explains {percent_text(share, 2)} of the "
         "information on the sensitivity. Vary the temperature up and down"
-    )
-
-
-def monotone_temperature() -> str:
-    """Return why temperature is not separable from time."""
-    return (
-        "the temperature only rises or only falls, and a drift with time explains as much. "
-        "Vary it up and down"
-    )
-
-
-def temperature_by_chance() -> str:
-    """Return why an effect that explains the drift is not shown."""
-    return (
-        "temperature follows most of the slow drift, but a random walk as strong as in this log "
-        "would do so by chance"
     )

@@ -21,9 +21,15 @@ _OTHER_AXES: Mapping[OtherAxes, str] = {
 }
 
 
-def simulated_recordings() -> str:
-    """Return that the numbers are not measured."""
-    return "The recordings are SIMULATED, not measured"
+SIMULATED_RECORDINGS = "The recordings are SIMULATED, not measured"
+BIASES_NOT_INCLUDED = "Fixed biases are not included, as they change from one start to the next"
+NOISE_ONLY = (
+    "The file contains noise only. Fixed biases change from one start to the next, and they "
+    "and their dependence on temperature are not included"
+)
+NO_WALK_KNOWN = "the model has no random walk, and no upper limit of it is known, so it is 0"
+NO_TEMPERATURE_FIT = "no fit of the temperature"
+BIAS_NOT_LINEAR = "its bias is not linear in temperature, and the program supports a slope only"
 
 
 def no_estimate(quantity: str) -> str:
@@ -31,21 +37,7 @@ def no_estimate(quantity: str) -> str:
     return f"{quantity}: not included, as there is no estimate"
 
 
-def biases_not_included() -> str:
-    """Return that a file has no fixed biases."""
-    return "Fixed biases are not included, as they change from one start to the next"
-
-
-def noise_only() -> str:
-    """Return that a file has neither fixed biases nor the effect of the temperature."""
-    return (
-        "The file contains noise only. Fixed biases change from one start to the next, and they "
-        "and their dependence on temperature are not included"
-    )
-
-
 def inflated(factor: float, because: str) -> str:
-    """Return that all numbers of a file are larger, and the reason of the user."""
     return (
         f"INFLATED: all densities and amplitudes below are {number_text(factor)} times those "
         f"above, because: {because}"
@@ -85,7 +77,6 @@ def axes_not_used(
 
 
 def axes_without_estimate(channels: Sequence[str]) -> str:
-    """Return which axes have no estimate in any recording."""
     return f"axes without an estimate: {join_names(list(map(channel_name, channels)))}"
 
 
@@ -134,11 +125,6 @@ def _limits_text(limits: tuple[float, float] | None) -> str:
     return "" if limits is None else f", with 95 % limits of {limits[0]:.3e} to {limits[1]:.3e}"
 
 
-def no_walk_known() -> str:
-    """Return why the random walk of a file is 0."""
-    return "the model has no random walk, and no upper limit of it is known, so it is 0"
-
-
 def upper_walk_used(K: float) -> str:
     """Return why the random walk of a file is an upper limit, SI."""
     return (
@@ -179,17 +165,14 @@ def _signed(share: float) -> str:
 
 
 def growing_only(label: str, term: str) -> str:
-    """Return why a noise is not in a file."""
     return f"{label} noise {term} is not included, as its error does not grow"
 
 
 def lines_not_included(lines: str) -> str:
-    """Return why spectral lines are not in a file."""
     return f"{lines}: not included, as a spectral line is not noise"
 
 
 def fitted_terms(terms: str) -> str:
-    """Return the model that an overbound replaces."""
     return f"the fitted model was: {terms}"
 
 
@@ -257,32 +240,26 @@ def families_compared(
 
 
 def programs_of(family: str, programs: Sequence[str]) -> str:
-    """Return which programs support a family of models."""
     return f"{family} is supported by {', '.join(programs)}"
 
 
 def excess_warning(text: str, programs: Sequence[str]) -> str:
-    """Return the warning of an overbound with the programs that support closer models."""
     return "WARNING: " + "; ".join([text, *programs])
 
 
 def recording_in_doubt(recording: str, doubts: str) -> str:
-    """Return that the recording of a file has doubts."""
     return f"{recording} is in doubt: {doubts}"
 
 
 def recording_rejected(recording: str, status: str, reason: str | None) -> str:
-    """Return why a recording has no estimates."""
     return f"{recording} is not used, as it was {status}: {reason or 'no reason is known'}"
 
 
 def used_despite_doubts(reasons: str, because: str) -> str:
-    """Return that recordings are used all the same, with the reason of the user."""
     return f"{reasons}; used all the same, because: {because}"
 
 
 def no_temperature(recording: str) -> str:
-    """Return why a file has no effect of the temperature."""
     return f"not included, as {recording} has no temperature readings"
 
 
@@ -298,7 +275,6 @@ def temperature_range(
 
 
 def axis_not_included(axis: str, reason: str) -> str:
-    """Return why the effect of the temperature on an axis is not in a file."""
     return f"axis {axis} is not included: {reason}"
 
 
@@ -319,23 +295,15 @@ def axis_slope(
     )
 
 
-def no_temperature_fit() -> str:
-    """Return why an axis is not corrected."""
-    return "no fit of the temperature"
-
-
 def sensitivity_status(status: Status, reason: str | None) -> str:
-    """Return why an axis without a sensitivity is not corrected."""
     return f"the sensitivity is {STATUS_WORDS[status]}{_because(reason)}"
 
 
 def effect_not_shown(reason: str | None) -> str:
-    """Return why an axis is not corrected whose log does not show the effect."""
     return f"the log does not show an effect{_because(reason)}"
 
 
 def sensitivity_uncertain(error: float, most: float) -> str:
-    """Return why an axis is not corrected; relative half-widths of the 95 % interval."""
     return (
         f"the sensitivity is known to {percent_text(error, 2)}, from noise and the resolution of "
         f"the temperature, and {percent_text(most, 2)} is needed"
@@ -351,7 +319,6 @@ def small_temperature_range(span: float, least: float) -> str:
 
 
 def lag_status(status: Status, reason: str | None) -> str:
-    """Return why an axis with an unknown lag is not corrected."""
     return f"its lag is {STATUS_WORDS[status]}{_because(reason)}"
 
 
@@ -363,11 +330,6 @@ def long_lag(longest: float, horizon: float) -> str:
     )
 
 
-def bias_not_linear() -> str:
-    """Return why an axis is not corrected by a program with slopes alone."""
-    return "its bias is not linear in temperature, and the program supports a slope only"
-
-
 def flicker_poles(B: float, poles: int, longest: float) -> str:
     """Return how flicker noise, SI, is made, and up to which tau, s."""
     return (
@@ -377,7 +339,6 @@ def flicker_poles(B: float, poles: int, longest: float) -> str:
 
 
 def short_process(samples: float) -> str:
-    """Return that a process is short for a program."""
     return (
         f"T_B is {number_text(samples, 3)} samples, and the discretisation of the program is "
         "inaccurate for so short a process"
@@ -385,10 +346,8 @@ def short_process(samples: float) -> str:
 
 
 def terms_not_supported(terms: str) -> str:
-    """Return which terms a file does not have."""
     return f"not included: {terms}"
 
 
 def value_clipped(value: float, low: float, high: float, used: float) -> str:
-    """Return that a value is outside the range of a program."""
     return f"{value:.4g} is outside the range of {low:g} to {high:g}, and {used:g} is used"

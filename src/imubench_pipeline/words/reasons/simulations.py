@@ -5,6 +5,25 @@ from __future__ import annotations
 from imubench_pipeline.words.findings.base import channel_name
 from imubench_pipeline.words.numbers import counted, number_text
 
+ONE_SIDED_DENSITY = "the printed noise density is one-sided (N is this density / √2)"
+NO_BIAS_INSTABILITY = "no bias instability, as none is printed"
+NO_RANDOM_WALK = "no random walk K, as none is printed"
+BIAS_SIGN_DRAWN = "the sign of the bias is random"
+DRIFT_SIGN_DRAWN = "drift with temperature is 0 at 25 °C, without lag, and its sign is random"
+NO_DRIFT = "no drift with temperature, as no coefficient is printed"
+NOT_ROUNDED = "values are not rounded, as no sensitivity is printed"
+NO_SATURATION = "no saturation, as no full scale is printed"
+GRAVITY_IS_NO_BIAS = "accel: no bias from the log, as the mean of a recording is mostly gravity"
+NO_NOISE_MODEL = (
+    "the noise of this sensor is not known: no static recording is usable, and its data sheet "
+    "prints no noise. Add a static log of this sensor"
+)
+NOT_PRINTED_BY_SOURCE = "the source does not print it"
+ESTIMATE_DOUBTFUL = "the estimate is doubtful"
+NOT_SOLD = "this sensor is not sold"
+SIMULATED_BESIDE_MEASURED = "it is simulated, and other recordings are measured"
+IN_NO_TABLE = "it is in no table of its sensor"
+
 
 def of_data_sheet(name: str, document: str | None) -> str:
     """Return the source of a model; ``document``: of the data sheet, if it is named."""
@@ -12,46 +31,34 @@ def of_data_sheet(name: str, document: str | None) -> str:
 
 
 def of_run(results: str, recording: str) -> str:
-    """Return the source of a model that a run estimated from a recording."""
     return f"the estimates of a run in {results}, from the recording {recording}"
 
 
 def of_model_file(name: str, source: str | None) -> str:
-    """Return the source of a model in a file, with the source that it states."""
     return f"the model file {name}" + (f" ({source})" if source else "")
 
 
 def stated_in(name: str) -> str:
-    """Return that a figure is as a file states it."""
     return f"as stated in {name}"
 
 
 def printed_figure(
     label: str, value: float, unit: str, kind: str, reason: str | None = None
 ) -> str:
-    """Return a figure of the data sheet, in its unit, with its conversion."""
     text = f"{label} {number_text(value)} {unit}: {kind}, data sheet"
     return f"{text} ({reason})" if reason else text
 
 
 def printed_full_scale(value: float, unit: str) -> str:
-    """Return the full scale of the data sheet, in its unit."""
     return f"full scale {number_text(value)} {unit}: data sheet"
 
 
 def chosen_range(value: float, unit: str) -> str:
-    """Return which of several full scales is assumed, in its unit."""
     return f"range {number_text(value)} {unit}"
 
 
 def channel_not_printed(channel: str) -> str:
-    """Return why a channel is not simulated."""
     return f"{channel_name(channel)} is not included, as no noise of it is printed"
-
-
-def one_sided_density() -> str:
-    """Return what is assumed of a density whose side is not stated."""
-    return "the printed noise density is one-sided (N is this density / √2)"
 
 
 def bias_instability_printed(floor: float, *, timed: bool) -> str:
@@ -60,48 +67,11 @@ def bias_instability_printed(floor: float, *, timed: bool) -> str:
     return text if timed else f"{text}, as flicker noise, because no correlation time is printed"
 
 
-def no_bias_instability() -> str:
-    """Return what is assumed without a printed bias instability."""
-    return "no bias instability, as none is printed"
-
-
-def no_random_walk() -> str:
-    """Return what is assumed without a printed K."""
-    return "no random walk K, as none is printed"
-
-
-def bias_sign_drawn() -> str:
-    """Return what is assumed of a printed bias."""
-    return "the sign of the bias is random"
-
-
-def drift_sign_drawn() -> str:
-    """Return what is assumed of a printed temperature coefficient."""
-    return "drift with temperature is 0 at 25 °C, without lag, and its sign is random"
-
-
-def no_drift() -> str:
-    """Return what is assumed without a printed temperature coefficient."""
-    return "no drift with temperature, as no coefficient is printed"
-
-
-def not_rounded() -> str:
-    """Return what is assumed without a printed sensitivity."""
-    return "values are not rounded, as no sensitivity is printed"
-
-
-def no_saturation() -> str:
-    """Return what is assumed without a printed full scale."""
-    return "no saturation, as no full scale is printed"
-
-
 def stated_cutoff(text: str) -> str:
-    """Return a cut-off as the sensor file states it."""
     return f"cut-off {text}: stated for the log"
 
 
 def low_pass_assumed(*, known: bool) -> str:
-    """Return what is assumed of the low-pass."""
     return "the low-pass is of first order" if known else "no low-pass, as no cut-off is known"
 
 
@@ -111,12 +81,10 @@ def estimated_cutoff(cutoff: float, log: str) -> str:
 
 
 def estimated_sensitivity(value: float, unit: str, log: str) -> str:
-    """Return a temperature sensitivity that is estimated from a log."""
     return f"temperature sensitivity {number_text(value)} {unit}: estimated from {log}"
 
 
 def estimated_noise(model: str, method: str, log: str) -> str:
-    """Return how the noise of a model is estimated."""
     return (
         f"noise {model}: estimated by method {method} from {log}. "
         "N is converted to its value before low-pass and rounding"
@@ -134,25 +102,10 @@ def bias_of_mean(bias: float, log: str) -> str:
 
 
 def log_is_simulated(log: str) -> str:
-    """Return that the source of a model is simulated."""
     return f"{log} is itself simulated"
 
 
-def gravity_is_no_bias() -> str:
-    """Return why the bias of an accelerometer is not that of its log."""
-    return "accel: no bias from the log, as the mean of a recording is mostly gravity"
-
-
-def no_noise_model() -> str:
-    """Return why results are missing that need the noise of a sensor."""
-    return (
-        "the noise of this sensor is not known: no static recording is usable, and its data sheet "
-        "prints no noise. Add a static log of this sensor"
-    )
-
-
 def printed_noise(source: str) -> str:
-    """Return that results use printed noise."""
     return (
         f"typical figures of {source}, not measured. No static recording of this sensor determines "
         "its noise"
@@ -184,7 +137,6 @@ def static_noise(
 
 
 def several_segments(segments: int) -> str:
-    """Return why a log with gaps is not used."""
     return (
         f"the log has {counted(segments, 'segment')}, with gaps of unknown length between them. "
         "State one of them as 'use:' beside the log"
@@ -192,35 +144,8 @@ def several_segments(segments: int) -> str:
 
 
 def nothing_to_simulate(reasons: list[str]) -> str:
-    """Return why an estimate is not reconstructed, with the reasons of its parameters."""
     return f"no term has a value: {'; '.join(reasons)}"
 
 
-def not_printed_by_source() -> str:
-    """Return why a parameter of the authors of a recording is not known."""
-    return "the source does not print it"
-
-
 def no_model_explains(channel: str) -> str:
-    """Return a doubt about a channel whose models do not fit."""
     return f"no model explains the spectrum of {channel_name(channel)}"
-
-
-def estimate_doubtful() -> str:
-    """Return a doubt about a parameter without a reason."""
-    return "the estimate is doubtful"
-
-
-def not_sold() -> str:
-    """Return why recordings of a sensor are not used for decisions."""
-    return "this sensor is not sold"
-
-
-def simulated_beside_measured() -> str:
-    """Return why simulated recordings are not used beside measured ones."""
-    return "it is simulated, and other recordings are measured"
-
-
-def in_no_table() -> str:
-    """Return why a file has no result."""
-    return "it is in no table of its sensor"

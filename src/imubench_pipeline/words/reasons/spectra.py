@@ -5,6 +5,8 @@ from __future__ import annotations
 from imubench_pipeline.model.states import BandSource
 from imubench_pipeline.words.numbers import counted, number_text, percent_text
 
+NO_FILTER = "the spectrum shows no low-pass"
+
 
 def filter_text(kind: str, order: int, cutoff: float) -> str:
     """Return a low-pass filter: ``analogue low-pass of order 2 at 5 Hz``."""
@@ -59,13 +61,7 @@ def filter_or_quantization(lower: float, upper: float) -> str:
     )
 
 
-def no_filter() -> str:
-    """Return why there is no cut-off."""
-    return "the spectrum shows no low-pass"
-
-
 def few_bins(bins: int, needed: int) -> str:
-    """Return why no filter is searched for."""
     return f"the spectrum has {bins} bins, {needed} are needed. Record a longer log"
 
 
