@@ -10,7 +10,7 @@ import pytest
 import yaml
 
 from imubench_pipeline.allan import allan_variance
-from imubench_pipeline.export import basalt, kalibr, openvins, orb_slam3, px4, vins_fusion
+from imubench_pipeline.export import px4, visual_inertial
 from imubench_pipeline.export.imu import ExportError, Imu
 from imubench_pipeline.export.targets import TARGETS
 from imubench_pipeline.noise import NoiseModel
@@ -34,14 +34,14 @@ def opencv(text: str) -> dict[str, Any]:
 
 
 def from_kalibr(sensor: Imu) -> dict[str, Recursion]:
-    found = yaml.safe_load(kalibr.write(sensor))
+    found = yaml.safe_load(visual_inertial.write_kalibr(sensor))
     rate = found["update_rate"]
     assert found["rostopic"] == "/imu0"
     return densities(found, rate)
 
 
 def from_openvins(sensor: Imu) -> dict[str, Recursion]:
-    found = opencv(openvins.write(sensor))["imu0"]
+    found = opencv(visual_inertial.write_openvins(sensor))["imu0"]
     assert set(found) >= {"T_i_b", "Tw", "Ta", "Tg", "R_IMUtoGYRO", "R_IMUtoACC", "time_offset"}
     assert np.array_equal(found["T_i_b"], np.eye(4))
     assert not np.any(found["Tg"])
@@ -62,7 +62,7 @@ def densities(found: dict[str, float], rate: float) -> dict[str, Recursion]:
 
 
 def from_vins(sensor: Imu) -> dict[str, Recursion]:
-    found = opencv(vins_fusion.write(sensor))
+    found = opencv(visual_inertial.write_vins_fusion(sensor))
     assert found["g_norm"] == sensor.gravity
     return {
         name: (midpoint, found[f"{word}_n"], found[f"{word}_w"] / sensor.rate, sensor.rate)
@@ -71,7 +71,7 @@ def from_vins(sensor: Imu) -> dict[str, Recursion]:
 
 
 def from_orb(sensor: Imu) -> dict[str, Recursion]:
-    text = orb_slam3.write(sensor)
+    text = visual_inertial.write_orb_slam3(sensor)
     found = opencv(text)
     # the program ends at a number without a point
     assert all(isinstance(value, float) for value in found.values())
@@ -88,7 +88,7 @@ def from_orb(sensor: Imu) -> dict[str, Recursion]:
 
 
 def from_basalt(sensor: Imu) -> dict[str, Recursion]:
-    found = json.loads(basalt.write(sensor))["value0"]
+    found = json.loads(visual_inertial.write_basalt(sensor))["value0"]
     rate = found["imu_update_rate"]
     for key, value in found.items():
         assert key == "imu_update_rate" or len(value) == 3
@@ -172,9 +172,9 @@ def test_what_the_program_simulates_has_the_allan_deviation_of_the_model(
 
 def test_white_noise_alone_takes_the_upper_limit_or_is_refused() -> None:
     white = NoiseModel(N=1e-4)
-    for writer in (kalibr, openvins, orb_slam3, basalt):
+    for name in ("kalibr", "openvins", "orb-slam3", "basalt"):
         with pytest.raises(ExportError, match="gyro: K is 0"):
-            writer.write(imu(gyro=white))
+            TARGETS[name].write(imu(gyro=white))
     assert ekf2(px4.write(imu(gyro=white)))["EKF2_GYR_B_NOISE"] == 0.0
     assert "no upper limit of it is known" in px4.write(imu(gyro=white)).replace("\n#  ", "")
 

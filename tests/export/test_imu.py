@@ -7,7 +7,7 @@ from imubench_pipeline.export.imu import (
     compute_normal_gravity,
     inflate,
 )
-from imubench_pipeline.export.kalibr import write
+from imubench_pipeline.export.visual_inertial import write_kalibr as write
 from imubench_pipeline.noise import GaussMarkov, NoiseModel, Sinusoid
 from tests.export.sensors import GYRO, imu
 

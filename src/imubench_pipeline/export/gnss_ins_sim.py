@@ -21,7 +21,6 @@ import math
 from imubench_pipeline.export.comments import describe_model, format_python_comments
 from imubench_pipeline.export.imu import Imu
 from imubench_pipeline.export.mapping import as_process
-from imubench_pipeline.export.target import Target
 from imubench_pipeline.noise import NoiseModel, compute_driving_density
 from imubench_pipeline.words.reasons import exports as texts
 
@@ -69,6 +68,3 @@ def _stationary_deviation(model: NoiseModel) -> float:
     if model.T_B is None or model.B == 0.0:
         return 0.0
     return math.sqrt(compute_driving_density(model.B, model.T_B) * model.T_B / 2.0)
-
-
-TARGET = Target("gnss-ins-sim", "gnss-ins-sim", "imu_err.py", write, "N+GM")

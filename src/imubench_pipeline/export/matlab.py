@@ -31,7 +31,6 @@ from dataclasses import dataclass
 from imubench_pipeline.export.comments import describe_model, format_comments
 from imubench_pipeline.export.imu import AxisNoise, Imu
 from imubench_pipeline.export.mapping import Mapped, as_process
-from imubench_pipeline.export.target import Target
 from imubench_pipeline.export.temperature import AXES, TemperatureEffect
 from imubench_pipeline.noise import NoiseModel, compute_driving_density
 from imubench_pipeline.words.reasons import exports as texts
@@ -137,6 +136,3 @@ def _map_parameters(axis: AxisNoise, imu: Imu) -> tuple[Mapped, _Parameters]:
 
 def _format_vector(values: Sequence[float]) -> str:
     return f"[{', '.join(f'{value:.9g}' for value in values)}]"
-
-
-TARGET = Target("matlab", "MATLAB (imuSensor)", "imu_noise.m", write, "N+GM+K")

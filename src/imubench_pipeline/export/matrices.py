@@ -26,7 +26,6 @@ from scipy.linalg import block_diag
 from imubench_pipeline.export.comments import describe_model
 from imubench_pipeline.export.imu import Imu
 from imubench_pipeline.export.mapping import describe_terms
-from imubench_pipeline.export.target import Target
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.typing import Array
 
@@ -125,8 +124,3 @@ def write_npz(imu: Imu) -> bytes:
     stream = io.BytesIO()
     np.savez(stream, about=about, **arrays)  # type: ignore[arg-type]  # its stub takes a flag among the arrays
     return stream.getvalue()
-
-
-JSON = Target("json", "any: matrices as JSON", "noise.json", write_json, "N+GM+K")
-
-NPZ = Target("npz", "any: matrices as NumPy arrays", "noise.npz", write_npz, "N+GM+K")

@@ -30,9 +30,8 @@ import math
 
 from imubench_pipeline.export.comments import describe_model, format_comments
 from imubench_pipeline.export.imu import ExportError, Imu
-from imubench_pipeline.export.target import Target
 from imubench_pipeline.export.temperature import AXES
-from imubench_pipeline.export.walks import map_to_walks
+from imubench_pipeline.export.visual_inertial import map_to_walks
 from imubench_pipeline.words.reasons import exports as texts
 
 DEFAULT_PERIOD = 10_000
@@ -108,6 +107,3 @@ def write(imu: Imu, period: int = DEFAULT_PERIOD) -> str:
         )
     columns = "# Vehicle-Id Component-Id Name Value Type\n"
     return format_comments(["Onboard parameters for Vehicle 1", *about]) + columns + "".join(rows)
-
-
-TARGET = Target("px4", "PX4 (EKF2)", "ekf2.params", write, "N+K")

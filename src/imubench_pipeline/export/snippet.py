@@ -11,7 +11,6 @@ from imubench_pipeline.export.comments import describe_model, format_python_comm
 from imubench_pipeline.export.imu import Imu
 from imubench_pipeline.export.mapping import describe_terms
 from imubench_pipeline.export.matrices import FLICKER_TAU_OVER_HORIZON
-from imubench_pipeline.export.target import Target
 from imubench_pipeline.noise.terms.base import drives_of
 from imubench_pipeline.words.reasons import exports as texts
 
@@ -92,6 +91,3 @@ def write(imu: Imu) -> str:
     return format_python_comments(about) + _PROGRAM.format(
         rate=float(imu.rate), horizon=float(imu.horizon), noise=entries
     )
-
-
-TARGET = Target("python", "Python with NumPy", "noise.py", write, "N+GM+K")

@@ -1,37 +1,60 @@
-"""The programs that a noise model can be exported to; each is declared in its module."""
+"""The programs that a noise model can be exported to."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 
-from imubench_pipeline.export import (
-    basalt,
-    gnss_ins_sim,
-    kalibr,
-    matlab,
-    matrices,
-    openvins,
-    orb_slam3,
-    px4,
-    snippet,
-    vins_fusion,
+from imubench_pipeline.export import gnss_ins_sim, matlab, matrices, px4, snippet
+from imubench_pipeline.export.imu import Imu
+from imubench_pipeline.export.smallest_model import Family
+from imubench_pipeline.export.visual_inertial import (
+    write_basalt,
+    write_kalibr,
+    write_openvins,
+    write_orb_slam3,
+    write_vins_fusion,
 )
-from imubench_pipeline.export.target import Target
+
+
+@dataclass(frozen=True)
+class Target:
+    """A program that a noise model can be exported to.
+
+    Attributes
+    ----------
+    name, program : str
+        Identifier in commands and settings, and the name for people.
+    file_name : str
+        The usual name of its file.
+    write : callable
+        Imu -> content of the file: str, or bytes. Raises ExportError if the program needs a
+        quantity without estimate, or a density above 0.
+    family : str
+        Terms that the program supports; an overbound for it has these.
+    """
+
+    name: str
+    program: str
+    file_name: str
+    write: Callable[[Imu], str | bytes]
+    family: Family
+
 
 TARGETS: Mapping[str, Target] = {
     target.name: target
     for target in (
-        kalibr.TARGET,
-        openvins.TARGET,
-        vins_fusion.TARGET,
-        basalt.TARGET,
-        orb_slam3.TARGET,
-        px4.TARGET,
-        gnss_ins_sim.TARGET,
-        matlab.TARGET,
-        matrices.JSON,
-        matrices.NPZ,
-        snippet.TARGET,
+        Target("kalibr", "Kalibr", "imu.yaml", write_kalibr, "N+K"),
+        Target("openvins", "OpenVINS", "kalibr_imu_chain.yaml", write_openvins, "N+K"),
+        Target("vins-fusion", "VINS-Fusion, VINS-Mono", "vins_imu.yaml", write_vins_fusion, "N+K"),
+        Target("basalt", "Basalt", "calibration_imu.json", write_basalt, "N+K"),
+        Target("orb-slam3", "ORB-SLAM3", "orb_slam3_imu.yaml", write_orb_slam3, "N+K"),
+        Target("px4", "PX4 (EKF2)", "ekf2.params", px4.write, "N+K"),
+        Target("gnss-ins-sim", "gnss-ins-sim", "imu_err.py", gnss_ins_sim.write, "N+GM"),
+        Target("matlab", "MATLAB (imuSensor)", "imu_noise.m", matlab.write, "N+GM+K"),
+        Target("json", "any: matrices as JSON", "noise.json", matrices.write_json, "N+GM+K"),
+        Target("npz", "any: matrices as NumPy arrays", "noise.npz", matrices.write_npz, "N+GM+K"),
+        Target("python", "Python with NumPy", "noise.py", snippet.write, "N+GM+K"),
     )
 }
 """All targets by their name in commands and settings."""
