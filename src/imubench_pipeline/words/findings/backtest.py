@@ -7,10 +7,7 @@ from imubench_pipeline.words.numbers import counted, join_names, number_text
 
 
 class BacktestContradicts(
-    FindingData,
-    code="backtest_contradicts",
-    affects=SLOW,
-    doubt="more drift of {channels} than its noise model predicts",
+    FindingData, affects=SLOW, doubt="more drift of {channels} than its noise model predicts"
 ):
     """The errors over windows of the log are larger than predicted."""
 

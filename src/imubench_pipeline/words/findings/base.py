@@ -2,7 +2,7 @@
 
 A finding is a class of its data, which the base class makes a dataclass:
 
-    class Stuck(FindingData, code="stuck", affects=ALL, unfit=True):
+    class Stuck(FindingData, affects=ALL, unfit=True):
         value: float
         def text(self, channel: str) -> str:
             return f"{channel} stays at {self.value:.4g} ..."
@@ -12,6 +12,7 @@ The check that finds it passes the data to `imubench_pipeline.tables.findings.fi
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar, dataclass_transform
@@ -50,6 +51,7 @@ class FindingData:
     """Data of a finding about a recording or a channel; each subclass is a frozen dataclass."""
 
     code: ClassVar[str]
+    """By default the name of the class, ``StuckForAWhile`` as ``stuck_for_a_while``."""
     affects: ClassVar[frozenset[str]]
     """Parameters whose estimates it puts in doubt; `NONE`: it is no doubt."""
     unfit: ClassVar[bool]
@@ -62,14 +64,15 @@ class FindingData:
     def __init_subclass__(
         cls,
         *,
-        code: str,
         affects: frozenset[str],
+        code: str = "",
         unfit: bool = False,
         scales: Mapping[str, float] | None = None,
         doubt: str = "",
     ) -> None:
         """Make a finding a dataclass, and register it by its code."""
         dataclass(frozen=True)(cls)
+        code = code or re.sub(r"(?<!^)(?=[A-Z])", "_", cls.__name__).lower()
         cls.code, cls.affects, cls.unfit, cls.scales = code, affects, unfit, scales or {}
         cls.doubt = doubt or code.replace("_", " ") + " ({channels})"
         FINDINGS[code] = cls

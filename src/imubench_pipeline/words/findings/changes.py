@@ -9,12 +9,7 @@ from imubench_pipeline.words.numbers import Unit, number_text, percent_text
 _SECONDS = Unit("s", 1.0)
 
 
-class BiasStep(
-    FindingData,
-    code="bias_step",
-    affects=SLOW | {"bias"},
-    doubt="the bias of {channels} steps",
-):
+class BiasStep(FindingData, affects=SLOW | {"bias"}, doubt="the bias of {channels} steps"):
     """The bias changes at once, and stays there."""
 
     size: float
@@ -36,10 +31,7 @@ class BiasStep(
 
 
 class WarmUpDrift(
-    FindingData,
-    code="warm_up_drift",
-    affects=SLOW | {"bias"},
-    doubt="the bias of {channels} drifts during warm-up",
+    FindingData, affects=SLOW | {"bias"}, doubt="the bias of {channels} drifts during warm-up"
 ):
     """The bias settles exponentially from the start of the log."""
 
@@ -62,12 +54,7 @@ class WarmUpDrift(
         )
 
 
-class PeriodicDrift(
-    FindingData,
-    code="periodic_drift",
-    affects=SLOW,
-    doubt="the bias of {channels} oscillates slowly",
-):
+class PeriodicDrift(FindingData, affects=SLOW, doubt="the bias of {channels} oscillates slowly"):
     """The bias varies with a slow period."""
 
     size: float
@@ -90,10 +77,7 @@ class PeriodicDrift(
 
 
 class TelegraphNoise(
-    FindingData,
-    code="telegraph_noise",
-    affects=SLOW | {"bias"},
-    doubt="the bias of {channels} steps repeatedly",
+    FindingData, affects=SLOW | {"bias"}, doubt="the bias of {channels} steps repeatedly"
 ):
     """The bias steps again and again between levels."""
 
@@ -108,7 +92,7 @@ class TelegraphNoise(
         )
 
 
-class HeavyTails(FindingData, code="heavy_tails", affects=NONE):
+class HeavyTails(FindingData, affects=NONE):
     """Large samples are more frequent than in normal noise."""
 
     kurtosis: float
@@ -148,10 +132,7 @@ class NoiseTrend(
 
 
 class NoiseVaries(
-    FindingData,
-    code="noise_varies",
-    affects=WHITE,
-    doubt="the white noise of {channels} varies over the log",
+    FindingData, affects=WHITE, doubt="the white noise of {channels} varies over the log"
 ):
     """The white noise differs between parts of the log, without a trend."""
 

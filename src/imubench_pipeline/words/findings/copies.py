@@ -7,11 +7,7 @@ from imubench_pipeline.words.numbers import join_names, number_text, percent_tex
 
 
 class ChannelTwice(
-    FindingData,
-    code="channel_twice",
-    affects=ALL,
-    unfit=True,
-    doubt="{channels} {are} a copy of another channel",
+    FindingData, affects=ALL, unfit=True, doubt="{channels} {are} a copy of another channel"
 ):
     """A channel has the samples of another one."""
 
@@ -39,9 +35,7 @@ def _describe_repeat(channel: str, start: float, end: float, original: float, nu
     return f"{repeats}: {span} {where}"
 
 
-class LogTwice(
-    FindingData, code="log_twice", affects=ALL, unfit=True, doubt="the log repeats itself"
-):
+class LogTwice(FindingData, affects=ALL, unfit=True, doubt="the log repeats itself"):
     """A large part of a log is a copy of an earlier part."""
 
     start: float
@@ -60,9 +54,7 @@ class LogTwice(
         )
 
 
-class RepeatedStretch(
-    FindingData, code="repeated_stretch", affects=ALL, doubt="a part of {channels} is a copy"
-):
+class RepeatedStretch(FindingData, affects=ALL, doubt="a part of {channels} is a copy"):
     """A small part of a log is a copy of an earlier part."""
 
     start: float
@@ -79,11 +71,7 @@ class RepeatedStretch(
 
 
 class RecordingTwice(
-    FindingData,
-    code="recording_twice",
-    affects=ALL,
-    unfit=True,
-    doubt="the recording is a copy of another one",
+    FindingData, affects=ALL, unfit=True, doubt="the recording is a copy of another one"
 ):
     """A recording has the samples of another one."""
 
@@ -99,9 +87,7 @@ class RecordingTwice(
         )
 
 
-class SharedNoise(
-    FindingData, code="shared_noise", affects=ALL, doubt="correlated noise of {channels}"
-):
+class SharedNoise(FindingData, affects=ALL, doubt="correlated noise of {channels}"):
     """The noise of two axes is correlated."""
 
     other: str

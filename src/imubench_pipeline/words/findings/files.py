@@ -16,7 +16,7 @@ from imubench_pipeline.words.findings.base import (
 from imubench_pipeline.words.numbers import counted, duration_text, join_names, number_text
 
 
-class Rejected(FindingData, code="rejected", affects=ALL, doubt="the recording was rejected"):
+class Rejected(FindingData, affects=ALL, doubt="the recording was rejected"):
     """A recording that cannot be used."""
 
     reason: str
@@ -25,7 +25,7 @@ class Rejected(FindingData, code="rejected", affects=ALL, doubt="the recording w
         return self.reason
 
 
-class Failed(FindingData, code="failed", affects=ALL, doubt="the analysis failed"):
+class Failed(FindingData, affects=ALL, doubt="the analysis failed"):
     """A recording of which a step failed."""
 
     reason: str
@@ -36,7 +36,7 @@ class Failed(FindingData, code="failed", affects=ALL, doubt="the analysis failed
         )
 
 
-class WarmUpTrimmed(FindingData, code="warm_up_trimmed", affects=NONE):
+class WarmUpTrimmed(FindingData, affects=NONE):
     """A warm-up that is left out."""
 
     end: float
@@ -48,9 +48,7 @@ class WarmUpTrimmed(FindingData, code="warm_up_trimmed", affects=NONE):
         )
 
 
-class ShortRecording(
-    FindingData, code="short_recording", affects=SLOW, doubt="the recording is short"
-):
+class ShortRecording(FindingData, affects=SLOW, doubt="the recording is short"):
     """A recording that is too short for slow noise."""
 
     duration: float
@@ -62,7 +60,7 @@ class ShortRecording(
         )
 
 
-class Knocks(FindingData, code="knocks", affects=WHITE, doubt="knocks in {channels}"):
+class Knocks(FindingData, affects=WHITE, doubt="knocks in {channels}"):
     """Short disturbances, which are left out."""
 
     knocks: int
@@ -87,7 +85,6 @@ class Knocks(FindingData, code="knocks", affects=WHITE, doubt="knocks in {channe
 
 class SimulatedByMark(
     FindingData,
-    code="simulated_by_mark",
     affects=NONE,
     doubt="the log is marked as simulated, and the notes say that it is not",
 ):
@@ -102,7 +99,7 @@ class SimulatedByMark(
         )
 
 
-class UnusedFiles(FindingData, code="unused_files", affects=NONE):
+class UnusedFiles(FindingData, affects=NONE):
     """Files of a folder from which no channel is read."""
 
     files: tuple[str, ...]
@@ -121,9 +118,7 @@ class UnusedFiles(FindingData, code="unused_files", affects=NONE):
         )
 
 
-class UnequalLength(
-    FindingData, code="unequal_length", affects=NONE, doubt="files may be cut short"
-):
+class UnequalLength(FindingData, affects=NONE, doubt="files may be cut short"):
     """Files without time stamps that have different numbers of samples."""
 
     files: tuple[str, ...]
@@ -140,7 +135,7 @@ class UnequalLength(
         )
 
 
-class NotUsed(FindingData, code="not_used", affects=NONE):
+class NotUsed(FindingData, affects=NONE):
     """Samples outside of the part to use."""
 
     file: str
@@ -155,7 +150,6 @@ class NotUsed(FindingData, code="not_used", affects=NONE):
 
 class UnitContradicts(
     FindingData,
-    code="unit_contradicts",
     affects=frozenset(POWERS_OF_UNIT),
     unfit=True,
     scales=POWERS_OF_UNIT,
@@ -183,7 +177,7 @@ class UnitContradicts(
         )
 
 
-class ZeroBytes(FindingData, code="zero_bytes", affects=ALL, doubt="the file has zero bytes"):
+class ZeroBytes(FindingData, affects=ALL, doubt="the file has zero bytes"):
     """Runs of zero bytes, which are left out."""
 
     file: str
@@ -217,9 +211,7 @@ class ZeroBytes(FindingData, code="zero_bytes", affects=ALL, doubt="the file has
         return text
 
 
-class TruncatedFile(
-    FindingData, code="truncated_file", affects=NONE, doubt="the end of the file is missing"
-):
+class TruncatedFile(FindingData, affects=NONE, doubt="the end of the file is missing"):
     """A file without its end, or with records in a journal beside it."""
 
     file: str
@@ -238,7 +230,7 @@ class TruncatedFile(
         return f"{self.file}: {what}; read as far as possible"
 
 
-class IncompleteLastRecord(FindingData, code="incomplete_last_record", affects=NONE):
+class IncompleteLastRecord(FindingData, affects=NONE):
     """A last record that is cut short, and left out."""
 
     file: str
@@ -269,7 +261,7 @@ class IncompleteLastRecord(FindingData, code="incomplete_last_record", affects=N
         return f"{self.file}: {why}; left out: {self.shown!r}"
 
 
-class IncompleteFirstRecord(FindingData, code="incomplete_first_record", affects=NONE):
+class IncompleteFirstRecord(FindingData, affects=NONE):
     """First lines that are only parts of records, and left out."""
 
     file: str
@@ -287,7 +279,7 @@ class IncompleteFirstRecord(FindingData, code="incomplete_first_record", affects
         )
 
 
-class NotRecords(FindingData, code="not_records", affects=NONE):
+class NotRecords(FindingData, affects=NONE):
     """Lines under the names of columns that are neither units nor records."""
 
     file: str
@@ -305,7 +297,7 @@ class NotRecords(FindingData, code="not_records", affects=NONE):
         )
 
 
-class RestartedLog(FindingData, code="restarted_log", affects=NONE):
+class RestartedLog(FindingData, affects=NONE):
     """Headers within a log."""
 
     file: str
@@ -323,7 +315,7 @@ class RestartedLog(FindingData, code="restarted_log", affects=NONE):
         )
 
 
-class LeapSecond(FindingData, code="leap_second", affects=NONE):
+class LeapSecond(FindingData, affects=NONE):
     """Time stamps that count leap seconds."""
 
     file: str
@@ -333,9 +325,7 @@ class LeapSecond(FindingData, code="leap_second", affects=NONE):
         return f"{self.file}: the time stamps count {counted(self.seconds, 'leap second')}"
 
 
-class DamagedMessage(
-    FindingData, code="damaged_message", affects=ALL, doubt="messages are damaged"
-):
+class DamagedMessage(FindingData, affects=ALL, doubt="messages are damaged"):
     """Messages of a bag that do not match their type."""
 
     file: str
@@ -352,9 +342,7 @@ class DamagedMessage(
         )
 
 
-class NotMeasured(
-    FindingData, code="not_measured", affects=ALL, doubt="messages without a measurement"
-):
+class NotMeasured(FindingData, affects=ALL, doubt="messages without a measurement"):
     """Messages that state that a quantity was not measured."""
 
     file: str
@@ -370,9 +358,7 @@ class NotMeasured(
         )
 
 
-class WrongChecksum(
-    FindingData, code="wrong_checksum", affects=ALL, doubt="messages have a wrong checksum"
-):
+class WrongChecksum(FindingData, affects=ALL, doubt="messages have a wrong checksum"):
     """Messages or sentences with a wrong checksum."""
 
     file: str
@@ -400,9 +386,7 @@ class WrongChecksum(
         return text
 
 
-class UnreadableSentence(
-    FindingData, code="unreadable_sentence", affects=ALL, doubt="sentences are not readable"
-):
+class UnreadableSentence(FindingData, affects=ALL, doubt="sentences are not readable"):
     """Sentences with other fields than expected."""
 
     file: str
@@ -419,7 +403,7 @@ class UnreadableSentence(
         )
 
 
-class OtherSentences(FindingData, code="other_sentences", affects=NONE):
+class OtherSentences(FindingData, affects=NONE):
     """Sentences of other kinds, which are not read."""
 
     file: str
@@ -434,7 +418,7 @@ class OtherSentences(FindingData, code="other_sentences", affects=NONE):
         )
 
 
-class NotSentences(FindingData, code="not_sentences", affects=NONE):
+class NotSentences(FindingData, affects=NONE):
     """Lines that are no sentence, and not read."""
 
     file: str

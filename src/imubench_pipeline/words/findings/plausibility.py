@@ -23,7 +23,6 @@ _CORRECT_UNIT = "If so, correct 'unit' in the sensor file"
 
 class RateImplausible(
     FindingData,
-    code="rate_implausible",
     affects=frozenset(POWERS_OF_TIME),
     unfit=True,
     scales=POWERS_OF_TIME,
@@ -57,7 +56,6 @@ class RateImplausible(
 
 class SuspiciousUnit(
     FindingData,
-    code="suspicious_unit",
     affects=_OF_UNIT,
     unfit=True,
     scales=POWERS_OF_UNIT,
@@ -100,12 +98,7 @@ class SuspiciousUnit(
         )
 
 
-class GravityNorm(
-    FindingData,
-    code="gravity_norm",
-    affects=ALL,
-    doubt="the mean acceleration is not gravity",
-):
+class GravityNorm(FindingData, affects=ALL, doubt="the mean acceleration is not gravity"):
     """The mean acceleration is not gravity, in no unit."""
 
     norm: float
@@ -126,10 +119,7 @@ class GravityNorm(
 
 
 class NoiseUnlikeDatasheet(
-    FindingData,
-    code="noise_unlike_datasheet",
-    affects=ALL,
-    doubt="the noise of {channels} differs from its data sheet",
+    FindingData, affects=ALL, doubt="the noise of {channels} differs from its data sheet"
 ):
     """The white noise is far from the printed one, and no unit explains it."""
 
@@ -153,10 +143,7 @@ class NoiseUnlikeDatasheet(
 
 
 class AxisUnlike(
-    FindingData,
-    code="axis_unlike",
-    affects=ALL,
-    doubt="the noise of {channels} differs from the other axes",
+    FindingData, affects=ALL, doubt="the noise of {channels} differs from the other axes"
 ):
     """One axis has much more or much less noise than both others."""
 
@@ -183,7 +170,7 @@ class AxisUnlike(
         )
 
 
-class Turning(FindingData, code="turning", affects=ALL, unfit=True, doubt="the sensor was turning"):
+class Turning(FindingData, affects=ALL, unfit=True, doubt="the sensor was turning"):
     """The mean rate of a gyro, or a steady turn of gravity, shows a rotation."""
 
     rate: float
@@ -245,7 +232,6 @@ UNIT_MISTAKES: Mapping[str, Sequence[tuple[float, str]]] = {
 
 class UnusualFigure(
     FindingData,
-    code="unusual_figure",
     affects=_OF_UNIT | {"S"},
     doubt="N or B of {channels} differs from all known sensors",
 ):

@@ -32,7 +32,7 @@ def _at(seconds: float) -> str:
     return f"{number_text(seconds, 5)} s"
 
 
-class Quantised(FindingData, code="quantised", affects=NONE):
+class Quantised(FindingData, affects=NONE):
     """The values are multiples of a visible step."""
 
     step: float
@@ -55,7 +55,7 @@ class Quantised(FindingData, code="quantised", affects=NONE):
         return text + (_ROUNDED if self.is_rounded else "")
 
 
-class Coarse(FindingData, code="coarse", affects=ALL, doubt="coarse resolution of {channels}"):
+class Coarse(FindingData, affects=ALL, doubt="coarse resolution of {channels}"):
     """The noise is rounding noise."""
 
     levels: float
@@ -72,9 +72,7 @@ class Coarse(FindingData, code="coarse", affects=ALL, doubt="coarse resolution o
         )
 
 
-class RepeatedSamples(
-    FindingData, code="repeated_samples", affects=WHITE, doubt="repeated samples in {channels}"
-):
+class RepeatedSamples(FindingData, affects=WHITE, doubt="repeated samples in {channels}"):
     """Samples repeat their predecessor more often than rounding explains."""
 
     share: float
@@ -89,9 +87,7 @@ class RepeatedSamples(
         )
 
 
-class HeldSamples(
-    FindingData, code="held_samples", affects=WHITE, doubt="repeated samples in {channels}"
-):
+class HeldSamples(FindingData, affects=WHITE, doubt="repeated samples in {channels}"):
     """Every n-th sample repeats its predecessor."""
 
     period: int
@@ -106,14 +102,14 @@ class HeldSamples(
         )
 
 
-class NoSamples(FindingData, code="no_samples", affects=ALL, doubt="no samples in {channels}"):
+class NoSamples(FindingData, affects=ALL, doubt="no samples in {channels}"):
     """A channel without a number."""
 
     def text(self, channel: str) -> str:
         return f"{channel_name(channel)} contains no number"
 
 
-class TooShort(FindingData, code="too_short", affects=ALL, doubt="too few samples in {channels}"):
+class TooShort(FindingData, affects=ALL, doubt="too few samples in {channels}"):
     """Too few samples, or too few adjacent ones for an Allan variance."""
 
     samples: int
@@ -137,7 +133,7 @@ class TooShort(FindingData, code="too_short", affects=ALL, doubt="too few sample
         )
 
 
-class Stuck(FindingData, code="stuck", affects=ALL, unfit=True, doubt="{channels} did not change"):
+class Stuck(FindingData, affects=ALL, unfit=True, doubt="{channels} did not change"):
     """A channel that never changes."""
 
     value: float
@@ -151,9 +147,7 @@ class Stuck(FindingData, code="stuck", affects=ALL, unfit=True, doubt="{channels
         )
 
 
-class EmptyCells(
-    FindingData, code="empty_cells", affects=ALL, doubt="missing samples in {channels}"
-):
+class EmptyCells(FindingData, affects=ALL, doubt="missing samples in {channels}"):
     """Records without a number."""
 
     cells: int
@@ -171,9 +165,7 @@ class EmptyCells(
         )
 
 
-class NotFinite(
-    FindingData, code="not_finite", affects=ALL, doubt="values of {channels} that are not finite"
-):
+class NotFinite(FindingData, affects=ALL, doubt="values of {channels} that are not finite"):
     """Infinities, or values that are too large for a measurement."""
 
     cells: int
@@ -201,12 +193,7 @@ def _longest_run(records: int, duration: float, start: float) -> str:
     )
 
 
-class StuckForAWhile(
-    FindingData,
-    code="stuck_for_a_while",
-    affects=ALL,
-    doubt="{channels} did not change for some time",
-):
+class StuckForAWhile(FindingData, affects=ALL, doubt="{channels} did not change for some time"):
     """A channel that stays at one value for longer than by chance."""
 
     duration: float
@@ -219,9 +206,7 @@ class StuckForAWhile(
         )
 
 
-class Saturated(
-    FindingData, code="saturated", affects=ALL, doubt="saturated samples in {channels}"
-):
+class Saturated(FindingData, affects=ALL, doubt="saturated samples in {channels}"):
     """Samples at an end of the range."""
 
     samples: int
@@ -236,9 +221,7 @@ class Saturated(
         )
 
 
-class PiledUp(
-    FindingData, code="piled_up", affects=ALL, doubt="one value is too frequent in {channels}"
-):
+class PiledUp(FindingData, affects=ALL, doubt="one value is too frequent in {channels}"):
     """One value is far more frequent than its neighbours."""
 
     share: float
@@ -253,7 +236,7 @@ class PiledUp(
         )
 
 
-class Motion(FindingData, code="motion", affects=ALL, unfit=True, doubt="the sensor was moved"):
+class Motion(FindingData, affects=ALL, unfit=True, doubt="the sensor was moved"):
     """The sensor was shaken."""
 
     start: float
@@ -266,7 +249,7 @@ class Motion(FindingData, code="motion", affects=ALL, unfit=True, doubt="the sen
         )
 
 
-class Step(FindingData, code="step", affects=SLOW | {"bias"}, doubt="a step in {channels}"):
+class Step(FindingData, affects=SLOW | {"bias"}, doubt="a step in {channels}"):
     """A sudden change of the mean."""
 
     size: float
@@ -282,9 +265,7 @@ class Step(FindingData, code="step", affects=SLOW | {"bias"}, doubt="a step in {
         )
 
 
-class WarmUp(
-    FindingData, code="warm_up", affects=SLOW | {"bias"}, doubt="warm-up drift of {channels}"
-):
+class WarmUp(FindingData, affects=SLOW | {"bias"}, doubt="warm-up drift of {channels}"):
     """The beginning drifts."""
 
     drift: float
@@ -303,9 +284,7 @@ class WarmUp(
         )
 
 
-class NotStationary(
-    FindingData, code="not_stationary", affects=ALL, doubt="the noise of {channels} changes"
-):
+class NotStationary(FindingData, affects=ALL, doubt="the noise of {channels} changes"):
     """The noise of one part is larger than elsewhere."""
 
     ratio: float
@@ -320,7 +299,7 @@ class NotStationary(
         )
 
 
-class Joined(FindingData, code="joined", affects=ALL, unfit=True, doubt="two logs are joined"):
+class Joined(FindingData, affects=ALL, unfit=True, doubt="two logs are joined"):
     """The data of another sensor, or of another range, begin within the log."""
 
     changes: tuple[Change, ...]
@@ -339,11 +318,7 @@ class Joined(FindingData, code="joined", affects=ALL, unfit=True, doubt="two log
 
 
 class Interleaved(
-    FindingData,
-    code="interleaved",
-    affects=ALL,
-    unfit=True,
-    doubt="samples of two sensors are interleaved",
+    FindingData, affects=ALL, unfit=True, doubt="samples of two sensors are interleaved"
 ):
     """Every other sample is of another sensor."""
 

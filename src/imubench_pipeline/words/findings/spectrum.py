@@ -22,7 +22,7 @@ class MethodsDiffer(FindingData, code="N_differs", affects=NONE):
         )
 
 
-class Lines(FindingData, code="lines", affects=NONE):
+class Lines(FindingData, affects=NONE):
     """Spectral lines that the noise fit excludes."""
 
     sinusoids: int
@@ -52,7 +52,6 @@ class Lines(FindingData, code="lines", affects=NONE):
 
 class StrongLine(
     FindingData,
-    code="strong_line",
     affects=frozenset({"S"}),
     doubt="a vibration of {channels} adds much to the white-noise error",
 ):
@@ -73,10 +72,7 @@ class StrongLine(
 
 
 class TooManyLines(
-    FindingData,
-    code="too_many_lines",
-    affects=frozenset({"S"}),
-    doubt="too many spectral lines in {channels}",
+    FindingData, affects=frozenset({"S"}), doubt="too many spectral lines in {channels}"
 ):
     """More sinusoids than a noise model has."""
 
@@ -101,7 +97,7 @@ class TooManyLines(
         )
 
 
-class BandLimit(FindingData, code="band_limit", affects=NONE):
+class BandLimit(FindingData, affects=NONE):
     """The fit uses only frequencies below a limit."""
 
     highest: float
@@ -125,10 +121,7 @@ class BandLimit(FindingData, code="band_limit", affects=NONE):
 
 
 class SlowNoiseMissing(
-    FindingData,
-    code="slow_noise_missing",
-    affects=SLOW,
-    doubt="slow noise of {channels} was removed before logging",
+    FindingData, affects=SLOW, doubt="slow noise of {channels} was removed before logging"
 ):
     """Less power than white noise at the lowest frequencies."""
 

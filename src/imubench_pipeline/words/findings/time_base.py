@@ -34,9 +34,7 @@ def _change_of_n(correct: float, used: float) -> str:
     return f"{percent_text(abs(change), 2)} {'higher' if change > 0.0 else 'lower'}"
 
 
-class RateChanges(
-    FindingData, code="rate_changes", affects=WHITE, doubt="the sampling rate changes"
-):
+class RateChanges(FindingData, affects=WHITE, doubt="the sampling rate changes"):
     """A part of a log has every n-th sample only."""
 
     share: float
@@ -59,9 +57,7 @@ class RateChanges(
         )
 
 
-class CoarseStamps(
-    FindingData, code="coarse_stamps", affects=_TIMED, doubt="the sampling rate is ambiguous"
-):
+class CoarseStamps(FindingData, affects=_TIMED, doubt="the sampling rate is ambiguous"):
     """Stamps with double or zero steps at regular distances."""
 
     rate: float
@@ -80,7 +76,7 @@ class CoarseStamps(
         )
 
 
-class MissingSamples(FindingData, code="missing_samples", affects=ALL, doubt="samples are missing"):
+class MissingSamples(FindingData, affects=ALL, doubt="samples are missing"):
     """Points of the grid without a sample."""
 
     missing: int
@@ -115,9 +111,7 @@ class MissingSamples(FindingData, code="missing_samples", affects=ALL, doubt="sa
         return text
 
 
-class Segments(
-    FindingData, code="segments", affects=SLOW | {"bias"}, doubt="the recording was interrupted"
-):
+class Segments(FindingData, affects=SLOW | {"bias"}, doubt="the recording was interrupted"):
     """Pauses of the recording, or jumps of its clock."""
 
     has_grid: bool
@@ -136,7 +130,7 @@ class Segments(
         return f"{what} {often} {step}. The recording is analysed as {self.pauses + 1} segments"
 
 
-class RepeatedStamps(FindingData, code="repeated_stamps", affects=NONE):
+class RepeatedStamps(FindingData, affects=NONE):
     """Records with the stamp of an earlier one, which are left out."""
 
     records: int
@@ -150,9 +144,7 @@ class RepeatedStamps(FindingData, code="repeated_stamps", affects=NONE):
         )
 
 
-class MissingStamps(
-    FindingData, code="missing_stamps", affects=_TIMED, doubt="time stamps are missing"
-):
+class MissingStamps(FindingData, affects=_TIMED, doubt="time stamps are missing"):
     """Records without a stamp, which are taken as consecutive."""
 
     records: int
@@ -165,10 +157,7 @@ class MissingStamps(
 
 
 class RateContradictsStamps(
-    FindingData,
-    code="rate_contradicts_stamps",
-    affects=_TIMED,
-    doubt="the stated rate contradicts the time stamps",
+    FindingData, affects=_TIMED, doubt="the stated rate contradicts the time stamps"
 ):
     """The stated rate contradicts the stamps, whose rate is used."""
 
@@ -182,7 +171,7 @@ class RateContradictsStamps(
         )
 
 
-class RateDrifts(FindingData, code="rate_drifts", affects=_TIMED, doubt="the clock drifts"):
+class RateDrifts(FindingData, affects=_TIMED, doubt="the clock drifts"):
     """The sampling interval differs between the halves of a log."""
 
     drift: float
@@ -196,9 +185,7 @@ class RateDrifts(FindingData, code="rate_drifts", affects=_TIMED, doubt="the clo
         )
 
 
-class JitteredStamps(
-    FindingData, code="jittered_stamps", affects=_TIMED, doubt="the time stamps are irregular"
-):
+class JitteredStamps(FindingData, affects=_TIMED, doubt="the time stamps are irregular"):
     """Stamps on no uniform grid, so that lost samples are not seen."""
 
     share: float
@@ -221,10 +208,7 @@ class JitteredStamps(
 
 
 class IrregularStamps(
-    FindingData,
-    code="irregular_stamps",
-    affects=_TIMED,
-    doubt="some time stamps have more or fewer samples than others",
+    FindingData, affects=_TIMED, doubt="some time stamps have more or fewer samples than others"
 ):
     """Stamps that more or fewer samples share than others."""
 
@@ -239,7 +223,7 @@ class IrregularStamps(
         )
 
 
-class OwnRate(FindingData, code="own_rate", affects=NONE):
+class OwnRate(FindingData, affects=NONE):
     """Channels with fewer numbers than the log has records."""
 
     channels: tuple[str, ...]
