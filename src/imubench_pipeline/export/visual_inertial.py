@@ -36,8 +36,7 @@ _ORB_CONVENTION = (
     "N as IMU.Noise* and K as IMU.*Walk: continuous in time, two-sided, SI; the program itself "
     "multiplies by the root of IMU.Frequency, or divides by it."
 )
-_TOPIC = "/imu0"
-"""ROS topic of the samples."""
+_TOPIC = "/imu0"  # ROS topic of the samples
 
 
 def map_to_walks(imu: Imu) -> dict[str, Mapped]:

@@ -37,8 +37,7 @@ class DriftRow(SensorRow):
     device: Annotated[str, Column("whose recordings are compared")]
     channel: Annotated[str, Column("axis and quantity, gyro_x to accel_z")]
     parameter: Annotated[
-        str,
-        Column("N, B_curve, sigma_min, K, B, T_B, Q, R, or bias: the fixed bias"),
+        str, Column("N, B_curve, sigma_min, K, B, T_B, Q, R, or bias: the fixed bias")
     ]
     recording: Annotated[str, Column("name of the recording")]
     position: Annotated[int, Column("place in the order of the device's recordings, from 1")]
@@ -48,21 +47,17 @@ class DriftRow(SensorRow):
     upper: UpperLimit = None
     unit: Unit
     expected: Annotated[
-        float | None,
-        Column("what the earlier recordings let one expect", "as in unit"),
+        float | None, Column("what the earlier recordings let one expect", "as in unit")
     ] = None
     expected_lower: Annotated[
-        float | None,
-        Column("lower 95 % limit of the estimate expected", "as in unit"),
+        float | None, Column("lower 95 % limit of the estimate expected", "as in unit")
     ] = None
     expected_upper: Annotated[
-        float | None,
-        Column("upper 95 % limit of the estimate expected", "as in unit"),
+        float | None, Column("upper 95 % limit of the estimate expected", "as in unit")
     ] = None
     change: Annotated[float | None, Column("value / expected - 1; null for a bias")] = None
     p_value: Annotated[
-        float | None,
-        Column("chance of such a difference, if the device has not changed"),
+        float | None, Column("chance of such a difference, if the device has not changed")
     ] = None
     verdict: Annotated[DriftVerdict | None, Column("null: cannot be judged")] = None
     reason: Annotated[str | None, Column("in words")] = None
@@ -75,8 +70,7 @@ class PooledRow(SensorRow):
     device: Annotated[str | None, Column("null: all recordings of the sensor")] = None
     channel: Annotated[str, Column("axis and quantity, gyro_x to accel_z")]
     parameter: Annotated[
-        str,
-        Column("N, B_curve, sigma_min, K, B, T_B, Q, R, or bias: the fixed bias"),
+        str, Column("N, B_curve, sigma_min, K, B, T_B, Q, R, or bias: the fixed bias")
     ]
     recordings: Annotated[int, Column("recordings pooled")]
     left_out: Annotated[int, Column("recordings that have no value to pool")]
@@ -88,20 +82,16 @@ class PooledRow(SensorRow):
     upper: UpperLimit = None
     unit: Unit
     spread: Annotated[
-        float | None,
-        Column("standard deviation between recordings", "as in unit"),
+        float | None, Column("standard deviation between recordings", "as in unit")
     ] = None
     spread_lower: Annotated[
-        float | None,
-        Column("lower 95 % limit of the spread", "as in unit"),
+        float | None, Column("lower 95 % limit of the spread", "as in unit")
     ] = None
     spread_upper: Annotated[
-        float | None,
-        Column("upper 95 % limit of the spread", "as in unit"),
+        float | None, Column("upper 95 % limit of the spread", "as in unit")
     ] = None
     p_value: Annotated[
-        float | None,
-        Column("chance of such differences, if the recordings agree"),
+        float | None, Column("chance of such differences, if the recordings agree")
     ] = None
     verdict: Annotated[PoolVerdict | None, Column("at a level of 1 %")] = None
     reason: Annotated[str | None, Column("in words")] = None
@@ -113,8 +103,7 @@ class DatasheetRow(ChannelRow):
     """A row of the table ``datasheet``."""
 
     method: Annotated[
-        str,
-        Column("of the estimate; mean: of the log; temperature: the thermal fit"),
+        str, Column("of the estimate; mean: of the log; temperature: the thermal fit")
     ]
     quantity: Annotated[str, Column("N, bias_instability, K, T_B, allan_deviation, offset, ...")]
     statistic: Annotated[
@@ -122,24 +111,20 @@ class DatasheetRow(ChannelRow):
         Column("what is compared: N, adev_minimum, plateau (0.664 B), K, T_B, mean, sensitivity"),
     ]
     printed: Annotated[
-        float | None,
-        Column("figure as printed; null: the verdict says why", "as in unit"),
+        float | None, Column("figure as printed; null: the verdict says why", "as in unit")
     ] = None
     unit: Annotated[str | None, Column("unit as printed")] = None
     kind: Annotated[str | None, Column("typ, max, min, range, 1sigma or derived")] = None
     condition: Annotated[str | None, Column("as printed")] = None
     sidedness: Annotated[str | None, Column("of a noise density, as assumed in this row")] = None
     comparable: Annotated[
-        float | None,
-        Column("the printed figure in the convention of measured", "SI"),
+        float | None, Column("the printed figure in the convention of measured", "SI")
     ] = None
     comparable_lower: Annotated[
-        float | None,
-        Column("least figure that is printed of it, such as typ", "SI"),
+        float | None, Column("least figure that is printed of it, such as typ", "SI")
     ] = None
     comparable_upper: Annotated[
-        float | None,
-        Column("largest figure that is printed of it, such as max", "SI"),
+        float | None, Column("largest figure that is printed of it, such as max", "SI")
     ] = None
     measured: Annotated[float | None, Column("estimate of the same quantity", "SI")] = None
     lower: Annotated[float | None, Column("lower 95 % limit of measured", "SI")] = None
@@ -166,8 +151,7 @@ class RepeatabilityRow(SensorRow):
     condition: Annotated[str | None, Column("as printed")] = None
     comparable: Annotated[float | None, Column("the printed figure", "SI")] = None
     measured: Annotated[
-        float | None,
-        Column("standard deviation of the fixed bias between recordings", "SI"),
+        float | None, Column("standard deviation of the fixed bias between recordings", "SI")
     ] = None
     lower: Annotated[float | None, Column("lower 95 % limit of measured", "SI")] = None
     upper: Annotated[float | None, Column("upper 95 % limit of measured", "SI")] = None
@@ -182,20 +166,17 @@ class DatasheetCurveRow(ChannelRow):
 
     sidedness: Annotated[str | None, Column("of the noise density, as assumed in this row")] = None
     N: Annotated[
-        float | None,
-        Column("line N / sqrt(tau) of the datasheet", "rad/s or m/s^2 times sqrt(s)"),
+        float | None, Column("line N / sqrt(tau) of the datasheet", "rad/s or m/s^2 times sqrt(s)")
     ] = None
     floor: Annotated[
-        float | None,
-        Column("bias instability of the datasheet", "rad/s or m/s^2"),
+        float | None, Column("bias instability of the datasheet", "rad/s or m/s^2")
     ] = None
     rms: Annotated[
         float | None,
         Column("RMS over tau of measured Allan deviation minus the lines'", "rad/s or m/s^2"),
     ] = None
     rms_log10: Annotated[
-        float | None,
-        Column("RMS over tau of the difference of log10", "decades"),
+        float | None, Column("RMS over tau of the difference of log10", "decades")
     ] = None
 
 
@@ -208,41 +189,34 @@ class ErrorBudgetRow(OfRecordingRow):
     gyro: Annotated[str | None, Column("channel that answers")] = None
     accel: Annotated[str | None, Column("channel that answers")] = None
     error: Annotated[
-        str,
-        Column("attitude, heading, velocity, position; north: heading found at rest"),
+        str, Column("attitude, heading, velocity, position; north: heading found at rest")
     ]
     time: Annotated[float, Column("of dead reckoning; of rest for north", "s")]
     source: Annotated[str, Column("total, or what the error comes of")]
     sigma: Annotated[
-        float | None,
-        Column("standard deviation; null where reason says why", "as in unit"),
+        float | None, Column("standard deviation; null where reason says why", "as in unit")
     ] = None
     lower: Annotated[float | None, Column("lower 95 % limit of a total", "as in unit")] = None
     upper: Annotated[float | None, Column("upper 95 % limit of a total", "as in unit")] = None
-    drawn: Annotated[
-        str | None,
-        Column("parameters behind the limits: jointly, or one by one"),
-    ] = None
+    drawn: Annotated[str | None, Column("parameters behind the limits: jointly, or one by one")] = (
+        None
+    )
     within: Annotated[float | None, Column("chance that the total is within limit")] = None
     limit: Annotated[
-        float | None,
-        Column("largest standard deviation that is allowed", "as in unit"),
+        float | None, Column("largest standard deviation that is allowed", "as in unit")
     ] = None
     unit: Unit
     reached_after: Annotated[
-        float | None,
-        Column("time after which the limit is reached; null: never", "s"),
+        float | None, Column("time after which the limit is reached; null: never", "s")
     ] = None
     cause: Annotated[
-        str | None,
-        Column("of a source: noise, start, turn_on_bias, temperature, ..."),
+        str | None, Column("of a source: noise, start, turn_on_bias, temperature, ...")
     ] = None
     origin: Annotated[Origin | None, Column("of the figure of a source")] = None
     kind: Annotated[str | None, Column("of a printed figure: typ, max, 1sigma, ...")] = None
     convention: Annotated[str | None, Column("how a figure became a standard deviation")] = None
     largest: Annotated[
-        float | None,
-        Column("1 sigma with which the limit is kept", "as in largest_unit"),
+        float | None, Column("1 sigma with which the limit is kept", "as in largest_unit")
     ] = None
     largest_unit: Annotated[str | None, Column("SI unit of the figure")] = None
     reason: Annotated[str | None, Column("what is not known")] = None
@@ -265,32 +239,27 @@ class RankingRow(TableRow):
     trajectory: Annotated[str | None, Column("of an outage of GNSS; null: an error budget")] = None
     at_most: Annotated[float | None, Column("the limit as it was asked for", "as in unit")] = None
     confidence: Annotated[
-        float | None,
-        Column("chance of an error within it that was asked for"),
+        float | None, Column("chance of an error within it that was asked for")
     ] = None
     limit: Annotated[
-        float | None,
-        Column("the same as a standard deviation: the largest allowed", "as in unit"),
+        float | None, Column("the same as a standard deviation: the largest allowed", "as in unit")
     ] = None
     sigma: Annotated[
-        float | None,
-        Column("standard deviation of the error, of the next specimen", "as in unit"),
+        float | None, Column("standard deviation of the error, of the next specimen", "as in unit")
     ] = None
     lower: LowerLimit = None
     upper: UpperLimit = None
     unit: Unit
     margin: Annotated[float | None, Column("limit over sigma")] = None
     chance: Annotated[
-        float | None,
-        Column("that sigma is within limit, as far as logs and specimens tell"),
+        float | None, Column("that sigma is within limit, as far as logs and specimens tell")
     ] = None
     limit_verdict: Annotated[Verdict, Column("of this limit alone")]
     source: Annotated[str | None, Column("the largest contribution")] = None
     share: Annotated[float | None, Column("its part of the variance")] = None
-    reached_after: Annotated[
-        float | None,
-        Column("time after which the limit is reached", "s"),
-    ] = None
+    reached_after: Annotated[float | None, Column("time after which the limit is reached", "s")] = (
+        None
+    )
     conditions: Annotated[
         tuple[Condition, ...], Column("unknown figures and properties; largest: 1 sigma, SI")
     ] = ()
@@ -307,8 +276,7 @@ class RankingRow(TableRow):
     recordings: Annotated[int | None, Column("recordings that they stand on")] = None
     longest_log: Annotated[float | None, Column("duration of the longest of them", "s")] = None
     spread: Annotated[
-        float | None,
-        Column("standard deviation of ln sigma between specimens; null: unknown"),
+        float | None, Column("standard deviation of ln sigma between specimens; null: unknown")
     ] = None
     spread_of: Annotated[SpreadOf | None, Column("compared units or recordings")] = None
     evidence: Annotated[Evidence | None, Column("for this limit; null: there is no figure")] = None
@@ -327,16 +295,13 @@ class RankingRow(TableRow):
     logged_verdict: Annotated[Verdict | None, Column("with unused recordings, as logged")] = None
     logged_margin: Annotated[float | None, Column("with unused recordings, as logged")] = None
     backtest_channel: Annotated[
-        str | None,
-        Column("that the error mostly comes of; null: not tested"),
+        str | None, Column("that the error mostly comes of; null: not tested")
     ] = None
     backtest_ratio: Annotated[
-        float | None,
-        Column("error that its log shows of its part, over the predicted one"),
+        float | None, Column("error that its log shows of its part, over the predicted one")
     ] = None
     backtest_ratio_lower: Annotated[
-        float | None,
-        Column("lower end of where it lies in 95 % of logs"),
+        float | None, Column("lower end of where it lies in 95 % of logs")
     ] = None
     backtest_ratio_upper: Annotated[float | None, Column("upper end")] = None
     backtest_windows: Annotated[int | None, Column("of the log, overlapping")] = None
@@ -368,22 +333,18 @@ class ShortlistRow(TableRow):
     sensor: Annotated[str, Column("of the catalogue")]
     price_class: Annotated[str | None, Column("as stated")] = None
     best_margin: Annotated[
-        float | None,
-        Column("limit over error, of the best that the datasheet allows"),
+        float | None, Column("limit over error, of the best that the datasheet allows")
     ] = None
     worst_margin: Annotated[
-        float | None,
-        Column("of the worst that it allows; null: not known"),
+        float | None, Column("of the worst that it allows; null: not known")
     ] = None
     decides: Annotated[str | None, Column("the limit with the least margin at the best")] = None
     verdict: Annotated[ShortlistVerdict, Column("by the data sheet alone")]
     measured_margin_of: Annotated[
-        str | None,
-        Column("logs or simulated logs; null: not measured"),
+        str | None, Column("logs or simulated logs; null: not measured")
     ] = None
     measured_margin: Annotated[
-        float | None,
-        Column("limit over error by its logs: see the table ranking"),
+        float | None, Column("limit over error by its logs: see the table ranking")
     ] = None
     measured_verdict: Annotated[Verdict | None, Column("as in the table ranking")] = None
     assumed: Annotated[tuple[str, ...], Column("unprinted figures, and the values assumed")] = ()

@@ -30,32 +30,28 @@ class AllanRow(ChannelRow):
     adev: Annotated[float, Column("Allan deviation", "rad/s or m/s^2")]
     lower: Annotated[float | None, Column("lower 95 % limit", "rad/s or m/s^2")] = None
     upper: Annotated[float | None, Column("upper 95 % limit", "rad/s or m/s^2")] = None
-    edf: Annotated[
-        float | None,
-        Column("equivalent degrees of freedom of the Allan variance"),
-    ] = None
+    edf: Annotated[float | None, Column("equivalent degrees of freedom of the Allan variance")] = (
+        None
+    )
     edf_upper: Annotated[
         float | None,
         Column("degrees of freedom of the upper 95 % limit: more where few clusters remain"),
     ] = None
     edf_source: Annotated[
-        str,
-        Column("what they follow from: fitted spectrum, or power law at this tau"),
+        str, Column("what they follow from: fitted spectrum, or power law at this tau")
     ]
     averaged: Annotated[
         float | None,
         Column(
-            "samples that a cluster really averages: fewer than its size where samples are missing",
+            "samples that a cluster really averages: fewer than its size where samples are missing"
         ),
     ] = None
     exponent: Annotated[
-        int | None,
-        Column("noise type: 0 white, -1 flicker, -2 random walk, 1 and 2 phase noise"),
+        int | None, Column("noise type: 0 white, -1 flicker, -2 random walk, 1 and 2 phase noise")
     ] = None
-    share: Annotated[
-        float | None,
-        Column("part of the differences that missing samples leave"),
-    ] = None
+    share: Annotated[float | None, Column("part of the differences that missing samples leave")] = (
+        None
+    )
 
 
 @table("parameters")
@@ -72,7 +68,7 @@ class ParameterRow(ChannelRow):
             "Q, N, B, T_B, K, R; N_sensor (white density before a low-pass or an interpolation "
             "that shows); amplitude and frequency of a line; of the curve of the model: B_curve "
             "(bias instability of the curve: highest Allan deviation of all F and GM terms over "
-            "0.664), sigma_min and tau_min (lowest point, up to a ninth of the log)",
+            "0.664), sigma_min and tau_min (lowest point, up to a ninth of the log)"
         ),
     ]
     value: Estimate = None
@@ -82,8 +78,7 @@ class ParameterRow(ChannelRow):
     status: EstimateStatus
     reason: EstimateReason = None
     duration_needed: Annotated[
-        float | None,
-        Column("length of a log that gives the value to 10 %", "s"),
+        float | None, Column("length of a log that gives the value to 10 %", "s")
     ] = None
     fitted: FittedValue = None
 
@@ -99,16 +94,14 @@ class ModelRow(ChannelRow):
     bic: Annotated[float, Column("-2 log likelihood + free log(bins); + 4: GM for K, + 6: Q, R")]
     aic: Annotated[float, Column("-2 log likelihood + 2 free")]
     weight: Annotated[float, Column("of the model among the candidates, by BIC")]
-    deviance: Annotated[
-        float | None,
-        Column("mean of a bin; about 1 where the model is right"),
-    ] = None
+    deviance: Annotated[float | None, Column("mean of a bin; about 1 where the model is right")] = (
+        None
+    )
     chance: Annotated[float | None, Column("of so poor a fit, if the model is right")] = None
     verdict: Annotated[GoodnessVerdict, Column("whether the model explains the spectrum")]
-    note: Annotated[
-        str | None,
-        Column("where it is furthest from the spectrum; what AIC says"),
-    ] = None
+    note: Annotated[str | None, Column("where it is furthest from the spectrum; what AIC says")] = (
+        None
+    )
     bins: Annotated[int, Column("bins of the spectrum used")]
     band: Annotated[float | None, Column("highest frequency used", "Hz")] = None
     band_source: Annotated[str | None, Column("how it was found")] = None
@@ -127,8 +120,7 @@ class LineRow(ChannelRow):
     amplitude_upper: Annotated[float | None, Column("upper 95 % limit", "rad/s or m/s^2")] = None
     ratio: Annotated[float | None, Column("ratio of the highest density to the noise")] = None
     false_alarm: Annotated[
-        float | None,
-        Column("chance of one like it in a channel without lines"),
+        float | None, Column("chance of one like it in a channel without lines")
     ] = None
     width: Annotated[float | None, Column("how wide it is", "Hz")] = None
 
@@ -150,20 +142,17 @@ class ModelSampleRow(ChannelRow):
     """A row of the table ``samples_of_models``."""
 
     of: Annotated[
-        str,
-        Column("log; before: of the model that the curve reads; after: of the estimate"),
+        str, Column("log; before: of the model that the curve reads; after: of the estimate")
     ]
     what: Annotated[
-        str,
-        Column("deviation of all samples; stretch: each sample; envelope: over time"),
+        str, Column("deviation of all samples; stretch: each sample; envelope: over time")
     ]
     start: Annotated[float, Column("from the first sample", "s")]
     end: Annotated[float, Column("its end", "s")]
     low: Annotated[float | None, Column("of an envelope: least sample", "SI")] = None
     high: Annotated[float | None, Column("largest sample", "SI")] = None
     mean: Annotated[
-        float | None,
-        Column("mean of the samples, the sample, or the deviation", "SI"),
+        float | None, Column("mean of the samples, the sample, or the deviation", "SI")
     ] = None
 
 
@@ -186,8 +175,7 @@ class SpectrumRow(ChannelRow):
     ordinates: Annotated[float, Column("degrees of freedom of the bin")]
     density: Annotated[float, Column("measured, two-sided", "(rad/s)^2/Hz or (m/s^2)^2/Hz")]
     fitted: Annotated[
-        float | None,
-        Column("of the chosen model", "(rad/s)^2/Hz or (m/s^2)^2/Hz"),
+        float | None, Column("of the chosen model", "(rad/s)^2/Hz or (m/s^2)^2/Hz")
     ] = None
     used: Annotated[bool, Column("inside the band, and clear of lines")]
 
@@ -206,8 +194,7 @@ class TemperatureRow(ChannelRow):
 
     compensated: Annotated[bool, Column("taken out of the noise: method compensated")]
     parameter: Annotated[
-        str,
-        Column("T_0 (mean temperature), sensitivity, quadratic, lag, bias (at T_0)"),
+        str, Column("T_0 (mean temperature), sensitivity, quadratic, lag, bias (at T_0)")
     ]
     value: Estimate = None
     lower: LowerLimit = None
@@ -224,26 +211,22 @@ class CompensatedAllanRow(ChannelRow):
 
     tau: Annotated[float, Column("cluster length", "s")]
     adev: Annotated[
-        float,
-        Column("Allan deviation of the log less what temperature adds", "rad/s or m/s^2"),
+        float, Column("Allan deviation of the log less what temperature adds", "rad/s or m/s^2")
     ]
     lower: Annotated[float | None, Column("lower 95 % limit", "rad/s or m/s^2")] = None
     upper: Annotated[float | None, Column("upper 95 % limit", "rad/s or m/s^2")] = None
-    edf: Annotated[
-        float | None,
-        Column("equivalent degrees of freedom of the Allan variance"),
-    ] = None
+    edf: Annotated[float | None, Column("equivalent degrees of freedom of the Allan variance")] = (
+        None
+    )
     edf_upper: Annotated[
         float | None,
         Column("degrees of freedom of the upper 95 % limit: more where few clusters remain"),
     ] = None
     edf_source: Annotated[
-        str,
-        Column("what they follow from: fitted spectrum, or power law at this tau"),
+        str, Column("what they follow from: fitted spectrum, or power law at this tau")
     ]
     temperature: Annotated[
-        float,
-        Column("Allan deviation of what temperature adds", "rad/s or m/s^2"),
+        float, Column("Allan deviation of what temperature adds", "rad/s or m/s^2")
     ]
 
 
@@ -253,12 +236,10 @@ class LowPassRow(ChannelRow):
 
     kind: Annotated[str | None, Column("analogue, bilinear or boxcar; null: none shows")] = None
     order: Annotated[
-        int | None,
-        Column("order of the filter: 1, or of a Butterworth; null: no filter found"),
+        int | None, Column("order of the filter: 1, or of a Butterworth; null: no filter found")
     ] = None
     parameter: Annotated[
-        str,
-        Column("cutoff (-3 dB), floor (white noise that does not pass the filter)"),
+        str, Column("cutoff (-3 dB), floor (white noise that does not pass the filter)")
     ]
     value: Estimate = None
     lower: LowerLimit = None
@@ -279,8 +260,7 @@ class ReconstructionRow(ChannelRow):
     lower: Annotated[float, Column("lower 95 % limit of the ensemble", "rad/s or m/s^2")]
     upper: Annotated[float, Column("upper 95 % limit of the ensemble", "rad/s or m/s^2")]
     reconstructed: Annotated[
-        float,
-        Column("Allan deviation of the full-length simulated log", "rad/s or m/s^2"),
+        float, Column("Allan deviation of the full-length simulated log", "rad/s or m/s^2")
     ]
 
 
@@ -297,26 +277,22 @@ class ScoreRow(ChannelRow):
             "rad/s or m/s^2",
         ),
     ] = None
-    rms_log10: Annotated[
-        float | None,
-        Column("the same of the difference of log10", "decades"),
-    ] = None
+    rms_log10: Annotated[float | None, Column("the same of the difference of log10", "decades")] = (
+        None
+    )
     drawn: Annotated[
         float | None,
         Column("rms of one simulated log in the model's place: median of many", "rad/s or m/s^2"),
     ] = None
     drawn_lower: Annotated[
-        float | None,
-        Column("lower end of the range of 90 % of them", "rad/s or m/s^2"),
+        float | None, Column("lower end of the range of 90 % of them", "rad/s or m/s^2")
     ] = None
     drawn_upper: Annotated[float | None, Column("upper end", "rad/s or m/s^2")] = None
     drawn_log10: Annotated[
-        float | None,
-        Column("rms_log10 of one simulated log: median of many", "decades"),
+        float | None, Column("rms_log10 of one simulated log: median of many", "decades")
     ] = None
     drawn_log10_lower: Annotated[
-        float | None,
-        Column("lower end of the range of 90 % of them", "decades"),
+        float | None, Column("lower end of the range of 90 % of them", "decades")
     ] = None
     drawn_log10_upper: Annotated[float | None, Column("upper end", "decades")] = None
     whole: Annotated[
@@ -324,20 +300,18 @@ class ScoreRow(ChannelRow):
         Column("RMS of one simulated log, every tau alike: median of many", "rad/s or m/s^2"),
     ] = None
     whole_lower: Annotated[
-        float | None,
-        Column("lower end of the range of 90 % of them", "rad/s or m/s^2"),
+        float | None, Column("lower end of the range of 90 % of them", "rad/s or m/s^2")
     ] = None
     whole_upper: Annotated[float | None, Column("upper end", "rad/s or m/s^2")] = None
     beats: Annotated[
         float | None,
         Column(
             "chance that a log simulated of it has a lower whole than one of the recommended "
-            "method: 0.5 for the same model",
+            "method: 0.5 for the same model"
         ),
     ] = None
     inside_band: Annotated[
-        float | None,
-        Column("share of the measured curve inside the 95 % band"),
+        float | None, Column("share of the measured curve inside the 95 % band")
     ] = None
     reason: Annotated[str | None, Column("why there is no score")] = None
 
@@ -360,44 +334,35 @@ class BacktestRow(ChannelRow):
 
     requirement: Annotated[str, Column("that has the limit")]
     error: Annotated[
-        str,
-        Column("attitude, heading, velocity, position: the part of it of this channel"),
+        str, Column("attitude, heading, velocity, position: the part of it of this channel")
     ]
     time: Annotated[float, Column("of dead reckoning", "s")]
     window: Annotated[
-        float | None,
-        Column("at rest right before, over which the bias is the mean", "s"),
+        float | None, Column("at rest right before, over which the bias is the mean", "s")
     ] = None
     windows: Annotated[
-        int | None,
-        Column("of the log, overlapping; those with gaps are left out"),
+        int | None, Column("of the log, overlapping; those with gaps are left out")
     ] = None
     independent: Annotated[
-        float | None,
-        Column("windows that would scatter as little, if independent"),
+        float | None, Column("windows that would scatter as little, if independent")
     ] = None
     measured: Annotated[
-        float | None,
-        Column("rms of the error over the windows of the log as it is", "as in unit"),
+        float | None, Column("rms of the error over the windows of the log as it is", "as in unit")
     ] = None
     predicted: Annotated[
-        float | None,
-        Column("standard deviation by the noise model of the channel", "as in unit"),
+        float | None, Column("standard deviation by the noise model of the channel", "as in unit")
     ] = None
     predicted_lower: Annotated[
-        float | None,
-        Column("lower 95 % limit, by the models drawn", "as in unit"),
+        float | None, Column("lower 95 % limit, by the models drawn", "as in unit")
     ] = None
     predicted_upper: UpperLimit = None
     ratio: Annotated[float | None, Column("measured over predicted")] = None
     ratio_lower: Annotated[
-        float | None,
-        Column("lower end of where it lies in 95 % of logs, the model right"),
+        float | None, Column("lower end of where it lies in 95 % of logs, the model right")
     ] = None
     ratio_upper: Annotated[float | None, Column("upper end")] = None
     chance: Annotated[
-        float | None,
-        Column("of such a ratio or a larger one, if the model is right"),
+        float | None, Column("of such a ratio or a larger one, if the model is right")
     ] = None
     verdict: Annotated[BacktestVerdict | None, Column("null: it cannot be done")] = None
     contradicted: Annotated[
@@ -406,12 +371,10 @@ class BacktestRow(ChannelRow):
     ] = None
     unit: Unit
     taken_out: Annotated[
-        str | None,
-        Column("in the log, not in the model: kinds of deterministic"),
+        str | None, Column("in the log, not in the model: kinds of deterministic")
     ] = None
     duration_needed: Annotated[
-        float | None,
-        Column("length of a log that can be tested so", "s"),
+        float | None, Column("length of a log that can be tested so", "s")
     ] = None
     reason: Annotated[str | None, Column("why it cannot be done")] = None
 
@@ -427,8 +390,7 @@ class DrawnDeviationRow(ChannelRow):
     ] = None
     adev: Annotated[float, Column("Allan deviation of the noise model", "rad/s or m/s^2")]
     unknown: Annotated[
-        str | None,
-        Column("parameters that matter and that the log does not tell"),
+        str | None, Column("parameters that matter and that the log does not tell")
     ] = None
 
 
@@ -437,8 +399,7 @@ class DeterministicRow(ChannelRow):
     """A row of the table ``deterministic``."""
 
     kind: Annotated[
-        str,
-        Column("bias_step, warm_up_drift or periodic_drift: taken out of the noise"),
+        str, Column("bias_step, warm_up_drift or periodic_drift: taken out of the noise")
     ]
     start: Annotated[float, Column("of the part that has it, from the first sample", "s")]
     end: Annotated[float, Column("its end; of a step both are its place", "s")]
@@ -447,14 +408,12 @@ class DeterministicRow(ChannelRow):
     size_upper: UpperLimit = None
     unit: Annotated[str, Column("SI unit of the sizes")]
     time: Annotated[
-        float | None,
-        Column("time constant of a warm-up, period of periodic drift", "s"),
+        float | None, Column("time constant of a warm-up, period of periodic drift", "s")
     ] = None
     time_lower: Annotated[float | None, Column("lower 95 % limit", "s")] = None
     time_upper: Annotated[float | None, Column("upper 95 % limit", "s")] = None
     place_error: Annotated[
-        float | None,
-        Column("half width of the 95 % interval of a step's place", "s"),
+        float | None, Column("half width of the 95 % interval of a step's place", "s")
     ] = None
     gain: Annotated[float | None, Column("twice the log likelihood that is lost without it")] = None
 
@@ -475,20 +434,17 @@ class DrawRow(ChannelRow):
         Column("white noise; null: it has none", "rad/s/sqrt(Hz) or m/s^2/sqrt(Hz)", single=True),
     ] = None
     B: Annotated[
-        float | None,
-        Column("bias instability; null: it has none", "rad/s or m/s^2", single=True),
+        float | None, Column("bias instability; null: it has none", "rad/s or m/s^2", single=True)
     ] = None
     T_B: Annotated[
-        float | None,
-        Column("correlation time; null where B is flicker noise", "s", single=True),
+        float | None, Column("correlation time; null where B is flicker noise", "s", single=True)
     ] = None
     K: Annotated[
         float | None,
         Column("random walk; null: it has none", "rad/s/sqrt(s) or m/s^2/sqrt(s)", single=True),
     ] = None
     R: Annotated[
-        float | None,
-        Column("ramp; null: it has none", "rad/s^2 or m/s^3", single=True),
+        float | None, Column("ramp; null: it has none", "rad/s^2 or m/s^3", single=True)
     ] = None
 
 
@@ -500,8 +456,7 @@ class ErrorGrowthRow(OfRecordingRow):
     gyro: Annotated[str, Column("channel that answers")]
     accel: Annotated[str | None, Column("channel that answers")] = None
     window: Annotated[
-        float,
-        Column("at rest right before, from which biases and tilt are taken", "s"),
+        float, Column("at rest right before, from which biases and tilt are taken", "s")
     ]
     error: Annotated[str, Column("attitude, heading, velocity or position")]
     time: Annotated[float, Column("of dead reckoning", "s")]

@@ -30,8 +30,7 @@ class RecordingRow(SensorRow):
     rate: Annotated[float | None, Column("sampling rate used", "Hz")] = None
     rate_from: Annotated[str | None, Column("where it is from: stamps, or stated")] = None
     rate_error: Annotated[
-        float | None,
-        Column("its standard deviation, as the stamps' scatter tells", "Hz"),
+        float | None, Column("its standard deviation, as the stamps' scatter tells", "Hz")
     ] = None
     samples: Annotated[int | None, Column("samples present in the longest channel")] = None
     duration: Annotated[float | None, Column("from the first to the last sample", "s")] = None
@@ -57,26 +56,17 @@ class FileRow(TableRow):
 class DoubtRow(OfRecordingRow):
     """A row of the table ``doubts``."""
 
-    channel: Annotated[
-        str | None,
-        Column("the channel concerned; null: the whole recording"),
-    ] = None
+    channel: Annotated[str | None, Column("the channel concerned; null: the whole recording")] = (
+        None
+    )
     code: Annotated[
-        str,
-        Column("a finding; not_explained: the spectrum; doubtful: a parameter's status"),
+        str, Column("a finding; not_explained: the spectrum; doubtful: a parameter's status")
     ]
-    fitness: Annotated[
-        Fitness,
-        Column("unfit: the figures may not be those of a sensor at rest"),
-    ]
+    fitness: Annotated[Fitness, Column("unfit: the figures may not be those of a sensor at rest")]
     parameters: Annotated[tuple[str, ...], Column("affected; empty: all")] = ()
-    factor: Annotated[
-        float | None,
-        Column("possible change of a value, where known"),
-    ] = None
+    factor: Annotated[float | None, Column("possible change of a value, where known")] = None
     start: Annotated[
-        float | None,
-        Column("begin of the part concerned, from the first sample", "s"),
+        float | None, Column("begin of the part concerned, from the first sample", "s")
     ] = None
     end: Annotated[float | None, Column("its end", "s")] = None
     reason: Annotated[str, Column("in words")]
@@ -86,10 +76,9 @@ class DoubtRow(OfRecordingRow):
 class FindingRow(OfRecordingRow):
     """A row of the table ``findings``."""
 
-    channel: Annotated[
-        str | None,
-        Column("the channel concerned; null: the whole recording"),
-    ] = None
+    channel: Annotated[str | None, Column("the channel concerned; null: the whole recording")] = (
+        None
+    )
     finding: Annotated[str, Column("what was found")]
     severity: Annotated[Severity, Column("fatal: not analysed")]
     affects: Annotated[tuple[str, ...], Column("parameters whose estimates it puts in doubt")] = ()
@@ -97,8 +86,7 @@ class FindingRow(OfRecordingRow):
     value: Annotated[float | None, Column("its size", "as the finding says")] = None
     data: Annotated[str | None, Column("its data, JSON")] = None
     start: Annotated[
-        float | None,
-        Column("begin of the part concerned, from the first sample", "s"),
+        float | None, Column("begin of the part concerned, from the first sample", "s")
     ] = None
     end: Annotated[float | None, Column("its end", "s")] = None
 
@@ -108,8 +96,7 @@ class FailureRow(SensorRow):
     """A row of the table ``failures``."""
 
     recording: Annotated[
-        str | None,
-        Column("that is left out; null: a step of the whole sensor"),
+        str | None, Column("that is left out; null: a step of the whole sensor")
     ] = None
     step: Annotated[str, Column("of the workflow, which failed")]
     cause: Annotated[FailureCause, Column("time: it ran past its time limit")]

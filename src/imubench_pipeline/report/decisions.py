@@ -35,11 +35,9 @@ from imubench_pipeline.words.verdicts import (
 
 _VERDICTS: tuple[Verdict, ...] = get_args(Verdict)
 
-_MAX_ORDER_DECADES = 4.0
-"""Maximum decades from 1 by which margins are sorted."""
+_MAX_ORDER_DECADES = 4.0  # maximum decades from 1 by which margins are sorted
 
-_MAX_BAR_DECADES = 2.0
-"""Maximum decades from 1 that a bar shows."""
+_MAX_BAR_DECADES = 2.0  # maximum decades from 1 that a bar shows
 
 
 @dataclass(frozen=True)

@@ -41,8 +41,7 @@ _DASHES = ("solid", "dash", "dot", "dashdot", "longdash")
 
 _INK_COLOURS = ("#1b1b1b", "#e8e8e8")
 _INK_SHARES = (0.0, 0.5, 0.25, 0.75)
-_STYLES_PER_DASH = len(_INK_SHARES) * len(_MARKERS)
-"""Recordings with the same dash."""
+_STYLES_PER_DASH = len(_INK_SHARES) * len(_MARKERS)  # recordings with the same dash
 
 _METHOD_STYLES = {
     "likelihood": Appearance("#008F6B", "#2EC4A0", "solid", "diamond"),

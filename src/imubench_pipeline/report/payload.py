@@ -24,11 +24,9 @@ Json = dict[str, Any]
 FOREST = (*COMPARED, "B", "T_B")
 """The parameters that are drawn across sensors."""
 
-_SPECTRUM_POINTS = 80
-"""Points of the curve of a term in a spectrum."""
+_SPECTRUM_POINTS = 80  # points of the curve of a term in a spectrum
 
-_COMPARED_MODEL_POINTS = 24
-"""Points of the curve of a model in a comparison of channels."""
+_COMPARED_MODEL_POINTS = 24  # points of the curve of a model in a comparison of channels
 
 
 Packed = tuple[str, float, float, bytes]

@@ -7,12 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from imubench_pipeline.model.comparisons import CoverageRow
-from imubench_pipeline.model.estimates import (
-    BacktestRow,
-    EnvelopeRow,
-    HistogramRow,
-    ModelSampleRow,
-)
+from imubench_pipeline.model.estimates import BacktestRow, EnvelopeRow, HistogramRow, ModelSampleRow
 from imubench_pipeline.model.table import R
 from imubench_pipeline.recordings.kept import Quality
 from imubench_pipeline.recordings.recording import list_log_files, read_metadata
@@ -46,11 +41,9 @@ from imubench_pipeline.words.numbers import (
     started_text,
 )
 
-_MAX_HIDDEN_RATE_ERROR = 1e-9
-"""Relative error of a rate up to which the page does not state it."""
+_MAX_HIDDEN_RATE_ERROR = 1e-9  # relative error of a rate up to which the page does not state it
 
-_SHOWN_MODELS = 4
-"""Models with the lowest BIC that the page lists, besides the model of the papers."""
+_SHOWN_MODELS = 4  # models with the lowest BIC that the page lists, besides the model of the papers
 
 _SEVERITIES = ("fatal", "warning", "note")
 _RATE_FROM = {"stamps": "from the time stamps", "stated": "as stated"}

@@ -28,10 +28,8 @@ from imubench_pipeline.tables.schemas import OF_ONE_RECORDING, TABLES
 
 _CHANNEL_ORDER = ("gyro_x", "gyro_y", "gyro_z", "accel_x", "accel_y", "accel_z")
 _PACKAGE = "imubench_pipeline"
-_FIRST_ROWS = 100
-"""Rows of a long table that are shown at first."""
-_PLAIN_ROWS = 30
-"""Rows of a long table that are plain HTML, for readers without JavaScript."""
+_FIRST_ROWS = 100  # rows of a long table that are shown at first
+_PLAIN_ROWS = 30  # rows of a long table that are plain HTML, for readers without JavaScript
 _NOT_IN_NAMES = re.compile(r"[^\w .+()-]")
 
 

@@ -31,11 +31,9 @@ from imubench_pipeline.words.verdicts import (
     used_doubts_text,
 )
 
-_STEPS = 3
-"""Next steps on the start page; the table has all."""
+_STEPS = 3  # next steps on the start page; the table has all
 
-_LINE = 100
-"""Characters of a reason that fit on one line."""
+_LINE = 100  # characters of a reason that fit on one line
 
 
 def _start(site: Site) -> Mapping[str, object]:
@@ -284,10 +282,7 @@ START = Entry(
 """The page with the choice of a sensor, its evidence, and the problems of the recordings."""
 
 RECORDINGS = Entry(
-    file="recordings.html",
-    title="Recordings",
-    context=_recordings,
-    views=lambda site: site.views,
+    file="recordings.html", title="Recordings", context=_recordings, views=lambda site: site.views
 )
 """The page that lists every recording with its state."""
 

@@ -28,13 +28,7 @@ from imubench_pipeline.report.terminal_table import fit_table
 from imubench_pipeline.settings.requirements import Requirement
 from imubench_pipeline.settings.sensor import quantity_of
 from imubench_pipeline.words.estimates import STATUS_WORDS, symbol_text
-from imubench_pipeline.words.numbers import (
-    NO_VALUE,
-    Unit,
-    counted,
-    duration_text,
-    rates_text,
-)
+from imubench_pipeline.words.numbers import NO_VALUE, Unit, counted, duration_text, rates_text
 
 R = TypeVar("R", bound=OfRecordingRow)
 
@@ -52,8 +46,7 @@ _STYLES: Mapping[Verdict, str] = {
 }
 _LONGEST_FINDING = 400
 _STEPS = 3
-_BESIDE = 34
-"""Columns of the remarks below a verdict."""
+_BESIDE = 34  # columns of the remarks below a verdict
 
 
 def render_comparison(
@@ -199,11 +192,7 @@ def _listed(title: str, lines: Iterable[str], *, cut: bool = False) -> Iterator[
 
 
 def _ranking_tables(
-    rows: Sequence[RankingRow],
-    requirement: str | None,
-    about: About,
-    system: System,
-    width: int,
+    rows: Sequence[RankingRow], requirement: str | None, about: About, system: System, width: int
 ) -> Iterator[RenderableType]:
     # The table tells neither title nor rest before, and neither is shown.
     asked = {

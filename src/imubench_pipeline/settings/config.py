@@ -118,8 +118,7 @@ class DecideSettings(Strict):
     """Which recordings decide although something speaks against it."""
 
     include: tuple[HeldBack, ...] = Field(
-        (),
-        description="unfit recordings that enter rankings, pools and exports all the same",
+        (), description="unfit recordings that enter rankings, pools and exports all the same"
     )
 
 

@@ -33,8 +33,7 @@ _SYMBOLS = {
     "bias": "fixed bias",
 }
 
-_MAX_SYMMETRIC = 0.3
-"""Maximum half-width of an interval over its value that ± describes."""
+_MAX_SYMMETRIC = 0.3  # maximum half-width of an interval over its value that ± describes
 
 
 def status_text(status: str) -> str:

@@ -107,10 +107,7 @@ _PROPERTIES: Mapping[Property, tuple[str, str, str]] = {
 _FULL_SCALES = {"gyro": ("deg/s", "angular_rate"), "accel": ("g", "acceleration")}
 
 _UNIT_MISTAKES: Mapping[str, Sequence[tuple[float, str]]] = {
-    "gyro": (
-        (math.radians(1.0), "°/s, not rad/s"),
-        (math.degrees(1.0), "rad/s, not °/s"),
-    ),
+    "gyro": ((math.radians(1.0), "°/s, not rad/s"), (math.degrees(1.0), "rad/s, not °/s")),
     "accel": (
         (STANDARD_GRAVITY, "g, not m/s²"),
         (1.0 / STANDARD_GRAVITY, "m/s², not g"),
@@ -323,8 +320,7 @@ _HEADINGS: Mapping[Verdict, str] = {
     "excluded": "Excluded",
 }
 
-_MAX_NAMES = 4
-"""Maximum number of sensors that are named with one verdict."""
+_MAX_NAMES = 4  # maximum number of sensors that are named with one verdict
 
 
 def list_others(rows: Iterable[RankingRow], names: Mapping[str, str]) -> list[str]:

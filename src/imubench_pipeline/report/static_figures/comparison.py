@@ -38,8 +38,7 @@ from imubench_pipeline.words.estimates import status_text
 _MOST_BANDS = 8
 _MAX_SENSORS_IN_COLUMN = 6  # sensors, in a figure one column wide
 _MOST_CURVES_IN_A_COLUMN = 30
-_MAX_EQUAL_RECORDINGS = 3
-"""Number of recordings of a sensor up to which all are drawn alike."""
+_MAX_EQUAL_RECORDINGS = 3  # number of recordings of a sensor up to which all are drawn alike
 
 _MARKERS_PER_SENSOR = 9  # on the curves of a sensor
 _THIN_WIDTH, _PALE_OPACITY = 0.4, 0.45  # width in pt and opacity of a curve among many
@@ -51,8 +50,7 @@ _SLOT_HEIGHT = 2.6  # mm, of a recording where there is room
 _MIN_ROW_HEIGHT = 4.2  # mm, of a sensor: its name must fit
 _MAX_HEIGHT = 205.0  # mm, of all sensors: the figure fits on one page
 _FRAME_HEIGHT = 16.0  # mm, title and axis
-_MAX_INTERVAL_DECADES = 1.5
-"""Maximum length of an interval beyond all values, decades."""
+_MAX_INTERVAL_DECADES = 1.5  # maximum length of an interval beyond all values, decades
 
 # A bar at the limit and an arrow to the left of it, in units of the bar.
 _ARROW_MARKER = Path(

@@ -37,8 +37,7 @@ from imubench_pipeline.report.view import METHOD_NAMES, ChannelView
 from imubench_pipeline.words.estimates import status_text
 from imubench_pipeline.words.numbers import NO_VALUE
 
-_MAX_RATIO = 4.0
-"""Largest ratio of model and measurement in the lower panel."""
+_MAX_RATIO = 4.0  # largest ratio of model and measurement in the lower panel
 
 _WRITTEN_BELOW = frozenset({"F", "K"})
 """Terms whose parameter is written below its point: the curve of the sum is above."""

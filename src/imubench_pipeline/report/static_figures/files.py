@@ -74,10 +74,7 @@ def list_cross_figures(
 
 
 def list_channel_figures(
-    view: ChannelView,
-    system: System = "practical",
-    *,
-    kinds: Sequence[str] = tuple(CHANNEL_KINDS),
+    view: ChannelView, system: System = "practical", *, kinds: Sequence[str] = tuple(CHANNEL_KINDS)
 ) -> Iterator[tuple[str, Make]]:
     """Yield the name of each figure of a channel, and its maker, which may return None."""
     for kind in kinds:

@@ -24,8 +24,7 @@ from imubench_pipeline.report.static_figures.style import (
 )
 from imubench_pipeline.report.view import ChannelView
 
-_SPECTRUM_METHOD = "likelihood"
-"""The method whose model the table ``spectrum`` has."""
+_SPECTRUM_METHOD = "likelihood"  # the method whose model the table ``spectrum`` has
 
 _MOST_NAMED = 3
 _LABEL_OFFSET = 0.05  # of the frequency axis: the height of a letter, and more

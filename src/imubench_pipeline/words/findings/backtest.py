@@ -11,20 +11,14 @@ class BacktestContradicts(
 ):
     """The errors over windows of the log are larger than predicted."""
 
-    error: str
-    """``attitude``, ``heading``, ``velocity`` or ``position``."""
-    time: float
-    """Of dead reckoning, s."""
-    window: float | None
-    """At rest before it, over which the bias is estimated, s."""
-    ratio: float
-    """Measured over predicted error."""
+    error: str  # ``attitude``, ``heading``, ``velocity`` or ``position``
+    time: float  # of dead reckoning, s
+    window: float | None  # at rest before it, over which the bias is estimated, s
+    ratio: float  # measured over predicted error
     ratio_lower: float | None
-    ratio_upper: float | None
-    """Limits of the ratio in 95 % of logs, if the model is right."""
+    ratio_upper: float | None  # limits of the ratio in 95 % of logs, if the model is right
     windows: int | None
-    independent: float | None
-    """Equivalent number of independent windows."""
+    independent: float | None  # equivalent number of independent windows
     removed: tuple[str, ...]
     """Kinds of the deterministic signals that are in the log and not in the noise."""
 

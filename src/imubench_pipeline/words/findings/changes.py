@@ -14,12 +14,9 @@ class BiasStep(FindingData, affects=SLOW | {"bias"}, doubt="the bias of {channel
 
     size: float
     size_lower: float
-    size_upper: float
-    """With 95 % limits, SI."""
-    time: float
-    """s from the first sample."""
-    time_error: float
-    """Half width of the 95 % interval of the time, s."""
+    size_upper: float  # with 95 % limits, SI
+    time: float  # s from the first sample
+    time_error: float  # half width of the 95 % interval of the time, s
 
     def text(self, channel: str) -> str:
         size = estimate_text(self.size, self.size_lower, self.size_upper, unit_of(channel, "level"))
@@ -37,12 +34,10 @@ class WarmUpDrift(
 
     size: float
     size_lower: float
-    size_upper: float
-    """Initial value, with 95 % limits, SI."""
+    size_upper: float  # initial value, with 95 % limits, SI
     time: float
     time_lower: float
-    time_upper: float
-    """Time constant, with 95 % limits, s."""
+    time_upper: float  # time constant, with 95 % limits, s
 
     def text(self, channel: str) -> str:
         size = estimate_text(self.size, self.size_lower, self.size_upper, unit_of(channel, "level"))
@@ -59,12 +54,10 @@ class PeriodicDrift(FindingData, affects=SLOW, doubt="the bias of {channels} osc
 
     size: float
     size_lower: float
-    size_upper: float
-    """Amplitude, with 95 % limits, SI."""
+    size_upper: float  # amplitude, with 95 % limits, SI
     time: float
     time_lower: float
-    time_upper: float
-    """Period, with 95 % limits, s."""
+    time_upper: float  # period, with 95 % limits, s
 
     def text(self, channel: str) -> str:
         size = estimate_text(self.size, self.size_lower, self.size_upper, unit_of(channel, "level"))
@@ -81,8 +74,7 @@ class TelegraphNoise(
 ):
     """The bias steps again and again between levels."""
 
-    steps: int
-    """Minimum number of steps."""
+    steps: int  # minimum number of steps
 
     def text(self, channel: str) -> str:
         return (
@@ -95,10 +87,8 @@ class TelegraphNoise(
 class HeavyTails(FindingData, affects=NONE):
     """Large samples are more frequent than in normal noise."""
 
-    kurtosis: float
-    """Excess kurtosis."""
-    widening: float
-    """Factor on the interval of N."""
+    kurtosis: float  # excess kurtosis
+    widening: float  # factor on the interval of N
 
     def text(self, channel: str) -> str:
         return (
@@ -117,10 +107,8 @@ class NoiseTrend(
 ):
     """The white noise grows or falls steadily."""
 
-    trend: float
-    """N at the end over N at the start, minus 1."""
-    error: float
-    """Half width of the 95 % interval of the trend."""
+    trend: float  # N at the end over N at the start, minus 1
+    error: float  # half width of the 95 % interval of the trend
 
     def text(self, channel: str) -> str:
         verb = "grows" if self.trend > 0.0 else "falls"
@@ -136,8 +124,7 @@ class NoiseVaries(
 ):
     """The white noise differs between parts of the log, without a trend."""
 
-    spread: float
-    """Relative standard deviation of N between sixteenths of the log."""
+    spread: float  # relative standard deviation of N between sixteenths of the log
 
     def text(self, channel: str) -> str:
         return (
@@ -155,11 +142,9 @@ class RandomWalkChanges(
 ):
     """The random walk differs between the halves of the log."""
 
-    middle: float
-    """End of the first half, s from the first sample."""
+    middle: float  # end of the first half, s from the first sample
     first: float
-    second: float
-    """K of each half over K of the log."""
+    second: float  # K of each half over K of the log
 
     def text(self, channel: str) -> str:
         return _halves_text(f"K of {channel_name(channel)}", self.middle, self.first, self.second)
@@ -173,11 +158,9 @@ class SlowNoiseChanges(
 ):
     """The slow noise differs between the halves of the log."""
 
-    middle: float
-    """End of the first half, s from the first sample."""
+    middle: float  # end of the first half, s from the first sample
     first: float
-    second: float
-    """Amplitude of the slow noise of each half, relative to the log."""
+    second: float  # amplitude of the slow noise of each half, relative to the log
 
     def text(self, channel: str) -> str:
         noise = f"The slow noise of {channel_name(channel)}"

@@ -12,8 +12,7 @@ class ChannelTwice(
     """A channel has the samples of another one."""
 
     original: str
-    factor: float
-    """Factor from the other channel, SI."""
+    factor: float  # factor from the other channel, SI
 
     def text(self, channel: str) -> str:
         scaled = ""
@@ -40,11 +39,9 @@ class LogTwice(FindingData, affects=ALL, unfit=True, doubt="the log repeats itse
 
     start: float
     end: float
-    original: float
-    """Start of the copied part, s."""
+    original: float  # start of the copied part, s
     repeats: int
-    share: float
-    """Share of copies in the log."""
+    share: float  # share of copies in the log
 
     def text(self, channel: str) -> str:
         return (
@@ -59,8 +56,7 @@ class RepeatedStretch(FindingData, affects=ALL, doubt="a part of {channels} is a
 
     start: float
     end: float
-    original: float
-    """Start of the copied part, s."""
+    original: float  # start of the copied part, s
     repeats: int
 
     def text(self, channel: str) -> str:

@@ -64,12 +64,9 @@ class Knocks(FindingData, affects=WHITE, doubt="knocks in {channels}"):
     """Short disturbances, which are left out."""
 
     knocks: int
-    sigmas: float
-    """Size of the largest one over the noise."""
-    times: tuple[float, ...]
-    """Positions of the first ones, s."""
-    samples: int
-    """Samples that are left out."""
+    sigmas: float  # size of the largest one over the noise
+    times: tuple[float, ...]  # positions of the first ones, s
+    samples: int  # samples that are left out
 
     def text(self, channel: str) -> str:
         at = ", ".join(number_text(time, 5) for time in self.times)
@@ -102,10 +99,8 @@ class SimulatedByMark(
 class UnusedFiles(FindingData, affects=NONE):
     """Files of a folder from which no channel is read."""
 
-    files: tuple[str, ...]
-    """The first ones."""
-    number: int
-    """Number of all."""
+    files: tuple[str, ...]  # the first ones
+    number: int  # number of all
     folder: str
 
     def text(self, channel: str) -> str:
@@ -159,13 +154,10 @@ class UnitContradicts(
 
     file: str
     in_log: str
-    where: str
-    """Place of the unit in the log."""
+    where: str  # place of the unit in the log
     in_sensor_file: str
-    scale: float
-    """Scale in the sensor file."""
-    factor: float
-    """Unit of the log over the one that is used."""
+    scale: float  # scale in the sensor file
+    factor: float  # unit of the log over the one that is used
 
     def text(self, channel: str) -> str:
         scaled = "" if self.scale == 1.0 else f", times {number_text(self.scale)}"
@@ -183,14 +175,10 @@ class ZeroBytes(FindingData, affects=ALL, doubt="the file has zero bytes"):
     file: str
     zeros: int
     places: int
-    first: str
-    """Place of the first run: ``line 3``."""
-    is_at_end: bool
-    """They are the end of the file."""
-    damaged_lines: int = 0
-    """Lines with zeros between their letters."""
-    is_shifted: bool = False
-    """Later samples are shifted in time, since no stamps are read."""
+    first: str  # place of the first run: ``line 3``
+    is_at_end: bool  # they are the end of the file
+    damaged_lines: int = 0  # lines with zeros between their letters
+    is_shifted: bool = False  # later samples are shifted in time, since no stamps are read
 
     def text(self, channel: str) -> str:
         zeros = f"{self.file}: {counted(self.zeros, 'zero byte')}"
@@ -234,16 +222,12 @@ class IncompleteLastRecord(FindingData, affects=NONE):
     """A last record that is cut short, and left out."""
 
     file: str
-    shown: str | None = None
-    """Its first letters, if it has no line break."""
-    has_checksum: bool = False
-    """Its kind has a checksum, which is wrong."""
+    shown: str | None = None  # its first letters, if it has no line break
+    has_checksum: bool = False  # its kind has a checksum, which is wrong
     columns: int | None = None
-    expected: int | None = None
-    """Number of its columns, and of those of a whole record."""
+    expected: int | None = None  # number of its columns, and of those of a whole record
     messages: int | None = None
-    message: str = ""
-    """Number of messages that are cut short, and their name."""
+    message: str = ""  # number of messages that are cut short, and their name
 
     def text(self, channel: str) -> str:
         if self.messages is not None:
@@ -266,10 +250,8 @@ class IncompleteFirstRecord(FindingData, affects=NONE):
 
     file: str
     lines: int
-    first: int
-    """Number of the first line."""
-    shown: str
-    """Its first letters."""
+    first: int  # number of the first line
+    shown: str  # its first letters
 
     def text(self, channel: str) -> str:
         return (
@@ -284,10 +266,8 @@ class NotRecords(FindingData, affects=NONE):
 
     file: str
     lines: int
-    first: int
-    """Number of the first line."""
-    shown: str
-    """Its first letters."""
+    first: int  # number of the first line
+    shown: str  # its first letters
 
     def text(self, channel: str) -> str:
         verb, are = ("follows", "is") if self.lines == 1 else ("follow", "are")
@@ -302,8 +282,7 @@ class RestartedLog(FindingData, affects=NONE):
 
     file: str
     restarts: int
-    cut: int
-    """Places where a record before the header is cut short."""
+    cut: int  # places where a record before the header is cut short
 
     def text(self, channel: str) -> str:
         cut = ""
@@ -331,8 +310,7 @@ class DamagedMessage(FindingData, affects=ALL, doubt="messages are damaged"):
     file: str
     messages: int
     topic: str
-    is_left_out: bool
-    """Otherwise they are missing samples."""
+    is_left_out: bool  # otherwise they are missing samples
 
     def text(self, channel: str) -> str:
         verb = "message of {} does" if self.messages == 1 else "messages of {} do"
@@ -364,12 +342,9 @@ class WrongChecksum(FindingData, affects=ALL, doubt="messages have a wrong check
     file: str
     number: int
     name: str
-    is_sentence: bool
-    """A line of text, which may also be cut short."""
-    is_left_out: bool
-    """Otherwise they are missing samples."""
-    is_shifted: bool = False
-    """Later samples are shifted in time, since no stamps are read."""
+    is_sentence: bool  # a line of text, which may also be cut short
+    is_left_out: bool  # otherwise they are missing samples
+    is_shifted: bool = False  # later samples are shifted in time, since no stamps are read
 
     def text(self, channel: str) -> str:
         kind = "sentence" if self.is_sentence else "message"
@@ -392,8 +367,7 @@ class UnreadableSentence(FindingData, affects=ALL, doubt="sentences are not read
     file: str
     sentences: int
     name: str
-    expected: int
-    """Numbers of a sentence."""
+    expected: int  # numbers of a sentence
 
     def text(self, channel: str) -> str:
         return (
@@ -408,8 +382,7 @@ class OtherSentences(FindingData, affects=NONE):
 
     file: str
     sentences: int
-    names: tuple[str, ...]
-    """Names of the first kinds."""
+    names: tuple[str, ...]  # names of the first kinds
 
     def text(self, channel: str) -> str:
         return (

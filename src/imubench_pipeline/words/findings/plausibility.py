@@ -32,12 +32,9 @@ class RateImplausible(
 
     rate: float
     slowest: float
-    fastest: float
-    """Limits of a plausible rate, Hz."""
-    factor: float
-    """Corrects the times."""
-    statable: bool
-    """Whether the rate is plausible once the sensor file states it."""
+    fastest: float  # limits of a plausible rate, Hz
+    factor: float  # corrects the times
+    statable: bool  # whether the rate is plausible once the sensor file states it
 
     def text(self, channel: str) -> str:
         times, size = (self.factor, "long") if self.factor > 1.0 else (1.0 / self.factor, "short")
@@ -64,18 +61,12 @@ class SuspiciousUnit(
     """Gravity, or the noise, is usual in another unit than the stated one."""
 
     stated: str
-    likely: str
-    """Units as the sensor file writes them."""
-    factor: float
-    """Corrects the samples."""
-    gravity: float | None = None
-    """Norm of the mean acceleration, m/s², if it shows the mistake."""
-    noise: float | None = None
-    """White noise, SI, if it shows the mistake."""
-    usual: tuple[float, float] | None = None
-    """Usual limits of the white noise, SI."""
-    printed: bool = False
-    """Whether they are from the data sheet of the sensor, and not of any."""
+    likely: str  # units as the sensor file writes them
+    factor: float  # corrects the samples
+    gravity: float | None = None  # norm of the mean acceleration, m/s², if it shows the mistake
+    noise: float | None = None  # white noise, SI, if it shows the mistake
+    usual: tuple[float, float] | None = None  # usual limits of the white noise, SI
+    printed: bool = False  # whether they are from the data sheet of the sensor, and not of any
 
     def text(self, channel: str) -> str:
         name = channel_name(channel)
@@ -101,10 +92,8 @@ class SuspiciousUnit(
 class GravityNorm(FindingData, affects=ALL, doubt="the mean acceleration is not gravity"):
     """The mean acceleration is not gravity, in no unit."""
 
-    norm: float
-    """m/s²."""
-    removed: bool
-    """Whether gravity seems to be subtracted."""
+    norm: float  # m/s²
+    removed: bool  # whether gravity seems to be subtracted
 
     def text(self, channel: str) -> str:
         advice = (
@@ -123,13 +112,10 @@ class NoiseUnlikeDatasheet(
 ):
     """The white noise is far from the printed one, and no unit explains it."""
 
-    measured_on: str
-    """The channel, also where the finding is about all."""
+    measured_on: str  # the channel, also where the finding is about all
     noise: float
-    printed: float
-    """White noise, SI."""
-    stated_rate: float | None
-    """Hz, if the log has no time stamps: it may be the cause."""
+    printed: float  # white noise, SI
+    stated_rate: float | None  # Hz, if the log has no time stamps: it may be the cause
 
     def text(self, channel: str) -> str:
         name, unit = channel_name(self.measured_on), unit_of(self.measured_on, "density")
@@ -148,13 +134,10 @@ class AxisUnlike(
     """One axis has much more or much less noise than both others."""
 
     others: tuple[str, ...]
-    ratio: float
-    """White noise over that of the others."""
-    noise: float
-    """White noise, SI."""
+    ratio: float  # white noise over that of the others
+    noise: float  # white noise, SI
     stated: str
-    likely: str | None
-    """Units as the sensor file writes them; None: no unit explains it."""
+    likely: str | None  # units as the sensor file writes them; None: no unit explains it
 
     def text(self, channel: str) -> str:
         unit = (
@@ -173,14 +156,12 @@ class AxisUnlike(
 class Turning(FindingData, affects=ALL, unfit=True, doubt="the sensor was turning"):
     """The mean rate of a gyro, or a steady turn of gravity, shows a rotation."""
 
-    rate: float
-    """Of the gyro, or of gravity relative to the sensor, rad/s."""
+    rate: float  # of the gyro, or of gravity relative to the sensor, rad/s
     largest: float | None = None
     """Largest plausible offset of the gyro, rad/s; None: gravity shows the turn."""
     offset_of: str | None = None
     """``data sheet``, or the price class, that limits the offset; None: any gyro."""
-    swept: float | None = None
-    """Angle by which gravity turns, rad."""
+    swept: float | None = None  # angle by which gravity turns, rad
     gyro_rate: float | None = None
     """Mean rate of the gyros about the axis of gravity's turn, if it agrees, rad/s."""
 
@@ -238,13 +219,10 @@ class UnusualFigure(
     """N or B is twenty times off the figures of other sensors."""
 
     quantity: str
-    figure: str
-    """``N`` or ``B``."""
+    figure: str  # ``N`` or ``B``
     value: float
-    usual: float
-    """Median of other sensors, or the least if the value is below it, SI."""
-    sensors: int
-    """Number of those sensors."""
+    usual: float  # median of other sensors, or the least if the value is below it, SI
+    sensors: int  # number of those sensors
     factor: float | None
     """Of a unit mistake that explains it (`UNIT_MISTAKES`); None: there is none."""
     lower: float | None = None

@@ -36,8 +36,7 @@ class Quantised(FindingData, affects=NONE):
     """The values are multiples of a visible step."""
 
     step: float
-    step_over_noise: float | None = None
-    """None: the noise is not known, as most samples are equal."""
+    step_over_noise: float | None = None  # none: the noise is not known, as most samples are equal
     lowest: float | None = None
     highest: float | None = None
     is_rounded: bool = False
@@ -112,12 +111,9 @@ class NoSamples(FindingData, affects=ALL, doubt="no samples in {channels}"):
 class TooShort(FindingData, affects=ALL, doubt="too few samples in {channels}"):
     """Too few samples, or too few adjacent ones for an Allan variance."""
 
-    samples: int
-    """Samples; of an Allan variance, points of the grid."""
-    required: int | None = None
-    """Smallest number of samples."""
-    rate: float | None = None
-    """Rate of the grid, Hz, if no Allan variance can be estimated."""
+    samples: int  # samples; of an Allan variance, points of the grid
+    required: int | None = None  # smallest number of samples
+    rate: float | None = None  # rate of the grid, Hz, if no Allan variance can be estimated
 
     def text(self, channel: str) -> str:
         name = channel_name(channel)
@@ -151,12 +147,9 @@ class EmptyCells(FindingData, affects=ALL, doubt="missing samples in {channels}"
     """Records without a number."""
 
     cells: int
-    longest: int
-    """Records of the longest run."""
-    duration: float
-    """Its duration, s."""
-    start: float
-    """Its start, s."""
+    longest: int  # records of the longest run
+    duration: float  # its duration, s
+    start: float  # its start, s
 
     def text(self, channel: str) -> str:
         return (
@@ -170,12 +163,9 @@ class NotFinite(FindingData, affects=ALL, doubt="values of {channels} that are n
 
     cells: int
     limit: float
-    longest: int
-    """Records of the longest run."""
-    duration: float
-    """Its duration, s."""
-    start: float
-    """Its start, s."""
+    longest: int  # records of the longest run
+    duration: float  # its duration, s
+    start: float  # its start, s
 
     def text(self, channel: str) -> str:
         return (
@@ -211,8 +201,7 @@ class Saturated(FindingData, affects=ALL, doubt="saturated samples in {channels}
 
     samples: int
     value: float
-    side: str
-    """``lowest`` or ``highest``."""
+    side: str  # ``lowest`` or ``highest``
 
     def text(self, channel: str) -> str:
         return (
@@ -254,8 +243,7 @@ class Step(FindingData, affects=SLOW | {"bias"}, doubt="a step in {channels}"):
 
     size: float
     at: float
-    sigmas: float
-    """Size over the standard deviation of all changes of the mean."""
+    sigmas: float  # size over the standard deviation of all changes of the mean
 
     def text(self, channel: str) -> str:
         return (
@@ -270,8 +258,7 @@ class WarmUp(FindingData, affects=SLOW | {"bias"}, doubt="warm-up drift of {chan
 
     drift: float
     end: float
-    ratio: float | None
-    """Drift over the usual one in the rest; None if there is none."""
+    ratio: float | None  # drift over the usual one in the rest; None if there is none
 
     def text(self, channel: str) -> str:
         later = "; later it does not drift"
@@ -304,8 +291,7 @@ class Joined(FindingData, affects=ALL, unfit=True, doubt="two logs are joined"):
 
     changes: tuple[Change, ...]
     at: float
-    noise_ratio: float
-    """Noise after the change over the noise before."""
+    noise_ratio: float  # noise after the change over the noise before
 
     def text(self, channel: str) -> str:
         changed = join_names([_CHANGES[change] for change in self.changes])
@@ -323,8 +309,7 @@ class Interleaved(
     """Every other sample is of another sensor."""
 
     changes: tuple[Change, ...]
-    level: float
-    """Difference of the levels over the standard deviation of the noise."""
+    level: float  # difference of the levels over the standard deviation of the noise
     noise_ratio: float
 
     def text(self, channel: str) -> str:

@@ -10,8 +10,7 @@ from imubench_pipeline.words.numbers import counted, number_text, percent_text
 class MethodsDiffer(FindingData, code="N_differs", affects=NONE):
     """N of the curve fit and N of the likelihood exclude each other."""
 
-    ratio: float
-    """N of the curve fit over N of the likelihood."""
+    ratio: float  # N of the curve fit over N of the likelihood
 
     def text(self, channel: str) -> str:
         return (
@@ -26,12 +25,9 @@ class Lines(FindingData, affects=NONE):
     """Spectral lines that the noise fit excludes."""
 
     sinusoids: int
-    bands: int
-    """Number of narrow bands of noise."""
-    frequency: float
-    """Frequency of the strongest, Hz."""
-    ratio: float
-    """Density of the strongest over the noise floor."""
+    bands: int  # number of narrow bands of noise
+    frequency: float  # frequency of the strongest, Hz
+    ratio: float  # density of the strongest over the noise floor
 
     def text(self, channel: str) -> str:
         kinds = [
@@ -57,10 +53,8 @@ class StrongLine(
 ):
     """A sinusoid whose integral is comparable to the integral of white noise."""
 
-    frequency: float
-    """Hz."""
-    ratio: float
-    """Ratio of its integral to the integral of white noise, after 1 s."""
+    frequency: float  # Hz
+    ratio: float  # ratio of its integral to the integral of white noise, after 1 s
 
     def text(self, channel: str) -> str:
         return (
@@ -77,14 +71,10 @@ class TooManyLines(
     """More sinusoids than a noise model has."""
 
     lines: int
-    single: int
-    """Number of lines that are used individually."""
-    groups: int
-    """Number of lines into which the others are merged."""
-    share: float
-    """Power of the others over the power of all lines."""
-    rms: float
-    """Of the others, SI."""
+    single: int  # number of lines that are used individually
+    groups: int  # number of lines into which the others are merged
+    share: float  # power of the others over the power of all lines
+    rms: float  # of the others, SI
 
     def text(self, channel: str) -> str:
         return (
@@ -100,10 +90,8 @@ class TooManyLines(
 class BandLimit(FindingData, affects=NONE):
     """The fit uses only frequencies below a limit."""
 
-    highest: float
-    """Hz."""
-    follows_model: bool
-    """Whether the spectrum follows a noise model up to there."""
+    highest: float  # Hz
+    follows_model: bool  # whether the spectrum follows a noise model up to there
 
     def text(self, channel: str) -> str:
         name, limit = channel_name(channel), f"{number_text(self.highest)} Hz"
@@ -125,10 +113,8 @@ class SlowNoiseMissing(
 ):
     """Less power than white noise at the lowest frequencies."""
 
-    highest: float
-    """Frequency up to which power is missing, Hz."""
-    ratio: float
-    """Ratio of the density up to there to the white noise."""
+    highest: float  # frequency up to which power is missing, Hz
+    ratio: float  # ratio of the density up to there to the white noise
 
     def text(self, channel: str) -> str:
         return (

@@ -15,8 +15,7 @@ from imubench_pipeline.words.findings.base import (
 )
 from imubench_pipeline.words.numbers import counted, join_names, number_text, percent_text
 
-_TIMED = frozenset(POWERS_OF_TIME)
-"""Parameters that a wrong sampling rate changes."""
+_TIMED = frozenset(POWERS_OF_TIME)  # parameters that a wrong sampling rate changes
 
 
 def _rate_text(rate: float) -> str:
@@ -37,13 +36,11 @@ def _change_of_n(correct: float, used: float) -> str:
 class RateChanges(FindingData, affects=WHITE, doubt="the sampling rate changes"):
     """A part of a log has every n-th sample only."""
 
-    share: float
-    """Share of the samples in that part."""
+    share: float  # share of the samples in that part
     start: float
     end: float
     lower_rate: float
-    rate: float
-    """Rate at which all are analysed, Hz."""
+    rate: float  # rate at which all are analysed, Hz
 
     def text(self, channel: str) -> str:
         of = f" of {channel_name(channel)}" if channel else ""
@@ -61,8 +58,7 @@ class CoarseStamps(FindingData, affects=_TIMED, doubt="the sampling rate is ambi
     """Stamps with double or zero steps at regular distances."""
 
     rate: float
-    other_rate: float
-    """Rate if the stamps are not rounded, Hz."""
+    other_rate: float  # rate if the stamps are not rounded, Hz
 
     def text(self, channel: str) -> str:
         what, cause = "repeat", "records are written twice"
@@ -82,14 +78,11 @@ class MissingSamples(FindingData, affects=ALL, doubt="samples are missing"):
     missing: int
     expected: int
     gaps: int
-    longest: float
-    """Duration of the longest gap, s."""
-    start: float
-    """Its start, s."""
+    longest: float  # duration of the longest gap, s
+    start: float  # its start, s
     rate_of_bursts: float | None = None
     """Rate if no sample is missing, Hz; where most samples are missing."""
-    noise_ratio: float | None = None
-    """N at that rate over N."""
+    noise_ratio: float | None = None  # N at that rate over N
 
     def text(self, channel: str) -> str:
         longest = f"{number_text(self.longest, 3)} s, from {_at(self.start)} on"
@@ -114,13 +107,10 @@ class MissingSamples(FindingData, affects=ALL, doubt="samples are missing"):
 class Segments(FindingData, affects=SLOW | {"bias"}, doubt="the recording was interrupted"):
     """Pauses of the recording, or jumps of its clock."""
 
-    has_grid: bool
-    """The stamps lie on a uniform grid."""
+    has_grid: bool  # the stamps lie on a uniform grid
     pauses: int
-    longest: float
-    """Largest step of the stamps, s; below 0: backwards."""
-    at: float
-    """Duration of the samples before it, s."""
+    longest: float  # largest step of the stamps, s; below 0: backwards
+    at: float  # duration of the samples before it, s
 
     def text(self, channel: str) -> str:
         what = "The clock jumps or stops" if self.has_grid else "The stamps stop or run backwards"
@@ -174,8 +164,7 @@ class RateContradictsStamps(
 class RateDrifts(FindingData, affects=_TIMED, doubt="the clock drifts"):
     """The sampling interval differs between the halves of a log."""
 
-    drift: float
-    """Relative change of the interval."""
+    drift: float  # relative change of the interval
 
     def text(self, channel: str) -> str:
         return (
@@ -188,13 +177,10 @@ class RateDrifts(FindingData, affects=_TIMED, doubt="the clock drifts"):
 class JitteredStamps(FindingData, affects=_TIMED, doubt="the time stamps are irregular"):
     """Stamps on no uniform grid, so that lost samples are not seen."""
 
-    share: float
-    """Share of the stamps off the grid."""
+    share: float  # share of the stamps off the grid
     pauses: int
-    longest: float
-    """Longest interval, s."""
-    at: float
-    """Its position, s."""
+    longest: float  # longest interval, s
+    at: float  # its position, s
     rate: float
 
     def text(self, channel: str) -> str:

@@ -6,8 +6,7 @@ from collections.abc import Sequence
 
 from imubench_pipeline.words.numbers import number_text, percent_text
 
-_MAX_PRINTED_ERROR = 10.0
-"""Maximum relative standard error that is printed as a number."""
+_MAX_PRINTED_ERROR = 10.0  # maximum relative standard error that is printed as a number
 
 
 REPEATED_SAMPLES = (

@@ -96,11 +96,7 @@ def bound_used(
 
 
 def fitted_used(
-    label: str,
-    status: Status,
-    reason: str | None,
-    value: float,
-    limits: tuple[float, float] | None,
+    label: str, status: Status, reason: str | None, value: float, limits: tuple[float, float] | None
 ) -> str:
     """Return that the fit is used where no value is given, SI."""
     return (
