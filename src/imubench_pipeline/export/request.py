@@ -75,10 +75,7 @@ class Request:
 def load(path: Path) -> dict[str, pa.Table]:
     """Read the tables of a run from the folder of its results, or from ``tables`` in it.
 
-    Raises
-    ------
-    ExportError
-        If a table is missing or of another form.
+    Raises ExportError if a table is missing or of another form.
     """
     try:
         paths = find_tables(path, NEEDED)

@@ -115,12 +115,8 @@ class NoiseModel:
     def psd(self, frequency: ArrayLike, rate: float | None = None) -> Array:
         """Return the two-sided power spectral density at frequencies in Hz, in squared SI units/Hz.
 
-        Lines have none. Only quantization noise depends on the rate, Hz.
-
-        Raises
-        ------
-        ValueError
-            If there is quantization noise, and no rate.
+        Lines have none. Only quantization noise depends on the rate, Hz. Raises ValueError if there
+        is quantization noise, and no rate.
         """
         f = np.asarray(frequency, dtype=np.float64)
         interval = None if rate is None else 1.0 / rate
@@ -129,12 +125,9 @@ class NoiseModel:
     def allan_variance(self, tau: ArrayLike, rate: float | None = None) -> Array:
         """Return the Allan variance at tau in s, (rad/s)² or (m/s²)².
 
-        With a rate, Hz, it is the exact result for the process sampled at this rate.
-
-        Raises
-        ------
-        ValueError
-            If a rate is given and a cluster has no sample: it is rounded to the nearest number.
+        With a rate, Hz, it is the exact result for the process sampled at this rate. Raises
+        ValueError if a rate is given and a cluster has no sample: it is rounded to the nearest
+        number.
         """
         t = np.asarray(tau, dtype=np.float64)
         if rate is None:

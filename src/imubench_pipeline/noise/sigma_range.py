@@ -82,13 +82,9 @@ def drawn_from_covariance(
     """Return noise models with jointly log-normal parameters, whose medians are those of a model.
 
     ``covariance``, shape (p, p), is the covariance of the natural logarithms of the parameters
-    ``names``, of Q, N, B, T_B and K; the others are not changed.
-
-    Raises
-    ------
-    ValueError
-        If a name is unknown, the model has no such parameter, or the covariance has a wrong shape,
-        is not symmetric or not positive semi-definite.
+    ``names``, of Q, N, B, T_B and K; the others are not changed. Raises ValueError if a name is
+    unknown, the model has no such parameter, or the covariance has a wrong shape, is not symmetric
+    or not positive semi-definite.
     """
     for name in names:
         if name not in _SCALABLE_PARAMETERS:

@@ -57,12 +57,8 @@ class _Glossary(dict[str, Term]):
 def read_glossary() -> dict[str, Term]:
     """Return all terms by their keys, in the order of the file; read once, not to be changed.
 
-    An unknown key raises an UnknownTermError with similar terms.
-
-    Raises
-    ------
-    ConfigError
-        If the file cannot be used, or a key is in two sections.
+    An unknown key raises an UnknownTermError with similar terms. Raises ConfigError if the file
+    cannot be used, or a key is in two sections.
     """
     terms = _Glossary()
     for section, entries in parse(_Sections, read_yaml(_FILE), str(_FILE)).root.items():
@@ -79,10 +75,6 @@ def find_term(value: str, kind: str = "") -> Term:
 
     ``kind`` begins the key of values that are ambiguous alone: ``verdict``, ``published``, ``kind``
     (of a printed figure or recording), ``line``, ``axis``, ``rate_from``, ``recording`` (status).
-
-    Raises
-    ------
-    UnknownTermError
-        If the glossary does not have it.
+    Raises UnknownTermError if the glossary does not have it.
     """
     return read_glossary()["_".join(re.findall(r"\w+", f"{kind} {value}"))]

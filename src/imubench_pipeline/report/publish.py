@@ -214,12 +214,8 @@ def make_site(tables: Mapping[str, pa.Table], settings: str, results: Path) -> S
 def load_site(results: Path) -> Site:
     """Return the site of a finished run, from its files.
 
-    Raises
-    ------
-    FileNotFoundError
-        If there is no report.
-    ValueError
-        If it is damaged, or from another version.
+    Raises FileNotFoundError if there is no report. Raises ValueError if it is damaged, or from
+    another version.
     """
     path = results / "report" / _SETTINGS_FILE
     settings = path.read_text(encoding="utf-8")

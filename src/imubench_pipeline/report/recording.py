@@ -286,10 +286,7 @@ def describe_recording(
 def load_metadata(folder: Path) -> Mapping[str, Any]:
     """Return the metadata of the log in a folder of a recording; empty without them.
 
-    Raises
-    ------
-    RecordingError
-        If it is not there any more, or not as the ingest left it.
+    Raises RecordingError if it is not there any more, or not as the ingest left it.
     """
     quality = folder / "quality.json"
     if quality.is_file() and (fault := Quality.read(quality).fault(folder)):

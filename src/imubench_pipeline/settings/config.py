@@ -270,10 +270,7 @@ def read_run(config: Mapping[str, object], file: str = "config/config.yaml or --
 def read_config(file: Path) -> dict[str, Any]:
     """Return the settings in a configuration, unchecked; none if it does not exist.
 
-    Raises
-    ------
-    ConfigError
-        If it is not YAML, or has no keys.
+    Raises ConfigError if it is not YAML, or has no keys.
     """
     content = read_yaml(file) if file.is_file() else None
     if content is not None and not isinstance(content, dict):

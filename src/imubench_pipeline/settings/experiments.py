@@ -67,12 +67,8 @@ class Experiment(Strict):
     def moved_gyro(self, channels: Sequence[str], *, column: bool) -> str | None:
         """Return the one of the log's channels that it is about; None: it is about all axes.
 
-        `column`: the log has a column with the rate of a table.
-
-        Raises
-        ------
-        ValueError
-            If the log lacks what it takes; the text begins with the key.
+        `column`: the log has a column with the rate of a table. Raises ValueError if the log lacks
+        what it takes; the text begins with the key.
         """
 
 
@@ -101,13 +97,9 @@ def kind_of(notes: object) -> Kind:
 def stated_gyro(stated: Gyro | None, channels: Sequence[str], what: str) -> str:
     """Return the gyro that an experiment is about: the one that its notes state, or the only one.
 
-    `what` completes "the gyro whose axis ..." of the error.
-
-    Raises
-    ------
-    ValueError
-        If it is not among the channels of the log, or is not stated and the log has another number
-        of gyros than one; the text begins with the key.
+    `what` completes "the gyro whose axis ..." of the error. Raises ValueError if it is not among
+    the channels of the log, or is not stated and the log has another number of gyros than one; the
+    text begins with the key.
     """
     gyros = [name for name in channels if name.startswith("gyro_")]
     if stated in gyros:

@@ -322,10 +322,7 @@ class RecordingNotes(WithBlocks):
     def check_gyro(self, log: LogFormat) -> None:
         """Check that the gyro of an experiment is in the log, and all that it takes.
 
-        Raises
-        ------
-        ValueError
-            If it is not; the text begins with the key.
+        Raises ValueError if it is not; the text begins with the key.
         """
         channels = [str(name) for name in log.channels]
         for key, experiment in stated_experiments(self).items():
@@ -343,10 +340,7 @@ def read_sensors(folders: Path | Iterable[Path]) -> dict[str, Sensor]:
 def read_sensor_files(folders: Path | Iterable[Path]) -> dict[str, Sensor | ConfigError]:
     """Read every sensor file of one or several folders; why, of those that are of no use.
 
-    Raises
-    ------
-    ConfigError
-        If there is no folder.
+    Raises ConfigError if there is no folder.
     """
     return read_folder(Sensor, folders, "sensor")
 

@@ -184,10 +184,7 @@ class SimulatedRecording(OfASensor, Surroundings, WithBlocks):
     def moved_gyro(self) -> str | None:
         """The gyro of its experiment; None where it has none, or one of all axes.
 
-        Raises
-        ------
-        ValueError
-            If it is not stated, or not simulated.
+        Raises ValueError if it is not stated, or not simulated.
         """
         channels = [str(name) for name in self.channels]
         for experiment in stated_experiments(self).values():

@@ -26,12 +26,8 @@ def from_datasheet(name: str, sensor: Sensor, seed: int) -> Origin:
     """Build the model of a sensor from its datasheet; ``name`` is the name of the sensor file.
 
     Typical figures are used. Bias and temperature coefficient are the printed figures with random
-    signs from the seed. Bias instability is flicker noise if no correlation time is printed.
-
-    Raises
-    ------
-    ConfigError
-        If no noise is printed for any channel of the log format.
+    signs from the seed. Bias instability is flicker noise if no correlation time is printed. Raises
+    ConfigError if no noise is printed for any channel of the log format.
     """
     source = texts.of_data_sheet(name, sensor.datasheet.document)
     origin = Origin(ImuModel(axes={}), source, sensor=name)

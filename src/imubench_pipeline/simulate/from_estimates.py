@@ -32,11 +32,7 @@ def with_estimates(
     The estimates are from the longest recording, or from the named one: noise (recommended method)
     and bias. If a temperature effect was compensated, the compensated noise, the bias and the drift
     are used. The cut-off is used if it has a value. Resolution and full scale stay as printed.
-
-    Raises
-    ------
-    ConfigError
-        If there is no estimate of the sensor, or of the recording.
+    Raises ConfigError if there is no estimate of the sensor, or of the recording.
     """
     folder = find_tables_folder(results)
     try:

@@ -58,10 +58,7 @@ class FileSeries:
     def take(self, name: str, dimension: str) -> None:
         """Request a column by name, without its unit, and dimension.
 
-        Raises
-        ------
-        ConfigError
-            If there is no such column, or its unit has another dimension.
+        Raises ConfigError if there is no such column, or its unit has another dimension.
         """
         if name not in self._headings:
             raise ConfigError(
@@ -79,10 +76,8 @@ class FileSeries:
     def span(self) -> tuple[float, float]:
         """Return the first and the last time, s; this reads the whole file.
 
-        Raises
-        ------
-        ConfigError
-            If the file has no rows, a number is missing in it, or its times do not ascend.
+        Raises ConfigError if the file has no rows, a number is missing in it, or its times do not
+        ascend.
         """
         first, last = np.nan, np.nan
         for row, batch in self._read():
@@ -98,12 +93,8 @@ class FileSeries:
         """Return a requested column (`take`), in SI, temperature in °C, shape (k,).
 
         It is linear between rows and constant beyond them. The times, shape (k,), are in s,
-        ascending.
-
-        Raises
-        ------
-        ConfigError
-            If a number is missing in the file, or its times do not ascend.
+        ascending. Raises ConfigError if a number is missing in the file, or its times do not
+        ascend.
         """
         if not len(times):
             return np.empty(0)

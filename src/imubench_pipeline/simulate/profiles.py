@@ -127,12 +127,8 @@ class FileColumn(Profile):
 def profiles_of(around: Surroundings, folder: Path) -> tuple[dict[str, Profile], Profile | None]:
     """Return motion by channel, and temperature, in SI; file names are relative to a folder.
 
-    Raises
-    ------
-    ConfigError
-        If a file cannot be used.
-    UnitError
-        If a unit has another dimension than its profile.
+    Raises ConfigError if a file cannot be used. Raises UnitError if a unit has another dimension
+    than its profile.
     """
     opened: dict[Path, FileSeries] = {}
     motion = {
@@ -147,14 +143,8 @@ def make_profile(form: Form, name: str, folder: Path, opened: dict[Path, FileSer
     """Return a profile, in SI, of a channel or of ``temperature``.
 
     File names are relative to the folder. A file is opened once: a newly opened file is added to
-    ``opened``.
-
-    Raises
-    ------
-    ConfigError
-        If its file cannot be used.
-    UnitError
-        If a unit has another dimension.
+    ``opened``. Raises ConfigError if its file cannot be used. Raises UnitError if a unit has
+    another dimension.
     """
     dimension = name if name == "temperature" else QUANTITIES[quantity_of(name)]
     if isinstance(form, FileForm):

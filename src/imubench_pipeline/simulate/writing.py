@@ -86,13 +86,9 @@ def notes_text(name: str, log: LogFormat, sensor: LogFormat | None, words: str) 
 def check_notes(notes: Path, path: Path) -> None:
     """Check that the notes of a simulated log are the notes of no other recording.
 
-    ``notes``, ``path``: the notes, and the log; they need not exist.
-
-    Raises
-    ------
-    ConfigError
-        If another log or folder has the same name, which the notes would belong to as well, or the
-        notes that exist are not from a simulation of this log.
+    ``notes``, ``path``: the notes, and the log; they need not exist. Raises ConfigError if another
+    log or folder has the same name, which the notes would belong to as well, or the notes that
+    exist are not from a simulation of this log.
     """
     beside = sorted(path.parent.iterdir()) if path.parent.is_dir() else []
     for other in beside:
@@ -112,10 +108,7 @@ def check_notes(notes: Path, path: Path) -> None:
 def layout(path: Path, columns: Iterable[str], rate: float, sensor: LogFormat | None) -> LogFormat:
     """Return the format of a log of channels, and perhaps temperature, at a rate, Hz.
 
-    Raises
-    ------
-    ConfigError
-        If the suffix is not a supported format.
+    Raises ConfigError if the suffix is not a supported format.
     """
     if path.suffix not in FORMATS:
         raise ConfigError(f"{path}: expected a name that ends in {' or '.join(FORMATS)}")

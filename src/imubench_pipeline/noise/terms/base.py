@@ -108,12 +108,8 @@ class Term(ABC):
 
         ``lags`` are whole numbers of blocks from 0, ``block`` is their length, s. (I. M. Gelfand
         and G. E. Shilov, "Generalized Functions", vol. 1, 1964: -ln|t| / pi and -|t| / 2 of 1/|f|
-        and 1/f^2, with the densities of IEEE Std 952-1997, annex C.)
-
-        Raises
-        ------
-        TypeError
-            If the term is deterministic.
+        and 1/f^2, with the densities of IEEE Std 952-1997, annex C.) Raises TypeError if the term
+        is deterministic.
         """
 
     @abstractmethod

@@ -15,12 +15,9 @@ _REQUIRED_VARIABLES = ("symbol", "label", "standard_name", "word", "role", "para
 def register_terms(*kinds: type[Term]) -> tuple[type[Term], ...]:
     """Return the kinds of terms, after checking that each is complete.
 
-    Raises
-    ------
-    TypeError
-        If a kind lacks a method, a class variable or a search range of a time constant, its
-        parameters are not its fields, or two kinds share a symbol or a word, or a symbol of
-        different parameters.
+    Raises TypeError if a kind lacks a method, a class variable or a search range of a time
+    constant, its parameters are not its fields, or two kinds share a symbol or a word, or a symbol
+    of different parameters.
     """
     for kind in kinds:
         name = kind.__name__

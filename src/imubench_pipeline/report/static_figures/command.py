@@ -115,10 +115,7 @@ def select(
 ) -> dict[str, pa.Table]:
     """Return the part of the tables that a sensor, recording and channel have; None: all.
 
-    Raises
-    ------
-    SelectionError
-        If there is no such curve; it lists the choices.
+    Raises SelectionError if there is no such curve; it lists the choices.
     """
     chosen = dict(tables)
     for column, asked in (("sensor", sensor), ("recording", recording), ("channel", channel)):
