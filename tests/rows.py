@@ -22,3 +22,17 @@ def typed(of: type[R], rows: Iterable[Mapping[str, Any]]) -> list[R]:
         if column.required
     }
     return [row if isinstance(row, of) else of(**(plain | dict(row))) for row in rows]
+
+
+DATASHEET_VERDICTS = (
+    "better than typ",
+    "as printed",
+    "worse than typ",
+    "worse than max",
+    "not sure",
+    "not published",
+    "not looked up",
+    "not measured",
+    "not comparable (condition)",
+)
+"""All verdicts on a printed figure."""

@@ -39,7 +39,7 @@ def test_no_arrow_points_back() -> None:
 # A module, what is written at its end, and what is said of it.
 WRONG = {
     "back": (
-        "noise/terms/ramp.py",
+        "noise/terms/flicker.py",
         "from imubench_pipeline.estimators.estimate import Estimate\n",
         "imubench_pipeline.noise is not allowed to import imubench_pipeline.estimators:",
     ),

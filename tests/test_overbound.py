@@ -9,8 +9,15 @@ from scipy.optimize import brentq
 
 from imubench_pipeline.allan import AllanCurve, allan_variance, cluster_sizes
 from imubench_pipeline.export.growth import growth
-from imubench_pipeline.export.overbound import Overbound, limits_of, overbound, simultaneous_upper
-from imubench_pipeline.export.smallest_model import FAMILIES, Family, find_smallest
+from imubench_pipeline.export.overbound import (
+    FAMILIES,
+    Family,
+    Overbound,
+    find_smallest,
+    limits_of,
+    overbound,
+    simultaneous_upper,
+)
 from imubench_pipeline.noise import GaussMarkov, NoiseModel
 from imubench_pipeline.noise.simulate import simulate
 from imubench_pipeline.typing import Array

@@ -13,9 +13,8 @@ import yaml
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from imubench_pipeline.export.imu import AxisNoise, Imu
+from imubench_pipeline.export.imu import AxisNoise, Imu, TemperatureEffect
 from imubench_pipeline.export.targets import TARGETS
-from imubench_pipeline.export.temperature import TemperatureEffect
 from imubench_pipeline.noise import GaussMarkov, NoiseModel, Sinusoid
 from tests.export.test_filters import ekf2, opencv
 

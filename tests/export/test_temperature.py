@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from imubench_pipeline.export import matlab, px4
+from imubench_pipeline.export.imu import TemperatureEffect, find_temperature_effect
 from imubench_pipeline.export.targets import TARGETS
-from imubench_pipeline.export.temperature import TemperatureEffect, find_temperature_effect
 from imubench_pipeline.model.estimates import TemperatureRow
 from imubench_pipeline.model.recordings import RecordingRow
 from tests.export.sensors import imu

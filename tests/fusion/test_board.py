@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from imubench_pipeline.extensions.fusion.board import Board, Shared, block_mean_spectrum, divided
 from imubench_pipeline.extensions.fusion.prediction import allan_of_spectrum
 from imubench_pipeline.noise import GaussMarkov, NoiseModel, Sinusoid
-from imubench_pipeline.noise.block_means import of_block_means
+from imubench_pipeline.noise.state_space import of_block_means
 
 MODEL = NoiseModel(Q=1e-6, N=1e-4, B=5e-5, T_B=0.4, K=1e-6)
 

@@ -39,7 +39,7 @@ from imubench_pipeline.settings.sensor import RecordingNotes, Sensor, merged_log
 from imubench_pipeline.settings.simulated_recordings import read_simulated
 from imubench_pipeline.settings.validation import ConfigError, parse
 from imubench_pipeline.settings.yaml_files import read_yaml
-from imubench_pipeline.simulate.sources import read_model_file
+from imubench_pipeline.simulate.models import read_model_file
 from imubench_pipeline.tables import TableError, read, write
 from imubench_pipeline.tables.failures import Failure, read_failure
 from imubench_pipeline.tables.findings import RecordingError

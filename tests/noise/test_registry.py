@@ -25,7 +25,7 @@ from imubench_pipeline.noise import (
     WhiteNoise,
     terms,
 )
-from imubench_pipeline.noise.terms.registry import register_terms
+from imubench_pipeline.noise.terms.base import register_terms
 from imubench_pipeline.report.practical import choose_page_unit
 from imubench_pipeline.report.static_figures.style import SYMBOLS, TERM_LOOKS, TERM_NAMES
 from imubench_pipeline.settings.simulated_sensor import AxisSettings

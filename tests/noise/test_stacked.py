@@ -11,7 +11,7 @@ from imubench_pipeline.noise.exponentials import (
     integrate_squared_response,
 )
 from imubench_pipeline.noise.growth import Calibrated, Uncalibrated
-from imubench_pipeline.noise.stacked import stack_models, sum_over_terms
+from imubench_pipeline.noise.model import stack_models, sum_over_terms
 
 MODELS = [
     NoiseModel(Q=1e-6, N=1e-4, B=2e-5, T_B=90.0, K=1e-7, R=-1e-9),

@@ -3,15 +3,14 @@ from functools import cache
 
 import pytest
 
-from imubench_pipeline.report import made, site, theory
+from imubench_pipeline.report import pages, site
 from imubench_pipeline.report import publish as publishing
 
 ONCE = {
     (module, name): cache(getattr(module, name))
     for module, names in {
         publishing: ("make_templates", "digest_sources"),
-        theory: ("draw_theory_figure", "encode_figure"),
-        made: ("version",),
+        pages: ("draw_theory_figure", "encode_figure", "version"),
         site: ("version",),
     }.items()
     for name in names
@@ -34,7 +33,7 @@ def _once() -> Iterator[None]:
 def small_report() -> Iterator[None]:
     """What is large and the same in every report is left out."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(theory, "encode_figure", lambda figure: "data:image/svg+xml;base64,PHN2Zy8+")
-        patch.setattr(theory, "draw_theory_figure", lambda system: None)
+        patch.setattr(pages, "encode_figure", lambda figure: "data:image/svg+xml;base64,PHN2Zy8+")
+        patch.setattr(pages, "draw_theory_figure", lambda system: None)
         patch.setattr(publishing, "read_plotting_script", lambda: "var Plotly = {};")
         yield

@@ -44,8 +44,8 @@ from imubench_pipeline.tables import findings
 from imubench_pipeline.units import convert_from_si, convert_to_si
 from imubench_pipeline.words.estimates import STATUS_WORDS
 from imubench_pipeline.words.findings import FINDINGS
-from imubench_pipeline.words.reasons.datasheets import DELTA_MEANINGS
 from tests.conftest import PROJECT
+from tests.rows import DATASHEET_VERDICTS
 
 SOURCE = PROJECT / "src/imubench_pipeline"
 BASE = "{% block title %}{% endblock %}<main>{% block main %}{% endblock %}</main>"
@@ -292,7 +292,7 @@ def values_in_tables() -> Iterator[tuple[str, str]]:
     for severity in get_args(findings.Severity):
         yield severity, ""
     for verdict in [
-        *DELTA_MEANINGS,
+        *DATASHEET_VERDICTS,
         *get_args(pooled.Verdict),
         *get_args(comparison.Verdict),
     ]:

@@ -11,7 +11,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from imubench_pipeline.report.publish import publish
-from imubench_pipeline.report.shell import make_command, make_recompute_command
+from imubench_pipeline.report.site import make_command, make_recompute_command
 from imubench_pipeline.run.cli import main
 from tests.report.tables import joined, put_log, put_samples, recording_rows, site
 

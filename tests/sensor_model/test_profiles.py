@@ -10,8 +10,7 @@ from hypothesis import strategies as st
 
 from imubench_pipeline.settings.profile_forms import Surroundings
 from imubench_pipeline.settings.validation import ConfigError, parse
-from imubench_pipeline.simulate.profile_files import FileSeries
-from imubench_pipeline.simulate.profiles import profiles_of
+from imubench_pipeline.simulate.profiles import FileSeries, profiles_of
 from imubench_pipeline.units import UnitError, parse_difference
 
 

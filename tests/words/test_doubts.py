@@ -4,9 +4,8 @@ import pytest
 
 from imubench_pipeline.model.verdicts import DoubtMark
 from imubench_pipeline.recordings.fitness import BESIDE_MEASURED
-from imubench_pipeline.words.doubts import doubt_text
 from imubench_pipeline.words.findings import FINDINGS
-from imubench_pipeline.words.verdicts import doubts_text
+from imubench_pipeline.words.verdicts import doubt_text, doubts_text
 
 DECLARED = {code for code, kind in FINDINGS.items() if kind.affects or kind.unfit}
 CODES = sorted({*DECLARED, BESIDE_MEASURED, "not_sold",

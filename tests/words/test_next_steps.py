@@ -7,7 +7,7 @@ import pytest
 from imubench_pipeline.model.comparisons import NextStepRow
 from imubench_pipeline.model.states import Action
 from imubench_pipeline.model.verdicts import Condition
-from imubench_pipeline.words.next_steps import next_step_text
+from imubench_pipeline.words.verdicts import next_step_text
 
 FIGURES = (
     Condition("scale_factor", None, "gyro"),

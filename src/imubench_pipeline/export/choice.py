@@ -11,8 +11,7 @@ import numpy as np
 
 from imubench_pipeline.estimators.estimate import Estimate
 from imubench_pipeline.estimators.rows import make_estimate
-from imubench_pipeline.export.imu import AxisNoise, ExportError
-from imubench_pipeline.export.temperature import AXES
+from imubench_pipeline.export.imu import AXES, AxisNoise, ExportError
 from imubench_pipeline.model.estimates import ParameterRow
 from imubench_pipeline.words.reasons import exports as texts
 

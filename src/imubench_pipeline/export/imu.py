@@ -1,14 +1,115 @@
-"""Noise model of an inertial sensor, as the export to other programs takes it."""
+"""Noise and temperature effect of an inertial sensor, as exports to other programs take them."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 from imubench_pipeline.earth import STANDARD_GRAVITY
-from imubench_pipeline.export.temperature import TemperatureEffect
+from imubench_pipeline.model.estimates import TemperatureRow
+from imubench_pipeline.model.recordings import RecordingRow
 from imubench_pipeline.noise import NoiseModel
+from imubench_pipeline.words.reasons import exports as texts
+
+AXES = "xyz"
+
+_MAX_RELATIVE_ERROR = 0.5
+"""Max. half-width of the 95 % interval over s; a correction then removes at least half."""
+
+_MIN_TEMPERATURE_RANGE = 2.0
+"""K. PX4 updates a correction only after a change of 1 K (update_offsets_gyro); in a smaller range
+about T_0 it would not correct anything."""
+
+
+@dataclass(frozen=True)
+class TemperatureEffect:
+    """Effect of temperature on the biases of a quantity, for programs that correct or simulate it.
+
+        bias(T) - bias(T_0) = s (T - T_0) + q (T - T_0)^2,
+
+    as `estimators.thermal` fits it to one recording of one device. A wrong correction is worse than
+    none, and none of the programs models a thermal lag. An axis is therefore left out, with the
+    reason, unless the log determines s accurately enough.
+
+    ``slope`` and ``square`` are s and q of each axis with a usable estimate, rad/s or m/s² per K
+    and K²; q only for axes with a quadratic term.
+    """
+
+    reference: float = 0.0  # T_0, the temperature of zero effect, °C
+    low: float = 0.0  # range of the temperature of the recording, °C
+    high: float = 0.0
+    slope: Mapping[str, float] = field(default_factory=dict)
+    square: Mapping[str, float] = field(default_factory=dict)
+    notes: Sequence[str] = ()  # source of each axis, and reasons for omitted axes
+
+
+def find_temperature_effect(
+    rows: Iterable[TemperatureRow], recording: RecordingRow, quantity: str, horizon: float
+) -> TemperatureEffect:
+    """Return the effect of temperature on a quantity in one recording.
+
+    `rows` are the rows of the recording. An axis whose thermal lag may exceed the `horizon` is left
+    out; the horizon is the longest time that the program predicts without a measurement, s.
+    """
+    low, high = recording.temperature_min, recording.temperature_max
+    by_axis: dict[str, dict[str, TemperatureRow]] = {}
+    for row in rows:
+        of, axis = row.channel.split("_")
+        if of == quantity:
+            by_axis.setdefault(axis, {})[row.parameter] = row
+    if not by_axis or low is None or high is None:
+        return TemperatureEffect(notes=[texts.no_temperature(recording.recording)])
+    reference = _require_value(min(by_axis.items())[1]["T_0"])
+    unit = {"gyro": "rad/s", "accel": "m/s^2"}[quantity]
+    slope: dict[str, float] = {}
+    square: dict[str, float] = {}
+    notes = [texts.temperature_range(reference, recording.recording, recording.device, low, high)]
+    for axis in AXES:
+        if axis not in by_axis:
+            notes.append(texts.axis_not_included(axis, texts.NO_TEMPERATURE_FIT))
+            continue
+        fit = by_axis[axis]
+        reason = _find_objection(fit, high - low, horizon)
+        if reason is not None:
+            notes.append(texts.axis_not_included(axis, reason))
+            continue
+        s, q = fit["sensitivity"], fit["quadratic"].value or 0.0
+        # The axes of one quantity may come from files whose mean temperatures differ.
+        slope[axis] = _require_value(s) + 2.0 * q * (reference - _require_value(fit["T_0"]))
+        if q:
+            square[axis] = q
+        limits, lag = (s.lower, s.upper), fit["lag"].upper
+        notes.append(texts.axis_slope(axis, _require_value(s), limits, q, unit, lag))
+    return TemperatureEffect(reference, float(low), float(high), slope, square, notes)
+
+
+def _require_value(row: TemperatureRow) -> float:
+    """Return the value of T_0 or of a usable sensitivity; ValueError if it has none."""
+    if row.value is None:
+        raise ValueError(f"{row.channel}: {row.parameter} has no value: {row.reason}")
+    return row.value
+
+
+def _find_objection(fit: Mapping[str, TemperatureRow], span: float, horizon: float) -> str | None:
+    """Return the reason against a correction with a fit; None if it is safe."""
+    s, lag = fit["sensitivity"], fit["lag"]
+    if s.value is None or s.lower is None or s.upper is None:
+        return texts.sensitivity_status(s.status, s.reason)
+    if not s.compensated:
+        return texts.effect_not_shown(s.reason)
+    error = 0.5 * (s.upper - s.lower) / abs(s.value)
+    if error > _MAX_RELATIVE_ERROR:
+        return texts.sensitivity_uncertain(error, _MAX_RELATIVE_ERROR)
+    if span < _MIN_TEMPERATURE_RANGE:
+        return texts.small_temperature_range(span, _MIN_TEMPERATURE_RANGE)
+    if lag.status != "absent":
+        longest = lag.upper
+        if longest is None:
+            return texts.lag_status(lag.status, lag.reason)
+        if longest > horizon:
+            return texts.long_lag(longest, horizon)
+    return None
 
 
 class ExportError(ValueError):

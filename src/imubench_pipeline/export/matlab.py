@@ -29,9 +29,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from imubench_pipeline.export.comments import describe_model, format_comments
-from imubench_pipeline.export.imu import AxisNoise, Imu
+from imubench_pipeline.export.imu import AXES, AxisNoise, Imu, TemperatureEffect
 from imubench_pipeline.export.mapping import Mapped, as_process
-from imubench_pipeline.export.temperature import AXES, TemperatureEffect
 from imubench_pipeline.noise import NoiseModel, compute_driving_density
 from imubench_pipeline.words.reasons import exports as texts
 

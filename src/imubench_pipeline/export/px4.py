@@ -29,8 +29,7 @@ from __future__ import annotations
 import math
 
 from imubench_pipeline.export.comments import describe_model, format_comments
-from imubench_pipeline.export.imu import ExportError, Imu
-from imubench_pipeline.export.temperature import AXES
+from imubench_pipeline.export.imu import AXES, ExportError, Imu
 from imubench_pipeline.export.visual_inertial import map_to_walks
 from imubench_pipeline.words.reasons import exports as texts
 

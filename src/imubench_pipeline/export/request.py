@@ -14,12 +14,17 @@ from imubench_pipeline.allan import AllanCurve
 from imubench_pipeline.earth import STANDARD_GRAVITY
 from imubench_pipeline.estimators.rows import read_draws
 from imubench_pipeline.export.choice import WORST, Choice, choose
-from imubench_pipeline.export.imu import AxisNoise, ExportError, Imu, compute_normal_gravity
+from imubench_pipeline.export.imu import (
+    AxisNoise,
+    ExportError,
+    Imu,
+    TemperatureEffect,
+    compute_normal_gravity,
+    find_temperature_effect,
+)
 from imubench_pipeline.export.mapping import describe_terms
-from imubench_pipeline.export.overbound import MAX_EXCESS, overbound
-from imubench_pipeline.export.smallest_model import FAMILIES, Family
+from imubench_pipeline.export.overbound import FAMILIES, MAX_EXCESS, Family, overbound
 from imubench_pipeline.export.targets import TARGETS
-from imubench_pipeline.export.temperature import TemperatureEffect, find_temperature_effect
 from imubench_pipeline.model.estimates import AllanRow, ParameterRow, TemperatureRow
 from imubench_pipeline.model.recordings import RecordingRow
 from imubench_pipeline.model.table import R

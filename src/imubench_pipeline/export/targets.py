@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from imubench_pipeline.export import gnss_ins_sim, matlab, matrices, px4, snippet
 from imubench_pipeline.export.imu import Imu
-from imubench_pipeline.export.smallest_model import Family
+from imubench_pipeline.export.overbound import Family
 from imubench_pipeline.export.visual_inertial import (
     write_basalt,
     write_kalibr,

@@ -57,7 +57,6 @@ Origin = Literal["measured", "datasheet", "requirement", "not known"]
 BacktestVerdict = Literal["as predicted", "more than predicted", "less than predicted"]
 PoolVerdict = Literal["agree", "differ"]
 DriftVerdict = Literal["changed", "as before"]
-RatioVerdict = Literal["lower", "higher", "not significant", "not known"]
 
 ShortlistVerdict = Literal["cannot_meet", "worth_logging", "meets_at_worst", "not_judged"]
 """Verdict on a sensor by its data sheet alone."""

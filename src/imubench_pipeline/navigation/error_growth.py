@@ -27,8 +27,8 @@ from imubench_pipeline.navigation.expected_errors import (
 )
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.growth import Calibrated
+from imubench_pipeline.noise.model import sum_over_terms
 from imubench_pipeline.noise.simulate import channel_rng
-from imubench_pipeline.noise.stacked import sum_over_terms
 from imubench_pipeline.settings.requirements import DIMENSIONS
 from imubench_pipeline.typing import Array
 from imubench_pipeline.units import SI_UNITS

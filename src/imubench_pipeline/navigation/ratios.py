@@ -24,8 +24,8 @@ import numpy as np
 from imubench_pipeline.estimators.estimate import Parameter
 from imubench_pipeline.model.estimates import DrawnDeviationRow
 from imubench_pipeline.navigation.compared import ComparedChannel, compute_number_needed
+from imubench_pipeline.noise.model import sum_over_terms
 from imubench_pipeline.noise.simulate import channel_rng
-from imubench_pipeline.noise.stacked import sum_over_terms
 from imubench_pipeline.typing import Array
 from imubench_pipeline.words.reasons import pools as texts
 

@@ -2,12 +2,70 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+import platform
+from collections.abc import Iterator, Mapping, Sequence
+from importlib.metadata import version
 
 from imubench_pipeline.registry import Hook
-from imubench_pipeline.report import compare, made, recording, shortlist, start, theory
+from imubench_pipeline.report import compare, recording, shortlist, start
+from imubench_pipeline.report.glossary import read_glossary
+from imubench_pipeline.report.plotting import read_plotting_version
 from imubench_pipeline.report.sensor import make_device_page, make_sensor_page
-from imubench_pipeline.report.site import RECORDING_PAGES, Entry, Page, Site
+from imubench_pipeline.report.site import RECORDING_PAGES, Entry, Page, Site, make_command
+from imubench_pipeline.report.static_figures.files import encode_figure
+from imubench_pipeline.report.static_figures.theory import draw_theory_figure
+
+
+def _describe_theory(site: Site) -> Mapping[str, object]:
+    return {"figure": encode_figure(draw_theory_figure(site.system)), "terms": read_glossary()}
+
+
+THEORY = Entry(file="theory.html", title="Theory", context=_describe_theory)
+"""The page that the terms of all other pages link to."""
+
+_LIBRARIES = ("numpy", "scipy", "numba", "pyarrow", "matplotlib", "snakemake")
+_RUN_COMMAND = (
+    "snakemake -c2",
+    "runs everything; later only the steps that new logs or changed settings affect. "
+    "In a folder made by imubench init, use imubench run, with further flags after --",
+)
+_COMMANDS: tuple[tuple[str, dict[str, str], str], ...] = (
+    ("show", {}, "prints the comparison in the terminal"),
+    ("figures", {"--sensor": "NAME"}, "draws the figures of channels for print, as SVG and PDF"),
+    (
+        "report",
+        {"--one-file": "report.html"},
+        "writes all pages into one file, for example to send by mail",
+    ),
+    ("export", {"--sensor": "NAME", "--target": "kalibr"}, "writes the noise model for a filter"),
+)
+"""Commands of `imubench` for the results, their options, and their effect."""
+
+
+def _describe_making(site: Site) -> Mapping[str, object]:
+    commands = [_RUN_COMMAND]
+    for name, options, words in _COMMANDS:
+        commands.append((make_command(name, site.results_name, options), words))
+    if site.at_once:
+        commands = [(site.at_once, "writes these pages again")]
+    return {
+        "commands": commands,
+        "versions": {
+            "python": platform.python_version(),
+            **{name: version(name) for name in ("imubench_pipeline", *_LIBRARIES)},
+            "plotly.js": read_plotting_version(),
+        },
+        "settings": {
+            f"{section}.{key}": value
+            for section, values in site.settings["settings"].items()
+            for key, value in values.items()
+        },
+    }
+
+
+MADE = Entry(file="made.html", title="How this was made", context=_describe_making)
+"""The page that the footer of every page links to."""
+
 
 _ADDED: Hook[Entry] = Hook("pages")
 
@@ -18,8 +76,8 @@ ENTRIES: Sequence[Entry] = (
     start.DATASHEETS,
     shortlist.SHORTLIST,
     *sorted(_ADDED.objects(), key=lambda entry: entry.place),
-    theory.THEORY,
-    made.MADE,
+    THEORY,
+    MADE,
 )
 """The pages that exist once, in the order of the navigation; the first is the start page."""
 

@@ -13,9 +13,13 @@ from imubench_pipeline.recordings.kept import Quality
 from imubench_pipeline.recordings.recording import list_log_files, read_metadata
 from imubench_pipeline.registry import Hook
 from imubench_pipeline.report import thermal
-from imubench_pipeline.report.backtest import format_backtest
 from imubench_pipeline.report.datasheets import compare_with_datasheet, format_curve_distances
-from imubench_pipeline.report.meaning import explain_budget, make_budget_bars, make_budget_tables
+from imubench_pipeline.report.meaning import (
+    explain_budget,
+    format_backtest,
+    make_budget_bars,
+    make_budget_tables,
+)
 from imubench_pipeline.report.parameters import count_digits, make_methods_table
 from imubench_pipeline.report.payload import (
     Arrays,
@@ -25,8 +29,7 @@ from imubench_pipeline.report.payload import (
     pack_styles,
 )
 from imubench_pipeline.report.practical import System, choose_page_unit, format_temperature
-from imubench_pipeline.report.shell import make_command
-from imubench_pipeline.report.site import Page, RecordingPage, Site
+from imubench_pipeline.report.site import Page, RecordingPage, Site, make_command
 from imubench_pipeline.report.view import ChannelView, RecordingView
 from imubench_pipeline.tables import read
 from imubench_pipeline.tables.findings import RecordingError

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import re
+import shlex
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -22,9 +23,30 @@ from imubench_pipeline.registry import Hook
 from imubench_pipeline.report.comparison import ComparedRecording, gather_recording
 from imubench_pipeline.report.palette import Appearance, assign_sensor_styles
 from imubench_pipeline.report.practical import System, choose_first_units, list_page_units
-from imubench_pipeline.report.shell import make_recompute_command
 from imubench_pipeline.report.view import Name, RecordingView, gather_recordings
 from imubench_pipeline.tables.schemas import OF_ONE_RECORDING, TABLES
+
+
+def make_command(name: str, results: str, options: Mapping[str, str] | None = None) -> str:
+    """Return a command of `make_command`, such as ``figures``, for the results of a run.
+
+    ``options`` has the values of options such as ``--sensor``; a word in capitals is a placeholder.
+    """
+    words = ["imubench", name, f"./{results}" if results.startswith("-") else results]
+    for key, value in (options or {}).items():
+        words += [f"{key}={value}"] if value.startswith("-") else [key, value]
+    return shlex.join(words)
+
+
+def make_recompute_command(target: str, overrides: Sequence[str] = ()) -> str:
+    """Return the command that recomputes a file of a recording from its log.
+
+    ``overrides`` are the settings of the run for ``snakemake --config``.
+    """
+    stated = ["--config", *overrides] if overrides else []
+    # After the two dashes, nothing is read as an option.
+    return shlex.join(["snakemake", "-c2", *stated, "--forcerun", "ingest", "--", target])
+
 
 _CHANNEL_ORDER = ("gyro_x", "gyro_y", "gyro_z", "accel_x", "accel_y", "accel_z")
 _PACKAGE = "imubench_pipeline"

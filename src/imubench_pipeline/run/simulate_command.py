@@ -21,8 +21,8 @@ from imubench_pipeline.tables.outputs import OutputFile, add_output
 from imubench_pipeline.units import UnitError, add_key_to_errors, parse_quantity
 
 if TYPE_CHECKING:
+    from imubench_pipeline.simulate.models import Origin
     from imubench_pipeline.simulate.profiles import Profile
-    from imubench_pipeline.simulate.sources import Origin
 
 _YAML_SUFFIXES = (".yaml", ".yml")
 _MAX_SAMPLES = 1 << 36
@@ -221,7 +221,7 @@ def _declared(name: str, stated: Path | None) -> Any:
 def _origin(options: argparse.Namespace) -> tuple[Origin, Any]:
     """Return the model, and the sensor file where there is one."""
     from imubench_pipeline.settings.sensor import CHANNELS
-    from imubench_pipeline.simulate import sources
+    from imubench_pipeline.simulate import models
     from imubench_pipeline.simulate.from_datasheet import from_datasheet
     from imubench_pipeline.simulate.from_estimates import with_estimates
     from imubench_pipeline.simulate.imu import ImuModel
@@ -237,7 +237,7 @@ def _origin(options: argparse.Namespace) -> tuple[Origin, Any]:
     if path.suffix in _YAML_SUFFIXES:
         if options.results:
             raise ConfigError("--results are for a sensor by name; the file of models has its own")
-        origin = sources.read_model_file(path)
+        origin = models.read_model_file(path)
         sensor = _declared(origin.sensor, options.sensors) if origin.sensor else None
     else:
         sensor = _declared(options.sensor, options.sensors)
@@ -246,11 +246,11 @@ def _origin(options: argparse.Namespace) -> tuple[Origin, Any]:
         except ConfigError:
             if not options.results:
                 raise
-            origin = sources.Origin(ImuModel(axes={}), "", sensor=options.sensor)
+            origin = models.Origin(ImuModel(axes={}), "", sensor=options.sensor)
         if options.results:
             origin = with_estimates(origin, options.results, options.sensor, options.recording)
     if asked:
-        origin = sources.select_channels(origin, asked)
+        origin = models.select_channels(origin, asked)
     return origin, sensor
 
 
@@ -291,8 +291,7 @@ def _profiles(
     options: argparse.Namespace, origin: Origin
 ) -> tuple[dict[str, Profile], Profile | None]:
     from imubench_pipeline.settings.profile_forms import Surroundings
-    from imubench_pipeline.simulate.profile_files import FileSeries
-    from imubench_pipeline.simulate.profiles import profiles_of
+    from imubench_pipeline.simulate.profiles import FileSeries, profiles_of
 
     forms: dict[str, Any] = {}
     folder = Path()

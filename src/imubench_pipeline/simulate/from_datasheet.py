@@ -15,7 +15,7 @@ from imubench_pipeline.settings.sensor import CHANNELS, Sensor, quantity_of
 from imubench_pipeline.settings.validation import ConfigError
 from imubench_pipeline.simulate.imu import ImuModel
 from imubench_pipeline.simulate.model import SensorModel, TemperatureDrift
-from imubench_pipeline.simulate.sources import Origin, Remark, Topic
+from imubench_pipeline.simulate.models import Origin, Remark, Topic
 from imubench_pipeline.units import convert_to_si, find_dimension, parse_quantity
 from imubench_pipeline.words.reasons import simulations as texts
 

@@ -8,8 +8,8 @@ from decimal import ROUND_DOWN, Decimal
 from typing import get_args
 
 from imubench_pipeline.earth import STANDARD_GRAVITY
-from imubench_pipeline.model.comparisons import RankingRow
-from imubench_pipeline.model.states import ShortlistVerdict, SpreadOf, Verdict
+from imubench_pipeline.model.comparisons import NextStepRow, RankingRow
+from imubench_pipeline.model.states import Action, ShortlistVerdict, SpreadOf, Verdict
 from imubench_pipeline.model.verdicts import (
     Condition,
     DoubtMark,
@@ -21,7 +21,7 @@ from imubench_pipeline.model.verdicts import (
 )
 from imubench_pipeline.settings.printed import SENSORS
 from imubench_pipeline.units import convert_from_si
-from imubench_pipeline.words.doubts import doubt_text
+from imubench_pipeline.words.findings import FINDINGS
 from imubench_pipeline.words.numbers import (
     counted,
     duration_text,
@@ -29,6 +29,22 @@ from imubench_pipeline.words.numbers import (
     number_text,
     percent_text,
 )
+
+_TEXTS: Mapping[str, str] = {
+    "simulated_beside_measured": "it is simulated, and other recordings are measured",
+    "not_sold": "this sensor is not sold",
+    "not_explained": "no model explains the spectrum of {channels}",
+    "doubtful": "the decisive parameter is doubtful",
+}
+"""Doubts that are no findings."""
+
+
+def doubt_text(code: str, channels: Sequence[str] = ()) -> str:
+    """Return a doubt in words: ``the unit of gyro z looks wrong``."""
+    where = join_names([channel.replace("_", " ") for channel in channels])
+    text = _TEXTS.get(code) or FINDINGS[code].doubt
+    return text.format(channels=where or "the data", are="is" if len(channels) == 1 else "are")
+
 
 VERDICT_WORDS: Mapping[Verdict, str] = {
     "meets": "meets the limits",
@@ -63,13 +79,6 @@ SHORTLIST_WORDS: Mapping[ShortlistVerdict, str] = {
     "not_judged": "not judged",
 }
 """Verdict by the data sheet alone."""
-
-SHORTLIST_MEANINGS: Mapping[ShortlistVerdict, str] = {
-    "cannot_meet": "lacks a demanded property, or fails even with its best printed figures",
-    "worth_logging": "meets the limits with its best figures, and may not with its worst",
-    "meets_at_worst": "even with its worst printed figures",
-    "not_judged": "too little is published, or its price class is another",
-}
 
 _NOUNS: Mapping[Figure, tuple[str, str, str]] = {
     "turn_on_bias": ("bias after calibration", "deg/s", "mg"),
@@ -339,3 +348,67 @@ def list_others(rows: Iterable[RankingRow], names: Mapping[str, str]) -> list[st
         f"{heading}: {', '.join(own) if len(own) <= _MAX_NAMES else counted(len(own), 'sensor')}."
         for heading, own in by_heading.items()
     ]
+
+
+def next_step_text(step: NextStepRow) -> str:
+    """Return a next step: ``Record 3 more units: this could settle 1 verdict``."""
+    return f"{_describe_action(step)}: {_describe_effect(step)}"
+
+
+def _describe_action(step: NextStepRow) -> str:
+    quantities = " and ".join(SENSORS[name] for name in step.quantities)
+    match step.action:
+        case "check_unit":
+            units = f"{quantities} unit" + "s" * (len(step.quantities) > 1)
+            return f"Check the {units.strip()} of {step.recording}"
+        case "find_figures":
+            return f"Look up the {join_names(list(map(subject_text, step.figures)))}"
+        case "record_again":
+            doubts = "; ".join(map(doubt_text, step.doubts))
+            return f"Record {step.recording} again" + f" ({doubts})" * bool(doubts)
+        case "add_channels":
+            if quantities:
+                return f"Record the {quantities} too ({step.recording} has none)"
+            return f"Record all three axes ({step.recording} has fewer)"
+        case "log_longer":
+            assert step.duration is not None  # of every such step
+            more = step.duration - (step.logged or 0.0)
+            return f"Extend {step.recording} by {_round_up(more)} to {_round_up(step.duration)}"
+        case "add_specimens":
+            return f"Record {counted(step.specimens or 0, 'more unit', 'more units')}"
+
+
+_EFFECTS: Mapping[Action, str] = {
+    "check_unit": "this could change {verdicts}",
+    "record_again": "this could allow {verdicts}",
+    "add_channels": "this could allow {verdicts}",
+    "log_longer": "this could settle {verdicts}",
+    "add_specimens": "this could settle {verdicts}",
+    "find_figures": "this would remove a condition from {verdicts}",
+}
+
+
+def _describe_effect(step: NextStepRow) -> str:
+    parts = []
+    if step.action == "find_figures":
+        parts.append(_EFFECTS[step.action].format(verdicts=_count(step.verdicts_strengthened)))
+    elif step.verdicts_turned:
+        parts.append(_EFFECTS[step.action].format(verdicts=_count(step.verdicts_turned)))
+    if step.verdicts_strengthened and step.action != "find_figures":
+        parts.append(f"give {_count(step.verdicts_strengthened)} stronger evidence")
+        if len(parts) == 1:
+            parts[0] = f"this would {parts[0]}"
+    return " and ".join(parts)
+
+
+def _count(number: int) -> str:
+    return counted(number, "verdict")
+
+
+def _round_up(seconds: float) -> str:
+    """Return a duration in a suitable unit, to two digits, rounded up."""
+    for unit, size in (("h", 3600.0), ("min", 60.0)):
+        if seconds >= size:
+            number = seconds / size
+            return f"{math.ceil(number) if number >= 10 else math.ceil(10 * number) / 10:g} {unit}"
+    return f"{math.ceil(seconds)} s"

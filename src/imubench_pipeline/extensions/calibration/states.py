@@ -15,8 +15,12 @@ from numpy.typing import NDArray
 
 from imubench_pipeline.extensions.calibration.experiment import Blocks, longest_tau
 from imubench_pipeline.noise import NoiseModel, Role
-from imubench_pipeline.noise.block_means import of_block_means
-from imubench_pipeline.noise.state_space import StateSpace, factor_covariance, repeat_step
+from imubench_pipeline.noise.state_space import (
+    StateSpace,
+    factor_covariance,
+    of_block_means,
+    repeat_step,
+)
 from imubench_pipeline.typing import Array
 
 # Standard deviation of an uninformative prior, rad/s: 14,000 times the Earth's rate

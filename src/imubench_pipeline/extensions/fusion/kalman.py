@@ -17,7 +17,7 @@ from scipy.sparse import csr_array
 
 from imubench_pipeline.extensions.fusion.board import Board, stochastic
 from imubench_pipeline.noise import GaussMarkov, compute_bias_instability
-from imubench_pipeline.noise.block_means import of_block_means
+from imubench_pipeline.noise.state_space import of_block_means
 from imubench_pipeline.typing import Array
 
 _MAX_DOUBLINGS = 80

@@ -14,7 +14,7 @@ from imubench_pipeline.model.comparisons import ErrorBudgetRow
 from imubench_pipeline.navigation.verdicts.basis import Basis
 from imubench_pipeline.navigation.verdicts.standing import Standing
 from imubench_pipeline.noise import TERMS
-from imubench_pipeline.noise.terms.traits import Role
+from imubench_pipeline.noise.terms.base import Role
 from imubench_pipeline.settings.requirements import Requirement
 from imubench_pipeline.units import parse_quantity
 

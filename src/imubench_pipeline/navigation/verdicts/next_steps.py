@@ -21,7 +21,7 @@ from imubench_pipeline.navigation.verdicts.evidence import (
 from imubench_pipeline.navigation.verdicts.judgement import Judgement
 from imubench_pipeline.navigation.verdicts.specimens import Expected
 from imubench_pipeline.navigation.verdicts.standing import Standing
-from imubench_pipeline.words.next_steps import next_step_text
+from imubench_pipeline.words.verdicts import next_step_text
 
 T = TypeVar("T")
 

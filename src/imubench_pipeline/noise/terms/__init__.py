@@ -4,7 +4,13 @@ Models, fits, simulation, budgets, exports and pages take everything from here. 
 is a module here, and an entry of `TERMS`.
 """
 
-from imubench_pipeline.noise.terms.base import Deterministic, Term
+from imubench_pipeline.noise.terms.base import (
+    Deterministic,
+    Role,
+    Term,
+    TermParameter,
+    register_terms,
+)
 from imubench_pipeline.noise.terms.flicker import Flicker
 from imubench_pipeline.noise.terms.gauss_markov import (
     FLOOR,
@@ -15,13 +21,8 @@ from imubench_pipeline.noise.terms.gauss_markov import (
     evaluate_gauss_markov_shape,
     evaluate_sampled_shape,
 )
-from imubench_pipeline.noise.terms.quantization import Quantization
-from imubench_pipeline.noise.terms.ramp import Ramp
-from imubench_pipeline.noise.terms.random_walk import RandomWalk
-from imubench_pipeline.noise.terms.registry import register_terms
+from imubench_pipeline.noise.terms.power_laws import Quantization, Ramp, RandomWalk, WhiteNoise
 from imubench_pipeline.noise.terms.sinusoid import Sinusoid
-from imubench_pipeline.noise.terms.traits import Role, TermParameter
-from imubench_pipeline.noise.terms.white_noise import WhiteNoise
 
 __all__ = [
     "FLOOR",

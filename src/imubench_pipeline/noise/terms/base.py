@@ -2,28 +2,118 @@
 
 from __future__ import annotations
 
+import inspect
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, ClassVar, Self
+from dataclasses import dataclass, fields, replace
+from enum import Enum
+from typing import TYPE_CHECKING, ClassVar, Protocol, Self
 
 import numpy as np
+from numpy.typing import NDArray
 
 from imubench_pipeline.noise.growth import SensorStart, Uncalibrated
 from imubench_pipeline.noise.state_space import ContinuousSpace, StateSpace, factor_covariance
-from imubench_pipeline.noise.terms.traits import (
-    Drive,
-    Process,
-    Reading,
-    Role,
-    SampleBlocks,
-    TermParameter,
-)
 from imubench_pipeline.typing import Array
 
 if TYPE_CHECKING:
     from imubench_pipeline.noise.terms.gauss_markov import GaussMarkov
+
+
+class Role(Enum):
+    """Representation of a term in filters and simulators, most of which have few terms."""
+
+    WHITE = "white noise"
+    RANDOM_WALK = "a random walk"
+    GAUSS_MARKOV = "a first-order Gauss-Markov process (`Term.gauss_markov`)"
+    SLOW = "expressed by none: a walk or a process of its Allan variance stands for it"
+    NOT_GROWING = "left out: its error does not grow"
+    NO_NOISE = "left out: it is no noise"
+
+
+@dataclass(frozen=True)
+class SearchRange:
+    """Range of a time constant in a fit."""
+
+    samples: float  # shortest, sampling intervals
+    of_log: float  # longest, as a part of the log
+
+
+@dataclass(frozen=True)
+class TermParameter:
+    """A parameter of a term: a field of its dataclass."""
+
+    symbol: str  # name of the field
+    label: str  # in words
+    signal: float
+    seconds: float
+    """Its dimension: powers of the unit of the signal, rad/s or m/s^2, and of seconds."""
+    signed: bool = False  # whether it may be negative
+    search: SearchRange | None = None  # of a time constant
+
+    def check(self, value: float) -> None:
+        """Raise ValueError if the value is not finite or out of range."""
+        time = (self.signal, self.seconds) == (0.0, 1.0)
+        if math.isfinite(value) and (self.signed or value > 0.0 or (value == 0.0 and not time)):
+            return
+        expected = "a finite number" if self.signed else "a number from 0"
+        if time:
+            expected = "a time above 0 s"
+        raise ValueError(f"the {self.label} {self.symbol} is {value}, expected {expected}")
+
+
+@dataclass(frozen=True)
+class Process:
+    """White noise through a first-order lag."""
+
+    T_B: float  # correlation time, s; infinite: a random walk
+    density: float  # of the driving white noise, SI^2/s
+
+
+@dataclass(frozen=True)
+class Drive:
+    """Input of a term to a filter after it."""
+
+    white: float = 0.0  # density N^2, SI^2/Hz
+    flicker: float = 0.0  # B of flicker noise, SI
+    process: Process | None = None
+
+
+@dataclass(frozen=True)
+class Reading:
+    """The point of a curve that shows a parameter."""
+
+    tau: float
+    level: float
+    """Position, s, and Allan deviation, SI."""
+    symbol: str
+    factor: float = 1.0  # level over the parameter
+    peak: bool = False  # the term is nowhere higher
+
+
+class SampleBlocks(Protocol):
+    """Blocks of samples of a log; b is their number."""
+
+    @property
+    def rate(self) -> float:
+        """Sampling rate, Hz."""
+
+    @property
+    def start(self) -> NDArray[np.int64]:
+        """First sample of each block, shape (b,)."""
+
+    @property
+    def stop(self) -> NDArray[np.int64]:
+        """One-past-last sample of each block, shape (b,)."""
+
+    @property
+    def count(self) -> NDArray[np.int64]:
+        """Number of samples present in each block, shape (b,)."""
+
+    @property
+    def middle(self) -> Array:
+        """Mean time of each block, s from the first sample of the first block."""
 
 
 @dataclass(frozen=True)
@@ -31,7 +121,7 @@ class Term(ABC):
     """One noise process of a model; frequencies in Hz, tau and interval in s, results SI.
 
     A term is a frozen dataclass of its parameters. What is abstract here, and the class variables
-    without a value, are its own; `noise.terms.registry` refuses a term that lacks one.
+    without a value, are its own; `register_terms` refuses a term that lacks one.
     """
 
     symbol: ClassVar[str]
@@ -242,3 +332,46 @@ def drives_of(terms: Iterable[Term]) -> Drives:
         tuple(process for process in processes if math.isfinite(process.T_B)),
         tuple(process for process in processes if math.isinf(process.T_B)),
     )
+
+
+_REQUIRED_VARIABLES = ("symbol", "label", "standard_name", "word", "role", "parameters", "states")
+"""Class variables that every kind must define."""
+
+
+def register_terms(*kinds: type[Term]) -> tuple[type[Term], ...]:
+    """Return the kinds of terms, after checking that each is complete.
+
+    Raises TypeError if a kind lacks a method, a class variable or a search range of a time
+    constant, its parameters are not its fields, or two kinds share a symbol or a word, or a symbol
+    of different parameters.
+    """
+    for kind in kinds:
+        name = kind.__name__
+        if inspect.isabstract(kind):
+            missing = ", ".join(sorted(kind.__abstractmethods__))
+            raise TypeError(f"the noise term {name} lacks {missing}")
+        lacking = [variable for variable in _REQUIRED_VARIABLES if not hasattr(kind, variable)]
+        if lacking:
+            raise TypeError(f"the noise term {name} lacks the class variable {', '.join(lacking)}")
+        symbols = [parameter.symbol for parameter in kind.parameters]
+        own = [field.name for field in fields(kind)]
+        if symbols != own:
+            raise TypeError(f"the noise term {name} states the parameters {symbols}, and has {own}")
+        for parameter in kind.parameters:
+            if (parameter.signal, parameter.seconds) == (0.0, 1.0) and parameter.search is None:
+                raise TypeError(
+                    f"{parameter.symbol} of {name} is a time, without the range of a search"
+                )
+        if (kind.role is Role.GAUSS_MARKOV) != (kind.gauss_markov is not Term.gauss_markov):
+            raise TypeError(f"the role of {name} and its process (`gauss_markov`) are not the same")
+    for name in ("symbol", "word"):
+        stated = [getattr(kind, name) for kind in kinds]
+        for value in stated:
+            if stated.count(value) > 1:
+                raise TypeError(f"{name} {value!r} is that of two noise terms")
+    parameters: dict[str, TermParameter] = {}
+    for kind in kinds:
+        for parameter in kind.parameters:
+            if parameters.setdefault(parameter.symbol, parameter) != parameter:
+                raise TypeError(f"{parameter.symbol} is another parameter in {kind.__name__}")
+    return kinds

@@ -28,15 +28,14 @@ from scipy.optimize import nnls
 
 from imubench_pipeline.noise.growth import Calibrated, SensorStart
 from imubench_pipeline.noise.state_space import StateSpace
-from imubench_pipeline.noise.terms.base import Term
+from imubench_pipeline.noise.terms.base import Drive, Reading, Role, SampleBlocks, Term
 from imubench_pipeline.noise.terms.gauss_markov import (
     BIAS_INSTABILITY,
     FLOOR,
     PEAK_TAU,
     GaussMarkov,
 )
-from imubench_pipeline.noise.terms.traits import Drive, Reading, Role, SampleBlocks
-from imubench_pipeline.noise.terms.white_noise import WhiteNoise
+from imubench_pipeline.noise.terms.power_laws import WhiteNoise
 from imubench_pipeline.typing import Array
 
 _MIN_LAG_FOR_SERIES = 100  # blocks; at longer lags the closed form of the covariance cancels

@@ -12,17 +12,17 @@ from numpy.typing import ArrayLike
 from imubench_pipeline.noise.exponentials import evaluate_decay, integrate_squared_response
 from imubench_pipeline.noise.growth import SensorStart, Uncalibrated, of_constant
 from imubench_pipeline.noise.state_space import ContinuousSpace, StateSpace, draw_block_sums
-from imubench_pipeline.noise.terms.base import Term
-from imubench_pipeline.noise.terms.random_walk import RandomWalk
-from imubench_pipeline.noise.terms.traits import (
+from imubench_pipeline.noise.terms.base import (
     Drive,
     Process,
     Reading,
     Role,
     SampleBlocks,
     SearchRange,
+    Term,
     TermParameter,
 )
+from imubench_pipeline.noise.terms.power_laws import RandomWalk
 from imubench_pipeline.typing import Array
 
 PEAK = 0.4365  # peak of the Allan deviation of a Gauss-Markov process over sqrt(S_B T_B)

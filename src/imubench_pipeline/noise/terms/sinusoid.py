@@ -11,8 +11,7 @@ import numpy as np
 from imubench_pipeline.noise.exponentials import evaluate_phi
 from imubench_pipeline.noise.growth import SensorStart, Uncalibrated, of_constant
 from imubench_pipeline.noise.state_space import ContinuousSpace, StateSpace
-from imubench_pipeline.noise.terms.base import Deterministic
-from imubench_pipeline.noise.terms.traits import Role, SampleBlocks, TermParameter
+from imubench_pipeline.noise.terms.base import Deterministic, Role, SampleBlocks, TermParameter
 from imubench_pipeline.typing import Array
 
 

@@ -27,7 +27,6 @@ SINGLE, DOUBLE = 88.0, 180.0
 """Widths of one and of two columns of a journal, mm."""
 
 MEASURED = "black"
-GREY = "0.6"
 FONT_SIZE = 7.0
 """pt; no text of a figure is smaller."""
 

@@ -2,8 +2,15 @@
 
 from __future__ import annotations
 
-from imubench_pipeline.words.findings.base import NONE, SLOW, WHITE, FindingData, channel_name
-from imubench_pipeline.words.findings.shown import estimate_text, unit_of
+from imubench_pipeline.words.findings.base import (
+    NONE,
+    SLOW,
+    WHITE,
+    FindingData,
+    channel_name,
+    estimate_text,
+    unit_of,
+)
 from imubench_pipeline.words.numbers import Unit, number_text, percent_text
 
 _SECONDS = Unit("s", 1.0)

@@ -13,8 +13,9 @@ from imubench_pipeline.words.findings.base import (
     POWERS_OF_UNIT,
     FindingData,
     channel_name,
+    unit_of,
+    value_text,
 )
-from imubench_pipeline.words.findings.shown import unit_of, value_text
 from imubench_pipeline.words.numbers import join_names, number_text
 
 _OF_UNIT = frozenset(POWERS_OF_UNIT)

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from imubench_pipeline.words.findings.base import NONE, SLOW, FindingData, channel_name
-from imubench_pipeline.words.findings.shown import value_text
+from imubench_pipeline.words.findings.base import NONE, SLOW, FindingData, channel_name, value_text
 from imubench_pipeline.words.numbers import counted, number_text, percent_text
 
 

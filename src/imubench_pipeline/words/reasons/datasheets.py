@@ -6,19 +6,6 @@ from collections.abc import Mapping, Sequence
 
 from imubench_pipeline.words.numbers import number_text
 
-DELTA_MEANINGS: Mapping[str, str] = {
-    "better than typ": "below a typical figure and the tolerance, or below a printed range",
-    "as printed": "at a typical figure, within the tolerance; within a maximum or a range",
-    "worse than typ": "above a typical figure and the tolerance",
-    "worse than max": "above a maximum, or above a range",
-    "not sure": "the 95 % interval includes more than one of these verdicts",
-    "not published": "the vendor publishes no figure",
-    "not looked up": "nobody looked up whether a figure is printed",
-    "not measured": "the log does not determine the value",
-    "not comparable (condition)": "the figure is for a condition that this log does not have",
-}
-"""Meaning of each verdict on a printed figure."""
-
 ONE_LOG_OBSTACLES: Mapping[str, str] = {
     "bias_repeatability": "a spread between runs: see the table repeatability",
     "drift": "the data sheet does not define this drift",

@@ -1,0 +1,352 @@
+"""Terms whose density is a power of frequency: quantization, white noise, random walk and ramp."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from imubench_pipeline.noise.growth import (
+    Calibrated,
+    SensorStart,
+    Uncalibrated,
+    of_constant,
+    of_walk,
+    of_white,
+    of_white_mean,
+)
+from imubench_pipeline.noise.state_space import ContinuousSpace, StateSpace, draw_block_sums
+from imubench_pipeline.noise.terms.base import (
+    Deterministic,
+    Drive,
+    Process,
+    Reading,
+    Role,
+    SampleBlocks,
+    Term,
+    TermParameter,
+)
+from imubench_pipeline.typing import Array
+
+
+@dataclass(frozen=True)
+class Quantization(Term):
+    """Angle or velocity quantization Q of a sensor that rounds its increments (IEEE Std 952)."""
+
+    Q: float
+    symbol = "Q"
+    label = "quantization"
+    standard_name = "{integral} quantization"
+    word = "Q"
+    role = Role.NOT_GROWING
+    parameters = (TermParameter("Q", "quantization", 1.0, 1.0),)
+    states = ("z_Q", "z_Q before")
+
+    def psd(self, frequency: Array, interval: float | None = None) -> Array:
+        """(4 Q^2 / T) sin^2(pi f T): it depends on the sampling; ValueError without an interval."""
+        if interval is None:
+            raise ValueError("the density of quantization noise depends on the rate; give it")
+        return self.Q**2 * 4.0 * np.sin(np.pi * frequency * interval) ** 2 / interval
+
+    def allan_variance(self, tau: Array) -> Array:
+        """3 Q^2 / tau^2."""
+        return 3.0 * self.Q**2 / tau**2
+
+    def sampled_allan_variance(self, n: Array, interval: float) -> Array:
+        """3 Q^2 / tau^2: only the rounding errors at the ends of a cluster remain."""
+        return 3.0 * self.Q**2 / (n * interval) ** 2
+
+    def sampled_spectrum(self, omega: Array, interval: float) -> Array:
+        """(Q^2 / T^2) (2 - 2 cos(omega))."""
+        return self.Q**2 / interval**2 * 4.0 * np.sin(omega / 2.0) ** 2
+
+    def sum_covariance(self, lags: Array, n: int, interval: float) -> Array:
+        """Q^2 / T^2 at lag 0: the sum is the last rounding error."""
+        return self.Q**2 / interval**2 * (lags == 0.0)
+
+    def state_space(self, interval: float) -> StateSpace:
+        """States: the current rounding error and the previous one."""
+        return StateSpace(
+            np.array([[0.0, 0.0], [1.0, 0.0]]),
+            np.diag([self.Q**2, 0.0]),
+            np.array([1.0, -1.0]) / interval,
+            0.0,
+            np.zeros(2),
+            np.eye(2) * self.Q**2,
+        )
+
+    @property
+    def drive(self) -> Drive | None:
+        """None: a converter that counts increments follows every filter."""
+        return None
+
+    def growth(self, order: int, time: float, start: SensorStart) -> float:
+        """Q^2 ([m = 0] + (t^m/m! + c/W)^2 + (c/W)^2), without c/W where not calibrated.
+
+        The roundings between the ends are left out: for m > 0 they add a part of about one over
+        the number of samples.
+        """
+        # The rounding at the start ends the window and begins the motion.
+        first = time**order / math.factorial(order)
+        last = 1.0 if order == 0 else 0.0
+        mean = of_constant(order, time) / start.window if isinstance(start, Calibrated) else 0.0
+        return self.Q**2 * (last + (first + mean) ** 2 + mean**2)
+
+    def growth_from_known(self, time: Array) -> tuple[Array, Array]:
+        """0: it does not grow."""
+        return np.zeros_like(time), np.zeros_like(time)
+
+    def block_covariance(self, lags: Array, block: float) -> Array:
+        """2 Q^2 / d^2 at k = 0 and -Q^2 / d^2 at 1."""
+        return self.Q**2 / block**2 * (2.0 * (lags == 0.0) - (lags == 1.0))
+
+    def mean_covariance(self, blocks: SampleBlocks) -> Array:
+        """2 Q^2 / (n T)^2 on the diagonal, -Q^2 / (n m T^2) for blocks without a gap between.
+
+        A block's mean is (q_stop - q_start) / (n T), n its samples.
+        """
+        n = (blocks.stop - blocks.start).astype(np.float64)
+        touching = np.zeros((len(n), len(n)))
+        i = np.flatnonzero(blocks.start[1:] == blocks.stop[:-1])
+        touching[i, i + 1] = touching[i + 1, i] = -1.0 / (n[i] * n[i + 1])
+        return (self.Q / (1.0 / blocks.rate)) ** 2 * (touching + np.diag(2.0 / n**2))
+
+    def block_sums(self, blocks: int, width: int, rate: float, rng: np.random.Generator) -> Array:
+        """Drawn from the rounding errors at the ends of the blocks."""
+        return np.diff(rng.standard_normal(blocks + 1)) * self.Q * rate
+
+
+@dataclass(frozen=True)
+class WhiteNoise(Term):
+    """White noise of density N: angle or velocity random walk (IEEE Std 952)."""
+
+    N: float
+    symbol = "N"
+    label = "white noise"
+    standard_name = "{integral} random walk"
+    word = "N"
+    role = Role.WHITE
+    parameters = (TermParameter("N", "noise density", 1.0, 0.5),)
+    states = ()
+
+    def psd(self, frequency: Array, interval: float | None = None) -> Array:
+        """N^2."""
+        return np.full_like(frequency, self.N**2)
+
+    def allan_variance(self, tau: Array) -> Array:
+        """N^2 / tau."""
+        return self.N**2 / tau
+
+    def sampled_allan_variance(self, n: Array, interval: float) -> Array:
+        """N^2 / tau: sampled white noise of variance N^2 / T is white."""
+        return self.N**2 / (n * interval)
+
+    def sampled_spectrum(self, omega: Array, interval: float) -> Array:
+        """N^2 / T."""
+        return np.full_like(omega, self.N**2 / interval)
+
+    def sum_covariance(self, lags: Array, n: int, interval: float) -> Array:
+        """-N^2 / (2 T) |k|: the sum is a random walk."""
+        return -0.5 * self.N**2 / interval * np.abs(lags)
+
+    def state_space(self, interval: float) -> StateSpace:
+        """No state: R_d = N^2 / T."""
+        return StateSpace.without_states(self.N**2 / interval)
+
+    def continuous_space(self) -> ContinuousSpace:
+        """No state: the density of the measurement is as in `drive`."""
+        return ContinuousSpace.without_states()
+
+    @property
+    def drive(self) -> Drive:
+        """N^2."""
+        return Drive(white=self.N**2)
+
+    def as_unit(self) -> tuple[float, Term]:
+        """N^2 and N = 1."""
+        return self.N**2, WhiteNoise(1.0)
+
+    def growth(self, order: int, time: float, start: SensorStart) -> float:
+        """N^2 (t^(2m+1) / ((2m+1) m!^2) + c^2 / W), the last where calibrated (Groves, 2013)."""
+        return self.N**2 * (of_white(order, time) + of_white_mean(order, time, start))
+
+    def sources(self, order: int, time: float, start: SensorStart) -> Iterator[tuple[str, float]]:
+        """Yield motion and static window apart: white noise in one does not know the other."""
+        moving = Uncalibrated(bias=0.0, on_time=0.0)
+        yield self.source, math.sqrt(self.growth(order, time, moving))
+        if isinstance(start, Calibrated):
+            mean = self.N * math.sqrt(of_white_mean(order, time, start))
+            yield f"{self.source} in the static window", mean
+
+    def growth_from_known(self, time: Array) -> tuple[Array, Array]:
+        """N^2 t and N^2 t^3 / 3."""
+        return self.N**2 * time, self.N**2 * time**3 / 3.0
+
+    def block_covariance(self, lags: Array, block: float) -> Array:
+        """N^2 / d at k = 0."""
+        return self.N**2 / block * (lags == 0.0)
+
+    def mean_covariance(self, blocks: SampleBlocks) -> Array:
+        """N^2 / (T count) on the diagonal, count the samples present."""
+        return np.diag(self.N**2 / (1.0 / blocks.rate * blocks.count))
+
+    def block_sums(self, blocks: int, width: int, rate: float, rng: np.random.Generator) -> Array:
+        """Draw sums of variance n N^2 / T."""
+        return rng.standard_normal(blocks) * math.sqrt(width * self.N**2 * rate)
+
+    def reading(self, lowest_tau: float) -> Reading:
+        """N at 1 s."""
+        return Reading(1.0, self.N, "N")
+
+
+@dataclass(frozen=True)
+class RandomWalk(Term):
+    """Rate or acceleration random walk K (IEEE Std 952)."""
+
+    K: float
+    symbol = "K"
+    label = "random walk"
+    standard_name = "{signal} random walk"
+    word = "K"
+    role = Role.RANDOM_WALK
+    parameters = (TermParameter("K", "random walk", 1.0, -0.5),)
+    states = ("z_K",)
+
+    def psd(self, frequency: Array, interval: float | None = None) -> Array:
+        """K^2 / (2 pi f)^2."""
+        return self.K**2 / (2.0 * np.pi * frequency) ** 2
+
+    def allan_variance(self, tau: Array) -> Array:
+        """K^2 tau / 3."""
+        return self.K**2 * tau / 3.0
+
+    def sampled_allan_variance(self, n: Array, interval: float) -> Array:
+        """K^2 tau / 3 (1 + 1 / (2 n^2))."""
+        return self.K**2 * n * interval / 3.0 * (1.0 + 0.5 / n**2)
+
+    def sampled_spectrum(self, omega: Array, interval: float) -> Array:
+        """K^2 T / (2 - 2 cos(omega))."""
+        return self.K**2 * interval / (4.0 * np.sin(omega / 2.0) ** 2)
+
+    def sum_covariance(self, lags: Array, n: int, interval: float) -> Array:
+        """K^2 T (|k|^3 - |k|) / 12."""
+        k = np.abs(lags)
+        return self.K**2 * interval / 12.0 * (k**3 - k)
+
+    def state_space(self, interval: float) -> StateSpace:
+        """Phi = 1, Q_d = K^2 T; it starts at 0."""
+        return StateSpace.scalar(1.0, self.K**2 * interval, 0.0)
+
+    def continuous_space(self) -> ContinuousSpace:
+        """F = 0, Q = K^2."""
+        return ContinuousSpace(np.zeros((1, 1)), np.array([[self.K**2]]), np.ones(1))
+
+    @property
+    def drive(self) -> Drive:
+        """K^2, never forgotten."""
+        return Drive(process=Process(math.inf, self.K**2))
+
+    def as_unit(self) -> tuple[float, Term]:
+        """K^2 and K = 1."""
+        return self.K**2, RandomWalk(1.0)
+
+    def growth(self, order: int, time: float, start: SensorStart) -> float:
+        """K^2 (t^(2m+3) / ((2m+3) (m+1)!^2) + c^2 W/3), A in the place of W/3 uncalibrated."""
+        lag = start.window / 3.0 if isinstance(start, Calibrated) else start.on_time
+        return self.K**2 * (of_walk(order, time) + of_constant(order, time) ** 2 * lag)
+
+    def growth_from_known(self, time: Array) -> tuple[Array, Array]:
+        """K^2 t^3 / 3 and K^2 t^5 / 20."""
+        return self.K**2 * time**3 / 3.0, self.K**2 * time**5 / 20.0
+
+    def block_covariance(self, lags: Array, block: float) -> Array:
+        """-K^2 d k / 2, and -K^2 d / 6 at k = 0."""
+        return -(self.K**2) * block * np.where(lags == 0.0, 1.0 / 6.0, 0.5 * lags)
+
+    def mean_covariance(self, blocks: SampleBlocks) -> Array:
+        """K^2 times the mean time of the earlier block.
+
+        On the diagonal K^2 T (start + (n - 1) (2 n - 1) / (6 n)).
+        """
+        n = (blocks.stop - blocks.start).astype(np.float64)
+        first = (blocks.start - blocks.start[0]).astype(np.float64)
+        means = first + (n - 1.0) / 2.0
+        covariance = np.minimum.outer(means, means)
+        np.fill_diagonal(covariance, first + (n - 1.0) * (2.0 * n - 1.0) / (6.0 * n))
+        covariance *= self.K**2 * (1.0 / blocks.rate)
+        return np.asarray(covariance)
+
+    def block_sums(self, blocks: int, width: int, rate: float, rng: np.random.Generator) -> Array:
+        """Draw them with the states at their ends."""
+        interval = 1.0 / rate
+        space = self.state_space(interval)
+        return draw_block_sums(space, self.start(rng, interval), blocks, width, rng)
+
+    def reading(self, lowest_tau: float) -> Reading:
+        """K at 3 s."""
+        return Reading(3.0, self.K, "K")
+
+
+@dataclass(frozen=True)
+class Ramp(Deterministic):
+    """Rate or acceleration ramp R, a linear drift (IEEE Std 952); deterministic."""
+
+    R: float
+    symbol = "R"
+    label = "ramp"
+    standard_name = "{signal} ramp"
+    word = "R"
+    role = Role.SLOW
+    parameters = (TermParameter("R", "ramp", 1.0, -1.0, signed=True),)
+    states = ("z_R", "z_R slope")
+
+    def psd(self, frequency: Array, interval: float | None = None) -> Array:
+        """R^2 / (2 pi f)^3, as IEEE Std 952 assigns it; a ramp has no density proper."""
+        return self.R**2 / (2.0 * np.pi * np.abs(frequency)) ** 3
+
+    def allan_variance(self, tau: Array) -> Array:
+        """R^2 tau^2 / 2."""
+        return self.R**2 * tau**2 / 2.0
+
+    def sampled_allan_variance(self, n: Array, interval: float) -> Array:
+        """R^2 tau^2 / 2."""
+        return self.R**2 * (n * interval) ** 2 / 2.0
+
+    def state_space(self, interval: float) -> StateSpace:
+        """Give the states: the drift, and its rate R."""
+        return StateSpace(
+            np.array([[1.0, interval], [0.0, 1.0]]),
+            np.zeros((2, 2)),
+            np.array([1.0, 0.0]),
+            0.0,
+            np.array([0.0, self.R]),
+            np.zeros((2, 2)),
+        )
+
+    def continuous_space(self) -> ContinuousSpace:
+        """Give the states: the drift, and its rate."""
+        return ContinuousSpace(
+            np.array([[0.0, 1.0], [0.0, 0.0]]), np.zeros((2, 2)), np.array([1.0, 0.0])
+        )
+
+    def growth(self, order: int, time: float, start: SensorStart) -> float:
+        """R^2 (t^(m+2) / (m+2)! + c W/2)^2, A in the place of W/2 where not calibrated."""
+        lag = start.window / 2.0 if isinstance(start, Calibrated) else start.on_time
+        rise = of_constant(order + 1, time) + of_constant(order, time) * lag
+        return (self.R * rise) ** 2
+
+    def mean_covariance(self, blocks: SampleBlocks) -> Array:
+        """R^2 times the product of the mean times: a slope of variance R^2, of either sign."""
+        return np.asarray(self.R**2 * np.outer(blocks.middle, blocks.middle))
+
+    def block_sums(self, blocks: int, width: int, rate: float, rng: np.random.Generator) -> Array:
+        """Return the drift in the middle of each block, n times."""
+        firsts = np.arange(blocks) * width
+        return np.asarray(self.R * (1.0 / rate) * (firsts + (width - 1) / 2.0) * width)
+
+    def swing(self, weights: Array, block: float) -> tuple[float, float]:
+        """Return the square of what it rises, at the frequency 0."""
+        middle = np.arange(len(weights)) + 0.5
+        return float(self.R * block * (weights @ middle)) ** 2, 0.0
