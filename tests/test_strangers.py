@@ -19,7 +19,7 @@ from imubench_pipeline.readers import log_files
 from imubench_pipeline.readers.arrays import file as arrays
 from imubench_pipeline.readers.arrays import hdf5
 from imubench_pipeline.recordings.drop_zone import account_for, find_logs
-from imubench_pipeline.report.drop_zone import describe_drop_zone
+from imubench_pipeline.report.run_summary import describe_drop_zone
 from imubench_pipeline.run.checking import check
 from imubench_pipeline.run.plan import Plan
 from imubench_pipeline.settings.sensor import RecordingNotes, Sensor

@@ -25,18 +25,19 @@ from imubench_pipeline.report.static_figures.comparison import (
     make_marks,
 )
 from imubench_pipeline.report.static_figures.curves import (
+    CHARACTERISTIC,
     draw_allan_figure,
     draw_datasheet_figure,
     draw_methods_figure,
+    draw_spectrum_figure,
     draw_terms_figure,
+    draw_theory_figure,
 )
 from imubench_pipeline.report.static_figures.files import (
     list_channel_figures,
     list_cross_figures,
     save,
 )
-from imubench_pipeline.report.static_figures.spectrum import draw_spectrum_figure
-from imubench_pipeline.report.static_figures.theory import CHARACTERISTIC, draw_theory_figure
 from imubench_pipeline.report.view import ChannelView, gather_recordings
 from imubench_pipeline.tables import write
 from imubench_pipeline.tables.keys import Key

@@ -12,8 +12,8 @@ from snakemake.utils import update_config
 
 from imubench_pipeline.recordings.kept import describe_outcome
 from imubench_pipeline.registry import files_of, references
-from imubench_pipeline.report.drop_zone import describe_drop_zone
 from imubench_pipeline.report.folder import count_attempt
+from imubench_pipeline.report.run_summary import describe_drop_zone
 from imubench_pipeline.run.lock import Lock, TakenError, locate_lock
 from imubench_pipeline.run.recovery import STILL_WRITTEN, remove_temporary
 from imubench_pipeline.run.plan import Plan

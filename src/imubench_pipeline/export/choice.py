@@ -44,31 +44,16 @@ def choose(
     devices: Mapping[str, str] | None = None,
     method: str | None = None,
 ) -> Choice:
-    """Choose the axis whose noise represents a quantity of a sensor.
+    """Choose the axis whose noise represents ``gyro`` or ``accel`` of a sensor.
 
-    Axes are ordered by the Allan deviation of their model at the horizon h. Times sqrt(2) h, it is
-    the standard deviation of the angle or velocity after h without a measurement, with a bias that
-    was averaged over the preceding h. All parameters come from one axis.
+    Axes are ordered by the Allan deviation of their model at the horizon h, s. Times sqrt(2) h, it
+    is the standard deviation of the angle or velocity after h without a measurement, with a bias
+    that was averaged over the preceding h. All parameters come from one axis.
 
-    Parameters
-    ----------
-    rows : iterable of ParameterRow
-        Of one sensor.
-    quantity : {"gyro", "accel"}
-    axis : str
-        ``worst``, ``median`` (the upper median of an even number), or the name of a device or
-        recording, whose worst axis is chosen.
-    horizon : float
-        s.
-    devices : mapping of str to str, optional
-        The device of each recording.
-    method : str, optional
-        Estimation method; the recommended one by default.
-
-    Raises
-    ------
-    ExportError
-        If there is no estimate of the quantity, or of the device.
+    ``axis`` is ``worst``, ``median`` (the upper median of an even number), or the name of a device
+    or recording, whose worst axis is chosen. ``devices`` has the device of each recording.
+    ``method`` is an estimation method; the recommended one by default. Raises ExportError if there
+    is no estimate of the quantity, or of the device.
     """
     everywhere: dict[_Estimated, list[ParameterRow]] = defaultdict(list)
     for row in rows:

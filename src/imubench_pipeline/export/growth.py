@@ -45,18 +45,12 @@ class Growth:
 
 
 def growth(model: NoiseModel, time: ArrayLike, rate: float) -> Growth:
-    """Return the variances of the integrals of the noise of a model.
+    """Return the variances of the integrals of the noise of a model at times, shape (m,), s.
 
-    They contain white noise, Gauss-Markov processes, random walk and flicker noise. Deterministic
-    terms (ramp, lines) and quantization noise, which does not grow, do not contribute.
-
-    Parameters
-    ----------
-    model : NoiseModel
-    time : array_like, shape (m,)
-        Since the states were known, s.
-    rate : float
-        Hz; the processes that approximate flicker noise begin at half its period.
+    The states were known at time 0. White noise, Gauss-Markov processes, random walk and flicker
+    noise contribute; the processes that approximate flicker noise begin at half the period of the
+    rate, Hz. Deterministic terms (ramp, lines) and quantization noise, which does not grow, do not
+    contribute.
     """
     t = np.atleast_1d(np.asarray(time, dtype=np.float64))
     first, second = np.zeros_like(t), np.zeros_like(t)

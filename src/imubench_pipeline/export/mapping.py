@@ -65,15 +65,8 @@ def as_walk(
 ) -> Mapped:
     """Return white noise and a random walk in place of a model.
 
-    Parameters
-    ----------
-    model : NoiseModel
-    horizon : float
-        s.
-    rate : float
-        Hz; the error is evaluated at tau from its period.
-    least_walk : float, optional
-        K of the replacement if the model has no slow term.
+    The horizon is in s. The error is evaluated at tau from the period of the rate, Hz.
+    ``least_walk`` is K of the replacement if the model has no slow term.
     """
     slow = _select_slow_terms(model)
     if not slow:

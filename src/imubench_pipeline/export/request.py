@@ -95,21 +95,11 @@ def recordings_of(path: Path) -> Path:
 
 
 def make_content(tables: Tables, request: Request, recordings: Path | None = None) -> str | bytes:
-    """Return the content of the file.
+    """Return the content of the file, from the tables `NEEDED` of a run.
 
-    Parameters
-    ----------
-    tables : mapping of str to pyarrow.Table
-        The tables `NEEDED` of a run.
-    request : Request
-    recordings : Path, optional
-        Folder of the recordings of the run. Their tables ``draws`` contain the posterior of the
-        fits, for an overbound.
-
-    Raises
-    ------
-    ExportError
-        If the sensor or target is not known, or the target does not support the estimates.
+    ``recordings`` is the folder of the recordings of the run. Their tables ``draws`` contain the
+    posterior of the fits, for an overbound. Raises ExportError if the sensor or target is not
+    known, or the target does not support the estimates.
     """
     if request.target not in TARGETS:
         raise ExportError(

@@ -45,21 +45,10 @@ def sigma_range(
 ) -> SigmaRange:
     """Return the range of a standard deviation over noise models.
 
-    Parameters
-    ----------
-    sigma : callable
-        Such as ``lambda model: RateFilter(blocks, model).rate_sigma[-1]``.
-    model : NoiseModel
-        Estimated model.
-    drawn : sequence of NoiseModel
-        From `error_budget.draw_models`, `drawn_from_covariance`, or a posterior.
-    level : float
-        Share of the drawn models between the limits.
-
-    Raises
-    ------
-    ValueError
-        If there is no draw, or the level is not between 0 and 1.
+    ``sigma`` is a function of a model, such as ``lambda model: RateFilter(blocks,
+    model).rate_sigma[-1]``; ``model`` is the estimated one. ``drawn`` are from
+    `error_budget.draw_models`, `drawn_from_covariance`, or a posterior; ``level`` is their share
+    between the limits. Raises ValueError if there is no draw, or the level is not between 0 and 1.
     """
     if not drawn:
         raise ValueError("expected noise models, and there is none")

@@ -12,8 +12,8 @@ from imubench_pipeline.report.glossary import read_glossary
 from imubench_pipeline.report.plotting import read_plotting_version
 from imubench_pipeline.report.sensor import make_device_page, make_sensor_page
 from imubench_pipeline.report.site import RECORDING_PAGES, Entry, Page, Site, make_command
+from imubench_pipeline.report.static_figures.curves import draw_theory_figure
 from imubench_pipeline.report.static_figures.files import encode_figure
-from imubench_pipeline.report.static_figures.theory import draw_theory_figure
 
 
 def _describe_theory(site: Site) -> Mapping[str, object]:

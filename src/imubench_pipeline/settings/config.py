@@ -313,19 +313,14 @@ def _as_given(value: object) -> str:
         return "false"  # files that are left out: no other entry outside of a group may be null
     if not isinstance(value, str):
         return json.dumps(value, ensure_ascii=False)
-    if _means_itself(value):
+    # ``snakemake --config`` takes a text for itself that is no number and no other YAML.
+    number = r"[+-]?([\d._]+(e[+-]?\d+)?|inf|infinity|nan)|true|false"
+    plain = r"(?!\.\.\.)[\w/.]([\w/.~+ ,()-]*[\w/.~+,()-])?"
+    if re.fullmatch(plain, value) and not re.fullmatch(number, value, re.IGNORECASE):
         return value
+    escaped = (
+        letter if letter.isprintable() and letter not in '"\\' else f"\\U{ord(letter):08x}"
+        for letter in value
+    )
     # Quotes at both ends would be taken away before it is read as YAML.
-    return '!!str "' + "".join(map(_escaped, value)) + '" #'
-
-
-def _means_itself(text: str) -> bool:
-    """Return whether ``snakemake --config`` takes a text for itself: no number, no other YAML."""
-    if re.fullmatch(r"[+-]?([\d._]+(e[+-]?\d+)?|inf|infinity|nan)|true|false", text, re.IGNORECASE):
-        return False
-    return re.fullmatch(r"(?!\.\.\.)[\w/.]([\w/.~+ ,()-]*[\w/.~+,()-])?", text) is not None
-
-
-def _escaped(letter: str) -> str:
-    plain = letter.isprintable() and letter not in '"\\'
-    return letter if plain else f"\\U{ord(letter):08x}"
+    return '!!str "' + "".join(escaped) + '" #'

@@ -76,24 +76,11 @@ def simulate_imu(
 ) -> Iterator[dict[str, Array]]:
     """Yield the log of a sensor in blocks of `SAMPLES_PER_BLOCK` samples, with constant memory.
 
-    The channels are in SI. ``temperature``, if given, is in °C and rounded to its register.
-
-    Parameters
-    ----------
-    imu : ImuModel
-    rate : float
-        Hz.
-    samples : int
-    seed : int
-    names : tuple of str
-        Such as sensor and recording; seed and names determine all samples. An axis does not depend
-        on the other simulated axes or on the number of threads.
-    motion : mapping of str to Profile, optional
-        True rate, rad/s, and specific force, m/s², by channel; 0 where there is none.
-    temperature : Profile, optional
-        °C. Without one there is no drift.
-    threads : int
-        Number of axes that are simulated in parallel.
+    The channels are in SI, the rate is in Hz. ``temperature``, if given, is in °C and rounded to
+    its register; without one there is no drift. ``motion`` is the true rate, rad/s, and specific
+    force, m/s², by channel; 0 where there is none. ``seed`` and ``names``, such as sensor and
+    recording, determine all samples. An axis does not depend on the other simulated axes or on the
+    number of ``threads``, in which axes are simulated in parallel.
     """
     profiles = dict(motion or {})
     if temperature is not None:

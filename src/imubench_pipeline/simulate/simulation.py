@@ -158,34 +158,14 @@ def simulate_blocks(
     temperature: Signal | None = None,
     block: int = SAMPLES_PER_CHUNK,
 ) -> Iterator[Array]:
-    """Yield a simulated log of one axis in blocks; the log does not depend on their size.
+    """Yield a simulated log of one axis, rad/s or m/s², in blocks of shape (block,).
 
-    Parameters
-    ----------
-    model : SensorModel
-    rate : float
-        Hz.
-    samples : int
-        Length of the log.
-    rng : numpy.random.Generator
-        For a channel, see `imubench_pipeline.noise.simulate.channel_rng`.
-    true : callable, optional
-        Returns the true rate or specific force along the axis, rad/s or m/s², for the indices of
-        the first sample and one past the last; 0 by default.
-    temperature : callable, optional
-        °C, likewise; the reference of the drift by default.
-    block : int
-        Samples of a block.
-
-    Yields
-    ------
-    ndarray, shape (block,)
-        rad/s or m/s²; the last one may be shorter.
-
-    Raises
-    ------
-    ValueError
-        If the rate is not above 0, or a value of `true` or `temperature` is not finite.
+    The log does not depend on the size of the blocks; the last one may be shorter. The rate is in
+    Hz, the length of the log in samples. For ``rng`` see
+    `imubench_pipeline.noise.simulate.channel_rng`. ``true`` returns the true rate or specific force
+    along the axis, rad/s or m/s², for the indices of the first sample and one past the last; 0 by
+    default. ``temperature`` does so in °C; by default it is the reference of the drift. Raises
+    ValueError if the rate is not above 0, or a value of ``true`` or ``temperature`` is not finite.
     """
     if not (math.isfinite(rate) and rate > 0):
         raise ValueError(f"the rate is {rate} Hz, expected a frequency above 0")

@@ -284,16 +284,8 @@ def answer_text(
 ) -> str:
     """Return in a line which sensor to choose: the best first, of those that are judged.
 
-    Parameters
-    ----------
-    rows : sequence of RankingRow
-        The deciding rows of the judged sensors, the best first.
-    names : mapping of str to str
-        Name of each sensor.
-    asked : int
-        Number of sensors, judged or not.
-    excluded : int
-        Number of those that lack a demanded property.
+    ``rows`` are the deciding rows of the judged sensors, the best first. ``asked`` is the number of
+    sensors, judged or not; ``excluded`` the number of those that lack a demanded property.
     """
     having = "the demanded properties and usable data" if excluded else "usable data"
     if not rows:

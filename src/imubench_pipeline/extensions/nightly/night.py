@@ -35,7 +35,7 @@ from imubench_pipeline.extensions.nightly.summary import (
     compare_states,
     format_summary,
 )
-from imubench_pipeline.report.drop_zone import describe_drop_zone
+from imubench_pipeline.report.run_summary import describe_drop_zone
 from imubench_pipeline.run import recovery
 from imubench_pipeline.run.lock import Lock, TakenError, locate_lock
 from imubench_pipeline.run.project import find_snakefile

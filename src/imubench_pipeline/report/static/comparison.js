@@ -19,7 +19,6 @@ function chosenFrom(keys) {
 }
 
 const channelFor = (one, channel) => pageData.channels.find((view) => view.sensor === one.sensor && view.recording === one.recording && view.channel === channel);
-const titleOf = (one) => `${nameOf(one.sensor)}${one.row.simulated ? " (simulated)" : ""}`;
 const shortName = (one) => (chosen.filter((other) => other.sensor === one.sensor).length > 1 ? `${one.letter} ${nameOf(one.sensor)} ${one.recording}` : `${one.letter} ${nameOf(one.sensor)}`);
 
 // Colour and mark are the sensor's; of two recordings of one, the dash and a hollow mark differ.

@@ -179,13 +179,13 @@ def _list_figures(
     chosen: Mapping[str, pa.Table], sensors: Sequence[str], arguments: argparse.Namespace
 ) -> Iterator[tuple[str, Make]]:
     """Yield name and maker of each selected figure."""
+    from imubench_pipeline.report.static_figures.curves import draw_theory_figure
     from imubench_pipeline.report.static_figures.files import (
         CHANNEL_KINDS,
         CROSS_KINDS,
         list_channel_figures,
         list_cross_figures,
     )
-    from imubench_pipeline.report.static_figures.theory import draw_theory_figure
     from imubench_pipeline.report.view import gather_recordings
 
     cross = [kind for kind in arguments.kind if kind in CROSS_KINDS]

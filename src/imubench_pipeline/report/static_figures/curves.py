@@ -1,4 +1,4 @@
-"""The Allan deviation of one channel: alone, with models, terms and the lines of its datasheet."""
+"""The figures of one channel: Allan deviation with models and datasheet, spectrum, theory."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from imubench_pipeline.model.comparisons import DatasheetRow
-from imubench_pipeline.noise import NoiseModel, Term
+from imubench_pipeline.noise import FLOOR, NoiseModel, Term
 from imubench_pipeline.report.palette import get_method_style
 from imubench_pipeline.report.practical import System, choose_page_unit
 from imubench_pipeline.report.static_figures.style import (
@@ -310,3 +310,153 @@ def _label_printed(row: DatasheetRow) -> str:
     number = NO_VALUE if row.printed is None else f"{row.printed:g}"
     text = f"datasheet {_FIGURE_NAMES[row.statistic]}: {number} {unit}"
     return f"{text} ({about})" if about else text
+
+
+_SPECTRUM_METHOD = "likelihood"  # the method whose model the table ``spectrum`` has
+
+_MOST_NAMED = 3
+_LABEL_OFFSET = 0.05  # of the frequency axis: the height of a letter, and more
+_TERM_POINTS = 200  # points of a term: it is smooth
+
+
+@set_style()
+def draw_spectrum_figure(view: ChannelView, system: System = "practical") -> Figure | None:
+    """Draw the root of the two-sided spectrum with the model of the likelihood.
+
+    None where there is no spectrum.
+    """
+    if not view.spectrum:
+        return None
+    unit = choose_page_unit(view.quantity, "psd", system)
+    figure, axes, _ = make_channel_axes(view, system, "spectrum")
+    axes.set_xlabel("frequency (Hz)")
+    axes.set_ylabel(f"root of the two-sided density ({unit.sign})")
+    spectrum = view.spectrum
+    frequency = spectrum["frequency"]
+    level, fitted, lower, upper = (
+        np.sqrt(density) * unit.per_si
+        for density in (spectrum["density"], spectrum["fitted"], *view.bin_limits())
+    )
+    is_fitted = bool(np.isfinite(fitted).any())
+    if is_fitted:
+        band = "95 % of bins by the fit"
+        axes.fill_between(frequency, lower, upper, color="0.87", lw=0, label=band)
+    used = spectrum["used"] > 0
+    dot = {"ls": "none", "marker": "o", "markersize": 1.8, "markeredgewidth": 0.4, "zorder": 2.4}
+    for chosen, face, edge, label in (
+        (used, MEASURED, MEASURED, f"{name_log(view)}, bins used"),
+        (~used, "white", "0.6", "bins left out"),
+    ):
+        if chosen.any():
+            look: dict[str, Any] = dot | {"markerfacecolor": face, "markeredgecolor": edge}
+            axes.plot(frequency[chosen], level[chosen], label=label, **look)
+    if _SPECTRUM_METHOD in view.parameters:
+        grid = np.geomspace(frequency[0], frequency[-1], _TERM_POINTS)
+        interval = view.tau[0]  # the first cluster is one sample
+        for term in view.model(_SPECTRUM_METHOD).terms:
+            # As sampled, so that the terms add up to the fit.
+            density = term.sampled_spectrum(2.0 * np.pi * grid * interval, interval) * interval
+            if density.any():
+                label, look = TERM_NAMES[view.quantity][term.symbol], TERM_LOOKS[term.symbol]
+                root = np.sqrt(density) * unit.per_si
+                axes.plot(grid, root, lw=0.8, label=label, zorder=2.8, **look)
+    if is_fitted:
+        name = next((f": {row.model}" for row in view.models if row.chosen), "")
+        axes.plot(frequency, fitted, label=f"fit by likelihood{name}", zorder=3.0, **SUM_LOOK)
+    _draw_lines(axes, view)
+    set_log_axis(axes, "x", compute_limits(frequency))
+    # Single ordinates scatter to almost 0; limits for them would hide the rest.
+    low, high = np.nanquantile(level, [0.01, 1.0])
+    set_log_axis(axes, "y", compute_limits([low, high], fitted, margin=1.6))
+    draw_legend_below(figure, axes.get_legend_handles_labels()[0])
+    return fix_layout(figure)
+
+
+def _draw_lines(axes: Axes, view: ChannelView) -> None:
+    """Draw the spectral lines, the largest with their frequency."""
+    frequency = view.spectrum["frequency"]
+    apart = (frequency[-1] / frequency[0]) ** _LABEL_OFFSET
+    named: list[float] = []
+    look = TERM_LOOKS["S"]
+    strongest = sorted(view.lines, key=lambda row: -(row.ratio or 0.0))
+    for number, row in enumerate(strongest):
+        line = row.frequency
+        label = f"{TERM_NAMES[view.quantity]['S']} ({len(strongest)})" if number == 0 else None
+        axes.axvline(line, lw=0.5, label=label, zorder=1.5, **look)
+        crowded = any(1.0 / apart < line / other < apart for other in named)
+        if len(named) == _MOST_NAMED or crowded:
+            continue
+        named.append(line)
+        axes.annotate(
+            f"{line:.4g} Hz",
+            (line, 1.0),
+            xycoords=("data", "axes fraction"),
+            xytext=(-1.0, -3.0),
+            textcoords="offset points",
+            rotation=90,
+            ha="right",
+            va="top",
+            color=look["color"],
+        )
+
+
+DEGREE_PER_HOUR = math.pi / 180.0 / 3600.0
+
+CHARACTERISTIC = NoiseModel(
+    N=20.0 * DEGREE_PER_HOUR, B=10.0 * DEGREE_PER_HOUR, K=0.4 * DEGREE_PER_HOUR
+)
+"""A gyroscope whose three slopes are seen, each over a decade or more: rad/s and s."""
+
+_DRAWN_TAU = np.geomspace(1e-2, 1e5, 281)
+
+
+@set_style()
+def draw_theory_figure(system: System = "practical") -> Figure:
+    """Draw a curve with white noise, bias instability and random walk, with the reading points.
+
+    Figure 1 of Maia et al. and of Silva et al.
+    """
+    unit = choose_page_unit("gyro", "adev", system)
+    model = CHARACTERISTIC
+    figure = make_figure(SINGLE, 68.0, "Characteristic curve of the Allan deviation")
+    axes = figure.add_subplot()
+    total = np.sqrt(model.allan_variance(_DRAWN_TAU)) * unit.per_si
+    for symbol, label, term in (
+        ("N", "white noise: $N$ / √τ", NoiseModel(N=model.N)),
+        ("F", f"bias instability: {FLOOR:.3f} $B$", NoiseModel(B=model.B)),
+        ("K", "random walk: $K$ √(τ / 3)", NoiseModel(K=model.K)),
+    ):
+        deviation = np.sqrt(term.allan_variance(_DRAWN_TAU)) * unit.per_si
+        axes.plot(_DRAWN_TAU, deviation, label=label, lw=0.8, **TERM_LOOKS[symbol])
+    axes.plot(_DRAWN_TAU, total, label="Allan deviation of the sum", zorder=2.8, **SUM_LOOK)
+    set_log_axis(axes, "x", (float(_DRAWN_TAU[0]), float(_DRAWN_TAU[-1])))
+    set_log_axis(axes, "y", compute_limits(total, model.K * unit.per_si, margin=2.0))
+    axes.set_xlabel("averaging time τ (s)")
+    axes.set_ylabel(f"Allan deviation σ(τ) ({unit.sign})")
+    # The curve is flat where N / sqrt(tau) = K sqrt(tau / 3).
+    flat = math.sqrt(3.0) * model.N / model.K
+    white, walk, plateau = (x * unit.per_si for x in (model.N, model.K, FLOOR * model.B))
+    mark_point(axes, "N", (1.0, white), "$N$: at τ = 1 s", (6.0, 6.0), va="center")
+    mark_point(axes, "K", (3.0, walk), "$K$: at τ = 3 s", (7.0, -7.0), va="center")
+    # Beside the point the three lines cross; at their end there is room.
+    end = (float(_DRAWN_TAU[-1]), plateau)
+    text = f"{FLOOR:.3f} $B$"
+    mark_point(axes, "F", (flat, plateau), text, (-4.0, -6.0), beside=end, va="center")
+    draw_legend_below(figure, axes.get_legend_handles_labels()[0])
+    fix_layout(figure)
+    # The angle of a slope on paper is known when the layout is.
+    for tau, slope, text in ((0.05, -0.5, "−1/2"), (flat, 0.0, "0"), (2e4, 0.5, "+1/2")):
+        level = math.sqrt(float(model.allan_variance(tau))) * unit.per_si
+        ends = axes.transData.transform([(tau, level), (tau * 10.0, level * 10.0**slope)])
+        angle = math.atan2(*(ends[1] - ends[0])[::-1])
+        axes.annotate(
+            f"slope {text}",
+            (tau, level),
+            xytext=(-5.0 * math.sin(angle), 5.0 * math.cos(angle)),
+            textcoords="offset points",
+            rotation=math.degrees(angle),
+            rotation_mode="anchor",
+            ha="center",
+            va="bottom",
+        )
+    return figure

@@ -21,9 +21,9 @@ from imubench_pipeline.report.static_figures.curves import (
     draw_allan_figure,
     draw_datasheet_figure,
     draw_methods_figure,
+    draw_spectrum_figure,
     draw_terms_figure,
 )
-from imubench_pipeline.report.static_figures.spectrum import draw_spectrum_figure
 from imubench_pipeline.report.static_figures.style import set_style
 from imubench_pipeline.report.view import ChannelView, gather_recordings
 from imubench_pipeline.tables import make_schema, replace_file

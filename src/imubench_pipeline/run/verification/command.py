@@ -25,7 +25,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Print what is wrong; return the exit status."""
     # Arrow is loaded for this command only: the others answer at once.
-    from imubench_pipeline.report.drop_zone import describe_drop_zone
+    from imubench_pipeline.report.run_summary import describe_drop_zone
     from imubench_pipeline.run.verification.results import Results
     from imubench_pipeline.tables.seals import FOLDER
     from imubench_pipeline.tables.texts import escape_invisible

@@ -54,7 +54,6 @@ def no_walk_slope(steepest: float | None) -> str:
 
 
 def no_peak(longest: float) -> str:
-    """Return why T_B is at the longest time of its search, s."""
     return (
         f"T_B reaches the longest time of its search, {number_text(longest)} s: the curve shows no "
         "peak of a Gauss-Markov process"
@@ -62,7 +61,6 @@ def no_peak(longest: float) -> str:
 
 
 def like_white_noise(shortest: float) -> str:
-    """Return why T_B is at the shortest time of its search, s."""
     return (
         f"T_B reaches the shortest time of its search, {number_text(shortest)} s: the process "
         "looks like white noise"
@@ -97,7 +95,6 @@ def _error_text(error: float) -> str:
 
 
 def broadband_process(time: float) -> str:
-    """Return why a process with a short correlation time, s, is no bias instability."""
     return (
         f"a process with a correlation time of {number_text(time, 2)} s is broadband noise, not "
         "bias instability"
@@ -125,7 +122,6 @@ def time_at_bound(reason: str) -> str:
 
 
 def no_model_minimum(falls_to: float | None) -> str:
-    """Return why a model has no minimum: it falls up to a tau, s, or, with None, rises at once."""
     text = "the Allan deviation of the fitted noise has no minimum: it "
     if falls_to is None:
         return f"{text}rises from its shortest τ"
@@ -140,7 +136,6 @@ def white_level_of_model(decades: float) -> str:
 
 
 def white_level_of_curve(first: float, last: float, times: Sequence[float]) -> str:
-    """Return where N is read, s, and the correlation times, s, of the processes in it."""
     listed = " and ".join(f"{number_text(time, 3)} s" for time in times)
     process = (
         "a process with a correlation time"

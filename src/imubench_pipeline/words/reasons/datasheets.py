@@ -72,7 +72,6 @@ def interval_spans(least: str, largest: str) -> str:
 
 
 def curve_not_shown(tau: float) -> str:
-    """Return why a printed Allan deviation is not compared at a tau, s."""
     return f"the log does not show the curve at {number_text(tau)} s"
 
 

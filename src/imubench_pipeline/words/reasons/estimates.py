@@ -38,7 +38,6 @@ def models_alike(others: Sequence[str], chosen: str) -> str:
 
 
 def correlation_bound(bound: float, *, longest: bool) -> str:
-    """Return why T_B is at a bound, s."""
     end = "longest" if longest else "shortest"
     return f"the {end} correlation time that this log can show is {number_text(bound)} s"
 
@@ -148,17 +147,14 @@ def pause_steps(number: int) -> str:
 
 
 def step_at(time: float) -> str:
-    """Return a step at a time, s, as a deterministic signal."""
     return f"a step of the bias at {number_text(time, 5)} s"
 
 
 def warm_up(time: float) -> str:
-    """Return a warm-up with a time constant, s, as a deterministic signal."""
     return f"a warm-up with a time constant of {number_text(time, 3)} s"
 
 
 def periodic_drift(period: float) -> str:
-    """Return a periodic drift, s, as a deterministic signal."""
     return f"a periodic drift with a period of {number_text(period, 3)} s"
 
 
@@ -168,7 +164,6 @@ def curve_bias_unknown(reason: str | None) -> str:
 
 
 def band_excluded(highest: float) -> str:
-    """Return why B is not identified where frequencies above a limit, Hz, are not fitted."""
     return (
         f"above {number_text(highest)} Hz neither a process nor a low-pass explains the spectrum, "
         "so a faster process is not visible"
@@ -185,7 +180,6 @@ def temperature_preferred(delta_bic: float, *, enough: bool) -> str:
 
 
 def settling_excluded(seconds: float) -> str:
-    """Return which beginning of a log, s, is not used for the sensitivity."""
     return (
         f"the first {number_text(seconds, 3)} s follow the temperature differently, and are not "
         "used for the sensitivity"
@@ -193,7 +187,6 @@ def settling_excluded(seconds: float) -> str:
 
 
 def lag_range(lower: float, upper: float) -> str:
-    """Return which lags, s, fit the log."""
     return f"lags from {number_text(lower, 3)} to {number_text(upper, 3)} s fit the log"
 
 

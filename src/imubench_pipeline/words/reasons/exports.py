@@ -262,7 +262,6 @@ def no_temperature(recording: str) -> str:
 def temperature_range(
     reference: float, recording: str, device: str, low: float, high: float
 ) -> str:
-    """Return where the effect of the temperature is measured, degC."""
     at = number_text
     return (
         f"T_0 = {at(reference)} degC, from recording {recording} of device {device}. It is valid "
@@ -307,7 +306,6 @@ def sensitivity_uncertain(error: float, most: float) -> str:
 
 
 def small_temperature_range(span: float, least: float) -> str:
-    """Return why an axis is not corrected; ranges in K."""
     return (
         f"the temperature varies by only {number_text(span, 2)} K, and {number_text(least)} K is "
         "needed"
@@ -319,7 +317,6 @@ def lag_status(status: Status, reason: str | None) -> str:
 
 
 def long_lag(longest: float, horizon: float) -> str:
-    """Return why an axis with a lag, s, is not corrected."""
     return (
         f"it may lag the temperature by {number_text(longest, 3)} s, more than the horizon of "
         f"{number_text(horizon)} s, and the program has no lag"

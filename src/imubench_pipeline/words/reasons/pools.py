@@ -91,7 +91,6 @@ def operand_status(place: str, status: Status) -> str:
 
 
 def tau_beyond(longest: float) -> str:
-    """Return why there is no ratio at a longer tau, s."""
     return f"the logs are long enough for τ up to {number_text(longest, 3)} s only"
 
 
@@ -121,7 +120,6 @@ def _windows_text(windows: int, span: float, needed: float) -> str:
 
 
 def long_sampling_interval(rate: float) -> str:
-    """Return why a log with a rate, Hz, is not tested."""
     return f"the sampling interval exceeds the times of the errors ({number_text(rate)} Hz)"
 
 

@@ -76,7 +76,6 @@ def low_pass_assumed(*, known: bool) -> str:
 
 
 def estimated_cutoff(cutoff: float, log: str) -> str:
-    """Return a cut-off, Hz, that is estimated from a log."""
     return f"cut-off {number_text(cutoff)} Hz: estimated from {log}"
 
 
@@ -92,12 +91,10 @@ def estimated_noise(model: str, method: str, log: str) -> str:
 
 
 def bias_at_reference(bias: float, log: str) -> str:
-    """Return a bias, rad/s, at the reference temperature of a log."""
     return f"bias {number_text(bias)} rad/s at T_0: estimated from {log}"
 
 
 def bias_of_mean(bias: float, log: str) -> str:
-    """Return a bias, rad/s, that is the mean of a log."""
     return f"bias {number_text(bias)} rad/s: mean of {log}"
 
 

@@ -44,7 +44,6 @@ def band_text(source: BandSource, highest: float, low_pass: str = "") -> str:
 
 
 def cutoff_range(lower: float, upper: float) -> str:
-    """Return which cut-offs, Hz, fit the log."""
     return f"cut-offs from {number_text(lower)} to {number_text(upper)} Hz fit the log"
 
 
@@ -54,7 +53,6 @@ def unknown_filter(number: int) -> str:
 
 
 def filter_or_quantization(lower: float, upper: float) -> str:
-    """Return why a filter with a cut-off between limits, Hz, is not certain."""
     return (
         "the spectrum rises towards the Nyquist frequency. Quantization noise explains it as well "
         f"as a low-pass with a cut-off from {number_text(lower)} to {number_text(upper)} Hz"
@@ -75,7 +73,6 @@ def few_bins_left(bins: int, needed: int, highest: float, hidden: int) -> str:
 
 
 def process_or_filter(time: float, cutoff: float) -> str:
-    """Return why a process with T_B, s, may be a filter with a cut-off, Hz."""
     return (
         f"a Gauss-Markov process (T_B = {number_text(time, 3)} s) and a first-order low-pass at "
         f"{number_text(cutoff, 3)} Hz fit equally well, as no white noise is visible. "
@@ -84,7 +81,6 @@ def process_or_filter(time: float, cutoff: float) -> str:
 
 
 def fast_process_or_filter(time: float) -> str:
-    """Return why a process with a correlation time, s, may be a filter."""
     return (
         f"a process with a correlation time of {number_text(time, 3)} s, a few samples, may be the "
         "low-pass of the sensor. State the bandwidth in the sensor file"
@@ -103,7 +99,6 @@ def unfiltered_noise(share: float, low_pass: str, factor: float) -> str:
 
 
 def worst_band(first: float, last: float, sigmas: float, *, above: bool) -> str:
-    """Return where, Hz, and by how many standard errors a spectrum departs from its model."""
     side = "above" if above else "below"
     return (
         f"the spectrum is furthest from the model at {number_text(first, 3)} to "
@@ -112,7 +107,6 @@ def worst_band(first: float, last: float, sigmas: float, *, above: bool) -> str:
 
 
 def grouped_lines(lines: int, first: float, last: float) -> str:
-    """Return from which lines, Hz, one is made."""
     return (
         f"{counted(lines, 'weak line')} from {number_text(first)} to {number_text(last)} Hz, merged"
     )
