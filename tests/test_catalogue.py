@@ -9,12 +9,13 @@ import pytest
 import yaml
 
 from imubench_pipeline.datasheets.suspicion import printed_figures, suspicious, usual_figures
-from imubench_pipeline.settings.conversions import (
+from imubench_pipeline.settings.printed import (
+    FIGURE_DIMENSIONS,
+    PrintedFigure,
     compute_noise_bandwidth,
     convert_density,
     noise_of_rms,
 )
-from imubench_pipeline.settings.printed import FIGURE_DIMENSIONS, PrintedFigure
 from imubench_pipeline.settings.sensor import QUANTITIES, Sensor, read_sensors
 from imubench_pipeline.units import convert_to_si
 from tests.conftest import PROJECT

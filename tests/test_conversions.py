@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from imubench_pipeline.settings.conversions import (
+from imubench_pipeline.settings.printed import (
     Sidedness,
     compute_noise_bandwidth,
     convert_density,

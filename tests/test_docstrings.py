@@ -10,7 +10,7 @@ from tests.conftest import PROJECT
 
 SOURCE = PROJECT / "src/imubench_pipeline"
 PUBLIC = ["units",
-          "settings/conversions", "settings/requirements", "settings/simulated_sensor",
+          "settings/printed", "settings/requirements", "settings/simulated_sensor",
           "extensions/earth_rate/settings",
           "allan/confidence", "allan/variance",
           "noise/growth", "noise/low_pass", "noise/model", "noise/simulate",
@@ -26,7 +26,7 @@ PUBLIC = ["units",
           "simulate/discretisation", "simulate/from_datasheet",
           "simulate/from_estimates", "simulate/imu", "simulate/model",
           "simulate/profiles", "simulate/samples",
-          "simulate/simulation", "simulate/models", "simulate/spectra", "simulate/writing",
+          "simulate/simulation", "simulate/models", "simulate/writing",
           "navigation/drift", "navigation/error_budget/budget", "navigation/error_budget/in_use",
           "navigation/error_budget/parts",
           "navigation/error_budget/printed_errors", "navigation/expected_errors",

@@ -15,11 +15,11 @@ from imubench_pipeline.navigation.expected_errors import (
 from imubench_pipeline.report.meaning import (
     Group,
     LimitLine,
+    SourcedNumber,
     explain_budget,
     format_rankings,
     make_budget_tables,
 )
-from imubench_pipeline.report.sourced import SourcedNumber
 from imubench_pipeline.settings.requirements import Requirement
 from imubench_pipeline.tables import build
 from tests.ranking import ranking_rows

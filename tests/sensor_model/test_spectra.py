@@ -15,7 +15,7 @@ from imubench_pipeline.simulate.discretisation import (
     discretise_slow_sources,
 )
 from imubench_pipeline.simulate.model import SensorModel, bank_for, fit_density_bank, sources_of
-from imubench_pipeline.simulate.spectra import compute_allan_variance as closed_form
+from imubench_pipeline.simulate.model import compute_allan_variance as closed_form
 from tests.conftest import few
 from tests.sensor_model import theory
 

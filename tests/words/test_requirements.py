@@ -1,7 +1,7 @@
 from typing import Any
 
 from imubench_pipeline.settings.requirements import Requirement
-from imubench_pipeline.words.requirements import requirement_text
+from imubench_pipeline.words.verdicts import requirement_text
 
 
 def asked(**changes: Any) -> str:

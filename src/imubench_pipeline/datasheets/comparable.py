@@ -12,18 +12,16 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 from imubench_pipeline.noise import FLOOR
-from imubench_pipeline.settings.conversions import (
-    Sidedness,
-    compute_noise_bandwidth,
-    convert_density,
-    convert_power_density,
-    noise_of_rms,
-)
 from imubench_pipeline.settings.printed import (
     FIGURE_DIMENSIONS,
     Datasheet,
     PrintedFigure,
     QuantityDatasheet,
+    Sidedness,
+    compute_noise_bandwidth,
+    convert_density,
+    convert_power_density,
+    noise_of_rms,
 )
 from imubench_pipeline.units import convert_to_si, find_dimension
 from imubench_pipeline.words.reasons import datasheets as texts

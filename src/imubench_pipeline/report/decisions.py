@@ -13,13 +13,13 @@ from typing import get_args
 
 from imubench_pipeline.model.comparisons import RankingRow
 from imubench_pipeline.model.states import Verdict
-from imubench_pipeline.report.site import Site
-from imubench_pipeline.report.sourced import (
+from imubench_pipeline.report.meaning import (
     SourcedNumber,
     compute_margin_limits,
     format_margin,
     source_number,
 )
+from imubench_pipeline.report.site import Site
 from imubench_pipeline.report.view import RecordingView
 from imubench_pipeline.settings.requirements import Requirement
 from imubench_pipeline.words.numbers import counted, duration_text, number_text

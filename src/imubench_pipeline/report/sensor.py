@@ -27,22 +27,22 @@ from imubench_pipeline.report.meaning import (
     format_recording_error,
     make_budget_bars,
     make_budget_tables,
+    source_number,
 )
 from imubench_pipeline.report.palette import make_recording_styles
 from imubench_pipeline.report.payload import FOREST, pack_styles
 from imubench_pipeline.report.practical import format_temperature
 from imubench_pipeline.report.site import Page, Site
-from imubench_pipeline.report.sourced import source_number
 from imubench_pipeline.report.start import summarise_recordings
 from imubench_pipeline.report.view import QUANTITY_NAMES, RecordingView
 from imubench_pipeline.settings.sensor import quantity_of
 from imubench_pipeline.words.estimates import symbol_text
 from imubench_pipeline.words.numbers import counted, limit_digits, number_text
-from imubench_pipeline.words.requirements import requirement_text
 from imubench_pipeline.words.verdicts import (
     SHORT_VERDICTS,
     condition_text,
     doubts_text,
+    requirement_text,
     spread_text,
     stated_verdict,
     verdict_text,

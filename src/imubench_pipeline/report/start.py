@@ -21,12 +21,12 @@ from imubench_pipeline.report.site import Entry, Site
 from imubench_pipeline.report.view import RecordingView
 from imubench_pipeline.settings.requirements import Requirement
 from imubench_pipeline.words.numbers import counted, duration_text, join_names, sentence
-from imubench_pipeline.words.requirements import requirement_text
 from imubench_pipeline.words.verdicts import (
     answer_text,
     condition_text,
     doubts_text,
     list_others,
+    requirement_text,
     spread_text,
     used_doubts_text,
 )

@@ -28,9 +28,11 @@ def fit_table(
     column of numbers has their unit on a second line; ``names`` is the column that may be broken
     anywhere.
     """
-    cells = [["-", *column] for column in zip(heads, *lines, strict=True)]
-    widths = [max(cell_len(word) for cell in column for word in _words(cell)) for column in cells]
-    wanted = [max(cell_len(text) for cell in column for text in _lines(cell)) for column in cells]
+    cells = [["-", *map(str, column)] for column in zip(heads, *lines, strict=True)]
+    widths = [max(cell_len(word) for cell in column for word in cell.split()) for column in cells]
+    wanted = [
+        max(cell_len(text) for cell in column for text in cell.split("\n")) for column in cells
+    ]
     widths[names] = min(widths[names], _NAME_FOLDS_AT)
     shown = len(heads)
     while shown > names + 1 and sum(widths[:shown]) + _GAP * (shown - 1) > width:
@@ -63,11 +65,3 @@ def fit_table(
     for line in lines:
         table.add_row(*line[:shown])
     return table
-
-
-def _words(cell: str | Text) -> list[str]:
-    return str(cell).split()
-
-
-def _lines(cell: str | Text) -> list[str]:
-    return str(cell).split("\n")

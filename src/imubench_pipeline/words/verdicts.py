@@ -1,4 +1,4 @@
-"""Verdicts on sensors in words: conditions, evidence, doubts and alternatives."""
+"""Verdicts on sensors in words: requirements, conditions, evidence, doubts and next steps."""
 
 from __future__ import annotations
 
@@ -20,6 +20,8 @@ from imubench_pipeline.model.verdicts import (
     UnitFactor,
 )
 from imubench_pipeline.settings.printed import SENSORS
+from imubench_pipeline.settings.requirements import Requirement
+from imubench_pipeline.settings.validation import Strict
 from imubench_pipeline.units import convert_from_si
 from imubench_pipeline.words.findings import FINDINGS
 from imubench_pipeline.words.numbers import (
@@ -404,3 +406,41 @@ def _round_up(seconds: float) -> str:
             number = seconds / size
             return f"{math.ceil(number) if number >= 10 else math.ceil(10 * number) / 10:g} {unit}"
     return f"{math.ceil(seconds)} s"
+
+
+def requirement_text(requirement: Requirement) -> str:
+    """Return the demands of a requirement in sentences."""
+    limits = "; ".join(limit.text for limit in requirement.limits)
+    if requirement.static_window:
+        begin = (
+            f"biases and tilt estimated over {requirement.static_window} at rest immediately before"
+        )
+    elif requirement.turn_on:
+        stated = (requirement.turn_on.gyro, requirement.turn_on.accel)
+        biases = " and ".join(bias or "the datasheet" for bias in stated)
+        begin = f"turn-on biases of {biases}, not calibrated"
+    else:
+        begin = ""
+    parts = [
+        "Invented example." if requirement.example else "",
+        f"Limits: {limits}, in {100 * requirement.confidence:g} % of runs, for the "
+        f"{requirement.axis} axis{begin and f'; {begin}'}.",
+        _stated("In use", requirement.environment),
+        _stated("A sensor must have", requirement.must),
+        f"{requirement.note.rstrip('.')}." if requirement.note else "",
+    ]
+    return " ".join(part for part in parts if part)
+
+
+def _stated(lead: str, group: Strict) -> str:
+    """Return what a group of a requirement states, in a sentence; empty if it states nothing."""
+    stated: list[str] = []
+    for name, value in group:
+        if isinstance(value, Strict):
+            inner = ", ".join(f"{key} {item}" for key, item in value if item is not None)
+            value = inner or None
+        elif isinstance(value, tuple):
+            value = (" to " if name == "temperature" else ", ").join(value) or None
+        if value is not None:
+            stated.append(f"{name.replace('_', ' ')} {value}")
+    return f"{lead}: {'; '.join(stated)}." if stated else ""
