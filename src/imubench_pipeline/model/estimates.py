@@ -20,6 +20,15 @@ from imubench_pipeline.model.table import (
     table,
 )
 
+_Degrees = Annotated[float | None, Column("equivalent degrees of freedom of the Allan variance")]
+_UpperDegrees = Annotated[
+    float | None,
+    Column("degrees of freedom of the upper 95 % limit: more where few clusters remain"),
+]
+_DegreesSource = Annotated[
+    str, Column("what they follow from: fitted spectrum, or power law at this tau")
+]
+
 
 @table("allan")
 class AllanRow(ChannelRow):
@@ -30,16 +39,9 @@ class AllanRow(ChannelRow):
     adev: Annotated[float, Column("Allan deviation", "rad/s or m/s^2")]
     lower: Annotated[float | None, Column("lower 95 % limit", "rad/s or m/s^2")] = None
     upper: Annotated[float | None, Column("upper 95 % limit", "rad/s or m/s^2")] = None
-    edf: Annotated[float | None, Column("equivalent degrees of freedom of the Allan variance")] = (
-        None
-    )
-    edf_upper: Annotated[
-        float | None,
-        Column("degrees of freedom of the upper 95 % limit: more where few clusters remain"),
-    ] = None
-    edf_source: Annotated[
-        str, Column("what they follow from: fitted spectrum, or power law at this tau")
-    ]
+    edf: _Degrees = None
+    edf_upper: _UpperDegrees = None
+    edf_source: _DegreesSource
     averaged: Annotated[
         float | None,
         Column(
@@ -215,16 +217,9 @@ class CompensatedAllanRow(ChannelRow):
     ]
     lower: Annotated[float | None, Column("lower 95 % limit", "rad/s or m/s^2")] = None
     upper: Annotated[float | None, Column("upper 95 % limit", "rad/s or m/s^2")] = None
-    edf: Annotated[float | None, Column("equivalent degrees of freedom of the Allan variance")] = (
-        None
-    )
-    edf_upper: Annotated[
-        float | None,
-        Column("degrees of freedom of the upper 95 % limit: more where few clusters remain"),
-    ] = None
-    edf_source: Annotated[
-        str, Column("what they follow from: fitted spectrum, or power law at this tau")
-    ]
+    edf: _Degrees = None
+    edf_upper: _UpperDegrees = None
+    edf_source: _DegreesSource
     temperature: Annotated[
         float, Column("Allan deviation of what temperature adds", "rad/s or m/s^2")
     ]

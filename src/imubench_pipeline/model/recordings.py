@@ -14,6 +14,8 @@ from imubench_pipeline.model.states import (
 from imubench_pipeline.model.table import Column, OfRecordingRow, SensorRow, TableRow, table
 from imubench_pipeline.model.verdicts import DoubtMark
 
+_Channel = Annotated[str | None, Column("the channel concerned; null: the whole recording")]
+
 
 @table("recordings")
 class RecordingRow(SensorRow):
@@ -56,9 +58,7 @@ class FileRow(TableRow):
 class DoubtRow(OfRecordingRow):
     """A row of the table ``doubts``."""
 
-    channel: Annotated[str | None, Column("the channel concerned; null: the whole recording")] = (
-        None
-    )
+    channel: _Channel = None
     code: Annotated[
         str, Column("a finding; not_explained: the spectrum; doubtful: a parameter's status")
     ]
@@ -76,9 +76,7 @@ class DoubtRow(OfRecordingRow):
 class FindingRow(OfRecordingRow):
     """A row of the table ``findings``."""
 
-    channel: Annotated[str | None, Column("the channel concerned; null: the whole recording")] = (
-        None
-    )
+    channel: _Channel = None
     finding: Annotated[str, Column("what was found")]
     severity: Annotated[Severity, Column("fatal: not analysed")]
     affects: Annotated[tuple[str, ...], Column("parameters whose estimates it puts in doubt")] = ()

@@ -385,18 +385,18 @@ _EFFECTS: Mapping[Action, str] = {
 def _describe_effect(step: NextStepRow) -> str:
     parts = []
     if step.action == "find_figures":
-        parts.append(_EFFECTS[step.action].format(verdicts=_count(step.verdicts_strengthened)))
+        parts.append(
+            _EFFECTS[step.action].format(verdicts=counted(step.verdicts_strengthened, "verdict"))
+        )
     elif step.verdicts_turned:
-        parts.append(_EFFECTS[step.action].format(verdicts=_count(step.verdicts_turned)))
+        parts.append(
+            _EFFECTS[step.action].format(verdicts=counted(step.verdicts_turned, "verdict"))
+        )
     if step.verdicts_strengthened and step.action != "find_figures":
-        parts.append(f"give {_count(step.verdicts_strengthened)} stronger evidence")
+        parts.append(f"give {counted(step.verdicts_strengthened, 'verdict')} stronger evidence")
         if len(parts) == 1:
             parts[0] = f"this would {parts[0]}"
     return " and ".join(parts)
-
-
-def _count(number: int) -> str:
-    return counted(number, "verdict")
 
 
 def _round_up(seconds: float) -> str:
