@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from imubench_pipeline.export import matrices, snippet
+from imubench_pipeline.export import matrices
 from imubench_pipeline.export.growth import growth
 from imubench_pipeline.export.imu import AxisNoise, Imu
 from imubench_pipeline.noise import GaussMarkov, NoiseModel, Sinusoid
@@ -83,7 +83,7 @@ def test_a_sensor_of_one_quantity_and_of_white_noise_alone() -> None:
 
 def test_the_snippet_makes_the_same_matrices_at_any_rate() -> None:
     namespace: dict[str, object] = {"__name__": "noise"}
-    exec(snippet.write(imu()), namespace)
+    exec(matrices.write_python(imu()), namespace)
     noises, maker = namespace["NOISE"], namespace["matrices"]
     for name, model in (("gyro", GYRO), ("accel", ACCEL)):
         for rate in (1.0, 200.0):
@@ -99,7 +99,7 @@ def test_the_snippet_makes_the_same_matrices_at_any_rate() -> None:
 def test_the_snippet_runs_alone_and_predicts_the_growth(tmp_path: Path) -> None:
     flicker = NoiseModel(N=1.1e-3, B=7.2e-4)
     path = tmp_path / "noise.py"
-    path.write_text(snippet.write(imu(accel=flicker)), encoding="utf-8")
+    path.write_text(matrices.write_python(imu(accel=flicker)), encoding="utf-8")
     done = subprocess.run(
         [sys.executable, "-I", str(path)], capture_output=True, text=True, check=True
     )
@@ -109,6 +109,6 @@ def test_the_snippet_runs_alone_and_predicts_the_growth(tmp_path: Path) -> None:
 
 
 def test_the_snippet_says_what_it_does_not_hold() -> None:
-    text = snippet.write(imu(gyro=EVERYTHING))
+    text = matrices.write_python(imu(gyro=EVERYTHING))
     assert "gyro: not included: R = 1.000e-05, line of amplitude" in text.replace("\n#  ", "")
-    assert "gyro: not included" not in snippet.write(imu())
+    assert "gyro: not included" not in matrices.write_python(imu())

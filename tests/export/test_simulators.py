@@ -7,7 +7,7 @@ import pytest
 from scipy.signal import lfilter
 
 from imubench_pipeline.allan import allan_variance
-from imubench_pipeline.export import gnss_ins_sim, matlab
+from imubench_pipeline.export import simulators
 from imubench_pipeline.export.imu import AxisNoise, Imu
 from imubench_pipeline.noise import GaussMarkov, NoiseModel
 from tests.export.sensors import ACCEL, GYRO, Array, imu
@@ -25,7 +25,7 @@ def compared(log: Array, model: NoiseModel, rate: float, tau: list[float]) -> Ar
 
 def error_dictionary(sensor: Imu) -> dict[str, Array]:
     namespace: dict[str, dict[str, Array]] = {}
-    exec(gnss_ins_sim.write(sensor), namespace)
+    exec(simulators.write_gnss_ins_sim(sensor), namespace)
     return namespace["imu_err"]
 
 
@@ -74,7 +74,7 @@ def test_gnss_ins_sim_takes_the_deviation_of_the_process_and_not_its_bias_instab
 
 
 def test_gnss_ins_sim_says_where_a_process_is_too_short_for_it() -> None:
-    text = gnss_ins_sim.write(imu(gyro=NoiseModel(N=1e-4, B=1e-4, T_B=0.1), rate=RATE))
+    text = simulators.write_gnss_ins_sim(imu(gyro=NoiseModel(N=1e-4, B=1e-4, T_B=0.1), rate=RATE))
     assert "inaccurate for so short a process" in text.replace("\n#  ", "")
 
 
@@ -106,7 +106,7 @@ def imu_sensor_log(text: str, member: str, rate: float, samples: int, seed: int)
 
 @pytest.mark.parametrize("member", ["Gyroscope", "Accelerometer"])
 def test_matlab_makes_the_model_at_every_tau(member: str) -> None:
-    text = matlab.write(imu(rate=RATE))
+    text = simulators.write_matlab(imu(rate=RATE))
     assert f"IMU.SampleRate = {RATE:g};" in text
     log = imu_sensor_log(text, member, RATE, round(80_000.0 * RATE), 3)
     model = {"Gyroscope": GYRO, "Accelerometer": ACCEL}[member]
@@ -116,7 +116,7 @@ def test_matlab_makes_the_model_at_every_tau(member: str) -> None:
 def test_matlab_makes_flicker_noise_up_to_the_horizon() -> None:
     model = NoiseModel(N=1e-5, B=1e-3, K=1e-6)
     rate = 10.0
-    text = matlab.write(imu(gyro=model, rate=rate, horizon=15.0))
+    text = simulators.write_matlab(imu(gyro=model, rate=rate, horizon=15.0))
     assert "fractalcoef(300)" in text
     log = imu_sensor_log(text, "Gyroscope", rate, 400_000, 4)
     n = np.array([10, 50, 150])
@@ -125,18 +125,19 @@ def test_matlab_makes_flicker_noise_up_to_the_horizon() -> None:
 
 
 def test_matlab_without_poles_enough_takes_the_nearest_process() -> None:
-    text = matlab.write(imu(gyro=NoiseModel(N=1e-5, B=1e-3), rate=1000.0, horizon=60.0))
+    text = simulators.write_matlab(imu(gyro=NoiseModel(N=1e-5, B=1e-3), rate=1000.0, horizon=60.0))
     assert "replaced by a Gauss-Markov process" in text.replace("\n%  ", "")
 
 
 def test_matlab_takes_one_quantity_alone() -> None:
-    text = matlab.write(Imu(sensor="one", rate=100.0, gyro=AxisNoise(GYRO, "gyro_x")))
+    text = simulators.write_matlab(Imu(sensor="one", rate=100.0, gyro=AxisNoise(GYRO, "gyro_x")))
     assert "IMU.Gyroscope" in text
     assert "IMU.Accelerometer" not in text
 
 
 def test_two_processes_are_replaced_by_one_in_both() -> None:
     model = NoiseModel(N=1e-4, B=1e-4, T_B=5.0, further=[GaussMarkov(1e-4, 50.0)])
-    for text in (matlab.write(imu(gyro=model)), gnss_ins_sim.write(imu(gyro=model))):
+    for write in (simulators.write_matlab, simulators.write_gnss_ins_sim):
+        text = write(imu(gyro=model))
         joined = re.sub(r"\n[#%]  +", " ", text)
         assert "with the same Allan variance at the horizon of 60 s" in joined

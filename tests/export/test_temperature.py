@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from imubench_pipeline.export import matlab, px4
+from imubench_pipeline.export import px4, simulators
 from imubench_pipeline.export.imu import TemperatureEffect, find_temperature_effect
 from imubench_pipeline.export.targets import TARGETS
 from imubench_pipeline.model.estimates import TemperatureRow
@@ -80,7 +80,7 @@ def test_px4_takes_off_what_temperature_adds_within_the_range_of_the_log() -> No
 
 def test_matlab_adds_nothing_at_the_reference_and_a_line_elsewhere() -> None:
     told = effect(rows("gyro_x"), rows("gyro_y", quadratic=(1e-6, 9e-7, 1.1e-6, "ok")))
-    text = matlab.write(imu(temperature={"gyro": told}))
+    text = simulators.write_matlab(imu(temperature={"gyro": told}))
     vectors = {
         name: [float(one) for one in values.split(", ")]
         for name, values in re.findall(r"'(ConstantBias|TemperatureBias)', \[([^\]]+)\]", text)
@@ -109,8 +109,8 @@ def test_what_is_not_safe_is_left_out_with_the_reason(changes: dict[str, Any], r
     told = effect(rows("gyro_x", **changes))
     assert not told.slope
     assert any(reason in note for note in told.notes)
-    for writer in (px4, matlab):
-        text = writer.write(imu(temperature={"gyro": told}))
+    for write in (px4.write, simulators.write_matlab):
+        text = write(imu(temperature={"gyro": told}))
         assert reason in re.sub(r"\n[#%]  ", "", text)
         assert "TC_G0" not in text and "'TemperatureBias'" not in text
 

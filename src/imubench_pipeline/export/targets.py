@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
-from imubench_pipeline.export import gnss_ins_sim, matlab, matrices, px4, snippet
+from imubench_pipeline.export import matrices, px4
 from imubench_pipeline.export.imu import Imu
 from imubench_pipeline.export.overbound import Family
+from imubench_pipeline.export.simulators import write_gnss_ins_sim, write_matlab
 from imubench_pipeline.export.visual_inertial import (
     write_basalt,
     write_kalibr,
@@ -50,11 +51,11 @@ TARGETS: Mapping[str, Target] = {
         Target("basalt", "Basalt", "calibration_imu.json", write_basalt, "N+K"),
         Target("orb-slam3", "ORB-SLAM3", "orb_slam3_imu.yaml", write_orb_slam3, "N+K"),
         Target("px4", "PX4 (EKF2)", "ekf2.params", px4.write, "N+K"),
-        Target("gnss-ins-sim", "gnss-ins-sim", "imu_err.py", gnss_ins_sim.write, "N+GM"),
-        Target("matlab", "MATLAB (imuSensor)", "imu_noise.m", matlab.write, "N+GM+K"),
+        Target("gnss-ins-sim", "gnss-ins-sim", "imu_err.py", write_gnss_ins_sim, "N+GM"),
+        Target("matlab", "MATLAB (imuSensor)", "imu_noise.m", write_matlab, "N+GM+K"),
         Target("json", "any: matrices as JSON", "noise.json", matrices.write_json, "N+GM+K"),
         Target("npz", "any: matrices as NumPy arrays", "noise.npz", matrices.write_npz, "N+GM+K"),
-        Target("python", "Python with NumPy", "noise.py", snippet.write, "N+GM+K"),
+        Target("python", "Python with NumPy", "noise.py", matrices.write_python, "N+GM+K"),
     )
 }
 """All targets by their name in commands and settings."""

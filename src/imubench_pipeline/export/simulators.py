@@ -1,26 +1,4 @@
-"""MATLAB: a script that creates an ``imuSensor`` of the Navigation and Sensor Fusion toolboxes.
-
-With ``NoiseType`` "single-sided" a sample gets NoiseDensity sqrt(SampleRate) of white noise, and a
-step of the random walk RandomWalk / sqrt(SampleRate): NoiseDensity is N and RandomWalk is K, in the
-two-sided convention of IEEE Std 952. (With the default, "double-sided", SampleRate / 2 replaces
-SampleRate in both: N would have to be sqrt(2) times larger, a one-sided density as on datasheets,
-and K sqrt(2) times smaller.)
-
-BiasInstability is the standard deviation of white samples, which the filter
-BiasInstabilityCoefficients shapes. The first-order filter 1 / (1 - p z^-1), p = e^(-dt / T_B),
-gives the exact Gauss-Markov process with B' = sqrt(S_B T_B / 2 (1 - p^2)). ``fractalcoef`` gives
-flicker noise with B' = B: its spectrum B^2 / |1 - e^(-i omega)| is cut off at low frequencies by
-the number of poles. With n poles the Allan deviation is within 7 % at n samples and 11 % at 2 n.
-The default of one pole is not flicker noise.
-
-TemperatureBias (T - 25) is added at the temperature T of the sensor, degC; the 25 is fixed. A
-ConstantBias of s (25 - T_0) changes this to s (T - T_0), and the script sets T to T_0.
-
-Sources: MathWorks, reference pages of imuSensor ("Algorithms"), gyroparams, accelparams and
-fractalcoef (R2023b); the example "Inertial Sensor Noise Analysis Using Allan Variance"; C code
-generated from fusion.simulink.imuSensor (pBandwidth, pStdDevWhiteNoise, pStdDevRandWalk,
-pStdDevBiasInst).
-"""
+"""Programs that simulate a sensor: gnss-ins-sim and MATLAB."""
 
 from __future__ import annotations
 
@@ -28,13 +6,77 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from imubench_pipeline.export.comments import describe_model, format_comments
+from imubench_pipeline.export.comments import (
+    describe_model,
+    format_comments,
+    format_python_comments,
+)
 from imubench_pipeline.export.imu import AXES, AxisNoise, Imu, TemperatureEffect
 from imubench_pipeline.export.mapping import Mapped, as_process
 from imubench_pipeline.noise import NoiseModel, compute_driving_density
 from imubench_pipeline.words.reasons import exports as texts
 
-_CONVENTION = (
+_GNSS_INS_SIM_CONVENTION = (
+    "*_arw and *_vrw are N (two-sided) an hour; *_b_stability is the standard deviation of a "
+    "first-order Gauss-Markov process (1.076 B), *_b_corr its T_B in s. Fixed biases are 0."
+)
+_MIN_SAMPLES_IN_T_B = 20.0
+"""With fewer samples in T_B, the program's discretisation is off by more than 3 %."""
+
+
+def write_gnss_ins_sim(imu: Imu) -> str:
+    """Return Python that defines ``imu_err``, for ``imu_model.IMU(accuracy=imu_err)``.
+
+    ``gyro_arw`` in deg/sqrt(h) and ``accel_vrw`` in m/s/sqrt(h) are N, two-sided (a sample gets N /
+    sqrt(dt)). ``*_b_stability`` with ``*_b_corr`` is the standard deviation of a first-order
+    Gauss-Markov process, deg/h and m/s^2; it is not the bias instability B of IEEE Std 952:
+
+        stability = sqrt(S_B T_B / 2) = 1.076 B.
+
+    The process is discretised as x' = (1 - dt / T_B) x + w, accurate where T_B is many samples, and
+    starts at 0. Without ``*_b_corr`` (or inf) the program draws white noise, so it is always given.
+    There is no random walk.
+
+    Source: Aceinna/gnss-ins-sim, gnss_ins_sim/sim/imu_model.py (names and units),
+    gnss_ins_sim/pathgen/pathgen.py (acc_gen, gyro_gen, bias_drift).
+    """
+    imu.require_both()
+    mapped = {name: as_process(a.model, imu.horizon, imu.rate) for name, a in imu.axes.items()}
+    gyro, accel = mapped["gyro"].model, mapped["accel"].model
+    about = describe_model(imu, "gnss-ins-sim", _GNSS_INS_SIM_CONVENTION, mapped)
+    for name, process in mapped.items():
+        if process.model.T_B is not None and process.model.T_B * imu.rate < _MIN_SAMPLES_IN_T_B:
+            about.append(f"{name}: {texts.short_process(process.model.T_B * imu.rate)}.")
+    degrees = math.degrees(1.0)
+    entries = [
+        ("gyro_b", 0.0, "deg/h, fixed bias"),
+        ("gyro_arw", gyro.N * degrees * 60.0, "deg/sqrt(h), N"),
+        ("gyro_b_stability", _stationary_deviation(gyro) * degrees * 3600.0, "deg/h, 1 sigma"),
+        ("gyro_b_corr", gyro.T_B or imu.horizon, "s, T_B"),
+        ("accel_b", 0.0, "m/s^2, fixed bias"),
+        ("accel_vrw", accel.N * 60.0, "m/s/sqrt(h), N"),
+        ("accel_b_stability", _stationary_deviation(accel), "m/s^2, 1 sigma"),
+        ("accel_b_corr", accel.T_B or imu.horizon, "s, T_B"),
+    ]
+    lines = [
+        f'    "{key}": np.full(3, {float(f"{value:.9g}")!r}),  # {comment}\n'
+        for key, value, comment in entries
+    ]
+    return (
+        format_python_comments(about)
+        + "import numpy as np\n\nimu_err = {\n"
+        + "".join(lines)
+        + "}\n"
+    )
+
+
+def _stationary_deviation(model: NoiseModel) -> float:
+    if model.T_B is None or model.B == 0.0:
+        return 0.0
+    return math.sqrt(compute_driving_density(model.B, model.T_B) * model.T_B / 2.0)
+
+
+_MATLAB_CONVENTION = (
     "NoiseDensity is N and RandomWalk is K in the two-sided convention, which this program calls "
     "single-sided; BiasInstability drives the filter of BiasInstabilityCoefficients, made for "
     "SampleRate = {rate:g} Hz. R2023b or newer."
@@ -53,13 +95,35 @@ class _Parameters:
     coefficients: str
 
 
-def write(imu: Imu) -> str:
-    """Return the script; it creates ``IMU``, an imuSensor."""
+def write_matlab(imu: Imu) -> str:
+    """Return a script of MATLAB that creates an ``imuSensor`` of its Navigation Toolbox.
+
+    With ``NoiseType`` "single-sided" a sample gets NoiseDensity sqrt(SampleRate) of white noise,
+    and a step of the random walk RandomWalk / sqrt(SampleRate): NoiseDensity is N and RandomWalk is
+    K, in the two-sided convention of IEEE Std 952. (With the default, "double-sided", SampleRate /
+    2 replaces SampleRate in both: N would have to be sqrt(2) times larger, a one-sided density as
+    on datasheets, and K sqrt(2) times smaller.)
+
+    BiasInstability is the standard deviation of white samples, which the filter
+    BiasInstabilityCoefficients shapes. The first-order filter 1 / (1 - p z^-1), p = e^(-dt / T_B),
+    gives the exact Gauss-Markov process with B' = sqrt(S_B T_B / 2 (1 - p^2)). ``fractalcoef``
+    gives flicker noise with B' = B: its spectrum B^2 / |1 - e^(-i omega)| is cut off at low
+    frequencies by the number of poles. With n poles the Allan deviation is within 7 % at n samples
+    and 11 % at 2 n. The default of one pole is not flicker noise.
+
+    TemperatureBias (T - 25) is added at the temperature T of the sensor, degC; the 25 is fixed. A
+    ConstantBias of s (25 - T_0) changes this to s (T - T_0), and the script sets T to T_0.
+
+    Sources: MathWorks, reference pages of imuSensor ("Algorithms"), gyroparams, accelparams and
+    fractalcoef (R2023b); the example "Inertial Sensor Noise Analysis Using Allan Variance"; C code
+    generated from fusion.simulink.imuSensor (pBandwidth, pStdDevWhiteNoise, pStdDevRandWalk,
+    pStdDevBiasInst).
+    """
     mapped: dict[str, Mapped] = {}
     parameters: dict[str, _Parameters] = {}
     for name, axis in imu.axes.items():
         mapped[name], parameters[name] = _map_parameters(axis, imu)
-    convention = _CONVENTION.format(rate=imu.rate)
+    convention = _MATLAB_CONVENTION.format(rate=imu.rate)
     about = describe_model(imu, "MATLAB imuSensor", convention, mapped, temperature=True)
     biases = {name: _map_temperature(imu.temperature.get(name)) for name in parameters}
     about += [f"{name} and temperature: {words}." for name in biases for words in biases[name][1]]
