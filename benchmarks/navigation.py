@@ -35,13 +35,16 @@ from imubench_pipeline.earth import STANDARD_GRAVITY
 from imubench_pipeline.extensions.aided import navigate
 from imubench_pipeline.extensions.aided.axis_states import AxisStates, make_axis_states
 from imubench_pipeline.extensions.aided.error_state import GROUPS
-from imubench_pipeline.extensions.aided.measures import (
+from imubench_pipeline.extensions.aided.plan import dump_navigate_settings
+from imubench_pipeline.extensions.aided.runs import (
+    FIX_INTERVAL,
+    Drive,
+    Outage,
     compute_mean_squares,
     compute_nees_share,
     compute_root_mean_square,
+    schedule_outages,
 )
-from imubench_pipeline.extensions.aided.plan import dump_navigate_settings
-from imubench_pipeline.extensions.aided.runs import FIX_INTERVAL, Drive, Outage, schedule_outages
 from imubench_pipeline.extensions.aided.settings import NavigateSettings
 from imubench_pipeline.extensions.aided.signals import Signals, Spreads, simulate_signals
 from imubench_pipeline.extensions.aided.trajectories import TRAJECTORY_NAMES, simulate_trajectory

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from imubench_pipeline.extensions.nightly.running import find_errors
+from imubench_pipeline.extensions.nightly.night import find_errors
 
 
 def test_what_failed_in_a_step_is_found_in_what_the_run_said(tmp_path: Path) -> None:

@@ -3,12 +3,14 @@
 import numpy as np
 import pytest
 
-from imubench_pipeline.extensions.aided.measures import (
+from imubench_pipeline.extensions.aided.runs import (
+    Drive,
+    Outcome,
     compute_mean_squares,
     predict_root_mean_square,
+    schedule_outages,
     select_epochs,
 )
-from imubench_pipeline.extensions.aided.runs import Drive, Outcome, schedule_outages
 from imubench_pipeline.extensions.aided.trajectories import simulate_trajectory
 
 

@@ -10,10 +10,14 @@ import pytest
 
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
 from imubench_pipeline.estimators.rows import make_parameter_rows
-from imubench_pipeline.extensions.aided.measures import Share
-from imubench_pipeline.extensions.aided.navigate import _is_consistent, navigate
+from imubench_pipeline.extensions.aided.navigate import (
+    _is_consistent,
+    collect_tunings,
+    navigate,
+    scale_model,
+)
+from imubench_pipeline.extensions.aided.runs import Share
 from imubench_pipeline.extensions.aided.settings import NavigateSettings
-from imubench_pipeline.extensions.aided.tunings import collect_tunings, scale_model
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.simulate import simulate
 from imubench_pipeline.recordings.kept import Quality

@@ -4,11 +4,11 @@ import math
 
 import pytest
 
-from imubench_pipeline.extensions.earth_rate.courses import thin
 from imubench_pipeline.extensions.earth_rate.published import (
     RunDesign,
     compute_allowed_sigmas,
     make_published_row,
+    thin,
 )
 from imubench_pipeline.extensions.earth_rate.simulation import (
     ASSUMED_LATITUDE,

@@ -14,7 +14,7 @@ from imubench_pipeline.extensions.earth_rate.bound import (
     compute_cramer_rao_bounds,
     compute_final_bound,
 )
-from imubench_pipeline.extensions.earth_rate.courses import compute_sigma_ranges
+from imubench_pipeline.extensions.earth_rate.published import compute_sigma_ranges
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.tables import write
 from imubench_pipeline.tables.keys import Key

@@ -6,14 +6,12 @@ from scipy.signal import lfilter
 
 from imubench_pipeline.extensions.calibration.experiment import Dwell
 from imubench_pipeline.extensions.earth_rate.choice_of_turns import compute_interval_log_density
-from imubench_pipeline.extensions.earth_rate.transients import (
-    CLEAR_LOG_LIKELIHOOD,
-    average_log_blocks,
-    detect_transients,
-)
 from imubench_pipeline.extensions.earth_rate.turning import find_turning
 from imubench_pipeline.extensions.earth_rate.turns import (
+    CLEAR_LOG_LIKELIHOOD,
     Turning,
+    average_log_blocks,
+    detect_transients,
     estimate_alternation,
     split_at_turns,
 )

@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
-from imubench_pipeline.extensions.fusion.grades import Grade, yield_grade_rows
+from imubench_pipeline.extensions.fusion.fusion import Grade, yield_grade_rows
 from imubench_pipeline.navigation.compared import ComparedChannel
 from imubench_pipeline.settings.printed import Datasheet
 from imubench_pipeline.settings.sensor import read_sensors

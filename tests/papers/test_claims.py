@@ -4,9 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from imubench_pipeline.extensions.papers.evidence import Evidence, Result
 from imubench_pipeline.extensions.papers.papers import judge, make_published_rows
-from imubench_pipeline.extensions.papers.printed import parse_number, read_papers
+from imubench_pipeline.extensions.papers.printed import Evidence, Result, parse_number, read_papers
 from imubench_pipeline.tables import build
 from tests.conftest import PROJECT
 

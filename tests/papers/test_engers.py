@@ -8,9 +8,8 @@ from scipy import signal
 
 from imubench_pipeline.allan import allan_variance
 from imubench_pipeline.extensions.papers.engers import AXES, DEGREE, compute_cutoff
-from imubench_pipeline.extensions.papers.evidence import Evidence
 from imubench_pipeline.extensions.papers.papers import make_rows
-from imubench_pipeline.extensions.papers.printed import read_paper
+from imubench_pipeline.extensions.papers.printed import Evidence, read_paper
 from imubench_pipeline.extensions.papers.tables import PublishedRow
 from imubench_pipeline.settings.sensor import read_sensors
 from imubench_pipeline.settings.simulated_recordings import read_simulated

@@ -10,25 +10,22 @@ import pytest
 from numpy.typing import NDArray
 from scipy.linalg import expm
 
-from imubench_pipeline.extensions.papers import maia, maia_draws
-from imubench_pipeline.extensions.papers.evidence import Evidence
+from imubench_pipeline.extensions.papers import maia
 from imubench_pipeline.extensions.papers.maia import (
-    WEIGHED_AT,
-    compute_weight_ratios,
-    evaluate_as_printed,
-    integrate_density,
-    read_manufacturer,
-)
-from imubench_pipeline.extensions.papers.maia_draws import (
     CHANNELS,
     GRIDS,
     MTI_GYRO,
+    WEIGHED_AT,
+    compute_weight_ratios,
+    evaluate_as_printed,
     find_lowest_point,
+    integrate_density,
+    read_manufacturer,
     simulate_lottery,
     simulate_readings,
 )
 from imubench_pipeline.extensions.papers.papers import make_rows
-from imubench_pipeline.extensions.papers.printed import read_paper
+from imubench_pipeline.extensions.papers.printed import Evidence, read_paper
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.simulate import simulate
 from imubench_pipeline.settings.sensor import read_sensors
@@ -45,17 +42,17 @@ PRINTED = {
 }
 
 
-@pytest.fixture(scope="module", params=few([60], [maia_draws.MEMBERS]))
+@pytest.fixture(scope="module", params=few([60], [maia.MEMBERS]))
 def members(request: pytest.FixtureRequest) -> Iterator[int]:
     """The number of reconstructions: less than what the page has, every day."""
     cached = (
-        maia_draws.simulate_lottery,
-        maia_draws.simulate_readings,
-        maia_draws._simulate_deviations,
+        maia.simulate_lottery,
+        maia.simulate_readings,
+        maia._simulate_deviations,
         maia._count_in_range,
     )
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(maia_draws, "MEMBERS", request.param)
+        patch.setattr(maia, "MEMBERS", request.param)
         for function in cached:
             function.cache_clear()
         yield request.param
@@ -65,7 +62,7 @@ def members(request: pytest.FixtureRequest) -> Iterator[int]:
 
 @pytest.fixture(scope="module")
 def lines(members: int) -> dict[str, list[dict[str, Any]]]:
-    assert members == maia_draws.MEMBERS
+    assert members == maia.MEMBERS
     by_place: dict[str, list[dict[str, Any]]] = {}
     for row in make_rows(read_paper("maia"), Evidence()):
         by_place.setdefault(row["place"], []).append(dict(row))

@@ -9,9 +9,8 @@ from scipy.signal import lfilter
 
 from imubench_pipeline.extensions.earth_rate.simulation import PAPER_MINUTES
 from imubench_pipeline.extensions.papers import silva
-from imubench_pipeline.extensions.papers.evidence import Evidence
 from imubench_pipeline.extensions.papers.papers import make_rows
-from imubench_pipeline.extensions.papers.printed import read_paper
+from imubench_pipeline.extensions.papers.printed import Evidence, read_paper
 from imubench_pipeline.tables import build
 from tests.conftest import few
 

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from imubench_pipeline.extensions.fusion.boards import BOARDS, make_published_lines
+from imubench_pipeline.extensions.fusion.page import BOARDS, make_published_lines
 from imubench_pipeline.extensions.fusion.tables import PublishedFigureRow
 from imubench_pipeline.report.pages import list_pages
 from imubench_pipeline.report.publish import publish

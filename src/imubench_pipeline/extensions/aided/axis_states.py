@@ -40,9 +40,8 @@ def make_axis_states(
 ) -> AxisStates:
     """Return the states of a noise model at a sampling rate, Hz.
 
-    ``turn_on`` is the standard deviation of the turn-on bias, rad/s or m/s^2, ``scale`` as in
-    `AxisStates`. From the tau ``shortest`` to ``longest``, s, a bank of processes represents
-    flicker noise; below, it is white.
+    ``turn_on`` is the standard deviation of the turn-on bias, rad/s or m/s^2. From the tau
+    ``shortest`` to ``longest``, s, a bank of processes represents flicker noise.
     """
     terms = model.realised(shortest, longest)
     spaces = [term.state_space(1.0 / sampling) for term in terms]

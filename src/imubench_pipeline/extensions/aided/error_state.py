@@ -26,15 +26,13 @@ from imubench_pipeline.extensions.aided.strapdown import (
 )
 from imubench_pipeline.typing import Array
 
-NAVIGATION_STATES = 9
-"""Number of states of position, velocity (north, east, down) and attitude."""
+NAVIGATION_STATES = 9  # position, velocity (north, east, down) and attitude
 
 GROUPS = ("position", "velocity", "attitude", "gyro", "accel", "navigation")
 """Groups of states with a normalised squared error (NEES). The bias of an axis is the sum of its
 states; ``navigation`` is the first three groups together."""
 
-DEGREES_OF_FREEDOM = (3, 3, 3, 3, 3, 9)
-"""Degrees of freedom of each group."""
+DEGREES_OF_FREEDOM = (3, 3, 3, 3, 3, 9)  # of each group
 
 
 @njit(cache=True, nogil=True)

@@ -22,9 +22,6 @@ from imubench_pipeline.settings.requirements import DIMENSIONS, Limit, Requireme
 from imubench_pipeline.units import SI_UNITS
 
 _AXIS_FACTORS = {"position": math.sqrt(2.0), "velocity": math.sqrt(2.0), "heading": 1.0}
-"""Root mean square error in the tables over the error of one axis."""
-
-_LIMITS_NOTE = "simulated drives; the limits are those of the runs, not of the estimate"
 
 
 def yield_outage_rows(
@@ -83,12 +80,12 @@ def _make_row(
         return replace(unknown, reason=f"the runs do not tell the error of the {limit.error}")
     sigma, lower, upper = sizes
     spread = math.log(upper / lower) / (2.0 * NORMAL_QUANTILE)
-    assumed = f"; assumed: {run.assumed}" if run.assumed else ""
+    reason = "simulated drives; the limits are those of the runs, not of the estimate"
     return replace(
         unknown,
         sigma=sigma,
         lower=lower,
         upper=upper,
         within=float(ndtr(math.log(allowed / sigma) / spread)),
-        reason=_LIMITS_NOTE + assumed,
+        reason=reason + (f"; assumed: {run.assumed}" if run.assumed else ""),
     )

@@ -12,50 +12,47 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
+import pyarrow.compute as pc
 
-from imubench_pipeline.estimators.rows import read_recommended_estimates
+from imubench_pipeline.datasheets.comparable import read_comparables
+from imubench_pipeline.estimators.estimate import Estimate
+from imubench_pipeline.estimators.rows import read_estimates, read_recommended_estimates
+from imubench_pipeline.export.overbound import overbound
+from imubench_pipeline.export.request import curve_of
 from imubench_pipeline.extensions.aided.axis_states import make_axis_states
 from imubench_pipeline.extensions.aided.error_state import GROUPS
-from imubench_pipeline.extensions.aided.measures import (
+from imubench_pipeline.extensions.aided.runs import (
     ERRORS,
+    FIX_INTERVAL,
+    RECOVERY_TIME,
+    WARM_UP,
+    Drive,
+    Outcome,
     Share,
     compute_mean_squares,
     compute_nees_share,
     compute_ratio,
     compute_root_mean_square,
     predict_root_mean_square,
-)
-from imubench_pipeline.extensions.aided.runs import (
-    FIX_INTERVAL,
-    RECOVERY_TIME,
-    WARM_UP,
-    Drive,
-    Outcome,
     schedule_outages,
 )
 from imubench_pipeline.extensions.aided.settings import NavigateSettings
 from imubench_pipeline.extensions.aided.signals import Signals, Spreads, simulate_signals
 from imubench_pipeline.extensions.aided.tables import NavigationRow
 from imubench_pipeline.extensions.aided.trajectories import simulate_trajectory
-from imubench_pipeline.extensions.aided.tunings import (
-    TRUE,
-    Models,
-    collect_tunings,
-    complete_axes,
-    complete_noise_models,
-    scale_model,
-)
-from imubench_pipeline.model.estimates import LowPassRow
+from imubench_pipeline.model.estimates import AllanRow, LowPassRow
 from imubench_pipeline.model.recordings import RecordingRow
-from imubench_pipeline.noise import NoiseModel
+from imubench_pipeline.noise import FLOOR, NoiseModel
 from imubench_pipeline.noise.low_pass import LowPass
 from imubench_pipeline.recordings.kept import load_static_logs
 from imubench_pipeline.settings.requirements import Trajectory
 from imubench_pipeline.settings.sensor import CHANNELS, Sensor, quantity_of
 from imubench_pipeline.settings.simulated_recordings import SimulatedRecording
+from imubench_pipeline.settings.validation import ConfigError
+from imubench_pipeline.simulate.from_datasheet import from_datasheet
 from imubench_pipeline.simulate.model import SensorModel, before_the_filter, in_the_log
 from imubench_pipeline.simulate.models import make_imu_model
 from imubench_pipeline.steps.noise_source import find_static_recordings
@@ -63,19 +60,132 @@ from imubench_pipeline.tables import read
 from imubench_pipeline.typing import Array
 from imubench_pipeline.units import parse_difference, parse_quantity
 
-_MIN_PIECES = 4
-"""Min. number of runs for which a log must be long enough."""
+T = TypeVar("T")
+
+Models = dict[str, NoiseModel]  # by channel
+
+DATASHEET, MISREAD, TENFOLD = "datasheet", "datasheet_misread", "times_ten"
+TABLE_1, OVERBOUND, TRUE = "table_1", "overbound", "true"
+"""Tunings other than those named after a method."""
+
+_ESTIMATION_METHODS = ("curve", "paper", "weighted", "likelihood", "likelihood_gm", "compensated")
+_TENFOLD_FACTOR = 10.0
+_MIN_PIECES = 4  # least number of runs for which a log must be long enough
+_MIN_RATE = 10.0  # least sampling rate of a log for navigation, Hz
 
 _SHARE_TOLERANCE = 0.02
 """Tolerance on the share 0.95 of a consistent filter. A filter is inconsistent if its share differs
 by more than the tolerance plus three standard errors."""
+_MAX_SHARE_ERROR = 0.05  # of a consistent filter, including two standard errors
 
 
-_MAX_SHARE_ERROR = 0.05
-"""Max. difference from 0.95, including two standard errors, of the share of a consistent filter."""
+def complete_axes(models: Mapping[str, T]) -> dict[str, T]:
+    """Return models of all six channels; a missing axis takes one of the same quantity."""
+    whole = {}
+    for channel in CHANNELS:
+        own = [name for name in models if quantity_of(name) == quantity_of(channel)]
+        here = channel if channel in own else own["xyz".index(channel[-1]) % len(own)]
+        whole[channel] = models[here]
+    return whole
 
-_MIN_RATE = 10.0
-"""Min. sampling rate of a log for navigation, Hz."""
+
+def complete_noise_models(models: Mapping[str, NoiseModel]) -> Models | None:
+    """Return models of all six channels; None if gyros or accelerometers have no white noise."""
+    usable = {name: model for name, model in models.items() if model.N > 0.0}
+    quantities = {quantity_of(name) for name in usable}
+    return complete_axes(usable) if quantities >= {"gyro", "accel"} else None
+
+
+def collect_tunings(
+    folder: Path, sensor: str, declared: Sensor | None, horizon: float, stand_in: Models
+) -> tuple[dict[str, Models], dict[str, str]]:
+    """Return the tunings from a recording and the datasheet of its sensor, and why others lack.
+
+    Both by name. ``horizon``, s, is for the overbound; ``stand_in`` replaces the channels of a
+    quantity that the recording does not have.
+    """
+    every = read_estimates(folder / "parameters.parquet", folder / "draws.parquet")
+    best = read_recommended_estimates(folder / "parameters.parquet", folder / "draws.parquet")
+    named = _make_printed_models(sensor, declared)
+    lacking: dict[str, str] = {}
+    ten = {name: scale_model(estimate.model, _TENFOLD_FACTOR) for name, estimate in best.items()}
+    named |= {TENFOLD: ten, TABLE_1: _select_method(every, "authors")}
+    named |= {method: _select_method(every, method) for method in _ESTIMATION_METHODS}
+    try:
+        # The smallest models of white noise and a walk above the curves.
+        table, bounds = read("allan", [folder / "allan.parquet"]), {}
+        for channel, estimate in best.items():
+            curve = curve_of(AllanRow.rows_of(table.filter(pc.field("channel") == channel)))
+            rate = float(curve.cluster_size[0] / curve.tau[0])
+            drawn = estimate.draws
+            many = [drawn.model(k) for k in range(len(drawn))] if drawn is not None else []
+            bounds[channel] = overbound(
+                curve,
+                estimate.model,
+                rate,
+                horizon=horizon,
+                drawn=many,
+                most_excess=_TENFOLD_FACTOR,
+            ).model
+        named[OVERBOUND] = bounds
+    except ValueError as error:
+        lacking[OVERBOUND] = str(error)
+    replaced = {quantity_of(channel) for channel in stand_in}
+    found = {}
+    for name, models in named.items():
+        if not models:
+            continue
+        own = {c: m for c, m in models.items() if quantity_of(c) not in replaced}
+        whole = complete_noise_models(own | stand_in)
+        if whole is None:
+            lacking[name] = "it tells no white noise of a gyro or of an accelerometer"
+        else:
+            found[name] = whole
+    return found, lacking
+
+
+def scale_model(model: NoiseModel, factor: float) -> NoiseModel:
+    """Return the model of a signal that is a factor larger; a ramp and lines are left out."""
+    return NoiseModel(
+        Q=model.Q * factor,
+        N=model.N * factor,
+        B=model.B * factor,
+        T_B=model.T_B,
+        K=model.K * factor,
+        further=tuple(term.scaled(factor) for term in model.further),
+    )
+
+
+def _select_method(every: Mapping[str, Sequence[Estimate]], method: str) -> Models:
+    """Return the models of a method without a ramp and lines: no filter expects them to go on."""
+    return {
+        channel: scale_model(estimate.model, 1.0)
+        for channel, own in every.items()
+        for estimate in own
+        if estimate.method == method
+    }
+
+
+def _make_printed_models(sensor: str, declared: Sensor | None) -> dict[str, Models]:
+    """Return what the datasheet says, read right, and as Maia et al. read it."""
+    if declared is None:
+        return {}
+    try:
+        axes = from_datasheet(sensor, declared, 0).imu.axes
+    except ConfigError:
+        return {}
+    right = {channel: model.noise for channel, model in axes.items()}
+    wrong = {}
+    for channel, noise in right.items():
+        halved = any(
+            row.statistic == "N" and row.sidedness == "one-sided" and row.quantity == "N"
+            for row in read_comparables(declared.datasheet, channel)
+            if row.value == noise.N
+        )
+        # A one-sided density for N, and the lowest point of the curve for B.
+        factor = math.sqrt(2.0) if halved else 1.0
+        wrong[channel] = replace(noise, N=noise.N * factor, B=noise.B * FLOOR)
+    return {DATASHEET: right, MISREAD: wrong}
 
 
 @dataclass(frozen=True)
@@ -120,22 +230,16 @@ def navigate(folders: Sequence[Path], sensor: str, settings: str) -> Iterator[Na
             lacking = f"samples of {rate:.3g} Hz; expected {_MIN_RATE:g} Hz or more"
         elif complete_noise_models(fitted) is None:
             lacking = "the recording tells no white noise of a gyro"
+        names: dict[str, Any] = {"sensor": sensor, "recording": about.recording}
         if lacking is not None:
             for course in how.trajectories:
-                yield NavigationRow(
-                    sensor=sensor,
-                    recording=about.recording,
-                    tuning=TRUE,
-                    trajectory=course,
-                    reason=lacking,
-                )
+                yield NavigationRow(**names, tuning=TRUE, trajectory=course, reason=lacking)
             return
         longest = max(parse_quantity(length, "time") for length in how.outages)
         tuned, lacking_of = collect_tunings(folder, sensor, declared, longest, stand_in)
         truth = truths.get(about.recording)
         methods = [each.method for each in best.values()]
         chosen = max(sorted(set(methods)), key=methods.count)
-        names = {"sensor": sensor, "recording": about.recording}
         for source in _list_sources(folder, about, rate, fitted, stand_in, truth, how):
             for row in _make_rows(names, how, source, tuned, lacking_of):
                 yield replace(
@@ -194,13 +298,9 @@ def _list_sources(
     axes = complete_axes(
         {channel: replace(model, bias=0.0, scale_error=0.0) for channel, model in axes.items()}
     )
-    true = {
-        channel: replace(model.noise, N=in_the_log(model, logged))
-        for channel, model in axes.items()
-    }
-    change = (
-        parse_difference(how.temperature_change, "temperature") if how.temperature_change else 0.0
-    )
+    true = {name: replace(model.noise, N=in_the_log(model, logged)) for name, model in axes.items()}
+    warming = how.temperature_change
+    change = parse_difference(warming, "temperature") if warming else 0.0
     reference = next((m.drift.reference for m in axes.values() if m.drift is not None), 25.0)
     block = max(math.ceil(logged / parse_quantity(how.rate, "frequency") - 1e-6), 1)
     sampling = logged / block

@@ -26,8 +26,6 @@ TUNINGS = {
     "likelihood_gm": "likelihood of the papers’ model",
     "compensated": "temperature compensated",
 }
-"""Name of each tuning on the page."""
-
 _SIGNAL_TEXTS: Mapping[str | None, str] = {
     None: NO_VALUE,
     "truth": "simulated from the truth",
@@ -37,8 +35,7 @@ _SIGNAL_TEXTS: Mapping[str | None, str] = {
 
 _CONSISTENT_TEXTS = {True: "yes", False: "no", None: "not determined"}
 
-_MIN_RELEVANT_RATIO = 1.1
-"""Ratio of the error to that of the true model from which a tuning matters."""
+_MIN_RELEVANT_RATIO = 1.1  # error over that of the true model from which a tuning matters
 
 
 def _make_context(site: Site) -> dict[str, Any]:
@@ -78,14 +75,12 @@ NAVIGATION = Entry(
     exists=lambda site: bool(site.rows(NavigationRow)),
     place=1,
 )
-"""The page of navigation filters with different tunings."""
 
 
 def describe_tunings(rows: Sequence[NavigationRow]) -> Iterator[dict[str, Any]]:
     """Yield, for each sensor, trajectory and kind of signals, whether the tuning matters.
 
-    The criterion is the position error after the longest outage, relative to the true model on the
-    same signals.
+    The criterion is the position error after the longest outage, relative to the true model.
     """
     groups: dict[tuple[str, str | None, str | None], list[NavigationRow]] = {}
     for row in rows:

@@ -9,28 +9,20 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.stats import chi2, t
 
 from imubench_pipeline.extensions.aided.axis_states import AxisStates, StackedStates, stack_axes
-from imubench_pipeline.extensions.aided.error_state import run_filter
+from imubench_pipeline.extensions.aided.error_state import DEGREES_OF_FREEDOM, GROUPS, run_filter
 from imubench_pipeline.extensions.aided.signals import Signals
 from imubench_pipeline.extensions.aided.strapdown import write_rotation
 from imubench_pipeline.extensions.aided.trajectories import Trajectory
 from imubench_pipeline.typing import Array
 
-FIX_INTERVAL = 1.0
-"""Time between two fixes, s, rounded to whole samples."""
-
-MAX_STEP = 0.1
-"""Longest step over which transition and noise are accumulated, s."""
-
-INITIAL_TILT_SIGMA, INITIAL_HEADING_SIGMA = math.radians(0.5), math.radians(2.0)
-"""Initial standard deviations of tilt and heading, rad."""
-
-WARM_UP = 120.0
-"""Time with GNSS before the evaluation begins, s."""
-
-RECOVERY_TIME = 40.0
-"""Time with GNSS between two outages, s."""
+FIX_INTERVAL = 1.0  # time between two fixes, s, rounded to whole samples
+MAX_STEP = 0.1  # longest step over which transition and noise are accumulated, s
+INITIAL_TILT_SIGMA, INITIAL_HEADING_SIGMA = math.radians(0.5), math.radians(2.0)  # rad
+WARM_UP = 120.0  # time with GNSS before the evaluation begins, s
+RECOVERY_TIME = 40.0  # time with GNSS between two outages, s
 
 
 @dataclass(frozen=True)
@@ -159,3 +151,92 @@ class Drive:
             )
             outcomes[name] = Outcome(errors, variances, normalised, states.states)
         return outcomes
+
+
+ERRORS = {"position": [0, 1], "velocity": [3, 4], "heading": [8]}
+"""Columns of the evaluated errors: horizontal position and velocity, and heading; m, m/s, rad."""
+
+
+@dataclass(frozen=True)
+class Interval:
+    """A value with its 95 % limits."""
+
+    value: float
+    lower: float
+    upper: float
+
+
+@dataclass(frozen=True)
+class Share:
+    """A share of the epochs and its standard error, at least from the scatter of the runs."""
+
+    value: float
+    error: float
+
+
+def select_epochs(drive: Drive, length: float | None) -> NDArray[np.bool_]:
+    """Return a mask of the epochs in outages of this length, s; None: fixes after warm-up."""
+    if length is None:
+        return np.asarray(drive.available & (drive.times > WARM_UP))
+    chosen = np.zeros(len(drive.times), dtype=np.bool_)
+    chosen[drive.of_outages(length)] = True
+    return chosen
+
+
+def compute_mean_squares(drive: Drive, outcome: Outcome, error: str, length: float | None) -> Array:
+    """Return the mean square of an error at the end of outages (None: at all fixes), shape (R,)."""
+    return _average_epochs(drive, outcome.errors[:, :, ERRORS[error]] ** 2, length)
+
+
+def predict_root_mean_square(
+    drive: Drive, outcome: Outcome, error: str, length: float | None
+) -> float:
+    """Return the root mean square of an error by the variances of the filter."""
+    return math.sqrt(_average_epochs(drive, outcome.variances[:, :, ERRORS[error]], length).mean())
+
+
+def _average_epochs(drive: Drive, parts: Array, length: float | None) -> Array:
+    """Return the mean over epochs, or exact ends of outages, of sums of parts, (R, E, parts)."""
+    total = parts.sum(axis=2)
+    if length is None:
+        return np.asarray(total[:, select_epochs(drive, None)].mean(axis=1))
+    last = drive.of_outages(length)[:, -1]
+    beyond = (last[0] - drive.of_outages(length)[0, 0] + 1) - length / drive.period
+    return np.asarray(((1.0 - beyond) * total[:, last] + beyond * total[:, last - 1]).mean(axis=1))
+
+
+def compute_root_mean_square(of_runs: Array) -> Interval:
+    """Return the root of the mean of mean squares, shape (R,), with limits from their scatter."""
+    mean = float(of_runs.mean())
+    return _compute_interval(math.sqrt(mean), of_runs / mean)
+
+
+def compute_ratio(of_runs: Array, others: Array) -> Interval:
+    """Return the ratio of two such roots of the same runs, shapes (R,)."""
+    square = float(of_runs.mean() / others.mean())
+    return _compute_interval(math.sqrt(square), (of_runs - square * others) / of_runs.mean())
+
+
+def _compute_interval(value: float, relative: Array) -> Interval:
+    """Return limits of a root, from the scatter of the relative terms of its square."""
+    runs = len(relative)
+    spread = 0.5 * float(relative.std(ddof=1)) / math.sqrt(runs)
+    factor = math.exp(float(t.ppf(0.975, runs - 1)) * spread)
+    return Interval(value, value / factor, value * factor)
+
+
+def compute_nees_share(
+    drive: Drive, outcome: Outcome, group: str, length: float | None
+) -> Share | None:
+    """Return the share of epochs whose NEES of a group is within 95 % bounds; None if unknown."""
+    place = GROUPS.index(group)
+    nees = outcome.normalised[:, select_epochs(drive, length), place]
+    if np.isnan(nees).any():
+        return None
+    low, high = (float(chi2.ppf(chance, DEGREES_OF_FREEDOM[place])) for chance in (0.025, 0.975))
+    of_runs = np.mean((nees > low) & (nees < high), axis=1)
+    scatter = float(of_runs.std(ddof=1)) / math.sqrt(len(of_runs))
+    # A few runs may all be inside by chance: one outage or minute counts as one independent epoch.
+    stretches = len(drive.of_outages(length)) if length is not None else int(drive.times[-1] // 60)
+    least = math.sqrt(0.95 * 0.05 / (len(of_runs) * max(stretches, 1)))
+    return Share(float(of_runs.mean()), max(scatter, least))

@@ -57,25 +57,12 @@ def simulate_signals(
     temperature: Signal | None = None,
     added: Mapping[str, Array] | None = None,
 ) -> Signals:
-    """Simulate a run.
+    """Simulate a run on all six axes, with ``every`` samples between two fixes.
 
-    Parameters
-    ----------
-    trajectory : Trajectory
-    axes : mapping of str to SensorModel
-        All six channels.
-    spreads : Spreads
-    every : int
-        Samples between two fixes.
-    seed : int
-    names : tuple of str
-        Such as sensor, trajectory and number of the run; with the seed they set all random numbers.
-    block : int
-        Number of sensor samples per sample of the trajectory, which is their mean.
-    temperature : callable, optional
-        °C at the samples of the sensor, as in `simulate.simulation.simulate_blocks`.
-    added : mapping of str to ndarray, shape (L,)
-        Errors of channels that replace simulated noise: pieces of a log at rest.
+    ``names``, such as sensor, trajectory and number of the run, set all random numbers with the
+    seed. A sample of the trajectory is the mean of ``block`` samples of the sensor. ``temperature``
+    is in °C, as in `simulate.simulation.simulate_blocks`. ``added``, shapes (L,), are errors of
+    channels that replace simulated noise: pieces of a log at rest.
     """
     L, rate = len(trajectory.rate), trajectory.sampling * block
     at = np.arange(every, L + 1, every)

@@ -7,6 +7,18 @@ from typing import Annotated
 from imubench_pipeline.model.table import Column, SensorRow, table
 
 
+def _lower(unit: str) -> Column:
+    return Column("lower 95 % limit, by the scatter of the runs", unit)
+
+
+def _rms(where: str, unit: str) -> Column:
+    meaning = f"rms of the error {where}, at the end of outages or at all fixes"
+    return Column(meaning, unit)
+
+
+_RATIO = Column("rms relative to the true model on the same signals")
+
+
 @table("navigation")
 class NavigationRow(SensorRow):
     """A row of the table ``navigation``."""
@@ -42,46 +54,25 @@ class NavigationRow(SensorRow):
     ] = None
     runs: Annotated[int | None, Column("that a row is of")] = None
     outages: Annotated[int | None, Column("of this length in all runs")] = None
-    position: Annotated[
-        float | None,
-        Column("rms of the error in the plane, at the end of outages or at all fixes", "m"),
-    ] = None
-    position_lower: Annotated[
-        float | None, Column("lower 95 % limit, by the scatter of the runs", "m")
-    ] = None
+    position: Annotated[float | None, _rms("in the plane", "m")] = None
+    position_lower: Annotated[float | None, _lower("m")] = None
     position_upper: Annotated[float | None, Column("upper 95 % limit", "m")] = None
     position_predicted: Annotated[float | None, Column("rms that the filter expects", "m")] = None
-    position_ratio: Annotated[
-        float | None, Column("rms relative to the true model on the same signals")
-    ] = None
+    position_ratio: Annotated[float | None, _RATIO] = None
     position_ratio_lower: Annotated[float | None, Column("lower 95 % limit")] = None
     position_ratio_upper: Annotated[float | None, Column("upper 95 % limit")] = None
-    velocity: Annotated[
-        float | None,
-        Column("rms of the error in the plane, at the end of outages or at all fixes", "m/s"),
-    ] = None
-    velocity_lower: Annotated[
-        float | None, Column("lower 95 % limit, by the scatter of the runs", "m/s")
-    ] = None
+    velocity: Annotated[float | None, _rms("in the plane", "m/s")] = None
+    velocity_lower: Annotated[float | None, _lower("m/s")] = None
     velocity_upper: Annotated[float | None, Column("upper 95 % limit", "m/s")] = None
     velocity_predicted: Annotated[float | None, Column("rms that the filter expects", "m/s")] = None
-    velocity_ratio: Annotated[
-        float | None, Column("rms relative to the true model on the same signals")
-    ] = None
+    velocity_ratio: Annotated[float | None, _RATIO] = None
     velocity_ratio_lower: Annotated[float | None, Column("lower 95 % limit")] = None
     velocity_ratio_upper: Annotated[float | None, Column("upper 95 % limit")] = None
-    heading: Annotated[
-        float | None,
-        Column("rms of the error about the vertical, at the end of outages or at all fixes", "rad"),
-    ] = None
-    heading_lower: Annotated[
-        float | None, Column("lower 95 % limit, by the scatter of the runs", "rad")
-    ] = None
+    heading: Annotated[float | None, _rms("about the vertical", "rad")] = None
+    heading_lower: Annotated[float | None, _lower("rad")] = None
     heading_upper: Annotated[float | None, Column("upper 95 % limit", "rad")] = None
     heading_predicted: Annotated[float | None, Column("rms that the filter expects", "rad")] = None
-    heading_ratio: Annotated[
-        float | None, Column("rms relative to the true model on the same signals")
-    ] = None
+    heading_ratio: Annotated[float | None, _RATIO] = None
     heading_ratio_lower: Annotated[float | None, Column("lower 95 % limit")] = None
     heading_ratio_upper: Annotated[float | None, Column("upper 95 % limit")] = None
     nees_inside: Annotated[

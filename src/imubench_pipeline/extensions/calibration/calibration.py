@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -74,48 +74,48 @@ _RUN_PARAMETERS = {"rate_table": ("bias", "scale_factor"), "at_rest": ("bias", "
 
 def make_calibration_tables(
     folder: Path, static: Sequence[Path], sensor: str, recording: str, settings: str
-) -> dict[str, Sequence[TableRow]]:
+) -> dict[str, list[TableRow]]:
     """Return the rows of the tables of a gyro on a rate table, or at rest with a known direction.
 
     `folder`: of the recording; `static`: of the static recordings of the same sensor; `settings`:
     of `imubench_pipeline.run.plan.Plan.experiment_settings`. A rejected recording has no rows.
     """
-    rows: dict[str, Sequence[TableRow]] = {name: [] for name in CALIBRATED}
+    tables: dict[str, list[TableRow]] = {name: [] for name in CALIBRATED}
     logs = load_logs(folder)
     if not logs:
-        return rows
+        return tables
     sections = json.loads(settings)
     simulated = None
     if "simulated" in sections:
         simulated = SimulatedRecording.model_validate(sections["simulated"])
     declared = _declared(sections, simulated)
     stated = Sensor.model_validate(sections["sensor"])
+    rows: Iterator[TableRow]
     if isinstance(declared, InPositions):
         triad = None if simulated is None else simulated.block(SimulatedPositions)
         truth = {} if triad is None else triad.true_angles
-        attitude = _attitude(
-            Key(sensor, recording, "gyro_x"), logs, static, stated, declared, truth
-        )
-        return rows | {"calibration": list(attitude)}
-    # Of several gyros the notes name one: the ingest has seen to it.
-    metadata = read_metadata(next(iter(logs.values())).path)
-    gyros = (name for name in [*logs, *metadata["unusable"]] if name.startswith("gyro_"))
-    channel: str = declared.channel or next(gyros)
-    key = Key(sensor, recording, channel)
-    if channel not in logs:
-        run = "rate_table" if isinstance(declared, OnRateTable) else "at_rest"
-        reason = f"{channel} cannot be used; the findings of the recording say why"
-        return rows | vars(_without(asdict(key) | {"run": run}, "not_shown", reason))
-    log = GyroLog(
-        key,
-        logs[channel],
-        find_noise_source(folder, static, key, stated),
-        metadata.get("begins", 0.0),
-        _truth(simulated, channel),
-    )
-    if isinstance(declared, OnRateTable):
-        return rows | vars(_on_rate_table(log, declared))
-    return rows | vars(_at_rest(log, declared))
+        rows = _attitude(Key(sensor, recording, "gyro_x"), logs, static, stated, declared, truth)
+    else:
+        # Of several gyros the notes name one: the ingest has seen to it.
+        metadata = read_metadata(next(iter(logs.values())).path)
+        gyros = (name for name in [*logs, *metadata["unusable"]] if name.startswith("gyro_"))
+        channel: str = declared.channel or next(gyros)
+        key = Key(sensor, recording, channel)
+        if channel not in logs:
+            run = "rate_table" if isinstance(declared, OnRateTable) else "at_rest"
+            reason = f"{channel} cannot be used; the findings of the recording say why"
+            rows = _without(asdict(key) | {"run": run}, "not_shown", reason)
+        else:
+            source = find_noise_source(folder, static, key, stated)
+            begins, truth = metadata.get("begins", 0.0), _truth(simulated, channel)
+            log = GyroLog(key, logs[channel], source, begins, truth)
+            if isinstance(declared, OnRateTable):
+                rows = _on_rate_table(log, declared)
+            else:
+                rows = _at_rest(log, declared)
+    for row in rows:
+        tables[row.table].append(row)
+    return tables
 
 
 def _declared(
@@ -148,14 +148,6 @@ def _truth(simulated: SimulatedRecording | None, channel: str) -> dict[str, floa
     if (table := simulated.block(SimulatedTable)) is not None:
         truth |= {"scale_factor": table.scale_factor, "quadratic": 0.0, "asymmetry": 0.0}
     return truth
-
-
-@dataclass
-class Rows:
-    """Rows of the tables of a calibration."""
-
-    calibration: list[CalibrationRow] = field(default_factory=list)
-    calibration_points: list[CalibrationPointRow] = field(default_factory=list)
 
 
 @dataclass(frozen=True)
@@ -201,9 +193,8 @@ def _attitude(
         reason = f"{', '.join(missing)} cannot be used; the findings of the recording say why"
         yield from without("not_shown", reason)
         return
-    axes = [logs[name] for name in TRIAD]
-    if any(len(log.segments) > 1 for log in axes):
-        yield from without("not_shown", explain_segments(axes[0]))
+    if any(len(logs[name].segments) > 1 for name in TRIAD):
+        yield from without("not_shown", explain_segments(logs[TRIAD[0]]))
         return
     at_rest = load_noise_at_rest(static)
     if at_rest is not None and any(channel.startswith("accel") for channel in at_rest.models):
@@ -218,7 +209,7 @@ def _attitude(
         models, words = [source.model for source in known], known[0].words
     about = partial(about, model=models[0].name, model_from=words)
     try:
-        positions, means = _average_positions(axes, declared)
+        positions, means = _average_positions([logs[name] for name in TRIAD], declared)
         triad = Triad(
             gyros=models[:3],
             accelerometers=models[3:],
@@ -278,19 +269,22 @@ def _average_positions(
     return Positions(blocks, rotation(angles)), means
 
 
-def _at_rest(gyro: GyroLog, declared: AtRest) -> Rows:
-    """Return the bias of a gyro with a stated direction, or the reason why there is none."""
+def _at_rest(gyro: GyroLog, declared: AtRest) -> Iterator[TableRow]:
+    """Yield the bias of a gyro with a stated direction, or the reason why there is none."""
     pointing = declared.pointing
     names = gyro.names("at_rest", pointing)
     if len(gyro.log.segments) > 1:
-        return _without(names, "not_shown", explain_segments(gyro.log))
+        yield from _without(names, "not_shown", explain_segments(gyro.log))
+        return
     if gyro.source is None:
-        return _without(names, "no_model", NO_MODEL)
+        yield from _without(names, "no_model", NO_MODEL)
+        return
     samples = place_on_grid(gyro.log.blocks(), gyro.log.grid)
     try:
         bias = bias_at_rest(samples, gyro.log.rate, gyro.source.model, pointing)
     except ValueError as error:
-        return _without(names, "too_short", str(error))
+        yield from _without(names, "too_short", str(error))
+        return
     about = names | {
         "duration": len(samples) / gyro.log.rate,
         "samples": int(np.isfinite(samples).sum()),
@@ -301,31 +295,35 @@ def _at_rest(gyro: GyroLog, declared: AtRest) -> Rows:
     fixed = _figure(gyro, "bias", bias.fixed, bias.fixed_sigma, limits, noise)
     limits, noise = bias.present_interval(), bias.present_noise_sigma
     present = _figure(gyro, "present_bias", bias.present, bias.present_sigma, limits, noise)
-    estimated = [CalibrationRow(**(about | row)) for row in (fixed, present)]
-    return Rows([*estimated, *_open(names, bias.not_observable)])
+    for row in (fixed, present):
+        yield CalibrationRow(**(about | row))
+    yield from _open(names, bias.not_observable)
 
 
-def _on_rate_table(gyro: GyroLog, declared: OnRateTable) -> Rows:
-    """Return scale factor and bias of a gyro on a rate table, or the reason without them."""
+def _on_rate_table(gyro: GyroLog, declared: OnRateTable) -> Iterator[TableRow]:
+    """Yield scale factor and bias of a gyro on a rate table, or the reason without them."""
     pointing = None if declared.axis is None else declared.axis.pointing
     names = gyro.names("rate_table", pointing)
     if len(gyro.log.segments) > 1:
-        return _without(names, "not_shown", explain_segments(gyro.log))
+        yield from _without(names, "not_shown", explain_segments(gyro.log))
+        return
     try:
         schedule = _schedule(gyro, declared)
     except ValueError as error:
-        return _without(names, "too_short", str(error))
+        yield from _without(names, "too_short", str(error))
+        return
     if gyro.source is None:
-        return _without(names, "no_model", NO_MODEL)
+        yield from _without(names, "no_model", NO_MODEL)
+        return
     model = gyro.source.model
     setting = declared.si("setting_sigma", "angular_rate")
     samples = place_on_grid(gyro.log.blocks(), gyro.log.grid)
     try:
         fit, measured = calibrate(samples, schedule, model, pointing, setting_sigma=setting)
-    except NotObservableError as error:
-        return _without(names, "not_observable", str(error))
     except ValueError as error:
-        return _without(names, "too_short", str(error))
+        status = "not_observable" if isinstance(error, NotObservableError) else "too_short"
+        yield from _without(names, status, str(error))
+        return
     earth = 0.0 if pointing is None else pointing.rate
     rates = schedule.of_blocks(measured.blocks) + earth
     left = residuals(fit, measured, rates, model, setting)
@@ -335,25 +333,23 @@ def _on_rate_table(gyro: GyroLog, declared: OnRateTable) -> Rows:
         "rates": len(left.dwell),
         "scatter": _finite(fit.line.p_value[0]) if fit.line.freedom else None,
     }
-    rows = Rows([CalibrationRow(**(about | row)) for row in _line(gyro, fit)])
-    rows.calibration += _open(names, fit.not_observable)
+    for row in _line(gyro, fit):
+        yield CalibrationRow(**(about | row))
+    yield from _open(names, fit.not_observable)
     for k, dwell in enumerate(left.dwell.tolist()):
         stretch = schedule.stretches[dwell]
-        rows.calibration_points.append(
-            CalibrationPointRow(
-                **asdict(gyro.key),
-                number=dwell + 1,
-                start=stretch.start / schedule.rate + gyro.begins,
-                stop=stretch.stop / schedule.rate + gyro.begins,
-                table_rate=float(schedule.table_rates[dwell]),
-                earth_rate=earth,
-                mean=float(left.mean[k]),
-                line=float(left.line[k]),
-                residual=float(left.value[k]),
-                sigma=float(left.sigma[k]),
-            )
+        yield CalibrationPointRow(
+            **asdict(gyro.key),
+            number=dwell + 1,
+            start=stretch.start / schedule.rate + gyro.begins,
+            stop=stretch.stop / schedule.rate + gyro.begins,
+            table_rate=float(schedule.table_rates[dwell]),
+            earth_rate=earth,
+            mean=float(left.mean[k]),
+            line=float(left.line[k]),
+            residual=float(left.value[k]),
+            sigma=float(left.sigma[k]),
         )
-    return rows
 
 
 def _schedule(gyro: GyroLog, declared: OnRateTable) -> Schedule:
@@ -441,11 +437,11 @@ def _open(
         )
 
 
-def _without(names: Mapping[str, Any], status: str, reason: str) -> Rows:
-    """Return the rows of a run without estimates."""
+def _without(names: Mapping[str, Any], status: str, reason: str) -> Iterator[CalibrationRow]:
+    """Yield the rows of a run without estimates."""
     about = {**names, "status": status, "reason": reason}
-    parameters = _RUN_PARAMETERS[names["run"]]
-    return Rows([CalibrationRow(**about, parameter=one, unit=UNITS[one]) for one in parameters])
+    for name in _RUN_PARAMETERS[names["run"]]:
+        yield CalibrationRow(**about, parameter=name, unit=UNITS[name])
 
 
 def _finite(value: float) -> float | None:

@@ -22,8 +22,7 @@ from imubench_pipeline.typing import Array
 
 Integers = NDArray[np.int64]
 
-# Least share of the samples of a block that must be present, or its mean is left out
-_MIN_PRESENT_SHARE = 0.5
+_MIN_PRESENT_SHARE = 0.5  # of the samples of a block, or its mean is left out
 
 
 @dataclass(frozen=True)
@@ -86,8 +85,7 @@ class Experiment:
         """Return an experiment that keeps to a schedule.
 
         ``dwell`` is the data in each dwell (at least one sample), ``turning`` the time between two,
-        in s, rounded to whole samples; the rate is in Hz, the latitude in rad. ``first`` is the
-        sense of the first dwell.
+        in s; the rate in Hz, the latitude in rad; ``first``: sense of the first dwell.
         """
         length = max(round(dwell * rate), 1)
         period = length + max(round(turning * rate), 0)
@@ -103,10 +101,9 @@ class Experiment:
         return sum(dwell.stop - dwell.start for dwell in self.dwells)
 
     def blocks(self, longest: int) -> Blocks:
-        """Return the blocks of a log without missing samples.
+        """Return the blocks of a log without missing samples, of ``longest`` samples at most.
 
-        Of ``longest`` samples at most; a dwell is divided evenly (`block_length`). Raises
-        ValueError if it is below 1.
+        Raises ValueError if ``longest`` is below 1.
         """
         if longest < 1:
             raise ValueError(f"a block of {longest} samples is empty")
@@ -172,10 +169,7 @@ class Blocks:
         return float(self.count.sum()) / self.rate
 
     def check_means(self, means: Array) -> None:
-        """Raise a ValueError if there is not one finite mean a block: without one a block is none.
-
-        The means have the shape (runs, b), see `block_means`.
-        """
+        """Raise ValueError if the means are not finite, of shape (runs, b)."""
         if means.ndim != 2 or means.shape[1] != len(self):
             raise ValueError(
                 f"the means have the shape {means.shape}, expected {len(self)} columns"
@@ -202,10 +196,7 @@ class Blocks:
         return replace(self.chosen(first), stop=self.stop[last], count=count)
 
     def means_of_dwells(self, means: Array) -> Array:
-        """Return the mean of each dwell over its samples present, shape (runs, dwells).
-
-        Of the means of blocks, rad/s, shape (runs, b).
-        """
+        """Return the means of dwells, (runs, dwells), from those of blocks, shape (runs, b)."""
         first = np.flatnonzero(np.diff(self.dwell, prepend=-1))
         total = np.add.reduceat(means * self.count, first, axis=1)
         return np.asarray(total / np.add.reduceat(self.count, first))
@@ -225,13 +216,12 @@ class Measured:
 def block_means(parts: Iterable[Array], experiment: Experiment, longest: int) -> Measured:
     """Return the means of blocks, of ``longest`` samples at most, of a log, in one pass.
 
-    The mean is over the samples present. Its white noise depends on their number; its slow noise is
-    taken as for a complete block. Therefore a block with more than half of its samples missing is
-    left out; its length still counts as a gap. With a third of all samples missing, a standard
-    deviation is right to 1 %, or 3 % too small if most of the noise is a process with a correlation
-    time of two samples. The parts of the log are in order, rad/s, each ndarray of one axis; NaN
-    where a sample is missing. Raises ValueError if the log ends before the last dwell does, or no
-    block has enough samples.
+    The mean is over the samples present; its slow noise is taken as for a complete block.
+    Therefore a block with more than half of its samples missing is left out. With a third of all
+    samples missing, a standard deviation is right to 1 %, or 3 % too small if most of the noise is
+    a process with a correlation time of two samples. The parts of the log are in order, rad/s, each
+    ndarray of one axis; NaN where a sample is missing. Raises ValueError if the log ends before the
+    last dwell does, or no block has enough samples.
     """
     whole = experiment.blocks(longest)
     total, count = np.zeros(len(whole)), np.zeros(len(whole), dtype=np.int64)
@@ -265,9 +255,7 @@ def block_mean_covariance(model: NoiseModel, blocks: Blocks) -> Array:
 
     It is the covariance of the samples, as `noise.simulate` draws them, summed over the blocks,
     without the fixed bias and the Earth's rate. The random walk counts from the first sample of the
-    first block; flicker noise is its bank of Gauss-Markov processes, up to the duration of the
-    blocks. It is independent of the filter, so that bounds and standard errors computed with it
-    check the filter.
+    first block; flicker noise is its bank of Gauss-Markov processes.
     """
     total = np.zeros((len(blocks), len(blocks)))
     for term in model.realised(1.0 / blocks.rate, longest_tau(blocks)):

@@ -26,18 +26,20 @@ from functools import cached_property
 import numpy as np
 from scipy.linalg import solve_triangular
 
-from imubench_pipeline.extensions.calibration.block_filter import (
+from imubench_pipeline.extensions.calibration.experiment import Blocks
+from imubench_pipeline.extensions.calibration.states import (
+    UNINFORMATIVE_SIGMA,
     BlockFilter,
     compute_deviation,
+    discretise_blocks,
     triangularise,
 )
-from imubench_pipeline.extensions.calibration.experiment import Blocks
-from imubench_pipeline.extensions.calibration.states import UNINFORMATIVE_SIGMA, discretise_blocks
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.typing import Array
 
-# Relative singular value of a predicted root with unit rows, below which it is rounding
-_SINGULAR_TOLERANCE = 1e-12
+_SINGULAR_TOLERANCE = (
+    1e-12  # relative singular value of a predicted root below which it is rounding
+)
 
 
 @dataclass(frozen=True)
@@ -64,19 +66,17 @@ class Filtered:
         return np.asarray((self.innovation / self.innovation_sigma) ** 2)
 
     def rate_nees(self, rate: float) -> Array:
-        """Return the squared error of the rate over its variance, shape (runs, b).
+        """Return the squared error of the rate, rad/s, over its variance, shape (runs, b).
 
-        Chi-squared of one degree of freedom for a consistent filter, once both positions have been
-        observed and the prior no longer matters. The true rate is in rad/s.
+        Chi-squared of one degree of freedom, once both positions have been observed.
         """
         return np.asarray(((self.rate - rate) / self.rate_sigma) ** 2)
 
     def nees(self, rate: float, states: Array) -> Array:
         """Return the normalised estimation error squared of rate and all states, shape (runs, b).
 
-        Chi-squared of m + 1 degrees of freedom; see `rate_nees`. Not finite where a state is known
-        exactly. The true rate is in rad/s, the true states, at the sample after each block, are of
-        shape (runs, b, m).
+        Chi-squared of m + 1 degrees of freedom; not finite where a state is known exactly. The true
+        rate is in rad/s, the true states after each block of shape (runs, b, m).
         """
         error = self.states[:, :, :-1].copy()
         error[:, :, 0] -= rate
@@ -104,10 +104,9 @@ class Smoothed:
 class RateFilter:
     """The filter of one design: blocks and noise model. It filters any number of runs at once.
 
-    Flicker noise of the model is a bank of Gauss-Markov processes; a ramp and lines are estimated,
-    see `states.block_states`. ``turn_on_bias`` is the standard deviation of the fixed bias,
-    ``rate_sigma`` of the prior of the rate about 0, both in rad/s and by default uninformative.
-    Raises ValueError if one of them is negative or not finite.
+    ``turn_on_bias`` is the standard deviation of the fixed bias, ``rate_sigma`` of the prior of the
+    rate about 0, both in rad/s and by default uninformative. Raises ValueError if one of them is
+    negative or not finite.
     """
 
     def __init__(
@@ -138,8 +137,7 @@ class RateFilter:
     def run(self, means: Array) -> Filtered:
         """Filter runs of one design from block means, rad/s, shape (runs, b).
 
-        Raises ValueError if there is not one mean a block, or one is not finite: a block without a
-        mean is no block (`experiment.block_means`).
+        Raises ValueError if there is not one finite mean a block.
         """
         self.blocks.check_means(means)
         states, innovation = self._filter.run(means[:, :, None])

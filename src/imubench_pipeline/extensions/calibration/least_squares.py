@@ -30,11 +30,8 @@ from imubench_pipeline.typing import Array
 
 _MAX_SIGMA_INCREASE = 1e-3  # largest relative increase of a standard error by longer blocks
 _MAX_BLOCKS = 1024  # largest number of blocks in the test of a block length
-# Least singular value of independent whitened regressors of unit length; others are rounding
-_MIN_SINGULAR_VALUE = 1e-8
-
+_MIN_SINGULAR_VALUE = 1e-8  # of independent whitened regressors of unit length
 CONFIDENCE_LEVEL = 0.95
-"""Confidence level of intervals."""
 
 Quantity = Literal[
     "earth_rate", "bias", "heading", "scale_factor", "asymmetry", "quadratic", "linearity"
@@ -83,10 +80,7 @@ class Fit:
 
 
 def compute_limits(value: Array, sigma: Array | float) -> Limits:
-    """Return the 95 % limits, lower and upper, of estimates with normal errors.
-
-    The standard errors have the unit of the values, and a shape that broadcasts with theirs.
-    """
+    """Return the 95 % limits, lower and upper, of estimates with normal errors, in one unit."""
     half = compute_half_width() * sigma
     return value - half, value + half
 
@@ -94,7 +88,7 @@ def compute_limits(value: Array, sigma: Array | float) -> Limits:
 def compute_half_width(level: float = CONFIDENCE_LEVEL) -> float:
     """Return half of a two-sided interval of the normal distribution, in standard deviations.
 
-    A level of 0.95 gives 1.96. Raises ValueError if it is not between 0 and 1.
+    Raises ValueError if the level is not between 0 and 1.
     """
     if not 0 < level < 1:
         raise ValueError(f"level is {level}, expected one between 0 and 1")
@@ -168,8 +162,7 @@ def choose_block_length(
 
     Blocks are shortened by halves until a fourth of their length would lower no standard error by
     0.1 %. There are 1,024 blocks at most, none longer than the longest dwell. ``regressors`` gives
-    the regressors of blocks, shape (b, p). Raises NotObservableError if samples do not determine
-    the parameters, either.
+    the regressors of blocks, shape (b, p). Raises NotObservableError if they are collinear.
     """
     length = max(dwell.stop - dwell.start for dwell in experiment.dwells)
 

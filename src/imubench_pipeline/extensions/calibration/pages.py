@@ -33,21 +33,17 @@ WORDS = {
     "earth_rate": "the Earth's rate",
     "heading": "heading",
 }
-"""Name of each figure on a page."""
 
 _PPM_PER_UNIT = 1e6
 _PERCENT_PER_UNIT = 1e2
-_RATIO_UNITS = {
+_RATIO_UNITS = {  # unit of each dimensionless quantity on a page, and the factor to it
     "scale_factor": ("", 1.0),
     "asymmetry": (" ppm", _PPM_PER_UNIT),
     "quadratic": (" ppm per °/s", _PPM_PER_UNIT * math.radians(1.0)),
     "linearity": (" %", _PERCENT_PER_UNIT),
 }
-"""Unit of each dimensionless quantity on a page, and the factor to it."""
-
-_MIN_LINEARITY_P_VALUE = 0.05  # p-value below which the response of a gyro counts as nonlinear
-# p-value below which the scatter of the means contradicts the noise model
-_MIN_SCATTER_P_VALUE = 0.01
+_MIN_LINEARITY_P_VALUE = 0.05  # below it the response of a gyro counts as nonlinear
+_MIN_SCATTER_P_VALUE = 0.01  # below it the scatter of the means contradicts the noise model
 
 
 def summarise_calibration(rows: Sequence[CalibrationRow], system: System) -> str:
@@ -160,9 +156,14 @@ def describe_earth_rate(rows: Sequence[CalibrationRow], system: System) -> str:
     if row is None:
         return "The bias includes the Earth's rate along the axis."
     unit = choose_page_unit("gyro", "adev", system)
+    direction = f"elevation {degrees_text(row.elevation)}"
+    if row.heading is not None:
+        direction = f"heading {degrees_text(row.heading)}, {direction}"
+    elif row.elevation is None or abs(math.cos(row.elevation)) >= 1e-6:
+        direction += ", no heading"
     text = (
         f"The Earth's rate along the axis, {unit.text(row.earth_rate, 4)} {unit.sign} (latitude "
-        f"{degrees_text(row.latitude)}, {_describe_direction(row)}), is subtracted"
+        f"{degrees_text(row.latitude)}, {direction}), is subtracted"
     )
     if row.half_width:
         half = f"{unit.text(row.half_width, 3)} {unit.sign}"
@@ -173,25 +174,14 @@ def describe_earth_rate(rows: Sequence[CalibrationRow], system: System) -> str:
     return text + "."
 
 
-def _describe_direction(row: CalibrationRow) -> str:
-    elevation = f"elevation {degrees_text(row.elevation)}"
-    if row.heading is not None:
-        return f"heading {degrees_text(row.heading)}, {elevation}"
-    upright = row.elevation is not None and abs(math.cos(row.elevation)) < 1e-6
-    return elevation if upright else f"{elevation}, no heading"
-
-
 Estimated = CalibrationRow | EarthRateRow
 
 
 def select_calibrated(site: Site) -> list[RecordingView]:
     """Return the recordings on a rate table, in positions, or at rest with a direction."""
     named = site.named_in(CalibrationRow)
-    return [
-        view
-        for view in site.views
-        if view.row.kind in ("rate_table", "positions") or view.full_name in named
-    ]
+    kinds = ("rate_table", "positions")
+    return [view for view in site.views if view.row.kind in kinds or view.full_name in named]
 
 
 def list_without_result(
@@ -212,7 +202,6 @@ NOT_CALIBRATED = Section(
         or None
     ),
 )
-"""The recordings without a calibration result, on the start page."""
 
 
 def make_rest_section(site: Site, view: RecordingView) -> tuple[str, dict[str, Any]] | None:
@@ -235,19 +224,16 @@ def group_by_run(site: Site) -> dict[str, list[dict[str, Any]]]:
     by_run: dict[str, list[dict[str, Any]]] = {"rate_table": [], "at_rest": [], "positions": []}
     for view in select_calibrated(site):
         rows = view.rows(CalibrationRow)
-        if not rows:
-            continue
-        if rows[0].run == "positions":
+        if rows and rows[0].run == "positions":
             by_run["positions"].append({"view": view, "lines": list(format_attitude(rows))})
-            continue
-        by_run[rows[0].run].append(
-            {
+        elif rows:
+            line = {
                 "view": view,
                 "lines": {line["parameter"]: line for line in format_estimates(rows)},
                 "answer": summarise_calibration(rows, site.system),
                 "earth": describe_earth_rate(rows, site.system),
             }
-        )
+            by_run[rows[0].run].append(line)
     return by_run
 
 
@@ -309,11 +295,10 @@ def _rate_table(site: Site, view: RecordingView, folder: Path) -> dict[str, Any]
             "channels": [],
             "findings": [],
             "table": {
-                "table_rate": arrays.exact([row.table_rate for row in points]),
-                "mean": arrays.exact([row.mean for row in points]),
-                "line": arrays.exact([row.line for row in points]),
-                "residual": arrays.exact([row.residual for row in points]),
-                "sigma": arrays.exact([row.sigma for row in points]),
+                **{
+                    name: arrays.exact([getattr(row, name) for row in points])
+                    for name in ("table_rate", "mean", "line", "residual", "sigma")
+                },
                 "number": [row.number for row in points],
             },
             "arrays": arrays.texts,
@@ -322,7 +307,6 @@ def _rate_table(site: Site, view: RecordingView, folder: Path) -> dict[str, Any]
 
 
 RATE_TABLE = RecordingPage("rate_table.html.jinja", _rate_table, "rate table")
-"""The page of a gyro on a rate table."""
 
 
 def _positions(site: Site, view: RecordingView, folder: Path) -> dict[str, Any]:
@@ -341,4 +325,3 @@ def _positions(site: Site, view: RecordingView, folder: Path) -> dict[str, Any]:
 
 
 POSITIONS = RecordingPage("positions.html.jinja", _positions, "several positions")
-"""The page of a triad that stood in several positions."""

@@ -52,9 +52,7 @@ from imubench_pipeline.extensions.calibration.schedule import Schedule
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.typing import Array
 
-# Largest unknown part of the Earth's rate along the axis that is ignored, rad/s
-_MAX_UNKNOWN_RATE = 1e-12
-
+_MAX_UNKNOWN_RATE = 1e-12  # ignored unknown part of the Earth's rate along the axis, rad/s
 _RATE_TOLERANCE = 1e-9  # relative difference below which two rates are equal up to rounding
 
 
@@ -94,8 +92,7 @@ class Linearity:
     def interval(self) -> Limits:
         """Return confidence limits of the largest true deviation, shapes (runs,).
 
-        The limits hold for all rates together (Bonferroni), since noise alone makes the largest of
-        many deviations large.
+        They hold for all rates together (Bonferroni).
         """
         half = compute_half_width(1.0 - (1.0 - CONFIDENCE_LEVEL) / self.sigma.size) * self.sigma
         size = np.abs(self.deviation)
@@ -145,10 +142,9 @@ class RateTable:
 
     The blocks are of the schedule's `experiment`; the noise model has some noise in every sample.
     ``pointing`` is the direction of the axis of table and gyro; without one the Earth's rate is a
-    part of the bias. Only a vertical axis may have no heading. ``setting_sigma``, rad/s, is the
-    standard deviation of the true rate of each stretch about the stated one. Raises
-    NotObservableError if there is one rate only: scale factor and bias are not separable. Raises
-    ValueError if the deviation is negative, or a required heading is missing.
+    part of the bias. ``setting_sigma``, rad/s, is the standard deviation of the true rate of each
+    stretch. Raises NotObservableError if there is one rate only; ValueError if the deviation is
+    negative, or the heading of an axis that is not vertical is missing.
     """
 
     def __init__(
@@ -171,7 +167,11 @@ class RateTable:
         earth = 0.0 if pointing is None else pointing.rate
         self._earth_sigma = 0.0 if pointing is None else pointing.rate_sigma
         rate = schedule.of_blocks(blocks) + earth
-        self._levels = _index_levels(rate)
+        # The index of each rate among the distinct ones, equal up to rounding.
+        order = np.argsort(rate, kind="stable")
+        risen = np.diff(rate[order], prepend=rate[order[0]]) > _RATE_TOLERANCE * np.abs(rate).max()
+        self._levels = np.empty(len(rate), dtype=np.int64)
+        self._levels[order] = np.cumsum(risen)
         number = int(self._levels.max()) + 1
         self._rates = np.array([rate[self._levels == level][0] for level in range(number)])
         if number < 2:
@@ -222,47 +222,38 @@ class RateTable:
 
         Raises ValueError if there is not one finite mean a block.
         """
-        line, quadratic = self._line.fit(means), None
+        line, quadratic, asymmetry, linearity = self._line.fit(means), None, None, None
         if (squares := self._quadratic) is not None:
             quadratic = Term(squares.fit(means).value[:, -1], float(squares.sigma[-1]))
-        asymmetry, not_observable = self._fit_asymmetry(means), self._open
-        if self._asymmetry is not None and asymmetry is None:
-            reason = (
-                "the gyro does not follow the table: there is no scale factor to be a fraction of"
+        not_observable = list(self._open)
+        if (squares := self._asymmetry) is not None:
+            fit = squares.fit(means)
+            scale = fit.value[:, 1]
+            if np.any(np.abs(scale) <= compute_half_width() * fit.sigma[1]):
+                reason = (
+                    "the gyro does not follow the table: there is no scale factor to be a fraction "
+                    "of"
+                )
+                not_observable.append(NotObservable("asymmetry", reason))
+            else:  # the error of the scale factor is of second order
+                sigma = float(squares.sigma[-1] / np.abs(scale).mean())
+                asymmetry = Term(fit.value[:, -1] / scale, sigma)
+        if self._each is not None:
+            each = self._each.fit(means)
+            explained = np.maximum(line.chi_squared - each.chi_squared, 0.0)
+            at_rates = np.column_stack([np.ones(len(self._rates)), self._rates])
+            # The line is fitted to the same means, which reduces the covariance of the residuals.
+            variance = np.diag(each.covariance - at_rates @ line.covariance @ at_rates.T)
+            full_scale = float(np.abs(self._rates).max())
+            linearity = Linearity(
+                (each.value - line.value @ at_rates.T) / full_scale,
+                np.sqrt(np.maximum(variance, 0.0)) / full_scale,
+                full_scale,
+                np.asarray(chi2.sf(explained, line.freedom - each.freedom)),
             )
-            not_observable = [*self._open, NotObservable("asymmetry", reason)]
-        linearity = self._test_linearity(line, means)
         return Calibration(
             line, self.sigma[0], quadratic, asymmetry, linearity, tuple(not_observable)
         )
-
-    def _test_linearity(self, line: Fit, means: Array) -> Linearity | None:
-        if self._each is None:
-            return None
-        each = self._each.fit(means)
-        explained = np.maximum(line.chi_squared - each.chi_squared, 0.0)
-        at_rates = np.column_stack([np.ones(len(self._rates)), self._rates])
-        # The line is fitted to the same means, which reduces the covariance of the residuals.
-        variance = np.diag(each.covariance - at_rates @ line.covariance @ at_rates.T)
-        full_scale = float(np.abs(self._rates).max())
-        return Linearity(
-            (each.value - line.value @ at_rates.T) / full_scale,
-            np.sqrt(np.maximum(variance, 0.0)) / full_scale,
-            full_scale,
-            np.asarray(chi2.sf(explained, line.freedom - each.freedom)),
-        )
-
-    def _fit_asymmetry(self, means: Array) -> Term | None:
-        """Return the asymmetry over the mean scale factor of both senses."""
-        if self._asymmetry is None:
-            return None
-        fit = self._asymmetry.fit(means)
-        scale = fit.value[:, 1]
-        if np.any(np.abs(scale) <= compute_half_width() * fit.sigma[1]):
-            return None
-        # The error of the scale factor is of second order.
-        sigma = float(self._asymmetry.sigma[-1] / np.abs(scale).mean())
-        return Term(fit.value[:, -1] / scale, sigma)
 
 
 def calibrate(
@@ -275,9 +266,8 @@ def calibrate(
 ) -> tuple[Calibration, Measured]:
     """Return bias and scale factor of a gyro from a log on a rate table, and its block means.
 
-    The log is in rad/s, shape (n,); NaN where a sample is missing. The other parameters are as in
-    `RateTable`. Raises NotObservableError if there is one rate only. Raises ValueError if the log
-    ends before the schedule does, or too few samples are present.
+    The log is in rad/s, shape (n,); NaN where a sample is missing. Parameters and errors are as in
+    `RateTable`; ValueError also if the log ends too early, or too few samples are present.
     """
     run = schedule.experiment
     whole = max(stretch.stop - stretch.start for stretch in schedule.stretches)
@@ -290,15 +280,6 @@ def calibrate(
     measured = block_means([log], run, longest)
     table = RateTable(schedule, measured.blocks, model, pointing, setting_sigma=setting_sigma)
     return table.fit(measured.means), measured
-
-
-def _index_levels(rate: Array) -> NDArray[np.int64]:
-    """Return the index of each rate among the distinct ones, equal up to rounding."""
-    order = np.argsort(rate, kind="stable")
-    risen = np.diff(rate[order], prepend=rate[order[0]]) > _RATE_TOLERANCE * np.abs(rate).max()
-    levels = np.empty(len(rate), dtype=np.int64)
-    levels[order] = np.cumsum(risen)
-    return levels
 
 
 @dataclass(frozen=True)

@@ -65,16 +65,13 @@ class Schedule:
     def from_column(
         cls, column: Array, rate: float, *, tolerance: float, shortest: float, settling: float = 0.0
     ) -> Schedule:
-        """Find the steady rates in a column with the table's rate.
+        """Find the steady rates in a column with the table's rate, rad/s, shape (n,), in Hz.
 
-        A sample is steady if the column stays within the tolerance for half the shortest time about
-        it. Consecutive steady samples are a stretch if they last long enough, and if the column
-        stays within twice the tolerance over all of them, which excludes slow ramps. The rate is
-        the mean of the column. The column, shape (n,), is in rad/s, NaN is not steady; the sampling
-        rate in Hz. ``tolerance``, rad/s, is the range of the column at a steady rate, including its
-        noise; stretches below ``shortest``, s, settling included, are left out, and so is the
-        settling time, s, at the start of each stretch. Raises ValueError if the tolerance is
-        negative, the shortest time is not longer than the settling, or there is no steady rate.
+        A sample is steady if the column stays within the tolerance, rad/s, for half the shortest
+        time, s, about it. Consecutive steady samples are a stretch if they last long enough, and
+        the column stays within twice the tolerance over all of them, which excludes slow ramps. The
+        settling time, s, at its start is left out. Raises ValueError if the tolerance is negative,
+        the shortest time is not longer than the settling, or there is no steady rate.
         """
         if not tolerance >= 0:
             raise ValueError(f"tolerance is {tolerance}, expected a rate from 0")

@@ -24,19 +24,14 @@ from imubench_pipeline.settings.validation import (
 )
 from imubench_pipeline.units import parse_quantity
 
-# Largest uncertainty of the Earth's rate about an axis without a heading, rad/s
-_MAX_UNKNOWN_EARTH_RATE = 1e-9
+_MAX_UNKNOWN_EARTH_RATE = 1e-9  # about an axis without a heading, rad/s
 
 TRIAD = ("gyro_x", "gyro_y", "gyro_z", "accel_x", "accel_y", "accel_z")
 """The axes of a triad, in the order of `imubench_pipeline.extensions.calibration.alignment`."""
 
 
 class Direction(Strict):
-    """Where an axis points on the Earth.
-
-    Raises ValueError if the latitude is missing, or a figure has a unit of another dimension or is
-    out of range.
-    """
+    """Where an axis points on the Earth."""
 
     latitude: Latitude = Field(description="of the place, with its unit; south is negative")
     heading: Angle | None = Field(
@@ -105,12 +100,7 @@ class Step(Strict):
 
 
 class OnRateTable(Experiment):
-    """A log of a gyro on a rate table, its axis along that of the table.
-
-    Raises ValueError if a figure has a unit of another dimension or is out of range, steps are not
-    in order, settling takes all of a step, or the heading of an axis that is not vertical is
-    missing.
-    """
+    """A log of a gyro on a rate table, its axis along that of the table."""
 
     steps: tuple[Step, ...] = Field(
         (), description="steady rates in their order; none: they are in the column log.table_rate"
@@ -174,8 +164,7 @@ class OnRateTable(Experiment):
     def moved_gyro(self, channels: Sequence[str], *, column: bool) -> str:
         """Return the one of the log's channels that is along the axis of the table.
 
-        `column`: the log has a column with the rate of the table. Raises ValueError as
-        `stated_gyro`; and if the rates of the table are stated nowhere, or twice.
+        `column`: the log has a column with the rate of the table; it or steps state the rates.
         """
         if not self.steps and not column:
             raise ValueError(
@@ -192,11 +181,7 @@ class OnRateTable(Experiment):
 
 
 class InPositions(Experiment):
-    """A triad that is turned about its z axis, by the clock, and stands still between the turns.
-
-    Raises ValueError if a figure has a unit of another dimension or is out of range, or a turn
-    takes all of a dwell.
-    """
+    """A triad that is turned about its z axis, by the clock, and stands still between the turns."""
 
     latitude: Latitude = Field(description="of the place, with its unit; south is negative")
     dwell: Time = Field(description="from the start of one turn to the start of the next")

@@ -35,8 +35,7 @@ from imubench_pipeline.extensions.calibration.pointing import Pointing
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.typing import Array
 
-# Least share of the Earth's rate along an axis that may depend on the heading
-_MIN_HEADING_SENSITIVITY = 1e-9
+_MIN_HEADING_SENSITIVITY = 1e-9  # least share of the rate that may depend on the heading
 
 
 @dataclass(frozen=True)
@@ -72,8 +71,7 @@ class StillBias:
     def fixed_interval(self) -> Limits:
         """Return confidence limits of the fixed bias, rad/s, shapes (runs,).
 
-        For an unknown heading the limits of the noise are widened to either side by the range of
-        the Earth's rate: they hold for every heading.
+        For an unknown heading they are widened by the range of the Earth's rate.
         """
         return self._interval(self.fixed, self.fixed_noise_sigma)
 
@@ -89,11 +87,7 @@ class StillBias:
 
 
 class StillRun:
-    """A run at rest in one position: blocks, noise model, and direction of the axis.
-
-    Neither the sense nor the latitude of the blocks is used; the model has some noise in every
-    sample.
-    """
+    """A run at rest in one position: blocks (of any sense), noise model, direction of the axis."""
 
     def __init__(self, blocks: Blocks, model: NoiseModel, pointing: Pointing) -> None:
         self.blocks, self.pointing = blocks, pointing

@@ -12,12 +12,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.stats import norm
 
-from imubench_pipeline.extensions.earth_rate.transients import (
+from imubench_pipeline.extensions.earth_rate.turns import (
     CLEAR_LOG_LIKELIHOOD,
     Event,
     LevelBlocks,
-)
-from imubench_pipeline.extensions.earth_rate.turns import (
     Turn,
     estimate_alternation,
     find_best_shift,
@@ -25,8 +23,7 @@ from imubench_pipeline.extensions.earth_rate.turns import (
 )
 from imubench_pipeline.typing import Array
 
-# Part of a dwell at either end of a log; a transient there is handling, not a turn
-EDGE_DWELL_FRACTION = 0.2
+EDGE_DWELL_FRACTION = 0.2  # of a dwell at either end of a log: a transient there is handling
 
 _MIN_CALM, _MIN_CALM_PER_DWELL, _MAX_REQUIRED_CALM = 2.5, 0.2, 6.0
 """Least calm between two turns, in s, in dwells, and its upper limit in s; closer events belong to
@@ -35,14 +32,9 @@ the same turn."""
 _DOUBLE_DWELL_SHARE = 0.07  # prior share of the dwells that last twice as long
 _EXTRA_DWELL_FACTOR = 0.35  # factor on the prior share for each further dwell without a turn
 _KNOCKS_PER_DWELL = 0.01  # expected disturbances as long as a turn, per dwell
-
-_MAX_WEAKNESS_COST = 3.5
-"""Largest log-likelihood cost of a clear transient that is weaker than the usual turn; noise is
-excluded for it."""
-
+_MAX_WEAKNESS_COST = 3.5  # log-likelihood cost of a clear transient weaker than the usual turn
 _FALSE_ALARM_PLACES = 8.0  # independent places where noise can look like a transient, 1/s
-# Weight of the given tolerance, as a number of dwells, against the dwells found
-_PRIOR_DWELLS = 5.0
+_PRIOR_DWELLS = 5.0  # weight of the given tolerance, in dwells, against the dwells found
 
 _MIN_STRENGTH_SIGMA, _MIN_STEP_STRENGTH_SIGMA = 0.4, 0.15
 """Least standard deviation of the strengths of turns. Turns by hand vary more than steps, whose
@@ -52,15 +44,10 @@ height is set by the Earth's rate."""
 _WEAK_STRENGTH, _MAX_WEAK_SHARE = math.log(2.0), 0.02
 # Least number of transients, and least share of equal intervals, that show a pace of their own
 _MIN_PACE_TRANSIENTS, _MIN_EQUAL_INTERVAL_SHARE = 5, 0.75
-# Probability that a turn is not detected, above which the schedule fills a gap
-_MAX_MISS_PROBABILITY = 0.05
-
-# Least share of the scheduled turns that must be detected for the events to decide
-_MIN_SEEN_SHARE = 0.4
-# Least alternation, in standard errors, of a log without transients that was turned
-_MIN_ALTERNATION_SIGMAS = 3.0
-# Least alternation, in standard errors, that may shift the start of the schedule
-_MIN_SHIFT_SIGMAS = 6.0
+_MAX_MISS_PROBABILITY = 0.05  # of a turn, above which the schedule fills a gap
+_MIN_SEEN_SHARE = 0.4  # of the scheduled turns, for the events to decide
+_MIN_ALTERNATION_SIGMAS = 3.0  # least alternation of a log without transients that was turned
+_MIN_SHIFT_SIGMAS = 6.0  # least alternation that may shift the start of the schedule
 _KNOCK_MARGIN = 0.25  # margin that is left out on either side of a knock, s
 
 
@@ -86,8 +73,7 @@ def find_turns(
     """Return turns (at least one), knocks and doubts for a log without a column, in order.
 
     The events are in order of time; ``trust`` accepts the schedule if nothing is detected. Knocks
-    are the start and stop of further times to leave out, s. Raises ValueError if there is no
-    evidence of turns, and the schedule is not trusted.
+    are start and stop, s. Raises ValueError if there is no evidence of turns, nor trust.
     """
     chosen = choose_turns(events, schedule.dwell, schedule.tolerance, schedule.duration)
     declared = schedule.dwell
@@ -292,14 +278,12 @@ def choose_turns(
     """Choose the turns among events in order of time; return their indices, in order.
 
     An event is a turn, a disturbance, or noise. The density of an interval between turns is a
-    mixture about the multiples of the dwell (Student's t of 3 degrees of freedom, so that an
-    unequal dwell costs no more than a doubt); disturbances and noise come at random. The sequence
-    of the greatest likelihood is searched again with the properties of the turns found: their
-    strength, so that noise does not replace a missed turn among strong ones, the usual dwell, and
-    the scatter of the dwells, so that dwells may be unequal if most of them are.
+    mixture about the multiples of the dwell (Student's t of 3 degrees of freedom: an unequal dwell
+    costs no more than a doubt); disturbances and noise come at random. The sequence of the greatest
+    likelihood is searched again with the properties of the turns found: their strength, so that
+    noise does not replace a missed turn among strong ones, the usual dwell, and its scatter.
 
-    Nominal dwell, tolerance (the standard deviation of the interval between two turns) and duration
-    of the log are in s.
+    Nominal dwell, tolerance (standard deviation of an interval) and duration of the log are in s.
     """
     if not events:
         return []
@@ -312,7 +296,15 @@ def choose_turns(
     for _ in range(3):
         if len(chosen) < 3:
             break
-        dwell, tolerance = _estimate_dwell(time[chosen, 1], *planned)
+        # The usual dwell, and the scale of the deviations from it, s.
+        interval = np.diff(time[chosen, 1])
+        many = np.maximum(np.rint(interval / planned[0]), 1.0)
+        dwell = float(np.median(interval / many))
+        dwell = min(max(dwell, 0.75 * planned[0]), 1.25 * planned[0])
+        scale = float(np.median(np.abs(interval - many * dwell) / np.sqrt(many))) / 0.6745
+        n = len(interval)
+        scale = (n * scale + _PRIOR_DWELLS * planned[1]) / (n + _PRIOR_DWELLS)
+        tolerance = max(scale, 0.03 * planned[0])
         usual, scatter = estimate_strength([events[k] for k in chosen])
         weak = np.minimum(np.array([event.strength for event in events]) - usual, 0.0) / scatter
         clear = np.array([event.likelihood > CLEAR_LOG_LIKELIHOOD for event in events])
@@ -327,9 +319,8 @@ def find_shorter_dwell(
     """Return the dwell of the clear transients, s, if it is far shorter than nominal.
 
     If turns come at twice the declared pace, each second turn is taken for a knock, halfway
-    between two others. Knocks and handling are not periodic. The events are in order of time, with
-    the indices of the turns chosen by the nominal dwell, s. None if the other transients are few,
-    weaker, or not periodic.
+    between two others; knocks and handling are not periodic. The events are in order of time, with
+    the indices of the turns chosen by the nominal dwell, s.
     """
     turns = [events[k] for k in chosen]
     if len(turns) < 2:
@@ -349,18 +340,6 @@ def find_shorter_dwell(
     pace = float(np.median(interval))
     even = float(np.mean(np.abs(interval - pace) < 0.2 * pace))
     return pace if pace < 0.75 * dwell and even >= _MIN_EQUAL_INTERVAL_SHARE else None
-
-
-def _estimate_dwell(time: Array, dwell: float, tolerance: float) -> tuple[float, float]:
-    """Return the usual dwell of a sequence, and the scale of the deviations from it, s."""
-    interval = np.diff(time)
-    many = np.maximum(np.rint(interval / dwell), 1.0)
-    usual = float(np.median(interval / many))
-    usual = min(max(usual, 0.75 * dwell), 1.25 * dwell)
-    scale = float(np.median(np.abs(interval - many * usual) / np.sqrt(many))) / 0.6745
-    n = len(interval)
-    scale = (n * scale + _PRIOR_DWELLS * tolerance) / (n + _PRIOR_DWELLS)
-    return usual, max(scale, 0.03 * dwell)
 
 
 def _find_best_sequence(
@@ -392,8 +371,7 @@ def _find_best_sequence(
 def compute_interval_log_density(interval: Array, dwell: float, tolerance: float) -> Array:
     """Return the logarithm of the density, 1/s, of the interval between two turns, shape (n,).
 
-    The intervals, the nominal dwell, and the standard deviation for one dwell (for k dwells it is
-    sqrt(k) times as large) are in s.
+    The intervals, the nominal dwell, and the standard deviation for one dwell are in s.
     """
     nearest = np.maximum(np.rint(interval / dwell), 1.0)
     density = np.zeros(len(interval))
@@ -422,10 +400,7 @@ def _compute_edge_log_density(interval: float, dwell: float) -> float:
 
 
 def estimate_strength(turns: Sequence[Event]) -> tuple[float, float]:
-    """Return the median strength of turns, and its standard deviation.
-
-    The standard deviation follows from the median absolute deviation.
-    """
+    """Return the median strength of turns, and its robust standard deviation."""
     values = np.array([event.strength for event in turns])
     usual = float(np.median(values))
     stepped = sum(event.kind == "step" for event in turns) > len(turns) / 2
@@ -434,11 +409,7 @@ def estimate_strength(turns: Sequence[Event]) -> tuple[float, float]:
 
 
 def is_detection_uncertain(turns: Sequence[Event]) -> bool:
-    """Return whether a turn like these may be too weak to detect.
-
-    It follows from the median and scatter of their strengths, or from the share of turns that are
-    hardly above the detection limit.
-    """
+    """Return whether a turn like these may be too weak to detect, by their strengths."""
     usual, scatter = estimate_strength(turns)
     weak = np.mean(
         [event.kind == "transient" and event.strength < _WEAK_STRENGTH for event in turns]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
@@ -14,18 +14,19 @@ from numpy.linalg import LinAlgError
 
 from imubench_pipeline.earth import EARTH_RATE
 from imubench_pipeline.extensions.calibration.experiment import Dwell, Experiment
-from imubench_pipeline.extensions.earth_rate.courses import (
+from imubench_pipeline.extensions.earth_rate.prediction import Outlook, prediction_rows
+from imubench_pipeline.extensions.earth_rate.published import (
     METHODS,
     Course,
     Courses,
     Range,
+    RunDesign,
     compute_sigma_ranges,
     compute_white_sigma,
     estimate_courses,
+    make_published_row,
     thin,
 )
-from imubench_pipeline.extensions.earth_rate.prediction import Outlook, prediction_rows
-from imubench_pipeline.extensions.earth_rate.published import RunDesign, make_published_row
 from imubench_pipeline.extensions.earth_rate.settings import (
     EarthRateSettings,
     SimulatedTurns,
@@ -42,7 +43,6 @@ from imubench_pipeline.extensions.earth_rate.tables import (
 from imubench_pipeline.extensions.earth_rate.turning import find_turning
 from imubench_pipeline.extensions.earth_rate.turns import FoundDwell, Turning
 from imubench_pipeline.model.table import TableRow
-from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.recordings.kept import load_logs
 from imubench_pipeline.recordings.recording import ChannelLog, place_on_grid, read_metadata
 from imubench_pipeline.settings.sensor import Sensor
@@ -59,20 +59,8 @@ from imubench_pipeline.typing import Array
 from imubench_pipeline.units import parse_quantity
 
 WHOLE = "whole"  # name of the part that is a whole recording
-
-# Min. share of turns found only by the schedule from which the turns count as not visible
-_MIN_SCHEDULED_SHARE = 0.9
+_MIN_SCHEDULED_SHARE = 0.9  # share of turns found by the schedule alone: turns are not visible
 _Z_95 = 1.96  # standard deviations of a 95 % limit
-
-_KNOWN_RATE_REASON = (
-    "bias tracking with known rate: the filter is given the Earth's rate and returns it; whatever "
-    "rate it is given, it finds"
-)
-
-_POSITION_CLOCK_REASON = (
-    "the position has a clock of its own; give it as a column of the file that the gyro is in, or "
-    "leave 'position' out"
-)
 
 
 def make_earth_rate_tables(
@@ -105,26 +93,24 @@ def make_earth_rate_tables(
         folder, static, key, Sensor.model_validate(sections["sensor"]), how.draws
     )
     begins = metadata.get("begins", 0.0)
-    found = _earth_rate(key, logs[channel], declared, source, how, begins)
-    rows |= vars(found)
+    for row in _earth_rate(key, logs[channel], declared, source, how, begins):
+        rows[row.table].append(row)
     if simulated is not None and turns is not None:
-        published = _published(key, simulated, turns, found.earth_rate)
+        published = _published(key, simulated, turns, rows["earth_rate"])
         rows["earth_rate_published"] = list(published)
     return rows
 
 
 def _published(
-    key: Key,
-    simulated: SimulatedRecording,
-    turns: SimulatedTurns,
-    estimates: Sequence[EarthRateRow],
+    key: Key, simulated: SimulatedRecording, turns: SimulatedTurns, estimates: Sequence[TableRow]
 ) -> Iterator[EarthRatePublishedRow]:
     """Yield the printed estimates of a simulated recording, with the estimates from its log."""
     rate = parse_quantity(simulated.rate, "frequency")
     schedule = RunDesign(turns.seconds("dwell"), turns.seconds("turning"), rate, turns.latitude_si)
     axes = {str(name): axis for name, axis in simulated.channels.items()}
     noise = make_axis_model(axes[key.channel], key.channel).noise
-    values = {(row.part, row.method): row.value for row in estimates}
+    rows = [row for row in estimates if isinstance(row, EarthRateRow)]
+    values = {(row.part, row.method): row.value for row in rows}
     for figure in turns.published:
         part = figure.part
         text = simulated.duration if part == WHOLE else part.removeprefix("last ")
@@ -139,16 +125,6 @@ def _published(
             simulated_filter=values.get((part, "filter")),
             assumed=", ".join(turns.assumed) or None,
         )
-
-
-@dataclass
-class EarthRate:
-    """Rows of the tables of an experiment."""
-
-    earth_rate: list[EarthRateRow] = field(default_factory=list)
-    earth_rate_series: list[EarthRateSeriesRow] = field(default_factory=list)
-    turning: list[TurningRow] = field(default_factory=list)
-    earth_rate_prediction: list[EarthRatePredictionRow] = field(default_factory=list)
 
 
 def _names(key: Key, declared: TwoPosition, source: NoiseSource | None = None) -> dict[str, Any]:
@@ -167,20 +143,30 @@ def _earth_rate(
     source: NoiseSource | None,
     settings: EarthRateSettings,
     begins: float,
-) -> EarthRate:
+) -> Iterator[TableRow]:
     """Find the turns of a gyro and estimate the Earth's rate; else the rows say why not.
 
     Without a noise source the turns are found, and nothing is estimated. `begins`: time of the
     first sample that is used, s from the first of the recording.
     """
-    tables = EarthRate()
     names = _names(key, declared, source)
     if len(log.segments) > 1 or log.position_elsewhere:
-        reason = explain_segments(log) if len(log.segments) > 1 else _POSITION_CLOCK_REASON
-        tables.earth_rate += _without(names, WHOLE, "not_shown", reason)
-        return tables
+        reason = (
+            explain_segments(log)
+            if len(log.segments) > 1
+            else "the position has a clock of its own; give it as a column of the file that the "
+            "gyro is in, or leave 'position' out"
+        )
+        yield from _without(names, WHOLE, "not_shown", reason)
+        return
+    bias = declared.turn_on_bias_si
     if source is not None:
-        tables.earth_rate_prediction += _predict(key, log.rate, declared, source, settings)
+        dwell, turn_time = declared.seconds("dwell"), declared.seconds("turning")
+        sigma = math.inf if bias is None else bias
+        outlook = Outlook(source.model, declared.latitude_si, turn_time, log.rate, sigma)
+        run_time = max(parse_quantity(settings.run_time, "time"), 3.0 * dwell + turn_time)
+        for row in prediction_rows(outlook, dwell - turn_time, settings.goals, run_time):
+            yield EarthRatePredictionRow(**asdict(key), **row)
     samples = place_on_grid(log.blocks(), log.grid)
     try:
         turning = find_turning(
@@ -200,19 +186,22 @@ def _earth_rate(
             f"no turns: {error}; check 'dwell' and 'channel' of two_position, or give the log a "
             "column with the position (log: position)"
         )
-        tables.earth_rate += _without(names, WHOLE, "no_turns", reason)
-        return tables
+        yield from _without(names, WHOLE, "no_turns", reason)
+        return
     used = np.where(turning.senses(len(samples), log.rate) == 0, np.nan, samples)  # no knocks
     dwells = [
         (dwell, dwell.in_samples(log.rate))
         for dwell in turning.dwells
         if dwell.stop - dwell.start > 2.0 / log.rate
     ]
-    tables.turning += _turning_rows(key, turning, dwells, used, begins)
+    yield from _turning_rows(key, turning, dwells, used, begins)
     if source is None:
-        tables.earth_rate += _without(names, WHOLE, "no_model", NO_MODEL)
-        return tables
-    model, *drawn = (_add_drift(each, declared.drift_si) for each in (source.model, *source.drawn))
+        yield from _without(names, WHOLE, "no_model", NO_MODEL)
+        return
+    model, *drawn = source.model, *source.drawn
+    if drift := declared.drift_si:  # beside the noise of the model
+        model, *drawn = (replace(m, R=(m.R**2 + drift**2) ** 0.5) for m in (model, *drawn))
+    unsure = _unsure(turning, declared.trust_schedule)
     parts = {WHOLE: 0.0}  # start of each part in the log, s
     for text in declared.last:
         parts[f"last {text}"] = max(len(samples) / log.rate - parse_quantity(text, "time"), 0.0)
@@ -220,40 +209,18 @@ def _earth_rate(
         chosen = tuple(dwell for _, dwell in dwells if dwell.start >= start * log.rate)
         if len(chosen) < 2:
             reason = f"{len(chosen)} dwells are not enough; it takes one of each position"
-            tables.earth_rate += _without(names, part, "too_short", reason)
+            yield from _without(names, part, "too_short", reason)
             continue
-        bias = declared.turn_on_bias_si
         try:
             experiment = Experiment(chosen, log.rate, declared.latitude_si)
             courses = estimate_courses(used, experiment, model, source.papers, bias)
         except (ValueError, LinAlgError) as error:
-            tables.earth_rate += _without(names, part, "too_short", str(error))
+            yield from _without(names, part, "too_short", str(error))
             continue
         about = names | {"part": part, "dwells": len(chosen), "turns": len(chosen) - 1}
         ranges = compute_sigma_ranges(courses.measured.blocks, model, drawn, bias)
-        unsure = _unsure(turning, declared.trust_schedule)
-        tables.earth_rate += _estimates(about, courses, source, unsure, ranges)
-        tables.earth_rate_series += _series(key, part, courses, begins)
-    return tables
-
-
-def _add_drift(model: NoiseModel, drift: float) -> NoiseModel:
-    """Return a model with a steady drift of a standard deviation, rad/s^2, beside its own."""
-    return replace(model, R=(model.R**2 + drift**2) ** 0.5) if drift else model
-
-
-def _predict(
-    key: Key, rate: float, declared: TwoPosition, source: NoiseSource, settings: EarthRateSettings
-) -> Iterator[EarthRatePredictionRow]:
-    """Yield the rows of the table ``earth_rate_prediction``."""
-    dwell, turning = declared.seconds("dwell"), declared.seconds("turning")
-    bias = declared.turn_on_bias_si
-    outlook = Outlook(
-        source.model, declared.latitude_si, turning, rate, math.inf if bias is None else bias
-    )
-    run_time = max(parse_quantity(settings.run_time, "time"), 3.0 * dwell + turning)
-    for row in prediction_rows(outlook, dwell - turning, settings.goals, run_time):
-        yield EarthRatePredictionRow(**asdict(key), **row)
+        yield from _estimates(about, courses, source, unsure, ranges)
+        yield from _series(key, part, courses, begins)
 
 
 def _turning_rows(
@@ -349,7 +316,10 @@ def _estimates(
             row |= {"status": "not_shown", "reason": course.reason}
         elif course.sigma is None:
             row |= {"value": float(course.rate[-1]), "status": "given"}
-            row |= {"reason": _KNOWN_RATE_REASON}
+            row |= {
+                "reason": "bias tracking with known rate: the filter is given the Earth's rate and "
+                "returns it; whatever rate it is given, it finds"
+            }
             row |= {"settled": None if course.settled in (None, math.inf) else course.settled}
         else:
             value, sigma = float(course.rate[-1]), float(course.sigma[-1])

@@ -110,14 +110,10 @@ def make_turned_context(site: Site, view: RecordingView, folder: Path) -> dict[s
 
 
 TURNED_PAGE = RecordingPage("turned.html.jinja", make_turned_context, "two positions")
-"""The page of a gyro that was turned between north and south."""
 
 
 def summarise_earth_rate(rows: Sequence[EarthRateRow], system: System) -> str:
-    """Return the filter's estimate in a sentence, or the reason why there is none.
-
-    ``rows`` belong to the whole recording in the table ``earth_rate``.
-    """
+    """Return the filter's estimate of a whole recording, or why there is none, in sentences."""
     by_method = {row.method: row for row in rows}
     best = by_method.get("filter")
     if best is None:
@@ -142,10 +138,7 @@ def summarise_earth_rate(rows: Sequence[EarthRateRow], system: System) -> str:
 
 
 def describe_settling(rows: Sequence[EarthRateRow]) -> str:
-    """Return the settling time of the filter that is given the rate, in a sentence.
-
-    ``rows`` are those of ``earth_rate``, of one or several recordings; empty without this filter.
-    """
+    """Return the settling times of the filter with known rate in recordings, in a sentence."""
     given = [row for row in rows if row.part == "whole" and row.status == "given"]
     parts = []
     for method, unit in (("known_rate", "(°/s)²"), ("known_rate_radians", "(rad/s)²")):
@@ -166,8 +159,7 @@ def describe_settling(rows: Sequence[EarthRateRow]) -> str:
     )
 
 
-# Error of an estimate in standard deviations beyond which noise does not explain it
-_MAX_NOISE_ERROR = 4.0
+_MAX_NOISE_ERROR = 4.0  # standard deviations beyond which noise does not explain an error
 
 
 def format_estimate(row: EarthRateRow) -> dict[str, Any]:
@@ -194,10 +186,7 @@ def format_published(rows: Sequence[EarthRatePublishedRow]) -> Iterator[dict[str
 
 
 def summarise_needs(rows: Sequence[EarthRatePredictionRow]) -> dict[str, Any] | None:
-    """Return the recordings required to find the Earth's rate, for a table and a sentence.
-
-    ``rows`` belong to one recording in the table ``earth_rate_prediction``.
-    """
+    """Return the recordings required to find the Earth's rate, by the rows of one recording."""
     goals = [row for row in rows if row.of == "goal"]
     if not goals:
         return None
@@ -247,8 +236,7 @@ def _describe_near_best(best: float, tried: Sequence[float], nearly: Sequence[fl
     return f"Dwells from {low} s to {high} s are less than 1 % worse."
 
 
-# Largest standard deviation of a heading for which the small-angle formula holds, rad
-_MAX_SMALL_HEADING = 0.5
+_MAX_SMALL_HEADING = 0.5  # rad; largest sigma of a heading for which the small-angle formula holds
 
 
 def _pack_figures(
@@ -257,6 +245,19 @@ def _pack_figures(
     """Return the data of the figures of dwells and estimates."""
     dwells, turns = ([row for row in turning if row.what == what] for what in ("dwell", "turn"))
     series = view.rows(EarthRateSeriesRow)
+    parts: dict[str, Any] = {}
+    for part in dict.fromkeys(row.part for row in series):
+        in_part = [row for row in series if row.part == part]
+        courses: dict[str, Any] = {}
+        for quantity, method in dict.fromkeys((row.quantity, row.method) for row in in_part):
+            own = [row for row in in_part if (row.quantity, row.method) == (quantity, method)]
+            courses["drift" if quantity == "drift" else method] = {
+                "name": "drift" if quantity == "drift" else _METHODS[method][1],
+                "time": arrays.exact([row.time for row in own]),
+                "value": arrays.exact([row.value for row in own]),
+                "sigma": arrays.exact(fill_missing(row.sigma for row in own)),
+            }
+        parts[part] = {"range": _find_range(in_part, rows[0].truth), "courses": courses}
     return {
         "channel": rows[0].channel if rows else "",
         "truth": rows[0].truth if rows else None,
@@ -270,27 +271,8 @@ def _pack_figures(
         },
         "turns": arrays.exact(fill_missing(row.time for row in turns)),
         "found_by": [row.found_by for row in turns],
-        "parts": {
-            part: {
-                "range": _find_range([row for row in series if row.part == part], rows[0].truth),
-                "courses": _pack_courses([row for row in series if row.part == part], arrays),
-            }
-            for part in dict.fromkeys(row.part for row in series)
-        },
+        "parts": parts,
     }
-
-
-def _pack_courses(series: Sequence[EarthRateSeriesRow], arrays: Arrays) -> dict[str, Any]:
-    courses: dict[str, Any] = {}
-    for name in dict.fromkeys((row.quantity, row.method) for row in series):
-        own = [row for row in series if (row.quantity, row.method) == name]
-        courses["drift" if name[0] == "drift" else name[1]] = {
-            "name": "drift" if name[0] == "drift" else _METHODS[name[1]][1],
-            "time": arrays.exact([row.time for row in own]),
-            "value": arrays.exact([row.value for row in own]),
-            "sigma": arrays.exact(fill_missing(row.sigma for row in own)),
-        }
-    return courses
 
 
 def _find_range(series: Sequence[EarthRateSeriesRow], truth: float) -> list[float]:
@@ -390,8 +372,6 @@ EARTH_RATE_PAGE = Entry(
     exists=lambda site: bool(_select_recordings(site)),
     place=4,
 )
-"""The page of all experiments that estimate the Earth's rate."""
-
 NOT_FOUND = Section(
     page="index.html",
     template="not_found.html.jinja",
@@ -399,7 +379,6 @@ NOT_FOUND = Section(
         list(list_without_result(select_turned(site), lambda view: view.rows(EarthRateRow))) or None
     ),
 )
-"""The recordings without an estimate of the Earth's rate, on the start page."""
 
 
 def _describe_run(site: Site, view: RecordingView) -> dict[str, Any]:
@@ -439,11 +418,9 @@ def describe_published(rows: Sequence[EarthRatePublishedRow]) -> str:
         return ""
     beyond = [row for row in rows if row.verdict == "beyond the noise"]
     if not beyond:
-        every = (
-            "the error of the published estimate"
-            if len(rows) == 1
-            else f"the errors of all {len(rows)} published estimates"
-        )
+        every = "the error of the published estimate"
+        if len(rows) > 1:
+            every = f"the errors of all {len(rows)} published estimates"
         return f"Noise explains {every}. {_describe_gain(rows)}"
     within = len(rows) - len(beyond)
     names = ", ".join(
@@ -485,42 +462,40 @@ _POSITION_TEXTS = {1: "one position", 2: "two opposite positions"}
 def summarise_alignments(site: Site, arrays: Arrays) -> list[dict[str, Any]]:
     """Return the section of each sensor with gyros and accelerometers; ``arrays`` gets its data."""
     entries = []
-    unit, fine = (
-        choose_page_unit("gyro", "adev", site.system),
-        choose_page_unit("accel", "adev", "si"),
-    )
+    unit = choose_page_unit("gyro", "adev", site.system)
+    fine = choose_page_unit("accel", "adev", "si")
     for view in site.views:
         rows = view.rows(AlignmentRow)
-        if rows:
-            about = rows[0]
-            entries.append(
-                {
-                    "view": view,
-                    "latitude": degrees_text(about.latitude),
-                    "biases": (
-                        f"Fixed biases of {unit.text(about.gyro_bias, 3)} {unit.sign} "
-                        f"({about.gyro_bias_from}) and "
-                        f"{fine.text(about.accelerometer_bias, 3)} {fine.sign} "
-                        f"({about.accelerometer_bias_from})."
-                    ),
-                    "axes": _describe_missing_axes(about),
-                    "lines": [
-                        {
-                            "position": _POSITION_TEXTS[row.positions],
-                            "method": row.method,
-                            "time": duration_text(row.time),
-                            "roll": _format_angle(row.roll),
-                            "pitch": _format_angle(row.pitch),
-                            "heading": _format_angle(row.heading),
-                        }
-                        for row in rows
-                        if row.time in _TABLE_TIMES
-                    ],
-                    "none": list(dict.fromkeys(sentence(row.reason) for row in rows if row.reason)),
-                    "check": _describe_check(rows),
-                    "drawn": _pack_curves(rows, arrays),
-                }
-            )
+        if not rows:
+            continue
+        about = rows[0]
+        gyro_bias = f"{unit.text(about.gyro_bias, 3)} {unit.sign} ({about.gyro_bias_from})"
+        accel_bias = f"{fine.text(about.accelerometer_bias, 3)} {fine.sign}"
+        lines = [
+            {
+                "position": _POSITION_TEXTS[row.positions],
+                "method": row.method,
+                "time": duration_text(row.time),
+                "roll": _format_angle(row.roll),
+                "pitch": _format_angle(row.pitch),
+                "heading": _format_angle(row.heading),
+            }
+            for row in rows
+            if row.time in _TABLE_TIMES
+        ]
+        entries.append(
+            {
+                "view": view,
+                "latitude": degrees_text(about.latitude),
+                "biases": f"Fixed biases of {gyro_bias} and {accel_bias} "
+                f"({about.accelerometer_bias_from}).",
+                "axes": _describe_missing_axes(about),
+                "lines": lines,
+                "none": list(dict.fromkeys(sentence(row.reason) for row in rows if row.reason)),
+                "check": _describe_check(rows),
+                "drawn": _pack_curves(rows, arrays),
+            }
+        )
     return entries
 
 

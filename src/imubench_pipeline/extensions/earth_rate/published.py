@@ -22,24 +22,170 @@ both. With P the time between turns, D the data in a dwell and L the latitude:
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.linalg import LinAlgError
 
 from imubench_pipeline.earth import EARTH_RATE
-from imubench_pipeline.extensions.calibration.experiment import Experiment
+from imubench_pipeline.extensions.calibration.experiment import (
+    Blocks,
+    Experiment,
+    Measured,
+    block_means,
+)
 from imubench_pipeline.extensions.calibration.kalman import RateFilter
-from imubench_pipeline.extensions.earth_rate.bound import choose_block_length
-from imubench_pipeline.extensions.earth_rate.courses import compute_white_sigma
-from imubench_pipeline.extensions.earth_rate.pairs import by_pairs
+from imubench_pipeline.extensions.calibration.states import UNINFORMATIVE_SIGMA
+from imubench_pipeline.extensions.earth_rate.bound import choose_block_length, compute_final_bound
+from imubench_pipeline.extensions.earth_rate.known_rate import STARTS, settled, track
+from imubench_pipeline.extensions.earth_rate.pairs import by_pairs, by_triples
 from imubench_pipeline.noise import NoiseModel
+from imubench_pipeline.noise.sigma_range import sigma_range
 from imubench_pipeline.typing import Array
+
+GIVEN = {"known_rate": STARTS["degrees"], "known_rate_radians": STARTS["radians"]}
+"""The methods with known rate, which cannot estimate it, and the start of each, (rad/s)^2."""
+
+METHODS = ("pairs", "triples", "filter", "smoother", *GIVEN)
+"""All methods, in the order of display."""
+
+_MAX_POINTS = 400
+
+Range = dict[str, float]
+
+
+@dataclass(frozen=True)
+class Course:
+    """Estimates of one method over time."""
+
+    method: str  # one of `METHODS`
+    time: Array  # shape (k,); s from the first sample of the log
+    # shape (k,); estimate from the data up to then, rad/s; by the smoother from all of the data
+    rate: Array
+    sigma: Array | None  # shape (k,); its standard deviation, rad/s; None where the method has none
+    reason: str | None = None  # why there is no estimate: the arrays are empty then
+    # s of data after which it stays within a tenth of the known rate, for methods with one
+    settled: float | None = None
+
+
+@dataclass(frozen=True)
+class Courses:
+    """The estimates of one experiment, and their data."""
+
+    courses: tuple[Course, ...]  # one per method
+    measured: Measured
+    longest: int  # largest number of samples of a block
+    # drift_time, drift, drift_sigma: shape (b,); middle of each block in s from the first sample of
+    # the log; slow error of the gyro in it, including the bias, from all data, and its standard
+    # deviation, rad/s
+    drift_time: Array
+    drift: Array
+    drift_sigma: Array
+
+
+def compute_white_sigma(model: NoiseModel, blocks: Blocks) -> float:
+    """Return the lower limit of sigma, N / sqrt(T) / cos(latitude), rad/s, of T s in blocks."""
+    return model.N / math.sqrt(blocks.time_in_blocks) / math.cos(blocks.latitude)
+
+
+def estimate_courses(
+    log: Array,
+    experiment: Experiment,
+    model: NoiseModel,
+    papers: NoiseModel,
+    turn_on_bias: float | None = None,
+) -> Courses:
+    """Estimate the Earth's rate by every method.
+
+    The log, shape (n,), is in rad/s, NaN where a sample is missing; the noise model has N. N, B
+    with T_B, and K of ``papers`` are for the filter of Silva et al. The turn-on bias is a standard
+    deviation, rad/s (None: unknown). Raises ValueError if the dwells are all of one sense, or no
+    block of them has enough samples.
+    """
+    if len({dwell.sense for dwell in experiment.dwells}) < 2:
+        raise ValueError("all dwells are of one position: the rate cannot be told from the bias")
+    longest = choose_block_length(experiment, model)
+    measured = block_means([log], experiment, longest)
+    blocks, means = measured.blocks, measured.means
+    first = blocks.start[0] / blocks.rate
+    rate_filter = RateFilter(
+        blocks, model, turn_on_bias=UNINFORMATIVE_SIGMA if turn_on_bias is None else turn_on_bias
+    )
+    filtered = rate_filter.run(means)
+    smoothed = rate_filter.smooth(filtered)
+    # Before the second position the rate and the bias are not separable.
+    from_second = slice(int(np.argmax(blocks.sense != blocks.sense[0])), None)
+    whole = np.array([first, first + blocks.duration])
+    courses = []
+    for method, estimate in (("pairs", by_pairs), ("triples", by_triples)):
+        try:
+            found = estimate(means, blocks, model)
+            courses.append(Course(method, first + found.time, found.rate[0], found.sigma))
+        except ValueError as error:
+            courses.append(Course(method, np.empty(0), np.empty(0), np.empty(0), str(error)))
+    filter_rate, filter_sigma = filtered.rate[0, from_second], filtered.rate_sigma[from_second]
+    courses += [
+        Course("filter", first + filtered.time[from_second], filter_rate, filter_sigma),
+        Course("smoother", whole, np.full(2, smoothed.rate[0]), np.full(2, smoothed.rate_sigma)),
+    ]
+    for method, start in GIVEN.items():
+        try:
+            tracked = track(log, experiment, papers, EARTH_RATE, start)
+        except ValueError as error:
+            courses.append(Course(method, np.empty(0), np.empty(0), None, str(error)))
+            continue
+        after = settled(tracked.mean, experiment.rate, EARTH_RATE)
+        time = tracked.sample / experiment.rate
+        courses.append(Course(method, time, tracked.mean, None, settled=after))
+    middle, drift = first + blocks.middle, smoothed.drift[0]
+    return Courses(tuple(courses), measured, longest, middle, drift, smoothed.drift_sigma)
+
+
+def thin(points: int) -> Iterator[int]:
+    """Yield the indices of some 400 points to display, half of them logarithmic, half even."""
+    if points <= _MAX_POINTS:
+        yield from range(points)
+        return
+    even = np.linspace(0, points - 1, _MAX_POINTS // 2)
+    early = np.geomspace(1, points, _MAX_POINTS // 2) - 1
+    yield from np.unique(np.rint(np.concatenate([even, early])).astype(np.int64)).tolist()
+
+
+def compute_sigma_ranges(
+    blocks: Blocks, model: NoiseModel, drawn: Sequence[NoiseModel], turn_on_bias: float | None
+) -> dict[str, Range]:
+    """Return the limits of the standard deviation of each method at the end of a run.
+
+    By method ``sigma_lower`` and ``sigma_upper``, rad/s, over models drawn from the limits of the
+    parameters. Methods without an estimate are left out, and all without draws. The standard
+    deviation of the fixed bias is in rad/s; None: unknown.
+    """
+    if not drawn:
+        return {}
+    zeros = np.zeros((1, len(blocks)))
+    bias = math.inf if turn_on_bias is None else turn_on_bias
+    methods: dict[str, Callable[[NoiseModel], float]] = {
+        "pairs": lambda one: float(by_pairs(zeros, blocks, one).sigma[-1]),
+        "triples": lambda one: float(by_triples(zeros, blocks, one).sigma[-1]),
+        "filter": lambda one: compute_final_bound(blocks, one, bias),
+    }
+    ranges: dict[str, Range] = {}
+    for method, sigma in methods.items():
+        try:
+            limits = sigma_range(sigma, model, drawn)
+        except (ValueError, LinAlgError):
+            continue  # no pair or triple in these dwells; the estimate has the reason
+        ranges[method] = {"sigma_lower": float(limits.lower), "sigma_upper": float(limits.upper)}
+    if "filter" in ranges:
+        ranges["smoother"] = ranges["filter"]  # equal at the end of the run
+    return ranges
+
 
 Row = dict[str, Any]
 
-_TESTED_CLOCK_ERRORS = 20_001  # number of tested clock errors
+_TESTED_CLOCK_ERRORS = 20_001
 _Z_95 = 1.96  # half width, in standard deviations, of the interval with 95 % of the estimates
 
 
@@ -66,8 +212,7 @@ class RunDesign:
 def compute_allowed_sigmas(run: RunDesign, duration: float, model: NoiseModel) -> Row:
     """Return the standard deviations by noise of the estimates of a run, rad/s; duration in s.
 
-    ``white``: by white noise alone; ``sigma``: of the mean over pairs; ``sigma_filter``: of the
-    filter.
+    ``white``: by white noise; ``sigma``: of the mean over pairs; ``sigma_filter``: of the filter.
     """
     design = run.experiment(duration)
     blocks = design.blocks(choose_block_length(design, model))
@@ -80,20 +225,18 @@ def compute_allowed_sigmas(run: RunDesign, duration: float, model: NoiseModel) -
 
 
 def make_published_row(value: float, run: RunDesign, duration: float, model: NoiseModel) -> Row:
-    """Return the columns of ``earth_rate_published`` for a published estimate.
+    """Return the columns of ``earth_rate_published`` for an estimate, rad/s, of a run or its part.
 
-    The value is in rad/s; the duration of the run, or of a part of it, in s; the noise model as
-    published.
+    The duration is in s.
     """
     noise = compute_allowed_sigmas(run, duration, model)
     off = (value - EARTH_RATE) / noise["sigma"]
-    verdict = "within the noise" if abs(off) <= _Z_95 else "beyond the noise"
     return noise | {
         "duration": duration,
         "published": value,
         "truth": EARTH_RATE,
         "off_sigma": off,
-        "verdict": verdict,
+        "verdict": "within the noise" if abs(off) <= _Z_95 else "beyond the noise",
     }
 
 
@@ -115,10 +258,7 @@ class PrintedRun:
 
 
 def compute_needed_drift(off: float, period: float, latitude: float) -> float:
-    """Return the drift of the bias that causes the error of pairs, rad/s^2, north first.
-
-    ``off``: error, rad/s; ``period``: from turn to turn, s; the latitude in rad.
-    """
+    """Return the drift, rad/s^2, that causes an error of pairs, rad/s, at a period of turns, s."""
     return -2.0 * math.cos(latitude) * off / period
 
 
@@ -176,8 +316,7 @@ def fit_warm_up(first: float, last: float, duration: float, last_duration: float
 def fit_single_miscount(whole: PrintedRun, last: PrintedRun, true: float) -> float:
     """Return the misfit of the best single miscount to both printed values, in sigma.
 
-    The senses are right up to a turn and wrong after it, or vice versa. The misfit is the root of
-    the least sum of squares over the first and the last part.
+    The senses are right up to a turn and wrong after it, or vice versa.
     """
     first = whole.without(last)
     flips = np.linspace(0.0, whole.duration, 6001)
@@ -193,16 +332,11 @@ def fit_single_miscount(whole: PrintedRun, last: PrintedRun, true: float) -> flo
     return float(min(misfits))
 
 
-def compute_slipped_share(slip: Array) -> Array:
-    """Return the remaining share of the rate, shape (n,), if dwells begin ``slip`` dwells late."""
-    return np.asarray(np.abs(2.0 * np.mod(slip, 2.0) - 2.0) - 1.0)
-
-
 def fit_clock_error(parts: Sequence[PrintedRun], period: float, true: float) -> tuple[float, float]:
     """Return the relative clock error that best explains consecutive parts, and its misfit.
 
-    Errors up to a twentieth are tested; both signs are equivalent. The misfit is the root of the
-    sum of squares in sigma. The period is from turn to turn, s.
+    Errors up to a twentieth are tested; both signs are equivalent. The misfit is in sigma, the
+    period from turn to turn in s.
     """
     errors = np.linspace(0.0, 0.05, _TESTED_CLOCK_ERRORS)
     edges = np.cumsum([0.0, *(part.duration for part in parts)])
@@ -218,6 +352,6 @@ def fit_clock_error(parts: Sequence[PrintedRun], period: float, true: float) -> 
 
 
 def _integrate_slipped(slip: Array) -> Array:
-    """Return the integral of `compute_slipped_share` from 0 on."""
+    """Return the integral from 0 of the share of the rate left if dwells begin so much late."""
     place = np.mod(slip, 2.0)
     return np.where(place <= 1.0, place - place**2, (place - 1.0) * (place - 2.0))

@@ -22,28 +22,24 @@ from imubench_pipeline.extensions.earth_rate.choice_of_turns import (
     leave_out_knocks,
     list_disturbances,
 )
-from imubench_pipeline.extensions.earth_rate.transients import (
-    CLEAR_LOG_LIKELIHOOD,
-    Event,
-    LevelBlocks,
-    average_log_blocks,
-    detect_steps,
-    detect_transients,
-    find_outliers,
-)
 from imubench_pipeline.extensions.earth_rate.turns import (
+    CLEAR_LOG_LIKELIHOOD,
     DETECTION_ORDER,
+    Event,
     FoundDwell,
     Turn,
     Turning,
+    average_log_blocks,
+    detect_steps,
+    detect_transients,
     estimate_alternation,
     find_contradiction,
+    find_outliers,
 )
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.typing import Array
 
-# Tolerance about a position, as a share of the distance between the two positions
-_POSITION_TOLERANCE = 0.1
+_POSITION_TOLERANCE = 0.1  # about a position, as a share of the distance between the two
 
 
 @dataclass(frozen=True)
@@ -65,10 +61,9 @@ def find_stays(position: Array, rate: float, shortest: float) -> Stays:
     """Find the stays in two positions.
 
     The positions are the medians of the column's lower and upper half, by range. A sample within a
-    tenth of their distance of one is in it; other samples are turning, or overshoot. Consecutive
-    stays in the same position are merged. The column, shape (n,), has two positions as numbers in
-    any unit, such as angles, 0 and 1, or -1 and +1; NaN where it is not known. An angle must not
-    wrap at one of them. The rate is in Hz; stays below the shortest, s, are overshoots. Raises
+    tenth of their distance of one is in it; other samples are turning, or overshoot. The column,
+    shape (n,), has two positions as numbers in any unit, NaN where it is not known; an angle must
+    not wrap at one of them. The rate is in Hz; stays below the shortest, s, are overshoots. Raises
     ValueError if the column has one position only, or none.
     """
     finite = np.flatnonzero(np.isfinite(position))
@@ -123,21 +118,17 @@ def find_turning(
     """Find the dwells and the turning points of a log.
 
     A column with the position decides if there is one. Else the transients and steps that fit the
-    schedule best are chosen (`extensions.earth_rate.choice_of_turns.choose_turns`): a missed turn
-    makes a dwell twice as long, an overshoot belongs to its turn, a knock is left out. Turns that
-    are too weak to detect are inserted from the schedule between the detected ones. If fewer than
-    40 % of the scheduled turns are detected, the schedule gives all of them.
-
-    A transient within a fifth of a dwell of an end of the log is handling, and cut off with that
-    end. Only the schedule separates handling as long as a turn (0.2 s and more) from a turn: if the
-    dwells differ by more than some tenths, it is taken for a turn.
-    ``benchmarks/dwell_detection.py`` measures how often, and which peaks are found.
+    schedule best are chosen (`extensions.earth_rate.choice_of_turns.choose_turns`). Turns that are
+    too weak to detect are inserted from the schedule between the detected ones. If fewer than 40 %
+    of the scheduled turns are detected, the schedule gives all of them. A transient within a fifth
+    of a dwell of an end of the log is handling, and cut off with that end. Only the schedule
+    separates handling of 0.2 s and more from a turn. ``benchmarks/dwell_detection.py`` measures how
+    often turns are found.
 
     The sense alternates at each turn. An extra or a missed turn inverts all later senses; if the
     alternation then clearly has the opposite sign, the result has a doubt. The first sense is
     ``first_sense``, or given by the column if it has +1 and -1. Otherwise +1 is assumed and the
-    result is ``ambiguous``: all senses may be inverted, and with them the sign of an estimated
-    rate. The known rate of the Earth is not used.
+    result is ``ambiguous``. The known rate of the Earth is not used.
 
     Without a transient, the log must alternate by 3 standard errors with the schedule. Runs where
     chance hides the alternation are then refused, which favours large estimates.
@@ -145,17 +136,26 @@ def find_turning(
 
     The log, shape (n,), is in rad/s, NaN where a sample is missing; the rate in Hz. ``dwell`` is
     the nominal time from the start of a turn to the start of the next, ``margin`` is left out on
-    both sides of a detected turn. ``turning``, the time that a turn takes, and ``start``, the start
-    of the first dwell of the schedule after the first sample, are only for turns that are not
-    detected; all in s. ``position``, shape (n,), is the position of the sensor (`find_stays`).
-    ``model`` is the noise of the sensor at rest, SI, by default estimated from the log. Raises
-    ValueError if an argument is out of range; if the log is shorter than two dwells; if there is no
-    evidence of turns.
+    both sides of a detected turn. ``turning``, the time that a turn takes, and ``start`` of the
+    first dwell after the first sample are only for turns that are not detected; all in s.
+    ``position``, shape (n,): see `find_stays`. ``model``: the noise at rest, SI, by default
+    estimated from the log. Raises ValueError if an argument is out of range, the log is shorter
+    than two dwells, or there is no evidence of turns.
     """
     log = np.asarray(log, dtype=np.float64)
     schedule = _check_schedule(log, rate, dwell, turning, start, first_sense, margin)
     blocks = average_log_blocks(log, rate, dwell, model)
-    events = _detect_events(blocks, log, rate, dwell, model)
+    # Transients and steps; of near ones, the greater.
+    events = detect_transients(blocks, log, rate)
+    near = max(3.0, 0.1 * dwell)
+    for step in detect_steps(blocks, dwell, model, rate):
+        beside = [e for e in events if e.start - near < step.time < e.stop + near]
+        # The level follows a step at once, except in the blocks of the step itself.
+        greater = [e for e in beside if e.kind == "transient" and e.peak > 1.5 * step.peak]
+        if all(event.haste for event in greater):
+            events = [e for e in events if e not in beside or e in greater]
+            events.append(step)
+    events.sort(key=lambda event: event.time)
     doubts = []
     if blocks.rough:
         doubts.append("the noise of the log is not that of the model: the log's is used")
@@ -223,22 +223,6 @@ def _check_schedule(
         raise ValueError(f"the log lasts {duration:g} s, less than two dwells of {dwell:g} s")
     tolerance = max(0.1 * dwell, min(2.0, 0.2 * dwell))
     return TurnSchedule(dwell, start, turning, tolerance, margin, duration)
-
-
-def _detect_events(
-    blocks: LevelBlocks, log: Array, rate: float, dwell: float, model: NoiseModel | None
-) -> list[Event]:
-    """Return transients and steps in order of time; of near ones, the greater."""
-    events = detect_transients(blocks, log, rate)
-    near = max(3.0, 0.1 * dwell)
-    for step in detect_steps(blocks, dwell, model, rate):
-        beside = [e for e in events if e.start - near < step.time < e.stop + near]
-        # The level follows a step at once, except in the blocks of the step itself.
-        greater = [e for e in beside if e.kind == "transient" and e.peak > 1.5 * step.peak]
-        if all(event.haste for event in greater):
-            events = [e for e in events if e not in beside or e in greater]
-            events.append(step)
-    return sorted(events, key=lambda event: event.time)
 
 
 def _find_turns_in_column(

@@ -15,7 +15,7 @@ EXTENSION = Extension(
     ),
     simulations={"specimens": "fusion.specimens:SPECIMENS"},
     sensor_tables={"published_figures": "fusion.published_figures:yield_published_figures"},
-    pages=("fusion.page:FUSION", "fusion.boards:BOARDS"),
+    pages=("fusion.page:FUSION", "fusion.page:BOARDS"),
     templates="templates",
     rules="rules.smk",
 )

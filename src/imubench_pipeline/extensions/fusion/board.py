@@ -13,19 +13,15 @@ from numpy.typing import ArrayLike, NDArray
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.typing import Array
 
-_RATIO_TOLERANCE = 1e-9
-"""Maximum relative distance of a ratio of rates from a whole number (rounding)."""
-
-_SHARED_PARAMETERS = ("N", "B", "K", "R")
-"""Parameters that sensors may share, each the root of a variance."""
+_RATIO_TOLERANCE = 1e-9  # relative distance of a ratio of rates from a whole number (rounding)
+_SHARED_PARAMETERS = ("N", "B", "K", "R")  # that sensors may share, each the root of a variance
 
 
 @dataclass(frozen=True)
 class Shared:
     """One process that acts on several sensors, with a separate sensitivity for each.
 
-    Examples are the temperature of a board, the noise of its supply, and an unwanted motion
-    (sensitivity 1). The resulting errors are correlated and do not average out.
+    Examples are the temperature of a board, and an unwanted motion (sensitivity 1).
     """
 
     model: NoiseModel  # the process in its own unit, such as kelvin, at the fused rate
@@ -60,27 +56,13 @@ class Board:
     The fused rate is the lowest of the rates. A faster sensor is decimated by block means. Its
     white noise density N and its Allan variance at each tau do not change. Its spectrum above the
     fused Nyquist frequency is aliased below it, attenuated by the transfer function of the mean,
-    |sin(m w/2) / (m sin(w/2))|^2.
-
-    Parameters
-    ----------
-    models : sequence of NoiseModel
-        Noise of each sensor, independent of the others.
-    rates : sequence of float
-        Hz, one a sensor.
-    shared : sequence of Shared
-        Shared processes, independent of each other and of `models`.
-
-    Raises
-    ------
-    ValueError
-        If the numbers differ, there is no sensor, a rate is not above 0 or no whole multiple of
-        the lowest, or a sensitivity is not finite.
+    |sin(m w/2) / (m sin(w/2))|^2. Raises ValueError if the numbers differ, there is no sensor, a
+    rate is not above 0 or no whole multiple of the lowest, or a sensitivity is not finite.
     """
 
-    models: Sequence[NoiseModel]
-    rates: Sequence[float]
-    shared: Sequence[Shared] = ()
+    models: Sequence[NoiseModel]  # noise of each sensor, independent of the others
+    rates: Sequence[float]  # Hz, one a sensor
+    shared: Sequence[Shared] = ()  # independent of each other and of the models
 
     def __post_init__(self) -> None:
         if not self.models or len(self.models) != len(self.rates):
@@ -110,10 +92,9 @@ class Board:
         rate: float,
         correlation: Mapping[str, float] | None = None,
     ) -> Board:
-        """Return a board of one or more specimens of one sensor, at a rate in Hz.
+        """Return a board of specimens of one sensor, with its whole noise, at a rate in Hz.
 
-        The model is the whole noise of each; the correlation, and a ValueError, are as for
-        `divided`.
+        The correlation, and a ValueError, are as for `divided`.
         """
         own, common = divided(model, correlation or {})
         shared = [Shared(common, [1.0] * number)] if common.terms else []
@@ -144,7 +125,7 @@ class Board:
     def allan_parts(self, tau: ArrayLike) -> Parts:
         """Return the Allan variances of the sensors at tau, s, array_like of shape (m,).
 
-        Each tau is rounded to the nearest whole number of fused samples, at least one.
+        Each tau is rounded to whole fused samples, at least one.
         """
         t = np.atleast_1d(np.asarray(tau, dtype=np.float64))
         t = np.maximum(np.rint(t * self.rate), 1.0) / self.rate
@@ -174,14 +155,9 @@ class Board:
 def divided(model: NoiseModel, correlation: Mapping[str, float]) -> tuple[NoiseModel, NoiseModel]:
     """Split the noise of a sensor into an independent part and one shared by all specimens.
 
-    The spectrum of the model is the sum of the two. ``correlation`` has the shared fraction of the
-    variance of N, B, K and R, 0 to 1. The fraction of B applies to further Gauss-Markov processes,
-    too. Quantization and lines are independent.
-
-    Raises
-    ------
-    ValueError
-        If a correlation is of another parameter, or not from 0 to 1.
+    ``correlation`` has the shared fraction of the variance of N, B, K and R, 0 to 1, or
+    ValueError. The fraction of B applies to further Gauss-Markov processes, too. Quantization and
+    lines are independent.
     """
     for name, value in correlation.items():
         if name not in _SHARED_PARAMETERS or not 0.0 <= value <= 1.0:

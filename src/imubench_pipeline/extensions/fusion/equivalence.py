@@ -16,8 +16,7 @@ from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.simulate import channel_rng
 from imubench_pipeline.typing import Array
 
-_TAIL_PROBABILITY = 0.025
-"""Probability beyond each 95 % limit."""
+_TAIL_PROBABILITY = 0.025  # beyond each 95 % limit
 
 
 @dataclass(frozen=True)
@@ -45,10 +44,9 @@ def answer(
     """Return the Allan variance of the median channel of a sensor at a tau; or why not.
 
     The candidates are all channels of one quantity of the sensor, at least one. Simulated ones are
-    left out if there are measured ones. The median of two is the worse one. The tau is in s;
-    ``correlation`` has the fraction of the variance of each parameter that specimens share,
-    ``longest`` is the longest tau as a fraction of the log, and ``draws`` the number of models
-    drawn from the estimate, with a random stream for each channel.
+    left out if there are measured ones. The tau is in s; ``correlation`` has the fraction of the
+    variance of each parameter that specimens share, ``longest`` is the longest tau as a fraction of
+    the log, and ``draws`` the number of models drawn from the estimate.
     """
     measured = [channel for channel in candidates if not channel.simulated] or candidates
     long = [channel for channel in measured if tau <= longest * channel.duration]

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Container, Iterator, Mapping
+import math
+from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from functools import cache, partial
 from pathlib import Path
 
@@ -10,10 +12,10 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
 
-from imubench_pipeline.estimators.estimate import JointDraws
+from imubench_pipeline.datasheets.comparable import Comparable, read_comparables
+from imubench_pipeline.estimators.estimate import JointDraws, Parameter
 from imubench_pipeline.estimators.rows import make_estimate, read_draws
 from imubench_pipeline.extensions.fusion.equivalence import equivalence_rows
-from imubench_pipeline.extensions.fusion.grades import Grade, yield_grade_rows
 from imubench_pipeline.extensions.fusion.tables import RECORDINGS_OF_A_PAIR, FusionRow, GradeRow
 from imubench_pipeline.model.estimates import CompensatedAllanRow, ParameterRow, TemperatureRow
 from imubench_pipeline.model.recordings import RecordingRow
@@ -22,12 +24,92 @@ from imubench_pipeline.navigation.compared import ComparedChannel, TemperaturePa
 from imubench_pipeline.navigation.error_budget.printed_errors import SIGMAS
 from imubench_pipeline.recordings.fitness import attach_doubts, list_excluded
 from imubench_pipeline.settings.config import FusionSettings
+from imubench_pipeline.settings.printed import Datasheet
 from imubench_pipeline.settings.sensor import Sensor, sensors_of
 from imubench_pipeline.tables import build, read, write_arrow
 from imubench_pipeline.units import parse_quantity
 
-NEEDED = ("recordings", "parameters", "allan_compensated", "temperature")
-"""The tables of a run that the step reads."""
+PARAMETER_OF_STATISTIC = {"N": "N", "adev_minimum": "sigma_min"}  # of a printed figure
+
+
+@dataclass(frozen=True)
+class Grade:
+    """A sensor of the better class."""
+
+    sensor: str  # name in the catalogue
+    name: str  # vendor and model
+    datasheet: Datasheet
+
+    def printed(self, channel: str) -> Iterator[tuple[str | None, Comparable]]:
+        """Yield the printed N and floor, SI, of each option; without a value if not printed."""
+        sheet = getattr(self.datasheet, channel.split("_")[0])
+        if sheet is None:
+            return
+        names = ("noise_density", "random_walk", "bias_instability")
+        figures = [figure for name in names for figure in sheet.printed(name)]
+        options = dict.fromkeys(figure.option for figure in figures) or {None: None}
+        for option in options:
+            chosen = self.datasheet.model_copy(update={"options": [option] if option else []})
+            for one in read_comparables(chosen, channel):
+                of_option = one.figure is None or one.figure.option in (None, option)
+                if one.statistic in PARAMETER_OF_STATISTIC and of_option:
+                    yield option, one
+
+
+def yield_grade_rows(
+    candidates: Iterable[ComparedChannel], grades: Sequence[Grade]
+) -> Iterator[GradeRow]:
+    """Yield the rows of the table ``grades``: each sensor against each printed figure.
+
+    The axis with the median N represents a sensor; measured axes are preferred to simulated ones.
+    """
+    by_sensor: dict[tuple[str, str], list[ComparedChannel]] = {}
+    for channel in candidates:
+        quantity = channel.channel.split("_")[0]
+        by_sensor.setdefault((quantity, channel.sensor), []).append(channel)
+    for (quantity, sensor), channels in sorted(by_sensor.items()):
+        measured = [channel for channel in channels if not channel.simulated] or channels
+        chosen = sorted(measured, key=lambda channel: channel.model.N)[len(measured) // 2]
+        for grade in grades:
+            if grade.sensor == sensor:
+                continue
+            for option, printed in grade.printed(chosen.channel):
+                name = PARAMETER_OF_STATISTIC[printed.statistic]
+                estimate = chosen.estimate
+                of = estimate.parameters if name == "N" else estimate.curve or {}
+                own = of.get(name, Parameter(None, "not_shown", "not estimated"))
+                reason = printed.obstacle or printed.reason
+                if printed.value is not None:
+                    reason = None if own.value is not None else own.reason or own.status
+                yield GradeRow(
+                    quantity=quantity,
+                    sensor=sensor,
+                    recording=chosen.recording,
+                    channel=chosen.channel,
+                    simulated=chosen.simulated,
+                    grade=grade.sensor,
+                    grade_name=grade.name,
+                    option=option,
+                    statistic=name,
+                    value=own.value,
+                    lower=own.lower,
+                    upper=own.upper,
+                    printed=printed.value,
+                    n=_divide(own.value, printed.value),
+                    n_lower=_divide(own.lower, printed.value),
+                    n_upper=_divide(own.upper, printed.value),
+                    reason=reason,
+                )
+
+
+def _divide(own: float | None, printed: float | None) -> float | None:
+    """Return the number of sensors that reach a printed figure."""
+    if own is None or printed is None:
+        return None
+    return (own / printed) ** 2 if printed else math.inf
+
+
+NEEDED = ("recordings", "parameters", "allan_compensated", "temperature")  # tables of a run
 
 
 def yield_candidates(
@@ -38,8 +120,7 @@ def yield_candidates(
     """Yield the channels of recordings that decide, and of the sensors in ``besides``.
 
     The estimate is the recommended one, or the one after removal of the temperature effect.
-    ``tables`` are the tables `NEEDED` of a run, ``joint`` the files of the table ``draws``, by
-    sensor and recording.
+    ``tables``: `NEEDED`; ``joint``: files of the table ``draws``, by sensor and recording.
     """
     parameters = tables["parameters"]
     warm = _temperature_parts(tables)
@@ -115,8 +196,7 @@ def yield_fusion_rows(
     return attach_doubts(rows, RecordingRow.rows_of(tables["recordings"]), RECORDINGS_OF_A_PAIR)
 
 
-TACTICAL_CLASS = "tactical"
-"""First word of the price class of the target datasheets."""
+TACTICAL_CLASS = "tactical"  # first word of the price class of the target datasheets
 
 
 def yield_grades_of_run(
@@ -139,9 +219,9 @@ def write_fusion(
     catalogue: str,
     outputs: list[Path],
 ) -> None:
-    """Write the tables ``fusion`` and ``grades``, as Parquet and CSV.
+    """Write the tables ``fusion`` and ``grades``, by the stems of ``outputs``, from ``inputs``.
 
-    ``joint``: tables ``draws`` of recordings; ``outputs``: files of both tables, by their stems.
+    ``joint``: tables ``draws`` of recordings.
     """
     how = FusionSettings.model_validate_json(settings)
     tables = {name: read(name, [Path(inputs[name])]) for name in NEEDED}
@@ -150,8 +230,6 @@ def write_fusion(
         "fusion": yield_fusion_rows(tables, how, of_recording),
         "grades": yield_grades_of_run(tables, sensors_of(catalogue)),
     }
-    for name, own in rows.items():
-        table = build(name, own)
-        for output in outputs:
-            if output.stem == name:
-                write_arrow(table, output)
+    made = {name: build(name, own) for name, own in rows.items()}
+    for output in outputs:
+        write_arrow(made[output.stem], output)

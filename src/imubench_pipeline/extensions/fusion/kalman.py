@@ -21,11 +21,8 @@ from imubench_pipeline.noise.state_space import of_block_means
 from imubench_pipeline.typing import Array
 
 _MAX_DOUBLINGS = 80
-_CONVERGENCE_TOLERANCE = 1e-13
-"""Maximum number of doublings, and relative change of the covariance at convergence."""
-
-_MAX_FLICKER_TAU = 1e5
-"""Maximum tau, s, up to which the filter models flicker noise."""
+_CONVERGENCE_TOLERANCE = 1e-13  # relative change of the covariance
+_MAX_FLICKER_TAU = 1e5  # s, up to which the filter models flicker noise
 
 _WALK_SURROGATE_TIME_RATIO = 100.0
 """Correlation time of the Gauss-Markov process that replaces a random walk, over the longest tau.
@@ -43,21 +40,13 @@ def steady_covariance(transition: Array, process_noise: Array, information: Arra
         P = Phi P (I + G P)^-1 Phi^T + Q,    G = H^T R^-1 H,
 
     by the structure-preserving doubling algorithm: k doublings are 2^k steps of the filter from
-    a known state. It uses the information G of one sample, not H and R, so that a singular G (a
-    combination without information) needs no choice of differences. It is accurate for
-    eigenvalues near 1, which slow Gauss-Markov processes have.
-
-    Phi, Q and G have the shape (m, m). Unobservable processes must be stable.
-
-    Raises
-    ------
-    ValueError
-        If it does not converge.
+    a known state. It uses the information G of one sample, so that a singular G needs no choice of
+    differences, and is accurate for eigenvalues near 1. Phi, Q and G have the shape (m, m).
+    Unobservable processes must be stable. Raises ValueError if it does not converge.
 
     References
     ----------
-    B. D. O. Anderson, "Second-order convergent algorithms for the steady-state Riccati
-    equation", International Journal of Control 28(2), 1978; E. K.-W. Chu et al., "A
+    B. D. O. Anderson, International Journal of Control 28(2), 1978; E. K.-W. Chu et al., "A
     structure-preserving doubling algorithm for periodic discrete-time algebraic Riccati
     equations", International Journal of Control 77(8), 2004.
     """
@@ -92,18 +81,10 @@ class KalmanFusion:
         s^ = a^T (y - H x),    a = S^-1 1 / (1^T S^-1 1),
         x' = Phi (x + L (y - H x)),    L = P H^T (S^-1 - S^-1 1 a^T),
 
-    which is equivalent to the Kalman filter of any n - 1 independent differences. The
-    discretisation is exact, including block means of faster sensors; flicker noise is modelled by
-    a bank of Gauss-Markov processes.
-
-    A sample has the least variance of all causal filters. At each frequency, an optimal smoother
-    (`imubench_pipeline.extensions.fusion.weights.ByFrequency`) has the same or less noise. Ramps
-    and lines are not estimated: they pass with the weights at their frequency.
-
-    Raises
-    ------
-    ValueError
-        If a sensor has no white noise.
+    which is equivalent to the Kalman filter of any n - 1 independent differences. Flicker noise is
+    modelled by a bank of Gauss-Markov processes. A sample has the least variance of all causal
+    filters. Ramps and lines are not estimated: they pass with the weights at their frequency.
+    Raises ValueError if a sensor has no white noise.
     """
 
     def __init__(self, board: Board) -> None:
@@ -148,15 +129,9 @@ class KalmanFusion:
         """Yield the fused samples, block by block; they do not depend on the size of the blocks.
 
         The filter begins with states of 0: subtract the fixed bias of each sensor before. If a
-        sensor has no sample (NaN), there is no fused sample, and the states are only predicted.
-
-        The blocks are samples of all sensors at the fused rate (`at_fused_rate`), shape (k, n),
-        in rad/s or m/s^2 like the fused ones, shape (k,).
-
-        Raises
-        ------
-        ValueError
-            If a block has another number of sensors.
+        sensor has no sample (NaN), there is no fused sample, and the states are only predicted. The
+        blocks are samples of all sensors at the fused rate (`at_fused_rate`), shape (k, n), in
+        rad/s or m/s^2. Raises ValueError if a block has another number of sensors.
         """
         state = np.zeros(self.states)
         output, transition = csr_array(self._output), csr_array(self._transition)

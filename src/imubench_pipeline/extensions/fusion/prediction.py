@@ -19,19 +19,14 @@ from imubench_pipeline.navigation.error_budget.uncertainty import draw_models
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.typing import Array
 
-_RULE = np.polynomial.legendre.leggauss(16)
-"""Gauss-Legendre points and weights in a panel."""
-
-_OCTAVE_PANELS = 40
-"""Number of panels below the first zero of sin^4(n w/2): remainder 1e-12 for a random walk."""
+_RULE = np.polynomial.legendre.leggauss(16)  # points and weights in a panel
+_OCTAVE_PANELS = 40  # below the first zero of sin^4(n w/2): remainder 1e-12 for a random walk
+_RAMP_FREQUENCY = 1e-9  # rad per sample, at which the response of a filter to a ramp is evaluated
 
 _RESOLVED_PERIODS = 64
 """Number of resolved periods of sin^4(n w/2). Beyond, its mean of 3/8 is used, with an error of
 4e-8 for white noise (first term of the asymptotic series of the remainder, 0.23/X^3 against
 pi/4)."""
-
-_RAMP_FREQUENCY = 1e-9
-"""rad per sample; frequency at which the response of a filter to a ramp is evaluated."""
 
 
 def nodes(n: int) -> tuple[Array, Array]:
@@ -42,12 +37,7 @@ def nodes(n: int) -> tuple[Array, Array]:
     with w in rad per sample and n samples in a cluster, from 1. The rule is Gauss-Legendre, in
     panels of an octave of w up to the first zero of sin^4, where P is smooth over log w, and then
     of one period. At high frequencies, the many periods of a long cluster are replaced by their
-    mean, again in octaves.
-
-    Raises
-    ------
-    ValueError
-        If n is below 1.
+    mean, again in octaves. Raises ValueError if n is below 1.
     """
     if n < 1:
         raise ValueError(f"a cluster has {n} samples, expected 1 or more")
@@ -137,10 +127,8 @@ def fused_allan(board: Board, weights: Weights, tau: ArrayLike) -> FusedCurve:
     (w^T g)^2 AV. With weights that change with the frequency it is the integral of the fused
     spectrum (`nodes`; relative error below 1e-7). A ramp passes with the weights at frequency 0, a
     line with the weights at its frequency. Ramps of several sensors have independent random signs.
-
-    The weights may be from another board than the actual sensors, to predict the effect of wrong
-    sensor models. The tau are array_like of shape (m,), s, rounded to the nearest whole number of
-    fused samples, at least one.
+    The weights may be from another board, to predict the effect of wrong sensor models. The tau are
+    array_like of shape (m,), s, rounded to whole fused samples, at least one.
     """
     sizes = np.maximum(np.rint(np.atleast_1d(np.asarray(tau)) * board.rate).astype(np.int64), 1)
     tau = sizes / board.rate
@@ -187,14 +175,12 @@ def prediction_limits(
 ) -> tuple[Array, Array]:
     """Return limits, shapes (m,), of the predicted Allan deviation, by uncertain parameters.
 
-    The weights are fixed, computed from the estimates. The sensors are drawn by `draw_models`: all
-    parameters together if the estimates have joint draws, else independently, which gives limits
-    that are too wide for correlated parameters. Sensors with the same estimate are specimens of one
-    sensor and are drawn together, since the error of a parameter is common to them.
-
-    The board is from the estimates; its shared parts are assumed to be known. There is an estimate
-    of the independent noise of each sensor. The tau are array_like of shape (m,), s; ``draws`` is
-    the number of boards, and ``level`` the fraction of them between the limits.
+    The sensors are drawn by `draw_models`: all parameters together if the estimates have joint
+    draws, else independently, which gives limits that are too wide for correlated parameters.
+    Sensors with the same estimate are specimens of one sensor and are drawn together. Weights and
+    shared parts of the board are fixed. There is an estimate of the independent noise of each
+    sensor. The tau are array_like of shape (m,), s; ``draws`` is the number of boards, and
+    ``level`` the fraction of them between the limits.
     """
     drawn: dict[int, list[NoiseModel]] = {}
     for estimate, stream in zip(estimates, rng.spawn(len(estimates)), strict=True):

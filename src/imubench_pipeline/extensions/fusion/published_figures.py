@@ -28,16 +28,13 @@ from imubench_pipeline.settings.simulated_recordings import SimulatedRecording
 
 _Place = tuple[str, str, str, str]
 
-_DATASHEET_PARAMETERS = {
+_DATASHEET_PARAMETERS = {  # parameter and factor of datasheet figures, by statistic or quantity
     "N": ("N", 1.0),
     "adev_minimum": ("B", 1.0 / FLOOR),
     "offset": ("bias", 1.0),
     SENSITIVITY: (SENSITIVITY, 1.0),
 }
-"""Parameter and factor of datasheet figures, by statistic or quantity."""
-
-_MAX_TAU_OVER_LENGTH = 1.0 / 9.0
-"""Longest tau at which a curve is read, over the length of the log."""
+_MAX_TAU_OVER_LENGTH = 1.0 / 9.0  # longest tau at which a curve is read, over that of the log
 
 
 def yield_published_figures(

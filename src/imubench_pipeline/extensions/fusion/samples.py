@@ -11,24 +11,15 @@ from imubench_pipeline.extensions.fusion.kalman import KalmanFusion
 from imubench_pipeline.extensions.fusion.weights import Constant
 from imubench_pipeline.typing import Array
 
-_BLOCK_LENGTH = 1 << 16
-"""Number of fused samples in a block of processing."""
+_BLOCK_LENGTH = 1 << 16  # number of fused samples in a block of processing
 
 
 def at_fused_rate(board: Board, samples: Sequence[Array]) -> Array:
     """Return the samples of all sensors at the fused rate, shape (k, n): means of blocks.
 
-    Parameters
-    ----------
-    board : Board
-    samples : sequence of ndarray
-        Samples of each sensor at its own rate, rad/s or m/s^2, with a common start. A remainder
-        that does not fill a block of every sensor is left out. A block with NaN (missing) is NaN.
-
-    Raises
-    ------
-    ValueError
-        If the number of sensors differs.
+    The samples of each sensor are at its own rate, rad/s or m/s^2, with a common start. A remainder
+    that does not fill a block of every sensor is left out. A block with NaN (missing) is NaN.
+    Raises ValueError if the number of sensors differs.
     """
     number = _count_fused_samples(board, samples)
     fused = np.empty((number, board.sensors))

@@ -26,8 +26,7 @@ from imubench_pipeline.simulate.profiles import Profile
 from imubench_pipeline.typing import Array
 from imubench_pipeline.units import parse_quantity
 
-_SPREAD_PARAMETERS = ("N", "B", "K")
-"""Parameters that differ between specimens."""
+_SPREAD_PARAMETERS = ("N", "B", "K")  # which differ between specimens
 
 
 def make_specimens(recording: SimulatedRecording) -> list[ImuModel]:
@@ -118,4 +117,3 @@ def compute_fusion_factors(recording: SimulatedRecording, channel: str) -> dict[
 
 
 SPECIMENS = Simulation(simulate_fused_blocks, compute_fusion_factors)
-"""How specimens on a board are simulated."""

@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 from imubench_pipeline.extensions.fusion.board import Board, Parts
 from imubench_pipeline.typing import Array
 
-_MIN_VARIANCE_RATIO = 1e-14
-"""Variance of a sensor without noise over the variance of the noisiest one."""
+_MIN_VARIANCE_RATIO = 1e-14  # of a sensor without noise, over the noisiest one
 
 
 class Weights(Protocol):
@@ -24,13 +23,7 @@ class Weights(Protocol):
 
 @dataclass(frozen=True)
 class Constant:
-    """Weights that are the same at every frequency.
-
-    Raises
-    ------
-    ValueError
-        If there is not one weight a sensor, or their sum is not 1 or not a number.
-    """
+    """Weights that are the same at every frequency; ValueError if their sum is not 1."""
 
     values: Array  # shape (n,); their sum is 1, so that the common signal passes unchanged
 
@@ -47,10 +40,8 @@ class Constant:
 class ByFrequency:
     """Optimal weights at each frequency: they minimise the fused spectrum.
 
-    w(f) = S^-1 1 / (1^T S^-1 1) with S the spectral matrix: inverse spectra without shared
-    processes. They are the weights of an optimal, non-causal smoother. No causal filter has less
-    noise at any frequency; the Kalman filter (`imubench_pipeline.extensions.fusion.kalman`) has
-    slightly more where the weights change.
+    w(f) = S^-1 1 / (1^T S^-1 1) with S the spectral matrix. They are the weights of an optimal,
+    non-causal smoother: no causal filter has less noise at any frequency.
     """
 
     board: Board  # with the models for the weights
@@ -72,15 +63,8 @@ def best_constant(board: Board, tau: float | None = None) -> Constant:
 
     Without common parts they are the normalised inverse Allan variances. With common parts, a
     weight may be negative: a poor sensor with a large temperature sensitivity compensates the
-    others.
-
-    The tau, s, is rounded to the nearest whole number of fused samples, at least one. Without it,
-    the weights are optimal for white noise, N^-2.
-
-    Raises
-    ------
-    ValueError
-        If a sensor has no noise to compute its weight.
+    others. The tau, s, is rounded to whole fused samples, at least one. Without it, the weights are
+    optimal for white noise, N^-2. Raises ValueError for a sensor without noise.
     """
     if tau is None:
         own = np.array([[model.N**2 for model in board.models]])

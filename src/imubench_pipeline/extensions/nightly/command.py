@@ -55,8 +55,9 @@ def run(options: argparse.Namespace) -> int:
     """Run the workflow on the logs that are complete; return the exit status."""
     with require_extra("workflow", "run the workflow"):
         import_module("snakemake")
-    from imubench_pipeline.extensions.nightly.night import Night, TakenError
+    from imubench_pipeline.extensions.nightly.night import Night
     from imubench_pipeline.extensions.nightly.summary import STATUS, format_summary
+    from imubench_pipeline.run.lock import TakenError
     from imubench_pipeline.settings.validation import ConfigError
 
     try:

@@ -95,16 +95,14 @@ def find_settled_logs(
 ) -> tuple[dict[str, Found], list[Skip]]:
     """Return the last scan of a drop zone, and the logs that are still being written.
 
-    A complete log has not changed for ``settle``, s. Logs that are as they were at an ``earlier``
-    run need no second scan.
+    A complete log has not changed for ``settle``, s, or since an ``earlier`` run.
     """
     first = second = scan_drop_zone(logs)
     if settle and any(earlier.get(key) != recording.files for key, recording in first.items()):
         time.sleep(min(settle, _MAX_PAUSE))
         second = scan_drop_zone(logs)
-    return second, list(
-        find_unsettled_logs(first, second, settle, time.time(), find_writers(second))
-    )
+    writing = find_writers(second)
+    return second, list(find_unsettled_logs(first, second, settle, time.time(), writing))
 
 
 def find_unsettled_logs(
@@ -146,10 +144,7 @@ def _describe_transfer(partial: tuple[str, int, int], now: float) -> str:
 
 
 def find_writers(recordings: Mapping[str, Found]) -> dict[Path, str]:
-    """Return the files of recordings that are open for writing, with their process.
-
-    Only accessible processes are checked: the user's own, or all for an administrator.
-    """
+    """Return the files of recordings that accessible processes have open for writing."""
     looked_for = {real for recording in recordings.values() for real in _resolve_paths(recording)}
     writing: dict[Path, str] = {}
     for process in psutil.process_iter() if looked_for else ():

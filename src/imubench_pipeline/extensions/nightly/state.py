@@ -167,10 +167,19 @@ def make_state(
             for name, digest in digests.items()
         },
         warned=sorted({make_warning_key(row) for row in select_warnings(tables.findings)}, key=str),
-        drifted=sorted({make_drift_key(row) for row in select_changed_devices(tables.drift)}),
+        drifted=sorted(make_drift_keys(tables.drift)),
         leaders=find_leaders(tables.ranking),
         skipped=dict(skipped),
     )
+
+
+def make_drift_keys(drift: Iterable[DriftRow]) -> dict[Drifted, DriftRow]:
+    """Return the rows of the table ``drift`` about devices that have changed, by their keys."""
+    return {
+        Drifted(row.sensor, row.device, row.channel, row.parameter, row.recording): row
+        for row in drift
+        if row.verdict == "changed"
+    }
 
 
 def get_recording_name(row: OfRecordingRow | RecordingRow | FailureRow | DriftRow) -> str:
@@ -181,16 +190,6 @@ def get_recording_name(row: OfRecordingRow | RecordingRow | FailureRow | DriftRo
 def make_warning_key(row: FindingRow) -> Warned:
     """Return the key of a finding."""
     return Warned(get_recording_name(row), row.channel, row.finding)
-
-
-def select_changed_devices(drift: Iterable[DriftRow]) -> list[DriftRow]:
-    """Return the rows of devices that have changed."""
-    return [row for row in drift if row.verdict == "changed"]
-
-
-def make_drift_key(row: DriftRow) -> Drifted:
-    """Return the key of a row of the table ``drift``."""
-    return Drifted(row.sensor, row.device, row.channel, row.parameter, row.recording)
 
 
 def find_leaders(ranking: Iterable[RankingRow]) -> dict[str, Leader | None]:

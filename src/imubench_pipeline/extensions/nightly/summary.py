@@ -13,9 +13,8 @@ from imubench_pipeline.extensions.nightly.state import (
     RunRows,
     State,
     get_recording_name,
-    make_drift_key,
+    make_drift_keys,
     make_warning_key,
-    select_changed_devices,
 )
 from imubench_pipeline.report.run_summary import (
     fold_text,
@@ -26,9 +25,7 @@ from imubench_pipeline.report.run_summary import (
 
 Outcome = Literal["fine", "flagged", "failed"]
 
-STATUS: Mapping[Outcome, int] = {"fine": 0, "flagged": 1, "failed": 2}
-"""Exit status of each outcome."""
-
+STATUS: Mapping[Outcome, int] = {"fine": 0, "flagged": 1, "failed": 2}  # exit status
 _MAX_LINES = 20
 
 
@@ -185,8 +182,8 @@ def compare_states(
         ],
         "drift": [
             Drift.model_validate(row.columns())
-            for row in select_changed_devices(tables.drift)
-            if get_recording_name(row) not in written_to and make_drift_key(row) not in known_drift
+            for key, row in make_drift_keys(tables.drift).items()
+            if key.name not in written_to and key not in known_drift
         ],
         "first": first,
     }

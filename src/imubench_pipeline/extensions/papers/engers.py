@@ -7,8 +7,7 @@ import math
 import numpy as np
 
 from imubench_pipeline.extensions.fusion.tables import GradeRow, PublishedFigureRow
-from imubench_pipeline.extensions.papers.evidence import Evidence, Log, Result
-from imubench_pipeline.extensions.papers.printed import Verdict, read_paper
+from imubench_pipeline.extensions.papers.printed import Evidence, Log, Result, Verdict, read_paper
 from imubench_pipeline.model.estimates import (
     AllanRow,
     CompensatedAllanRow,

@@ -20,7 +20,7 @@ from imubench_pipeline.estimators.identifiability import compute_cramer_rao_boun
 from imubench_pipeline.estimators.model_choice import PAPERS_MODEL
 from imubench_pipeline.estimators.spectrum import compute_spectra
 from imubench_pipeline.estimators.whittle import Whittle, make_whittle
-from imubench_pipeline.extensions.papers.maia_draws import DURATION, MTI_GYRO
+from imubench_pipeline.extensions.papers.maia import DURATION, MTI_GYRO
 from imubench_pipeline.extensions.papers.tables import AccuracyRow
 from imubench_pipeline.noise.simulate import channel_rng, simulate
 

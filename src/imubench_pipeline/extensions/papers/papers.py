@@ -7,11 +7,12 @@ from dataclasses import replace
 from pathlib import Path
 
 from imubench_pipeline.extensions.papers import engers, maia, silva
-from imubench_pipeline.extensions.papers.evidence import Evidence, Result
 from imubench_pipeline.extensions.papers.panel import make_accuracy_rows
 from imubench_pipeline.extensions.papers.printed import (
+    Evidence,
     Line,
     Paper,
+    Result,
     Unit,
     Verdict,
     parse_number,

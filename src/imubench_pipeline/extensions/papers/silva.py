@@ -37,8 +37,7 @@ from imubench_pipeline.extensions.earth_rate.simulation import (
     simulate_log,
 )
 from imubench_pipeline.extensions.earth_rate.tables import EarthRateRow
-from imubench_pipeline.extensions.papers.evidence import Evidence, Log, Result
-from imubench_pipeline.extensions.papers.printed import read_paper
+from imubench_pipeline.extensions.papers.printed import Evidence, Log, Result, read_paper
 from imubench_pipeline.noise import FLOOR, PEAK_TAU
 from imubench_pipeline.noise.simulate import channel_rng, simulate
 from imubench_pipeline.simulate.model import SensorModel

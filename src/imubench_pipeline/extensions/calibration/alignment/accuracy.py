@@ -42,10 +42,7 @@ class TriadRuns:
 
 
 def true_means(positions: Positions, site: Site, attitude: Array) -> Array:
-    """Return the readings of an error-free triad, rad/s and m/s^2, shape (b, 6).
-
-    Gyros and accelerometers x, y, z, at an attitude in the first position, shape (3, 3).
-    """
+    """Return the readings of an error-free triad at an attitude, shape (3, 3), as (b, 6)."""
     to_body = np.swapaxes(attitude @ positions.of_blocks, 1, 2)
     return np.concatenate([to_body @ site.earth_rate, to_body @ site.specific_force], axis=1)
 
@@ -59,10 +56,7 @@ def simulate_triad(
     runs: int,
     rng: np.random.Generator,
 ) -> TriadRuns:
-    """Draw the block means of many runs; the fixed biases are drawn for each.
-
-    The attitude, shape (3, 3), belongs to the first position.
-    """
+    """Draw the block means of many runs, from the attitude in the first position, (3, 3)."""
     drawn = [
         simulate_runs(
             model, positions.blocks, earth_rate=0.0, turn_on_bias=bias, runs=runs, rng=stream
@@ -81,9 +75,7 @@ _BLOCKS_BY_POSITIONS = {1: 16, 2: 64}
 """Blocks of a run, by the number of its positions. Twice as many lower a sigma by 5 % at most,
 after an hour in two positions."""
 
-# Largest standard deviation of a heading, rad, for a start from coarse alignment
-_MAX_LINEAR_HEADING_SIGMA = 0.2
-
+_MAX_LINEAR_HEADING_SIGMA = 0.2  # rad, for a start from coarse alignment
 _LEVEL_ATTITUDE = np.eye(3)
 
 
@@ -129,11 +121,9 @@ def accuracies(
     runs: int = 0,
     rng: np.random.Generator | None = None,
 ) -> Iterator[Accuracy]:
-    """Yield the accuracy of a triad after these times, in one position and in two.
+    """Yield the accuracy of a triad after these times, s, increasing, in one position and in two.
 
-    The sampling rate is in Hz; the times, s, increase, each longer than the turn between two
-    positions. For fine alignment, ``rng`` simulates this number of ``runs`` at the last time; 0:
-    none.
+    The sampling rate is in Hz. For fine alignment, ``rng`` simulates ``runs`` at the last time.
     """
     for number in (1, 2):
         for time in times:

@@ -36,8 +36,7 @@ def matrix(roll: float, pitch: float, heading: float) -> Array:
 def euler_angles(attitude: Array) -> Array:
     """Return roll, pitch and heading, rad, of attitudes of shape (..., 3, 3).
 
-    Roll and heading are from -pi to pi, pitch from -pi/2 to pi/2. At a pitch of +-pi/2
-    roll and heading are not separable (gimbal lock).
+    Roll and heading are from -pi to pi, pitch from -pi/2 to pi/2.
     """
     c = attitude
     level = np.hypot(c[..., 0, 0], c[..., 1, 0])
@@ -74,18 +73,13 @@ def rotation(vector: ArrayLike) -> Array:
 
 
 def correct(attitude: Array, psi: Array) -> Array:
-    """Return C: an attitude C~, shape (..., 3, 3), corrected by its error psi.
-
-    psi is in rad, shape (..., 3); exp([psi x]) is the inverse of I - [psi x] to the first order,
-    and a rotation.
-    """
+    """Return an attitude, (..., 3, 3), corrected by its error psi, rad, shape (..., 3)."""
     return np.asarray(rotation(psi) @ attitude)
 
 
 def euler_jacobian(attitude: Array) -> Array:
-    """Return the Jacobian of roll, pitch and heading with respect to a small error psi.
+    """Return the Jacobian, shape (3, 3), of roll, pitch and heading for a small error psi.
 
-    Multiplied by psi, it gives the errors of the three angles, rad. Shape (3, 3), as the attitude.
     Raises ValueError if the pitch is +-pi/2: roll and heading are not separable.
     """
     _, pitch, heading = euler_angles(attitude)

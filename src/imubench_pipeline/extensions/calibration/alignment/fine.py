@@ -30,9 +30,8 @@ from imubench_pipeline.extensions.calibration.alignment.attitude import (
 )
 from imubench_pipeline.extensions.calibration.alignment.coarse import coarse_alignment, mean_vectors
 from imubench_pipeline.extensions.calibration.alignment.triad import Positions, Site, Triad
-from imubench_pipeline.extensions.calibration.block_filter import BlockFilter
 from imubench_pipeline.extensions.calibration.least_squares import NotObservable, NotObservableError
-from imubench_pipeline.extensions.calibration.states import discretise_blocks
+from imubench_pipeline.extensions.calibration.states import BlockFilter, discretise_blocks
 from imubench_pipeline.typing import Array
 
 INITIAL_ANGLE_SIGMA = 10.0
@@ -115,9 +114,8 @@ class FineAlignment:
     def run(self, means: Array, attitude: Array | None = None) -> Aligned:
         """Align runs from block means of gyros and accelerometers x, y, z, shape (runs, b, 6).
 
-        The means are in rad/s and m/s^2. ``attitude``, shape (runs, 3, 3), is the attitude of each
-        run to correct, near the attitude of the filter, which is the default. Raises ValueError if
-        there are not six finite means per block.
+        ``attitude``, shape (runs, 3, 3), is near the one of the filter, the default. Raises
+        ValueError if there are not six finite means per block.
         """
         if means.ndim != 3 or means.shape[1:] != (len(self.positions.blocks), 6):
             raise ValueError(
@@ -150,12 +148,10 @@ def align(
 ) -> tuple[Aligned, FineAlignment]:
     """Align one run: coarsely, then by filters about the last attitude until it converges.
 
-    This is the Gauss-Newton method: each iteration linearises about a better attitude, which
-    removes the nonlinear effect of a large error of the coarse heading. The block means are of
-    gyros and accelerometers x, y, z, rad/s and m/s^2, shape (b, 6). Returned are the alignment of
-    the run and the last filter, which has the standard deviations. Raises NotObservableError if the
-    heading is not observable; use roll and pitch of the coarse alignment. Raises ValueError if the
-    attitude does not converge.
+    This is the Gauss-Newton method. The block means are of gyros and accelerometers x, y, z, rad/s
+    and m/s^2, shape (b, 6). Returned are the alignment of the run and the last filter, which has
+    the standard deviations. Raises NotObservableError if the heading is not observable, ValueError
+    if the attitude does not converge.
     """
     attitude = coarse_alignment(*mean_vectors(means, positions), site)
     for _ in range(_MAX_ITERATIONS):

@@ -123,11 +123,10 @@ class Positions:
     def turned_about_z(
         cls, headings: Sequence[float], *, dwell: float, turning: float, block: float, rate: float
     ) -> Positions:
-        """Return positions that differ by exactly known turns about the z axis.
+        """Return positions that differ by known turns about the z axis, by headings in rad.
 
-        The headings are angles from the first, rad; 0, pi is the classical pair. ``dwell`` is the
-        data in each position, ``turning`` the time between two, ``block`` the largest length of a
-        block, s; the sampling rate is in Hz.
+        ``dwell`` is the data in each, ``turning`` the time between two, ``block`` the largest
+        length of a block, s; the sampling rate is in Hz.
         """
         run = Experiment.regular(
             dwell=dwell, turning=turning, dwells=len(headings), rate=rate, latitude=0.0
