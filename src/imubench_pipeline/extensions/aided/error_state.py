@@ -82,29 +82,15 @@ def run_filter(
 ) -> tuple[Array, Array, Array, Array]:
     """Filter one run; p, v and C are changed in place.
 
-    Parameters
-    ----------
-    rate, force, T, earth
-        Sensor readings, shape (L, 3), rad/s and m/s^2, every T s; the Earth's rate, shape (3,).
-    fixes, available, spread
-        Position, velocity and heading of GNSS at the end of each epoch, shape (E, 7), whether the
-        filter uses them (E,), and their standard deviations (7,); infinite: not used.
-    position, velocity, attitude, bias
-        The truth at these times, shapes (E, 3), (E, 3), (E, 3, 3), and the true slow error of each
-        axis (E, 6); NaN if unknown.
-    p, v, C, start
-        Initial estimate, shapes (3,), (3,), (3, 3), and the covariance of its error, (9, 9).
-    axes, width
-        States of the axes, and samples of a step.
+    ``rate`` and ``force``, shape (L, 3), are readings every T s, ``earth``, (3,), the Earth's rate.
+    ``fixes``, (E, 7), are position, velocity and heading of GNSS at the end of each epoch, used
+    where ``available``, (E,), with the standard deviations ``spread``, (7,); infinite: not used.
+    ``position``, ``velocity``, (E, 3), and ``attitude``, (E, 3, 3), are the truth at these times,
+    ``bias``, (E, 6), the true slow error of each axis; NaN if unknown. The covariance of the
+    initial estimate p, v, C is ``start``, (9, 9); a step has ``width`` samples.
 
-    Returns
-    -------
-    errors, variances : ndarray, shape (E, 9)
-        True less estimated values, and their variances in the filter.
-    normalised : ndarray, shape (E, 6)
-        Normalised errors squared, by `GROUPS`.
-    covariance : ndarray, shape (9 + m + s, 9 + m + s)
-        Covariance of all states after the last epoch.
+    Returned are the errors (true less estimated) and their variances, both (E, 9), their normalised
+    squares by `GROUPS`, (E, 6), and the covariance of all states after the last epoch.
     """
     E, steps = len(fixes), len(axes.sum_observation)
     first, scale = axes.first, axes.scale

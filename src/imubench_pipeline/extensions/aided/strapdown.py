@@ -6,16 +6,10 @@ with the Earth. In it
     p' = v,    v' = C f + g(p) - 2 w_ie x v,    C' = C [w x] - [w_ie x] C,
 
 with C from the axes of the sensor to the frame, f the specific force and w the rate that it senses.
-Gravity points to the centre of the Earth and decreases with height, to first order of the distance
-from the start. This includes Schuler feedback, and holds for a drive of some 10 km.
-
-A sample is the mean of w and f over the interval that it ends, as of an integrating sensor. In an
-interval the mechanisation (`propagate_sample`) is of second order, and `invert_mechanisation` is
-its exact inverse up to rounding. Therefore navigation errors come from sensors, GNSS or the start
-alone.
-
-Kernels loop over scalars, since numba compiles assignments to slices and sums of arrays into code
-that takes longer than the kernel itself.
+Gravity decreases with height, to first order, which includes Schuler feedback and holds for a drive
+of some 10 km. A sample is the mean of w and f over the interval that it ends; in it the
+mechanisation is of second order, with `invert_mechanisation` its exact inverse. Kernels loop over
+scalars, since numba compiles slices and sums of arrays into slow code.
 """
 
 from __future__ import annotations
@@ -28,11 +22,10 @@ from numba import njit
 from imubench_pipeline.earth import STANDARD_GRAVITY
 from imubench_pipeline.typing import Array
 
-EARTH_RADIUS = 6371000.0
-"""Mean radius, m."""
-
-GRAVITY_GRADIENT = STANDARD_GRAVITY / EARTH_RADIUS
-"""Horizontal gradient of gravity, 1/s^2; the vertical one is twice as large."""
+EARTH_RADIUS = 6371000.0  # mean, m
+GRAVITY_GRADIENT = (
+    STANDARD_GRAVITY / EARTH_RADIUS
+)  # horizontal, 1/s^2; the vertical one is twice it
 
 
 @njit(cache=True, nogil=True)

@@ -25,9 +25,7 @@ class NavigationRow(SensorRow):
 
     recording: Annotated[str, Column("whose estimates tune the filter")]
     trajectory: Annotated[str | None, Column("field, car, drone or rest")] = None
-    outage: Annotated[
-        float | None, Column("length of the outages of GNSS; null: epochs with GNSS", "s")
-    ] = None
+    outage: Annotated[float | None, Column("of GNSS; null: epochs with GNSS", "s")] = None
     tuning: Annotated[
         str,
         Column(
@@ -36,22 +34,10 @@ class NavigationRow(SensorRow):
         ),
     ]
     recommended: Annotated[bool | None, Column("the recommended estimate")] = None
-    model: Annotated[str | None, Column("terms of gyros and of accelerometers in the filter")] = (
-        None
-    )
-    states: Annotated[
-        int | None, Column("of the filter, position, velocity and attitude included")
-    ] = None
-    signals: Annotated[
-        str | None,
-        Column(
-            "errors of the sensor: simulated by the truth of its recording, by its estimate, or "
-            "pieces of its log"
-        ),
-    ] = None
-    assumed: Annotated[
-        str | None, Column("of another sensor, as the recording does not have it")
-    ] = None
+    model: Annotated[str | None, Column("terms of gyros and accelerometers in the filter")] = None
+    states: Annotated[int | None, Column("number, with position, velocity and attitude")] = None
+    signals: Annotated[str | None, Column("source of the errors: truth, estimate or log")] = None
+    assumed: Annotated[str | None, Column("from another sensor, as this log lacks it")] = None
     runs: Annotated[int | None, Column("that a row is of")] = None
     outages: Annotated[int | None, Column("of this length in all runs")] = None
     position: Annotated[float | None, _rms("in the plane", "m")] = None
@@ -75,22 +61,13 @@ class NavigationRow(SensorRow):
     heading_ratio: Annotated[float | None, _RATIO] = None
     heading_ratio_lower: Annotated[float | None, Column("lower 95 % limit")] = None
     heading_ratio_upper: Annotated[float | None, Column("upper 95 % limit")] = None
-    nees_inside: Annotated[
-        float | None, Column("share of epochs with NEES within its 95 % bounds")
-    ] = None
+    nees_inside: Annotated[float | None, Column("share of epochs with NEES in 95 % bounds")] = None
     nees_error: Annotated[float | None, Column("standard error of that share")] = None
     nees_position: Annotated[float | None, Column("likewise of the position alone")] = None
     nees_velocity: Annotated[float | None, Column("of the velocity")] = None
     nees_attitude: Annotated[float | None, Column("of the attitude")] = None
-    nees_gyro: Annotated[
-        float | None, Column("of the biases of the gyros; null: not known, or flicker")
-    ] = None
+    nees_gyro: Annotated[float | None, Column("of gyro biases; null: unknown or flicker")] = None
     nees_accel: Annotated[float | None, Column("of the biases of the accelerometers")] = None
-    consistent: Annotated[
-        bool | None,
-        Column("that share, with twice its error, is 0.9 to 1; null: the runs do not tell"),
-    ] = None
-    smallest: Annotated[
-        bool | None, Column("of the consistent tunings that with the fewest states")
-    ] = None
+    consistent: Annotated[bool | None, Column("share and twice its error in 0.9 to 1")] = None
+    smallest: Annotated[bool | None, Column("fewest states of the consistent tunings")] = None
     reason: Annotated[str | None, Column("why there is no such tuning")] = None

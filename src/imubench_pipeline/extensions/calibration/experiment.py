@@ -2,8 +2,7 @@
 
 At rest a gyro with a horizontal axis to the north reads the Earth's rate times the cosine of the
 latitude, to the south the same with the opposite sign, and its bias both times. All estimates use
-means of blocks of samples. A block lies in one dwell, without turning, and the times between the
-blocks are whole numbers of samples.
+means of blocks of samples within one dwell.
 """
 
 from __future__ import annotations

@@ -5,16 +5,10 @@ w is a state in addition to the error of the gyro, observed with the sign of the
 
     x = [w, z_G ..., z_K],    mean of a block = s cos(latitude) w + mean of (z_G + ... + z_K) + v.
 
-The filter is a `block_filter` with one constant and one axis. Its square roots keep their
-precision from an uninformative start of 1 rad/s down to 1e-10 rad/s.
-
-References
-----------
-P. Park and T. Kailath, "New square-root algorithms for Kalman filtering" and "Square-root RTS
-smoothing algorithms", IEEE Trans. Autom. Control 40(5), 1995, and Int. J. Control 62(5), 1995;
-H. E. Rauch, F. Tung and C. T. Striebel, AIAA Journal 3(8), 1965; Y. Bar-Shalom, X. R. Li and
-T. Kirubarajan, "Estimation with Applications to Tracking and Navigation", Wiley 2001, section 5.4
-(NEES, NIS).
+The filter is a `BlockFilter` with one constant and one axis, in square-root form (P. Park and
+T. Kailath, IEEE Trans. Autom. Control 40(5), and Int. J. Control 62(5), 1995; H. E. Rauch, F. Tung
+and C. T. Striebel, AIAA Journal 3(8), 1965; NEES and NIS: Y. Bar-Shalom, X. R. Li and
+T. Kirubarajan, "Estimation with Applications to Tracking and Navigation", 2001, section 5.4).
 """
 
 from __future__ import annotations

@@ -2,11 +2,9 @@
 
     y = X b + e,   cov(e) = C,   b^ = (X^T C^-1 X)^-1 X^T C^-1 y,   cov(b^) = (X^T C^-1 X)^-1
 
-(A. C. Aitken 1935). `block_mean_covariance` gives C: the covariance of the means by white noise,
-Gauss-Markov processes, flicker noise, random walk and the other terms. The standard errors follow
-from the noise model, not from the scatter, which contains little of the slow noise. The scatter is
-a check: (y - X b^)^T C^-1 (y - X b^) is chi-squared of b - p degrees of freedom if the noise model
-and X are right.
+(A. C. Aitken 1935), with C from `block_mean_covariance`. The standard errors follow from the noise
+model, not from the scatter, which contains little of the slow noise. The scatter is a check:
+(y - X b^)^T C^-1 (y - X b^) is chi-squared of b - p degrees of freedom if C and X are right.
 """
 
 from __future__ import annotations

@@ -5,10 +5,9 @@ senses
 
     w = w_ie (cos(L) cos(e) cos(h) + sin(L) sin(e)).
 
-Mean and variance are those for a heading and an elevation that are normal about what is stated, in
-closed form for any spread: E[cos x] = cos(m) e^(-s^2/2). A heading that is not known at all is the
-limit of a wide one: w is then between two limits, with the U-shaped distribution of the sine of a
-uniform angle, whose standard deviation is the half width over sqrt(2) (JCGM 101:2008, 6.4.6).
+Heading and elevation are normal about the stated angles: E[cos x] = cos(m) e^(-s^2/2). For an
+unknown heading, w has the U-shaped distribution of the sine of a uniform angle, whose standard
+deviation is the half width over sqrt(2) (JCGM 101:2008, 6.4.6).
 """
 
 from __future__ import annotations

@@ -2,23 +2,18 @@
 
     mean of a block = bias + S (table rate + Earth's rate along the axis) + noise
 
-by generalised least squares over all steady rates (`least_squares`): the noise model describes the
-drift of the gyro from one rate to the next. The scale-factor tests of IEEE Std 952-2020 fit a line.
-Further terms test the line: a quadratic term; the asymmetry, the difference of the scale factors of
-positive and negative rates as a fraction of their mean; and the linearity, the largest deviation of
-a rate from the line as a fraction of full scale, here the largest rate of the test.
-
-The axis of the gyro is along the axis of the table. Then the Earth's rate along it is constant, and
-a part of the bias if it is unknown; the perpendicular part averages out over whole turns. An angle
-a between the two axes multiplies the scale factor by cos(a), and is not separable from it.
+by generalised least squares over all steady rates (`least_squares`). The scale-factor tests of IEEE
+Std 952-2020 fit a line. Further terms test it: a quadratic term; the asymmetry, the difference of
+the scale factors of positive and negative rates over their mean; and the linearity, the largest
+deviation of a rate over the largest rate. An angle a between the axes of gyro and table multiplies
+the scale factor by cos(a), and is not separable from it.
 
 The residuals of each steady rate and their covariance (`residuals`):
 
     r = A (m - X b),   cov(r) = A (C + D - X (X^T (C + D)^-1 X)^-1 X^T) A^T,
 
-m the block means, X and b the regressors and estimates of the line by generalised least squares, A
-the mean over the blocks of a steady rate, C the covariance of the noise model and D the covariance
-of the true rates about the stated ones.
+m the block means, X and b the regressors and estimates of the line, A the mean over the blocks of a
+steady rate, C the covariance of the noise model and D of the true rates about the stated ones.
 """
 
 from __future__ import annotations

@@ -34,16 +34,10 @@ class Direction(Strict):
     """Where an axis points on the Earth."""
 
     latitude: Latitude = Field(description="of the place, with its unit; south is negative")
-    heading: Angle | None = Field(
-        None, description="of the axis, from north towards east; null: not known"
-    )
-    elevation: Angle = Field(
-        "0 deg", description="of the axis above the horizon: 90 deg up, -90 deg down"
-    )
+    heading: Angle | None = Field(None, description="of the axis, north to east; null: unknown")
+    elevation: Angle = Field("0 deg", description="above the horizon: 90 deg up, -90 deg down")
     heading_sigma: AngleFromZero = Field("0 deg", description="standard deviation of the heading")
-    elevation_sigma: AngleFromZero = Field(
-        "0 deg", description="standard deviation of the elevation"
-    )
+    elevation_sigma: AngleFromZero = Field("0 deg", description="likewise of the elevation")
 
     @model_validator(mode="before")
     @classmethod
@@ -102,26 +96,16 @@ class Step(Strict):
 class OnRateTable(Experiment):
     """A log of a gyro on a rate table, its axis along that of the table."""
 
-    steps: tuple[Step, ...] = Field(
-        (), description="steady rates in their order; none: they are in the column log.table_rate"
-    )
-    channel: Gyro | None = Field(
-        None, description="along the axis of the table; null: the only gyro of the log"
-    )
+    steps: tuple[Step, ...] = Field((), description="steady rates; none: column log.table_rate")
+    channel: Gyro | None = Field(None, description="along the axis; null: the only gyro of the log")
     settling: TimeFromZero = Field("2 s", description="left out at the start of each steady rate")
     tolerance: RateFromZero = Field(
-        "0.05 deg/s", description="range of the column log.table_rate at a steady rate"
+        "0.05 deg/s", description="range of the column at a steady rate"
     )
-    shortest: Time = Field(
-        "10 s", description="steady rate that is looked for in that column, settling included"
-    )
-    setting_sigma: RateFromZero = Field(
-        "0 deg/s", description="standard deviation of each true rate about the stated one"
-    )
+    shortest: Time = Field("10 s", description="least duration of a steady rate in that column")
+    setting_sigma: RateFromZero = Field("0 deg/s", description="standard deviation of a true rate")
     axis: Direction | None = Field(
-        None,
-        description="where the axis of the table points, for the part of the Earth's rate; null: "
-        "that is a part of the bias",
+        None, description="of the table, for the Earth's rate along it; null: a part of the bias"
     )
 
     @model_validator(mode="after")

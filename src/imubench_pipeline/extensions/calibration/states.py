@@ -25,8 +25,7 @@ from imubench_pipeline.noise.state_space import (
 )
 from imubench_pipeline.typing import Array
 
-# Standard deviation of an uninformative prior, rad/s: 14,000 times the Earth's rate
-UNINFORMATIVE_SIGMA = 1.0
+UNINFORMATIVE_SIGMA = 1.0  # of a prior, rad/s: 14,000 times the Earth's rate
 
 
 @dataclass(frozen=True)
@@ -58,10 +57,9 @@ def discretise_blocks(
 ) -> BlockStates:
     """Return the states of a noise model over blocks.
 
-    Gauss-Markov processes start in their stationary distribution; flicker noise is its bank up to
-    the duration of the blocks; a ramp has a slope of variance R^2, of either sign; a line's phase
-    is not known; z_K starts with the standard deviation of the fixed bias, rad/s. Raises ValueError
-    if the turn-on bias is negative or not finite.
+    Gauss-Markov processes start in their stationary distribution; a ramp has a slope of variance
+    R^2, of either sign; a line's phase is not known; z_K starts with the standard deviation of the
+    fixed bias, rad/s. Raises ValueError if the turn-on bias is negative or not finite.
     """
     if not (math.isfinite(turn_on_bias) and turn_on_bias >= 0):
         raise ValueError(f"turn_on_bias is {turn_on_bias}, expected a number from 0")
@@ -109,15 +107,13 @@ def _build_step(space: StateSpace, gap: int, size: int) -> Step:
         means = of_block_means(space, size)
         transition[:], noise[:] = means.transition[:, :m], means.process_noise
     over, added = repeat_step(space.transition, space.process_noise, gap)
-    return Step(transition @ over, _compute_root(noise + transition @ added @ transition.T))
-
-
-def _compute_root(covariance: Array) -> Array:
-    """Return a root of a covariance that may be singular, scaled by its standard deviations."""
+    # A root of the covariance, which may be singular, scaled by its standard deviations.
+    covariance = noise + transition @ added @ transition.T
     scale = np.sqrt(np.diag(covariance))
     unit = np.where(scale > 0.0, scale, 1.0)
     values, vectors = np.linalg.eigh(covariance / np.outer(unit, unit))
-    return np.asarray(scale[:, None] * vectors * np.sqrt(np.maximum(values, 0.0)))
+    factor = scale[:, None] * vectors * np.sqrt(np.maximum(values, 0.0))
+    return Step(transition @ over, factor)
 
 
 class BlockFilter:

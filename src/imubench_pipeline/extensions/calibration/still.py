@@ -2,11 +2,10 @@
 
     bias = mean reading - w,    w the Earth's rate along the axis (`pointing`).
 
-This is the run without turning that Silva et al. leave for later (section 9). With a known rate it
-determines the bias. No filter can determine the rate from it, since bias and rate enter as a sum.
-The fixed bias is the bias at the first sample, by generalised least squares. The present bias is
-the mean of bias and drift over the last block, by the filter of the two-position experiment with a
-known rate.
+This is the run without turning that Silva et al. leave for later (section 9). No filter can
+determine the rate from it, since bias and rate enter as a sum. The fixed bias is the bias at the
+first sample, by generalised least squares; the present bias is the mean of bias and drift over the
+last block, by the filter of the two-position experiment with a known rate.
 """
 
 from __future__ import annotations

@@ -21,9 +21,7 @@ class CalibrationRow(OfRecordingRow):
     """A row of the table ``calibration``."""
 
     channel: Annotated[str, Column("the gyro that was calibrated")]
-    run: Annotated[
-        str, Column("rate_table; at_rest with a direction that is stated; positions of a triad")
-    ]
+    run: Annotated[str, Column("rate_table; at_rest (direction stated); positions of a triad")]
     parameter: Annotated[
         str,
         Column(
@@ -37,42 +35,24 @@ class CalibrationRow(OfRecordingRow):
     lower: LowerLimit = None
     upper: UpperLimit = None
     unit: EstimateUnit
-    status: Annotated[
-        str, Column("ok; not_observable: the run cannot tell it; no_model, too_short or not_shown")
-    ]
+    status: Annotated[str, Column("ok, not_observable, no_model, too_short or not_shown")]
     reason: EstimateReason = None
-    sigma: Annotated[
-        float | None, Column("standard deviation of value: noise and direction", "as in unit")
-    ] = None
-    sigma_noise: Annotated[
-        float | None, Column("the part of it that is by the noise model", "as in unit")
-    ] = None
-    chance: Annotated[
-        float | None, Column("of a quadratic, an asymmetry or deviations at least as large")
-    ] = None
-    half_width: Annotated[
-        float | None, Column("half of the range of the bias that is left open", "rad/s")
-    ] = None
-    earth_rate: Annotated[
-        float | None, Column("along the axis, which was taken off; null: it was not", "rad/s")
-    ] = None
-    earth_rate_sigma: Annotated[
-        float | None, Column("its standard deviation, by the direction's", "rad/s")
-    ] = None
+    sigma: Annotated[float | None, Column("standard error: noise, direction", "as in unit")] = None
+    sigma_noise: Annotated[float | None, Column("part by the noise model", "as in unit")] = None
+    chance: Annotated[float | None, Column("p-value of quadratic, asymmetry or linearity")] = None
+    half_width: Annotated[float | None, Column("half the open range of the bias", "rad/s")] = None
+    earth_rate: Annotated[float | None, Column("along the axis, if subtracted", "rad/s")] = None
+    earth_rate_sigma: Annotated[float | None, Column("its sigma by the direction", "rad/s")] = None
     truth: Annotated[float | None, Column("of a simulation", "as in unit")] = None
-    scatter: Annotated[
-        float | None, Column("chance of a scatter of the means at least as large, by the noise")
-    ] = None
+    scatter: Annotated[float | None, Column("p-value of the scatter, by the noise model")] = None
     latitude: Annotated[float | None, Column("as stated", "rad")] = None
-    heading: Annotated[
-        float | None, Column("of the axis, from north towards east; null: not known", "rad")
-    ] = None
+    heading: Annotated[float | None, Column("of the axis, from north towards east", "rad")] = None
     elevation: Annotated[float | None, Column("of the axis above the horizon", "rad")] = None
     duration: Annotated[float | None, Column("from the first to the last sample used", "s")] = None
     samples: Annotated[int | None, Column("used")] = None
     rates: Annotated[int | None, Column("of the table that are steady")] = None
     model: Annotated[str | None, Column("terms of the noise model")] = None
-    model_from: Annotated[str | None, Column("what that is from")] = None
+    model_from: Annotated[str | None, Column("source of the noise model")] = None
 
 
 @table("calibration_points")
@@ -81,20 +61,14 @@ class CalibrationPointRow(OfRecordingRow):
 
     channel: Annotated[str, Column("the gyro that was calibrated")]
     number: Annotated[int, Column("of the steady rate, in order, from 1")]
-    start: Annotated[
-        float, Column("from the first sample of the recording, settling left out", "s")
-    ]
+    start: Annotated[float, Column("from the first sample of the recording, without settling", "s")]
     stop: Annotated[float, Column("its end", "s")]
     table_rate: Annotated[float, Column("of the table", "rad/s")]
-    earth_rate: Annotated[
-        float, Column("along the axis, beside it; 0 where it is not known", "rad/s")
-    ]
+    earth_rate: Annotated[float, Column("along the axis; 0 if unknown", "rad/s")]
     mean: Annotated[float, Column("mean reading", "rad/s")]
     line: Annotated[float, Column("bias and scale factor at that rate", "rad/s")]
     residual: Annotated[float, Column("mean less line", "rad/s")]
-    sigma: Annotated[
-        float, Column("standard deviation of the residual, by the noise model", "rad/s")
-    ]
+    sigma: Annotated[float, Column("standard deviation of the residual by the noise", "rad/s")]
 
 
 CALIBRATED = ("calibration", "calibration_points")

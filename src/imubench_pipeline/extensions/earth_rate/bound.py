@@ -1,17 +1,12 @@
 """The Cramér-Rao bound of the Earth's rate, and a block length that loses no information.
 
-The bound is the variance of generalised least squares over the covariance C of the block means;
-Gaussian noise reaches it. With h the sensitivity of the block means to the rate, and 1 to the fixed
-bias,
+It is the variance of generalised least squares over the covariance C of the block means. With h the
+sensitivity of the block means to the rate, and 1 to the fixed bias,
 
     information of the rate = h^T C^-1 h - (h^T C^-1 1)^2 / (1^T C^-1 1 + 1 / bias variance).
 
-It uses nothing of the filter. White noise alone gives N / sqrt(T) / cos(latitude) for T seconds in
-dwells, if the bias is known; all other noise only adds to it.
-
-`whiten` decorrelates block means in a time that grows with their number, not with its cube: the
-innovations of a Kalman filter over their standard deviations are L^-1 y, with L the Cholesky root
-of the covariance (R. E. Kalman 1960).
+`whiten` decorrelates block means: the innovations of a Kalman filter over their standard deviations
+are L^-1 y, with L the Cholesky root of the covariance (R. E. Kalman 1960).
 """
 
 from __future__ import annotations
@@ -22,12 +17,10 @@ from functools import cache
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
-from scipy.linalg import cholesky, solve_triangular
 
 from imubench_pipeline.extensions.calibration.experiment import (
     Blocks,
     Experiment,
-    block_mean_covariance,
 )
 from imubench_pipeline.extensions.calibration.states import discretise_blocks
 from imubench_pipeline.noise import NoiseModel
@@ -35,7 +28,6 @@ from imubench_pipeline.typing import Array
 
 _MAX_SIGMA_INCREASE = 1e-3  # largest relative increase of the standard deviation by longer blocks
 _TESTED_DWELLS = 4  # dwells on which a block length is tested
-
 MAX_BLOCKS = 2048  # largest number of blocks in the test of a block length, and in a prediction
 
 
@@ -116,8 +108,7 @@ def compute_cramer_rao_bounds(
 
     In rad/s, shape (b,); infinite where the rate and the bias are not separable. The standard
     deviation of the bias, rad/s, is by default unknown. The model must have some noise in every
-    sample: N, or a process with such noise. Raises ValueError if the turn-on bias is negative, or
-    NaN.
+    sample. Raises ValueError if the turn-on bias is negative, or NaN.
     """
     return convert_to_sigma(compute_information(blocks, model, turn_on_bias))
 
@@ -127,21 +118,9 @@ def compute_information(blocks: Blocks, model: NoiseModel, turn_on_bias: float =
 
     The parameters and errors are as in `compute_cramer_rao_bounds`.
     """
-    # The root of the leading blocks is the leading part of the root.
-    root = cholesky(block_mean_covariance(model, blocks), lower=True, overwrite_a=True)
-    design = np.column_stack([blocks.seen, np.ones(len(blocks))])
-    return _eliminate_bias(solve_triangular(root, design, lower=True), turn_on_bias)
-
-
-def compute_information_by_states(blocks: Blocks, model: NoiseModel, turn_on_bias: float) -> Array:
-    """Return the same as `compute_information`, faster for many blocks."""
-    design = np.column_stack([blocks.seen, np.ones(len(blocks))])
-    return _eliminate_bias(whiten(model, blocks, design), turn_on_bias)
-
-
-def _eliminate_bias(white: Array, turn_on_bias: float) -> Array:
     if not turn_on_bias >= 0:
         raise ValueError(f"turn_on_bias is {turn_on_bias}, expected a number from 0, or infinity")
+    white = whiten(model, blocks, np.column_stack([blocks.seen, np.ones(len(blocks))]))
     rate = np.cumsum(white[:, 0] ** 2)
     if turn_on_bias == 0:
         return rate
@@ -152,16 +131,15 @@ def _eliminate_bias(white: Array, turn_on_bias: float) -> Array:
 
 
 def compute_final_bound(blocks: Blocks, model: NoiseModel, turn_on_bias: float = math.inf) -> float:
-    """Return `compute_cramer_rao_bounds` at the end of a run, rad/s, faster for many blocks."""
-    return float(convert_to_sigma(compute_information_by_states(blocks, model, turn_on_bias))[-1])
+    """Return `compute_cramer_rao_bounds` at the end of a run, rad/s."""
+    return float(compute_cramer_rao_bounds(blocks, model, turn_on_bias)[-1])
 
 
 def choose_block_length(experiment: Experiment, model: NoiseModel) -> int:
     """Return the longest block, in samples, whose means keep the information of the samples.
 
-    Blocks are shortened, by halves, until a fourth of their length would lower the bound by less
-    than 0.1 %. The bound is computed for the first four dwells, with 2,048 blocks at most, none
-    longer than the longest dwell.
+    Blocks are shortened, by halves, until a fourth of their length would lower the bound, in the
+    first four dwells, by less than 0.1 %; 2,048 at most, none longer than the longest dwell.
     """
     tried = Experiment(experiment.dwells[:_TESTED_DWELLS], experiment.rate, experiment.latitude)
     length = max(dwell.stop - dwell.start for dwell in experiment.dwells)
@@ -180,9 +158,6 @@ def choose_block_length(experiment: Experiment, model: NoiseModel) -> int:
 
 
 def convert_to_sigma(fisher: Array) -> Array:
-    """Return the standard deviations, rad/s, of information, 1/(rad/s)², both of shape (n,).
-
-    They are infinite where there is no information.
-    """
+    """Return the standard deviations, rad/s, of information, 1/(rad/s)², shape (n,); maybe inf."""
     with np.errstate(divide="ignore"):
         return np.asarray(1.0 / np.sqrt(fisher))

@@ -1,15 +1,10 @@
 """Bias tracking with known rate: the filter of Silva et al. (eq. 15, 16), for comparison.
 
-It cannot estimate the Earth's rate. Its measurement y = w_ie - w~ contains the unknown rate. It
-tracks the error of the gyro, so that the reading less the tracked error is, on average, the input
-rate. Given twice the Earth's rate it "finds" twice the Earth's rate, with the same speed and
-precision. The filter contains neither the latitude nor the sign of the dwell, which alone separates
-the rate from a bias. It is useful for the error of a gyro at rest at a known attitude.
-
-The scatter of the mean of its "rate" is independent of the input rate (`mean_sigma`). It is the
+It cannot estimate the Earth's rate: its measurement y = w_ie - w~ contains the unknown rate. Given
+twice the rate it "finds" twice the rate. It contains neither the latitude nor the sign of the
+dwell, which alone separates the rate from a bias. The scatter of its mean (`mean_sigma`) is the
 scatter of white noise, N / sqrt(t), once the filter has forgotten its start. The paper prints the
-start, P_0 = 0.1 I, without a unit (`STARTS`). In (deg/s)^2, since the paper uses degrees elsewhere,
-the mean scatters less than white noise at about 1,000 samples; in (rad/s)^2 it does not.
+start, P_0 = 0.1 I, without a unit (`STARTS`).
 
 Equation 13 is printed as P+ = (I - K H)^-1 P- instead of (I - K H) P-. Each measurement then
 increases the covariance instead of reducing it, and P grows without bound (`as_printed`).
@@ -79,11 +74,9 @@ def track(
     """Track the bias of a gyro with the filter of Silva et al., which needs the Earth's rate.
 
     F = diag(e^(-T/T_B), 1), H = [1, 1], R_d = N^2/T, Q_d = T diag(S_B, S_K), x_0 = 0 as printed,
-    although the first entry of Q_d is an approximation; P_0 = ``start`` I. Samples of turning are
-    left out, as if no time lay between dwells. The log, shape (samples,), is in rad/s, NaN where a
-    sample is missing; the known rate is in rad/s, the start in (rad/s)^2. N, B with T_B, and K of
-    the model are used. Raises ValueError if the model has no white noise, or its B no correlation
-    time.
+    although the first entry of Q_d is an approximation; P_0 = ``start`` I, (rad/s)^2. Samples of
+    turning are left out. The log, shape (samples,), is in rad/s, NaN where a sample is missing; so
+    is the known rate. Raises ValueError without N of the model, or T_B of its B.
     """
     one = _build_filter(model, experiment.rate)
     sample = np.concatenate([np.arange(dwell.start, dwell.stop) for dwell in experiment.dwells])
@@ -136,8 +129,7 @@ def mean_sigma(
     """Return the standard deviation of the mean of `track` after each sample, rad/s, shape (n,).
 
     Exact, over the noise of the model and a fixed bias of the standard deviation ``turn_on_bias``,
-    rad/s: the covariance of the true errors, the tracked errors and the sum is propagated with the
-    filter. It is independent of the known rate. The start is in (rad/s)^2, the rate in Hz. Raises
+    rad/s, and independent of the known rate. The start is in (rad/s)^2, the rate in Hz. Raises
     ValueError as `track`.
     """
     one = _build_filter(model, rate)

@@ -76,9 +76,8 @@ def make_outlook_tables(
 ) -> dict[str, Sequence[TableRow]]:
     """Return the rows of ``alignment`` and ``earth_rate_prediction`` of a sensor at rest.
 
-    `folders` are those of its static recordings; `settings`: of
-    `imubench_pipeline.extensions.earth_rate.plan.select_outlook_settings`. There are no rows
-    without the noise of a gyro, and none of ``alignment`` without an accelerometer.
+    `folders`: of its static recordings; `settings`: of `plan.select_outlook_settings`. There are no
+    rows without the noise of a gyro, and none of ``alignment`` without an accelerometer.
     """
     rows: dict[str, Sequence[TableRow]] = {"alignment": [], "earth_rate_prediction": []}
     sections = json.loads(settings)
@@ -86,16 +85,6 @@ def make_outlook_tables(
     noise = load_noise_at_rest(folders)
     if noise is None:
         return rows
-    rows["earth_rate_prediction"] = list(_predict_earth_rate(sensor, noise, how))
-    if any(name.startswith("accel_") for name in noise.models):
-        printed = Datasheet.model_validate(sections["datasheet"])
-        rows["alignment"] = list(_predict_alignment(sensor, noise, printed, how))
-    return rows
-
-
-def _predict_earth_rate(
-    sensor: str, noise: Noise, how: EarthRateSettings
-) -> Iterator[EarthRatePredictionRow]:
     variances = {
         name: float(model.allan_variance(DWELL))
         for name, model in noise.models.items()
@@ -107,8 +96,12 @@ def _predict_earth_rate(
     outlook = Outlook(noise.models[gyro], latitude, TURN_TIME, noise.rate)
     run_time = max(parse_quantity(how.run_time, "time"), 3.0 * DWELL)
     row = partial(EarthRatePredictionRow, sensor=sensor, recording=noise.recording, channel=gyro)
-    for predicted in prediction_rows(outlook, DWELL, how.goals, run_time):
-        yield row(**predicted)
+    predictions = prediction_rows(outlook, DWELL, how.goals, run_time)
+    rows["earth_rate_prediction"] = [row(**predicted) for predicted in predictions]
+    if any(name.startswith("accel_") for name in noise.models):
+        printed = Datasheet.model_validate(sections["datasheet"])
+        rows["alignment"] = list(_predict_alignment(sensor, noise, printed, how))
+    return rows
 
 
 def _predict_alignment(

@@ -2,13 +2,10 @@
 
     w = (w_N - w_S) / (2 cos(latitude))    (Silva et al., eq. 14)
 
-for each pair of consecutive dwells, and the mean over pairs. A drift of the gyro between the two
-dwells appears as rotation, with alternating sign if the turns alternate. A-B-A differences remove
-the linear part of the drift.
-
-The weights of an estimate on the means of the dwells add up to 0: the fixed bias drops out. The
-standard error is the root of w^T C w with C the covariance of these means in closed form. The
-scatter of the estimates is not used, since they are few and correlated.
+for each pair of consecutive dwells, and the mean over pairs. A drift of the gyro appears as
+rotation; A-B-A differences remove its linear part. The fixed bias drops out. The standard error of
+an estimate with weights w on the means of the dwells is the root of w^T C w with C the covariance
+of these means in closed form.
 """
 
 from __future__ import annotations

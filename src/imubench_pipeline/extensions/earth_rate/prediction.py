@@ -19,7 +19,7 @@ from imubench_pipeline.extensions.calibration.experiment import Experiment
 from imubench_pipeline.extensions.earth_rate.bound import (
     MAX_BLOCKS,
     choose_block_length,
-    compute_information_by_states,
+    compute_information,
     convert_to_sigma,
 )
 from imubench_pipeline.noise import NoiseModel
@@ -102,10 +102,8 @@ class Outlook:
     def turns_needed(self, dwell: float, relative: float) -> int | None:
         """Return the number of turns for a relative standard deviation of the Earth's rate.
 
-        None: more than `MAX_TURNS`.
-
-        The run lasts (turns + 1) dwells, each with ``dwell`` s of data, and the turns. A
-        ``relative`` of 0.01 is 1 % of the Earth's rate. Raises ValueError if it is not above 0.
+        None: more than `MAX_TURNS`. The run lasts (turns + 1) dwells, each with ``dwell`` s of
+        data, and the turns. Raises ValueError if ``relative``, such as 0.01, is not above 0.
         """
         if not relative > 0:
             raise ValueError(f"relative is {relative}, expected a number above 0")
@@ -169,10 +167,8 @@ class Outlook:
         """Return the least standard deviation of the heading by gyrocompassing after each turn.
 
         The axis is perpendicular to north, and is turned end for end: half the difference of its
-        readings is w_ie cos(latitude) times the (small) heading error. An error s of this half
-        difference is a heading error s / (w_ie cos(latitude)), as in `error_budget.Gyrocompass`
-        with two positions. Here s = sigma cos(latitude), with sigma of the rate. In rad, shape
-        (turns,).
+        readings is w_ie cos(latitude) times the (small) heading error, as in
+        `error_budget.Gyrocompass` with two positions. In rad, shape (turns,).
         """
         of_axis = self.against_time(dwell, turns).sigma * math.cos(self.latitude)
         return np.asarray(of_axis / (EARTH_RATE * math.cos(self.latitude)))
@@ -191,7 +187,7 @@ class Outlook:
         summed = max(MAX_BLOCKS // each, _MIN_COMPUTED_DWELLS)
         blocks = replace(design, dwells=design.dwells[:summed]).blocks(longest)
         last = np.flatnonzero(np.diff(blocks.dwell, append=-1))
-        information = compute_information_by_states(blocks, self.model, self.turn_on_bias)[last]
+        information = compute_information(blocks, self.model, self.turn_on_bias)[last]
         more = np.arange(1, dwells - len(information) + 1)
         if not len(more):
             return information

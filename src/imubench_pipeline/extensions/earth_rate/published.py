@@ -1,22 +1,16 @@
 """Compare published Earth-rate estimates with the scatter that the published noise allows.
 
-A run is modelled as its source describes it: the schedule of turns, and the noise of the printed
-figures. An estimate from pairs of dwells then scatters about the true rate with the standard
-deviation of `extensions.earth_rate.pairs`. A published estimate many standard deviations away has
-other errors: warm-up of the sensor, a misaligned axis, turns within the mean, or a wrong sense.
-
-A printed estimate v of the rate w is the mean over pairs (Silva et al., eq. 14) of a run. If noise
-does not explain v - w, another cause must, whose size follows from the printed figures. If a run is
-printed as a whole and by its last part, its first part follows, and a constant cause must explain
-both. With P the time between turns, D the data in a dwell and L the latitude:
+An estimate from pairs of dwells scatters about the true rate with the standard deviation of
+`extensions.earth_rate.pairs`, by the noise of the printed figures. If noise does not explain the
+error of a printed estimate v of the rate w (Silva et al., eq. 14), another cause must, whose size
+follows from the printed figures. With P the time between turns, D the data in a dwell and L the
+latitude:
 
 - a bias that drifts by r moves a pair that begins in the north by -r P / (2 cos L);
 - an angle a of turning that remains in each dwell, with the sign of the turn, by a / (D cos L);
-- turns miscounted so that the part f of the time has the wrong sense: v = (1 - 2 f) w, so that all
-  estimates lie between -w and w;
+- turns miscounted so that the part f of the time has the wrong sense: v = (1 - 2 f) w;
 - an axis that deviates from the meridian by A: v = w cos A;
-- a wrong clock, so that the dwells are cut s dwells too late: a dwell then contains the part s of
-  its neighbour, v = (1 - 2 s) w up to one dwell, and increasing again up to two.
+- a wrong clock, so that the dwells are cut s dwells too late: v = (1 - 2 s) w up to one dwell.
 """
 
 from __future__ import annotations

@@ -33,40 +33,24 @@ _REQUIRED_KEYS = {
 
 
 class TwoPosition(Experiment):
-    """A log in which one gyro was turned end for end, between north and south, again and again.
+    """A log in which one gyro was turned end for end, between north and south, again and again."""
 
-    Raises ValueError if latitude or dwell is missing, a figure has a unit of another dimension or
-    is out of range, or turning takes half of the dwell or more.
-    """
-
-    latitude: Latitude = Field(
-        description="of the place, with its unit; south is negative, to no effect"
-    )
+    latitude: Latitude = Field(description="of the place, with its unit; south is negative")
     dwell: Time = Field(description="nominal, from the start of one turn to the start of the next")
-    channel: Gyro | None = Field(
-        None, description="that was turned; null: the only gyro of the log"
-    )
+    channel: Gyro | None = Field(None, description="the turned gyro; null: the only one of the log")
     turning: TimeFromZero = Field("2 s", description="that a turn takes, where it is not seen")
-    start: TimeFromZero = Field(
-        "0 s", description="when the first dwell of the schedule begins, from the first sample used"
-    )
+    start: TimeFromZero = Field("0 s", description="of the first dwell, from the first sample used")
     first: Literal["north", "south"] | None = Field(
         None, description="where the axis points in the first dwell; null: not known"
     )
-    trust_schedule: bool = Field(
-        False, description="take the schedule's word where nothing of the turns is seen"
-    )
+    trust_schedule: bool = Field(False, description="accept the schedule if no turn is detected")
     turn_on_bias: Annotated[Text, _from_zero("angular_rate")] | None = Field(
         None, description="standard deviation of the fixed bias, such as 0.1 deg/s; null: not known"
     )
     drift: Annotated[Text, _from_zero("gyro_ramp")] | None = Field(
-        None,
-        description="standard deviation of a steady drift beside the noise, such as 20 deg/h/h "
-        "while the sensor warms up; null: none",
+        None, description="standard deviation of a steady drift, such as 20 deg/h/h; null: none"
     )
-    last: tuple[Time, ...] = Field(
-        (), description="of the log, which are estimated by themselves as well, such as 13 min"
-    )
+    last: tuple[Time, ...] = Field((), description="parts at the end, estimated too: 13 min")
 
     @model_validator(mode="before")
     @classmethod

@@ -99,11 +99,10 @@ def simulate_log(
 ) -> Array:
     """Return a whole log of an experiment, including turns, rad/s, shape (samples,).
 
-    During a turn, the axis moves from one position to the other with a sinusoidal speed, and senses
-    the Earth's rate times the cosine of the angle. The turn is about a perpendicular axis: only
-    misalignment makes it visible, as a pulse peak sin^2(pi t / turning). The log begins with the
-    first sample at 0 and ends with the last dwell. The bias of the model is the fixed bias of this
-    run. The other parameters are as in `compute_true_rate`.
+    During a turn, the axis senses the Earth's rate times the cosine of the angle, which changes at
+    a sinusoidal speed. The turn is about a perpendicular axis: only misalignment makes it visible,
+    as a pulse peak sin^2(pi t / turning). The bias of the model is the fixed bias of this run. The
+    other parameters are as in `compute_true_rate`.
     """
     true = compute_true_rate(experiment, earth_rate, transient)
     return simulate(model, experiment.rate, len(true), rng, true=lambda a, b: true[a:b])

@@ -39,43 +39,27 @@ class EarthRateRow(OfRecordingRow):
     upper: UpperLimit = None
     unit: EstimateUnit
     status: Annotated[
-        str,
-        Column(
-            "ok; ambiguous: the sign may be the other one; given: no estimate; no_turns, "
-            "no_model, too_short or not_shown"
-        ),
+        str, Column("ok; ambiguous (sign); given (input); no_turns, no_model, too_short, not_shown")
     ]
     reason: EstimateReason = None
-    sigma: Annotated[
-        float | None, Column("standard deviation of value, by the noise model", "rad/s")
-    ] = None
-    sigma_lower: Annotated[
-        float | None, Column("lower 95 % limit of sigma: the noise model is an estimate", "rad/s")
-    ] = None
+    sigma: Annotated[float | None, Column("standard deviation by the noise model", "rad/s")] = None
+    sigma_lower: Annotated[float | None, Column("lower 95 % limit of sigma", "rad/s")] = None
     sigma_upper: Annotated[float | None, Column("upper 95 % limit of sigma", "rad/s")] = None
-    white: Annotated[
-        float | None, Column("the least that it can be, N / sqrt(T) / cos(latitude)", "rad/s")
-    ] = None
+    white: Annotated[float | None, Column("lower limit, N/sqrt(T)/cos(latitude)", "rad/s")] = None
     truth: Annotated[float, Column("the Earth's rate", "rad/s")]
     off_sigma: Annotated[float | None, Column("value less truth, in sigma")] = None
-    settled: Annotated[
-        float | None, Column("of known_rate: data until it stays within 10 % of the given", "s")
-    ] = None
+    settled: Annotated[float | None, Column("time to within 10 % of the given rate", "s")] = None
     dwells: Annotated[int | None, Column("used")] = None
     turns: Annotated[int | None, Column("between them")] = None
     samples: Annotated[int | None, Column("used")] = None
-    missing: Annotated[
-        int | None, Column("samples of the dwells that are not there, or left out as knocks")
-    ] = None
-    duration: Annotated[
-        float | None, Column("from the begin of the first dwell to the end of the last", "s")
-    ] = None
+    missing: Annotated[int | None, Column("samples of dwells missing, or left out as knocks")] = (
+        None
+    )
+    duration: Annotated[float | None, Column("of all dwells and the turns between", "s")] = None
     latitude: Annotated[float, Column("as stated with the log", "rad")]
-    block: Annotated[
-        float | None, Column("length of the blocks that are averaged, at most", "s")
-    ] = None
+    block: Annotated[float | None, Column("largest length of an averaged block", "s")] = None
     model: Annotated[str | None, Column("terms of the noise model")] = None
-    model_from: Annotated[str | None, Column("what that is from")] = None
+    model_from: Annotated[str | None, Column("source of the noise model")] = None
 
 
 @table("earth_rate_series")
@@ -85,13 +69,9 @@ class EarthRateSeriesRow(OfRecordingRow):
     channel: TurnedGyro
     part: Part
     method: Method
-    quantity: Annotated[
-        str, Column("rate: the estimate of the Earth's; drift: the gyro's slow error")
-    ]
+    quantity: Annotated[str, Column("rate: the Earth's rate; drift: slow error of the gyro")]
     time: Annotated[float, Column("from the first sample of the recording", "s")]
-    value: Annotated[
-        float, Column("estimate from the data up to then; smoother: from all", "rad/s")
-    ]
+    value: Annotated[float, Column("from the data so far; smoother: from all the data", "rad/s")]
     sigma: Annotated[float | None, Column("its standard deviation", "rad/s")] = None
 
 
@@ -103,14 +83,13 @@ class TurningRow(OfRecordingRow):
     what: Annotated[str, Column("dwell, turn, knock, or a doubt about the whole")]
     number: Annotated[int | None, Column("in order, from 1")] = None
     start: Annotated[float | None, Column("from the first sample of the recording", "s")] = None
-    stop: Annotated[float | None, Column("its end; of a turn: what is left out for it", "s")] = None
+    stop: Annotated[float | None, Column("its end; of a turn: end of the time left out", "s")] = (
+        None
+    )
     time: Annotated[float | None, Column("of a turn: its middle", "s")] = None
     sense: Annotated[int | None, Column("of a dwell: 1 the axis points north, -1 south")] = None
     found_by: Annotated[str | None, Column("column, transient, step or schedule")] = None
-    peak: Annotated[
-        float | None,
-        Column("of a turn: the largest rate that is sensed of it, or its step", "rad/s"),
-    ] = None
+    peak: Annotated[float | None, Column("of a turn: largest rate or step", "rad/s")] = None
     mean: Annotated[float | None, Column("of a dwell", "rad/s")] = None
     doubts: Annotated[str | None, Column("in words")] = None
 
@@ -120,20 +99,14 @@ class EarthRatePredictionRow(OfRecordingRow):
     """A row of the table ``earth_rate_prediction``."""
 
     channel: TurnedGyro
-    of: Annotated[
-        str, Column("goal: what it takes; time: as a run grows; dwell: a run divided in dwells")
-    ]
+    of: Annotated[str, Column("goal: need; time: over run length; dwell: over length of a dwell")]
     latitude: Annotated[float, Column("where", "rad")]
     dwell: Annotated[float, Column("data in each dwell", "s")]
     turns: Annotated[int, Column("of the run")]
     time: Annotated[float, Column("length of the run", "s")]
-    sigma: Annotated[
-        float | None, Column("least standard deviation of the Earth's rate", "rad/s")
-    ] = None
+    sigma: Annotated[float | None, Column("least standard deviation of the rate", "rad/s")] = None
     relative: Annotated[float | None, Column("the same over the Earth's rate")] = None
-    heading: Annotated[
-        float | None, Column("standard deviation of north, the axis lying across it", "rad")
-    ] = None
+    heading: Annotated[float | None, Column("standard deviation, east-west axis", "rad")] = None
     goal: Annotated[float | None, Column("relative standard deviation that is wanted")] = None
     best: Annotated[bool | None, Column("of dwell: the best of these")] = None
     nearly_best: Annotated[bool | None, Column("of dwell: less than 1 % worse")] = None
@@ -150,20 +123,14 @@ class EarthRatePublishedRow(OfRecordingRow):
     published: Annotated[float, Column("the same", "rad/s")]
     truth: Annotated[float, Column("the Earth's rate", "rad/s")]
     duration: Annotated[float, Column("of the run, or of the part", "s")]
-    white: Annotated[float | None, Column("standard deviation by white noise alone", "rad/s")] = (
-        None
-    )
-    sigma: Annotated[
-        float | None, Column("of the mean over pairs, by the noise that the source prints", "rad/s")
-    ] = None
+    white: Annotated[float | None, Column("sigma by white noise alone", "rad/s")] = None
+    sigma: Annotated[float | None, Column("of the mean over pairs, printed noise", "rad/s")] = None
     sigma_filter: Annotated[float | None, Column("of the filter, likewise", "rad/s")] = None
     off_sigma: Annotated[float | None, Column("published less truth, in sigma")] = None
     verdict: Annotated[str, Column("within the noise or beyond the noise")]
-    simulated: Annotated[
-        float | None, Column("what the pairs find in the log simulated of this run", "rad/s")
-    ] = None
-    simulated_filter: Annotated[float | None, Column("what the filter finds in it", "rad/s")] = None
-    assumed: Annotated[str | None, Column("what the source does not print")] = None
+    simulated: Annotated[float | None, Column("from pairs, in a simulated log", "rad/s")] = None
+    simulated_filter: Annotated[float | None, Column("from the filter, likewise", "rad/s")] = None
+    assumed: Annotated[str | None, Column("assumptions: not printed by the source")] = None
 
 
 @table("alignment")
@@ -174,26 +141,19 @@ class AlignmentRow(OfRecordingRow):
     positions: Annotated[int, Column("1; or 2, opposite about the vertical")]
     method: Annotated[str, Column("coarse or fine")]
     time: Annotated[float, Column("of rest, the turn between two positions included", "s")]
-    roll: Annotated[
-        float | None,
-        Column("standard deviation, level, its nose to the north; null: see reason", "rad"),
-    ] = None
+    roll: Annotated[float | None, Column("standard deviation, level, facing north", "rad")] = None
     pitch: Annotated[float | None, Column("likewise", "rad")] = None
-    heading: Annotated[
-        float | None, Column("likewise; null where reason says why it is not to be had", "rad")
-    ] = None
+    heading: Annotated[float | None, Column("likewise; null: see reason", "rad")] = None
     reason: Annotated[str | None, Column("why an angle is missing")] = None
-    error_roll: Annotated[
-        float | None, Column("rms of the errors of simulated triads, over roll")
-    ] = None
+    error_roll: Annotated[float | None, Column("rms error of simulated triads over roll")] = None
     error_pitch: Annotated[float | None, Column("likewise, over pitch")] = None
     error_heading: Annotated[float | None, Column("likewise, over heading")] = None
     simulated: Annotated[int | None, Column("triads of that check; null: none")] = None
     latitude: Annotated[float, Column("as set (earth_rate: latitude)", "rad")]
     gyro_bias: Annotated[float, Column("standard deviation of the fixed biases", "rad/s")]
-    gyro_bias_from: Annotated[str, Column("what that is from")]
+    gyro_bias_from: Annotated[str, Column("source of this figure")]
     accelerometer_bias: Annotated[float, Column("standard deviation of the fixed biases", "m/s^2")]
-    accelerometer_bias_from: Annotated[str, Column("what that is from")]
+    accelerometer_bias_from: Annotated[str, Column("source of this figure")]
     gyros: Annotated[str, Column("channels whose noise the axes x, y, z have")]
     accelerometers: Annotated[str, Column("likewise")]
 

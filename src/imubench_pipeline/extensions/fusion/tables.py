@@ -27,21 +27,12 @@ class PublishedFigureRow(ChannelRow):
     means: Annotated[float, Column("value as that parameter", "as in unit")]
     unit: Annotated[str, Column("SI unit of the numbers")]
     truth: Annotated[float | None, Column("of the simulation", "as in unit")] = None
-    curve: Annotated[
-        float | None,
-        Column("read from the curve of the simulated log; mean of the log", "as in unit"),
-    ] = None
-    value: Annotated[
-        float | None, Column("as the recommended method estimates it of that log", "as in unit")
-    ] = None
+    curve: Annotated[float | None, Column("read from the curve; bias: mean", "as in unit")] = None
+    value: Annotated[float | None, Column("by the recommended method", "as in unit")] = None
     lower: LowerLimit = None
     upper: UpperLimit = None
-    datasheet: Annotated[
-        float | None, Column("of the sensor file, in the convention of N and B", "as in unit")
-    ] = None
-    datasheet_upper: Annotated[
-        float | None, Column("the largest of several, or of two readings", "as in unit")
-    ] = None
+    datasheet: Annotated[float | None, Column("of the sensor file, as N or B", "as in unit")] = None
+    datasheet_upper: Annotated[float | None, Column("largest of several", "as in unit")] = None
     reason: Annotated[str | None, Column("why the printed figure differs")] = None
 
 
@@ -55,31 +46,18 @@ class FusionRow(TableRow):
     recording: Annotated[str | None, Column("that answers for it: of its median channel")] = None
     channel: Annotated[str | None, Column("that answers")] = None
     simulated: Annotated[bool | None, Column("that recording is simulated")] = None
-    adev: Annotated[
-        float | None, Column("Allan deviation of one of them, by its noise model", "rad/s or m/s^2")
-    ] = None
-    floor: Annotated[
-        float | None,
-        Column("part of it that all have in common: any number keeps it", "rad/s or m/s^2"),
-    ] = None
+    adev: Annotated[float | None, Column("of one of them, by its model", "rad/s or m/s^2")] = None
+    floor: Annotated[float | None, Column("common part: not reduced by n", "rad/s or m/s^2")] = None
     common_share: Annotated[float | None, Column("the same as a part of the variance")] = None
-    temperature_share: Annotated[
-        float | None, Column("part of the variance that temperature adds: common")
-    ] = None
+    temperature_share: Annotated[float | None, Column("part of the variance by temperature")] = None
     other: Annotated[str, Column("sensor to be matched")]
     other_recording: Annotated[str | None, Column("that answers for it")] = None
     other_channel: Annotated[str | None, Column("that answers")] = None
     other_simulated: Annotated[bool | None, Column("that one is simulated")] = None
     other_adev: Annotated[float | None, Column("its Allan deviation", "rad/s or m/s^2")] = None
-    n: Annotated[float | None, Column("how many equal it, not rounded; below 1: one is better")] = (
-        None
-    )
-    lower: Annotated[float | None, Column("lower 95 % limit of n; null: no number is enough")] = (
-        None
-    )
-    upper: Annotated[
-        float | None, Column("upper 95 % limit of n; null: no number may be enough")
-    ] = None
+    n: Annotated[float | None, Column("number that equals it; below 1: one is better")] = None
+    lower: Annotated[float | None, Column("lower 95 % limit of n; null: none is enough")] = None
+    upper: Annotated[float | None, Column("upper 95 % limit of n; null: maybe none")] = None
     reachable: Annotated[bool | None, Column("some number is enough")] = None
     reason: Annotated[str | None, Column("why there is no n or no limit")] = None
     doubts: DoubtCodes = ()
@@ -102,9 +80,7 @@ class GradeRow(TableRow):
     lower: Annotated[float | None, Column("lower 95 % limit", "SI")] = None
     upper: Annotated[float | None, Column("upper 95 % limit", "SI")] = None
     printed: Annotated[float | None, Column("of the grade, in the same convention", "SI")] = None
-    n: Annotated[
-        float | None, Column("how many equal it, not rounded, if they have nothing in common")
-    ] = None
+    n: Annotated[float | None, Column("number that equals it, if independent")] = None
     n_lower: Annotated[float | None, Column("by the lower limit")] = None
     n_upper: Annotated[float | None, Column("by the upper limit")] = None
     reason: Annotated[str | None, Column("why there is no n")] = None

@@ -19,17 +19,10 @@ from imubench_pipeline.settings.validation import Strict
 
 DEGREE = math.pi / 180.0
 RECORDING = "sim_engers"
-READ_AT = 3600.0
-"""Cluster time at which the figures under "PSD" were read, s (section 2.2.4)."""
-
-_MIN_TAU_ABOVE_LOW_PASS = 0.1
-"""Cluster time above which the low-passes of these sensors have no effect, s."""
-
-_MIN_PERCENT_IN_BAND = 80.0
-"""Least share of a curve within its 95 % band, %. By chance, one curve in twenty is below."""
-
-_MAX_DEVIATION_DIFFERENCE = 0.05
-"""Largest relative difference of two deviations of samples that look alike."""
+READ_AT = 3600.0  # s; cluster time of the figures under "PSD" (section 2.2.4)
+_MIN_TAU_ABOVE_LOW_PASS = 0.1  # s, above which the low-passes of these sensors have no effect
+_MIN_PERCENT_IN_BAND = 80.0  # of a curve in its 95 % band; by chance, one in twenty is below
+_MAX_DEVIATION_DIFFERENCE = 0.05  # relative, of two deviations of samples that look alike
 
 _SINGLE_SENSOR, _FUSED_SENSOR, _FUSED_COUNT = "scc2130", "scc2130_x25", 25
 
@@ -69,15 +62,10 @@ AXES = {
     (row["sensor"], row["axis"]): Axis.model_validate({**_SENSORS[row["sensor"]], **row})
     for row in _FIGURES["axes"]
 }
-"""The axes by sensor and axis."""
 
 
 def compute_cutoff(_: Evidence, bandwidth: str) -> float:
-    """Return the cut-off of a low-pass of first order with this noise bandwidth, Hz.
-
-    White noise passes it as it passes a filter of this width with steep edges: pi/2 times the
-    cut-off is its noise bandwidth.
-    """
+    """Return the cut-off of a low-pass of first order with this noise bandwidth, Hz."""
     return 2.0 / math.pi * float(bandwidth)
 
 
@@ -228,21 +216,15 @@ def count_equal(run: Evidence, grade: str, option: str) -> Result | None:
             reason = f"noise of {rows[0].grade_name}: {rows[0].reason}"
             return Result(words="", verdict="not to be had", reason=reason)
         by = {row.statistic: row for row in reversed(rows)}
-        shown = [
-            f"{count} by its {what}"
-            for statistic, what in (("N", "white noise"), ("sigma_min", "lowest point"))
-            if (count := _format_count(by.get(statistic)))
-        ]
+        shown = []
+        for statistic, what in (("N", "white noise"), ("sigma_min", "lowest point")):
+            row = by.get(statistic)
+            if row is not None and row.n_upper is not None:
+                most = "at most " if row.n is None else ""
+                count = max(math.ceil(row.n_upper if row.n is None else row.n), 1)
+                shown.append(f"{most}{count} by its {what}")
         words.append(name + ", ".join(shown))
     return Result(fields={"counts": "; ".join(words)})
-
-
-def _format_count(row: GradeRow | None) -> str:
-    """Return the least sufficient whole number as text; empty if it is unknown."""
-    if row is None or row.n_upper is None:
-        return ""
-    most = "at most " if row.n is None else ""
-    return f"{most}{max(math.ceil(row.n_upper if row.n is None else row.n), 1)}"
 
 
 def get_fused_noise(run: Evidence) -> Result | None:

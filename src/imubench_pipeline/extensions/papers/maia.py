@@ -39,17 +39,14 @@ from imubench_pipeline.units import convert_to_si
 DURATION = 36_000.0
 """s; assumed, since the paper recommends ten hours and does not say how long its logs are."""
 
-MEMBERS = 200
-"""Number of reconstructions of each set of parameters, and of logs for the comparison."""
+MEMBERS = 200  # reconstructions of each set of parameters, and logs for the comparison
 
 Grid = Literal["steps", "every"]
-
 GRIDS: tuple[Grid, ...] = ("steps", "every")
 """The paper does not print at which tau it compares two curves: the program that it names plots
 1, 2, ... 9, 10, 20, ... samples; its equation 10 has every n up to half of the log."""
 
-_CLUSTER_SIZES = 100
-"""Number of cluster sizes in place of every n: the middles of equal parts."""
+_CLUSTER_SIZES = 100  # in place of every n: the middles of equal parts
 
 
 @dataclass(frozen=True)
@@ -91,13 +88,10 @@ def _read_channels() -> dict[str, Channel]:
     }
 
 
-CHANNELS = _read_channels()
-"""The channels of the paper by their keys."""
-
+CHANNELS = _read_channels()  # by the keys of the paper
 MTI_GYRO = CHANNELS["mti_gyro"]
 
-Range = tuple[float, float, float]
-"""The quantiles of 5, 50 and 95 %, SI."""
+Range = tuple[float, float, float]  # the quantiles of 5, 50 and 95 %, SI
 
 
 @dataclass(frozen=True)
@@ -211,8 +205,7 @@ assert _MODEL.T_B is not None
 _PROCESS = GaussMarkov(_MODEL.B, _MODEL.T_B)
 _DEFAULT_TAU = 100.0  # s
 
-WEIGHED_AT = (10.0, 100.0, 1000.0)
-"""Cluster times, s, for the comparison of the weight of equation 25 with the spread."""
+WEIGHED_AT = (10.0, 100.0, 1000.0)  # s, to compare the weight of equation 25 with the spread
 
 
 def read_manufacturer(symbol: str, key: str) -> float:
@@ -351,11 +344,7 @@ def get_weighted_rms(run: Evidence, key: str, method: str) -> Result | None:
     rows = run.of_log(ScoreRow, CHANNELS[key].log, method=method)
     if not rows or rows[0].rms is None:
         return None
-    row = rows[0]
-    return Result(
-        value=row.rms,
-        fields={**row.columns(), "surest": SUREST},
-    )
+    return Result(value=rows[0].rms, fields={**rows[0].columns(), "surest": SUREST})
 
 
 def convert_vendor_figure(_: Evidence, symbol: str, key: str) -> float:
@@ -429,9 +418,8 @@ def compute_datasheet_floor(_: Evidence, key: str) -> Result:
     """Return the lowest point of the optimised curve, with 0.664 B of the datasheet."""
     floor = FLOOR * read_manufacturer("B", key)
     shown = _format_power(floor, 2).replace(".", ",")
-    return Result(
-        value=find_lowest_point(CHANNELS[key].table_2)[1], printed=floor, fields={"floor": shown}
-    )
+    level = find_lowest_point(CHANNELS[key].table_2)[1]
+    return Result(value=level, printed=floor, fields={"floor": shown})
 
 
 def integrate_density(model: NoiseModel, tau: float) -> float:
@@ -476,11 +464,6 @@ def compute_weight_ratios(tau: float) -> tuple[float, float]:
 
 def evaluate_equation(_: Evidence, number: str) -> Result:
     """Return the result of an equation, with the printed one where it follows from Table 2."""
-    return _evaluate_equations()[number]
-
-
-@cache
-def _evaluate_equations() -> dict[str, Result]:
     N, B, K, T_B, T = _MODEL.N, _MODEL.B, _MODEL.K, _PROCESS.T_B, 1.0 / _RATE
     f, omega = np.array(1e-3), 2.0 * math.pi * 1e-3
     space, driven = _MODEL.state_space(_RATE), compute_driving_density(B, T_B)
@@ -503,7 +486,7 @@ def _evaluate_equations() -> dict[str, Result]:
         "21": Result(fields={"matrix": space.output.astype(int).tolist()}),
         "22": Result(value=float(space.process_noise[0, 0]) / (driven / _RATE)),
         "23": Result(value=float(space.measurement_noise), printed=N**2 / T),
-    }
+    }[number]
 
 
 def compute_spread_over_weight(_: Evidence) -> Result:
@@ -515,6 +498,5 @@ def evaluate_sign(_: Evidence) -> Result:
     """Return the error of equation 26 as meant, and the ratio as printed, against the density."""
     truth = integrate_density(_MODEL, _DEFAULT_TAU)
     ours = abs(float(_MODEL.allan_variance(_DEFAULT_TAU)) / truth - 1.0)
-    return Result(
-        fields={"ours": ours, "printed_ratio": evaluate_as_printed(_MODEL, _DEFAULT_TAU) / truth}
-    )
+    ratio = evaluate_as_printed(_MODEL, _DEFAULT_TAU) / truth
+    return Result(fields={"ours": ours, "printed_ratio": ratio})

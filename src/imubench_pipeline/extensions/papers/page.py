@@ -55,7 +55,6 @@ PAPERS_PAGE = Entry(
     views=_select_recordings,
     exists=lambda site: bool(site.rows(PublishedRow)),
 )
-"""The page of every table, figure and equation of the papers whose logs the run simulates."""
 
 
 def _select_curves(site: Site) -> list[tuple[Drawn, RecordingView, ChannelView]]:
@@ -126,10 +125,7 @@ def _describe_paper(paper: Paper, rows: Sequence[PublishedRow], there: set[str])
 
 
 def format_cells(row: PublishedRow) -> dict[str, str]:
-    """Return result, ratio and tolerance of a row of ``published``, as texts.
-
-    The result is in the unit of the paper, so that it can be compared with the printed value.
-    """
+    """Return result, in the unit of the paper, ratio and tolerance of a row, as texts."""
     found = ""
     if row.found is not None:
         digits = limit_digits(row.lower, row.upper, 3)
@@ -163,7 +159,6 @@ READING = Section(
     context=lambda site: describe_reading(site.rows(AccuracyRow)) or None,
     tables=("accuracy",),
 )
-"""The result of reading the curve, on the page of the theory."""
 
 
 def describe_reading(rows: Sequence[AccuracyRow]) -> str:

@@ -24,9 +24,7 @@ from imubench_pipeline.extensions.papers.maia import DURATION, MTI_GYRO
 from imubench_pipeline.extensions.papers.tables import AccuracyRow
 from imubench_pipeline.noise.simulate import channel_rng, simulate
 
-LOGS = 100
-"""Number of logs, enough to separate ratios of 1.1 and 1.5. `benchmarks/accuracy.py` has more, at
-the full rate."""
+LOGS = 100  # enough to separate ratios of 1.1 and 1.5; `benchmarks/accuracy.py` has more
 
 _RATE = MTI_GYRO.rate / 10.0
 _FIT_METHODS: tuple[Literal["paper", "weighted"], ...] = ("paper", "weighted")

@@ -99,11 +99,7 @@ def make_rows(paper: Paper, evidence: Evidence) -> Iterator[PublishedRow]:
 
 
 def write_published(tables: Iterable[Path], outputs: Iterable[Path]) -> None:
-    """Write the tables ``published`` and ``accuracy``, as Parquet and CSV.
-
-    `tables` are joined ones of the run, and parts of one table of recordings. Both are empty where
-    it has no log of a paper.
-    """
+    """Write the tables ``published`` and ``accuracy`` of a run, empty without logs of a paper."""
     parts: dict[str, list[Path]] = {}
     for path in tables:
         parts.setdefault(path.stem, []).append(path)

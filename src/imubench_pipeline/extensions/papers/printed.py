@@ -18,8 +18,7 @@ from imubench_pipeline.settings.validation import Strict, parse
 from imubench_pipeline.settings.yaml_files import read_yaml
 
 _FOLDER = Path(__file__).with_name("data")
-KEYS = ("maia", "silva", "engers")
-"""Names of the files, in the order in which the papers are shown."""
+KEYS = ("maia", "silva", "engers")  # names of the files, in the order of display
 
 Basis = Literal["come back", "simulated", "computed", "checked"]
 """Basis of a result; `Terms.bases` describes it."""
@@ -123,13 +122,7 @@ def read_papers() -> list[Paper]:
 
 @cache
 def read_paper(key: str) -> Paper:
-    """Return a paper of `KEYS`.
-
-    Raises
-    ------
-    ConfigError
-        If its file cannot be used.
-    """
+    """Return a paper of `KEYS`; raise ConfigError if its file cannot be used."""
     path = _FOLDER / f"{key}.yaml"
     data: Any = read_yaml(path)
     lines = list(_expand(data.pop("lines"), data.pop("defaults"), {}, data["figures"]))
@@ -183,13 +176,7 @@ class Result:
 
 
 class Evidence:
-    """The joined tables of a run; no tables without a run.
-
-    Parameters
-    ----------
-    tables : mapping of str to pyarrow.Table
-        By name; a missing table counts as empty.
-    """
+    """The joined tables of a run, by name; a missing table counts as empty."""
 
     def __init__(self, tables: Mapping[str, pa.Table] | None = None) -> None:
         self._tables = dict(tables or {})
@@ -213,10 +200,7 @@ class Evidence:
         return self.rows(of, **log._asdict(), **where)
 
     def parameter(self, log: Log, name: str, method: str | None = None) -> ParameterRow | None:
-        """Return the estimate of the first component of a parameter.
-
-        Without a method, the recommended one is used.
-        """
+        """Return the estimate of a parameter's first component, by default the recommended one."""
         by: dict[str, object] = {"recommended": True} if method is None else {"method": method}
         rows = self.of_log(ParameterRow, log, parameter=name, component=1, **by)
         return rows[0] if rows else None

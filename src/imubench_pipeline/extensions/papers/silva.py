@@ -45,15 +45,11 @@ from imubench_pipeline.simulate.model import SensorModel
 DEGREE = math.pi / 180.0
 SENSOR = "sirrs01_03"
 AT_REST = Log(SENSOR, "sim_published", "gyro_x")
+# Estimates of the Earth's rate by run, deg/s (section 6)
 PRINTED = {row["run"]: float(row["rate"]) for row in read_paper("silva").figures["runs"]}
-"""Estimates of the Earth's rate by run, deg/s (section 6)."""
 
-RUNS = 100
-"""Number of simulations of each of the four runs."""
-
-LOGS = 20
-"""Number of simulated logs of a week, and of 48 h."""
-
+RUNS = 100  # simulations of each of the four runs
+LOGS = 20  # simulated logs of a week, and of 48 h
 _ASSUMED_BIAS = math.radians(0.05)  # rad/s; assumed
 _WEEK, _TWO_DAYS = 168, 48  # h
 
@@ -109,14 +105,10 @@ def make_printed_run(run: str) -> PrintedRun:
     return PrintedRun(duration, PRINTED[run] * DEGREE, float(sigma))
 
 
-def _off(run: PrintedRun) -> float:
-    """Return the error of a printed estimate of the Earth's rate, rad/s."""
-    return run.value - EARTH_RATE
-
-
 def compute_error_in_sigma(_: Evidence, run: str) -> Result:
     """Return the error of a printed estimate over the noise of the mean over pairs."""
-    return Result(fields={"off": _off(make_printed_run(run)) / make_printed_run(run).sigma})
+    printed = make_printed_run(run)
+    return Result(fields={"off": (printed.value - EARTH_RATE) / printed.sigma})
 
 
 def compute_allowed_rates(evidence: Evidence, run: str) -> Result:
@@ -137,22 +129,21 @@ def explain_errors(_: Evidence) -> Result:
     first = runs["4"].without(last)
 
     def drift(run: PrintedRun) -> float:
-        return causes.compute_needed_drift(_off(run), PAPER_PERIOD, ASSUMED_LATITUDE)
+        return causes.compute_needed_drift(run.value - EARTH_RATE, PAPER_PERIOD, ASSUMED_LATITUDE)
 
     fields: dict[str, object] = {}
     for name, run in runs.items():
         parts = [first, last] if name == "4" else [run]
-        angle = causes.compute_needed_angle(
-            _off(run), PAPER_PERIOD - ASSUMED_TURNING, ASSUMED_LATITUDE
-        )
+        off, data = run.value - EARTH_RATE, PAPER_PERIOD - ASSUMED_TURNING
+        angle = causes.compute_needed_angle(off, data, ASSUMED_LATITUDE)
+        heading = causes.compute_needed_heading(run.value, EARTH_RATE) or 0.0
         fields |= {
             f"drift_{name}": drift(run) * run.duration / DEGREE,  # deg/s over the run
             f"wrong_{name}": 100 * (causes.compute_wrong_share(run.value, EARTH_RATE) or 0.0),  # %
             f"angle_{name}": abs(angle) / DEGREE,
             f"clock_{name}": 100 * causes.fit_clock_error(parts, PAPER_PERIOD, EARTH_RATE)[0],  # %
-            f"heading_{name}": (causes.compute_needed_heading(run.value, EARTH_RATE) or 0.0)
-            / DEGREE,
-            f"noise_{name}": abs(_off(run)) / run.sigma / _Z_95,
+            f"heading_{name}": heading / DEGREE,
+            f"noise_{name}": abs(off) / run.sigma / _Z_95,
             f"factor_{name}": run.value / EARTH_RATE,
         }
     warmed = causes.fit_warm_up(drift(first), drift(last), runs["4"].duration, last.duration)

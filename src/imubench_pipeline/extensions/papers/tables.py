@@ -14,26 +14,18 @@ class PublishedRow(TableRow):
     paper: Annotated[str, Column("its authors")]
     place: Annotated[str, Column("table, figure, equation or section, with its number there")]
     quantity: Annotated[str, Column("of what, in words")]
-    printed_as: Annotated[
-        str, Column("as printed, with its unit; derived: what follows from it alone")
-    ]
+    printed_as: Annotated[str, Column("as printed, with unit; derived: follows from it alone")]
     printed: Annotated[float | None, Column("the same; null: it is no number", "as in unit")] = None
-    found: Annotated[float | None, Column("what is found here", "as in unit")] = None
-    lower: Annotated[
-        float | None, Column("lower limit of it, 95 % where no other is said", "as in unit")
-    ] = None
-    upper: Annotated[float | None, Column("upper limit of it", "as in unit")] = None
+    found: Annotated[float | None, Column("result of this project", "as in unit")] = None
+    lower: Annotated[float | None, Column("lower limit, 95 % by default", "as in unit")] = None
+    upper: Annotated[float | None, Column("upper limit", "as in unit")] = None
     found_words: Annotated[str | None, Column("beside the number, or in its place")] = None
     ratio: Annotated[float | None, Column("found over printed")] = None
-    tolerance: Annotated[
-        float | None, Column("how far from 1 a ratio still agrees; null: there is no ratio")
-    ] = None
+    tolerance: Annotated[float | None, Column("of the ratio from 1; null: no ratio")] = None
     unit: Annotated[str, Column("SI unit of the numbers")]
     printed_unit: Annotated[str, Column("unit in which the paper prints it")]
     scale: Annotated[float, Column("one printed unit", "as in unit")]
-    basis: Annotated[
-        str, Column("come back, simulated, computed or checked: what is found rests on that")
-    ]
+    basis: Annotated[str, Column("basis of the result: come back, simulated, computed or checked")]
     verdict: Annotated[
         str, Column("agrees, differs, possible, refuted, misprint, done here or not to be had")
     ]
@@ -50,9 +42,7 @@ class AccuracyRow(TableRow):
     parameter: Annotated[str, Column("N, B, T_B or K")]
     logs: Annotated[int, Column("simulated")]
     given: Annotated[int, Column("of them that the method gives a value for")]
-    rmse: Annotated[
-        float | None, Column("root mean square error of these values over the truth")
-    ] = None
+    rmse: Annotated[float | None, Column("root mean square error over the truth")] = None
     bias: Annotated[float | None, Column("their mean error over the truth")] = None
     bound: Annotated[float, Column("Cramér-Rao bound of the standard deviation over the truth")]
     ratio: Annotated[float | None, Column("rmse over bound")] = None

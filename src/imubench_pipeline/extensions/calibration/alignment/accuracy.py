@@ -1,11 +1,9 @@
 """Accuracy of the self-alignment of a triad over the time at rest, in one position and in two.
 
-The triad is level, its nose to the north: the east gyro determines the accuracy of the heading. Two
-positions are opposite about the vertical, with equal amounts of data. Coarse alignment uses the
-means (`coarse`), fine alignment the filter (`fine`). As a check, triads are simulated from the
-exact distribution of their block means, and aligned coarsely, then by the filter. The root mean
-square of their errors over the standard deviation of the filter is 1 if the latter is right. If the
-error of the heading is too large for that, small angles about the true attitude are compared.
+The triad is level, its nose to the north. Two positions are opposite about the vertical, with equal
+amounts of data. As a check, triads are simulated from the exact distribution of their block means,
+and aligned coarsely, then by the filter. If the error of the heading is too large for that, small
+angles about the true attitude are compared.
 """
 
 from __future__ import annotations
@@ -140,22 +138,18 @@ def accuracies(
             fine = FineAlignment(triad, positions, site, _LEVEL_ATTITUDE)
             errors = None
             if runs and rng is not None and time == times[-1]:
-                errors = _simulate_errors(triad, site, fine, runs, rng)
+                # Rms errors of simulated triads over the sigma of the filter.
+                level, sigma = _LEVEL_ATTITUDE, fine.sigma[-1]
+                drawn = simulate_triad(triad, positions, site, level, runs=runs, rng=rng).means
+                if sigma[2] < _MAX_LINEAR_HEADING_SIGMA:
+                    start = coarse_alignment(*mean_vectors(drawn, positions), site)
+                    angles = euler_angles(fine.run(drawn, start).attitude)
+                    errors = np.asarray(np.sqrt(np.mean(angles**2, axis=0)) / sigma)
+                else:
+                    # The angles about north, east, down are errors of roll, pitch, heading.
+                    errors = np.sqrt(np.mean(fine.run(drawn).psi[:, -1] ** 2, axis=0)) / sigma
+                    known = [True, True, sigma[2] < UNIFORM_HEADING_SIGMA]
+                    errors = np.where(known, errors, math.nan)
             yield Accuracy(
                 number, "fine", time, fine.sigma[-1], errors, 0 if errors is None else runs
             )
-
-
-def _simulate_errors(
-    triad: Triad, site: Site, fine: FineAlignment, runs: int, rng: np.random.Generator
-) -> Array:
-    """Return the rms error of simulated triads over the sigma of the filter, shape (3,)."""
-    drawn = simulate_triad(triad, fine.positions, site, _LEVEL_ATTITUDE, runs=runs, rng=rng)
-    sigma = fine.sigma[-1]
-    if sigma[2] < _MAX_LINEAR_HEADING_SIGMA:
-        start = coarse_alignment(*mean_vectors(drawn.means, fine.positions), site)
-        aligned = fine.run(drawn.means, start)
-        return np.asarray(np.sqrt(np.mean(euler_angles(aligned.attitude) ** 2, axis=0)) / sigma)
-    # Level, to the north: the angles about north, east, down are errors of roll, pitch, heading.
-    ratios = np.sqrt(np.mean(fine.run(drawn.means).psi[:, -1] ** 2, axis=0)) / sigma
-    return np.where([True, True, sigma[2] < UNIFORM_HEADING_SIGMA], ratios, math.nan)

@@ -6,14 +6,11 @@ positions. The residual of the block means for an attitude C~ = (I - [psi x]) C 
     y - T^T C~^T v = T^T C~^T [v x] psi + mean error + white noise,
 
 v the Earth's rate or the specific force, T the turn since the first position. The errors of the six
-axes are states of their noise models (`calibration.states`), with the fixed biases. The filter
-estimates psi and all of them; its discretisation is exact. In one position it cannot separate the
-biases of the level accelerometers from tilt, nor the bias of the east gyro from the heading. Its
-covariance shows this:
+axes are states of their noise models (`calibration.states`), with the fixed biases. In one position
+the filter cannot separate the biases of the level accelerometers from tilt, nor the bias of the
+east gyro from the heading:
 
     sigma(roll, pitch) -> accelerometer bias / g,   sigma(heading) -> gyro bias / (w_ie cos(L)).
-
-The model has no errors of the turns, scale factors or misalignments, and no motion of the body.
 """
 
 from __future__ import annotations
