@@ -49,10 +49,7 @@ def make_axis_states(
 
 
 def add_turn_on_bias(space: StateSpace, turn_on: float) -> StateSpace:
-    """Return a state space with a turn-on bias of this standard deviation, in SI.
-
-    It is added to the initial variance of a random walk, or else becomes a constant state.
-    """
+    """Return a state space with a turn-on bias, standard deviation in SI, in its walk if any."""
     space = space.of_either_sign() if np.any(space.initial_mean) else space
     for i in range(len(space.output)):
         alone = np.zeros(len(space.output))
@@ -93,10 +90,7 @@ class StackedStates(NamedTuple):
 def stack_axes(
     axes: Sequence[AxisStates], sampling: float, width: int, steps: int
 ) -> StackedStates:
-    """Return the states of six axes over ``steps`` steps of ``width`` samples, at a rate in Hz.
-
-    The covariance between the sum over a step and the states after it is included.
-    """
+    """Return the states of six axes over steps of ``width`` samples, at a sampling rate in Hz."""
     T = 1.0 / sampling
     spaces = [axis.space for axis in axes]
     whole = StateSpace.together(spaces)

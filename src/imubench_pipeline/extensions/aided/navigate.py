@@ -200,10 +200,7 @@ class _Source:
 
 
 def navigate(folders: Sequence[Path], sensor: str, settings: str) -> Iterator[NavigationRow]:
-    """Yield the rows of the table ``navigation`` of a sensor, of its longest usable recording.
-
-    ``folders`` are its static recordings, ``settings`` are from `plan.navigate_settings`.
-    """
+    """Yield the rows of the table ``navigation`` of a sensor, of its longest usable recording."""
     sections = json.loads(settings)
     how = NavigateSettings.model_validate(sections["navigate"])
     how = _add_requirements(how, sections["asked"])
@@ -343,10 +340,7 @@ def _make_spreads(how: NavigateSettings) -> Spreads:
 
 
 def _cut_pieces(folder: Path, block: int, size: int) -> list[dict[str, Array]]:
-    """Return pieces of ``size`` means over ``block`` samples, less the mean of the log.
-
-    A channel with a hole is absent from the piece.
-    """
+    """Return pieces of ``size`` block means, less the mean of the log; channels without holes."""
     pieces: list[dict[str, Array]] = []
     for channel, log in load_static_logs(folder).items():
         values = np.concatenate([*log.blocks()])

@@ -78,10 +78,7 @@ NAVIGATION = Entry(
 
 
 def describe_tunings(rows: Sequence[NavigationRow]) -> Iterator[dict[str, Any]]:
-    """Yield, for each sensor, trajectory and kind of signals, whether the tuning matters.
-
-    The criterion is the position error after the longest outage, relative to the true model.
-    """
+    """Yield whether the tuning matters to the position after the longest outage, by sensor."""
     groups: dict[tuple[str, str | None, str | None], list[NavigationRow]] = {}
     for row in rows:
         groups.setdefault((row.sensor, row.trajectory, row.signals), []).append(row)

@@ -114,10 +114,7 @@ def compute_rotation_vector(C: Array, after: Array, into: Array) -> None:
 def invert_mechanisation(
     start: Array, velocity: Array, attitude: Array, T: float, earth: Array
 ) -> tuple[Array, Array, Array]:
-    """Return the positions, shape (L + 1, 3), and ideal rates and forces, shapes (L, 3).
-
-    The start has the shape (3,), m, the velocity (L + 1, 3), the attitude (L + 1, 3, 3).
-    """
+    """Return positions, shape (L + 1, 3), and ideal rates and forces, (L, 3), of a motion."""
     L = len(velocity) - 1
     position, rate, force = np.empty((L + 1, 3)), np.empty((L, 3)), np.empty((L, 3))
     for i in range(3):

@@ -26,10 +26,7 @@ _MIN_PRESENT_SHARE = 0.5  # of the samples of a block, or its mean is left out
 
 @dataclass(frozen=True)
 class Dwell:
-    """A time at rest in one position.
-
-    Raises ValueError if there is no sample, or the sense is neither 1 nor -1.
-    """
+    """A time at rest in one position; ValueError without a sample, or for another sense."""
 
     # start, stop: first sample of the log, and the one past the last
     start: int
@@ -45,11 +42,7 @@ class Dwell:
 
 @dataclass(frozen=True)
 class Experiment:
-    """Dwells in their order.
-
-    Raises ValueError if dwells overlap or are not in order, the rate is not above 0, or the
-    latitude is not between the poles.
-    """
+    """Dwells in their order, else ValueError; so for a rate or a latitude out of range."""
 
     # at least one; the time between them is turning. Two consecutive ones have the same sense after
     # a missed turn
@@ -100,10 +93,7 @@ class Experiment:
         return sum(dwell.stop - dwell.start for dwell in self.dwells)
 
     def blocks(self, longest: int) -> Blocks:
-        """Return the blocks of a log without missing samples, of ``longest`` samples at most.
-
-        Raises ValueError if ``longest`` is below 1.
-        """
+        """Return the blocks of a complete log, of ``longest`` samples at most, from 1."""
         if longest < 1:
             raise ValueError(f"a block of {longest} samples is empty")
         edges = []

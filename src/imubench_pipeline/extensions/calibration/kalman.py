@@ -60,10 +60,7 @@ class Filtered:
         return np.asarray((self.innovation / self.innovation_sigma) ** 2)
 
     def rate_nees(self, rate: float) -> Array:
-        """Return the squared error of the rate, rad/s, over its variance, shape (runs, b).
-
-        Chi-squared of one degree of freedom, once both positions have been observed.
-        """
+        """Return the squared error of the rate over its variance, shape (runs, b): chi^2(1)."""
         return np.asarray(((self.rate - rate) / self.rate_sigma) ** 2)
 
     def nees(self, rate: float, states: Array) -> Array:
@@ -129,10 +126,7 @@ class RateFilter:
         return compute_deviation(self._filter.roots, 0)
 
     def run(self, means: Array) -> Filtered:
-        """Filter runs of one design from block means, rad/s, shape (runs, b).
-
-        Raises ValueError if there is not one finite mean a block.
-        """
+        """Filter runs of one design from finite block means, rad/s, shape (runs, b)."""
         self.blocks.check_means(means)
         states, innovation = self._filter.run(means[:, :, None])
         roots = self._filter.roots

@@ -84,10 +84,7 @@ def compute_limits(value: Array, sigma: Array | float) -> Limits:
 
 
 def compute_half_width(level: float = CONFIDENCE_LEVEL) -> float:
-    """Return half of a two-sided interval of the normal distribution, in standard deviations.
-
-    Raises ValueError if the level is not between 0 and 1.
-    """
+    """Return half of a two-sided normal interval, in standard deviations, for a level in (0, 1)."""
     if not 0 < level < 1:
         raise ValueError(f"level is {level}, expected one between 0 and 1")
     return float(norm.ppf(0.5 + level / 2.0))
@@ -137,10 +134,7 @@ class LeastSquares:
         return np.sqrt(np.diag(self.covariance))
 
     def fit(self, means: Array) -> Fit:
-        """Estimate the parameters of runs of one design from means of shape (runs, b).
-
-        Raises ValueError if there is not one finite mean a block.
-        """
+        """Estimate the parameters of runs of one design from finite means of shape (runs, b)."""
         self._blocks.check_means(means)
         white = solve_triangular(self._root, means.T, lower=True).T
         along = white @ self._basis

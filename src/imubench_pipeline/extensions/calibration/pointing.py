@@ -20,11 +20,7 @@ from imubench_pipeline.earth import EARTH_RATE
 
 @dataclass(frozen=True, kw_only=True)
 class Pointing:
-    """Direction of a sensitive axis on the Earth, in rad, with standard deviations.
-
-    Raises ValueError if the latitude is beyond a pole, an angle is not finite, or a deviation is
-    negative.
-    """
+    """Direction of a sensitive axis, rad, with standard deviations; ValueError if out of range."""
 
     latitude: float  # north positive
     heading: float | None  # of the horizontal part, from north towards east; None: not known
@@ -62,10 +58,7 @@ class Pointing:
 
     @property
     def tilt_sigma(self) -> float:
-        """Effect of the spread of the elevation on the rate at the worst heading, rad/s.
-
-        To the first order: w_ie (cos(L) |sin(e)| + |sin(L) cos(e)|) times the spread.
-        """
+        """Effect of the spread of the elevation at the worst heading, to the first order, rad/s."""
         most = abs(math.cos(self.latitude) * math.sin(self.elevation))
         most += abs(math.sin(self.latitude) * math.cos(self.elevation))
         return EARTH_RATE * most * self.elevation_sigma

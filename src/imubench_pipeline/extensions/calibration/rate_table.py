@@ -85,10 +85,7 @@ class Linearity:
         return np.abs(self.deviation).max(axis=1)
 
     def interval(self) -> Limits:
-        """Return confidence limits of the largest true deviation, shapes (runs,).
-
-        They hold for all rates together (Bonferroni).
-        """
+        """Return limits of the largest true deviation, shapes (runs,), by Bonferroni."""
         half = compute_half_width(1.0 - (1.0 - CONFIDENCE_LEVEL) / self.sigma.size) * self.sigma
         size = np.abs(self.deviation)
         return np.maximum(size - half, 0.0).max(axis=1), (size + half).max(axis=1)
@@ -213,10 +210,7 @@ class RateTable:
         return math.hypot(bias, self._earth_sigma), float(scale)
 
     def fit(self, means: Array) -> Calibration:
-        """Estimate bias and scale factor in runs of this design from block means, rad/s, (runs, b).
-
-        Raises ValueError if there is not one finite mean a block.
-        """
+        """Estimate bias and scale factor in runs from block means, rad/s, shape (runs, b)."""
         line, quadratic, asymmetry, linearity = self._line.fit(means), None, None, None
         if (squares := self._quadratic) is not None:
             quadratic = Term(squares.fit(means).value[:, -1], float(squares.sigma[-1]))

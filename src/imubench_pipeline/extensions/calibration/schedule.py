@@ -19,11 +19,7 @@ from imubench_pipeline.typing import Array
 
 @dataclass(frozen=True)
 class Schedule:
-    """Steady rates of a table, in their order.
-
-    Raises ValueError if there is none, there is not one rate for each stretch, one is not finite,
-    or stretches overlap.
-    """
+    """Steady rates of a table, in their order; ValueError if they are none, or do not match."""
 
     stretches: Sequence[Dwell]  # samples of each; their sense is not used
     # shape (stretches,); rate of the table with respect to the Earth, rad/s, of the gyro's sign

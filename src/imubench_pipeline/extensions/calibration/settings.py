@@ -197,10 +197,7 @@ class InPositions(Experiment):
         return parse_quantity(self.latitude, "angle")
 
     def angle(self, number: int) -> float:
-        """Return the angle of a position, counted from 0, from the first one, rad.
-
-        It grows where the next one is less far round, so that all turns go the same way.
-        """
+        """Return the angle of a position, from 0, to the first, rad; it grows from turn to turn."""
         angles = [parse_quantity(text, "angle") for text in self.turned]
         return angles[number % len(angles)] + 2.0 * math.pi * (number // len(angles))
 

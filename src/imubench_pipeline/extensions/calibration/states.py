@@ -172,10 +172,7 @@ class BlockFilter:
         return self._matrices[self._which[block]]
 
     def run(self, means: Array) -> tuple[Array, Array]:
-        """Return the states after each block, (runs, b, n), and the innovations, (runs, b, a).
-
-        The means have the shape (runs, b, a).
-        """
+        """Return states, (runs, b, n), and innovations, (runs, b, a), of means (runs, b, a)."""
         b, _, n = self._seen.shape
         states = np.empty((len(means), b, n))
         innovations = np.empty_like(means)

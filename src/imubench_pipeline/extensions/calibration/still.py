@@ -68,10 +68,7 @@ class StillBias:
         return math.hypot(self.present_noise_sigma, self.rate_sigma)
 
     def fixed_interval(self) -> Limits:
-        """Return confidence limits of the fixed bias, rad/s, shapes (runs,).
-
-        For an unknown heading they are widened by the range of the Earth's rate.
-        """
+        """Return limits of the fixed bias, rad/s, shapes (runs,), wider for an unknown heading."""
         return self._interval(self.fixed, self.fixed_noise_sigma)
 
     def present_interval(self) -> Limits:
@@ -99,10 +96,7 @@ class StillRun:
         return float(self._fixed.sigma[0])
 
     def fit(self, means: Array) -> StillBias:
-        """Estimate the bias in runs of this design from block means, rad/s, shape (runs, b).
-
-        Raises ValueError if there is not one finite mean a block.
-        """
+        """Estimate the bias in runs from finite block means, rad/s, shape (runs, b)."""
         pointing = self.pointing
         error = means - pointing.rate
         fit, filtered = self._fixed.fit(error), self._filter.run(error)

@@ -60,10 +60,7 @@ def _compute_innovations(
     white: Array,
     columns: Array,
 ) -> Array:
-    """Return innovations over their standard deviations.
-
-    The last row of a transition matrix gives the mean of the block.
-    """
+    """Return innovations over their sigmas; the last row of a transition gives the mean."""
     # Plain loops: products of arrays take eight times as long to compile.
     m, width = covariance.shape[0], columns.shape[1]
     covariance = covariance.copy()
@@ -114,10 +111,7 @@ def compute_cramer_rao_bounds(
 
 
 def compute_information(blocks: Blocks, model: NoiseModel, turn_on_bias: float = math.inf) -> Array:
-    """Return the Fisher information of the rate in the data up to each block, (rad/s)^-2, (b,).
-
-    The parameters and errors are as in `compute_cramer_rao_bounds`.
-    """
+    """Return the Fisher information of the rate, (rad/s)^-2, shape (b,), as in the bounds above."""
     if not turn_on_bias >= 0:
         raise ValueError(f"turn_on_bias is {turn_on_bias}, expected a number from 0, or infinity")
     white = whiten(model, blocks, np.column_stack([blocks.seen, np.ones(len(blocks))]))

@@ -48,10 +48,7 @@ class Noise:
     models: dict[str, NoiseModel]  # by channel
 
     def three(self, quantity: str) -> dict[str, NoiseModel]:
-        """Return the models of the axes x, y and z of a quantity, by axis and source channel.
-
-        An axis that is missing in the log has the noise of another one.
-        """
+        """Return the models of x, y and z by axis; a missing axis has the noise of another."""
         names = [name for name in self.models if name.startswith(quantity)]
         models = {}
         for place, axis in enumerate("xyz"):

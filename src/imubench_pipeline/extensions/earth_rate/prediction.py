@@ -66,10 +66,7 @@ class DwellCurve:
         return int(np.argmin(self.sigma))
 
     def nearly_best(self) -> tuple[float, float]:
-        """Return the range of dwells with a loss of 1 % at most; the optimum is mostly broad.
-
-        Shortest and longest dwell of the curve about the best one, s.
-        """
+        """Return the shortest and longest dwell with a loss of 1 % at most, s."""
         little = self.sigma <= (1.0 + _NEARLY_BEST_LOSS) * self.sigma[self.best]
         worse = np.flatnonzero(~little)
         first = int(np.max(worse[worse < self.best], initial=-1)) + 1
@@ -127,10 +124,7 @@ class Outlook:
         return float(convert_to_sigma(np.array([last]))[0])
 
     def time_needed(self, dwell: float, relative: float) -> float:
-        """Return the run time for a relative standard deviation of the Earth's rate, s.
-
-        Infinity: more than `MAX_TURNS`.
-        """
+        """Return the run time for a relative sigma of the Earth's rate, s; inf: too many turns."""
         turns = self.turns_needed(dwell, relative)
         return math.inf if turns is None else (turns + 1) * dwell + turns * self.turning
 

@@ -219,10 +219,7 @@ def compute_allowed_sigmas(run: RunDesign, duration: float, model: NoiseModel) -
 
 
 def make_published_row(value: float, run: RunDesign, duration: float, model: NoiseModel) -> Row:
-    """Return the columns of ``earth_rate_published`` for an estimate, rad/s, of a run or its part.
-
-    The duration is in s.
-    """
+    """Return the columns of ``earth_rate_published`` for an estimate, rad/s, over a duration, s."""
     noise = compute_allowed_sigmas(run, duration, model)
     off = (value - EARTH_RATE) / noise["sigma"]
     return noise | {
@@ -308,10 +305,7 @@ def fit_warm_up(first: float, last: float, duration: float, last_duration: float
 
 
 def fit_single_miscount(whole: PrintedRun, last: PrintedRun, true: float) -> float:
-    """Return the misfit of the best single miscount to both printed values, in sigma.
-
-    The senses are right up to a turn and wrong after it, or vice versa.
-    """
+    """Return the misfit, in sigma, of the best single turn after which the senses are wrong."""
     first = whole.without(last)
     flips = np.linspace(0.0, whole.duration, 6001)
     before = np.clip(flips / first.duration, 0.0, 1.0)

@@ -354,10 +354,7 @@ class Turning:
         return sum(turn.found_by == "schedule" for turn in self.turns)
 
     def senses(self, samples: int, rate: float) -> NDArray[np.int8]:
-        """Return the sense of each sample, shape (samples,): 1 or -1, and 0 where it is not used.
-
-        The rate is in Hz.
-        """
+        """Return the sense of each sample, shape (samples,), 0 where it is not used; rate in Hz."""
         sense = np.zeros(samples, dtype=np.int8)
         for dwell in self.dwells:
             first, last = (_find_first_sample(time, rate) for time in (dwell.start, dwell.stop))
@@ -422,10 +419,7 @@ def _average(difference: Array, white: Array) -> Alternation:
 
 
 def find_contradiction(blocks: LevelBlocks, stretches: Sequence[tuple[float, float]]) -> int | None:
-    """Return the dwell from which the alternation has the opposite sign, or None.
-
-    An extra or a missed turn inverts the sign of all later dwells. The result only raises a doubt.
-    """
+    """Return the dwell from which the alternation has the opposite sign, which raises a doubt."""
     difference, white = compute_differences(blocks, stretches)
     if len(difference) < 6:
         return None

@@ -19,10 +19,7 @@ _SHARED_PARAMETERS = ("N", "B", "K", "R")  # that sensors may share, each the ro
 
 @dataclass(frozen=True)
 class Shared:
-    """One process that acts on several sensors, with a separate sensitivity for each.
-
-    Examples are the temperature of a board, and an unwanted motion (sensitivity 1).
-    """
+    """One process, such as a temperature, that acts on several sensors with sensitivities."""
 
     model: NoiseModel  # the process in its own unit, such as kelvin, at the fused rate
     # SI unit of the sensors per that unit, one a sensor, with sign: sensors of opposite signs can
@@ -92,10 +89,7 @@ class Board:
         rate: float,
         correlation: Mapping[str, float] | None = None,
     ) -> Board:
-        """Return a board of specimens of one sensor, with its whole noise, at a rate in Hz.
-
-        The correlation, and a ValueError, are as for `divided`.
-        """
+        """Return a board of equal sensors, at a rate in Hz; the correlation is as for `divided`."""
         own, common = divided(model, correlation or {})
         shared = [Shared(common, [1.0] * number)] if common.terms else []
         return cls([own] * number, [rate] * number, shared)
@@ -123,10 +117,7 @@ class Board:
         )
 
     def allan_parts(self, tau: ArrayLike) -> Parts:
-        """Return the Allan variances of the sensors at tau, s, array_like of shape (m,).
-
-        Each tau is rounded to whole fused samples, at least one.
-        """
+        """Return the Allan variances of the sensors at whole samples next to tau, s, shape (m,)."""
         t = np.atleast_1d(np.asarray(tau, dtype=np.float64))
         t = np.maximum(np.rint(t * self.rate), 1.0) / self.rate
         own = [m.allan_variance(t, r) for m, r in zip(self.models, self.rates, strict=True)]
@@ -134,10 +125,7 @@ class Board:
         return self._make_parts(own, common, len(t))
 
     def spectral_parts(self, omega: ArrayLike) -> Parts:
-        """Return the spectra of the fused samples, without ramps and lines.
-
-        The frequencies omega are in rad per fused sample, above 0, array_like of shape (m,).
-        """
+        """Return the spectra without ramps and lines at omega, rad per sample, shape (m,)."""
         w = np.atleast_1d(np.asarray(omega, dtype=np.float64))
         spectra: dict[tuple[int, int], Array] = {}  # specimens of one sensor have the same spectrum
         keys = [(id(m), size) for m, size in zip(self.models, self.blocks, strict=True)]

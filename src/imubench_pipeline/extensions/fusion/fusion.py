@@ -59,10 +59,7 @@ class Grade:
 def yield_grade_rows(
     candidates: Iterable[ComparedChannel], grades: Sequence[Grade]
 ) -> Iterator[GradeRow]:
-    """Yield the rows of the table ``grades``: each sensor against each printed figure.
-
-    The axis with the median N represents a sensor; measured axes are preferred to simulated ones.
-    """
+    """Yield the rows of ``grades``: the axis of median N of each sensor, each printed figure."""
     by_sensor: dict[tuple[str, str], list[ComparedChannel]] = {}
     for channel in candidates:
         quantity = channel.channel.split("_")[0]
@@ -219,10 +216,7 @@ def write_fusion(
     catalogue: str,
     outputs: list[Path],
 ) -> None:
-    """Write the tables ``fusion`` and ``grades``, by the stems of ``outputs``, from ``inputs``.
-
-    ``joint``: tables ``draws`` of recordings.
-    """
+    """Write the tables ``fusion`` and ``grades``, by the stems of ``outputs``, from ``inputs``."""
     how = FusionSettings.model_validate_json(settings)
     tables = {name: read(name, [Path(inputs[name])]) for name in NEEDED}
     of_recording = {(path.parts[-3], path.parts[-2]): path for path in joint}

@@ -88,10 +88,7 @@ def make_pair_lines(rows: Sequence[FusionRow]) -> Iterator[dict[str, Any]]:
 
 
 def make_matrices(lines: Sequence[Mapping[str, Any]]) -> Iterator[dict[str, Any]]:
-    """Yield a matrix for each quantity and averaging time, from the lines of `make_pair_lines`.
-
-    A cell has the number of row sensors that match one column sensor; the quietest come first.
-    """
+    """Yield a matrix of pair lines for each quantity and averaging time, the quietest first."""
     groups: dict[tuple[str, str], list[Mapping[str, Any]]] = {}
     for line in lines:
         groups.setdefault((line["quantity"], line["tau"]), []).append(line)

@@ -103,10 +103,7 @@ def run_snakemake(arguments: Sequence[str], project: Path, output: Path, lock: L
 
 
 class _Terminal:
-    """A pseudo-terminal for Snakemake, so that it shows its progress as in a terminal.
-
-    The output is passed to the real terminal unchanged, and to a file without erased lines.
-    """
+    """A pseudo-terminal that passes on progress, and keeps it in a file without erased lines."""
 
     def __init__(self, file: IO[bytes]) -> None:
         self._file = file

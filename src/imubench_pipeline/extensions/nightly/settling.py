@@ -75,10 +75,7 @@ def scan_drop_zone(logs: Path) -> dict[str, Found]:
 
 
 def find_complete_name(name: str) -> str | None:
-    """Return the name that a file will have once it is complete; None if it is complete.
-
-    It may be ``run.csv.part``, ``.run.csv.Xy12Zq`` (rsync) or ``.run.csv``.
-    """
+    """Return the name of a partial file (.part, hidden, rsync) once complete; None if it is."""
     if name.startswith("._"):
         return None  # what macOS keeps beside a file
     whole = name.lstrip(".")
@@ -93,10 +90,7 @@ def find_complete_name(name: str) -> str | None:
 def find_settled_logs(
     logs: Path, settle: float, earlier: Mapping[str, Signature]
 ) -> tuple[dict[str, Found], list[Skip]]:
-    """Return the last scan of a drop zone, and the logs that are still being written.
-
-    A complete log has not changed for ``settle``, s, or since an ``earlier`` run.
-    """
+    """Return the last scan of a drop zone, and the logs that changed within ``settle``, s."""
     first = second = scan_drop_zone(logs)
     if settle and any(earlier.get(key) != recording.files for key, recording in first.items()):
         time.sleep(min(settle, _MAX_PAUSE))

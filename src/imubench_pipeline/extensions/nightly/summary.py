@@ -124,10 +124,7 @@ class Summary(BaseModel):
 def compare_states(
     before: State | None, after: State, tables: RunRows, without: Iterable[str]
 ) -> dict[str, Any]:
-    """Return the changes of a state since the last successful run, as fields of the summary.
-
-    The recordings `without` are left out: their logs changed while they were read.
-    """
+    """Return the changes since the last successful run, apart from the recordings `without`."""
     was = before or State(finished=after.finished)
     written_to = set(without)
     now = {name: outcome for name, outcome in after.recordings.items() if name not in written_to}

@@ -145,10 +145,7 @@ def simulate_lottery(channel: Channel, grid: Grid) -> Lottery:
 
 @cache
 def simulate_readings(channel: Channel) -> dict[str, Range]:
-    """Return what reading the curves of single logs of Table 2 gives of N, B, K and T_B.
-
-    N is read at 1 s, K at a ninth of the log, B and T_B at the lowest point between them.
-    """
+    """Return the parameters read from curves of single logs of Table 2 (N at 1 s, K at a ninth)."""
     tau = choose_cluster_sizes(channel, "read") / channel.rate
     curves = _simulate_deviations(channel)[0]["read"]
     return {

@@ -33,10 +33,7 @@ Values = Mapping[str, float | None]
 
 
 def make_accuracy_rows(logs: int = LOGS) -> Iterator[AccuracyRow]:
-    """Yield the rows of the table ``accuracy``.
-
-    The likelihood uses the model of the papers, up to half of the sampling rate.
-    """
+    """Yield the rows of the table ``accuracy``; the likelihood has the model of the papers."""
     model = MTI_GYRO.table_2
     bounds = compute_cramer_rao_bounds(model, _RATE, DURATION, _RATE / 2.0)
     by_method: dict[str, list[Values]] = {}
@@ -69,10 +66,7 @@ def make_accuracy_rows(logs: int = LOGS) -> Iterator[AccuracyRow]:
 
 
 def _estimate_log(number: int, before: Whittle | None) -> tuple[dict[str, Values], Whittle]:
-    """Return the estimates of each method for a log, None where it has none, and the likelihood.
-
-    The likelihood `before` of another log has the same bins, and so the same spectral shapes.
-    """
+    """Return the estimates by method, and the likelihood, with the shapes of the one `before`."""
     samples = round(DURATION * _RATE)
     rng = channel_rng(1, MTI_GYRO.sensor, MTI_GYRO.channel, f"panel {number}")
     log = simulate(MTI_GYRO.table_2, _RATE, samples, rng)

@@ -34,10 +34,7 @@ def matrix(roll: float, pitch: float, heading: float) -> Array:
 
 
 def euler_angles(attitude: Array) -> Array:
-    """Return roll, pitch and heading, rad, of attitudes of shape (..., 3, 3).
-
-    Roll and heading are from -pi to pi, pitch from -pi/2 to pi/2.
-    """
+    """Return roll, pitch (-pi/2 to pi/2) and heading, rad, of attitudes of shape (..., 3, 3)."""
     c = attitude
     level = np.hypot(c[..., 0, 0], c[..., 1, 0])
     return np.stack(
@@ -59,10 +56,7 @@ def cross_matrix(vector: ArrayLike) -> Array:
 
 
 def rotation(vector: ArrayLike) -> Array:
-    """Return the matrix of a rotation vector (O. Rodrigues), exp([v x]), shape (..., 3, 3).
-
-    The vector is in rad, shape (..., 3).
-    """
+    """Return the matrix of a rotation vector, rad, (..., 3): exp([v x]), shape (..., 3, 3)."""
     v = np.asarray(vector, dtype=np.float64)
     angle = np.linalg.norm(v, axis=-1)[..., None, None]
     across = cross_matrix(v)
@@ -78,10 +72,7 @@ def correct(attitude: Array, psi: Array) -> Array:
 
 
 def euler_jacobian(attitude: Array) -> Array:
-    """Return the Jacobian, shape (3, 3), of roll, pitch and heading for a small error psi.
-
-    Raises ValueError if the pitch is +-pi/2: roll and heading are not separable.
-    """
+    """Return d(roll, pitch, heading)/d(psi), shape (3, 3); ValueError if the pitch is +-pi/2."""
     _, pitch, heading = euler_angles(attitude)
     cp, sp, ch, sh = np.cos(pitch), np.sin(pitch), np.cos(heading), np.sin(heading)
     if cp < MIN_COS_PITCH:

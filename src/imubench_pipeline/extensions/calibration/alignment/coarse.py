@@ -58,11 +58,7 @@ def mean_vectors(means: Array, positions: Positions) -> tuple[Array, Array]:
 def coarse_accuracy(
     triad: Triad, positions: Positions, site: Site, attitude: Array
 ) -> CoarseAccuracy:
-    """Return the uncertainty of coarse alignment about an attitude, to first order.
-
-    The attitude, shape (3, 3), is the true one, in the first position. Raises ValueError if the x
-    axis is vertical.
-    """
+    """Return the uncertainty of coarse alignment about a true attitude, shape (3, 3)."""
     weighted = _compute_weights(positions)[:, None, None] * positions.of_blocks
     of_sensor = []
     for three in (triad.axes[:3], triad.axes[3:]):

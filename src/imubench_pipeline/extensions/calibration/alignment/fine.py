@@ -109,11 +109,7 @@ class FineAlignment:
         return (NotObservable("heading", reason),)
 
     def run(self, means: Array, attitude: Array | None = None) -> Aligned:
-        """Align runs from block means of gyros and accelerometers x, y, z, shape (runs, b, 6).
-
-        ``attitude``, shape (runs, 3, 3), is near the one of the filter, the default. Raises
-        ValueError if there are not six finite means per block.
-        """
+        """Align runs from block means, (runs, b, 6), about attitudes of shape (runs, 3, 3)."""
         if means.ndim != 3 or means.shape[1:] != (len(self.positions.blocks), 6):
             raise ValueError(
                 f"the means have the shape {means.shape}, expected (runs, "

@@ -19,11 +19,7 @@ _NEAREST_POLE = 1e-6  # least cosine of the latitude; nearer to a pole there is 
 
 @dataclass(frozen=True, kw_only=True)
 class Site:
-    """A place on the Earth, with the rate and specific force of a triad at rest.
-
-    Raises ValueError if the latitude is not between the poles, where there is no north, or gravity
-    not above 0.
-    """
+    """A place between the poles (else ValueError), with rate and force of a triad at rest."""
 
     latitude: float  # rad, north positive
     gravity: float = STANDARD_GRAVITY  # m/s^2
@@ -47,10 +43,7 @@ class Site:
 
 @dataclass(frozen=True, kw_only=True)
 class Triad:
-    """Three gyros and three accelerometers along the axes x, y, z of the body.
-
-    Raises ValueError if there are not three of each, or a deviation is negative or not finite.
-    """
+    """Three gyros and accelerometers along x, y, z; ValueError if not, or for a wrong deviation."""
 
     gyros: Sequence[NoiseModel]  # three, SI
     accelerometers: Sequence[NoiseModel]  # three, SI
@@ -93,10 +86,7 @@ class Triad:
 
 @dataclass(frozen=True)
 class Positions:
-    """Blocks of a run at rest, in one position or in several with known turns from the first.
-
-    Raises ValueError if there is no rotation matrix for every dwell.
-    """
+    """Blocks of a run at rest, in one position or in several with known turns from the first."""
 
     blocks: Blocks  # neither their sense nor their latitude is used
     # shape (dwells, 3, 3); turns vectors of the body frame of each dwell into the first one
