@@ -46,8 +46,13 @@ from imubench_pipeline.extensions.aided.runs import (
     schedule_outages,
 )
 from imubench_pipeline.extensions.aided.settings import NavigateSettings
-from imubench_pipeline.extensions.aided.signals import Signals, Spreads, simulate_signals
-from imubench_pipeline.extensions.aided.trajectories import TRAJECTORY_NAMES, simulate_trajectory
+from imubench_pipeline.extensions.aided.trajectories import (
+    TRAJECTORY_NAMES,
+    Signals,
+    Spreads,
+    simulate_signals,
+    simulate_trajectory,
+)
 from imubench_pipeline.model.table import TableRow
 from imubench_pipeline.navigation.error_budget import Start, Uncalibrated, budget
 from imubench_pipeline.noise import GaussMarkov, NoiseModel

@@ -16,11 +16,13 @@ from imubench_pipeline.extensions.aided.runs import (
     Outcome,
     schedule_outages,
 )
-from imubench_pipeline.extensions.aided.signals import Signals, Spreads, simulate_signals
 from imubench_pipeline.extensions.aided.strapdown import compute_rotation_vector, write_rotation
 from imubench_pipeline.extensions.aided.trajectories import (
+    Signals,
+    Spreads,
     Trajectory,
     compute_headings,
+    simulate_signals,
     simulate_trajectory,
 )
 from imubench_pipeline.noise import NoiseModel

@@ -19,8 +19,11 @@ from imubench_pipeline.extensions.aided.axis_states import (
     make_axis_states,
 )
 from imubench_pipeline.extensions.aided.runs import Drive, Outage
-from imubench_pipeline.extensions.aided.signals import Spreads, simulate_signals
-from imubench_pipeline.extensions.aided.trajectories import simulate_trajectory
+from imubench_pipeline.extensions.aided.trajectories import (
+    Spreads,
+    simulate_signals,
+    simulate_trajectory,
+)
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.state_space import StateSpace
 from imubench_pipeline.settings.sensor import CHANNELS

@@ -4,7 +4,7 @@ from typing import Any
 
 import pytest
 
-from imubench_pipeline.extensions.papers.panel import make_accuracy_rows
+from imubench_pipeline.extensions.papers.papers import make_accuracy_rows
 
 pytestmark = pytest.mark.release
 

@@ -40,9 +40,13 @@ from imubench_pipeline.extensions.aided.runs import (
     schedule_outages,
 )
 from imubench_pipeline.extensions.aided.settings import NavigateSettings
-from imubench_pipeline.extensions.aided.signals import Signals, Spreads, simulate_signals
 from imubench_pipeline.extensions.aided.tables import NavigationRow
-from imubench_pipeline.extensions.aided.trajectories import simulate_trajectory
+from imubench_pipeline.extensions.aided.trajectories import (
+    Signals,
+    Spreads,
+    simulate_signals,
+    simulate_trajectory,
+)
 from imubench_pipeline.model.estimates import AllanRow, LowPassRow
 from imubench_pipeline.model.recordings import RecordingRow
 from imubench_pipeline.noise import FLOOR, NoiseModel

@@ -13,9 +13,8 @@ from scipy.stats import chi2, t
 
 from imubench_pipeline.extensions.aided.axis_states import AxisStates, StackedStates, stack_axes
 from imubench_pipeline.extensions.aided.error_state import DEGREES_OF_FREEDOM, GROUPS, run_filter
-from imubench_pipeline.extensions.aided.signals import Signals
 from imubench_pipeline.extensions.aided.strapdown import write_rotation
-from imubench_pipeline.extensions.aided.trajectories import Trajectory
+from imubench_pipeline.extensions.aided.trajectories import Signals, Trajectory
 from imubench_pipeline.typing import Array
 
 FIX_INTERVAL = 1.0  # time between two fixes, s, rounded to whole samples

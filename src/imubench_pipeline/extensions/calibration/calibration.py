@@ -55,7 +55,7 @@ from imubench_pipeline.tables.keys import Key
 from imubench_pipeline.typing import Array
 from imubench_pipeline.units import parse_quantity
 
-UNITS = {
+UNITS = {  # SI
     "bias": "rad/s",
     "present_bias": "rad/s",
     "scale_factor": "1",
@@ -65,8 +65,6 @@ UNITS = {
     "earth_rate": "rad/s",
     "heading": "rad",
 }
-"""SI unit of each quantity of the table ``calibration``."""
-
 _ANGLES = ("roll", "pitch", "heading")  # of the first position
 _Z_95 = 1.96  # standard deviations of a 95 % limit
 _RUN_PARAMETERS = {"rate_table": ("bias", "scale_factor"), "at_rest": ("bias", "present_bias")}

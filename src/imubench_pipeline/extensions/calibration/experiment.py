@@ -205,12 +205,11 @@ class Measured:
 def block_means(parts: Iterable[Array], experiment: Experiment, longest: int) -> Measured:
     """Return the means of blocks, of ``longest`` samples at most, of a log, in one pass.
 
-    The mean is over the samples present; its slow noise is taken as for a complete block.
-    Therefore a block with more than half of its samples missing is left out. With a third of all
-    samples missing, a standard deviation is right to 1 %, or 3 % too small if most of the noise is
-    a process with a correlation time of two samples. The parts of the log are in order, rad/s, each
-    ndarray of one axis; NaN where a sample is missing. Raises ValueError if the log ends before the
-    last dwell does, or no block has enough samples.
+    The mean is over the samples present; a block with more than half missing is left out. With a
+    third of all samples missing, a standard deviation is right to 1 %, or 3 % too small for a
+    correlation time of two samples. The parts of the log are in order, rad/s, each ndarray of one
+    axis; NaN where a sample is missing. Raises ValueError if the log ends before the last dwell, or
+    has no such block.
     """
     whole = experiment.blocks(longest)
     total, count = np.zeros(len(whole)), np.zeros(len(whole), dtype=np.int64)

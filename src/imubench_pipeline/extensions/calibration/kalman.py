@@ -15,7 +15,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 from scipy.linalg import solve_triangular
@@ -144,36 +143,25 @@ class RateFilter:
 
     def smooth(self, filtered: Filtered) -> Smoothed:
         """Smooth the result of `run` (Rauch, Tung and Striebel), with square roots."""
-        states = filtered.states.copy()
-        gains, sigma = self._smoother_gains
-        for k in range(len(self.blocks) - 2, -1, -1):
-            transition, _ = self._filter.matrices(k + 1)
-            predicted = filtered.states[:, k] @ transition.T
-            states[:, k] += (states[:, k + 1] - predicted) @ gains[k].T
-        return Smoothed(
-            states[:, -1, 0], float(self.rate_sigma[-1]), states[:, :, -1], sigma, states
-        )
-
-    @cached_property
-    def _smoother_gains(self) -> tuple[Array, Array]:
-        """Gains of the smoother at all but the last block, and sigma of the drift at each."""
-        root = self._filter.roots[-1]
-        gains = np.empty((len(self.blocks) - 1, *root.shape))
-        sigma = np.empty(len(self.blocks))
+        states, root = filtered.states.copy(), self._filter.roots[-1]
+        sigma = np.empty(len(self.blocks))  # of the drift at each block
         sigma[-1] = compute_deviation(root, -1)
         n = len(root)
-        for k in range(len(gains) - 1, -1, -1):
+        for k in range(len(self.blocks) - 2, -1, -1):
             transition, noise = self._filter.matrices(k + 1)
-            filtered = self._filter.roots[k]
+            before = self._filter.roots[k]
             joint = np.zeros((2 * n, n + noise.shape[1]))
-            joint[:n, :n], joint[:n, n:], joint[n:, :n] = transition @ filtered, noise, filtered
+            joint[:n, :n], joint[:n, n:], joint[n:, :n] = transition @ before, noise, before
             after = triangularise(joint)
             predicted, shared, rest = after[:n, :n], after[n:, :n], after[n:, n:]
             # Without process noise the mean of a block depends on the states: no plain inverse.
             scale = np.linalg.norm(predicted, axis=1)
             unit = np.where(scale > 0.0, scale, 1.0)
             inverse = np.linalg.pinv(predicted / unit[:, None], rcond=_SINGULAR_TOLERANCE)
-            gains[k] = shared @ inverse / unit
-            root = triangularise(np.concatenate([rest, gains[k] @ root], axis=1))
+            gain = shared @ inverse / unit
+            root = triangularise(np.concatenate([rest, gain @ root], axis=1))
             sigma[k] = compute_deviation(root, -1)
-        return gains, sigma
+            forecast = filtered.states[:, k] @ transition.T
+            states[:, k] += (states[:, k + 1] - forecast) @ gain.T
+        rate_sigma = float(self.rate_sigma[-1])
+        return Smoothed(states[:, -1, 0], rate_sigma, states[:, :, -1], sigma, states)

@@ -90,7 +90,7 @@ def format_estimates(rows: Sequence[CalibrationRow]) -> Iterator[dict[str, Any]]
     for row in rows:
         if row.status == "not_observable" and row.parameter in ("earth_rate", "heading"):
             continue
-        line = {
+        line: dict[str, Any] = {
             **row.columns(),
             "words": WORDS[row.parameter],
             "digits": limit_digits(row.lower, row.upper, 4),
@@ -98,30 +98,21 @@ def format_estimates(rows: Sequence[CalibrationRow]) -> Iterator[dict[str, Any]]
             "percent": None if row.chance is None else percent_text(row.chance, 2),
             "why": sentence(row.reason),
         }
-        yield line | _format_ratio(row)
-
-
-def _format_ratio(row: CalibrationRow) -> dict[str, str]:
-    """Return a dimensionless quantity with its limits as text."""
-    name = row.parameter
-    if row.value is None or name not in _RATIO_UNITS:
-        return dict.fromkeys(("text", "limits", "sigma_text", "truth_text"), "–")
-    shown = (row.value, row.lower, row.upper, row.truth)
-    if name == "scale_factor":
-        digits = limit_digits(row.lower, row.upper, 4)
-        value, low, high, true = (number_text(size, digits) for size in shown)
-        sigma = "–" if row.sigma is None else f"{number_text(_PPM_PER_UNIT * row.sigma, 3)} ppm"
-    else:
-        _, per = _RATIO_UNITS[name]
-        value, low, high, true, sigma = (
-            number_text(None if size is None else per * size, 3) for size in (*shown, row.sigma)
-        )
-    return {
-        "text": value + _RATIO_UNITS[name][0],
-        "limits": f"{low} to {high}",
-        "sigma_text": sigma,
-        "truth_text": true,
-    }
+        name, shown = row.parameter, (row.value, row.lower, row.upper, row.truth)
+        if row.value is None or name not in _RATIO_UNITS:
+            yield line | dict.fromkeys(("text", "limits", "sigma_text", "truth_text"), "–")
+            continue
+        if name == "scale_factor":
+            value, low, high, true = (number_text(size, line["digits"]) for size in shown)
+            sigma = "–" if row.sigma is None else f"{number_text(_PPM_PER_UNIT * row.sigma, 3)} ppm"
+        else:
+            value, low, high, true, sigma = (
+                number_text(None if size is None else _RATIO_UNITS[name][1] * size, 3)
+                for size in (*shown, row.sigma)
+            )
+        text = value + _RATIO_UNITS[name][0]
+        texts = {"text": text, "limits": f"{low} to {high}"}
+        yield line | texts | {"sigma_text": sigma, "truth_text": true}
 
 
 def list_not_observable(rows: Sequence[CalibrationRow]) -> list[dict[str, Any]]:

@@ -132,10 +132,9 @@ class Calibration:
 class RateTable:
     """A recording on a rate table: its blocks, the gyro's noise, and the known rates.
 
-    The blocks are of the schedule's `experiment`; the noise model has some noise in every sample.
-    ``pointing`` is the direction of the axis of table and gyro; without one the Earth's rate is a
-    part of the bias. ``setting_sigma``, rad/s, is the standard deviation of the true rate of each
-    stretch. Raises NotObservableError if there is one rate only; ValueError if the deviation is
+    The blocks are of the schedule's `experiment`. Without a direction (``pointing``) the Earth's
+    rate is a part of the bias. ``setting_sigma``, rad/s, is the standard deviation of the true rate
+    of each stretch. Raises NotObservableError for one rate; ValueError if the deviation is
     negative, or the heading of an axis that is not vertical is missing.
     """
 

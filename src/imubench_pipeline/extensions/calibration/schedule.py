@@ -39,11 +39,9 @@ class Schedule:
     def from_steps(
         cls, steps: Sequence[tuple[float, float, float]], rate: float, *, settling: float = 0.0
     ) -> Schedule:
-        """Return the schedule of known steps.
+        """Return the schedule of steps: start and end, s, and rate, rad/s; the sampling rate in Hz.
 
-        Each step is start and end of a steady rate, s from the first sample, and the rate, rad/s.
-        The settling time, s, at its start is left out. The sampling rate is in Hz. Raises
-        ValueError if a step holds no sample after it has settled; see `Schedule`.
+        The settling time, s, at their start is left out; ValueError if a step then has no sample.
         """
         stretches = []
         for start, stop, table_rate in steps:
@@ -63,11 +61,10 @@ class Schedule:
     ) -> Schedule:
         """Find the steady rates in a column with the table's rate, rad/s, shape (n,), in Hz.
 
-        A sample is steady if the column stays within the tolerance, rad/s, for half the shortest
-        time, s, about it. Consecutive steady samples are a stretch if they last long enough, and
-        the column stays within twice the tolerance over all of them, which excludes slow ramps. The
-        settling time, s, at its start is left out. Raises ValueError if the tolerance is negative,
-        the shortest time is not longer than the settling, or there is no steady rate.
+        A sample is steady if the column stays within the tolerance for half the shortest time, s,
+        about it; a stretch lasts that time and stays within twice the tolerance. The settling time,
+        s, at its start is left out. Raises ValueError for wrong arguments, or if there is no steady
+        rate.
         """
         if not tolerance >= 0:
             raise ValueError(f"tolerance is {tolerance}, expected a rate from 0")

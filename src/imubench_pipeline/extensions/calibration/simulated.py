@@ -60,9 +60,8 @@ def simulate_positions(recording: SimulatedRecording, rate: float) -> dict[str, 
 def compute_readings(site: Site, attitude: Array, angle: Array, turning: Array) -> Array:
     """Return rate and specific force in the body frame, rad/s and m/s^2, shape (n, 6).
 
-    Gyros and accelerometers x, y, z are without errors, and the turns are about the accelerometers.
-    The attitude, shape (3, 3), belongs to the first position; ``angle`` is the angle from it about
-    z, rad, and ``turning`` the rate of this angle, rad/s, shape (n,).
+    ``attitude``, shape (3, 3), is of the first position; ``angle`` the turn from it about z, rad,
+    and ``turning`` its rate, rad/s, shape (n,). The turns are about the accelerometers.
     """
     cosine, sine = np.cos(angle), np.sin(angle)
     columns = []

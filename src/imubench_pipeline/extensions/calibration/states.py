@@ -119,11 +119,9 @@ def _build_step(space: StateSpace, gap: int, size: int) -> Step:
 class BlockFilter:
     """The filter of one design; it filters any number of runs at once.
 
-    The a axes are over the same b blocks; ``seen``, shape (b, a, p), is the sensitivity of the mean
-    of each axis over each block to the p constants; ``start``, shape (p, p), a root of their prior
-    covariance. ``roots``, shape (b, n, n), ``gains``, (b, n, a), and ``innovation_roots``,
-    (b, a, a), are roots of the covariances after each block, Kalman gains, and roots of the
-    covariances of the innovations.
+    ``seen``, shape (b, a, p), is the sensitivity of the mean of each of a axes over each of b
+    blocks to p constants; ``start``, shape (p, p), a root of their prior covariance. The roots have
+    the shapes (b, n, n) of states and (b, a, a) of innovations, the gains (b, n, a).
     """
 
     def __init__(self, axes: Sequence[BlockStates], seen: Array, start: Array) -> None:

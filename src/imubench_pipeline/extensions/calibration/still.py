@@ -146,11 +146,10 @@ def not_observable(pointing: Pointing) -> tuple[NotObservable, ...]:
 def bias_at_rest(
     log: Array, rate: float, model: NoiseModel, pointing: Pointing, longest: int | None = None
 ) -> StillBias:
-    """Return the bias of a gyro from a log at rest.
+    """Return the bias of a gyro from a log at rest, rad/s, shape (n,), NaN where missing.
 
-    The log is in rad/s, shape (n,); NaN where a sample is missing; the rate in Hz. A block has
-    ``longest`` samples at most; by default the longest without loss of information. Raises
-    ValueError if the log is empty, or has too few samples present.
+    The rate is in Hz. A block has ``longest`` samples at most, by default the longest without loss
+    of information. Raises ValueError if the log has too few samples.
     """
     run = Experiment((Dwell(0, len(log), 1),), rate, 0.0)
     if longest is None:

@@ -278,12 +278,10 @@ def choose_turns(
     """Choose the turns among events in order of time; return their indices, in order.
 
     An event is a turn, a disturbance, or noise. The density of an interval between turns is a
-    mixture about the multiples of the dwell (Student's t of 3 degrees of freedom: an unequal dwell
-    costs no more than a doubt); disturbances and noise come at random. The sequence of the greatest
-    likelihood is searched again with the properties of the turns found: their strength, so that
-    noise does not replace a missed turn among strong ones, the usual dwell, and its scatter.
-
-    Nominal dwell, tolerance (standard deviation of an interval) and duration of the log are in s.
+    mixture about the multiples of the dwell (Student's t of 3 degrees of freedom). The sequence of
+    the greatest likelihood is searched again with strength, usual dwell and scatter of the turns
+    found. Nominal dwell, tolerance (standard deviation of an interval) and duration of the log are
+    in s.
     """
     if not events:
         return []
@@ -316,11 +314,11 @@ def choose_turns(
 def find_shorter_dwell(
     events: Sequence[Event], chosen: Sequence[int], dwell: float
 ) -> float | None:
-    """Return the dwell of the clear transients, s, if it is far shorter than nominal.
+    """Return the dwell of the clear transients, s, if it is far shorter than nominal, s.
 
-    If turns come at twice the declared pace, each second turn is taken for a knock, halfway
-    between two others; knocks and handling are not periodic. The events are in order of time, with
-    the indices of the turns chosen by the nominal dwell, s.
+    If turns come at twice the declared pace, each second turn is taken for a knock, but is
+    periodic. The events are in order of time, with the indices of the turns chosen by the nominal
+    dwell.
     """
     turns = [events[k] for k in chosen]
     if len(turns) < 2:

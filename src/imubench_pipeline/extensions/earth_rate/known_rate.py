@@ -126,11 +126,10 @@ def settled(mean: Array, rate: float, known_rate: float, part: float = 0.1) -> f
 def mean_sigma(
     model: NoiseModel, rate: float, samples: int, start: float, turn_on_bias: float
 ) -> Array:
-    """Return the standard deviation of the mean of `track` after each sample, rad/s, shape (n,).
+    """Return the exact sigma of the mean of `track` after each sample, rad/s, shape (n,).
 
-    Exact, over the noise of the model and a fixed bias of the standard deviation ``turn_on_bias``,
-    rad/s, and independent of the known rate. The start is in (rad/s)^2, the rate in Hz. Raises
-    ValueError as `track`.
+    It is over the noise of the model and a fixed bias of the sigma ``turn_on_bias``, rad/s. The
+    start is in (rad/s)^2, the rate in Hz. Raises ValueError as `track`.
     """
     one = _build_filter(model, rate)
     decay, of_f, of_rrw, white = one.decay, one.of_f, one.of_rrw, one.white

@@ -44,7 +44,7 @@ from imubench_pipeline.words.numbers import (
     sentence,
 )
 
-_METHODS = {
+_METHODS = {  # term of the glossary, and words
     "pairs": ("by_pairs", "pairs of dwells"),
     "triples": ("by_triples", "A-B-A differences"),
     "filter": ("rate_filter", "filter, rate unknown"),
@@ -52,10 +52,7 @@ _METHODS = {
     "known_rate": ("known_rate", "bias tracking with known rate, P₀ in (°/s)²"),
     "known_rate_radians": ("known_rate", "bias tracking with known rate, P₀ in (rad/s)²"),
 }
-"""Term of the glossary, and words, of each method."""
-
 ESTIMATES = ("filter", "pairs", "triples")
-"""The methods that estimate the rate, the recommended one first; filter and smoother agree."""
 
 
 def make_turned_context(site: Site, view: RecordingView, folder: Path) -> dict[str, Any]:

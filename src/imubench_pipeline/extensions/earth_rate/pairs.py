@@ -37,9 +37,7 @@ class Differences:
 def by_pairs(means: Array, blocks: Blocks, model: NoiseModel) -> Differences:
     """Estimate the rate from pairs of dwells, each in one pair at most (Silva et al., eq. 14).
 
-    A dwell followed by one of the same sense (a missed turn) is left out. The block means are in
-    rad/s, shape (runs, b); the noise model is for the standard errors. Raises ValueError if there
-    is no pair.
+    The block means are in rad/s, shape (runs, b). Raises ValueError if there is no pair.
     """
     dwells = blocks.of_dwells()
     differences, i = [], 0
@@ -57,10 +55,8 @@ def by_pairs(means: Array, blocks: Blocks, model: NoiseModel) -> Differences:
 def by_triples(means: Array, blocks: Blocks, model: NoiseModel) -> Differences:
     """Estimate the rate by A-B-A differences, which remove a drift that is linear in time.
 
-    Of three consecutive dwells of alternating sense, the middle one is compared with the line
-    through the outer two at its mean time. Triples overlap: each dwell except the first and the
-    last is the middle of one. Arguments and shapes are as in `by_pairs`. Raises ValueError if there
-    are no three such dwells.
+    The middle of three alternating dwells is compared with the line through the outer two; triples
+    overlap. Shapes and errors are as in `by_pairs`.
     """
     dwells = blocks.of_dwells()
     # The mean time of the samples present is taken from their blocks.

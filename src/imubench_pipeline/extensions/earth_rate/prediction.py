@@ -25,22 +25,18 @@ from imubench_pipeline.extensions.earth_rate.bound import (
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.typing import Array
 
-# Largest number of computed dwells; beyond, the information grows as over their latter half
-_MAX_COMPUTED_DWELLS = 64
+_MAX_COMPUTED_DWELLS = 64  # beyond, the information grows as over their latter half
 _MIN_COMPUTED_DWELLS = 8  # least number of computed dwells, if 64 of them have too many blocks
 _INFORMATION_TOLERANCE = 1e-9  # relative tolerance of the information for rounding
-# Relative rise of the standard deviation within which a dwell is nearly the best
-_NEARLY_BEST_LOSS = 0.01
+_NEARLY_BEST_LOSS = 0.01  # relative rise of sigma within which a dwell is nearly the best
 _DWELL_CURVE_POINTS = 40  # approximate number of points on a curve over the dwell
 _REFINEMENT_POINTS = 15  # number of further points about the best one
 
-Row = dict[str, Any]
-
-MAX_TURNS = 10**12
-"""Largest number of turns of a goal; at one a second they take 30 000 years."""
-
+MAX_TURNS = 10**12  # of a goal; at one a second they take 30 000 years
 _TIME_CURVE_POINTS = 60  # number of points on the curve over time
 _MAX_CURVE_TURNS = 20_000  # largest number of turns on the curve over time; goals may need more
+
+Row = dict[str, Any]
 
 
 @dataclass(frozen=True)
@@ -199,9 +195,8 @@ def prediction_rows(
 ) -> Iterator[Row]:
     """Yield the rows of the table ``earth_rate_prediction``, without the names.
 
-    ``dwell`` is the data in each dwell, s; the goals are standard deviations relative to the
-    Earth's rate; the best dwell is computed for the run time, s. Raises ValueError if the run time
-    does not hold two dwells and a turn.
+    ``dwell`` is the data in each, s; the goals are relative standard deviations. Raises ValueError
+    if the run time, s, for the best dwell, does not hold two dwells and a turn.
     """
     about = {"latitude": outlook.latitude}
     most = 1

@@ -42,12 +42,13 @@ from imubench_pipeline.typing import Array
 GIVEN = {"known_rate": STARTS["degrees"], "known_rate_radians": STARTS["radians"]}
 """The methods with known rate, which cannot estimate it, and the start of each, (rad/s)^2."""
 
-METHODS = ("pairs", "triples", "filter", "smoother", *GIVEN)
-"""All methods, in the order of display."""
-
+METHODS = ("pairs", "triples", "filter", "smoother", *GIVEN)  # in the order of display
 _MAX_POINTS = 400
+_TESTED_CLOCK_ERRORS = 20_001
+_Z_95 = 1.96  # half width, in standard deviations, of the interval with 95 % of the estimates
 
 Range = dict[str, float]
+Row = dict[str, Any]
 
 
 @dataclass(frozen=True)
@@ -91,12 +92,11 @@ def estimate_courses(
     papers: NoiseModel,
     turn_on_bias: float | None = None,
 ) -> Courses:
-    """Estimate the Earth's rate by every method.
+    """Estimate the Earth's rate by every method; ``papers`` is the model for Silva et al.
 
-    The log, shape (n,), is in rad/s, NaN where a sample is missing; the noise model has N. N, B
-    with T_B, and K of ``papers`` are for the filter of Silva et al. The turn-on bias is a standard
-    deviation, rad/s (None: unknown). Raises ValueError if the dwells are all of one sense, or no
-    block of them has enough samples.
+    The log, shape (n,), is in rad/s, NaN where a sample is missing; the turn-on bias is a standard
+    deviation, rad/s (None: unknown). Raises ValueError if the dwells are all of one sense, or
+    empty.
     """
     if len({dwell.sense for dwell in experiment.dwells}) < 2:
         raise ValueError("all dwells are of one position: the rate cannot be told from the bias")
@@ -150,11 +150,10 @@ def thin(points: int) -> Iterator[int]:
 def compute_sigma_ranges(
     blocks: Blocks, model: NoiseModel, drawn: Sequence[NoiseModel], turn_on_bias: float | None
 ) -> dict[str, Range]:
-    """Return the limits of the standard deviation of each method at the end of a run.
+    """Return the 95 % limits of the standard deviation of each method at the end of a run, rad/s.
 
-    By method ``sigma_lower`` and ``sigma_upper``, rad/s, over models drawn from the limits of the
-    parameters. Methods without an estimate are left out, and all without draws. The standard
-    deviation of the fixed bias is in rad/s; None: unknown.
+    They are over models drawn from the limits of the parameters; methods without an estimate are
+    left out. The standard deviation of the fixed bias is in rad/s; None: unknown.
     """
     if not drawn:
         return {}
@@ -175,12 +174,6 @@ def compute_sigma_ranges(
     if "filter" in ranges:
         ranges["smoother"] = ranges["filter"]  # equal at the end of the run
     return ranges
-
-
-Row = dict[str, Any]
-
-_TESTED_CLOCK_ERRORS = 20_001
-_Z_95 = 1.96  # half width, in standard deviations, of the interval with 95 % of the estimates
 
 
 @dataclass(frozen=True)

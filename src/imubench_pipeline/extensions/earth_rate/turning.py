@@ -58,13 +58,12 @@ class Stays:
 
 
 def find_stays(position: Array, rate: float, shortest: float) -> Stays:
-    """Find the stays in two positions.
+    """Find the stays in two positions: the medians of the column's lower and upper half, by range.
 
-    The positions are the medians of the column's lower and upper half, by range. A sample within a
-    tenth of their distance of one is in it; other samples are turning, or overshoot. The column,
-    shape (n,), has two positions as numbers in any unit, NaN where it is not known; an angle must
-    not wrap at one of them. The rate is in Hz; stays below the shortest, s, are overshoots. Raises
-    ValueError if the column has one position only, or none.
+    A sample within a tenth of their distance of one is in it. The column, shape (n,), is in any
+    unit, NaN where it is not known; an angle must not wrap at a position. The rate is in Hz; stays
+    below the shortest, s, are overshoots. Raises ValueError if the column has one position only, or
+    none.
     """
     finite = np.flatnonzero(np.isfinite(position))
     if len(finite) == 0:
@@ -118,29 +117,22 @@ def find_turning(
     """Find the dwells and the turning points of a log.
 
     A column with the position decides if there is one. Else the transients and steps that fit the
-    schedule best are chosen (`extensions.earth_rate.choice_of_turns.choose_turns`). Turns that are
-    too weak to detect are inserted from the schedule between the detected ones. If fewer than 40 %
-    of the scheduled turns are detected, the schedule gives all of them. A transient within a fifth
-    of a dwell of an end of the log is handling, and cut off with that end. Only the schedule
-    separates handling of 0.2 s and more from a turn. ``benchmarks/dwell_detection.py`` measures how
-    often turns are found.
+    schedule best are chosen (`extensions.earth_rate.choice_of_turns.choose_turns`), and weak turns
+    are inserted from the schedule; it gives all turns if fewer than 40 % are detected. A transient
+    within a fifth of a dwell of an end of the log is handling. ``benchmarks/dwell_detection.py``
+    measures how often turns are found.
 
-    The sense alternates at each turn. An extra or a missed turn inverts all later senses; if the
-    alternation then clearly has the opposite sign, the result has a doubt. The first sense is
-    ``first_sense``, or given by the column if it has +1 and -1. Otherwise +1 is assumed and the
-    result is ``ambiguous``. The known rate of the Earth is not used.
-
-    Without a transient, the log must alternate by 3 standard errors with the schedule. Runs where
-    chance hides the alternation are then refused, which favours large estimates.
-    ``trust_schedule`` accepts the schedule instead.
+    The sense alternates at each turn; an extra or a missed turn inverts all later senses, which
+    raises a doubt. The first sense is given, or +1 is assumed and the result is ``ambiguous``. The
+    known rate of the Earth is not used. Without a transient, the log must alternate by 3 standard
+    errors with the schedule, which favours large estimates, unless ``trust_schedule``.
 
     The log, shape (n,), is in rad/s, NaN where a sample is missing; the rate in Hz. ``dwell`` is
-    the nominal time from the start of a turn to the start of the next, ``margin`` is left out on
-    both sides of a detected turn. ``turning``, the time that a turn takes, and ``start`` of the
-    first dwell after the first sample are only for turns that are not detected; all in s.
-    ``position``, shape (n,): see `find_stays`. ``model``: the noise at rest, SI, by default
-    estimated from the log. Raises ValueError if an argument is out of range, the log is shorter
-    than two dwells, or there is no evidence of turns.
+    from the start of a turn to the start of the next, ``margin`` is left out on both sides of a
+    detected turn; ``turning`` and ``start`` of the first dwell are for turns that are not detected;
+    all in s. ``position``, shape (n,): see `find_stays`. ``model``: the noise at rest, SI, by
+    default estimated from the log. Raises ValueError if an argument is out of range, the log is
+    shorter than two dwells, or there is no evidence of turns.
     """
     log = np.asarray(log, dtype=np.float64)
     schedule = _check_schedule(log, rate, dwell, turning, start, first_sense, margin)

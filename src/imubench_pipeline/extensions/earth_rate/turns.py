@@ -76,10 +76,10 @@ def average_log_blocks(
 ) -> LevelBlocks:
     """Average a log over blocks, with their level and noise.
 
-    The level is a running median over less than a dwell, which follows a step at once. The noise is
-    the median absolute deviation from it, or the noise at rest, if given and within a factor of 1.5
-    of it. The log, shape (n,), is in rad/s, NaN where a sample is missing; the rate in Hz, the
-    nominal dwell in s. Raises ValueError if there are hardly any samples, or all are the same.
+    The level is a running median over less than a dwell, the noise the median absolute deviation
+    from it, or the noise at rest if within a factor of 1.5. The log, shape (n,), is in rad/s, NaN
+    where a sample is missing; the rate in Hz, the dwell in s. Raises ValueError if hardly any
+    samples differ.
     """
     size = max(1, round(BLOCK_LENGTH * rate))
     length = size / rate
@@ -125,11 +125,10 @@ def _estimate_sigma(residual: Array) -> float:
 def detect_transients(blocks: LevelBlocks, log: Array, rate: float) -> list[Event]:
     """Return the transients in order of time.
 
-    A window of n blocks with a mean square of r times the noise has the log-likelihood ratio
-    (n/2) (r - 1 - ln r) of a larger variance, maximised over its length and place. If blocks of
-    the calm parts are correlated, n is divided by an upper bound on the largest eigenvalue of their
-    correlation, 1 + 2 sum (1 - k/n) rho_k. The log is the one given to `average_log_blocks`, in
-    shape and units.
+    A window of n blocks with a mean square of r times the noise has the log-likelihood ratio (n/2)
+    (r - 1 - ln r) of a larger variance. If calm blocks are correlated, n is divided by a bound on
+    the largest eigenvalue of their correlation. The log has shape and units of
+    `average_log_blocks`.
     """
     # Autocorrelation of calm blocks, from lag 1 until it is not significant.
     calm = np.where(blocks.present & (np.abs(blocks.z) < _EDGE_SIGMAS), blocks.z, 0.0)
@@ -243,11 +242,9 @@ def detect_steps(
 ) -> list[Event]:
     """Return significant steps of the level, in order of time.
 
-    The statistic is the difference of the means over a third of a nominal dwell, s, after and
-    before a place, over its standard deviation; a step is a local maximum above 8. It takes a gyro
-    far better than the SiRRS01-03 of Silva et al. (N below about 0.001 deg/sqrt(s)). The drift of
-    a noise model is no step; without a model, the noise is white. The rate, Hz, is for quantization
-    noise only.
+    A step is a difference of the means over a third of a dwell, s, of 8 standard deviations. It
+    takes a gyro far better than the SiRRS01-03 of Silva et al. The drift of a noise model is no
+    step; without a model, the noise is white. The rate, Hz, is for quantization noise.
     """
     width = round(dwell / 3.0 / blocks.length)
     if width < 4 or 2 * width >= len(blocks.z):
@@ -373,12 +370,10 @@ def _find_first_sample(time: float, rate: float) -> int:
 def compute_differences(
     blocks: LevelBlocks, stretches: Sequence[tuple[float, float]]
 ) -> tuple[Array, Array]:
-    """Return the A-B-A differences of the dwells, with equal signs.
+    """Return the A-B-A differences of n dwells, with equal signs, and the variances of their means.
 
-    They are (-1)^i (2 m_i - m_(i-1) - m_(i+1)) / 4, rad/s, shape (n - 2,), positive if the sense of
-    the first dwell reads more; a linear drift cancels. For two dwells, half their difference. Also
-    returned is the variance of the means of the dwells from the noise of the blocks, (rad/s)^2,
-    shape (n,). ``stretches`` are start and stop of the n dwells, s, at least two.
+    They are (-1)^i (2 m_i - m_(i-1) - m_(i+1)) / 4, rad/s, shape (n - 2,); for two dwells, half
+    their difference. The variances are from the noise of the blocks, (rad/s)^2, shape (n,).
     """
     total = np.concatenate(([0.0], np.cumsum(clip_block_means(blocks))))
     present = np.concatenate(([0], np.cumsum(blocks.present)))
@@ -436,11 +431,10 @@ def find_contradiction(blocks: LevelBlocks, stretches: Sequence[tuple[float, flo
 def find_best_shift(
     blocks: LevelBlocks, turns: Array, half_width: float, longest: float, duration: float
 ) -> tuple[float, float, float]:
-    """Return the delay of the turns that maximises the alternation, whatever its size or sign.
+    """Return the delay of the turns, s, of the largest alternation, and z with and without it.
 
-    All shifts share one standard error, so that z^2 is twice the log-likelihood. Returned are the
-    shift, s, and the alternation in standard errors with and without it. The largest shift is
-    ``longest``, s; the turns are the scheduled ones (see `split_at_turns`).
+    All shifts, up to ``longest``, s, share one standard error, so that z^2 is twice the
+    log-likelihood. The turns are the scheduled ones (see `split_at_turns`).
     """
     shifts = np.arange(-math.floor(longest / 0.5), math.floor(longest / 0.5) + 1) * 0.5
     alternations = []

@@ -48,13 +48,11 @@ class Parts:
 
 @dataclass(frozen=True)
 class Board:
-    """Sensors that measure the same signal, all in SI.
+    """Sensors that measure the same signal, all in SI; ValueError if they do not match.
 
-    The fused rate is the lowest of the rates. A faster sensor is decimated by block means. Its
-    white noise density N and its Allan variance at each tau do not change. Its spectrum above the
-    fused Nyquist frequency is aliased below it, attenuated by the transfer function of the mean,
-    |sin(m w/2) / (m sin(w/2))|^2. Raises ValueError if the numbers differ, there is no sensor, a
-    rate is not above 0 or no whole multiple of the lowest, or a sensitivity is not finite.
+    The fused rate is the lowest. A faster sensor is decimated by block means: N and the Allan
+    variance do not change; the spectrum above the fused Nyquist frequency is aliased below it,
+    attenuated by |sin(m w/2) / (m sin(w/2))|^2.
     """
 
     models: Sequence[NoiseModel]  # noise of each sensor, independent of the others
@@ -169,11 +167,10 @@ def divided(model: NoiseModel, correlation: Mapping[str, float]) -> tuple[NoiseM
 
 
 def block_mean_spectrum(model: NoiseModel, omega: Array, rate: float, size: int) -> Array:
-    """Return the spectrum of block means of samples, with all aliases.
+    """Return the spectrum of block means of ``size`` (m) samples, with all aliases, SI^2.
 
-    sum over k of P((w + 2 pi k)/m) sin^2(w/2) / (m^3 sin^2((w + 2 pi k)/(2m))), SI^2, with w
-    ``omega`` of shape (m,), rad per block, above 0 and up to pi; the rate of the samples is in Hz,
-    and m is ``size``, the number of samples in a block.
+    sum over k of P((w + 2 pi k)/m) sin^2(w/2) / (m^3 sin^2((w + 2 pi k)/(2m))), with w ``omega``,
+    shape (m,), rad per block, above 0 and up to pi; the rate of the samples is in Hz.
     """
     if size == 1:
         return model.sampled_spectrum(omega, rate)

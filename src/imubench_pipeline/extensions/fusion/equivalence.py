@@ -41,12 +41,11 @@ def answer(
     draws: int,
     seed: int,
 ) -> Answer | str:
-    """Return the Allan variance of the median channel of a sensor at a tau; or why not.
+    """Return the Allan variance of the median channel of a sensor at a tau, s; or why not.
 
-    The candidates are all channels of one quantity of the sensor, at least one. Simulated ones are
-    left out if there are measured ones. The tau is in s; ``correlation`` has the fraction of the
-    variance of each parameter that specimens share, ``longest`` is the longest tau as a fraction of
-    the log, and ``draws`` the number of models drawn from the estimate.
+    The candidates are all channels of one quantity; simulated ones are left out beside measured
+    ones. ``correlation``: shared fraction of the variance of each parameter; ``longest``: largest
+    tau over the log; ``draws``: number of models drawn from the estimate.
     """
     measured = [channel for channel in candidates if not channel.simulated] or candidates
     long = [channel for channel in measured if tau <= longest * channel.duration]

@@ -39,16 +39,9 @@ def steady_covariance(transition: Array, process_noise: Array, information: Arra
 
         P = Phi P (I + G P)^-1 Phi^T + Q,    G = H^T R^-1 H,
 
-    by the structure-preserving doubling algorithm: k doublings are 2^k steps of the filter from
-    a known state. It uses the information G of one sample, so that a singular G needs no choice of
-    differences, and is accurate for eigenvalues near 1. Phi, Q and G have the shape (m, m).
-    Unobservable processes must be stable. Raises ValueError if it does not converge.
-
-    References
-    ----------
-    B. D. O. Anderson, International Journal of Control 28(2), 1978; E. K.-W. Chu et al., "A
-    structure-preserving doubling algorithm for periodic discrete-time algebraic Riccati
-    equations", International Journal of Control 77(8), 2004.
+    by a structure-preserving doubling algorithm (B. D. O. Anderson, Int. J. Control 28(2), 1978; E.
+    K.-W. Chu et al., Int. J. Control 77(8), 2004), which is accurate for a singular G and for
+    eigenvalues near 1. Raises ValueError if an unobservable process is not stable.
     """
     scale = np.sqrt(np.max(np.diag(process_noise), initial=0.0)) or 1.0
     a = transition
@@ -71,25 +64,39 @@ def steady_covariance(transition: Array, process_noise: Array, information: Arra
 
 
 class KalmanFusion:
-    """The best causal fusion in the steady state.
+    """The best causal fusion in the steady state; ValueError if a sensor has no white noise.
 
-    There is no model of the common signal, and it passes unchanged, without delay. The slow errors
-    of the sensors are states, estimated only from the differences between the sensors; the
-    residuals are weighted by their variance. With y = 1 s + H x + v, P the steady covariance of
-    the predicted states and S = H P H^T + R,
+    The common signal passes unchanged, without delay. The slow errors of the sensors are states,
+    estimated from the differences between the sensors. With y = 1 s + H x + v, P the steady
+    covariance of the predicted states and S = H P H^T + R,
 
         s^ = a^T (y - H x),    a = S^-1 1 / (1^T S^-1 1),
         x' = Phi (x + L (y - H x)),    L = P H^T (S^-1 - S^-1 1 a^T),
 
-    which is equivalent to the Kalman filter of any n - 1 independent differences. Flicker noise is
-    modelled by a bank of Gauss-Markov processes. A sample has the least variance of all causal
-    filters. Ramps and lines are not estimated: they pass with the weights at their frequency.
-    Raises ValueError if a sensor has no white noise.
+    as the Kalman filter of any n - 1 independent differences. Ramps and lines are not estimated.
     """
 
     def __init__(self, board: Board) -> None:
         self.sensors = board.sensors
-        transition, process_noise, output, white = _build_state_space(board)
+        spaces, outputs = [], []
+        white = np.zeros((board.sensors, board.sensors))
+        of_sensors = zip(
+            board.models, board.rates, board.blocks, np.eye(board.sensors), strict=True
+        )
+        shared = ((s.model, board.rate, 1, np.asarray(s.sensitivity)) for s in board.shared)
+        for model, rate, size, gains in [*of_sensors, *shared]:
+            noise = stochastic(model)
+            if noise.K:  # the walk is replaced by a slow stable process
+                time = _WALK_SURROGATE_TIME_RATIO * _MAX_FLICKER_TAU
+                walk = GaussMarkov(compute_bias_instability(noise.K**2, time), time)
+                noise = replace(noise, K=0.0, further=[*noise.further, walk])
+            space = of_block_means(noise.state_space(rate, _MAX_FLICKER_TAU), size)
+            spaces.append(space)
+            outputs.append(np.outer(gains, space.output))
+            white += space.measurement_noise * np.outer(gains, gains)
+        transition = np.asarray(block_diag(*(space.transition for space in spaces)))
+        process_noise = np.asarray(block_diag(*(space.process_noise for space in spaces)))
+        output = np.concatenate(outputs, axis=1)
         if not np.all(np.diag(white) > 0.0):
             raise ValueError("a filter needs white noise, N, of every sensor")
         information = output.T @ _project_out_common(white) @ output
@@ -148,32 +155,6 @@ class KalmanFusion:
                 np.ascontiguousarray(self._gain),
                 self.weights,
             )
-
-
-def _build_state_space(board: Board) -> tuple[Array, Array, Array, Array]:
-    """Return the transition, process noise, output and white noise of sensors and processes."""
-    spaces, outputs = [], []
-    white = np.zeros((board.sensors, board.sensors))
-    members = [
-        *zip(board.models, board.rates, board.blocks, np.eye(board.sensors), strict=True),
-        *((shared.model, board.rate, 1, np.asarray(shared.sensitivity)) for shared in board.shared),
-    ]
-    for model, rate, size, gains in members:
-        noise = stochastic(model)
-        if noise.K:  # the walk is replaced by a slow stable process
-            time = _WALK_SURROGATE_TIME_RATIO * _MAX_FLICKER_TAU
-            walk = GaussMarkov(compute_bias_instability(noise.K**2, time), time)
-            noise = replace(noise, K=0.0, further=[*noise.further, walk])
-        space = of_block_means(noise.state_space(rate, _MAX_FLICKER_TAU), size)
-        spaces.append(space)
-        outputs.append(np.outer(gains, space.output))
-        white += space.measurement_noise * np.outer(gains, gains)
-    return (
-        np.asarray(block_diag(*(space.transition for space in spaces))),
-        np.asarray(block_diag(*(space.process_noise for space in spaces))),
-        np.concatenate(outputs, axis=1),
-        white,
-    )
 
 
 def _project_out_common(covariance: Array) -> Array:

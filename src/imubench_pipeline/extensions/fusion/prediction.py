@@ -30,14 +30,12 @@ pi/4)."""
 
 
 def nodes(n: int) -> tuple[Array, Array]:
-    """Return frequencies and weights that integrate a spectrum to the Allan variance.
+    """Return frequencies, rad per sample, and weights from a spectrum to the Allan variance.
 
     sigma^2(n T) = (1/pi) int_0^pi P(w) 2 sin^4(n w/2) / (n^2 sin^2(w/2)) dw = ``weights @ P(w)``
 
-    with w in rad per sample and n samples in a cluster, from 1. The rule is Gauss-Legendre, in
-    panels of an octave of w up to the first zero of sin^4, where P is smooth over log w, and then
-    of one period. At high frequencies, the many periods of a long cluster are replaced by their
-    mean, again in octaves. Raises ValueError if n is below 1.
+    by Gauss-Legendre in panels: octaves up to the first zero of sin^4, then periods; for a cluster
+    of many samples n, the mean of sin^4 at high frequencies. Raises ValueError if n is below 1.
     """
     if n < 1:
         raise ValueError(f"a cluster has {n} samples, expected 1 or more")
@@ -123,12 +121,11 @@ def fused_psd(board: Board, weights: Weights, frequency: ArrayLike) -> tuple[Arr
 def fused_allan(board: Board, weights: Weights, tau: ArrayLike) -> FusedCurve:
     """Return the Allan variance of a virtual sensor.
 
-    With constant weights it is the sum of w_i^2 AV_i and, of each shared process, of
-    (w^T g)^2 AV. With weights that change with the frequency it is the integral of the fused
-    spectrum (`nodes`; relative error below 1e-7). A ramp passes with the weights at frequency 0, a
-    line with the weights at its frequency. Ramps of several sensors have independent random signs.
-    The weights may be from another board, to predict the effect of wrong sensor models. The tau are
-    array_like of shape (m,), s, rounded to whole fused samples, at least one.
+    With constant weights it is the sum of w_i^2 AV_i and, of each shared process, of (w^T g)^2 AV.
+    Else it is the integral of the fused spectrum (`nodes`; relative error below 1e-7); ramps, of
+    random signs, and lines pass with the weights at their frequency. The weights may be from
+    another board. The tau are array_like of shape (m,), s, rounded to whole fused samples, at least
+    one.
     """
     sizes = np.maximum(np.rint(np.atleast_1d(np.asarray(tau)) * board.rate).astype(np.int64), 1)
     tau = sizes / board.rate
@@ -136,31 +133,26 @@ def fused_allan(board: Board, weights: Weights, tau: ArrayLike) -> FusedCurve:
         parts = board.allan_parts(tau).of_sum(np.tile(weights.values, (len(tau), 1)))
     else:
         parts = allan_of_spectrum(lambda omega: _compute_spectra(board, weights, omega), sizes)
-        parts = parts + _compute_deterministic_variance(board, weights, tau)
+        deterministic = np.zeros((len(tau), 2))
+        # Ramps and lines, each at its own rate: block means of a faster sensor attenuate its lines.
+        alone = list(zip(board.models, board.rates, np.eye(board.sensors), strict=True))
+        common = [(s.model, board.rate, np.asarray(s.sensitivity)) for s in board.shared]
+        for column, members in enumerate((alone, common)):
+            for model, rate, gains in members:
+                terms = [(NoiseModel(R=model.R), _RAMP_FREQUENCY)] if model.R else []
+                for line in model.sinusoids:
+                    omega = 2.0 * np.pi * line.frequency / board.rate
+                    terms.append((NoiseModel(sinusoids=[line]), omega))
+                for term, omega in terms:
+                    power = float(np.abs(weights.response(np.array([omega]))[0] @ gains) ** 2)
+                    deterministic[:, column] += term.allan_variance(tau, rate) * power
+        parts = parts + deterministic
     return FusedCurve(tau, parts.sum(axis=1), parts[:, 1])
 
 
 def _compute_spectra(board: Board, weights: Weights, omega: Array) -> Array:
     """Return the fused spectra of the independent and common parts, SI^2, shape (m, 2)."""
     return board.spectral_parts(omega).of_sum(weights.response(omega))
-
-
-def _compute_deterministic_variance(board: Board, weights: Weights, tau: Array) -> Array:
-    """Return the Allan variances of independent and common ramps and lines, shape (m, 2)."""
-    # Each at its own rate: block means of a faster sensor attenuate its lines.
-    alone = list(zip(board.models, board.rates, np.eye(board.sensors), strict=True))
-    common = [(shared.model, board.rate, np.asarray(shared.sensitivity)) for shared in board.shared]
-    parts = np.zeros((len(tau), 2))
-    for column, members in enumerate((alone, common)):
-        for model, rate, gains in members:
-            terms = [(NoiseModel(R=model.R), _RAMP_FREQUENCY)] if model.R else []
-            for line in model.sinusoids:
-                omega = 2.0 * np.pi * line.frequency / board.rate
-                terms.append((NoiseModel(sinusoids=[line]), omega))
-            for term, omega in terms:
-                power = float(np.abs(weights.response(np.array([omega]))[0] @ gains) ** 2)
-                parts[:, column] += term.allan_variance(tau, rate) * power
-    return parts
 
 
 def prediction_limits(
@@ -175,12 +167,9 @@ def prediction_limits(
 ) -> tuple[Array, Array]:
     """Return limits, shapes (m,), of the predicted Allan deviation, by uncertain parameters.
 
-    The sensors are drawn by `draw_models`: all parameters together if the estimates have joint
-    draws, else independently, which gives limits that are too wide for correlated parameters.
-    Sensors with the same estimate are specimens of one sensor and are drawn together. Weights and
-    shared parts of the board are fixed. There is an estimate of the independent noise of each
-    sensor. The tau are array_like of shape (m,), s; ``draws`` is the number of boards, and
-    ``level`` the fraction of them between the limits.
+    `draw_models` draws the ``draws`` models of each estimate, of the noise of its sensor; sensors
+    with the same estimate are drawn together. Weights and shared parts are fixed. The tau are
+    array_like of shape (m,), s; ``level`` is the fraction of the boards between the limits.
     """
     drawn: dict[int, list[NoiseModel]] = {}
     for estimate, stream in zip(estimates, rng.spawn(len(estimates)), strict=True):

@@ -59,12 +59,10 @@ def equal(sensors: int) -> Constant:
 
 
 def best_constant(board: Board, tau: float | None = None) -> Constant:
-    """Return the constant weights of least Allan variance at a tau.
+    """Return the constant weights of least Allan variance at a tau, s, by default N^-2.
 
-    Without common parts they are the normalised inverse Allan variances. With common parts, a
-    weight may be negative: a poor sensor with a large temperature sensitivity compensates the
-    others. The tau, s, is rounded to whole fused samples, at least one. Without it, the weights are
-    optimal for white noise, N^-2. Raises ValueError for a sensor without noise.
+    With common parts, a weight may be negative: a sensor of large sensitivity compensates the
+    others. The tau is rounded to whole fused samples. Raises ValueError for a sensor without noise.
     """
     if tau is None:
         own = np.array([[model.N**2 for model in board.models]])
@@ -81,8 +79,7 @@ def least(parts: Parts) -> Array:
     """Return the weights of least variance with a sum of 1, shape (m, n), at m frequencies or tau.
 
     The model is y = 1 x + G c + e, with x unknown, and c the shared processes with unit variance.
-    The estimates follow from normal equations, which remain well conditioned for any size of c if
-    the part of G along x (the mean of G) is treated separately.
+    The normal equations are well conditioned if the mean of G is treated separately.
     """
     # A sensor without independent noise is nearly perfect; if none has any, all are equal.
     largest = parts.own.max(axis=1, keepdims=True)

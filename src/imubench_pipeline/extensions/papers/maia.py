@@ -36,8 +36,7 @@ from imubench_pipeline.settings.sensor import quantity_of
 from imubench_pipeline.typing import Array
 from imubench_pipeline.units import convert_to_si
 
-DURATION = 36_000.0
-"""s; assumed, since the paper recommends ten hours and does not say how long its logs are."""
+DURATION = 36_000.0  # s; assumed, since the paper recommends ten hours
 
 MEMBERS = 200  # reconstructions of each set of parameters, and logs for the comparison
 

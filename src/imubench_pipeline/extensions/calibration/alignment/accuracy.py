@@ -66,12 +66,9 @@ def simulate_triad(
     return TriadRuns(errors + true_means(positions, site, attitude), drift)
 
 
-TURN_TIME = 2.0
-"""Time between two positions, s."""
-
+TURN_TIME = 2.0  # between two positions, s
+# Blocks of a run, by the number of its positions; twice as many lower a sigma by 5 % at most
 _BLOCKS_BY_POSITIONS = {1: 16, 2: 64}
-"""Blocks of a run, by the number of its positions. Twice as many lower a sigma by 5 % at most,
-after an hour in two positions."""
 
 _MAX_LINEAR_HEADING_SIGMA = 0.2  # rad, for a start from coarse alignment
 _LEVEL_ATTITUDE = np.eye(3)

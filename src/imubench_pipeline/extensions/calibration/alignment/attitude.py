@@ -15,8 +15,7 @@ from numpy.typing import ArrayLike
 
 from imubench_pipeline.typing import Array
 
-MIN_COS_PITCH = 1e-6
-"""Least cosine of the pitch; below it roll and heading are not separable (gimbal lock)."""
+MIN_COS_PITCH = 1e-6  # below it roll and heading are not separable (gimbal lock)
 
 
 def matrix(roll: float, pitch: float, heading: float) -> Array:

@@ -44,10 +44,9 @@ def coarse_alignment(force: Array, rate: Array, site: Site) -> Array:
 def mean_vectors(means: Array, positions: Positions) -> tuple[Array, Array]:
     """Return mean specific force and rate in the body frame of the first position, shapes (..., 3).
 
-    Positions are weighted equally, whatever their duration; opposite positions cancel the biases.
-    Turns do not reverse the bias of the gyro along the axis of the turns. If this bias is large and
-    the axis is not vertical, only fine alignment finds the heading. The block means are of gyros
-    and accelerometers x, y, z, rad/s and m/s^2, shape (..., b, 6).
+    Positions are weighted equally; opposite ones cancel the biases, except along the axis of the
+    turns. The block means are of gyros and accelerometers x, y, z, rad/s and m/s^2, shape (..., b,
+    6).
     """
     weighted = _compute_weights(positions)[:, None, None] * positions.of_blocks
     rate = np.einsum("bij,...bj->...i", weighted, means[..., :3])

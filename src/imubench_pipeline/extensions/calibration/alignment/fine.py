@@ -31,14 +31,9 @@ from imubench_pipeline.extensions.calibration.least_squares import NotObservable
 from imubench_pipeline.extensions.calibration.states import BlockFilter, discretise_blocks
 from imubench_pipeline.typing import Array
 
-INITIAL_ANGLE_SIGMA = 10.0
-"""Standard deviation of each small angle at the start, rad: an uninformative prior."""
-
-UNIFORM_HEADING_SIGMA = math.pi / math.sqrt(3.0)
-"""Standard deviation of a uniformly distributed heading, rad; the limit for an unknown heading."""
-
+INITIAL_ANGLE_SIGMA = 10.0  # of each small angle, rad: an uninformative prior
+UNIFORM_HEADING_SIGMA = math.pi / math.sqrt(3.0)  # rad; the limit for an unknown heading
 _MAX_LAST_CORRECTION = 1e-7  # largest last correction, rad, of an attitude that has converged
-
 _MAX_ITERATIONS = 20
 
 
