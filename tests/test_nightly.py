@@ -22,18 +22,16 @@ from imubench_pipeline.extensions.nightly.settling import (
     find_unsettled_logs,
     scan_drop_zone,
 )
-from imubench_pipeline.extensions.nightly.state import (
-    State,
-    StateError,
-    load_tables,
-    make_state,
-    read_state,
-)
 from imubench_pipeline.extensions.nightly.summary import (
     STATUS,
+    State,
+    StateError,
     Summary,
     compare_states,
     format_summary,
+    load_tables,
+    make_state,
+    read_state,
 )
 from imubench_pipeline.run import recovery
 from imubench_pipeline.run.lock import Lock, TakenError, read_note

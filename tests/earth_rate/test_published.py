@@ -5,21 +5,18 @@ import math
 import pytest
 
 from imubench_pipeline.extensions.earth_rate.published import (
-    RunDesign,
     compute_allowed_sigmas,
     make_published_row,
     thin,
 )
 from imubench_pipeline.extensions.earth_rate.simulation import (
     ASSUMED_LATITUDE,
-    ASSUMED_TURNING,
     PAPER_MODEL,
-    PAPER_PERIOD,
-    PAPER_RATE,
+)
+from imubench_pipeline.extensions.earth_rate.simulation import (
+    PAPER_DESIGN as PAPER,
 )
 from imubench_pipeline.run.plan import Plan
-
-PAPER = RunDesign(PAPER_PERIOD, ASSUMED_TURNING, PAPER_RATE, ASSUMED_LATITUDE)
 
 
 @pytest.mark.parametrize(

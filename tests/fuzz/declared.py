@@ -26,7 +26,7 @@ from typing import Any
 
 import yaml
 
-from imubench_pipeline.extensions.nightly.state import State, StateError, read_state
+from imubench_pipeline.extensions.nightly.summary import State, StateError, read_state
 from imubench_pipeline.readers.bounded import limit_memory
 from imubench_pipeline.recordings.kept import Quality
 from imubench_pipeline.report.publish import _read_keys

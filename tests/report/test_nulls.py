@@ -16,7 +16,7 @@ import pyarrow as pa
 import pytest
 from rich.console import Console
 
-from imubench_pipeline.extensions.nightly import state as nightly
+from imubench_pipeline.extensions.nightly import summary as nightly
 from imubench_pipeline.report import publish as publishing
 from imubench_pipeline.report import run_summary, terminal
 from imubench_pipeline.report.html import make_templates

@@ -1,9 +1,7 @@
 """Aided navigation: an error-state filter on simulated drives, with outages of GNSS.
 
-A trajectory gives true motion and what ideal sensors measure of it (`trajectories`), a sensor model
-their errors (`signals`), a noise model the states of the filter (`axis_states`), which runs on both
-(`error_state`). `runs` repeats it, for several tunings on the same signals, and `measures` says how
-large the errors are at the end of an outage, and whether they are as large as the filter says.
+A trajectory gives true motion and sensor readings (`trajectories`), a noise model the states of the
+filter (`axis_states`) that runs on them (`error_state`), for several tunings (`runs`).
 """
 
 from imubench_pipeline.registry import Block, Extension

@@ -62,11 +62,7 @@ def add_turn_on_bias(space: StateSpace, turn_on: float) -> StateSpace:
 
 
 class StackedStates(NamedTuple):
-    """The states of all six axes over steps of several samples, for the compiled filter.
-
-    There are m states, gyros x, y, z before accelerometers, and n steps between two GNSS fixes.
-    A sum adds the samples of step k on the axis of a state.
-    """
+    """The m states of all six axes over n steps between two fixes, for the compiled filter."""
 
     first: Array  # (7,); index of the first state of each axis, and m
     step: Array  # (m, m); transition matrix over one step

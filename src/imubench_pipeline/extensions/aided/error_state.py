@@ -311,10 +311,7 @@ def _sandwich(A: Array, Q: Array, room: Array) -> None:
 def _predict(
     P: Array, A: Array, B: Array, Qnn: Array, Qnx: Array, D: Array, noise: Array, first: Array
 ) -> None:
-    """Carry the covariance from fix to fix, in place.
-
-    D is block diagonal, a block an axis; the states of scale factors, after them, are constant.
-    """
+    """Carry the covariance from fix to fix, in place; D is block diagonal, a block an axis."""
     n, total = len(A), len(P)
     m, s_all = first[6], len(P) - len(A)
     BP = np.zeros((n, s_all))

@@ -103,11 +103,7 @@ def complete_noise_models(models: Mapping[str, NoiseModel]) -> Models | None:
 def collect_tunings(
     folder: Path, sensor: str, declared: Sensor | None, horizon: float, stand_in: Models
 ) -> tuple[dict[str, Models], dict[str, str]]:
-    """Return the tunings from a recording and the datasheet of its sensor, and why others lack.
-
-    Both by name. ``horizon``, s, is for the overbound; ``stand_in`` replaces the channels of a
-    quantity that the recording does not have.
-    """
+    """Return tunings by name, with ``stand_in`` channels, and why others lack; horizon in s."""
     every = read_estimates(folder / "parameters.parquet", folder / "draws.parquet")
     best = read_recommended_estimates(folder / "parameters.parquet", folder / "draws.parquet")
     named = _make_printed_models(sensor, declared)

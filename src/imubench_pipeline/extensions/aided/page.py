@@ -159,17 +159,11 @@ def describe_row(row: NavigationRow) -> dict[str, Any]:
     """Return a row as the page shows it."""
     inside, error = row.nees_inside, row.nees_error
     return {
-        "sensor": row.sensor,
-        "trajectory": row.trajectory,
-        "states": row.states,
-        "model": row.model,
-        "assumed": row.assumed,
+        **row.columns(),
         "outage": _format_outage(row),
         "seconds": row.outage or 0.0,
         "signals": _SIGNAL_TEXTS[row.signals],
         "tuning": TUNINGS[row.tuning],
-        "recommended": row.recommended,
-        "position": row.position,
         "position_text": _format_figure(row.position, row.position_lower, row.position_upper),
         "ratio": row.position_ratio,
         "ratio_text": _format_figure(
@@ -184,7 +178,6 @@ def describe_row(row: NavigationRow) -> dict[str, Any]:
         "inside_text": ""
         if inside is None or error is None
         else f"{number_text(100.0 * inside, 3)} ± {percent_text(error, 2)}",
-        "consistent": row.consistent,
         "as_sure": _CONSISTENT_TEXTS[row.consistent],
         "of": counted(row.outages, "outage") if row.outage and row.outages else "",
     }

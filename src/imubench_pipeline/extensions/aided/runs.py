@@ -46,7 +46,7 @@ def schedule_outages(duration: float, lengths: Sequence[float]) -> list[Outage]:
 
 @dataclass(frozen=True)
 class Outcome:
-    """Results of a tuning, from R runs of E fixes; see `error_state.run`."""
+    """Results of a tuning, from R runs of E fixes; see `error_state.run_filter`."""
 
     errors: Array  # (R, E, 9)
     variances: Array  # (R, E, 9)
@@ -102,7 +102,7 @@ class Drive:
         return stack_axes(axes, self.trajectory.sampling, self.width, self.steps)
 
     def filter(self, stacked: StackedStates, signals: Signals) -> tuple[Array, Array, Array, Array]:
-        """Run the filter once; the result is as in `error_state.run`."""
+        """Run the filter once; the result is as in `error_state.run_filter`."""
         way = self.trajectory
         off = self._sigmas * signals.start
         turn = np.empty((3, 3))

@@ -44,9 +44,7 @@ class Dwell:
 class Experiment:
     """Dwells in their order, else ValueError; so for a rate or a latitude out of range."""
 
-    # at least one; the time between them is turning. Two consecutive ones have the same sense after
-    # a missed turn
-    dwells: Sequence[Dwell]
+    dwells: Sequence[Dwell]  # at least one; of the same sense one after another for a missed turn
     rate: float  # sampling rate, Hz
     latitude: float  # rad
 
@@ -74,11 +72,7 @@ class Experiment:
         latitude: float,
         first: int = 1,
     ) -> Experiment:
-        """Return an experiment that keeps to a schedule.
-
-        ``dwell`` is the data in each dwell (at least one sample), ``turning`` the time between two,
-        in s; the rate in Hz, the latitude in rad; ``first``: sense of the first dwell.
-        """
+        """Return an experiment with dwells and turns in s, a rate in Hz, a latitude in rad."""
         length = max(round(dwell * rate), 1)
         period = length + max(round(turning * rate), 0)
         return cls(

@@ -42,15 +42,11 @@ class Filtered:
     time: Array  # shape (b,); end of each block, s from the first sample of the first
     rate: Array  # shape (runs, b); estimated Earth's rate, rad/s
     rate_sigma: Array  # shape (b,); its standard deviation, rad/s
-    # shape (runs, b); estimated mean of the gyro's slow error over the block, its bias included,
-    # rad/s
-    drift: Array
+    drift: Array  # shape (runs, b); mean slow error of the gyro, bias included, rad/s
     drift_sigma: Array  # shape (b,); its standard deviation, rad/s
     innovation: Array  # shape (runs, b); each block mean less its prediction, rad/s
     innovation_sigma: Array  # shape (b,); its standard deviation, rad/s
-    # shape (runs, b, m + 2); rate, the states of `RateFilter.names` at the sample after the block,
-    # and the drift
-    states: Array
+    states: Array  # shape (runs, b, m + 2); rate, states after the block, and drift
     roots: Array  # shape (b, m + 2, m + 2); lower triangular roots of their covariances
 
     @property
@@ -63,11 +59,7 @@ class Filtered:
         return np.asarray(((self.rate - rate) / self.rate_sigma) ** 2)
 
     def nees(self, rate: float, states: Array) -> Array:
-        """Return the normalised estimation error squared of rate and all states, shape (runs, b).
-
-        Chi-squared of m + 1 degrees of freedom; not finite where a state is known exactly. The true
-        rate is in rad/s, the true states after each block of shape (runs, b, m).
-        """
+        """Return the NEES of rate, rad/s, and all states, (runs, b, m): (runs, b), chi^2(m + 1)."""
         error = self.states[:, :, :-1].copy()
         error[:, :, 0] -= rate
         error[:, :, 1:] -= states
@@ -82,11 +74,9 @@ class Filtered:
 class Smoothed:
     """Smoothed estimates of each block from all the data."""
 
-    # shape (runs,); estimated Earth's rate, rad/s: a constant, equal to the last filtered value
-    rate: Array
+    rate: Array  # shape (runs,); estimated Earth's rate, rad/s: the last filtered value
     rate_sigma: float  # its standard deviation, rad/s
-    # shape (runs, b); mean of the gyro's slow error over each block, its bias included, rad/s
-    drift: Array
+    drift: Array  # shape (runs, b); mean slow error of the gyro, bias included, rad/s
     drift_sigma: Array  # shape (b,); its standard deviation, rad/s
     states: Array  # shape (runs, b, m + 2); as in `Filtered`
 

@@ -42,8 +42,7 @@ class NotObservable:
 
     quantity: Quantity
     reason: str  # in words
-    # half of the range of the bias due to the unknown quantity, rad/s; None if it is unbounded
-    half_width: float | None = None
+    half_width: float | None = None  # half of the range of the bias, rad/s; None: unbounded
 
 
 class NotObservableError(ValueError):

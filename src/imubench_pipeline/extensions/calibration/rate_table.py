@@ -55,8 +55,7 @@ _RATE_TOLERANCE = 1e-9  # relative difference below which two rates are equal up
 class Term:
     """A further term of the line, in runs of one design."""
 
-    # shape (runs,); of the quadratic term, s/rad; of the asymmetry, a fraction of the scale factor
-    value: Array
+    value: Array  # shape (runs,); quadratic term, s/rad, or asymmetry, over scale factor
     sigma: float  # its standard error by the noise model
 
     @property
@@ -76,8 +75,7 @@ class Linearity:
     deviation: Array  # shape (runs, levels); deviation of each rate from the line, over full scale
     sigma: Array  # shape (levels,); its standard error by the noise model
     full_scale: float  # the largest rate of the test, rad/s
-    # shape (runs,); probability of deviations at least as large in total, if the line is right
-    p_value: Array
+    p_value: Array  # shape (runs,); of deviations at least as large in total
 
     @property
     def value(self) -> Array:
@@ -96,14 +94,11 @@ class Calibration:
     """Bias and scale factor in runs of one design."""
 
     line: Fit  # bias, rad/s, at the first sample of the first block, and scale factor
-    # standard error of the bias, including the Earth's rate along the axis, rad/s
-    bias_sigma: float
+    bias_sigma: float  # of the bias, with the Earth's rate along the axis, rad/s
     quadratic: Term | None  # coefficient of the square of the rate, in addition to the line, s/rad
-    # difference of the scale factors of positive and negative rates over their mean, with one bias
-    asymmetry: Term | None
+    asymmetry: Term | None  # of the scale factors of both senses, over their mean
     linearity: Linearity | None
-    # reasons for missing values, and quantities that contain others
-    not_observable: tuple[NotObservable, ...]
+    not_observable: tuple[NotObservable, ...]  # reasons for missing values
 
     @property
     def bias(self) -> Array:
@@ -274,8 +269,7 @@ def calibrate(
 class Residuals:
     """Residuals of steady rates from the line."""
 
-    # shape (k,); index in the schedule, from 0; rates without samples are left out
-    dwell: NDArray[np.int64]
+    dwell: NDArray[np.int64]  # shape (k,); index in the schedule, from 0
     mean: Array  # shape (k,); mean reading, rad/s
     line: Array  # shape (k,); value of the line, rad/s
     sigma: Array  # shape (k,); standard deviation of mean less line, rad/s

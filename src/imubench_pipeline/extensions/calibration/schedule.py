@@ -22,8 +22,7 @@ class Schedule:
     """Steady rates of a table, in their order; ValueError if they are none, or do not match."""
 
     stretches: Sequence[Dwell]  # samples of each; their sense is not used
-    # shape (stretches,); rate of the table with respect to the Earth, rad/s, of the gyro's sign
-    table_rates: Array
+    table_rates: Array  # shape (stretches,); with respect to the Earth, of the gyro's sign, rad/s
     rate: float  # sampling rate, Hz
 
     def __post_init__(self) -> None:

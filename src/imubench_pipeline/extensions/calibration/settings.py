@@ -146,10 +146,7 @@ class OnRateTable(Experiment):
         return parse_quantity(getattr(self, name), dimension)
 
     def moved_gyro(self, channels: Sequence[str], *, column: bool) -> str:
-        """Return the one of the log's channels that is along the axis of the table.
-
-        `column`: the log has a column with the rate of the table; it or steps state the rates.
-        """
+        """Return the channel along the axis of the table; ``column`` or steps state the rates."""
         if not self.steps and not column:
             raise ValueError(
                 "steps: missing; expected the steady rates, such as - {start: 0 s, end: 60 s, "

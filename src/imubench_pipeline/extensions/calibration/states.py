@@ -33,20 +33,17 @@ class Step:
     """Transition from the states after one block to the states after the next, and its mean."""
 
     transition: Array  # shape (m + 1, m); the last row gives the mean of the block
-    # shape (m + 1, m + 1); a root of the noise, whose covariance is ``factor @ factor.T``
-    factor: Array
+    factor: Array  # shape (m + 1, m + 1); a root of the covariance of the noise
 
 
 @dataclass(frozen=True)
 class BlockStates:
     """The states over the blocks of an experiment."""
 
-    # one per state: ``z_G`` and a number for each Gauss-Markov process, including the members of a
-    # flicker bank; ``z_Q``, ``z_R``, ``z_S`` in pairs for quantization, a ramp (level, slope) and
-    # lines; ``z_K``, the last, is the random walk with the fixed bias
+    # ``z_G`` and a number for each Gauss-Markov process; ``z_Q``, ``z_R``, ``z_S`` in pairs for
+    # quantization, a ramp and lines; ``z_K``, the last, is the random walk with the fixed bias
     names: tuple[str, ...]
-    # shape (m, m); a root of the covariance of the states at the first sample of the first block
-    initial: Array
+    initial: Array  # shape (m, m); a root of the covariance of the states at the first sample
     steps: tuple[Step, ...]  # without repetitions
     which: NDArray[np.int64]  # shape (b,); index into ``steps`` for each block
     white: Array  # shape (b,); standard deviation of the white noise of each mean, rad/s

@@ -45,16 +45,11 @@ class StillBias:
     fixed_noise_sigma: float  # its standard error by the noise model, rad/s
     present: Array  # shape (runs,); mean of bias and slow noise over the last block, rad/s
     present_noise_sigma: float  # its standard error by the noise model, rad/s
-    # the subtracted Earth's rate along the axis, rad/s; the middle of its range without a heading
-    rate: float
+    rate: float  # the subtracted Earth's rate along the axis, rad/s; the middle of its range
     rate_sigma: float  # its standard deviation, which adds to the noise of both biases, rad/s
-    # for an unknown heading: largest distance of the true rate from ``rate`` at the stated
-    # elevation, rad/s
-    bound: float | None
+    bound: float | None  # largest error of ``rate`` for an unknown heading, rad/s
     tilt_sigma: float  # standard deviation by the elevation, at the worst heading, rad/s
-    # shape (runs,); probability of a scatter of the block means at least as large, if the noise
-    # model is right; NaN for one block
-    p_value: Array
+    p_value: Array  # shape (runs,); of a scatter at least as large; NaN for one block
     not_observable: tuple[NotObservable, ...]
 
     @property

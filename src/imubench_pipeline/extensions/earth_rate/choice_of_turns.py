@@ -55,14 +55,11 @@ _KNOCK_MARGIN = 0.25  # margin that is left out on either side of a knock, s
 class TurnSchedule:
     """The stated turns, before any analysis of the log."""
 
-    # dwell, start, turning, margin: as
-    # `imubench_pipeline.extensions.earth_rate.turning.find_turning` takes them, s
+    # dwell, start, turning, margin: as of `turning.find_turning`, s
     dwell: float
     start: float
     turning: float
-    # how far a turn may be from the schedule, s (a standard deviation): a tenth of a dwell, and at
-    # least 2 s. So much is left out on both sides of a turn that is not seen
-    tolerance: float
+    tolerance: float  # standard deviation of a turn from the schedule, s; left out on both sides
     margin: float
     duration: float  # of the log, s
 
@@ -367,10 +364,7 @@ def _find_best_sequence(
 
 
 def compute_interval_log_density(interval: Array, dwell: float, tolerance: float) -> Array:
-    """Return the logarithm of the density, 1/s, of the interval between two turns, shape (n,).
-
-    The intervals, the nominal dwell, and the standard deviation for one dwell are in s.
-    """
+    """Return the log density, 1/s, of intervals between turns, shape (n,); all arguments in s."""
     nearest = np.maximum(np.rint(interval / dwell), 1.0)
     density = np.zeros(len(interval))
     for offset in (-1.0, 0.0, 1.0):

@@ -20,7 +20,6 @@ from imubench_pipeline.extensions.earth_rate.published import (
     Course,
     Courses,
     Range,
-    RunDesign,
     compute_sigma_ranges,
     compute_white_sigma,
     estimate_courses,
@@ -32,6 +31,7 @@ from imubench_pipeline.extensions.earth_rate.settings import (
     SimulatedTurns,
     TwoPosition,
 )
+from imubench_pipeline.extensions.earth_rate.simulation import RunDesign
 from imubench_pipeline.extensions.earth_rate.tables import (
     TURNED,
     EarthRatePredictionRow,

@@ -33,9 +33,7 @@ class Tracked:
 
     sample: NDArray[np.int64]  # shape (n,); number of each sample in the log
     drift: Array  # shape (n,); tracked error of the gyro, z_f + z_rrw, rad/s
-    # shape (n,); cumulative mean of its "Earth's rate", the reading less the drift, rad/s, as in
-    # figures 10 to 13 of Silva et al.
-    mean: Array
+    mean: Array  # shape (n,); cumulative mean of its "Earth's rate", rad/s (figures 10 to 13)
 
 
 @dataclass(frozen=True)
@@ -112,11 +110,7 @@ def _run_filter(
 
 
 def settled(mean: Array, rate: float, known_rate: float, part: float = 0.1) -> float:
-    """Return the time after which a mean stays near the known rate, s of data; inf: not yet.
-
-    Near is within ``part`` of the known rate. The mean of `track`, shape (n,), and the known rate
-    are in rad/s, the sampling rate in Hz.
-    """
+    """Return the data, s, until a mean, shape (n,), stays near the known rate; inf: not yet."""
     out = np.flatnonzero(np.abs(mean - known_rate) > part * abs(known_rate))
     if len(out) == 0:
         return 0.0

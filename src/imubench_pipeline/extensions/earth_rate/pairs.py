@@ -23,15 +23,12 @@ from imubench_pipeline.typing import Array
 class Differences:
     """Estimates from differences between dwells, and their mean as it grows with time."""
 
-    # shape (p,); end of the last dwell of each, s from the first sample of the first dwell
-    time: Array
+    time: Array  # shape (p,); end of the last dwell of each, s from the first sample
     each: Array  # shape (runs, p); each estimate, rad/s
     each_sigma: Array  # shape (p,); its standard error, rad/s
     rate: Array  # shape (runs, p); mean of the estimates up to each, rad/s
     sigma: Array  # shape (p,); its standard error, rad/s
-    # shape (runs, p); standard error from the scatter, for independent estimates, rad/s; NaN for
-    # one estimate
-    scatter: Array
+    scatter: Array  # shape (runs, p); standard error from the scatter, rad/s; NaN for one estimate
 
 
 def by_pairs(means: Array, blocks: Blocks, model: NoiseModel) -> Differences:

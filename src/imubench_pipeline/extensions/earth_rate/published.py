@@ -35,6 +35,7 @@ from imubench_pipeline.extensions.calibration.states import UNINFORMATIVE_SIGMA
 from imubench_pipeline.extensions.earth_rate.bound import choose_block_length, compute_final_bound
 from imubench_pipeline.extensions.earth_rate.known_rate import STARTS, settled, track
 from imubench_pipeline.extensions.earth_rate.pairs import by_pairs, by_triples
+from imubench_pipeline.extensions.earth_rate.simulation import RunDesign
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.sigma_range import sigma_range
 from imubench_pipeline.typing import Array
@@ -57,12 +58,10 @@ class Course:
 
     method: str  # one of `METHODS`
     time: Array  # shape (k,); s from the first sample of the log
-    # shape (k,); estimate from the data up to then, rad/s; by the smoother from all of the data
-    rate: Array
+    rate: Array  # shape (k,); estimate from the data up to then, or all of it, rad/s
     sigma: Array | None  # shape (k,); its standard deviation, rad/s; None where the method has none
     reason: str | None = None  # why there is no estimate: the arrays are empty then
-    # s of data after which it stays within a tenth of the known rate, for methods with one
-    settled: float | None = None
+    settled: float | None = None  # s of data to within a tenth of the known rate
 
 
 @dataclass(frozen=True)
@@ -72,9 +71,7 @@ class Courses:
     courses: tuple[Course, ...]  # one per method
     measured: Measured
     longest: int  # largest number of samples of a block
-    # drift_time, drift, drift_sigma: shape (b,); middle of each block in s from the first sample of
-    # the log; slow error of the gyro in it, including the bias, from all data, and its standard
-    # deviation, rad/s
+    # shape (b,); middle of each block, s, smoothed slow error with the bias, and its sigma, rad/s
     drift_time: Array
     drift: Array
     drift_sigma: Array
@@ -176,31 +173,8 @@ def compute_sigma_ranges(
     return ranges
 
 
-@dataclass(frozen=True)
-class RunDesign:
-    """A run as its source describes it."""
-
-    dwell: float  # from turn to turn, s
-    turning: float  # turning time within it, s
-    rate: float  # sampling rate, Hz
-    latitude: float  # rad
-
-    def experiment(self, duration: float) -> Experiment:
-        """Return the design of a run of this duration, s."""
-        return Experiment.regular(
-            dwell=self.dwell - self.turning,
-            turning=self.turning,
-            dwells=round(duration / self.dwell),
-            rate=self.rate,
-            latitude=self.latitude,
-        )
-
-
 def compute_allowed_sigmas(run: RunDesign, duration: float, model: NoiseModel) -> Row:
-    """Return the standard deviations by noise of the estimates of a run, rad/s; duration in s.
-
-    ``white``: by white noise; ``sigma``: of the mean over pairs; ``sigma_filter``: of the filter.
-    """
+    """Return sigmas by white noise, over pairs and by the filter, rad/s, of a duration in s."""
     design = run.experiment(duration)
     blocks = design.blocks(choose_block_length(design, model))
     zero_means = np.zeros((1, len(blocks)))
@@ -276,10 +250,7 @@ class WarmUp:
 
 
 def fit_warm_up(first: float, last: float, duration: float, last_duration: float) -> WarmUp | None:
-    """Return the warm-up with mean drift ``last`` in the last part of a run, ``first`` before.
-
-    Drifts in rad/s^2, durations in s; None if the drift does not decrease, or changes its sign.
-    """
+    """Return the warm-up with mean drifts ``first`` and ``last``, rad/s^2; None without one."""
     if not 0.0 < last / first < 1.0:
         return None
     rest = duration - last_duration
@@ -314,11 +285,7 @@ def fit_single_miscount(whole: PrintedRun, last: PrintedRun, true: float) -> flo
 
 
 def fit_clock_error(parts: Sequence[PrintedRun], period: float, true: float) -> tuple[float, float]:
-    """Return the relative clock error that best explains consecutive parts, and its misfit.
-
-    Errors up to a twentieth are tested; both signs are equivalent. The misfit is in sigma, the
-    period from turn to turn in s.
-    """
+    """Return the best relative clock error up to 1/20, and its misfit in sigma; period in s."""
     errors = np.linspace(0.0, 0.05, _TESTED_CLOCK_ERRORS)
     edges = np.cumsum([0.0, *(part.duration for part in parts)])
     squares = np.zeros(_TESTED_CLOCK_ERRORS)

@@ -40,15 +40,32 @@ ASSUMED_LATITUDE = math.radians(-23.3)
 ASSUMED_TURNING = 2.0  # time of a turn within each 30 s, s: the paper prints none
 
 
+@dataclass(frozen=True)
+class RunDesign:
+    """A run as its source describes it."""
+
+    dwell: float  # from turn to turn, s
+    turning: float  # turning time within it, s
+    rate: float  # sampling rate, Hz
+    latitude: float  # rad
+
+    def experiment(self, duration: float) -> Experiment:
+        """Return the design of a run of this duration, s."""
+        return Experiment.regular(
+            dwell=self.dwell - self.turning,
+            turning=self.turning,
+            dwells=round(duration / self.dwell),
+            rate=self.rate,
+            latitude=self.latitude,
+        )
+
+
+PAPER_DESIGN = RunDesign(PAPER_PERIOD, ASSUMED_TURNING, PAPER_RATE, ASSUMED_LATITUDE)
+
+
 def design_paper_run(minutes: float) -> Experiment:
     """Return the design of a run of Silva et al.: north first, a turn every 30 s."""
-    return Experiment.regular(
-        dwell=PAPER_PERIOD - ASSUMED_TURNING,
-        turning=ASSUMED_TURNING,
-        dwells=round(60.0 * minutes / PAPER_PERIOD),
-        rate=PAPER_RATE,
-        latitude=ASSUMED_LATITUDE,
-    )
+    return PAPER_DESIGN.experiment(60.0 * minutes)
 
 
 @dataclass(frozen=True)
@@ -56,10 +73,8 @@ class Runs:
     """Simulated runs of one design, and their truth."""
 
     means: Array  # shape (runs, b); block means, rad/s
-    # shape (runs, b); mean of the slow error over each block, its bias included, rad/s
-    drift: Array
-    # shape (runs, b, m); states at the sample after each block (`states.BlockStates`)
-    states: Array
+    drift: Array  # shape (runs, b); mean slow error over each block, bias included, rad/s
+    states: Array  # shape (runs, b, m); states after each block (`states.BlockStates`)
 
 
 def simulate_runs(
@@ -71,11 +86,7 @@ def simulate_runs(
     runs: int,
     rng: np.random.Generator,
 ) -> Runs:
-    """Draw the block means of many runs, from their exact joint distribution.
-
-    The Earth's rate is in rad/s, and so is the standard deviation of the fixed bias, which is drawn
-    for each run.
-    """
+    """Draw exact block means of runs; the rate, and sigma of the fixed biases, are in rad/s."""
     block_model = discretise_blocks(model, blocks, turn_on_bias)
     m = len(block_model.names)
     state = rng.standard_normal((runs, m)) @ block_model.initial.T
@@ -109,11 +120,7 @@ def simulate_log(
 
 
 def compute_true_rate(experiment: Experiment, earth_rate: float, transient: ArrayLike) -> Array:
-    """Return the readings of an error-free gyro in an experiment, rad/s, shape (samples,).
-
-    They end with the last dwell. ``transient`` is the peak of the pulse of turns, one value or one
-    per turn, in rad/s as the Earth's rate.
-    """
+    """Return error-free readings, rad/s, shape (samples,), with pulse peaks, one a turn or one."""
     dwells = experiment.dwells
     peaks = np.broadcast_to(np.asarray(transient, dtype=np.float64), len(dwells) - 1)
     seen = earth_rate * math.cos(experiment.latitude)

@@ -49,12 +49,9 @@ class Stays:
     # start, stop: shape (n,); s; what lies between two of them is turning
     start: Array
     stop: Array
-    # shape (n,); whether it is the position of the larger number; alternates
-    high: NDArray[np.bool_]
+    high: NDArray[np.bool_]  # shape (n,); whether it is the larger position; alternates
     senses: bool  # whether the column has +1 and -1, and so gives the sense
-    # whether more than a twentieth of the column lies outside both positions, for longer than a
-    # turn: perhaps there are more than two positions
-    away: bool
+    away: bool  # whether the column is in neither position for a twentieth of the time
 
 
 def find_stays(position: Array, rate: float, shortest: float) -> Stays:

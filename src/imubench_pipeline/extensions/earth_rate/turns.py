@@ -39,8 +39,7 @@ class LevelBlocks:
     """A log as means of short blocks."""
 
     length: float  # of a block, s
-    # mean, level: shape (b,); mean of the samples present (NaN where there are none), and the
-    # running median, rad/s
+    # mean, level: shape (b,); mean of the samples present, or NaN, and running median, rad/s
     mean: Array
     level: Array
     z: Array  # shape (b,); mean less level in standard deviations; 0 where there are no samples
@@ -58,12 +57,9 @@ class Event:
     stop: float
     kind: Literal["transient", "step"]
     likelihood: float  # log-likelihood ratio against noise alone, with clipped outliers
-    # largest distance from the level of a block, or of a sample that is far out; or height of the
-    # step; rad/s
-    peak: float
+    peak: float  # largest distance from the level, or height of the step, rad/s
     strength: float  # logarithm of the likelihood ratio over the detection limit
-    # log odds of a knock against a turn, from the short duration; 0 if it is long enough
-    haste: float
+    haste: float  # log odds of a knock against a turn, for a short one, else 0
 
     @property
     def time(self) -> float:
@@ -222,10 +218,7 @@ def _merge_events(
 
 
 def find_outliers(blocks: LevelBlocks, log: Array, rate: float) -> list[tuple[float, float]]:
-    """Return the start and stop of outliers, s, which the mean of a block may hide.
-
-    Those closer than a block are merged. The log has shape and units of `average_log_blocks`.
-    """
+    """Return start and stop of outliers, s, of a log, shape (n,), merged within a block."""
     size = round(blocks.length * rate)
     residual = log - np.repeat(blocks.level, size)[: len(log)]
     away = np.abs(residual)
@@ -321,8 +314,7 @@ class FoundDwell:
     stop: float
     sense: int  # +1 or -1
     found_by: FoundBy = "schedule"  # of the two adjacent turns, the less reliable way
-    # doubts about its length and sense, in words
-    doubts: tuple[str, ...] = ()
+    doubts: tuple[str, ...] = ()  # in words
 
     def in_samples(self, rate: float) -> Dwell:
         """Return the dwell in samples at a rate, Hz; raise ValueError if it has none."""
@@ -336,13 +328,9 @@ class Turning:
 
     dwells: tuple[FoundDwell, ...]  # in order; the sense alternates
     turns: tuple[Turn, ...]  # in order
-    # start and stop of disturbances other than turns, s; to be left out, too
-    knocks: tuple[tuple[float, float], ...]
-    # whether the sense of the first dwell was assumed: all senses may be inverted
-    ambiguous: bool
-    # level of sense +1 less the mean of both, from A-B-A differences: the Earth's rate along the
-    # axis, for information only
-    alternation: Alternation
+    knocks: tuple[tuple[float, float], ...]  # start and stop of other disturbances, s
+    ambiguous: bool  # whether the sense of the first dwell was assumed
+    alternation: Alternation  # from A-B-A differences: about the Earth's rate along the axis
     doubts: tuple[str, ...] = ()  # about the log as a whole, in words
 
     @property
@@ -392,10 +380,7 @@ def compute_differences(
 def estimate_alternation(
     blocks: LevelBlocks, stretches: Sequence[tuple[float, float]]
 ) -> Alternation:
-    """Return the mean of the A-B-A differences, with its standard error.
-
-    The error assumes white noise with the observed scatter, and at least the noise of the blocks.
-    """
+    """Return the mean of the A-B-A differences, with its standard error for white noise."""
     return _average(*compute_differences(blocks, stretches))
 
 

@@ -22,9 +22,7 @@ class Shared:
     """One process, such as a temperature, that acts on several sensors with sensitivities."""
 
     model: NoiseModel  # the process in its own unit, such as kelvin, at the fused rate
-    # SI unit of the sensors per that unit, one a sensor, with sign: sensors of opposite signs can
-    # cancel the process
-    sensitivity: Sequence[float]
+    sensitivity: Sequence[float]  # SI unit of the sensors per that unit, one a sensor, with sign
 
 
 @dataclass(frozen=True)

@@ -83,10 +83,7 @@ def equivalence_rows(
     draws: int,
     seed: int,
 ) -> Iterator[FusionRow]:
-    """Yield the rows of the table ``fusion``: every ordered pair of sensors at every tau, s.
-
-    The candidates are the channels of all sensors; the other parameters are as in `answer`.
-    """
+    """Yield rows of ``fusion``: every ordered pair of sensors at every tau, s (see `answer`)."""
     listed = sorted(candidates, key=lambda channel: channel.sensor)
     for quantity in ("gyro", "accel"):
         by_sensor: dict[str, list[ComparedChannel]] = {}

@@ -119,11 +119,7 @@ class KalmanFusion:
         return len(self._transition)
 
     def response(self, omega: Array) -> NDArray[np.complex128]:
-        """Return the transfer from each sensor, shape (m, n); its sum over the sensors is 1.
-
-        a^T (I - H (z I - F)^-1 Phi L) with F = Phi (I - L H), solved in the Schur form of F, at
-        angular frequencies in rad per fused sample, shape (m,).
-        """
+        """Return the transfer from each sensor, (m, n), at omega, rad per sample, shape (m,)."""
         # Loss of significance near frequency 0 is avoided: (z - 1) + (1 - F).
         turn = np.expm1(1j * omega)
         solved = np.zeros((self.states, len(omega)), dtype=np.complex128)

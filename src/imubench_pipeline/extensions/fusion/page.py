@@ -69,18 +69,11 @@ def make_pair_lines(rows: Sequence[FusionRow]) -> Iterator[dict[str, Any]]:
         if row.common_share is not None and row.temperature_share:
             common += f" (temperature {percent_text(row.temperature_share)})"
         yield {
-            "sensor": row.sensor,
-            "other": row.other,
-            "n": row.n,
-            "reason": row.reason,
+            **row.columns(),
             "quantity": QUANTITY_NAMES[row.quantity],
             "symbol": f"{row.quantity}.adev",
-            "simulated": bool(row.simulated),
-            "other_simulated": bool(row.other_simulated),
             "tau": f"{number_text(row.tau)} s",
             "seconds": row.tau,
-            "adev": row.adev,
-            "other_adev": row.other_adev,
             "number": "not possible" if row.reachable is False else number,
             "limits": _format_limits(row),
             "common": common,

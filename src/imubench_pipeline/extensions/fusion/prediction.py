@@ -91,8 +91,7 @@ class FusedCurve:
 
     tau: Array  # shape (m,); s
     variance: Array  # shape (m,); (rad/s)^2 or (m/s^2)^2
-    # shape (m,); the part from shared processes, which more sensors do not reduce
-    common: Array
+    common: Array  # shape (m,); the part from shared processes
 
     @property
     def deviation(self) -> Array:

@@ -29,10 +29,7 @@ def at_fused_rate(board: Board, samples: Sequence[Array]) -> Array:
 
 
 def fuse(board: Board, how: Constant | KalmanFusion, samples: Sequence[Array]) -> Array:
-    """Return the samples of the virtual sensor, rad/s or m/s^2, shape (k,), at the fused rate.
-
-    The samples, and a ValueError, are as for `at_fused_rate`.
-    """
+    """Return the samples of the virtual sensor, shape (k,), of samples as of `at_fused_rate`."""
     number = _count_fused_samples(board, samples)
     sizes = board.blocks
 

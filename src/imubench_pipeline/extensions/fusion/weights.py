@@ -38,11 +38,7 @@ class Constant:
 
 @dataclass(frozen=True)
 class ByFrequency:
-    """Optimal weights at each frequency: they minimise the fused spectrum.
-
-    w(f) = S^-1 1 / (1^T S^-1 1) with S the spectral matrix. They are the weights of an optimal,
-    non-causal smoother: no causal filter has less noise at any frequency.
-    """
+    """Optimal weights at each frequency, S^-1 1 / (1^T S^-1 1), as of a non-causal smoother."""
 
     board: Board  # with the models for the weights
 

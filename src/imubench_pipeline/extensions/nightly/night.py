@@ -28,18 +28,16 @@ from imubench_pipeline.extensions.nightly.settling import (
     find_settled_logs,
     scan_drop_zone,
 )
-from imubench_pipeline.extensions.nightly.state import (
-    State,
-    StateError,
-    load_tables,
-    make_state,
-    read_state,
-)
 from imubench_pipeline.extensions.nightly.summary import (
     Skipped,
+    State,
+    StateError,
     Summary,
     compare_states,
     format_summary,
+    load_tables,
+    make_state,
+    read_state,
 )
 from imubench_pipeline.report.run_summary import describe_drop_zone
 from imubench_pipeline.run import recovery

@@ -106,11 +106,7 @@ def find_unsettled_logs(
     now: float,
     writing: Mapping[Path, str],
 ) -> Iterator[Skip]:
-    """Yield the logs that are still being written, from two scans.
-
-    ``settle`` is as in `find_settled_logs`, ``now`` the time of the second scan, s since 1970, and
-    ``writing`` has the files that are open for writing, with their process.
-    """
+    """Yield the logs being written, from two scans, the second at ``now``, and open files."""
     for key in sorted(first.keys() | second.keys()):
         was, latest = first.get(key, Found()), second.get(key, Found())
         by = next((writing[real] for real in _resolve_paths(latest) if real in writing), None)

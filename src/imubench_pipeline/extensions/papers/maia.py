@@ -118,11 +118,7 @@ def choose_cluster_sizes(channel: Channel, grid: str) -> NDArray[np.int64]:
 
 @cache
 def simulate_lottery(channel: Channel, grid: Grid) -> Lottery:
-    """Return the spread of Table 3 for logs with the model of Table 2.
-
-    Each of `MEMBERS` logs stands for the measured one, and is held against as many reconstructions
-    by Table 1 and, of other draws, by Table 2.
-    """
+    """Return the spread of Table 3: each of `MEMBERS` logs of Table 2 against reconstructions."""
     n = choose_cluster_sizes(channel, grid)
     measured, *drawn = (curves[grid] for curves in _simulate_deviations(channel))
     of_each = [rms(one[:, None, :], measured[None, :, :]) for one in drawn]
@@ -446,11 +442,7 @@ def evaluate_as_printed(model: NoiseModel, tau: float) -> float:
 
 
 def compute_weight_ratios(tau: float) -> tuple[float, float]:
-    """Return the standard deviation of an Allan variance over the one that a weight assumes.
-
-    First for the intended weight, 2 √(n/2L) σ̂²; then for the printed one, 2 √(n/2L) σ̂. Its
-    dimension is wrong, so that the ratio depends on the unit. For the MTi-7 gyro at a tau, s.
-    """
+    """Return the spread at a tau, s, over the intended weight, 2 √(n/2L) σ̂², and the printed."""
     samples, n = round(DURATION * _RATE), round(tau * _RATE)
     variance = float(_MODEL.allan_variance(tau, _RATE))
     spread = math.sqrt(compute_variance_covariance(_MODEL, _RATE, samples, np.array([n]))[0, 0])

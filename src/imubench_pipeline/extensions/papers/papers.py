@@ -105,11 +105,7 @@ _MODULES = {module.__name__.rpartition(".")[2]: module for module in (engers, ma
 
 
 def evaluate(line: Line, evidence: Evidence) -> Result:
-    """Return the counterpart of a line.
-
-    It is a number (SI), or a function of the evidence and texts that returns a number, a `Result`,
-    or None if the run has no log for it.
-    """
+    """Return the counterpart of a line: a number (SI) or the result of a function, if any."""
     if not line.find:
         return Result()
     name, *arguments = (part.format(**line.fields) for part in line.find)

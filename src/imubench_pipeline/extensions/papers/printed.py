@@ -58,8 +58,7 @@ class Line:
     printed: str  # as printed, with its unit; or "derived: " and the derived value
     value: str = ""  # number in ``printed``, in the printed unit; empty: it is no number
     unit: str = "-"  # as printed
-    # "module.name" of the function (or number) that is its counterpart, and arguments in words
-    find: tuple[str, ...] = ()
+    find: tuple[str, ...] = ()  # "module.name" of its counterpart, and arguments
     found: str = ""  # result that needs no function, in the printed unit
     words: str = ""  # with the result, or instead of it
     verdict: Verdict | None = None  # None: it follows from the numbers
@@ -79,10 +78,8 @@ class Paper:
     key: str  # "maia"
     name: str  # "Maia et al."
     title: str  # subject of the paper
-    # sensor and recording of the logs that stand for its own; a run that has none leaves it out
-    logs: tuple[tuple[str, str], ...]
-    # sentences: what is assumed, whose input comes back, what is typed by hand
-    declared: tuple[str, ...]
+    logs: tuple[tuple[str, str], ...]  # sensor and recording of its simulated logs
+    declared: tuple[str, ...]  # sentences: assumptions, and sources of the input
     drawn: tuple[Drawn, ...] = ()
     units: Mapping[str, Unit]  # by the printed unit; others are SI
     figures: Mapping[str, tuple[Mapping[str, str], ...]]  # printed tables, row by row

@@ -23,12 +23,12 @@ from imubench_pipeline.extensions.earth_rate.known_rate import (
 )
 from imubench_pipeline.extensions.earth_rate.published import (
     PrintedRun,
-    RunDesign,
     compute_allowed_sigmas,
 )
 from imubench_pipeline.extensions.earth_rate.simulation import (
     ASSUMED_LATITUDE,
     ASSUMED_TURNING,
+    PAPER_DESIGN,
     PAPER_MINUTES,
     PAPER_MODEL,
     PAPER_PERIOD,
@@ -53,7 +53,6 @@ LOGS = 20  # simulated logs of a week, and of 48 h
 _ASSUMED_BIAS = math.radians(0.05)  # rad/s; assumed
 _WEEK, _TWO_DAYS = 168, 48  # h
 
-_DESIGN = RunDesign(PAPER_PERIOD, ASSUMED_TURNING, PAPER_RATE, ASSUMED_LATITUDE)
 _Z_95 = 1.96
 
 
@@ -101,7 +100,7 @@ def count_turns(evidence: Evidence, run: str) -> float | None:
 def make_printed_run(run: str) -> PrintedRun:
     """Return a run as printed, with the sigma that the printed noise gives the mean over pairs."""
     duration = 60.0 * PAPER_MINUTES[run]
-    sigma = compute_allowed_sigmas(_DESIGN, duration, PAPER_MODEL)["sigma"]
+    sigma = compute_allowed_sigmas(PAPER_DESIGN, duration, PAPER_MODEL)["sigma"]
     return PrintedRun(duration, PRINTED[run] * DEGREE, float(sigma))
 
 
@@ -229,7 +228,7 @@ def compute_error_of_mean(_: Evidence) -> Result:
         name: float(mean_sigma(PAPER_MODEL, PAPER_RATE, 1000, start, 0.0)[-1])
         for name, start in STARTS.items()
     }
-    pair = float(compute_allowed_sigmas(_DESIGN, 2.0 * PAPER_PERIOD, PAPER_MODEL)["sigma"])
+    pair = float(compute_allowed_sigmas(PAPER_DESIGN, 2.0 * PAPER_PERIOD, PAPER_MODEL)["sigma"])
     errors = {name: one / math.cos(ASSUMED_LATITUDE) / hour for name, one in along_axis.items()}
     return Result(fields=errors | {"rate": EARTH_RATE / hour, "pair": pair / hour})
 
@@ -238,7 +237,7 @@ def compute_filter_gain(_: Evidence) -> Result:
     """Return the least and greatest reduction of sigma by a filter with unknown rate, %."""
     gains = []
     for run in PRINTED:
-        sigmas = compute_allowed_sigmas(_DESIGN, 60.0 * PAPER_MINUTES[run], PAPER_MODEL)
+        sigmas = compute_allowed_sigmas(PAPER_DESIGN, 60.0 * PAPER_MINUTES[run], PAPER_MODEL)
         gains.append(100.0 * float(1.0 - sigmas["sigma_filter"] / sigmas["sigma"]))
     return Result(fields={"least": min(gains), "most": max(gains)})
 

@@ -33,10 +33,8 @@ from imubench_pipeline.typing import Array
 class TriadRuns:
     """Simulated runs of one design, and their truth."""
 
-    # shape (runs, b, 6); block means of gyros and accelerometers x, y, z, rad/s and m/s^2
-    means: Array
-    # shape (runs, b, 6); mean of each axis' slow error over each block, its bias included
-    drift: Array
+    means: Array  # shape (runs, b, 6); block means of gyros and accelerometers, SI
+    drift: Array  # shape (runs, b, 6); their slow errors, biases included
 
 
 def true_means(positions: Positions, site: Site, attitude: Array) -> Array:
@@ -82,8 +80,7 @@ class Accuracy:
     method: str  # ``coarse`` or ``fine``
     time: float  # s
     sigma: Array  # shape (3,); of roll, pitch and heading, rad
-    # shape (3,); rms of simulated errors over ``sigma``; NaN where there is no heading
-    errors: Array | None = None
+    errors: Array | None = None  # shape (3,); rms of simulated errors over ``sigma``
     simulated: int = 0  # number of simulated triads
 
     @property
@@ -116,10 +113,7 @@ def accuracies(
     runs: int = 0,
     rng: np.random.Generator | None = None,
 ) -> Iterator[Accuracy]:
-    """Yield the accuracy of a triad after these times, s, increasing, in one position and in two.
-
-    The sampling rate is in Hz. For fine alignment, ``rng`` simulates ``runs`` at the last time.
-    """
+    """Yield the accuracy after times, s, at a rate, Hz, simulated in ``runs`` at the last time."""
     for number in (1, 2):
         for time in times:
             block = time / _BLOCKS_BY_POSITIONS[number]

@@ -41,23 +41,14 @@ _MAX_ITERATIONS = 20
 class Aligned:
     """Attitudes of runs of one design."""
 
-    # shape (runs, 3, 3); from body to navigation frame, in the first position, from all the data
-    attitude: Array
-    # shape (runs, b, 3); estimated error of the given attitude after each block, rad
-    psi: Array
-    # shape (runs, b, 6); mean of each axis' error over each block, its bias included, as
-    # estimated then, rad/s and m/s^2
-    drift: Array
-    # shape (runs, b); normalised innovation squared: chi-squared of six degrees of freedom
-    nis: Array
+    attitude: Array  # shape (runs, 3, 3); body to navigation, first position, all the data
+    psi: Array  # shape (runs, b, 3); estimated error of the given attitude, rad
+    drift: Array  # shape (runs, b, 6); estimated error of each axis then, SI
+    nis: Array  # shape (runs, b); normalised innovation squared: chi^2(6)
 
 
 class FineAlignment:
-    """The filter of one design, about an attitude; it aligns any number of runs at once.
-
-    The attitude, shape (3, 3), is from body to navigation frame in the first position, as from a
-    coarse alignment. Raises ValueError if the x axis is vertical.
-    """
+    """The filter of one design for any number of runs, about an attitude, shape (3, 3)."""
 
     def __init__(self, triad: Triad, positions: Positions, site: Site, attitude: Array) -> None:
         self.positions, self.site, self.attitude = positions, site, attitude

@@ -89,8 +89,7 @@ class Positions:
     """Blocks of a run at rest, in one position or in several with known turns from the first."""
 
     blocks: Blocks  # neither their sense nor their latitude is used
-    # shape (dwells, 3, 3); turns vectors of the body frame of each dwell into the first one
-    turned: Array
+    turned: Array  # shape (dwells, 3, 3); from the body frame of each dwell to the first
 
     def __post_init__(self) -> None:
         dwells = int(self.blocks.dwell[-1]) + 1
@@ -113,11 +112,7 @@ class Positions:
     def turned_about_z(
         cls, headings: Sequence[float], *, dwell: float, turning: float, block: float, rate: float
     ) -> Positions:
-        """Return positions that differ by known turns about the z axis, by headings in rad.
-
-        ``dwell`` is the data in each, ``turning`` the time between two, ``block`` the largest
-        length of a block, s; the sampling rate is in Hz.
-        """
+        """Return positions at headings, rad; dwell, turning and block in s, the rate in Hz."""
         run = Experiment.regular(
             dwell=dwell, turning=turning, dwells=len(headings), rate=rate, latitude=0.0
         )
