@@ -35,7 +35,7 @@ _SIGNAL_TEXTS: Mapping[str | None, str] = {
 
 _CONSISTENT_TEXTS = {True: "yes", False: "no", None: "not determined"}
 
-_MIN_RELEVANT_RATIO = 1.1  # error over that of the true model from which a tuning matters
+_MIN_RELEVANT_RATIO = 1.1  # error over the error of the true model from which a tuning matters
 
 
 def _make_context(site: Site) -> dict[str, Any]:

@@ -179,7 +179,7 @@ class Blocks:
         return replace(self.chosen(first), stop=self.stop[last], count=count)
 
     def means_of_dwells(self, means: Array) -> Array:
-        """Return the means of dwells, (runs, dwells), from those of blocks, shape (runs, b)."""
+        """Return the means of dwells, (runs, dwells), from means of blocks, shape (runs, b)."""
         first = np.flatnonzero(np.diff(self.dwell, prepend=-1))
         total = np.add.reduceat(means * self.count, first, axis=1)
         return np.asarray(total / np.add.reduceat(self.count, first))

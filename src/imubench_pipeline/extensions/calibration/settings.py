@@ -94,7 +94,7 @@ class Step(Strict):
 
 
 class OnRateTable(Experiment):
-    """A log of a gyro on a rate table, its axis along that of the table."""
+    """A log of a gyro on a rate table, its axis along the axis of the table."""
 
     steps: tuple[Step, ...] = Field((), description="steady rates; none: column log.table_rate")
     channel: Gyro | None = Field(None, description="along the axis; null: the only gyro of the log")

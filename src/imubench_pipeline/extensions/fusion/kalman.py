@@ -40,7 +40,7 @@ def steady_covariance(transition: Array, process_noise: Array, information: Arra
         P = Phi P (I + G P)^-1 Phi^T + Q,    G = H^T R^-1 H,
 
     by a structure-preserving doubling algorithm (B. D. O. Anderson, Int. J. Control 28(2), 1978; E.
-    K.-W. Chu et al., Int. J. Control 77(8), 2004), which is accurate for a singular G and for
+    K.-W. Chu et al., Int. J. Control 77(8), 2004), accurate for a singular G and for
     eigenvalues near 1. Raises ValueError if an unobservable process is not stable.
     """
     scale = np.sqrt(np.max(np.diag(process_noise), initial=0.0)) or 1.0

@@ -174,7 +174,7 @@ def _round_up(number: float) -> str:
 
 
 _MAX_AGREEING_DIFFERENCE = 0.05  # relative, up to which result and printed figure agree
-_UNIT_SYMBOLS = {"bias": "signal"}  # of a parameter, where it differs from that of the parameter
+_UNIT_SYMBOLS = {"bias": "signal"}  # of a parameter, where it is not its own
 
 
 def _make_boards_context(site: Site) -> dict[str, Any]:

@@ -34,7 +34,7 @@ _DATASHEET_PARAMETERS = {  # parameter and factor of datasheet figures, by stati
     "offset": ("bias", 1.0),
     SENSITIVITY: (SENSITIVITY, 1.0),
 }
-_MAX_TAU_OVER_LENGTH = 1.0 / 9.0  # longest tau at which a curve is read, over that of the log
+_MAX_TAU_OVER_LENGTH = 1.0 / 9.0  # longest tau at which a curve is read, over the duration
 
 
 def yield_published_figures(
