@@ -360,32 +360,6 @@ def waiting(folder: Path, *words: str) -> subprocess.Popen[bytes]:
     return subprocess.Popen(command, cwd=folder, start_new_session=True)
 
 
-def test_a_lock_of_snakemake_is_stale_unless_its_process_lives(tmp_path: Path) -> None:
-    results = tmp_path / "results"
-    locks = tmp_path / ".snakemake/locks"
-    locks.mkdir(parents=True)
-    (locks / "0.output.lock").write_text("results/tables/a.csv\nresults/report\n")
-    (locks / "1.output.lock").write_text("other/tables/a.csv\nresults_2/x\n")
-    mine = recovery.find_snakemake_locks(tmp_path, results)
-    os.utime(mine[0], (OLD, OLD))
-    assert [path.name for path in mine] == ["0.output.lock"]
-    assert recovery.find_lock_owner(mine, tmp_path, results) is None
-    with (
-        waiting(tmp_path, "snakemake") as by_hand,
-        waiting(tmp_path, "snakemake", "results=other") as of_others,
-    ):
-        try:
-            assert recovery.find_lock_owner(mine, tmp_path, results) is None  # it began later
-            os.utime(mine[0], (time.time() + 2.0,) * 2)
-            assert recovery.find_lock_owner(mine, tmp_path, results) == by_hand.pid
-            by_hand.kill()
-            by_hand.wait()
-            assert recovery.find_lock_owner(mine, tmp_path, results) is None
-        finally:
-            by_hand.kill()
-            of_others.kill()
-
-
 def test_steps_that_run_on_are_ended(tmp_path: Path) -> None:
     since = datetime.now(UTC).isoformat()
     (tmp_path / "project").mkdir()

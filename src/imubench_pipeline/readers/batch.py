@@ -28,9 +28,7 @@ from imubench_pipeline.units import find_conversion
 from imubench_pipeline.words.findings.base import FindingData
 from imubench_pipeline.words.findings.files import UnitContradicts
 
-SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
-"""Seconds in a unit of time stamps."""
-
+SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}  # seconds in a unit of time stamps
 _MIN_MAGNITUDE = 1e-75
 """Least magnitude of the largest value of a column, SI. A column of smaller values is set to 0:
 they are no measurements, and their squares underflow."""
@@ -85,8 +83,7 @@ class LogFile(ABC):
     """Findings on omitted data; complete after `batches` is exhausted."""
     units: dict[str, StatedUnit] = field(default_factory=dict)
     """Units of channels that the file itself states, known after the first batch."""
-    simulated: bool = False
-    """The file has the mark of a simulated log; known after the first batch."""
+    simulated: bool = False  # the file has the mark of a simulated log; known after the first batch
 
     @abstractmethod
     def batches(self) -> Iterator[Batch]:

@@ -10,9 +10,7 @@ MIN_CHECKED_EXPANSION, MAX_EXPANSION_RATIO = 1 << 28, 800
 """Bytes to which any compressed data may expand, and largest ratio of expansion above that: only
 the repetition of one character expands further."""
 
-MAX_WINDOW = 1 << 27
-"""Memory of the decompression, bytes: the window of zstd, the dictionary of xz."""
-
+MAX_WINDOW = 1 << 27  # memory of the decompression, bytes: the window of zstd, the dictionary of xz
 MAX_UNCHECKED_PARTS, MIN_MEAN_PART = 10_000, 64
 """Number of compressed parts, such as members of gzip, that may be nearly empty; least mean size of
 more parts, bytes."""
@@ -20,17 +18,14 @@ more parts, bytes."""
 MAX_DIRECTORY, MAX_MEMBERS = 1 << 21, 1 << 16
 """Bytes of the directory of a zip archive; members of an archive without a directory."""
 
-MAX_ARCHIVE_PROBES = 1 << 14
-"""Members of an archive that are searched for the only text file."""
+MAX_ARCHIVE_PROBES = 1 << 14  # members of an archive that are searched for the only text file
 
 # --------------------------------------------------------------------------------------- text
 
 MAX_SEARCHED_COLUMNS = 1000
 """Columns of a table, of text or arrays, that are searched for the sensor."""
 
-MAX_LINE_LENGTH = 1 << 20
-"""Bytes of a line of text."""
-
+MAX_LINE_LENGTH = 1 << 20  # bytes of a line of text
 MAX_LINES_BEFORE, MAX_BYTES_BEFORE = 500_000, 1 << 26
 """Lines and bytes that are searched for the first record."""
 
@@ -39,18 +34,12 @@ MAX_COMMENT_LINES, MAX_COMMENT_BYTES = 1000, 1 << 23
 
 # ------------------------------------------------------------------------------------- arrays
 
-MAX_ARRAYS, MAX_FIELDS = 10_000, 1 << 14
-"""Arrays of a file; columns of an array of records."""
-
-MAX_BLOCK_BYTES = 1 << 26
-"""Bytes of a block of records, which may be a single record."""
-
+MAX_ARRAYS, MAX_FIELDS = 10_000, 1 << 14  # arrays of a file; columns of an array of records
+MAX_BLOCK_BYTES = 1 << 26  # bytes of a block of records, which may be a single record
 MAX_CHUNK_BYTES = 1 << 28
 """Total bytes of one chunk of each column of an HDF5 file: chunks are unpacked as a whole."""
 
-MAX_CHUNKS = 1 << 17
-"""Chunks of an HDF5 data set: the library takes 2 kB for each."""
-
+MAX_CHUNKS = 1 << 17  # chunks of an HDF5 data set: the library takes 2 kB for each
 MAX_ARROW_BATCH = 1 << 28
 """Bytes of a compressed record batch of Feather or Arrow IPC, which is unpacked as a whole."""
 
@@ -59,9 +48,7 @@ MAX_UNCHECKED_PAGES, MIN_MEAN_PAGE = 1 << 17, 1 << 12
 """Total unpacked bytes of the largest page of each column of a Parquet file; number of pages of any
 size, and least mean size of more pages, bytes."""
 
-MAX_OBJECTS, MAX_GROUP_DEPTH = 20_000, 64
-"""Objects of an HDF5 file, and depth of nested groups."""
-
+MAX_OBJECTS, MAX_GROUP_DEPTH = 20_000, 64  # objects of an HDF5 file, and depth of nested groups
 MAX_NPY_HEADER = 10_000
 """Bytes of a header. NumPy has the same limit, but reads a header before it checks the size."""
 
@@ -77,8 +64,6 @@ together to sort their messages: the messages take up to five times as much memo
 MAX_MESSAGE, MAX_MESSAGE_BATCH = 1 << 16, 1 << 24
 """Bytes of an inertial message (320 and the name of a frame), and of messages read together."""
 
-MAX_TOPICS, MAX_TOPIC_LENGTH = 10_000, 1024
-"""Topics of a bag, and bytes of the name of a topic."""
-
+MAX_TOPICS, MAX_TOPIC_LENGTH = 10_000, 1024  # topics of a bag, and bytes of the name of a topic
 MAX_METADATA = 1 << 20
 """Bytes of metadata.yaml: a topic takes some 300, more with its quality of service."""

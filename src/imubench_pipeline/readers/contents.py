@@ -16,8 +16,7 @@ from imubench_pipeline.tables.findings import RecordingError
 
 _MAX_SHOWN_FAULTS = 5
 
-MAX_FILES = 200
-"""Largest number of files of a folder that are examined."""
+MAX_FILES = 200  # largest number of files of a folder that are examined
 
 
 @dataclass(frozen=True)
@@ -30,10 +29,8 @@ class Contents:
     tables: tuple[LogTable, ...]
     stated: FileFormat | None = None
     """Format that the sensor file must state, since the first bytes do not show it."""
-    files: int = 1
-    """Number of files; at most `MAX_FILES` are examined."""
-    only: str | None = None
-    """The only file of a folder that is read if no ``file`` is stated."""
+    files: int = 1  # number of files; at most `MAX_FILES` are examined
+    only: str | None = None  # the only file of a folder that is read if no `file` is stated
 
 
 def list_contents(path: Path) -> Contents:

@@ -17,11 +17,8 @@ from imubench_pipeline.tables.findings import RecordingError
 
 Kind = Literal["number", "date", "text", "other"]
 
-MAX_EXAMINED_RECORDS = 1000
-"""Largest number of records that are examined in an inspection."""
-
-MAX_SHOWN_VALUES = 4
-"""Largest number of values of a column that are shown."""
+MAX_EXAMINED_RECORDS = 1000  # largest number of records that are examined in an inspection
+MAX_SHOWN_VALUES = 4  # largest number of values of a column that are shown
 
 NOTHING_STATED = LogFormat.model_validate(
     {"rate": "1 Hz", "channels": {"gyro_x": {"column": 1, "unit": "rad/s"}}}
@@ -38,17 +35,14 @@ class Signature:
     tells: Callable[[bytes], bool] | None = None
     """Returns whether the first 64 kB of a file have the format; used if they match no ``begins``.
     Random bytes must not be accepted, in any amount."""
-    folder_has: str | None = None
-    """A folder with a file of this name is one log."""
-    archive_has: str | None = None
-    """A zip archive with a file with this suffix is one log."""
+    folder_has: str | None = None  # a folder with a file of this name is one log
+    archive_has: str | None = None  # a zip archive with a file with this suffix is one log
 
 
 class Code(NamedTuple):
     """The code that reads the files of a format."""
 
-    log_file: type[LogFile]
-    """Reads one file, or one topic of it."""
+    log_file: type[LogFile]  # reads one file, or one topic of it
     tables: Callable[[Path, FileFormat], list[LogTable]]
     """Returns the tables of a file from its path and format; reads its beginning only. Raises
     `RecordingError` if there is no table."""
@@ -58,12 +52,9 @@ class Code(NamedTuple):
 class FileFormat:
     """Properties of a format of log files, without the code that reads it."""
 
-    name: Reader
-    """Value of ``reader`` in a sensor file, and name of the module in ``readers.formats``."""
-    title: str
-    """Common name of the format."""
-    endings: tuple[str, ...]
-    """Usual suffixes of its files, for messages."""
+    name: Reader  # value of `reader` in a sensor file, and name of the module in `readers.formats`
+    title: str  # common name of the format
+    endings: tuple[str, ...]  # usual suffixes of its files, for messages
     signature: Signature
     streamed: bool
     """Its logs are read sequentially, so that they may be compressed or in a zip archive."""
@@ -75,8 +66,7 @@ class FileFormat:
     """Entries of ``log``, or of its channels, that apply to this format but not to all."""
     code: Callable[[], Code]
     """Imports and returns the code; a function, so that a run imports only the formats it needs."""
-    vendor: str | None = None
-    """Vendor of all sensors with such logs."""
+    vendor: str | None = None  # vendor of all sensors with such logs
     measured_by_name: bool = False
     """All names mean measured quantities: linear acceleration includes gravity."""
     extra: Extra | None = None
@@ -104,23 +94,19 @@ class FileFormat:
 class LogColumn:
     """One column, as described by the beginning of a file."""
 
-    source: str | int
-    """Value of ``column`` in a sensor file."""
-    label: str
-    """Name of the column; empty if it has none."""
+    source: str | int  # value of `column` in a sensor file
+    label: str  # name of the column; empty if it has none
     kind: Kind
     first: tuple[str, ...] = ()
     """The first values as written."""
     values: NDArray[np.float64] = field(default_factory=lambda: np.empty(0))
     """First values, shape (n,); NaN where missing; dates in ns since 1970 or since midnight. Empty
     if they are no numbers."""
-    unit: str | None = None
-    """Unit that the file states or its format fixes."""
+    unit: str | None = None  # unit that the file states or its format fixes
     forms: tuple[str, ...] = ()
     """For dates in text: ``iso8601`` or matching patterns, the most plausible first; a pattern may
     be for a date only or a time of day only."""
-    address: str | int | None = None
-    """Value of ``column`` under ``time``, if it differs from ``source``."""
+    address: str | int | None = None  # value of `column` under `time`, if it differs from `source`
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,20 +119,13 @@ class LogTable:
     columns: tuple[LogColumn, ...] = ()
     variable: str | None = None
     """Value of ``variable`` in a sensor file."""
-    file: str | None = None
-    """Value of ``file`` in a sensor file; None: the recording is one file."""
-    rows: int | None = None
-    """Number of records, if it is known without reading them."""
-    rate: float | None = None
-    """Rate that the file states, Hz."""
-    started: str | None = None
-    """Start of the log that the file states, ISO 8601."""
-    about: str = ""
-    """Layout of the table, for messages."""
-    notes: tuple[str, ...] = ()
-    """Comments in the file."""
-    fault: str | None = None
-    """Reason why the table cannot be used, as the end of a sentence."""
+    file: str | None = None  # value of `file` in a sensor file; None: the recording is one file
+    rows: int | None = None  # number of records, if it is known without reading them
+    rate: float | None = None  # rate that the file states, Hz
+    started: str | None = None  # start of the log that the file states, ISO 8601
+    about: str = ""  # layout of the table, for messages
+    notes: tuple[str, ...] = ()  # comments in the file
+    fault: str | None = None  # reason why the table cannot be used, as the end of a sentence
 
 
 def format_first_numbers(values: NDArray[Any]) -> tuple[str, ...]:

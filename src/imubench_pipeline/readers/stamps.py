@@ -58,10 +58,8 @@ class Clock:
 class WrapState:
     """State of a counter after the stamps read so far."""
 
-    last: Any = None
-    """The last present stamp, as written."""
-    turns: int = 0
-    """Number of wraps of the counter."""
+    last: Any = None  # the last present stamp, as written
+    turns: int = 0  # number of wraps of the counter
 
 
 def unwrap(stamps: NDArray[Any], wraps: float, state: WrapState) -> NDArray[Any]:

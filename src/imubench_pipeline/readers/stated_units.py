@@ -101,10 +101,8 @@ _MAX_SHOWN_NAME = 60
 class StatedUnit:
     """The unit of a channel that the log states."""
 
-    unit: str
-    """Unit in the notation of a sensor file."""
-    where: str
-    """The place in the log."""
+    unit: str  # unit in the notation of a sensor file
+    where: str  # the place in the log
 
 
 def find_stated_unit(channel: str, text: str | None, where: str, label: str) -> StatedUnit | None:

@@ -41,8 +41,7 @@ from imubench_pipeline.tables.findings import RecordingError
 from imubench_pipeline.words.findings.files import IncompleteLastRecord, WrongChecksum
 
 _ESF_MEAS, ESF_RAW, _NAV_PVT = b"\x10\x02", b"\x10\x03", b"\x01\x07"
-KINDS = {_ESF_MEAS: "ESF-MEAS", ESF_RAW: "ESF-RAW"}
-"""The messages that are read, by class and id."""
+KINDS = {_ESF_MEAS: "ESF-MEAS", ESF_RAW: "ESF-RAW"}  # the messages that are read, by class and id
 
 COLUMNS: dict[str, tuple[int, float]] = {
     "gyro_x": (14, 2.0**-12),
@@ -55,12 +54,8 @@ COLUMNS: dict[str, tuple[int, float]] = {
 }
 """Data type of each column, and scale of one count in its unit."""
 
-UNITS = {"gyro": "deg/s", "accel": "m/s^2", "temperature": "degC"}
-"""Unit of each quantity."""
-
-TICK_MS = 5 / 128
-"""Length of a tick, ms: 1/25.6, which is exact in float64."""
-
+UNITS = {"gyro": "deg/s", "accel": "m/s^2", "temperature": "degC"}  # unit of each quantity
+TICK_MS = 5 / 128  # length of a tick, ms: 1/25.6, which is exact in float64
 _MIN_ZEROS = 512
 """Least run of zero bytes that is reported, a sector; shorter runs may be part of a message."""
 

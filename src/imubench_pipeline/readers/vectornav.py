@@ -259,8 +259,7 @@ _MAX_PROBED_SENTENCES = 1000
 _MAX_LISTED_NAMES, _MAX_SHOWN_NAME = 10, 12
 _ZONE_SUFFIX = re.compile(rb"(Z|[+-]\d\d:?\d\d)$")
 STAMP_PADDING = b" \t,;:|[]()\"'\r\0"
-HOST_TIME, COUNTER = "host_time", "counter"
-"""The columns of time."""
+HOST_TIME, COUNTER = "host_time", "counter"  # the columns of time
 
 
 class VectorNavFile(LogFile):

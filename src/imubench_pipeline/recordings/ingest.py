@@ -42,15 +42,13 @@ _MAX_TIMES = 5  # of knocks that are listed
 class Ingested:
     """What was kept of a recording."""
 
-    summary: dict[str, Any]
-    """A row of the table ``recordings`` without the names."""
+    summary: dict[str, Any]  # a row of the table `recordings` without the names
     findings: list[Finding]
     channels: dict[str, dict[str, Any]] = field(default_factory=dict)
     """Rate in Hz, points of the grid, segments and levels of each analysed channel."""
     kept: dict[str, dict[str, Any]] = field(default_factory=dict)
     """The files of samples (`imubench_pipeline.recordings.kept.identify_files`)."""
-    gravity: GravityTurn | None = None
-    """How gravity turns against the sensor."""
+    gravity: GravityTurn | None = None  # how gravity turns against the sensor
     sources: dict[str, KnownFile] | None = None
     """The files of the log, by their place in it; None: they were not read to their end."""
 

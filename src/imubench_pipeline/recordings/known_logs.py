@@ -28,9 +28,7 @@ from imubench_pipeline.tables.digests import (
     write_sealed_json,
 )
 
-KNOWN = "log.json"
-"""The file of the evidence, beside ``quality.json``."""
-
+KNOWN = "log.json"  # the file of the evidence, beside `quality.json`
 MAX_DIGESTED_SIZE = 1 << 26
 """Bytes. A file up to this size is read in the plan where only its stamps may have changed (0.1 s);
 a larger one goes through the ingest again."""
@@ -42,8 +40,7 @@ _CHUNK_SIZE = 1 << 20  # bytes
 _STAMP_RESOLUTION = 2_000_000_000
 """ns. Two changes within it may have the same stamp (FAT: 2 s, Linux: some ms)."""
 
-Stamps = tuple[int, int]
-"""Last change of the content and of anything, ns since 1970."""
+Stamps = tuple[int, int]  # last change of the content and of anything, ns since 1970
 
 
 @dataclass(frozen=True)

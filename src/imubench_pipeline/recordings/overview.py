@@ -29,12 +29,8 @@ from imubench_pipeline.settings.sensor import TEMPERATURE
 from imubench_pipeline.tables.keys import Key
 from imubench_pipeline.typing import Array
 
-BUCKETS = 400
-"""Default number of intervals of time of an envelope."""
-
-BUCKETS_OF_TURNS = 2400
-"""The same of a recording with turns in it, which should be seen."""
-
+BUCKETS = 400  # default number of intervals of time of an envelope
+BUCKETS_OF_TURNS = 2400  # the same of a recording with turns in it, which should be seen
 MOST_BINS = 120
 """Bins of a histogram at most; at least half as many, where the samples have as many levels."""
 

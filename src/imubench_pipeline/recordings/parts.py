@@ -26,8 +26,7 @@ from imubench_pipeline.tables.findings import Finding, RecordingError
 from imubench_pipeline.typing import Array
 from imubench_pipeline.words.findings.files import NotUsed
 
-STAMP_BLOCK = ROW_GROUP
-"""Records of a block of stamps, equal to the records of a row group."""
+STAMP_BLOCK = ROW_GROUP  # records of a block of stamps, equal to the records of a row group
 
 
 @dataclass

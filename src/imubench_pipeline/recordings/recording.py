@@ -25,14 +25,10 @@ from imubench_pipeline.tables import open_parquet, read_row_group
 from imubench_pipeline.tables.findings import RecordingError
 from imubench_pipeline.typing import Array
 
-ROW_GROUP = 1 << 20
-"""Rows of a row group."""
-
+ROW_GROUP = 1 << 20  # rows of a row group
 MEND = "remove it, and the next run reads the log again"
 
-BESIDE = frozenset({TEMPERATURE, POSITION, TABLE_RATE})
-"""Columns that are no channels."""
-
+BESIDE = frozenset({TEMPERATURE, POSITION, TABLE_RATE})  # columns that are no channels
 _NOT_CHANNELS = BESIDE | {"time", "sample"}
 
 

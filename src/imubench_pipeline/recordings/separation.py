@@ -41,8 +41,7 @@ relative difference of two numbers of records, or rates, that counts."""
 _MAX_STRIDE, _MIN_ON_STRIDE = 50, 0.98
 """Largest period of a slower clock, records, and least share of the samples that are on it."""
 
-ALL_RECORDS = -1
-"""Used instead of a bit mask of columns: all records, also those without a number."""
+ALL_RECORDS = -1  # used instead of a bit mask of columns: all records, also those without a number
 
 
 @dataclass

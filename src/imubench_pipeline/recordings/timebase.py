@@ -41,9 +41,7 @@ _MIN_INTERVAL, _MAX_INTERVAL = 1e-18, 1e8
 _MAX_MISSING_PER_SAMPLE, _MAX_EXTRA_POINTS = 100, 10_000_000
 """The grid has at most 100 points per record plus 10 million: each point takes memory."""
 
-MIN_MISSING = 0.01
-"""Least share of missing samples for the test of a change of the sampling rate."""
-
+MIN_MISSING = 0.01  # least share of missing samples for the test of a change of the sampling rate
 _MAX_RATE_ERROR_WITHOUT_LOSSES = 0.05
 """Largest relative difference of stated and mean rate if no sample is missing; the last burst may
 be incomplete."""

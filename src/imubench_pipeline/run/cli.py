@@ -63,8 +63,7 @@ SCHEMAS: dict[str, type[BaseModel]] = {
 """The configuration files: config.yaml, a sensor's, the notes beside a log, simulated.yaml, a
 board's."""
 
-_CLOSED_PIPE = 141
-"""Exit status that shells give a command whose reader has gone."""
+_CLOSED_PIPE = 141  # exit status that shells give a command whose reader has gone
 
 
 def make_parser() -> argparse.ArgumentParser:

@@ -52,8 +52,7 @@ from imubench_pipeline.tables.provenance import digest_sources
 from imubench_pipeline.units import parse_quantity
 
 _INGEST_OUTPUTS = ("quality.json", "envelope.parquet", "histogram.parquet")
-_RANKING_KEYS = ("price_class", "must")
-"""Keys of a requirement that do not affect the error budget."""
+_RANKING_KEYS = ("price_class", "must")  # keys of a requirement that do not affect the error budget
 
 _REPORTED_SECTIONS = {
     *("allan", "estimate", "reconstruction", "quality"),

@@ -26,8 +26,7 @@ COSTS = "IMUBENCH_COSTS"
 """Environment variable with the file for the cost of each step, one line of JSON each: CPU time in
 s, peak memory in MB."""
 
-_MAX_KILL_TIME = 60.0
-"""Max. time for the system to end a step, s."""
+_MAX_KILL_TIME = 60.0  # max. time for the system to end a step, s.
 
 
 class StepError(Exception):

@@ -1,8 +1,7 @@
 """Recover from a run that was killed, or interrupted by a power failure.
 
-Snakemake reruns interrupted steps (``--rerun-incomplete``). This module handles the lock of
-Snakemake, steps that are still running, temporary files, and files that were not yet on the disk
-when the machine stopped.
+Snakemake reruns interrupted steps (``--rerun-incomplete``). This module handles steps that still
+run, temporary files, and files that were not yet on the disk when the machine stopped.
 """
 
 from __future__ import annotations
@@ -30,57 +29,9 @@ _WRITTEN_FOLDERS = (
 _TEMPORARY_NAME = re.compile(r"\..+\.[a-z0-9_]{8}\.part")
 """Names of incomplete files of `tables.replacing`, `tables.making` and the ingest."""
 
-STILL_WRITTEN = 60.0
-"""s; a file that changed so shortly before a run may belong to another command."""
-
+STILL_WRITTEN = 60.0  # s; a file that changed so shortly before a run may belong to another command
 _MAX_WRITE_DELAY = 60.0  # s; systems buffer writes in memory for about half a minute
 _MAX_TERMINATION_TIME = 10.0  # s; for a process to end
-
-
-def find_snakemake_locks(project: Path, results: Path) -> list[Path]:
-    """Return the locks of Snakemake on files of these results; `project` has the Snakefile."""
-    # The paths in a lock are as given to Snakemake: links are not resolved.
-    inside = os.path.normpath(results) + os.sep
-
-    def concerns(path: Path) -> bool:
-        with path.open(encoding="utf-8", errors="replace") as lines:
-            return any(
-                os.path.normpath(project / line.strip()).startswith(inside) for line in lines
-            )
-
-    locks = []
-    for path in sorted(project.glob(".snakemake/locks/*.lock")):
-        with contextlib.suppress(OSError):  # a run that has just ended removes its lock
-            if concerns(path):
-                locks.append(path)
-    return locks
-
-
-def find_lock_owner(locks: Iterable[Path], project: Path, results: Path) -> int | None:
-    """Return the Snakemake process that may own these locks; None: they are stale."""
-    stamps = []
-    for lock in locks:
-        with contextlib.suppress(OSError):
-            stamps.append(lock.stat().st_mtime)
-    if not stamps:
-        return None
-    for process in psutil.process_iter():
-        with contextlib.suppress(psutil.Error):
-            words = process.cmdline()
-            # A process that began after the lock was made did not make it.
-            if not any(
-                Path(word).name == "snakemake" for word in words
-            ) or process.create_time() >= max(stamps):
-                continue
-            stated = [word.partition("=")[2] for word in words if word.startswith("results=")]
-            if stated and os.path.normpath(project / stated[-1]) != os.path.normpath(results):
-                continue
-            try:
-                if Path(process.cwd()) == project.resolve():
-                    return process.pid
-            except psutil.AccessDenied:
-                return process.pid  # of another user: rather wait one night
-    return None
 
 
 def end_left_over(note: Mapping[str, Any], project: Path) -> int:

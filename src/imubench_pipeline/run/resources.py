@@ -27,13 +27,9 @@ _START_TIME = 60
 
 _BYTES_PER_MB = 10**6
 
-_TIME_MARGIN = 10
-"""Factor on measured times, for a busy node and a slow file system."""
-
+_TIME_MARGIN = 10  # factor on measured times, for a busy node and a slow file system
 _TEXT_SUFFIXES = {".csv", ".txt", ".log", ".tsv", ".dat", ".asc", ".nmea"}
-_BINARY_EXPANSION, _COMPRESSED_EXPANSION = 3, 6
-"""Max. samples per byte of a log, relative to text."""
-
+_BINARY_EXPANSION, _COMPRESSED_EXPANSION = 3, 6  # max. samples per byte of a log, relative to text.
 _BYTES_PER_VALUE = 7
 """Bytes per value of text. Nine digits take eleven, small counts three; the margin covers these."""
 
@@ -54,8 +50,7 @@ Limits = Callable[[str, str | None], Limit]
 """Takes the sensor and the recording of a job; None: a step of the whole sensor."""
 
 
-Asked = Callable[[Mapping[str, str], int], int]
-"""Takes the wildcards of a job, and its attempt."""
+Asked = Callable[[Mapping[str, str], int], int]  # takes the wildcards of a job, and its attempt
 
 
 @dataclass(frozen=True)

@@ -28,14 +28,11 @@ _YAML_SUFFIXES = (".yaml", ".yml")
 _MAX_SAMPLES = 1 << 36
 _MIN_EXPONENT_FORMAT = 1e15
 _MIN_REPORTED_FOLDING = 1.02
-_MIN_TEMPERATURE, _MAX_TEMPERATURE = -273.15, 1000.0
-"""Range of sensor temperatures, degC."""
-_PROGRESS_INTERVAL = 3.0
-"""Seconds between two lines of progress where there is no terminal."""
+_MIN_TEMPERATURE, _MAX_TEMPERATURE = -273.15, 1000.0  # range of sensor temperatures, degC
+_PROGRESS_INTERVAL = 3.0  # seconds between two lines of progress where there is no terminal
 
 
-_LOG_PATH_DEPTH = 2
-"""Path components from the drop zone to a log: sensor and recording."""
+_LOG_PATH_DEPTH = 2  # path components from the drop zone to a log: sensor and recording
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

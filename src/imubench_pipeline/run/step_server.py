@@ -31,8 +31,7 @@ from imubench_pipeline.run.sealing import seal_outputs
 from imubench_pipeline.tables.failures import describe_error
 from imubench_pipeline.tables.findings import UnavailableError
 
-_MAX_ERROR_LENGTH = 300
-"""Max. length of an error in one line, characters."""
+_MAX_ERROR_LENGTH = 300  # max. length of an error in one line, characters.
 
 
 def serve(requests: socket.socket) -> None:

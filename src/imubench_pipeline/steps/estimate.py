@@ -274,9 +274,7 @@ class _Channel:
         return channel_rng(self.settings.seed, f"{self.mean!r}", f"{self.log.grid}", use)
 
 
-_MIN_SAMPLES_FOR_STEP = 1 << 16
-"""Samples from which the step of a register is found."""
-
+_MIN_SAMPLES_FOR_STEP = 1 << 16  # samples from which the step of a register is found
 _LIKELIHOOD_METHODS = {"likelihood", "likelihood_gm", "compensated"}
 
 _CURVE_METHODS = ("likelihood_gm", "weighted", "paper", "curve")

@@ -13,8 +13,7 @@ from imubench_pipeline.tables import make_folder, write_content
 from imubench_pipeline.tables.texts import escape_invisible
 from imubench_pipeline.units import parse_quantity
 
-NOT_MADE = "not_made.txt"
-"""Names the programs for which there is no file, with the reason."""
+NOT_MADE = "not_made.txt"  # names the programs for which there is no file, with the reason
 
 
 def make_exports(

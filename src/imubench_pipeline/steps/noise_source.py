@@ -25,12 +25,8 @@ from imubench_pipeline.simulate.from_datasheet import from_datasheet
 from imubench_pipeline.tables.keys import Key
 from imubench_pipeline.words.reasons import simulations as texts
 
-NO_MODEL = texts.NO_NOISE_MODEL
-"""Reason of missing results without a `NoiseSource`."""
-
-Kept = tuple[RecordingRow, Path]
-"""A recording, and its folder."""
-
+NO_MODEL = texts.NO_NOISE_MODEL  # reason of missing results without a `NoiseSource`
+Kept = tuple[RecordingRow, Path]  # a recording, and its folder
 _DRAW_SEED = 20260101
 """Seed of the drawn models; each recording and channel has an independent stream."""
 

@@ -36,16 +36,11 @@ from imubench_pipeline.tables import read
 from imubench_pipeline.tables.keys import Key
 from imubench_pipeline.typing import Array
 
-STRETCH = 1.0
-"""Length of the section in which every sample is shown, s."""
-
-MAX_SAMPLES = 1_500_000
-"""Max. number of compared samples of each; three sensors take 8 s."""
-
+STRETCH = 1.0  # length of the section in which every sample is shown, s
+MAX_SAMPLES = 1_500_000  # max. number of compared samples of each; three sensors take 8 s.
 _ENVELOPE_COLUMNS = ("start", "end", "low", "high", "mean")
 
-_TEMPERATURE_AVERAGING_TIME = 100.0
-"""Averaging time of temperature readings, s."""
+_TEMPERATURE_AVERAGING_TIME = 100.0  # averaging time of temperature readings, s
 
 
 def simulate_samples_of_models(

@@ -20,8 +20,7 @@ from imubench_pipeline.settings.requirements import Requirement, validate_requir
 from imubench_pipeline.settings.sensor import Sensor, sensors_of
 from imubench_pipeline.tables import read, write_each
 
-NEEDED = ("recordings", "parameters", "ranking")
-"""The tables of a run that the step reads."""
+NEEDED = ("recordings", "parameters", "ranking")  # the tables of a run that the step reads
 
 
 def list_shortlist(

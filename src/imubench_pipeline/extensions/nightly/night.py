@@ -10,7 +10,6 @@ import signal
 import subprocess
 import sys
 import termios
-import time
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from datetime import UTC, datetime
@@ -42,7 +41,7 @@ from imubench_pipeline.extensions.nightly.summary import (
 from imubench_pipeline.report.run_summary import describe_drop_zone
 from imubench_pipeline.run import recovery
 from imubench_pipeline.run.faults import TOLD
-from imubench_pipeline.run.lock import INHERITED, Lock, TakenError, locate_lock
+from imubench_pipeline.run.lock import INHERITED, Lock, locate_lock
 from imubench_pipeline.run.project import find_snakefile
 from imubench_pipeline.run.recovery import end_group
 from imubench_pipeline.settings.config import read_config, read_run
@@ -62,7 +61,6 @@ _PATH_SETTINGS = ("logs", "results", "held_back")
 _OWN_FLAGS = {"--config", "-C", "--configfile", "--configfiles"}
 _LOW_DISK_SPACE = 200e6  # bytes
 _MAX_ERRORS = 5
-_RETRY_INTERVAL = 5.0  # s between two looks at a Snakemake that somebody else runs
 _CHANGED_WHILE_READ = "it was written to while it was read: what the results say is of a part of it"
 
 
@@ -190,19 +188,10 @@ class Night:
         `settle`: min. time without change of a complete log, s; `wait`: max. time to wait for
         another run, s (then a TakenError).
         """
-        until = time.monotonic() + wait
         with Lock(locate_lock(self.results)) as lock, _interrupt_on_signals():
             lock.acquire(wait)
             self._began = datetime.now(UTC)
             self._log = self.folder / f"{self._began:%Y%m%dT%H%M%SZ}.log"
-            # Wait for a Snakemake that a user runs on these results.
-            while locks := recovery.find_snakemake_locks(self.project, self.results):
-                process = recovery.find_lock_owner(locks, self.project, self.results)
-                if process is None:
-                    break
-                if time.monotonic() >= until:
-                    raise TakenError(f"Snakemake (process {process}) works on {self.results}")
-                time.sleep(min(_RETRY_INTERVAL, max(until - time.monotonic(), 0.0)))
             try:
                 before = read_state(self._state)
             except StateError as error:
@@ -226,17 +215,10 @@ class Night:
         return summary
 
     def _recover(self, lock: Lock) -> None:
-        locks = recovery.find_snakemake_locks(self.project, self.results)
-        note = lock.left_over
-        if locks and not note:
-            since = datetime.fromtimestamp(locks[0].stat().st_mtime, UTC)
-            note = {"since": since.isoformat(timespec="seconds")}  # a run by hand
-        if note:
+        if note := lock.left_over:
             self._put_right.append(f"the run of {note.get('since')} did not reach its end")
         if ended := recovery.end_left_over(note, self.project):
             self._put_right.append(f"steps that still ran, and were ended: {ended}")
-        for path in locks:
-            path.unlink(missing_ok=True)
         if recovery.was_restarted(note) and (doubtful := recovery.remove_doubtful(self.results)):
             self._put_right.append(
                 f"the machine was restarted: files of its last minute made again: {doubtful}"
@@ -252,6 +234,7 @@ class Night:
         held_back = self.folder / "held_back.yaml"
         write_json({"held_back": sorted(names)}, held_back)
         arguments = ["--snakefile", str(self._snakefile), f"-c{cores}", "--rerun-incomplete"]
+        arguments += ["--nolock"]  # the lock on the results is held instead
         arguments += [*self._flags, "--configfile", str(held_back)]
         if self._config:
             arguments += ["--config", *self._config]

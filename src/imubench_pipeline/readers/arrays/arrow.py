@@ -30,9 +30,7 @@ from imubench_pipeline.readers.bounds import (
     MIN_MEAN_PAGE,
 )
 
-METADATA = b"imubench"
-"""Metadata key of Parquet files that this package writes; the value is JSON."""
-
+METADATA = b"imubench"  # metadata key of Parquet files that this package writes; the value is JSON
 _PARQUET_MAGIC, _FEATHER_1_MAGIC = b"PAR1", b"FEA1"
 _ARROW_FILE_MAGIC, _ARROW_STREAM_MAGIC = b"ARROW1", b"\xff\xff\xff\xff"
 

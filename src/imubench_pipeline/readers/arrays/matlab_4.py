@@ -37,10 +37,8 @@ class Header:
     dtype: np.dtype[np.generic]
     begin: int
     """Bytes of the header and the name."""
-    size: int
-    """Bytes of the numbers."""
-    fault: str | None
-    """Reason why they cannot be read, as the end of a sentence."""
+    size: int  # bytes of the numbers
+    fault: str | None  # reason why they cannot be read, as the end of a sentence
 
 
 def parse_header(begin: bytes) -> Header | None:

@@ -15,11 +15,8 @@ from numpy.typing import NDArray
 
 from imubench_pipeline.readers.bounds import MAX_FIELDS
 
-NUMBER_KINDS = "fiu"
-"""Kinds of NumPy types that are numbers: float, signed and unsigned integer."""
-
-DATE_KIND = "M"
-"""Kind of the NumPy type of dates (datetime64)."""
+NUMBER_KINDS = "fiu"  # kinds of NumPy types that are numbers: float, signed and unsigned integer
+DATE_KIND = "M"  # kind of the NumPy type of dates (datetime64)
 
 _KIND_NAMES = {
     **dict.fromkeys(NUMBER_KINDS, "numbers"),
@@ -38,29 +35,20 @@ class UnusableError(Exception):
 class Column:
     """One column of a table."""
 
-    label: str
-    """Name of the column; empty for the columns of a matrix."""
-    kind: str
-    """Kind of the NumPy type."""
-    holds: str
-    """Kind of the data in words."""
+    label: str  # name of the column; empty for the columns of a matrix
+    kind: str  # kind of the NumPy type
+    holds: str  # kind of the data in words
 
 
 class Table:
     """Columns of equal length with a common name in a file."""
 
-    name: str = ""
-    """Name of the table; empty if the file has one table without a name."""
-    rows: int | None = None
-    """Number of records; None if it is known only after reading."""
-    width: int = 0
-    """Number of columns."""
-    labels: Sequence[str] = ()
-    """Names of the columns; empty if they have none."""
-    fault: str | None = None
-    """Reason why the table cannot be used, as the end of a sentence."""
-    simulated: bool = False
-    """The table has the mark of a simulated log."""
+    name: str = ""  # name of the table; empty if the file has one table without a name
+    rows: int | None = None  # number of records; None if it is known only after reading
+    width: int = 0  # number of columns
+    labels: Sequence[str] = ()  # names of the columns; empty if they have none
+    fault: str | None = None  # reason why the table cannot be used, as the end of a sentence
+    simulated: bool = False  # the table has the mark of a simulated log
 
     @property
     def shown(self) -> str:
@@ -197,9 +185,7 @@ def _list_leaves(
         yield _Leaf(label, path, dtype)
 
 
-MAX_DEFLATE_RATIO = 1040
-"""Largest expansion ratio of deflate, with a margin for rounding."""
-
+MAX_DEFLATE_RATIO = 1040  # largest expansion ratio of deflate, with a margin for rounding
 _SKIP_BLOCK = 1 << 20
 
 

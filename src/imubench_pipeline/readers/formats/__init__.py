@@ -35,5 +35,4 @@ if _missing := _modules.symmetric_difference(get_args(Reader)):
 FILE_FORMATS: Mapping[Reader, FileFormat] = {name: _load_format(name) for name in get_args(Reader)}
 """All formats by the value of ``reader`` in a sensor file."""
 
-TEXT = FILE_FORMATS["csv"]
-"""Format of files without a known signature: text has none."""
+TEXT = FILE_FORMATS["csv"]  # format of files without a known signature: text has none

@@ -32,14 +32,10 @@ __all__ = ["Draft", "Inspection", "Proof", "inspect"]
 class Inspection:
     """Contents of a recording, and the drafted sensor file."""
 
-    listing: str
-    """The contents as text."""
-    block: str
-    """The sensor file as YAML."""
-    draft: Draft
-    """The sensor file as values."""
-    proof: Proof
-    """Result of reading the first records with it."""
+    listing: str  # the contents as text
+    block: str  # the sensor file as YAML
+    draft: Draft  # the sensor file as values
+    proof: Proof  # result of reading the first records with it
 
     @property
     def complete(self) -> bool:
@@ -141,10 +137,8 @@ _GRAVITY_TOLERANCE = 0.2
 class Proof:
     """Result of reading the first records with a draft."""
 
-    read: bool
-    """The records could be read."""
-    said: str
-    """One line about the records, or about the reason why they cannot be read."""
+    read: bool  # the records could be read
+    said: str  # one line about the records, or about the reason why they cannot be read
 
 
 @dataclass

@@ -57,10 +57,8 @@ class Clock:
     column: LogColumn
     entry: Entry
     """``time`` of the sensor file."""
-    counts: bool
-    """The column counts samples, so that ``rate`` is needed."""
-    order: tuple[int, ...]
-    """Sort key; a lower one is more plausible."""
+    counts: bool  # the column counts samples, so that `rate` is needed
+    order: tuple[int, ...]  # sort key; a lower one is more plausible
 
 
 def find_clocks(table: LogTable, columns: Sequence[LogColumn]) -> list[Clock]:

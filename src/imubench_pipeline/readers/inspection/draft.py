@@ -8,8 +8,7 @@ from typing import Any
 
 import yaml
 
-UNKNOWN = "?"
-"""Placeholder for a missing value; the sensor file is rejected until it is filled in."""
+UNKNOWN = "?"  # placeholder for a missing value; the sensor file is rejected until it is filled in
 
 
 @dataclass(frozen=True)

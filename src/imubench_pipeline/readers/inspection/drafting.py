@@ -48,14 +48,10 @@ class Group:
     table: LogTable
     columns: dict[str, LogColumn]
     """Columns by axis; the key of a temperature is an empty text."""
-    unit: str | None
-    """The unit that the file states."""
-    written: str
-    """Text of the file in the place of the unit, if it is no known unit."""
-    rank: int
-    """See `imubench_pipeline.readers.inspection.names.Meaning`."""
-    guessed: str = ""
-    """Reason for the choice of the columns, if it is not from their names."""
+    unit: str | None  # the unit that the file states
+    written: str  # text of the file in the place of the unit, if it is no known unit
+    rank: int  # see `imubench_pipeline.readers.inspection.names.Meaning`
+    guessed: str = ""  # reason for the choice of the columns, if it is not from their names
 
     @property
     def names(self) -> str:
@@ -218,8 +214,7 @@ class Choice:
     other_clocks: list[Clock]
     left: list[tuple[Group, str]]
     """Recognised groups that are not used, each with the reason."""
-    unknown: list[LogColumn]
-    """Number columns of the used tables that were not recognised."""
+    unknown: list[LogColumn]  # number columns of the used tables that were not recognised
 
 
 def choose_columns(contents: Contents) -> Choice:

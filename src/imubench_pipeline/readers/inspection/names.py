@@ -60,12 +60,9 @@ class Meaning:
     quantity: Quantity
     axis: str
     """x, y or z; a number for numbered columns; empty if there is none."""
-    stem: str
-    """The rest of the name, which is equal for the axes of one sensor."""
-    unit: str | None
-    """The unit in the name."""
-    rank: int
-    """`PLAIN`, `WEAK`, `WITHOUT_GRAVITY` or `DERIVED`."""
+    stem: str  # the rest of the name, which is equal for the axes of one sensor
+    unit: str | None  # the unit in the name
+    rank: int  # `PLAIN`, `WEAK`, `WITHOUT_GRAVITY` or `DERIVED`
 
 
 def interpret_label(label: str, context: str = "") -> Meaning | None:

@@ -55,12 +55,9 @@ def _make_axis_columns(name: str, first: int) -> dict[str, int]:
 class Layout:
     """Layout of the numbers of a kind of message, after its header."""
 
-    figures: int
-    """Number of numbers."""
-    columns: dict[str, int]
-    """Index of each number that can be a column."""
-    units: dict[str, str]
-    """Unit of each column, which ROS fixes."""
+    figures: int  # number of numbers
+    columns: dict[str, int]  # index of each number that can be a column
+    units: dict[str, str]  # unit of each column, which ROS fixes
     covariances: dict[str, int]
     """Index of the first covariance of a quantity; its value is -1 if it is not measured."""
 
@@ -124,8 +121,7 @@ def decode_messages(
 _BATCH_MESSAGES = 1 << 14
 _MAX_LISTED_NAMES = 10
 _SQLITE_MAGIC = b"SQLite format 3"
-HEADER_STAMP, LOG_TIME = "header.stamp", "log_time"
-"""The columns of time."""
+HEADER_STAMP, LOG_TIME = "header.stamp", "log_time"  # the columns of time
 
 
 Source = Bag | Bag2

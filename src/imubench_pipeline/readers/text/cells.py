@@ -8,9 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-MAX_COLUMNS = 1 << 15
-"""Largest number of columns of a record."""
-
+MAX_COLUMNS = 1 << 15  # largest number of columns of a record
 _NAME_SEPARATOR = re.compile(r"\s{2,}|\t")
 
 

@@ -43,8 +43,7 @@ _SCORED_LINES, _SCORED_CELLS, _MAX_SHOWN_NAMES, _MAX_SHOWN_LENGTH = 50, 50, 20, 
 class TextLayout:
     """Layout of a text log."""
 
-    file: str
-    """Name of the file, for messages."""
+    file: str  # name of the file, for messages
     lines_before: int
     bytes_before: int
     """Number of lines and bytes before the first record."""
@@ -53,20 +52,14 @@ class TextLayout:
     decimal: Decimal
     names: list[str]
     """Names of the columns; their positions if there is no header."""
-    rows: list[list[str]]
-    """Cells of the first records; the last record may be incomplete."""
-    comments: tuple[str, ...]
-    """Prefixes of comment lines."""
-    skipped: tuple[bytes, ...]
-    """The first lines that are skipped because of ``skip_lines``."""
-    header: bytes
-    """The line of names; empty if there is none."""
-    preamble: tuple[bytes, ...]
-    """The lines before the first record, with the comments."""
+    rows: list[list[str]]  # cells of the first records; the last record may be incomplete
+    comments: tuple[str, ...]  # prefixes of comment lines
+    skipped: tuple[bytes, ...]  # the first lines that are skipped because of `skip_lines`
+    header: bytes  # the line of names; empty if there is none
+    preamble: tuple[bytes, ...]  # the lines before the first record, with the comments
     passed_over: tuple[tuple[int, str], ...]
     """Number and text of the lines before the first record that are neither names nor units."""
-    blank_is_missing: bool
-    """A blank line among the records is a record with one empty cell."""
+    blank_is_missing: bool  # a blank line among the records is a record with one empty cell
 
     def position(self, column: Column, key: str) -> int:
         """Return the position, from 0, of a column; raise `RecordingError` if none, or two."""

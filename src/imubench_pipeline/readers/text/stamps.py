@@ -19,8 +19,7 @@ from imubench_pipeline.readers.text.cells import is_missing
 from imubench_pipeline.readers.text.layout import TextLayout
 from imubench_pipeline.settings.sensor import TimeSource
 
-DAY = 24 * 3600 * 10**9
-"""Length of a day, ns."""
+DAY = 24 * 3600 * 10**9  # length of a day, ns
 
 _ISO_STAMP = re.compile(
     r"\d{4}-\d\d-\d\d[T ]\d\d:\d\d(?P<seconds>:\d\d(?:\.\d{1,9})?)?(?P<zone>Z|[+-]\d\d(?::?\d\d)?)?"

@@ -14,9 +14,7 @@ from numba import njit
 from imubench_pipeline.recordings.quality.repeats import Repeats
 from imubench_pipeline.typing import Array
 
-MIN_BLOCK_SIZE = 256
-"""Records of a block, until there are `2 * _MAX_BLOCKS` blocks."""
-
+MIN_BLOCK_SIZE = 256  # records of a block, until there are `2 * _MAX_BLOCKS` blocks
 _MAX_BLOCKS = 1 << 15  # pairs of blocks are merged when there are twice this number
 
 
@@ -91,9 +89,7 @@ def compute_finite_median(values: Array) -> float:
     return float(np.median(present)) if len(present) else float("nan")
 
 
-PIECE_SIZE = 4096
-"""Records of a piece."""
-
+PIECE_SIZE = 4096  # records of a piece
 MAX_PIECES = 16
 """Number of pieces at which every second one is dropped; a shorter log is stored completely."""
 
@@ -162,8 +158,7 @@ def pair_common_samples(first: list[Excerpt], other: list[Excerpt]) -> list[tupl
     return pairs
 
 
-MAX_MEASUREMENT = 1e30
-"""Largest magnitude of a measurement, SI. Larger values count as infinite."""
+MAX_MEASUREMENT = 1e30  # largest magnitude of a measurement, SI. Larger values count as infinite.
 
 # Indices of the state of a column
 
@@ -177,9 +172,7 @@ _BLOCK_LOWEST, _BLOCK_HIGHEST, _BLOCK_SHIFT = range(23, 26)
 _GAP_LENGTH, _LONGEST_GAP, _GAP_END = range(26, 29)
 _STATE_SIZE = 29
 
-FAR_LAG = 64
-"""Lag, samples, at which low-passed noise is uncorrelated for all usual low-passes."""
-
+FAR_LAG = 64  # lag, samples, at which low-passed noise is uncorrelated for all usual low-passes
 _MAX_RATIO_OF_ONE_STEP = 1.5
 """Largest ratio of a change to the smallest step that counts as one step: steps of rounded values
 may differ by a digit."""

@@ -57,8 +57,7 @@ _TABLES_OF_STEP: dict[str, tuple[str, ...]] = {
     "reconstruct": (),
 }
 """Output tables of each step."""
-_MIN_REPORTED_TIME = 3.0
-"""Steps that take longer, s, are reported."""
+_MIN_REPORTED_TIME = 3.0  # steps that take longer, s, are reported
 
 
 class Analysis:

@@ -10,8 +10,7 @@ from imubench_pipeline.estimators.compilation import compile_kernels
 from imubench_pipeline.readers.bounded import Bounded
 
 _MAX_COMPILE_TIME, _MAX_COMPILE_MEMORY = 600.0, 4 << 30
-_MESSAGE_DELAY = 3.0
-"""Delay of the message about the compilation, s."""
+_MESSAGE_DELAY = 3.0  # delay of the message about the compilation, s
 
 
 class Compilation:
