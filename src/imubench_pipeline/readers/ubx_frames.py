@@ -44,7 +44,11 @@ class Frames:
             ended = not block
             self.read += len(block)
             data += block
-            first, second = _cumulate_checksums(data)
+            # Sums of all bytes before each position, and sums of these, modulo 256. The checksum of
+            # a message (8-bit Fletcher) is a difference of them: false sync bytes cost no time.
+            sums = np.cumsum(np.frombuffer(data, np.uint8), dtype=np.uint8)
+            first = b"\0" + sums.tobytes()
+            second = b"\0" + np.cumsum(sums, dtype=np.uint8).tobytes()
             at = 0
             while (sync := data.find(_SYNC_BYTES, at)) >= 0:
                 at = sync
@@ -72,14 +76,3 @@ class Frames:
                 # The last byte may be the first byte of the next message.
                 at = max(at, len(data) - 1)
             data = data[at:]
-
-
-def _cumulate_checksums(data: bytes) -> tuple[bytes, bytes]:
-    """Return the sums of all bytes before each position, and the sums of these, modulo 256.
-
-    The checksum of a message (8-bit Fletcher) follows from differences of the sums. False sync
-    bytes therefore cost no time.
-    """
-    first = np.cumsum(np.frombuffer(data, np.uint8), dtype=np.uint8)
-    second = np.cumsum(first, dtype=np.uint8)
-    return b"\0" + first.tobytes(), b"\0" + second.tobytes()

@@ -270,7 +270,13 @@ class VectorNavFile(LogFile):
 
     def batches(self) -> Iterator[Batch]:
         """Yield the records in the order of the file (see `LogFile.batches`)."""
-        self._check_time()
+        stated = self.log.time
+        if stated is not None and stated.column not in (HOST_TIME, COUNTER):
+            raise RecordingError(
+                f"{self.path.name}: no time column {stated.column!r}; a VectorNav log has "
+                f"{HOST_TIME!r}, a stamp before the '$', and {COUNTER!r}, the figure after 'T' at "
+                "the end; mend 'column' of 'time', or drop 'time' and state 'rate'"
+            )
         kind = self._kind()
         records = Sentences(kind, self.log.time is not None)
         positions = {
@@ -317,7 +323,19 @@ class VectorNavFile(LogFile):
             )
         if len(able) == 1:
             return able[0]
-        present = self._present()
+        # The names of the sentences at the beginning of the file
+        names: Counter[str] = Counter()
+        for text in read_lines(self.path, []):
+            pieces = [piece.rpartition(b"*") for piece in text.replace(b"\n", b"$").split(b"$")]
+            right = verify_checksums([p[0] for p in pieces], [p[2].rstrip() for p in pieces])
+            names.update(
+                piece[0].partition(b",")[0].decode("ascii", "replace")
+                for good, piece in zip(right, pieces, strict=True)
+                if good and piece[0]
+            )
+            if names.total() >= _MAX_PROBED_SENTENCES:
+                break
+        present = set(names)
         both = [kind for kind in able if kind in present]
         if len(both) == 1:
             return both[0]
@@ -332,30 +350,6 @@ class VectorNavFile(LogFile):
             f"{self.path.name}: {' and '.join(both)} both hold the columns; say which in the "
             f"sensor file, as in 'column: {both[0]}.{FIELDS[both[0]][-1]}'"
         )
-
-    def _present(self) -> set[str]:
-        """Return the names of the sentences at the beginning of the file."""
-        names: Counter[str] = Counter()
-        for text in read_lines(self.path, []):
-            pieces = [piece.rpartition(b"*") for piece in text.replace(b"\n", b"$").split(b"$")]
-            right = verify_checksums([p[0] for p in pieces], [p[2].rstrip() for p in pieces])
-            names.update(
-                piece[0].partition(b",")[0].decode("ascii", "replace")
-                for good, piece in zip(right, pieces, strict=True)
-                if good and piece[0]
-            )
-            if names.total() >= _MAX_PROBED_SENTENCES:
-                break
-        return set(names)
-
-    def _check_time(self) -> None:
-        time = self.log.time
-        if time is not None and time.column not in (HOST_TIME, COUNTER):
-            raise RecordingError(
-                f"{self.path.name}: no time column {time.column!r}; a VectorNav log has "
-                f"{HOST_TIME!r}, a stamp before the '$', and {COUNTER!r}, the figure after 'T' at "
-                "the end; mend 'column' of 'time', or drop 'time' and state 'rate'"
-            )
 
     def _stamps(self, rows: list[Row]) -> tuple[NDArray[Any], NDArray[np.bool_]]:
         """Return the stamps of some records, and a mask of the missing ones."""

@@ -101,7 +101,21 @@ class LogHandler(LogHandlerBase):
         about: Mapping[str, Any] = record.__dict__
         event = about.get("event")
         if event == LogEvent.JOB_INFO:
-            self._start_job(about)
+            wildcards: Mapping[str, Any] = about.get("wildcards") or {}
+            label = fold_text(f"{about.get('rule_name')} {'/'.join(map(str, wildcards.values()))}")
+            self._running[about["jobid"]] = (label, time.monotonic())
+            if wildcards.get("sensor") and wildcards.get("recording"):
+                self._of[about["jobid"]] = str(wildcards["sensor"]), str(wildcards["recording"])
+            if self._live is None and self._moves:
+                self._live = Live(
+                    get_renderable=self._make_line,
+                    console=self._console,
+                    transient=True,
+                    redirect_stdout=False,
+                    redirect_stderr=False,
+                    refresh_per_second=4,
+                )
+                self._live.start()
         elif event == LogEvent.JOB_FINISHED:
             self._end_job(about.get("job_id"))
         elif event == LogEvent.PROGRESS:
@@ -128,23 +142,6 @@ class LogHandler(LogHandlerBase):
 
     def _print(self, text: str, style: str = "") -> None:
         self._console.print(Text(text, style=style), soft_wrap=True)
-
-    def _start_job(self, about: Mapping[str, Any]) -> None:
-        wildcards: Mapping[str, Any] = about.get("wildcards") or {}
-        label = fold_text(f"{about.get('rule_name')} {'/'.join(map(str, wildcards.values()))}")
-        self._running[about["jobid"]] = (label, time.monotonic())
-        if wildcards.get("sensor") and wildcards.get("recording"):
-            self._of[about["jobid"]] = str(wildcards["sensor"]), str(wildcards["recording"])
-        if self._live is None and self._moves:
-            self._live = Live(
-                get_renderable=self._make_line,
-                console=self._console,
-                transient=True,
-                redirect_stdout=False,
-                redirect_stderr=False,
-                refresh_per_second=4,
-            )
-            self._live.start()
 
     def _end_job(self, job: int | None) -> None:
         if job is not None:

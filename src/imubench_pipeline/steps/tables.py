@@ -19,11 +19,8 @@ def join_all_tables(parts: Mapping[str, Sequence[Path]]) -> dict[str, pa.Table]:
     for name, paths in parts.items():
         joined[name], failed = read_with_failures(name, paths)
         failures |= dict.fromkeys(failed)
-    return _remove_simulated(mark_failures(joined, list(failures)))
-
-
-def _remove_simulated(tables: dict[str, pa.Table]) -> dict[str, pa.Table]:
-    """Return tables in which no simulated recording decides beside measured ones of any sensor."""
+    # Tables in which no simulated recording decides beside measured ones of any sensor
+    tables = mark_failures(joined, list(failures))
     recordings, new = exclude_simulated(RecordingRow.rows_of(tables["recordings"]))
     if not new:
         return tables

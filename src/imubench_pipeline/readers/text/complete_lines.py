@@ -154,7 +154,18 @@ class CompleteLines:
         """Return the next complete lines; empty if the next line is not yet complete."""
         block = self._text.read(max(size - len(self.rest), _READ_BLOCK))
         if not block:
-            return self._end()
+            # The lines after the last line feed that end in carriage returns
+            self._ended = True
+            cut = self.rest.rfind(b"\r", 0, len(self.rest.rstrip(b"\r"))) + 1
+            if cut and self.rest.endswith(b"\r"):
+                cut = len(self.rest)
+            lines, self.rest = self.rest[:cut].replace(b"\r", b"\n"), self.rest[cut:]
+            if self._text.bytes.ended_early:
+                self._findings.append(make_truncation_finding(self._path))
+            if self.rest.strip(b"\0\r\n\t "):
+                shown = self.rest.strip(b"\0")[:60].decode("utf-8", "replace")
+                self._findings.append(find(IncompleteLastRecord(self._path.name, shown), "note", 1))
+            return lines
         cut = block.rfind(b"\n") + 1
         if not cut:
             self.rest += block
@@ -175,20 +186,6 @@ class CompleteLines:
         total = zeros.count * self._text.letter + self._text.bytes.omitted
         where = f"line {zeros.first[1]}"
         return zeros.finding(self._path.name, where, total, damaged=damaged, shifted=shifted)
-
-    def _end(self) -> bytes:
-        """Return the lines after the last line feed that end in carriage returns."""
-        self._ended = True
-        cut = self.rest.rfind(b"\r", 0, len(self.rest.rstrip(b"\r"))) + 1
-        if cut and self.rest.endswith(b"\r"):
-            cut = len(self.rest)
-        lines, self.rest = self.rest[:cut].replace(b"\r", b"\n"), self.rest[cut:]
-        if self._text.bytes.ended_early:
-            self._findings.append(make_truncation_finding(self._path))
-        if self.rest.strip(b"\0\r\n\t "):
-            shown = self.rest.strip(b"\0")[:60].decode("utf-8", "replace")
-            self._findings.append(find(IncompleteLastRecord(self._path.name, shown), "note", 1))
-        return lines
 
 
 def describe_missing_text(path: Path) -> str:
@@ -267,7 +264,19 @@ class Records:
         """Return the records of complete lines."""
         # Before the comments, since the header may be a comment.
         if self._header and self._telling in lines and self._header in lines:
-            lines = self._without_headers(lines)
+            records = []
+            for line in lines[:-1].split(b"\n"):
+                text = line.rstrip(b"\r").lstrip(b"\0")
+                if text == self._header:
+                    self.restarts += 1
+                elif text in self._preamble:
+                    continue
+                elif text.endswith(self._begins):
+                    self.restarts += text.endswith(self._header)
+                    self.cut += 1
+                else:
+                    records.append(line + b"\n")
+            lines = b"".join(records)
         if b"\0" in lines:
             lines = _LINE_WITH_ZEROS.sub(self._left_out, lines)
         for sign in self._comments:
@@ -301,21 +310,6 @@ class Records:
         before = _MISSING_CELL * self._blank
         self._blank = after - 1
         return before + _BLANK_LINES.sub(_MISSING_CELL, ended) + b"\n"
-
-    def _without_headers(self, lines: bytes) -> bytes:
-        records = []
-        for line in lines[:-1].split(b"\n"):
-            text = line.rstrip(b"\r").lstrip(b"\0")
-            if text == self._header:
-                self.restarts += 1
-            elif text in self._preamble:
-                continue
-            elif text.endswith(self._begins):
-                self.restarts += text.endswith(self._header)
-                self.cut += 1
-            else:
-                records.append(line + b"\n")
-        return b"".join(records)
 
 
 def _merge_spaces(lines: bytes) -> bytes:

@@ -172,7 +172,9 @@ class CsvFile(LogFile):
                         if value is not None and _SECOND_SIXTY.search(value[1] or ""):
                             raise _SecondSixtyError from None
                     raise self._explained(error, fault, layout, time) from None
-            self._note_zeros(lines, records.damaged)
+            shifted = records.damaged > 0 and self.log.time is None
+            if (finding := lines.zeros(records.damaged, shifted=shifted)) is not None:
+                self.findings.append(finding)
         if fault.row is not None:
             data = files.IncompleteLastRecord(
                 self.path.name,
@@ -189,11 +191,6 @@ class CsvFile(LogFile):
         if records.restarts:
             data = files.RestartedLog(self.path.name, records.restarts, records.cut)
             self.note(data, records.restarts, "note")
-
-    def _note_zeros(self, lines: CompleteLines, damaged: int) -> None:
-        shifted = damaged > 0 and self.log.time is None
-        if (finding := lines.zeros(damaged, shifted=shifted)) is not None:
-            self.findings.append(finding)
 
     def _wrong_width(self, row: pacsv.InvalidRow, layout: TextLayout) -> RecordingError:
         return RecordingError(

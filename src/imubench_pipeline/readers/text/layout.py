@@ -138,7 +138,13 @@ class _Search:
         if self._lines:
             refuse_other_formats(self._file, self._lines[0].raw)
             begin = b"\n".join(line.raw for line in self._lines[:_SCORED_LINES])
-            refuse_control_characters(self._file, self._lines[0].number, begin)
+            controls = len(begin) - len(begin.translate(None, _CONTROL_CHARACTERS))
+            if controls > max(_MAX_CONTROLS, _MAX_CONTROL_SHARE * len(begin)):
+                raise RecordingError(
+                    f"{self._file}, line {self._lines[0].number}: holds binary data of no known "
+                    f"format, the bytes {begin[:8].hex(' ')} (hexadecimal) and so on; expected "
+                    "text, or a log of a format that 'imubench formats' lists: export it as CSV"
+                )
         split = max(self._splits(), key=self._likelihood)
         comments, lines = self._parted(split)
         if not lines:
@@ -407,17 +413,6 @@ def refuse_other_formats(file: str, line: bytes) -> None:
         raise RecordingError(
             f"{file}: is JSON, which begins with {shown!r}; expected a line a record: export the "
             "log as CSV"
-        )
-
-
-def refuse_control_characters(file: str, number: int, begin: bytes) -> None:
-    """Raise `RecordingError` if a log begins with many control characters, unlike text."""
-    controls = len(begin) - len(begin.translate(None, _CONTROL_CHARACTERS))
-    if controls > max(_MAX_CONTROLS, _MAX_CONTROL_SHARE * len(begin)):
-        raise RecordingError(
-            f"{file}, line {number}: holds binary data of no known format, the bytes "
-            f"{begin[:8].hex(' ')} (hexadecimal) and so on; expected text, or a log of a format "
-            "that 'imubench formats' lists: export it as CSV"
         )
 
 

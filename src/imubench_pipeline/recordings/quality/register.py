@@ -83,7 +83,23 @@ def _find_hidden_step(values: Array) -> float | None:
     lengths = np.unique(gaps)
     apart = np.concatenate((lengths[:1], np.diff(lengths)))
     digit = float(apart[apart > least_sure].min())
-    return _resolve_mirror_frequency(levels, counts, digit, frequency)
+    # The step of a peak. For values on multiples of d, A is equal at f and at 1 / d - f
+    multiples = (levels - levels[0]) / digit
+    if np.abs(multiples - np.round(multiples)).max() > 0.05:
+        # The values are not on multiples of a digit.
+        scatter = 0.25 / frequency
+        return 1.0 / frequency if _is_explained(levels, counts, frequency, scatter) else None
+    height = _evaluate_height(levels, counts, frequency)
+    heights = {
+        f: float(np.sinc(digit * f))
+        for f in (frequency, 1.0 / digit - frequency)
+        if 0.0 < digit * f < _MAX_DIGIT_OVER_STEP
+    }
+    if not heights:
+        return None
+    best = min(heights, key=lambda f: abs(heights[f] - height))
+    sure = abs(heights[best] - height) < _HEIGHT_TOLERANCE
+    return 1.0 / best if sure and _is_explained(levels, counts, best, 0.6 * digit) else None
 
 
 def _find_peak(levels: Array, counts: NDArray[np.int64], sigma: float) -> float | None:
@@ -108,28 +124,6 @@ def _find_peak(levels: Array, counts: NDArray[np.int64], sigma: float) -> float 
 def _evaluate_height(levels: Array, counts: NDArray[np.int64], frequency: float) -> float:
     turned = np.exp(2j * np.pi * frequency * (levels - levels[0]))
     return float(np.abs(counts @ turned) / counts.sum())
-
-
-def _resolve_mirror_frequency(
-    levels: Array, counts: NDArray[np.int64], digit: float, frequency: float
-) -> float | None:
-    """Return the step of a peak. For values on multiples of d, A is equal at f and at 1 / d - f."""
-    multiples = (levels - levels[0]) / digit
-    if np.abs(multiples - np.round(multiples)).max() > 0.05:
-        # The values are not on multiples of a digit.
-        scatter = 0.25 / frequency
-        return 1.0 / frequency if _is_explained(levels, counts, frequency, scatter) else None
-    height = _evaluate_height(levels, counts, frequency)
-    heights = {
-        f: float(np.sinc(digit * f))
-        for f in (frequency, 1.0 / digit - frequency)
-        if 0.0 < digit * f < _MAX_DIGIT_OVER_STEP
-    }
-    if not heights:
-        return None
-    best = min(heights, key=lambda f: abs(heights[f] - height))
-    sure = abs(heights[best] - height) < _HEIGHT_TOLERANCE
-    return 1.0 / best if sure and _is_explained(levels, counts, best, 0.6 * digit) else None
 
 
 def _is_explained(
