@@ -35,13 +35,8 @@ __all__ = ["Batch", "LogFile", "RecordingError", "find_only_log", "is_endless", 
 def log_files(path: Path) -> list[Path]:
     """Return the files of a recording: the file itself, or the visible files of its folder.
 
-    Broken links to files are included; links to folders are not followed.
-
-    Raises
-    ------
-    OSError
-        If the path is a device or a named pipe, which may never end, or if a folder cannot be
-        listed.
+    Broken links to files are included; links to folders are not followed. Raise an OSError if the
+    ``path`` is a device or a named pipe, which may never end, or a folder cannot be listed.
     """
     if is_endless(path):
         raise OSError(errno.EINVAL, "it is neither a file nor a folder")

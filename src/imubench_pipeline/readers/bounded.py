@@ -32,10 +32,7 @@ the meantime would keep the pipe open."""
 
 
 class BoundError(Exception):
-    """The function exceeded its limit of memory or time.
-
-    ``is_external``: the reason lies outside of it: it waited, as for a disk, or was killed.
-    """
+    """The function exceeded a limit; ``is_external``: it waited, as for a disk, or was killed."""
 
     def __init__(self, text: str, *, is_external: bool = False) -> None:
         super().__init__(text)
@@ -43,10 +40,9 @@ class BoundError(Exception):
 
 
 def limit_memory(more: int) -> None:
-    """Limit the additional memory of this process to ``more`` bytes, on Linux.
+    """Limit the additional memory of this process to ``more`` bytes, on Linux; more is an error.
 
-    Larger allocations fail, which the libraries report as an error. Unlike RLIMIT_AS, the limit
-    does not count reserved addresses, of which Arrow and numba have many.
+    Unlike RLIMIT_AS, this does not count reserved addresses, of which Arrow and numba have many.
     """
     if sys.platform != "linux":
         return
@@ -62,22 +58,9 @@ def run_bounded(
 ) -> T:
     """Return the result of a function in a process of its own, with limits of time and memory.
 
-    Parameters
-    ----------
-    seconds : float
-        Time limit. On a busy machine it applies to the time of a core, and the real time may be
-        five times as long.
-    memory : int
-        Additional memory, bytes.
-    function : callable
-        Its result or exception is pickled.
-    *arguments, **named
-        Its arguments.
-
-    Raises
-    ------
-    BoundError
-        If a limit is exceeded, or the system ends the process.
+    ``seconds``: on a busy machine they are of a core, and the real time may be five times as long.
+    ``memory``: additional bytes. The result or the exception of the function is pickled. Raise a
+    `BoundError` if a limit is exceeded, or the system ends the process.
     """
     return Bounded(memory, function, *arguments, **named).result(seconds)
 
@@ -124,8 +107,8 @@ class Bounded(Generic[T]):
     def result(self, seconds: float) -> T:
         """Return the result of the function, or raise its exception; to be called once.
 
-        Raise `BoundError` if a limit is exceeded (see `run_bounded`; ``seconds`` count from now),
-        or if the system ends the process.
+        Raise `BoundError` if a limit is exceeded within ``seconds`` from now, or the system ends
+        it.
         """
         process = psutil.Process(self._process)
         try:

@@ -40,12 +40,10 @@ _READ_BLOCK = 1 << 16
 
 
 class _CompressedParts:
-    """The decompressed bytes of one or several consecutive compressed parts.
+    """The decompressed bytes of one or several consecutive compressed parts; zeros may follow each.
 
-    Nearly empty parts take time but few bytes of the file: the libraries skip millions of them
-    before they return. Their number is therefore limited.
-
-    ``new`` creates the decompressor of one part. Only zeros may follow a part.
+    The number of nearly empty parts is limited: the libraries skip millions of them before they
+    return. ``new`` creates the decompressor of one part.
     """
 
     def __init__(self, file: FileWithoutHoles, new: Callable[[], Any]) -> None:
@@ -270,10 +268,7 @@ def _make_corrupt_error(name: str, error: Exception) -> RecordingError:
 
 
 def open_bytes(path: Path) -> Bytes:
-    """Open a log: a file, compressed or not, or a member of a zip archive (archive / name).
-
-    Raise `RecordingError` if it cannot be opened, or its compression is not supported.
-    """
+    """Open a log, perhaps compressed or a member of a zip archive, or raise RecordingError."""
     archive = None if path.is_file() else _find_archive(path)
     try:
         with ExitStack() as stack:  # closes the file if it cannot be read
@@ -493,9 +488,9 @@ BLOCK_BYTES = 1 << 20
 def blocks(path: Path, findings: list[Finding], least_zeros: int) -> Iterator[bytes]:
     """Yield the bytes of a log, compressed or not, in blocks of about `BLOCK_BYTES`.
 
-    ``findings`` receives findings about truncated compressed data, and about runs of at least
-    ``least_zeros`` zero bytes, which no logger writes.
-    Raise `RecordingError` if the file cannot be opened, or compressed data are corrupt.
+    ``findings`` receives findings about truncated compressed data, and about runs of
+    ``least_zeros`` zero bytes. Raise `RecordingError` if the file cannot be opened, or compressed
+    data are corrupt.
     """
     zeros = ZeroRuns(least_zeros)
     with closing(open_bytes(path)) as stream:

@@ -34,10 +34,7 @@ class Contents:
 
 
 def list_contents(path: Path) -> Contents:
-    """Return the contents of a recording, from the beginning of each of its files.
-
-    Raise `RecordingError` if it cannot be read, or has no data.
-    """
+    """Return the contents of a recording from its beginning; RecordingError without data."""
     if not path.exists():
         raise RecordingError(f"{path.name}: no such file or folder; expected a log")
     if path.is_dir() and recognise_folder(path) is None:

@@ -83,10 +83,7 @@ class FileFormat:
             raise RecordingError(str(error)) from None
 
     def tables(self, path: Path) -> list[LogTable]:
-        """Return the tables of a log (a file, or a member of a zip archive), from its beginning.
-
-        Raise `RecordingError` if it cannot be read, or has no data.
-        """
+        """Return the tables of a log, from its beginning; RecordingError if it cannot be read."""
         return self.load().tables(path, self)
 
 

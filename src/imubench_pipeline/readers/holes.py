@@ -19,10 +19,7 @@ _REPLACEMENT_ZEROS = 512  # bytes: the zeros that are returned in place of a lon
 
 
 def find_next_data(descriptor: int, offset: int) -> int | None:
-    """Return the offset of the first stored byte at or after an offset; None if there is none.
-
-    Without support of the system, every byte counts as stored. The position of the file changes.
-    """
+    """Return the offset of the first stored byte from an offset on, or None; moves the file."""
     if not hasattr(os, "SEEK_DATA"):
         return offset
     try:
@@ -125,11 +122,11 @@ class ZeroRuns:
     def finding(
         self, name: str, where: str, total: int, *, damaged: int = 0, shifted: bool = False
     ) -> Finding | None:
-        """Return the finding about the zero bytes; None if there are none.
+        """Return the finding about the zero bytes of the file ``name``; None if there are none.
 
-        ``name``: name of the file. ``where``: place of the first run. ``total``: number of zero
-        bytes, with those in holes (`FileWithoutHoles`). ``damaged``: number of lines with
-        zeros between their letters. ``shifted``: later samples are shifted in time.
+        ``where``: place of the first run. ``total``: number with those in holes
+        (`FileWithoutHoles`). ``damaged``: lines with zeros between their letters. ``shifted``:
+        later samples are shifted in time.
         """
         if not self.count:
             return None

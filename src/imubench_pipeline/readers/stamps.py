@@ -21,8 +21,7 @@ _YEAR_2100 = 4_102_444_800 * 10**9
 class Clock:
     """Converts the stamps of a file to s since the first one, and sets its ``started``.
 
-    ``wraps``: value at which stamps wrap to 0, in their unit; None: they do not wrap.
-    ``started``: returns ISO 8601 date and time of the first stamp; None if the stamp is no date.
+    ``wraps``: value at which stamps wrap to 0, or None. ``started``: returns the date of the first.
     """
 
     def __init__(
@@ -65,11 +64,9 @@ class WrapState:
 def unwrap(stamps: NDArray[Any], wraps: float, state: WrapState) -> NDArray[Any]:
     """Unwrap the stamps of a counter; int64 for integers, exact, else float64 with NaN if missing.
 
-    A step back by more than half of ``wraps`` is a wrap. A step forward by more than half is a late
-    record from before the wrap, or a damaged stamp, which then does not affect the others.
-
-    ``wraps``: value at which the counter wraps to 0, in the unit of the stamps.
-    ``state``: state between blocks; changed in place.
+    A step back by more than half of ``wraps``, the value at which the counter wraps to 0, is a
+    wrap. A step forward by more than half is a late record, or a damaged stamp, which does not
+    affect the others. ``state``: between blocks; changed in place.
     """
     whole = stamps.dtype.kind in "iu" and float(wraps).is_integer()
     going_on = stamps.astype(np.int64 if whole else np.float64)

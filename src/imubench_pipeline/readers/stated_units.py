@@ -43,10 +43,7 @@ _SPELLINGS: dict[str, tuple[tuple[str, str], ...]] = {
 
 
 def parse_unit(text: str, dimension: str) -> str | None:
-    """Return the unit of a text, such as ``m_s2`` or ``dps``, in the notation of a sensor file.
-
-    None if the text is no known unit of the dimension, a key of `imubench_pipeline.units.SI_UNITS`.
-    """
+    """Return the unit of a text, such as ``m_s2``, as in a sensor file; None if it is unknown."""
     text = text.strip()
     if not text or len(text) > _MAX_UNIT_LENGTH:
         return None
@@ -106,10 +103,7 @@ class StatedUnit:
 
 
 def find_stated_unit(channel: str, text: str | None, where: str, label: str) -> StatedUnit | None:
-    """Return the unit that a log states for a channel; None if there is no known unit.
-
-    ``text``, ``where``: text in the place of the unit, and a description of this place.
-    """
+    """Return the unit that a log states for a channel in ``text`` or ``label``; None if unknown."""
     if channel not in CHANNELS:
         return None
     dimension = QUANTITIES[quantity_of(channel)]

@@ -369,8 +369,7 @@ def _group_records(
 ) -> int:
     """Fill records; return the number of complete ones.
 
-    A record begins with the first column of the log, or with a column that repeats (the first
-    column was lost then). ``state``: the first column, and whether a record is open.
+    ``state``: the first column of the log, which begins a record, and whether a record is open.
     """
     count = 0
     for i in range(columns.size):

@@ -166,8 +166,8 @@ def find_position(kind: str, column: str | int) -> int:
 def read_lines(path: Path, findings: list[Finding]) -> Iterator[bytes]:
     """Yield the text of a log in blocks of complete lines.
 
-    A last line without its line break is used if its checksum is right. Otherwise the end of the
-    recording truncated it, which is reported in ``findings``.
+    A last line without its line break is used if its checksum is right, else reported in
+    ``findings``.
     """
     rest = b""
     for block in blocks(path, findings, _MIN_ZEROS):

@@ -42,10 +42,9 @@ def assemble(
     metadata: dict[str, Any],
     path: Path,
 ) -> tuple[Path, dict[str, int]]:
-    """Write the columns of the files that share a clock to one Parquet file.
+    """Write the columns of files that share a clock to ``path``, unless one can be used unchanged.
 
-    The file is ``path``, unless the file of a part can be used unchanged. Return its path, and the
-    number of samples of each column that are left out because they repeat a stamp.
+    Return the path, and the samples of each column that are left out because they repeat a stamp.
     """
     for part in parts:
         part.writer.finish(metadata)
@@ -97,9 +96,7 @@ def _read_columns(parts: list[Part]) -> Iterator[dict[str, NDArray[Any]]]:
 def count_samples(
     path: Path, parts: list[Part], repeated: Mapping[str, int]
 ) -> dict[str, dict[str, int]]:
-    """Return the number of samples of each column that were used and left out, by reason.
-
-    For the assembled file and the repeated samples see `assemble`.
+    """Return how many samples of each column are used and left out, by reason (see `assemble`).
 
     Raises RuntimeError if the numbers do not add up, which is an error of this program.
     """

@@ -28,16 +28,14 @@ _ABSENT = frozenset({errno.ENOENT, errno.ENOTDIR})
 
 @contextmanager
 def watch_log(source: Path, planned: Collection[str] = ()) -> Iterator[Callable[[], bool]]:
-    """Let a `RecordingError` pass only where it is a property of the log.
+    """Let a `RecordingError` pass only where it is a property of the log, which may change.
 
-    It gives a function that returns whether the log is still the one that was there at first.
-    ``source``: the log file, or the folder of a recording. ``planned``: the files that the plan
-    found there, by their place in the log.
+    The function that is yielded returns whether the log is still the one that was there at first.
+    ``planned``: the files that the plan found there, by their place in the log.
 
     Raises RecordingError if the path itself cannot be used, such as a link to itself or an empty
-    folder. Raises UnavailableError if the log is not there, cannot be read for a reason outside of
-    it, or changed while it was rejected. Raises OSError if a disk is full, or there are too many
-    open files.
+    folder; UnavailableError if the log is not there, cannot be read for a reason outside of it, or
+    changed while it was rejected; OSError if a disk is full, or there are too many open files.
     """
     try:
         before = read_identity(source)

@@ -63,10 +63,9 @@ class Recording:
     def inputs(self) -> list[Path]:
         """Files whose date decides whether Snakemake reads the recording again.
 
-        Logs and notes are not among them: their content is in the settings of the ingest. A log may
-        have any date, of the future with a wrong clock of its logger, or of long ago if it was
-        moved here. If the recording is held back, the file does not exist but its results do:
-        Snakemake leaves them as they are.
+        The content of logs and notes is in the settings of the ingest instead, as they may have any
+        date. If the recording is held back, the file does not exist but its results do: Snakemake
+        leaves them.
         """
         if self.held_back:
             return [self.path / "held back"]
@@ -86,8 +85,7 @@ class FoundFile:
 def find_logs(logs: Path) -> list[Recording]:
     """Return the recordings of a drop zone, in order; two logs of one name are there twice.
 
-    Logs in no folder of a sensor are among them, with the reason why they cannot be analysed.
-    `account_for` has all other files.
+    Logs in no folder of a sensor have the reason why they cannot be analysed.
     """
     recordings: list[Recording] = []
     for path in _shown(logs):
@@ -108,10 +106,7 @@ def find_logs(logs: Path) -> list[Recording]:
 def account_for(
     logs: Path, recordings: Iterable[Recording], held_back: Iterable[Recording] = ()
 ) -> list[FoundFile]:
-    """Return every file in the drop zone once, with its recording, or why it is skipped.
-
-    ``held_back``: recordings that the run leaves alone because they are still being written.
-    """
+    """Return every file once, with its recording, or why it is skipped, such as ``held_back``."""
     owners = {file: recording for recording in recordings for file in recording.files}
     waiting = {file for recording in held_back for file in recording.files}
     found = []

@@ -131,10 +131,7 @@ def doubt_unsold_sensors(
 
 
 def doubt_simulated_recordings(recordings: Sequence[RecordingRow]) -> Iterator[Doubt]:
-    """Yield a doubt for each simulated recording, where any measured one was analysed.
-
-    ``recordings``: of one sensor or of all.
-    """
+    """Yield a doubt for each simulated recording, where any measured one was analysed."""
     reason = texts.SIMULATED_BESIDE_MEASURED
     if any(row.status == "ok" and not row.simulated for row in recordings):
         for row in recordings:
@@ -145,8 +142,7 @@ def doubt_simulated_recordings(recordings: Sequence[RecordingRow]) -> Iterator[D
 def exclude_simulated(recordings: Sequence[RecordingRow]) -> tuple[list[RecordingRow], list[Doubt]]:
     """Return the recordings of all sensors, judged anew, and the doubts that are new.
 
-    Sensors are judged each by itself: a simulated recording of one decides until a measured one of
-    another is known.
+    A simulated recording of one sensor decides until a measured one of another sensor is known.
     """
     known = {_key(row) for row in recordings if any(d.code == BESIDE_MEASURED for d in row.doubts)}
     new = [
@@ -180,10 +176,7 @@ def judge_fitness(of_recording: Iterable[Doubt]) -> Fitness:
 def judge_recordings(
     recordings: Sequence[RecordingRow], doubts: Iterable[Doubt], included: Collection[str]
 ) -> list[RecordingRow]:
-    """Return the rows of recordings with whether they decide, and their doubts.
-
-    ``included``: recordings that decide although they are unfit, as ``sensor/recording``.
-    """
+    """Return rows of recordings with whether they decide, as ``included`` do, and their doubts."""
     by_recording: dict[Key, list[Doubt]] = defaultdict(list)
     for doubt in doubts:
         by_recording[doubt.sensor, doubt.recording].append(doubt)
@@ -219,10 +212,7 @@ def list_excluded(recordings: Iterable[RecordingRow]) -> dict[Key, tuple[DoubtMa
 
 
 def mask_excluded(rows: Iterable[Estimated], not_deciding: Collection[Key]) -> Iterator[Estimated]:
-    """Yield rows of estimates, without the values of recordings that do not decide.
-
-    A mean that is left out is NaN, as a row of it has a value.
-    """
+    """Yield rows of estimates, without values (a mean is NaN) of recordings that do not decide."""
     for row in rows:
         if _key(row) not in not_deciding:
             yield row
@@ -237,10 +227,7 @@ def attach_doubts(
     recordings: Iterable[RecordingRow],
     named: Collection[tuple[str, str]] = (("sensor", "recording"),),
 ) -> Iterator[Doubted]:
-    """Yield rows with the codes of the doubts about their recordings.
-
-    ``named``: the columns of sensor and recording of each recording of a row.
-    """
+    """Yield rows with the doubts about their recordings, which the columns ``named`` name."""
     by_recording: dict[tuple[str, str | None], list[str]] = {
         _key(row): [doubt.code for doubt in row.doubts] for row in recordings
     }

@@ -380,9 +380,9 @@ def ingest_as_planned(
 
 
 def write_failed(settings: str, failure: Failure, path: Path) -> None:
-    """Write ``path``, the ``quality.json`` of a recording whose ingest failed; remove its samples.
+    """Write the ``quality.json`` of a recording whose ingest failed; remove its samples.
 
-    For the settings see `ingest_as_planned`.
+    `settings` are as of `ingest_as_planned`, `failure` is the reason, `path` the file.
     """
     plan = json.loads(settings)
     notes = plan.get("notes", {})

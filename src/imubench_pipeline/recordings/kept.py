@@ -23,10 +23,9 @@ from imubench_pipeline.tables.parquet import read_footer
 
 @dataclass(frozen=True)
 class Quality:
-    """``quality.json``: the findings of the ingest, and the channels that are analysed.
+    """``quality.json``: the findings of the ingest, the analysed channels, and a digest at its end.
 
-    It contains the digests of the samples, so that it changes with them: the results are computed
-    again even if the run that read the log was stopped in between. Its own digest is at its end.
+    It has the digests of the samples, so that the results are computed again where these change.
     """
 
     recording: dict[str, Any]
@@ -51,10 +50,7 @@ class Quality:
 
     @classmethod
     def read(cls, path: Path) -> Quality:
-        """Read the file that `write` wrote.
-
-        Raises RecordingError if it is damaged.
-        """
+        """Read the file that `write` wrote; raise RecordingError if it is damaged."""
         try:
             content = read_sealed_json(path)
             content["findings"] = [FindingRow.from_json(row) for row in content.get("findings", ())]
@@ -67,10 +63,10 @@ class Quality:
         write_sealed_json(asdict(self), path)
 
     def fault(self, folder: Path, *, whole: bool = False) -> str | None:
-        """Return what is wrong with the samples kept in a folder; None where nothing is seen.
+        """Return the fault of the samples kept in a folder; None where nothing is seen.
 
-        With ``whole`` all is read, otherwise size and metadata only: the checksums of the pages are
-        verified where samples are read.
+        With ``whole`` all is read, otherwise size and metadata only: pages have checksums of their
+        own.
         """
         for name, stated in (self.kept or {}).items():
             path = folder / name
@@ -128,10 +124,8 @@ def _footer(path: Path) -> str:
 def load_logs(folder: Path) -> dict[str, ChannelLog]:
     """Return the channels of a recording that can be analysed, by name; none of a rejected one.
 
-    ``folder`` contains its ``quality.json``.
-
-    Raises RecordingError if files of samples are not there, are not those that the ingest left, or
-    are damaged.
+    ``folder`` contains its ``quality.json``. Raises RecordingError if files of samples are not
+    there, are not those that the ingest left, or are damaged.
     """
     quality = Quality.read(folder / "quality.json")
     if fault := quality.fault(folder):

@@ -100,8 +100,7 @@ def write_known(
 ) -> None:
     """Write the evidence of an ingest to the results of a recording: files by place in the log.
 
-    ``versions`` are as the plan named them. A file that was planned and is not among ``files`` was
-    not there.
+    ``versions``: as the plan named them; a file of the plan that is not in ``files`` was not there.
     """
     if versions is not None:
         absent = {name: KnownFile(None, None, None) for name in versions}
@@ -116,11 +115,9 @@ def write_known(
 def identify_log_files(
     source: Path, is_stopped: Callable[[], bool] = lambda: False
 ) -> dict[str, KnownFile]:
-    """Read all files of a log, and return their identity by their place in the log.
+    """Read all files of a log (file or folder); return their identity by their place in the log.
 
-    ``source``: the log file, or the folder of a recording. ``is_stopped`` is called now and then:
-    whether digests of large files are not needed any more.
-
+    ``is_stopped`` is called now and then: whether digests of large files are not needed any more.
     Raises OSError if the folder cannot be listed.
     """
     return {name: KnownFile.of(file, is_stopped) for name, file in _places(source).items()}
@@ -130,7 +127,6 @@ def read_identity(source: Path) -> dict[str, tuple[int, ...]]:
     """Return size, stamps and inode of the files of a log and of their folder, by their place.
 
     It is another value whenever a file was changed, replaced, renamed, or moved away and back.
-
     Raises OSError if the log is not there, or cannot be listed.
     """
     paths = {".": source} | _places(source)
@@ -144,9 +140,8 @@ def read_identity(source: Path) -> dict[str, tuple[int, ...]]:
 def plan_versions(source: Path, folder: Path) -> dict[str, str]:
     """Return a name of the content of each file of a log; an ingest is needed where it changes.
 
-    It is the name that the last ingest was planned with as long as the evidence of that ingest
-    holds, and another one otherwise. New stamps of unchanged files are noted in ``folder``, the
-    results of the log.
+    It stays as long as the evidence of the last ingest holds. New stamps of unchanged files are
+    noted in ``folder``, the results of the log.
     """
     known = read_known(folder)
     places: dict[str, Path] = {}
@@ -193,10 +188,7 @@ def _now(path: Path, before: KnownFile) -> KnownFile | None:
 
 
 def is_changed(source: Path, folder: Path) -> bool:
-    """Return whether the files of a log have changed since its results in ``folder``.
-
-    False if there are no results.
-    """
+    """Return whether a log has changed since its results in ``folder``; False without any."""
     if (known := read_known(folder)) is None:
         return False
     try:
@@ -226,12 +218,10 @@ def plan_recording_versions(recording: Recording, results: Path) -> dict[str, st
 
 
 def digest_blocks(path: Path) -> str:
-    """Return the size of a file and a digest of it; of a large file, of blocks spread over it.
+    """Return the size of a file and a digest of it; above 1 MB, of 16 blocks spread over it.
 
-    The first and the last block are among them. In a file above 1 MB, a change that leaves the
-    size and all 16 blocks of 4 kB as they are has no effect; the stamps tell that one.
-
-    Raises OSError if it cannot be read.
+    The first and the last block are among them. A change that leaves the size and all blocks as
+    they are has no effect; the stamps tell that one. Raises OSError if it cannot be read.
     """
     digest = hashlib.sha256()
     with _opened(path) as file:
@@ -246,10 +236,9 @@ def digest_blocks(path: Path) -> str:
 
 
 def _digest(path: Path, size: int, is_stopped: Callable[[], bool]) -> str | None:
-    """Return the SHA-256 of a file; None where it was stopped.
+    """Return the SHA-256 of the first `size` bytes of a file; None where it was stopped.
 
-    At most `size` bytes are read: a file of the kernel says that it is empty, and may never end. Of
-    a long hole in a large sparse file, only the last bytes count.
+    A file of the kernel may never end. Of a long hole in a large sparse file, only the end counts.
     """
     digest, is_large = hashlib.sha256(), size > MAX_DIGESTED_SIZE
     is_sparse = is_large and 512 * path.stat().st_blocks < size - MAX_DIGESTED_SIZE

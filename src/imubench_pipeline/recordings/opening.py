@@ -17,13 +17,11 @@ _SLOWEST = 5e6
 
 
 def check_opening(source: Path, log: LogFormat, seconds: float) -> None:
-    """Read the first records of each file of a recording, and no more.
+    """Read the first records of each file of a recording (file or folder), and no more.
 
-    ``source``: the log file, or the folder of a recording.
-    ``seconds``: how long it may take, and a second more for each 5 MB of the log.
-
-    Raises RecordingError if they cannot be read, or that takes longer or more than 512 MiB, or
-    crashes. Raises OSError if the log is not there, or its disk does not answer in that time.
+    ``seconds``: how long it may take, and a second more for each 5 MB of the log. Raises
+    RecordingError if they cannot be read, or that takes longer or more than 512 MiB, or crashes;
+    OSError if the log is not there, or its disk does not answer in that time.
     """
     size = sum(path.stat().st_size for path in log_files(source))
     try:

@@ -57,14 +57,8 @@ def overview(folder: Path, sensor: str, recording: str, buckets: int | None = No
     """Return envelopes and histograms of a kept recording; no row if it was rejected.
 
     Channels that cannot be analysed are left out. The temperature has an envelope alone.
-
-    Parameters
-    ----------
-    folder : Path
-        Folder of its ``log*.parquet``.
-    sensor, recording : str
-    buckets : int, optional
-        Max. intervals of time of an envelope; more by default if the sensor was turned.
+    ``folder``: of its ``log*.parquet``; ``sensor``, ``recording``: names; ``buckets``: max.
+    intervals of time of an envelope; by default more if the sensor was turned.
     """
     result = Overview([], [])
     logs = [*open_channel_logs(folder).values()]
@@ -124,10 +118,7 @@ def _follow(log: ChannelLog, edges: NDArray[np.int64]) -> tuple[Array, Array]:
 
 
 def envelope_rows(times: Array, figures: Array) -> Iterator[dict[str, Any]]:
-    """Yield the rows of the table ``envelope``, without the names.
-
-    The times of the edges, s, have the shape (b + 1,), the figures (b, 4) as in `no_figures`.
-    """
+    """Yield rows of ``envelope``: times of edges, s, shape (b + 1,), figures as in `no_figures`."""
     spans = zip(times[:-1].tolist(), times[1:].tolist(), figures.tolist(), strict=True)
     for start, end, (low, high, total, present) in spans:
         row = {"start": start, "end": end, "samples": int(present)}
@@ -140,11 +131,10 @@ def envelope_rows(times: Array, figures: Array) -> Iterator[dict[str, Any]]:
 def bin_edges(drawn: Array, low: float, high: float) -> Array:
     """Return the edges of the bins of a histogram, SI, increasing, shape (n + 1,).
 
-    The bins are equally wide, over some 6 standard deviations either side. Samples further out are
-    in the first or the last bin, which ends at the lowest or the highest sample. Where the samples
-    have steps, a bin holds a whole number of levels, and no level is on an edge. Where all samples
-    are equal there are two equal edges. ``drawn``: samples that stand for all, in any order, SI.
-    ``low``, ``high``: lowest and highest sample, SI.
+    ``drawn``: samples that stand for all, SI; ``low``, ``high``: extremes of all. The bins are
+    equally wide, over some 6 standard deviations either side; the first and the last end at the
+    extremes. Where the samples have steps, a bin holds a whole number of levels, and no level is on
+    an edge. Where all samples are equal there are two equal edges.
     """
     if low == high:
         return np.array([low, high])
@@ -195,10 +185,7 @@ def _lattice(ordered: Array) -> tuple[float, float] | None:
 
 @njit(cache=True, nogil=True)
 def gather(values: Array, reached: int, edges: NDArray[np.int64], figures: Array) -> None:
-    """Take consecutive grid points from ``reached`` on into their buckets; NaN is missing.
-
-    The values have the shape (n,), the edges of b buckets (b + 1,), the figures (b, 4).
-    """
+    """Take values from ``reached`` on into their buckets, by edges; figures of shape (b, 4)."""
     bucket, begin = 0, 0
     while edges[bucket + 1] <= reached:
         bucket += 1

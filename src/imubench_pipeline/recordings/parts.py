@@ -77,10 +77,7 @@ class Part:
 def open_part(
     source: LogFile, columns: Iterable[str], scratch: Path, name: str
 ) -> Iterator[tuple[Part, PartWriter]]:
-    """Begin a part; yield it with the writer of its records.
-
-    ``scratch``, ``name``: folder and stem of the scratch files.
-    """
+    """Begin a part with scratch files of this ``name``; yield it with the writer of its records."""
     data, stamps, present = (
         scratch / f"{name}.{ending}" for ending in ("parquet", "stamps", "present")
     )
@@ -119,10 +116,7 @@ class PartWriter:
 
 
 def read_part(file: LogFile, use: UsedPart, scratch: Path, number: int) -> Part:
-    """Read one file of a recording, in bounded memory.
-
-    ``scratch``: folder for the scratch files.
-    ``number``: number of the file, for the names of the scratch files.
+    """Read one file of a recording, in bounded memory; its number names the files in ``scratch``.
 
     Raises RecordingError if the file cannot be read, or no sample lies in the part to use.
     """
@@ -155,11 +149,10 @@ def read_part(file: LogFile, use: UsedPart, scratch: Path, number: int) -> Part:
 def leave_out_knocks(
     part: Part, sigmas: float, longest: int, scratch: Path
 ) -> dict[str, list[Knock]]:
-    """Replace the samples of knocks by NaN; return the knocks by column.
+    """Replace the samples of knocks by NaN in the file of a part; return the knocks by column.
 
-    The scratch file of the part is written again if there is a knock. ``sigmas``: least distance of
-    a knock from the level, in standard deviations. ``longest``: longest knock, records; a longer
-    event is motion.
+    ``sigmas``: least distance of a knock from the level, in standard deviations. ``longest``:
+    longest knock, records; a longer event is motion.
     """
     blocks = {name: column.blocks() for name, column in part.columns.items()}
     doubtful = [name for name, b in blocks.items() if len(find_outlier_blocks(b, sigmas)[0])]

@@ -90,10 +90,7 @@ class LogWriter:
 
 
 def _to_numpy(column: pa.ChunkedArray) -> NDArray[Any]:
-    """Return a column of numbers, NaN where it is null.
-
-    Its own ``to_numpy`` imports pandas, where that is installed: 40 MB in memory.
-    """
+    """Return a column of numbers, NaN where null; its own ``to_numpy`` imports pandas (40 MB)."""
     array = column.chunk(0) if column.num_chunks == 1 else pa.concat_arrays(column.chunks)
     validity, data = array.buffers()
     part = slice(array.offset, array.offset + len(array))

@@ -71,10 +71,7 @@ class _Records:
         return self.common[channel, channel]
 
     def times(self, *, numbered: bool = False) -> Iterator[Array]:
-        """Yield the stamps of all records, s; without stamps, or if ``numbered``, their indices.
-
-        Indices are divided by the stated rate, if there is one.
-        """
+        """Yield the stamps of all records, s; without them, or if ``numbered``, the indices."""
         part = self._part
         if part.stamped and not numbered:
             yield from part.stamps()
@@ -85,10 +82,8 @@ class _Records:
     def base(self, bits: int, *, numbered: bool = False, known: float | None = None) -> TimeBase:
         """Return the time base of the records with a number in any of the columns of a bit mask.
 
-        The stated rate belongs to all records. It only decides whether double steps are lost
-        samples. ``known``: the interval, s, if it is known.
-
-        Raises RecordingError if their stamps do not advance, or jump too often.
+        The stated rate only decides whether double steps are lost samples. ``known``: the interval,
+        s. Raises RecordingError if their stamps do not advance, or jump too often.
         """
 
         def stamps() -> Iterator[Array]:
@@ -113,10 +108,9 @@ class _Records:
             yield chosen[chosen >= 0]
 
     def stride(self, base: TimeBase, bits: int) -> int:
-        """Return the sampling interval of a channel, in intervals of all records.
+        """Return the sampling interval of a channel, in intervals of all records; 1: none.
 
-        It is found with any number of missing samples. 1: the samples are not on a slower clock
-        with a multiple of the interval of all records.
+        It is found with any number of missing samples.
         """
         hits = np.zeros(_MAX_STRIDE + 1)
         total = 0
@@ -144,11 +138,9 @@ def separate_clocks(
 ) -> list[Part]:
     """Return one part for each clock of a file; the part itself if there is only one clock.
 
-    The scratch file of a part that is separated is read again. ``stated``: rate of its records, Hz.
-    ``whole`` returns the time base of all records. ``scratch``: folder for the scratch files.
-
-    Raises RecordingError if channels have no clock of their own, and all records together have none
-    either.
+    ``stated``: rate of its records, Hz. ``whole`` returns the time base of all records.
+    ``scratch``: folder for the scratch files. Raises RecordingError if channels have no clock of
+    their own, and all records together have none either.
     """
     records = _Records(part, stated, settings)
     channels = [
@@ -198,10 +190,7 @@ def separate_clocks(
 
 
 def _find_complete_sibling(name: str, own: Mapping[str, TimeBase], records: _Records) -> str | None:
-    """Return the most complete axis of the same sensor with the records of this one, or None.
-
-    ``own``: time bases of the channels with a clock of their own.
-    """
+    """Return the most complete axis of the same sensor with the records of this one, or None."""
     siblings = [
         other
         for other in records.bit
@@ -216,10 +205,7 @@ def _find_complete_sibling(name: str, own: Mapping[str, TimeBase], records: _Rec
 def _find_own_clock(
     name: str, channels: list[str], part: Part, records: _Records, grid: TimeBase | None
 ) -> TimeBase | None:
-    """Return the time base of the records of a channel; None if it has no clock of its own.
-
-    ``grid``: time base of all records, if they lie on a grid.
-    """
+    """Return the time base of the records of a channel; None if it has no clock of its own."""
     number = records.count(name)
     bits = records.bit[name]
     try:
@@ -269,10 +255,7 @@ def _assign_to_clocks(
     records: _Records,
     leaders: Mapping[str, str | None],
 ) -> list[str]:
-    """Add channels with missing samples to the clock of their records; return the others.
-
-    ``leaders``: for each channel, the axis of the same sensor that gives its clock, or None.
-    """
+    """Add channels with missing samples to the clock of their records; return the others."""
     rest = []
     for name in channels:
         if name in own:
@@ -295,8 +278,7 @@ def _assign_to_clocks(
 def _write_parts(part: Part, clocks: list[_Clock], records: _Records, scratch: Path) -> list[Part]:
     """Write the records of each clock to a part of its own.
 
-    Additional columns, such as the temperature, are written to each part: a reading goes into the
-    next record of the part.
+    Readings of additional columns, such as the temperature, go into the next record of each part.
     """
     part.writer.finish({})
     beside = [name for name in part.columns if name in BESIDE]
@@ -345,8 +327,7 @@ def _write_parts(part: Part, clocks: list[_Clock], records: _Records, scratch: P
 def _carry(values: Array, chosen: NDArray[np.bool_], waiting: float) -> tuple[Array, float]:
     """Return the latest reading since the previous chosen record, for each chosen record.
 
-    ``waiting``: reading after the last chosen record of the previous block. The same for this block
-    is returned as the second value.
+    ``waiting``: reading after the last chosen record of the block before; of this one, if second.
     """
     there = np.where(np.isfinite(values), np.arange(len(values)), -1)
     latest = np.maximum.accumulate(there)

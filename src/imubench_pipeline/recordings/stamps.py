@@ -113,10 +113,9 @@ def _take_forward_steps(block: Array) -> Array:
 
 
 def _are_regular(chosen: NDArray[np.bool_]) -> bool:
-    """Return whether the chosen steps have regular distances throughout a block.
+    """Return whether the chosen steps have regular distances throughout a block, as by rounding.
 
-    Rounding gives two neighbouring distances. Losses give random distances. A lower rate in a part
-    of the block gives one distance in that part only.
+    Losses give random distances; a lower rate in a part of the block gives one in that part only.
     """
     places = np.flatnonzero(chosen)
     if len(places) < 10:
@@ -210,11 +209,10 @@ def track_stamps(stamps: Stamps, interval: float, longest_hole: float) -> Track:
 
 @njit(cache=True, nogil=True)
 def is_set_back(stamps: Array, i: int, step: float, interval: float) -> bool:
-    """Return whether the clock was set back before a record.
+    """Return whether the clock was set back before record ``i``.
 
-    In that case the stamps on both sides increase, but their median decreases. Scattered stamps and
-    late records do not behave so. ``stamps``: s, shape (n,); NaN where missing. ``i``: index of the
-    record. ``step``: from the previous stamp to this one, s. ``interval``: sampling interval, s.
+    In that case the stamps on both sides, s, increase, but their median decreases. Scattered stamps
+    and late records do not behave so. ``step``: from the previous stamp to this one, s.
     """
     if not step < -max(MIN_SET_BACK, 1.5 * interval):
         return False
@@ -241,8 +239,8 @@ def _assign_grid_points(
 ) -> float:
     """Assign a grid point to each stamp; return the time between stamps within segments, s.
 
-    ``state``: time of the last grid point, last stamp, interval, last stamped grid point, sum of
-    the squared distances from the grid.
+    ``state``: time of the last grid point, last stamp, interval, last stamped point, sum of
+    squares.
     """
     origin, last, interval, stamped = state[0], state[1], state[2], state[3]
     point = grid - 1

@@ -101,10 +101,8 @@ def fit_time_base(
 ) -> TimeBase:
     """Return the time base of a file from its stamps, which are read several times.
 
-    ``stated``: rate in the sensor file, Hz. ``known``: sampling interval, s, if known; needed if
-    most samples are missing.
-
-    Raises RecordingError if the stamps do not advance, or jump or stop too often.
+    ``stated``: rate in the sensor file, Hz. ``known``: sampling interval, s; needed if most samples
+    are missing. Raises RecordingError if the stamps do not advance, or jump or stop too often.
     """
     typical = estimate_interval(stamps) if known is None else Interval(known)
     if typical is None:
@@ -195,8 +193,8 @@ def find_rate_changes(
 ) -> list[Finding]:
     """Return a finding if a part of a log has every second (third, ...) sample only.
 
-    Random losses do not give 32 equal steps in a row. ``points``: grid points of the samples, in
-    blocks; below 0 for those left out. ``rate``: of the grid, Hz.
+    ``points``: grid points of the samples, below 0 for those left out; ``rate``: of the grid, Hz.
+    Random losses do not give 32 equal steps in a row.
     """
     samples: Counter[int] = Counter()
     begin: dict[int, int] = {}
@@ -232,10 +230,7 @@ def _is_rate_of(stated: float | None, interval: float, settings: QualitySettings
 
 
 def _describe_coarse_stamps(rate: float, other: float) -> Finding:
-    """Return the finding about stamps with double or zero steps at regular distances.
-
-    ``other``: rate, Hz, if double steps are lost samples and zero steps are copies, not rounding.
-    """
+    """Return the finding about rounded stamps; ``other``: rate, Hz, if they are not rounded."""
     return find(time_base.CoarseStamps(rate, other), "warning", rate)
 
 
@@ -275,8 +270,8 @@ def _check_segments(number: int) -> None:
 def _describe_segments(times: list[float], jumps: list[float], *, has_grid: bool) -> Finding:
     """Return the finding about pauses, with the position of the longest one.
 
-    ``times``: duration of the samples before each pause, s. ``jumps``: steps of the stamps, s;
-    negative ones go backwards. ``has_grid``: the stamps lie on a uniform grid.
+    ``times``: s of samples before each pause. ``jumps``: steps of the stamps, s; negative:
+    backwards.
     """
     jump, at = max(zip(jumps, times, strict=True), key=lambda place: abs(place[0]))
     data = time_base.Segments(has_grid, len(jumps), float(jump), float(at))
@@ -391,8 +386,8 @@ class Groups:
     def rate(self) -> tuple[float, int]:
         """Return the rate, Hz, and the number of irregular groups that were left out of it.
 
-        Stamps in whole seconds have equal numbers of samples, except if the clock was set or
-        samples were lost. Without a most frequent number all groups are used.
+        Stamps in whole seconds have equal numbers of samples, unless the clock was set or samples
+        lost.
         """
         everything = self.samples / self.elapsed, 0
         if not self._pairs:

@@ -54,10 +54,7 @@ def _check_recording(plan: Plan, recording: Recording, folder: Path) -> Quality:
 def findings_of_channel(
     channel: str, log: ChannelLog, bandwidth: float | None, settings: AllanSettings
 ) -> list[Finding]:
-    """Return lines and the end of the band of a channel, if its spectrum can be taken.
-
-    `bandwidth`: cut-off of the sensor's own filter, where it is known, Hz.
-    """
+    """Return lines and the end of the band of a channel; `bandwidth` of the sensor, Hz."""
     if log.holes:
         # Filling gaps needs a model, which only the estimation has.
         return (

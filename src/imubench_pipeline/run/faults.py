@@ -27,9 +27,8 @@ _FAULT_FOLDER = "faults"
 class Faults:
     """The records of the steps that failed, in the folder ``faults`` of the results.
 
-    The records at the creation of this object contain the number of attempts of each step. A step
-    that failed at its last attempt is tried again. An ingest is also tried again if its samples
-    were changed: they are not declared outputs of a rule, since their files depend on the log.
+    They have the number of attempts of each step. A step that failed is tried again, and an ingest
+    whose samples were changed: these are no declared outputs, since their files depend on the log.
     """
 
     def __init__(self, results: Path) -> None:
@@ -51,8 +50,7 @@ class Faults:
     def _has_lost_samples(self, of: Of) -> bool:
         """Return whether the outputs of an ingest were changed, as checked at the first call.
 
-        All samples are read if another step of the recording failed, since damaged samples make
-        steps fail.
+        All is read if another step of the recording failed, since damaged samples make steps fail.
         """
         step, sensor, recording = of
         if step != "ingest" or recording is None:

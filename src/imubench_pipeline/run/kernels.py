@@ -16,11 +16,8 @@ from numba.core.caching import FunctionCache
 def compile_once(locks: IO[bytes]) -> None:
     """Make this process and its forks wait for kernels that another process compiles.
 
-    Parameters
-    ----------
-    locks : file
-        Open for writing, and never closed; the same file for all processes. Each kernel locks the
-        byte of the hash of its name; the system unlocks it when the process ends.
+    `locks`: a file open for writing, never closed, the same for all processes. Each kernel locks
+    the byte of the hash of its name; the system unlocks it when the process ends.
     """
     load, save = FunctionCache.load_overload, FunctionCache.save_overload
 

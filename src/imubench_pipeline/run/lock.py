@@ -39,9 +39,9 @@ def locate_lock(results: Path) -> Path:
 class Lock:
     """A lock on a folder of results, which the system releases if the process is killed.
 
-    All processes with an open ``descriptor`` hold the lock. Snakemake inherits it, so the lock
-    lasts until both processes end. While the lock is held, the file contains a note about the
-    holder. A note in the file of a free lock comes from a run that did not reach its end.
+    All processes with an open ``descriptor`` hold it, such as Snakemake, which inherits it. While
+    it is held, its file has a note about the holder; a note in a free lock is of a run without an
+    end.
     """
 
     def __init__(self, path: Path) -> None:
@@ -77,8 +77,8 @@ class Lock:
     def acquire_unless_inherited(self) -> None:
         """Acquire the lock, unless this process inherited it; raise `TakenError` if it is taken.
 
-        A note of a run that did not reach its end stays only if the machine was restarted since:
-        `imubench nightly` then checks the files that were being written.
+        A note of an earlier run stays only after a restart: `imubench nightly` then checks its
+        files.
         """
         if self.descriptor >= 0:
             return

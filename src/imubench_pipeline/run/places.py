@@ -32,13 +32,12 @@ _WORKFLOW_PARTS = ("Snakefile", "workflow", "profiles", "src", "tests", "pyproje
 
 
 def find_protected_places(path: Path, results: Path | None = None) -> Iterator[Place]:
-    """Yield the protected places that may contain a path, or be inside it.
+    """Yield the protected places that may contain an absolute path without links, or be inside it.
 
     These are the configuration of the package, and the ``config/``, logs, results, sensors,
     requirements and workflow of each project: a folder with ``config/config.yaml`` that is the
-    working folder, or lies at or above the path or the results of the command. In `results`, and in
-    any other folder with ``seals/`` or ``tables/recordings.parquet``, only the folders that runs
-    write and the logs that the report names are protected. `path` is absolute, without links.
+    working folder, or lies at or above the path or `results`. In folders of results, only the
+    folders that runs write and the logs that the report names are protected.
     """
     above = [path, *path.parents]
     given = [] if results is None else [results.absolute(), Path(os.path.realpath(results))]

@@ -71,11 +71,8 @@ _BRACE_BEFORE_WORD = re.compile(r"\{(?=\s*\w)")
 class Plan:
     """The plan of a run.
 
-    Raises
-    ------
-    ConfigError
-        If the configuration or the list of simulated recordings cannot be used, or a log would
-        make the same recording as one of these.
+    A ConfigError is raised if the configuration or the list of simulated recordings cannot be used,
+    or a log would make the same recording as one of these.
     """
 
     def __init__(self, config: Mapping[str, object]) -> None:
@@ -169,10 +166,7 @@ class Plan:
         return to_json([asdict(file) for file in files])
 
     def attempt(self, step: str, sensor: str, name: str | None = None) -> int:
-        """Return the number of the attempt of a step, see `Faults.attempt`.
-
-        A failed step is tried again, but not for a recording that is held back.
-        """
+        """Return the attempt of a step (`Faults.attempt`), the last one if it is held back."""
         held_back = name is not None and self.recordings[sensor, name].held_back
         return self.faults.attempt((step, sensor, name), again=not held_back)
 
@@ -272,10 +266,7 @@ class Plan:
         return by_sensor
 
     def experiment_settings(self, sensor: str, name: str, *sections: str) -> str:
-        """Return sections of the configuration, and what is stated of a sensor and its recording.
-
-        That is the experiment of its notes, or all of a simulated recording.
-        """
+        """Return sections of the configuration, the sensor, and what is stated of a recording."""
         recording = self.recordings[sensor, name]
         declared = self.sensors.get(sensor)
         settings: dict[str, object] = {
@@ -448,10 +439,7 @@ class Plan:
 
     @cached_property
     def usual(self) -> str:
-        """Usual figures of sensors, from the catalogue of the package.
-
-        Sensor files of the user are not included: an edit of one only affects its own logs.
-        """
+        """Usual figures of sensors, from the catalogue of the package, which no user edits."""
         return usual_as_text(usual_figures(shipped_sensors()))
 
     def truths(self, sensor: str) -> str:

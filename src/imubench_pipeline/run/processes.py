@@ -67,9 +67,8 @@ class Job:
 class Processes:
     """Runs scripts in forks of one process, which begins with the first of them.
 
-    The forking process ends with the process of this object, even if that is killed. On Linux the
-    forks end, too, and each has the name of its script. A fork does not depend on the forking
-    process.
+    It ends with the process of this object, even if that is killed; on Linux the forks end, too,
+    and each has the name of its script. A fork does not depend on the forking process.
     """
 
     def __init__(self) -> None:
@@ -80,8 +79,7 @@ class Processes:
     def run(self, job: Job, seconds: float | None = None) -> None:
         """Run a script to its end; several threads may run one each.
 
-        `seconds`: max. time without imports. Raise a `StepError` if the script fails, is killed, or
-        takes longer.
+        Raise a `StepError` if it fails, is killed, or takes more than `seconds` without imports.
         """
         ours, theirs = Pipe()
         with ours:

@@ -52,20 +52,16 @@ _told: list[Callable[[str, str], str]] = []
 
 
 def follow(jobs: Iterable[Recording], told: Callable[[str, str], str]) -> None:
-    """Show a line for each finished recording.
-
-    `jobs`: the recording of each job of one; `told` returns the line about a recording.
-    """
+    """Show what `told` returns for a recording as the last of its `jobs` ends, one entry each."""
     _expected.clear()
     _expected.update(jobs)
     _told[:] = [told]
 
 
 class LogHandler(LogHandlerBase):
-    """Shows the progress of a run, errors and warnings.
+    """Shows the progress of a run, errors and warnings; a dry run shows the output of Snakemake.
 
-    A terminal has a single line while jobs run: steps write their errors to the terminal, too, and
-    a taller display would cover them. A dry run and verbose runs show the output of Snakemake.
+    A terminal has a single line while jobs run: a taller display would cover the errors of steps.
     """
 
     writes_to_stream = True

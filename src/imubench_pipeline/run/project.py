@@ -18,10 +18,7 @@ def has_snakefile(folder: Path) -> bool:
 def find_snakefile(folder: Path) -> Path:
     """Return the Snakefile of a folder; for a folder of logs, the Snakefile of this package.
 
-    Raises
-    ------
-    ConfigError
-        If the folder is neither.
+    A ConfigError is raised if the folder is neither.
     """
     for own in _SNAKEFILE_PATHS:
         if (folder / own).is_file():

@@ -35,10 +35,7 @@ _MAX_TERMINATION_TIME = 10.0  # s; for a process to end
 
 
 def end_left_over(note: Mapping[str, Any], project: Path) -> int:
-    """End the steps of a killed run that are still running; return their number.
-
-    `note` is the note of that run in the lock; the steps run in `project`.
-    """
+    """End the steps of a killed run, by its note, that run in `project`; return their number."""
     group = note.get("snakemake")
     if note.get("host") != platform.node() or not isinstance(group, int) or was_restarted(note):
         return 0
@@ -76,10 +73,7 @@ def was_restarted(note: Mapping[str, Any], boot: float | None = None) -> bool:
 
 
 def remove_temporary(results: Path, locked: float) -> tuple[int, int]:
-    """Remove the temporary files of killed runs; return their number and bytes.
-
-    `locked`: time of the lock, s since 1970. Files that changed shortly before or later stay.
-    """
+    """Remove temporary files older than the time of the lock, s; return their number and bytes."""
     number = size = 0
     for path in list(_walk_outputs(results)):
         if not _TEMPORARY_NAME.fullmatch(path.name) or path.is_symlink():
@@ -111,8 +105,7 @@ def remove_unfinished(outputs: Iterable[Path]) -> None:
 def remove_doubtful(results: Path) -> int:
     """Remove the files of the last minute before a power failure; return their number.
 
-    Such a file may have its final name without its content. Snakemake makes missing files again.
-    A folder that one step makes is removed as a whole.
+    Such a file may have its name without its content; a folder that one step makes goes as a whole.
     """
     stamps: dict[Path, float] = {}
     for path in _walk_outputs(results):

@@ -36,10 +36,7 @@ _BYTES_PER_VALUE = 7
 
 @dataclass(frozen=True)
 class Limit:
-    """Limits of a step: time in s, and memory in bytes besides the memory of the forking process.
-
-    ``words``: the settings of the limit.
-    """
+    """Max. time of a step in s, memory in bytes beside the forking process, and their settings."""
 
     seconds: float
     words: str
@@ -55,10 +52,7 @@ Asked = Callable[[Mapping[str, str], int], int]  # takes the wildcards of a job,
 
 @dataclass(frozen=True)
 class Extent:
-    """Size of the data of a recording, a sensor or the run.
-
-    ``million_samples`` is the number per channel.
-    """
+    """Size of the data of a recording, a sensor or the run; ``million_samples`` are per channel."""
 
     million_samples: float = 0.0
     channels: int = 1
@@ -91,7 +85,7 @@ class OfRecording:
 
 @dataclass(frozen=True, kw_only=True)
 class OfMany:
-    """Cost of a step of many recordings, of one sensor or of all: memory in MB, and time in s.
+    """Memory in MB and time in s of a step of many recordings, of one sensor or of all.
 
     ``many_jobs``: a group contains many such jobs, which do not each request a start-up time.
     """
@@ -115,9 +109,9 @@ Cost = OfRecording | OfMany
 
 
 def compute_resources(cost: Cost, extent: Extent, attempt: int = 1) -> dict[str, int]:
-    """Return the memory in MB and the time in minutes that a job requests.
+    """Return the memory in MB and the minutes that a job requests, twice as much at each `attempt`.
 
-    Each attempt, counted from 1, requests twice as much as the one before.
+    `cost`: of its rule; `extent`: of its data.
     """
     memory, seconds = cost.of(extent)
     times: int = 2 ** (attempt - 1)

@@ -25,11 +25,9 @@ class Scripts:
     """Replacement for the function `script` of Snakemake, which rules with a script call.
 
     A rule with the parameter ``attempt`` belongs to a recording or a sensor, which is left out if
-    its script fails. A killed script, for example for lack of memory, is run once more. Other
-    scripts fail as usual. A step also fails as usual if it is stopped with the run, the disk is
-    full, or it cannot be imported.
-
-    `limits`: of a step of one recording or sensor; without them, each failure ends the job.
+    its script fails. A killed script, for example for lack of memory, is run once more. Any script
+    ends the job as usual if it is stopped with the run, the disk is full, or it cannot be imported.
+    Without `limits` (of a step of one recording or sensor) each failure ends the job.
     """
 
     def __init__(self, faults: Faults, limits: Limits | None) -> None:

@@ -23,10 +23,7 @@ from imubench_pipeline.tables.seals import (
 
 @contextlib.contextmanager
 def seal_outputs(job: Job) -> Iterator[None]:
-    """Seal the outputs and inputs of a job when the block ends without error.
-
-    A job without ``results`` is not sealed.
-    """
+    """Seal outputs and inputs of a job when the block ends without error, if it has ``results``."""
     if job.results is None:
         yield
         return
@@ -50,13 +47,12 @@ def digest_settings(params: Mapping[str, object]) -> str:
 
 
 def find_unsound_jobs(results: Path, jobs: Mapping[str, str]) -> Iterator[str]:
-    """Yield the jobs whose outputs are not those of the present inputs and settings.
+    """Yield the jobs whose outputs are not of the present inputs and settings, by their places.
 
     Outputs are missing or changed, have no seal, are of another form, or were made of other files
-    or with other settings. The records of Snakemake are not used: results may come from a backup,
-    or from another machine. A file with unchanged size and date is not read.
-
-    A job is named by the place of its seal; `jobs` has the `digest_settings` of each.
+    or settings. The records of Snakemake are not used: results may come from a backup, or from
+    another machine. A file with unchanged size and date is not read. `jobs` has the
+    `digest_settings` of each.
     """
     seals: dict[str, Seal] = {}
     for place in jobs:

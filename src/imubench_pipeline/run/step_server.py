@@ -35,10 +35,9 @@ _MAX_ERROR_LENGTH = 300  # max. length of an error in one line, characters.
 
 
 def serve(requests: socket.socket) -> None:
-    """Fork for each connection that comes through a socket, until the other end is closed.
+    """Fork for each job that comes through a socket as a connection, until the other end is closed.
 
-    A connection transfers the job of a step. It returns None at the begin of the step, and then
-    its cost, or a `StepError`.
+    The connection returns None at the begin of the step, and then its cost, or a `StepError`.
     """
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the forks end, and that the run ends is seen
     signal.signal(signal.SIGCHLD, _reap)
@@ -163,8 +162,7 @@ def _print_to(log: Path) -> None:
 def _end_with_who_asked(connection: Connection[Any, Any]) -> None:
     """Have the system end this process when the other end of a connection closes or sends.
 
-    That the server ends would tell later: it may be importing what another step needs, while the
-    next run begins.
+    The end of the server would come later: it may be importing for another step.
     """
     signal.signal(signal.SIGIO, signal.SIG_DFL)
     fcntl.fcntl(connection, fcntl.F_SETOWN, os.getpid())

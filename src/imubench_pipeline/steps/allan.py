@@ -70,10 +70,7 @@ def curve_of(
 
 
 def read_curves(path: Path, samples: Mapping[str, int]) -> dict[str, AllanCurve]:
-    """Read the curves of a recording from a table ``allan``, by channel.
-
-    `samples`: number of each channel, including missing ones.
-    """
+    """Read the curves of a recording by channel; `samples`: number of each, with missing ones."""
     by_channel = split_table(read("allan", [path]), "channel")
     return {
         channel: AllanCurve(
@@ -102,10 +99,7 @@ def _read_degrees(table: pa.Table) -> dict[str, Any]:
 def read_compensated_curves(
     path: Path, measured: Mapping[str, AllanCurve]
 ) -> dict[str, AllanCurve]:
-    """Read the table ``allan_compensated`` of a recording, by channel.
-
-    `measured`: the curves of the log as it is, with the same clusters.
-    """
+    """Read ``allan_compensated`` by channel; `measured`: the curves of the log as it is."""
     by_channel = split_table(read("allan_compensated", [path]), "channel")
     return {
         channel: replace(

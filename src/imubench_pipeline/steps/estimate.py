@@ -101,8 +101,7 @@ def estimate_channel(
 ) -> None:
     """Estimate the noise of a channel by every method of the settings; `into` takes the rows.
 
-    `curve` is of the log, with limits by the identified power laws; `bandwidth` the cut-off of the
-    sensor's own filter, where it is known, Hz.
+    `curve`: with limits by the identified power laws; `bandwidth`: known cut-off of the sensor, Hz.
     """
     channel = _Channel(key, log, curve, settings, bandwidth)
     verdict = assess_signals(key.channel, channel.signals)

@@ -27,10 +27,9 @@ def list_files(
     recordings: Iterable[RecordingRow],
     failures: Iterable[FailureRow],
 ) -> Iterator[FileRow]:
-    """Yield the rows of the table ``files``.
+    """Yield the rows of the table ``files``, of every file in the drop zone (`FoundFile`).
 
-    `files`: every file in the drop zone (`imubench_pipeline.recordings.drop_zone.FoundFile`). The
-    files of a recording without a row have failed with its sensor.
+    The files of a recording without a row have failed with its sensor.
     """
     outcome = {(row.sensor, row.recording): row for row in recordings}
     of_sensor = {row.sensor: row.reason for row in failures if row.recording is None}

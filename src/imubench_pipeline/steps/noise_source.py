@@ -44,11 +44,11 @@ class NoiseSource:
 def take_static_noise(
     folders: Sequence[Path], own: RecordingRow, channel: str, draws: int = 0
 ) -> NoiseSource | None:
-    """Return the noise of a gyro from the static recordings of its sensor, in `folders`.
+    """Return the noise of a gyro from the static recordings of its sensor in `folders`, or None.
 
-    None if no recording has an estimate of a gyro with white noise. `own` is the recording that was
-    turned, `channel` its gyro; another gyro of the sensor is used if this one has no estimate.
-    `draws`: number of models to draw from the uncertainty of the estimate.
+    `own` is the recording that was turned, `channel` its gyro; another gyro of the sensor is used
+    if this one has no estimate. `draws`: number of models to draw from the uncertainty of the
+    estimate.
     """
 
     def far(row: RecordingRow) -> tuple[bool, bool]:
@@ -73,10 +73,7 @@ def take_static_noise(
 def find_static_recordings(
     folders: Sequence[Path], far: Callable[[RecordingRow], tuple[bool, ...]]
 ) -> list[Kept]:
-    """Return the usable static recordings: the nearest first, of these the longest.
-
-    `far` returns the differences of a recording that speak against it.
-    """
+    """Return the usable static recordings in `folders`: the least `far`, then the longest."""
 
     def order(recording: Kept) -> tuple[Any, ...]:
         row = recording[0]

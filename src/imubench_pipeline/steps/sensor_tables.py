@@ -135,10 +135,9 @@ def collect_findings(
     sensors: Mapping[str, Sensor],
     usual: UsualFigures,
 ) -> list[FindingRow]:
-    """Return the rows of the table ``findings`` about single recordings.
+    """Return the rows of the table ``findings`` about single recordings, of the ingest and later.
 
-    From the results of the ingest, rows of the tables ``deterministic`` and ``estimate_findings``,
-    the recommended parameters, the sensor files, and the usual figures of other sensors.
+    `deterministic`, `of_estimates`: of these tables; `estimated`: the recommended parameters.
     """
     about = [quality.row for quality in qualities]
     of_logs = drop_duplicate_findings(
@@ -157,10 +156,7 @@ def drop_duplicate_findings(
     deterministic: Iterable[DeterministicRow],
     durations: Mapping[tuple[str, str], float],
 ) -> Iterator[FindingRow]:
-    """Yield the findings of the ingest that are not also in the table ``deterministic``.
-
-    `durations`: of each sensor and recording, s.
-    """
+    """Yield the findings of the ingest that are not in ``deterministic``; `durations` in s."""
     by_place: dict[tuple[str, str, str], list[DeterministicRow]] = {}
     for row in deterministic:
         by_place.setdefault((row.sensor, row.recording, row.channel), []).append(row)

@@ -28,10 +28,10 @@ def list_shortlist(
     sensors: Mapping[str, Sensor],
     tables: Mapping[str, Path],
 ) -> Iterator[ShortlistRow]:
-    """Yield the rows of the table ``shortlist``.
+    """Yield the rows of the table ``shortlist``; OSError or ValueError if a table cannot be read.
 
-    `sensors`: the catalogue; `tables`: files of the tables `NEEDED`, empty if nothing is measured.
-    Raise an OSError or a ValueError if a table cannot be read, or is of another form.
+    `sensors`: the catalogue; `tables`: files of the tables `NEEDED`, empty if nothing is measured;
+    `requirements`: of applications, by name.
     """
     sensors = {name: sensor for name, sensor in sensors.items() if sensor.sold}
 

@@ -31,10 +31,7 @@ _MOTIONS: Hook[Motion] = Hook("motions")
 def write_simulated(recording: SimulatedRecording, log: LogFormat, folder: Path) -> None:
     """Simulate a recording and write it as text, by its `layout` of the sensor's logs.
 
-    Raises
-    ------
-    ConfigError
-        If the logs of the sensor are not text.
+    A ConfigError is raised if the logs of the sensor are not text.
     """
     if log.reader not in (None, "csv"):
         raise ConfigError(

@@ -66,10 +66,7 @@ class Failure:
 
 
 def describe_error(error: BaseException) -> str:
-    """Return an error in words: with its type, unless it is a log that cannot be read now.
-
-    Addresses of objects and folders of files are removed, so that it is the same in each run.
-    """
+    """Return an error in words, the same in each run: without addresses and folders."""
     if isinstance(error, UnavailableError):
         return str(error)
     text = "".join(traceback.format_exception_only(error)).strip()
@@ -118,8 +115,7 @@ def mark_failures(
     """Return tables with the failures, and without failed recordings.
 
     A recording with a failed step has the status ``failed``, a finding, and no rows in other
-    tables, unless the step needs more than a static log. ``tables`` include ``recordings`` and
-    ``findings``.
+    tables, unless the step needs more than a static log.
     """
     if not failures:
         return {"failures": make_schema("failures").empty_table()} | dict(tables)

@@ -53,9 +53,9 @@ def make_schema(table: str) -> pa.Schema:
 def build(table: str, rows: Iterable[AnyRow]) -> pa.Table:
     """Make an Arrow table of rows and check it against the schema of ``table``.
 
-    A column that a row leaves out is null. NaN and infinities become null, and invisible characters
-    are escaped. Raises a `TableError` if a row has a column that the table does not, or lacks a
-    required value.
+    A column that a row leaves out, NaN and infinities become null; invisible characters are
+    escaped. Raises a `TableError` for a column that the table does not have, and a missing required
+    value.
     """
     listed = [row.columns() if isinstance(row, TableRow) else row for row in rows]
     columns = get_columns(table)
@@ -134,10 +134,7 @@ def replace_file(path: Path) -> Iterator[Path]:
 
 @contextlib.contextmanager
 def make_folder(folder: Path) -> Iterator[Path]:
-    """Give the name of a folder to fill, renamed to ``folder`` when the block ends without error.
-
-    ``folder`` must be missing or empty.
-    """
+    """Give a folder to fill, renamed to ``folder``, which is missing or empty, at the end."""
     folder.parent.mkdir(parents=True, exist_ok=True)
     scratch = Path(tempfile.mkdtemp(prefix=f".{folder.name}.", suffix=".part", dir=folder.parent))
     try:
@@ -162,10 +159,10 @@ def write_each(tables: Mapping[str, Iterable[AnyRow]], outputs: Iterable[Path]) 
 
 
 def write_arrow(table: pa.Table, path: Path) -> None:
-    """Write an Arrow table as Parquet or, where the name ends so, CSV, atomically.
+    """Write an Arrow ``table`` as Parquet or, where the ``path`` ends so, CSV, atomically.
 
-    Texts in CSV are such as no spreadsheet takes for formulas (`imubench_pipeline.tables.texts`);
-    lists are joined by semicolons, structs are JSON. Raises a `TableError` for NaN or infinities.
+    Texts in CSV are no formulas, lists are joined by semicolons, structs are JSON. Raises a
+    `TableError` for NaN or infinities.
     """
     if fault := _not_finite(table):
         raise TableError(f"{path}: {fault}; expected a finite number or null")

@@ -64,10 +64,7 @@ def remove_addresses(reason: str) -> str:
 
 
 class RecordingError(ValueError):
-    """A recording that cannot be used; the text is the reason, and how to mend it.
-
-    Long reasons are cut in the middle, invisible characters replaced, addresses of objects removed.
-    """
+    """A recording that cannot be used; the text is cut and printable, and says how to mend it."""
 
     def __init__(self, reason: str) -> None:
         if not reason.isprintable():

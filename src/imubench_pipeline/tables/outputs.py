@@ -183,10 +183,7 @@ class OutputFolder(Output):
 
     @contextmanager
     def filling(self) -> Iterator[Path]:
-        """Give a folder to fill, whose files are moved here when the block ends without error.
-
-        A file of the same content as the one that is there is left as it is.
-        """
+        """Give a folder to fill, whose new or changed files are moved here at the end."""
         real = self.check()
         if not real.exists():
             with self._explaining(), make_folder(real) as made:
@@ -242,8 +239,7 @@ def add_output(
 ) -> None:
     """Declare an option, or an argument, that names an output, and beside it ``--force``.
 
-    ``make`` makes the output of its path; ``keys`` are those of
-    `argparse.ArgumentParser.add_argument`.
+    ``make`` makes the output of its path; ``keys`` are of `argparse.ArgumentParser.add_argument`.
     """
     parser.add_argument(name, type=Path, action=StoreOutput, make=make, **keys)
     if name.startswith("-"):

@@ -29,10 +29,10 @@ def open_parquet(path: Path) -> pq.ParquetFile:
 
 
 def read_row_group(file: pq.ParquetFile, number: int, columns: list[str] | None = None) -> pa.Table:
-    """Read a row group of a file that `open_parquet` has opened, whole.
+    """Read a row group of an open Parquet file; raise `pyarrow.ArrowInvalid` if rows are missing.
 
-    Raises a `pyarrow.ArrowInvalid` if rows are missing: checksums do not cover the header of a
-    page, and PyArrow before version 22 silently omits rows where it is damaged.
+    PyArrow before version 22 omits rows where the header of a page is damaged, as no checksum
+    covers it.
     """
     table = file.read_row_group(number, columns=columns, use_threads=False)
     expected = file.metadata.row_group(number).num_rows

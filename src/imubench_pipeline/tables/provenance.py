@@ -21,12 +21,12 @@ _TEXT = re.compile(r"""["'](\w[\w.]*\*?)["']""", re.ASCII)
 
 
 def digest_sources(*modules: str) -> str:
-    """Return a digest of modules of this package and of all other code and files that they use.
+    """Return a digest of ``modules`` of this package and of all other code and files that they use.
 
     These are their imports, extensions of it (`imubench_pipeline.registry`), and modules and files
     that their texts name: a module in full, every module of a package by a name that ends in
-    ``.*``, or a file or folder beside the module. ``modules`` are names below the package, such as
-    ``estimators.curve``. Raises a ValueError for an unknown one.
+    ``.*``, or a file or folder beside the module. ``modules`` are such as ``estimators.curve``.
+    Raises a ValueError for an unknown one.
     """
     todo, seen = [_path(module) for module in modules], set()
     while todo:

@@ -105,8 +105,7 @@ def seal_files(
 ) -> None:
     """Seal the outputs of a step: files, or folders with all their files.
 
-    ``place`` is as of `name_place`, ``inputs`` as of `compute_digests`; ``settings`` is a digest of
-    the settings and the code of the step.
+    ``inputs``: of `compute_digests`; ``settings``: a digest of the settings and code of the step.
     """
     left = {name: SealedFile.of(path) for name, path in sorted(_below(results, outputs))}
     Seal(place, compute_form_digest(), dict(inputs), left, settings).write(results)
@@ -137,10 +136,7 @@ def compute_digests(results: Path, paths: Iterable[Path]) -> dict[str, str]:
 
 
 def read_seal(results: Path, place: str) -> Seal:
-    """Return the seal of a place.
-
-    Raises a FileNotFoundError without one, and a `SealError` if it is damaged or of another place.
-    """
+    """Return the seal of a place; FileNotFoundError without one, `SealError` if it is another."""
     try:
         data = read_sealed_json(results / name_seal_file(place))
         outputs = {name: SealedFile(**file) for name, file in data["outputs"].items()}

@@ -27,11 +27,7 @@ def escape_invisible(text: str) -> str:
 
 
 def escape_cell(text: str) -> str:
-    """Return a text as a cell of a CSV file that no spreadsheet takes for a formula.
-
-    It is `escape_invisible`, and each sign that would begin a formula has one more apostrophe
-    before it.
-    """
+    """Return `escape_invisible` of a text, so that no spreadsheet takes its cell for a formula."""
     return _FORMULA.sub(r"\1'\2", escape_invisible(text))
 
 

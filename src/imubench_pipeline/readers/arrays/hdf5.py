@@ -52,8 +52,8 @@ class Hdf5File(ArrayFile):
 def list_data_sets(file: h5py.File, time_axis: int = 0, passed_over: str = "\0") -> list[DataSet]:
     """Return the data sets of a file by name; only hard links are followed.
 
-    ``passed_over``: prefix of the names in the root group that are not data. Raise `UnusableError`
-    if there are too many objects, or groups are nested too deeply.
+    ``passed_over``: prefix of names in the root group that are not data. Raise `UnusableError` if
+    there are too many objects, or groups are nested too deeply.
     """
     objects = 0
     seen = {_get_identity(file)}
@@ -237,9 +237,9 @@ _MAX_MEMORY = 1 << 29
 def _read_variable_length_texts(path: str, *_: int) -> dict[str, str]:
     """Return the units of a file by data set; empty if they cannot be read.
 
-    The library may crash or hang on damaged texts of variable length. They are therefore read in a
-    process of their own with a time limit. The length of a text is known only after it is unpacked,
-    so the process stops at the first text that is too long for a unit.
+    The library may crash or hang on damaged texts of variable length: a process of its own reads
+    them, and stops at the first one that is too long for a unit, whose length is known only
+    unpacked.
     """
     try:
         limits = str(_MAX_STORED_LENGTH), str(_MAX_MEMORY)

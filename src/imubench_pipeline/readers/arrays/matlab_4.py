@@ -42,10 +42,7 @@ class Header:
 
 
 def parse_header(begin: bytes) -> Header | None:
-    """Return the header in the first `HEADER_BYTES` bytes; None if there is none.
-
-    Random bytes are not accepted: most of the first 16 bytes must be zero, and the name valid.
-    """
+    """Return the header in the first `HEADER_BYTES` bytes; None if they are no header."""
     before = struct.calcsize(_HEADER_FORMAT)
     if len(begin) < before:
         return None

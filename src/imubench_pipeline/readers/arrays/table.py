@@ -192,10 +192,10 @@ _SKIP_BLOCK = 1 << 20
 class StreamedArray(Array):
     """An array (see `Array`) with consecutive elements in a file or in a compressed part of it.
 
-    If a matrix is stored column by column, each column is read by a stream of its own, so that only
-    one block of each is in memory. ``fortran``: the first index varies fastest. ``opened``: opens a
-    new stream of the bytes, which its caller closes. ``offset``: bytes before the first element.
-    ``checked``: the bytes have a checksum, which is verified at their end.
+    If a matrix is stored column by column, each column is read by a stream of its own. ``fortran``:
+    the first index varies fastest. ``opened``: opens a new stream of the bytes, which its caller
+    closes. ``offset``: bytes before the first element. ``checked``: a checksum is verified at their
+    end.
     """
 
     def __init__(

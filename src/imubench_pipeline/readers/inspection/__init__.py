@@ -44,21 +44,11 @@ class Inspection:
 
 
 def inspect(path: Path, model: str | None = None) -> Inspection:
-    """Inspect a recording and draft a sensor file for it.
+    """Inspect a recording (file, folder, zip archive or ROS 2 bag) and draft a sensor file for it.
 
     Only the beginning of each file is read, so that the time does not depend on the length.
-
-    Parameters
-    ----------
-    path : Path
-        A log file, or the folder, zip archive or ROS 2 bag of a recording.
-    model : str or None
-        Name of the sensor; None: the name of the log.
-
-    Raises
-    ------
-    RecordingError
-        If the recording cannot be read, or is no log.
+    ``model``: name of the sensor; None: the name of the log. Raise `RecordingError` if it cannot be
+    read, or is no log.
     """
     # Numbers in a damaged file may overflow.
     with np.errstate(all="ignore"):

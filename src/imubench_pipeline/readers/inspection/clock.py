@@ -200,8 +200,7 @@ def _take_steps(values: NDArray[np.float64]) -> NDArray[np.float64]:
 def estimate_step(values: NDArray[np.float64]) -> float | None:
     """Return the step from sample to sample; None if the stamps do not advance.
 
-    If most steps are equal, steps over missing samples are left out. If they scatter, as stamps of
-    arrival in a host do, the mean is returned. Samples may share a stamp.
+    If most are equal, steps over missing samples are left out; if they scatter, it is the mean.
     """
     steps = _take_steps(values)
     forward = steps[steps > 0]

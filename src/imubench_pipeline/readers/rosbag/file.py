@@ -79,11 +79,10 @@ LAYOUTS: dict[str, Layout] = {
 def decode_messages(
     messages: Sequence[bytes], layout: Layout, ros_1: bool
 ) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.bool_]]:
-    """Return stamps, numbers and soundness of messages, serialised as in ROS 1 or as CDR.
+    """Return stamps of the headers, ns, numbers, and soundness of messages of ROS 1 or in CDR.
 
-    ``stamps``: stamps of the headers, ns.
-    ``figures``: shape (messages, layout.figures); NaN where the message is damaged.
-    ``sound``: whether the message has the layout of its type.
+    The numbers have the shape (messages, layout.figures), and are NaN where the message has not the
+    layout of its type.
     """
     stamps = np.zeros(len(messages), np.int64)
     figures = np.full((len(messages), layout.figures), np.nan)
@@ -299,10 +298,7 @@ def explain_errors(path: Path) -> Iterator[None]:
 
 
 def open_bag(path: Path) -> Source:
-    """Open a bag, a file or the folder of a ROS 2 bag; its kind is recognised by its content.
-
-    Raise `RecordingError` if the path cannot be opened, or is no bag.
-    """
+    """Open a bag (file, or folder of ROS 2), known by its content, or raise RecordingError."""
     with explain_errors(path):
         try:
             if path.is_dir():

@@ -31,8 +31,7 @@ _BYTE_ORDER_MARKS: Mapping[bytes, str] = {
 class _Text:
     """The decompressed bytes of a text log, in an encoding that contains ASCII.
 
-    Carriage returns alone at the ends of lines become line feeds. A byte order mark is removed, and
-    each run of zero bytes is reduced to one. ``letter``: bytes of a letter in the file.
+    Lines end in line feeds; runs of zeros are reduced to one. ``letter``: bytes of one in the file.
     """
 
     def __init__(self, path: Path, skipped: int, most: int | None) -> None:
@@ -87,14 +86,12 @@ class _Text:
 
 
 class CompleteLines:
-    """A file for reading that ends with the last complete line.
+    """A file for reading that ends with the last complete line, also if it is compressed and cut.
 
-    The text after the last line break was being written when the power was cut. Such a record may
-    lack digits; it is left out with a finding. A truncated compressed file is read to its end, with
-    a finding.
-
-    ``skipped``: bytes of the text to skip. ``records``: converts complete lines to the text that is
-    read. ``most``: bytes of the text after which reading stops; None: the whole file.
+    The text after the last line break was being written when the power was cut, and may lack
+    digits: it is left out with a finding. ``skipped``: bytes of the text to skip. ``records``:
+    converts complete lines to the text that is read. ``most``: bytes of the text after which
+    reading stops.
     """
 
     closed = False
@@ -227,11 +224,11 @@ _TAB_TO_SPACE = bytes.maketrans(b"\t", b" ")
 
 
 class Records:
-    """Removes from the lines of a file all that are no records.
+    """Removes all that are no records from the lines of a file.
 
-    ``preamble``: the lines before the first record, which a restarted logger repeats.
-    ``runs``: columns are separated by runs of spaces or tabs, which become one space.
-    ``blank_is_missing``: a blank line between two records is a record with one empty cell.
+    ``preamble``: the lines before the first record, which a restarted logger repeats. ``runs``: of
+    spaces or tabs separate columns, and become one space. ``blank_is_missing``: a blank line is a
+    cell.
     """
 
     def __init__(

@@ -19,12 +19,10 @@ _WORDS_ONLY = re.compile(r"[^\W\d]*(?:[\s./()\[\]-]+[^\W\d]+)*[.)\]]?")
 
 
 def find_header(lines: Sequence[Sequence[str]]) -> int | None:
-    """Return the index of the line with the names of the columns, as opposed to units.
-
-    The line with the most names is returned, the first of equals; None if no line has names.
+    """Return the index of the line with the most names of columns, the first of equals, or None.
 
     ``lines``: the cells of the lines before the first record; empty for a line that is not split
-    like the record.
+    like the record. Lines of units are no names.
     """
     best, header = 0, None
     for index, cells in enumerate(lines):

@@ -107,8 +107,7 @@ def find_layout(
 ) -> TextLayout:
     """Return the layout of a text log; raise `RecordingError` if it is no text.
 
-    ``figures`` and ``times``: the required columns of numbers and of time stamps, by name or
-    position. If there are none, the most plausible layout is returned.
+    ``figures``, ``times``: required columns, by name or position; none: the most plausible layout.
     """
     return _Search(path, log, figures, times).layout()
 
@@ -260,8 +259,7 @@ class _Search:
     def _likelihood(self, split: Split) -> tuple[float, ...]:
         """Return a score of a delimiter for comparison; the first of equals is used.
 
-        In order of priority: number of required names found; as many names as cells in the records;
-        more than one column; share of numbers in lines of equal width.
+        By priority: required names; as many names as cells; several columns; share of numbers.
         """
         comments, lines = self._parted(split)
         rows = [split.cells(line.text) for line in lines[-_SCORED_LINES:]]
@@ -442,8 +440,8 @@ def refuse_decimals_apart(file: str, number: int, line: str, rows: Sequence[Sequ
     """Raise `RecordingError` if commas may be delimiters as well as decimal signs.
 
     Decimals have no sign and sometimes begin with 0, unlike integers, unless all integers are
-    padded with zeros. ``number``, ``line``, ``rows``: line number of the first record, its text,
-    and the cells of the first records, split at commas.
+    padded with zeros. ``line``, ``rows``: first record, and the cells of the first records, split
+    at commas.
     """
     if {len(row) % 2 for row in rows} != {0}:
         return

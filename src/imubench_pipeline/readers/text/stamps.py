@@ -88,9 +88,9 @@ class TextStamps:
     def _counted(self, time: NDArray[np.int64], leap: NDArray[np.bool_]) -> NDArray[np.int64]:
         """Return stamps that advance through leap seconds.
 
-        Second 60 is read as second 0 of the next minute. After a leap second, second 0 follows and
-        repeats this time, so that one second is added. If 60 is only due to rounding, the next
-        stamp is later, and nothing is added.
+        Second 60 is read as second 0 of the next minute. If second 0 follows and repeats this time,
+        one second is added; if 60 is only due to rounding, the next stamp is later, and nothing is
+        added.
         """
         if not len(time):
             return time
@@ -190,10 +190,9 @@ _FORMS_BY_SIGNS = _group_forms_by_signs()
 
 
 def find_stamp_forms(texts: Sequence[str]) -> tuple[str, ...]:
-    """Return the patterns that all stamps match, the most plausible first; empty if there are none.
+    """Return the patterns of date, time or both that all stamps match, the most plausible first.
 
-    A pattern may have a date only or a time of day only. If day and month are ambiguous, the
-    patterns with the shortest time span are returned. Missing stamps are ignored.
+    If day and month are ambiguous, it is the shortest time span. Missing stamps are ignored.
     """
     stamps = [text.strip() for text in texts if not is_missing(text)]
     if not stamps or not all(
@@ -228,8 +227,8 @@ class TextTime:
     """Converts the stamps of a text log to seconds.
 
     ``types``: type for pyarrow by column position; a separate column of dates comes first.
-    ``position``: column of the stamps. ``expected``: description of a stamp for messages.
-    ``as_text``: ISO 8601 is read as text, not by pyarrow.
+    ``position`` of the stamps. ``expected``: for messages. ``as_text``: ISO 8601 is not read by
+    pyarrow.
     """
 
     _text: TextStamps | None = None

@@ -33,14 +33,13 @@ _MIN_STEP_WHERE_ROUNDING_DOMINATES = 1.5
 
 
 def estimate_excess_repeats(column: ColumnSummary) -> tuple[float, float]:
-    """Return the share of samples that repeat for another reason than rounding.
+    """Return the share of samples that repeat beyond chance, and the share of pairs by chance.
 
     A register that is read faster than it is updated repeats samples, and between the repeats it
-    changes like independent samples. Samples also repeat by chance, for two reasons, and the larger
-    of the two shares is subtracted. Coarse steps: the share of samples that equal the sample
-    `summary.FAR_LAG` before. Low-passed noise, whose neighbours are alike: the share of repeats in
-    rounded normal noise with the same share of one-step changes. The result is the share of all
-    samples that repeat beyond chance, and the share of pairs that repeat by chance.
+    changes like independent samples. By chance samples repeat for two reasons, of which the larger
+    share is subtracted. Coarse steps: the share of samples that equal the sample `summary.FAR_LAG`
+    before. Low-passed noise: the share of repeats in rounded normal noise with the same share of
+    one-step changes.
     """
     pairs, far_pairs = column.pairs, column.far_pairs
     if pairs == 0 or far_pairs == 0:
@@ -56,10 +55,7 @@ def estimate_excess_repeats(column: ColumnSummary) -> tuple[float, float]:
 
 
 def _estimate_rounded_repeats(single: int, steps: int) -> float:
-    """Return the share of repeats in rounded normal noise with this share of one-step changes.
-
-    ``single``: number of changes by one step, of ``steps`` changes.
-    """
+    """Return the share of repeats in rounded normal noise with this share of one-step changes."""
     if steps == 0:
         return 1.0
     part = single / steps
@@ -76,11 +72,9 @@ def _estimate_rounded_repeats(single: int, steps: int) -> float:
 def _expect_rounded_changes(deviation: float) -> tuple[float, float]:
     """Return the expected share of equal neighbours, and of one-step changes among the changes.
 
-    The difference d of two neighbours is normal. Rounded with a uniform phase it becomes k steps
-    with probability 1 - |d - k|. With G(x) = E[(d - x)⁺] the expected share of differences of k
-    steps is G(k - 1) - 2 G(k) + G(k + 1).
-
-    ``deviation``: standard deviation of d, in steps.
+    The difference d of two neighbours is normal, with the ``deviation`` in steps. Rounded with a
+    uniform phase it becomes k steps with probability 1 - |d - k|. With G(x) = E[(d - x)⁺] the
+    expected share of differences of k steps is G(k - 1) - 2 G(k) + G(k + 1).
     """
     below, none, single, two = (_expect_excess(x, deviation) for x in (-1.0, 0.0, 1.0, 2.0))
     equal = below - 2.0 * none + single
@@ -103,8 +97,7 @@ def check_columns(
 ) -> list[Finding]:
     """Return the findings about the columns of one file; an unusable channel is fatal.
 
-    ``rate``: Hz. ``static``: the sensor was at rest. If it was turned on purpose, changes are not
-    reported.
+    ``rate``: Hz. ``static``: the sensor was at rest; changes are not reported if it was turned.
     """
     findings: list[Finding] = []
     usable: dict[str, ColumnSummary] = {}

@@ -54,10 +54,7 @@ _FINGERPRINT_FORMAT = ".8e"  # nine digits, to find copies of a log
 
 
 def find_copied_channels(columns: Mapping[str, ColumnSummary]) -> Iterator[Finding]:
-    """Yield a finding for each channel with the samples of another one, also in another unit.
-
-    ``columns``: all channels of a recording; no other columns.
-    """
+    """Yield a finding for each channel with the samples of another one, also in another unit."""
     pieces = {
         name: column.excerpts() for name, column in columns.items() if column.low < column.high
     }
@@ -76,10 +73,7 @@ def find_copied_channels(columns: Mapping[str, ColumnSummary]) -> Iterator[Findi
 
 
 def _find_copy_factor(first: list[Excerpt], other: list[Excerpt]) -> float | None:
-    """Return the factor from the samples of one column to the other, or None if it is no copy.
-
-    The majority of the pieces decides: a knock, or a vibration of both axes, affects its own only.
-    """
+    """Return the factor of one column to the other by most pieces; None if it is no copy."""
     slopes, alike = [], []
     for x, y, dx, dy in _pair_increments(first, other):
         xx, yy, xy = float(dx @ dx), float(dy @ dy), float(dx @ dy)
@@ -117,10 +111,7 @@ def find_repeated_stretches(
     steps: Mapping[str, levels.Quantisation | None],
     rate: float,
 ) -> Iterator[Finding]:
-    """Yield findings about stretches of a log that repeat an earlier stretch bit for bit.
-
-    ``columns`` and ``steps``: usable channels of one file, and their quantisation. ``rate``: Hz.
-    """
+    """Yield findings about stretches of usable channels that repeat an earlier one bit for bit."""
     stretches_of = {}
     for name, column in columns.items():
         quantisation = steps[name]
@@ -161,8 +152,7 @@ def find_copied_recordings(
 ) -> Iterator[FindingRow]:
     """Yield rows of the table ``findings`` about recordings that are copies of another one.
 
-    ``models`` and ``biases``: rows of the tables ``models`` and ``fixed_bias``, in the order of the
-    recordings. The first of several copies counts as the original.
+    The rows are in the order of the recordings; the first of several copies counts as the original.
     """
     means = {_get_channel_key(row): row.value for row in biases}
     first: dict[tuple[Any, ...], str] = {}
@@ -198,13 +188,11 @@ _CORRELATION_SIGMAS = 4.0
 
 
 def find_shared_noise(columns: Mapping[str, ColumnSummary]) -> Iterator[Finding]:
-    """Yield findings about axes of one sensor with correlated increments.
+    """Yield findings about usable axes of one sensor with correlated increments.
 
     Increments suppress slow signals, such as a temperature effect on all axes. The standard error
-    of a correlation of noise with the autocorrelations a_k and b_k is sqrt(sum a_k b_k / n)
-    (M. S. Bartlett, "Some Aspects of the Time-Correlation Problem", J. R. Stat. Soc. 98, 1935).
-
-    ``columns``: usable channels of one file.
+    of a correlation of noise with the autocorrelations a_k and b_k is sqrt(sum a_k b_k / n) (M. S.
+    Bartlett, "Some Aspects of the Time-Correlation Problem", J. R. Stat. Soc. 98, 1935).
     """
     pieces = {name: column.excerpts() for name, column in columns.items()}
     strongest: dict[str, tuple[float, str]] = {}

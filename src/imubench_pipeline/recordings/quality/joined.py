@@ -45,10 +45,7 @@ _SD_OVER_MAD = 1.4826  # standard deviation over the median absolute deviation, 
 
 
 def find_joined_logs(channel: str, column: ColumnSummary, rate: float) -> Iterator[Finding]:
-    """Yield a finding if the data of another sensor seem to begin in the log.
-
-    ``rate``: Hz.
-    """
+    """Yield a finding if the data of another sensor seem to begin in the log; ``rate`` in Hz."""
     blocks = column.blocks()
     filled = np.flatnonzero(blocks.spread > 0.0)
     if len(filled) < 4 * _MIN_NOISE_WIDTH:
@@ -127,10 +124,7 @@ def _is_lasting(logs: Array, place: int) -> bool:
 
 
 def detect_register_step(pieces: Sequence[Excerpt]) -> tuple[float, float] | None:
-    """Return the step of a register, and the finest detectable step, SI; None without data.
-
-    The step is infinite if none is detected.
-    """
+    """Return the step of a register, SI, or infinity, and the finest detectable one, or None."""
     whole = [piece for piece in pieces if len(piece.values) >= PIECE_SIZE // 4]
     values = [piece.present for piece in whole if len(piece.present) >= PIECE_SIZE // 8]
     if not values:
@@ -195,10 +189,7 @@ def find_interleaved_samples(channel: str, column: ColumnSummary) -> Iterator[Fi
 
 
 def _compare_even_and_odd(values: Array) -> tuple[float, float, int] | None:
-    """Return level difference over noise, log ratio of the noises, and number of samples.
-
-    Compares even and odd samples. Medians over parts of the piece suppress knocks.
-    """
+    """Return level difference over noise, log ratio of noises, number of samples; or None."""
     whole = len(values) // (2 * _PAIRS_PER_PART) * 2 * _PAIRS_PER_PART
     pairs = values[:whole].reshape(-1, _PAIRS_PER_PART, 2)
     present: NDArray[np.bool_] = np.isfinite(pairs[:, :, 0]) & np.isfinite(pairs[:, :, 1])

@@ -40,17 +40,12 @@ class Knock:
 def find_outlier_blocks(
     blocks: BlockStatistics, sigmas: float, step: float | None = None
 ) -> tuple[NDArray[np.int64], Array, Array]:
-    """Return the blocks with an outlier, and the level and the noise around them.
+    """Return the blocks with an outlier, and level and noise around them, SI, shape (n,) each.
 
-    ``sigmas``: least distance of an outlier from the level, in standard deviations of the samples.
-    ``step``: least significant bit, SI; a change by one is no outlier. None: not quantised.
-
-    Returns
-    -------
-    number : ndarray of int, shape (n,)
-    level, noise : ndarray, shape (n,)
-        Median of the means of the nearest blocks, and the noise, SI: the median of the standard
-        deviations of the blocks around, with a lower bound from the step.
+    The level is the median of the means of the nearest blocks. The noise is the median of the
+    standard deviations of the blocks around, with a lower bound from the step. ``sigmas``: least
+    distance of an outlier from the level, in standard deviations of the samples. ``step``: least
+    significant bit, SI; a change by one is no outlier. None: not quantised.
     """
     least = _MIN_OUTLIER_STEPS * (step or 0.0) / sigmas
     filled = np.isfinite(blocks.spread)
@@ -82,10 +77,10 @@ def find_knocks(
     longest: int,
     step: float | None = None,
 ) -> Iterator[Knock]:
-    """Yield the knocks of a column.
+    """Yield the knocks of a column; for the other parameters see `find_outlier_blocks`.
 
-    ``pieces``: the column in order, SI; NaN where a sample is missing. ``longest``: longest knock,
-    records; a longer event is motion. For the other parameters see `find_outlier_blocks`.
+    ``pieces``: the column in order, SI. ``longest``: longest knock, records; a longer one is
+    motion.
     """
     number, level, noise = find_outlier_blocks(blocks, sigmas, step)
     if len(number) == 0:

@@ -71,11 +71,10 @@ def estimate_noise(column: ColumnSummary) -> float:
 def find_piled_value(
     column: ColumnSummary, steps: Quantisation | None
 ) -> tuple[float, float] | None:
-    """Return a value that is far more frequent than its neighbours; None if there is none.
+    """Return a value, SI, far more frequent than its neighbours, and its share; None if none is.
 
     Neighbouring levels of a fine register are about equally frequent. A constant that replaces lost
-    samples, or the 0 of a dead band, is more frequent. Coarse registers are not tested. The result
-    is the value, SI, and its share of the samples in the excerpts.
+    samples, or the 0 of a dead band, is more frequent. Coarse registers are not tested.
     """
     if steps is not None and steps.over_noise > _MAX_STEP_FOR_PILING:
         return None
@@ -105,21 +104,19 @@ def summarise_level(
 ) -> dict[str, Any]:
     """Return the level and noise of a channel, to be compared with its datasheet.
 
-    ``mean`` is the median of the block means, SI, which is robust to knocks; for ``density`` see
-    `bound_noise_density`. ``unit``: as stated in the sensor file. ``timed``: the log has stamps;
-    otherwise the rate, Hz, is the stated one.
+    ``mean`` is the median of the block means, SI, which is robust to knocks. ``unit``: as stated in
+    the sensor file. ``timed``: the log has stamps; otherwise the rate, Hz, is the stated one.
     """
     level, density = compute_finite_median(column.blocks().mean), bound_noise_density(column, rate)
     return {"mean": level, "density": density, "unit": unit, "rate": rate, "timed": timed}
 
 
 def bound_noise_density(column: ColumnSummary, rate: float) -> tuple[float, float | None]:
-    """Return approximate bounds of the white noise density of a column.
+    """Return bounds of the white noise density N of a column, SI/√Hz, two-sided; ``rate`` in Hz.
 
-    Two estimates are used. The standard deviation within blocks over √rate is too small behind a
-    low-pass. The Allan deviation of the block means times √τ is too large if slow noise dominates
-    at τ. The upper bound is at least the quantisation noise of the register; it is None if there
-    are too few blocks. The bounds are of N, SI/√Hz, two-sided; the rate is in Hz.
+    The standard deviation within blocks over √rate is too small behind a low-pass. The Allan
+    deviation of the block means times √τ is too large if slow noise dominates at τ. The upper bound
+    is at least the quantisation noise of the register; it is None if there are too few blocks.
     """
     blocks = column.blocks()
     spread = estimate_noise(column) / math.sqrt(rate)
@@ -144,10 +141,9 @@ def compute_longest_chance_run(column: ColumnSummary) -> float:
 def find_saturation(
     column: ColumnSummary, steps: Quantisation | None, share: float
 ) -> tuple[str, int] | None:
-    """Return the extreme where a column is saturated; None if it is not.
+    """Return ``lowest`` or ``highest`` where a column is saturated, and the samples there, or None.
 
-    The result is ``lowest`` or ``highest``, and the number of samples there. ``share``: least share
-    of the samples at a saturated extreme.
+    ``share``: least share of the samples at a saturated extreme.
     """
     if steps is not None and steps.levels < 10:
         return None  # with so few levels an extreme is frequent in any case
@@ -162,8 +158,8 @@ def _is_cut_off(column: ColumnSummary, steps: Quantisation | None, side: str, nu
     """Return whether samples beyond an extreme are missing from the distribution.
 
     In the tail of normal noise the ratio of the counts of neighbouring levels falls by exp(-q^2)
-    from one level to the next, with q the step over the noise. The expected count of the level
-    beyond the last one is therefore n_last^2 / n_next exp(-q^2).
+    per level, with q the step over the noise: the level beyond the last has n_last^2 / n_next
+    exp(-q^2).
     """
     if steps is None:
         return True

@@ -49,10 +49,7 @@ all levels are used."""
 
 
 def find_hidden_step(pieces: Sequence[Excerpt]) -> float | None:
-    """Return the least significant bit, SI, of a register whose values were rounded again.
-
-    None: the least difference of values is the step, or there is no step.
-    """
+    """Return the least significant bit, SI, of a register that was rounded again, or None."""
     chosen = [piece.present for piece in pieces if len(piece.present) >= _MIN_SAMPLES]
     chosen = chosen[:: max(1, len(chosen) // _MAX_PIECES)][:_MAX_PIECES]
     steps = [_find_hidden_step(values) for values in chosen]

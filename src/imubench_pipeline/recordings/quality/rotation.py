@@ -34,12 +34,10 @@ def detect_gravity_turn(axes: Sequence[BlockStatistics], rate: float) -> Gravity
     """Return the steady rotation in the block means of an accelerometer; None if there is none.
 
     In the frame of a sensor with the angular rate ω, gravity changes by dg/dt = -ω × g. The mean of
-    a block has the direction of g at its middle, and all means are shorter by the same factor.
-    Hence means rotate like g. For neighbouring means with difference d and average m, -w × m = d is
-    solved for w by least squares, where |w| = 2 tan(θ/2) and θ is the angle per block.
-
-    ``axes``: statistics of x, y and z, SI, over the same records.
-    ``rate``: sampling rate, Hz.
+    a block has the direction of g at its middle, and all means are shorter by the same factor:
+    means rotate like g. For neighbouring means with difference d and average m, -w × m = d is
+    solved for w by least squares, where |w| = 2 tan(θ/2) and θ is the angle per block. ``axes``:
+    statistics of x, y and z, SI, over the same records. ``rate``: Hz.
     """
     whole = np.all([blocks.count > 0.9 * blocks.size for blocks in axes], axis=0)
     means = np.column_stack([np.where(whole, blocks.mean, np.nan) for blocks in axes])

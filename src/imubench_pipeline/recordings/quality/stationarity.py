@@ -74,10 +74,7 @@ def find_steps(blocks: BlockStatistics, sigmas: float) -> list[Step]:
 
 
 def find_warm_up(blocks: BlockStatistics, times: float) -> WarmUp | None:
-    """Find a beginning that drifts more than the rest.
-
-    ``times``: least ratio of the first drift to the median drift of the later parts.
-    """
+    """Find a beginning that drifts more than `times` the median drift of the later parts."""
     size = len(blocks.mean) // _NUMBER_OF_PARTS
     if size < _MIN_BLOCKS_PER_PART:
         return None
@@ -99,10 +96,7 @@ def find_warm_up(blocks: BlockStatistics, times: float) -> WarmUp | None:
 
 
 def find_variance_change(blocks: BlockStatistics) -> tuple[float, int, int] | None:
-    """Return the ratio of the largest to the smallest noise of a part; None if it is too short.
-
-    The ratio is followed by the first and one-past-last record of the noisiest part.
-    """
+    """Return the ratio of largest to smallest noise of a part, and the noisiest records."""
     size = len(blocks.spread) // _NUMBER_OF_PARTS
     if size < _MIN_BLOCKS_PER_PART:
         return None
@@ -117,10 +111,9 @@ def find_variance_change(blocks: BlockStatistics) -> tuple[float, int, int] | No
 
 
 def find_motion(blocks: BlockStatistics, times: float, least: float = 0.0) -> list[tuple[int, int]]:
-    """Return the parts with motion: a large standard deviation that no knock explains.
+    """Return the parts (first, one past last record) with a large deviation that no knock explains.
 
-    ``times``, ``least``: lower limits of the standard deviation, over its median and in SI. A part
-    is its first and one-past-last record.
+    ``times``, ``least``: lower limits of the standard deviation, over its median and in SI.
     """
     usual = compute_finite_median(blocks.spread)
     if not usual > 0.0:

@@ -111,8 +111,7 @@ class Excerpt:
 class Excerpts:
     """Collects pieces of a streamed column: every one, every second, every fourth and so on.
 
-    Block statistics cannot show multiples of a step or periodic repeats. A few ten thousand samples
-    can, for a log of any length.
+    They show steps and periodic repeats, which block statistics cannot.
     """
 
     _stride: int = 1
@@ -144,10 +143,7 @@ class Excerpts:
 
 
 def pair_common_samples(first: list[Excerpt], other: list[Excerpt]) -> list[tuple[Array, Array]]:
-    """Return the samples of two columns of one table that are present in both.
-
-    There are two arrays of equal shape for each excerpt that both columns have.
-    """
+    """Return the samples that are present in two columns, in a pair for each common excerpt."""
     places = {piece.first: piece.values for piece in other}
     pairs = []
     for piece in first:

@@ -63,8 +63,7 @@ _MIN_REPORTED_TIME = 3.0  # steps that take longer, s, are reported
 class Analysis:
     """The steps of all recordings of a plan: first for the numbers, then for the pages.
 
-    A recording with a failed step is left out, and is listed in the table ``failures``. `cores`:
-    number of parallel processes; `say` is called with progress messages.
+    `cores`: number of parallel processes; `say` is called with progress messages.
     """
 
     def __init__(self, plan: Plan, compiling: Compilation, cores: int, say: Say) -> None:

@@ -14,10 +14,7 @@ _MESSAGE_DELAY = 3.0  # delay of the message about the compilation, s
 
 
 class Compilation:
-    """Compiles the kernels of estimates unless they are cached; begins at once.
-
-    As a context manager it ends its process if nobody waited for it.
-    """
+    """Compiles the kernels of estimates unless they are cached; a context ends its process."""
 
     def __init__(self, say: Callable[[str], None]) -> None:
         self._say = say

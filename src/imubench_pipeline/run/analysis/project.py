@@ -50,28 +50,14 @@ def lay_out(
     catalogue: Sequence[Path],
     folder: Path,
 ) -> dict[str, str | None]:
-    """Make a project of logs: a drop zone of links, and the sensor files for them.
+    """Make a project of logs in an existing folder: a drop zone of links, and their sensor files.
 
-    Parameters
-    ----------
-    logs : sequence of Path
-        Files of logs, or folders of recordings.
-    sensor : Path or None
-        The sensor file of all logs, or its name in the folders `catalogue`. None: a draft for each
-        log, as by `imubench inspect`, completed by `stated`.
-    folder : Path
-        Existing folder for the project.
+    `logs`: files, or folders of recordings. `sensor`: the sensor file of all logs, or its name in
+    the folders `catalogue`; None: a draft for each log, as by `imubench inspect`, completed by
+    `stated`. Return the paths in the configuration of the run.
 
-    Returns
-    -------
-    dict
-        The paths in the configuration of the run.
-
-    Raises
-    ------
-    ConfigError
-        If a log is missing, two logs would have one name, the sensor file cannot be used, or a log
-        does not state a required property (`UnfilledError`).
+    Raise a ConfigError if a log is missing, two logs would have one name, the sensor file cannot be
+    used, or a log does not state a required property (`UnfilledError`).
     """
     missing = [log for log in logs if not log.exists()]
     if missing:
