@@ -51,8 +51,7 @@ class Batch:
 
     time: NDArray[np.float64] | None
     """s since the first stamp of the file, shape (n,); NaN where the stamp is missing."""
-    columns: Mapping[str, NDArray[np.float64]]
-    """rad/s, m/s² or °C by channel, shape (n,); NaN where the sample is missing."""
+    columns: Mapping[str, NDArray[np.float64]]  # rad/s, m/s² or °C, shape (n,); NaN: missing
 
     def __len__(self) -> int:
         return len(next(iter(self.columns.values())))
@@ -68,17 +67,13 @@ class LogFile(ABC):
     """One file of a recording, read as a stream in bounded memory."""
 
     fixed_units: ClassVar[Mapping[str, str]] = {}
-    fixed_by: ClassVar[str] = ""
-    """Units that the format fixes, by quantity, and the name of the format."""
+    fixed_by: ClassVar[str] = ""  # name of the format that fixes units by quantity
 
     path: Path
     log: LogFormat
-    sources: Mapping[str, ColumnSource]
-    """Columns that are read from this file: channels and, where it has one, the temperature."""
-    started: str | None = None
-    """ISO 8601 date and time of the first sample, known after the first batch."""
-    rate: float | None = None
-    """Sampling rate that the file itself states, Hz; known after the first batch."""
+    sources: Mapping[str, ColumnSource]  # columns that are read from this file, with temperature
+    started: str | None = None  # ISO 8601 date of the first sample, after the first batch
+    rate: float | None = None  # Hz, stated in the file; known after the first batch
     findings: list[Finding] = field(default_factory=list)
     """Findings on omitted data; complete after `batches` is exhausted."""
     units: dict[str, StatedUnit] = field(default_factory=dict)

@@ -23,9 +23,7 @@ T = TypeVar("T")
 
 _PIPE_BLOCK = 1 << 20
 
-_OVERLOAD_FACTOR = 5.0
-"""Factor by which the time limit is extended while a process waits for a core or a disk."""
-
+_OVERLOAD_FACTOR = 5.0  # on the time limit, while a process waits for a core or a disk
 _FORK_LOCK = Lock()
 """Held between opening a pipe and closing its unused ends: a process forked by another thread in
 the meantime would keep the pipe open."""

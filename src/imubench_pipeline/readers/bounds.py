@@ -15,43 +15,30 @@ MAX_UNCHECKED_PARTS, MIN_MEAN_PART = 10_000, 64
 """Number of compressed parts, such as members of gzip, that may be nearly empty; least mean size of
 more parts, bytes."""
 
-MAX_DIRECTORY, MAX_MEMBERS = 1 << 21, 1 << 16
-"""Bytes of the directory of a zip archive; members of an archive without a directory."""
-
+MAX_DIRECTORY, MAX_MEMBERS = 1 << 21, 1 << 16  # bytes of a zip directory; members without one
 MAX_ARCHIVE_PROBES = 1 << 14  # members of an archive that are searched for the only text file
 
 # --------------------------------------------------------------------------------------- text
 
-MAX_SEARCHED_COLUMNS = 1000
-"""Columns of a table, of text or arrays, that are searched for the sensor."""
-
+MAX_SEARCHED_COLUMNS = 1000  # columns of a table that are searched for the sensor
 MAX_LINE_LENGTH = 1 << 20  # bytes of a line of text
-MAX_LINES_BEFORE, MAX_BYTES_BEFORE = 500_000, 1 << 26
-"""Lines and bytes that are searched for the first record."""
-
-MAX_COMMENT_LINES, MAX_COMMENT_BYTES = 1000, 1 << 23
-"""Lines and bytes of comments before the first record that are stored."""
+MAX_LINES_BEFORE, MAX_BYTES_BEFORE = 500_000, 1 << 26  # searched for the first record
+MAX_COMMENT_LINES, MAX_COMMENT_BYTES = 1000, 1 << 23  # stored before the first record
 
 # ------------------------------------------------------------------------------------- arrays
 
 MAX_ARRAYS, MAX_FIELDS = 10_000, 1 << 14  # arrays of a file; columns of an array of records
 MAX_BLOCK_BYTES = 1 << 26  # bytes of a block of records, which may be a single record
-MAX_CHUNK_BYTES = 1 << 28
-"""Total bytes of one chunk of each column of an HDF5 file: chunks are unpacked as a whole."""
-
+MAX_CHUNK_BYTES = 1 << 28  # bytes of a chunk of each HDF5 column: they are unpacked whole
 MAX_CHUNKS = 1 << 17  # chunks of an HDF5 data set: the library takes 2 kB for each
-MAX_ARROW_BATCH = 1 << 28
-"""Bytes of a compressed record batch of Feather or Arrow IPC, which is unpacked as a whole."""
-
+MAX_ARROW_BATCH = 1 << 28  # bytes of a compressed record batch, which is unpacked whole
 MAX_PAGE_BYTES = 1 << 28
 MAX_UNCHECKED_PAGES, MIN_MEAN_PAGE = 1 << 17, 1 << 12
 """Total unpacked bytes of the largest page of each column of a Parquet file; number of pages of any
 size, and least mean size of more pages, bytes."""
 
 MAX_OBJECTS, MAX_GROUP_DEPTH = 20_000, 64  # objects of an HDF5 file, and depth of nested groups
-MAX_NPY_HEADER = 10_000
-"""Bytes of a header. NumPy has the same limit, but reads a header before it checks the size."""
-
+MAX_NPY_HEADER = 10_000  # bytes; NumPy has the same limit, but reads a header first
 MAX_STRUCTURE_DEPTH, MAX_MATLAB_NAME, MAX_DIMENSIONS = 16, 256, 32
 """For MATLAB 5: depth of structures; bytes of a name (MATLAB allows 63); dimensions of an array."""
 
@@ -65,5 +52,4 @@ MAX_MESSAGE, MAX_MESSAGE_BATCH = 1 << 16, 1 << 24
 """Bytes of an inertial message (320 and the name of a frame), and of messages read together."""
 
 MAX_TOPICS, MAX_TOPIC_LENGTH = 10_000, 1024  # topics of a bag, and bytes of the name of a topic
-MAX_METADATA = 1 << 20
-"""Bytes of metadata.yaml: a topic takes some 300, more with its quality of service."""
+MAX_METADATA = 1 << 20  # bytes of metadata.yaml: a topic takes some 300

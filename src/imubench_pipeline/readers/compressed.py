@@ -137,8 +137,7 @@ _MAGIC = re.compile(
     rb"|(?P<bzip2>BZh[1-9](?:1AY&SY|\x17rE8P\x90|.{0,5}\Z))",
     re.DOTALL,
 )
-MAX_MAGIC_LENGTH = 10
-"""Bytes of the longest signature. Shorter signatures would match random bytes."""
+MAX_MAGIC_LENGTH = 10  # bytes of a signature; shorter ones would match random bytes
 
 
 def recognise_compression(begin: bytes) -> str:

@@ -24,11 +24,9 @@ class Contents:
     """Contents of a recording."""
 
     path: Path
-    about: str
-    """Kind of the recording, such as its format."""
+    about: str  # kind of the recording, such as its format
     tables: tuple[LogTable, ...]
-    stated: FileFormat | None = None
-    """Format that the sensor file must state, since the first bytes do not show it."""
+    stated: FileFormat | None = None  # format to state, since the first bytes do not show it
     files: int = 1  # number of files; at most `MAX_FILES` are examined
     only: str | None = None  # the only file of a folder that is read if no `file` is stated
 

@@ -30,8 +30,7 @@ NOTHING_STATED = LogFormat.model_validate(
 class Signature:
     """Features that identify a format: contents only, never the name of a file."""
 
-    begins: tuple[bytes, ...] = ()
-    """A file that begins with one of these byte strings has the format."""
+    begins: tuple[bytes, ...] = ()  # a file that begins with one of these has the format
     tells: Callable[[bytes], bool] | None = None
     """Returns whether the first 64 kB of a file have the format; used if they match no ``begins``.
     Random bytes must not be accepted, in any amount."""
@@ -56,21 +55,14 @@ class FileFormat:
     title: str  # common name of the format
     endings: tuple[str, ...]  # usual suffixes of its files, for messages
     signature: Signature
-    streamed: bool
-    """Its logs are read sequentially, so that they may be compressed or in a zip archive."""
-    clock_of: Literal["file", "variable", "length"]
-    """Data that share a clock: the whole file, each ``variable``, or all arrays of one length."""
-    time_columns: tuple[str, ...]
-    """Names of the time columns in the format; empty if the format does not fix them."""
-    settings: tuple[str, ...]
-    """Entries of ``log``, or of its channels, that apply to this format but not to all."""
-    code: Callable[[], Code]
-    """Imports and returns the code; a function, so that a run imports only the formats it needs."""
+    streamed: bool  # read sequentially: may be compressed or in a zip archive
+    clock_of: Literal["file", "variable", "length"]  # data that share a clock: arrays of a length
+    time_columns: tuple[str, ...]  # names that the format fixes; empty if it fixes none
+    settings: tuple[str, ...]  # entries of `log` that apply to this format, but not to all
+    code: Callable[[], Code]  # imports and returns the code, when a run needs the format
     vendor: str | None = None  # vendor of all sensors with such logs
-    measured_by_name: bool = False
-    """All names mean measured quantities: linear acceleration includes gravity."""
-    extra: Extra | None = None
-    """Extra of the package with the library that the code needs; None: no library."""
+    measured_by_name: bool = False  # linear acceleration includes gravity
+    extra: Extra | None = None  # extra of the package with a library for the code
 
     def load(self) -> Code:
         """Return the code; raise `RecordingError` if the library that it needs is not installed."""
@@ -94,8 +86,7 @@ class LogColumn:
     source: str | int  # value of `column` in a sensor file
     label: str  # name of the column; empty if it has none
     kind: Kind
-    first: tuple[str, ...] = ()
-    """The first values as written."""
+    first: tuple[str, ...] = ()  # the first values as written
     values: NDArray[np.float64] = field(default_factory=lambda: np.empty(0))
     """First values, shape (n,); NaN where missing; dates in ns since 1970 or since midnight. Empty
     if they are no numbers."""
@@ -111,11 +102,9 @@ class LogTable:
     """Columns with common records: a text log, an array, a topic or a message."""
 
     file_format: FileFormat
-    name: str = ""
-    """Name of the array, topic or message; empty for a text log."""
+    name: str = ""  # of the array, topic or message; empty for a text log
     columns: tuple[LogColumn, ...] = ()
-    variable: str | None = None
-    """Value of ``variable`` in a sensor file."""
+    variable: str | None = None  # value of `variable` in a sensor file
     file: str | None = None  # value of `file` in a sensor file; None: the recording is one file
     rows: int | None = None  # number of records, if it is known without reading them
     rate: float | None = None  # rate that the file states, Hz

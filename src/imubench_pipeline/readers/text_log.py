@@ -23,8 +23,7 @@ from imubench_pipeline.settings.sensor import (
 from imubench_pipeline.settings.validation import ConfigError
 from imubench_pipeline.units import find_conversion
 
-_DECIMALS = 12
-"""Decimals that are written; more are rounding errors, and would double the size of the file."""
+_DECIMALS = 12  # more are rounding errors, and would double the size of the file
 
 
 class TextLog:

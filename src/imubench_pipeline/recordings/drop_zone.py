@@ -14,25 +14,16 @@ from imubench_pipeline.settings.validation import cut
 from imubench_pipeline.tables.texts import escape_invisible
 from imubench_pipeline.words.reasons import files as texts
 
-PARTIAL = frozenset({".part", ".tmp", ".filepart", ".crdownload"})
-"""How the names of files end that are still being transferred."""
-
-COMPRESSED = frozenset({".gz", ".zst", ".xz", ".bz2", ".zip"})
-"""How the names of files end that are compressed."""
-
-NO_SENSOR = "(no sensor)"
-"""Stands for the sensor of logs that lie beside the folders of the sensors."""
-
+PARTIAL = frozenset({".part", ".tmp", ".filepart", ".crdownload"})  # ends of names in transfer
+COMPRESSED = frozenset({".gz", ".zst", ".xz", ".bz2", ".zip"})  # ends of compressed files
+NO_SENSOR = "(no sensor)"  # sensor of logs that lie beside the folders of the sensors
 _NOTES = ".yaml"
 _MISNAMED_NOTES = {".yml", _NOTES}  # in lower case
 _NOT_LOGS = {".md"} | _MISNAMED_NOTES | PARTIAL
 _FOLLOWED = 2  # levels of folders where links are followed: sensors, and recordings
 _UNUSABLE_IN_NAMES = re.compile(r"[^\w .+()-]")
-_LONGEST_NAME, _MOST_BYTES = 120, 160
-"""Letters, and bytes: the name of a page is longer, and systems take 255 bytes."""
-
-_PERIODIC = re.compile(r"(.+?)\1{19,}$")
-"""An end that repeats itself: Snakemake ends a run over names that do so twenty times."""
+_LONGEST_NAME, _MOST_BYTES = 120, 160  # letters, bytes: the name of a page is longer
+_PERIODIC = re.compile(r"(.+?)\1{19,}$")  # Snakemake ends a run over names that repeat
 
 
 @dataclass(frozen=True)
@@ -44,8 +35,7 @@ class Recording:
     path: Path  # the log file, or the folder of a recording that has several
     notes: Path | None  # the file of notes beside it
     simulated: bool
-    error: str | None = None
-    """Why the file cannot be used, where its name or its place says so already."""
+    error: str | None = None  # why the file cannot be used, if its name or place says so
     unavailable: str | None = None  # why it cannot be looked at now; nothing is known about it
     held_back: bool = False  # the log is not read in this run: the results that are there stay
 

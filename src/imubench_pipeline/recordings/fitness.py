@@ -25,8 +25,7 @@ from imubench_pipeline.words.reasons import simulations as texts
 
 Key = tuple[str, str]  # sensor, recording
 
-BESIDE_MEASURED = "simulated_beside_measured"
-"""Code of the doubt that leaves out simulated recordings, though they be included."""
+BESIDE_MEASURED = "simulated_beside_measured"  # leaves out simulated recordings
 
 WITH_DOUBTS: Mapping[str, type[ErrorBudgetRow] | type[DatasheetRow]] = {
     "error_budget": ErrorBudgetRow,
@@ -42,9 +41,7 @@ class Doubt:
     sensor: str
     recording: str
     channel: str | None  # None: the whole recording
-    code: str
-    """The finding, ``not_explained`` (no model explains the spectrum), or the status of a
-    parameter."""
+    code: str  # the finding, `not_explained` (by a model), or the status of a parameter
     reason: str
     parameters: tuple[str, ...] = ()  # that it affects; none: all
     unfit: bool = False  # the figures may be of something else

@@ -31,12 +31,9 @@ class Quality:
     recording: dict[str, Any]
     findings: list[FindingRow]
     channels: dict[str, dict[str, Any]]
-    kept: dict[str, dict[str, Any]] | None = None
-    """The files of samples, as `identify_files` gives them; None: not known."""
-    failure: dict[str, Any] | None = None
-    """Why the ingest failed (`imubench_pipeline.tables.failures.Failure`)."""
-    gravity: dict[str, Any] | None = None
-    """How gravity turns against the sensor (`recordings.quality.rotation.GravityTurn`)."""
+    kept: dict[str, dict[str, Any]] | None = None  # samples, as `identify_files` gives them
+    failure: dict[str, Any] | None = None  # why the ingest failed (`tables.failures.Failure`)
+    gravity: dict[str, Any] | None = None  # how gravity turns (`quality.rotation.GravityTurn`)
 
     @property
     def row(self) -> RecordingRow:

@@ -37,9 +37,7 @@ _MAX_WHOLE_GLIMPSE = 1 << 20  # bytes
 _BLOCKS = 16
 _BLOCK_SIZE = 4096  # bytes
 _CHUNK_SIZE = 1 << 20  # bytes
-_STAMP_RESOLUTION = 2_000_000_000
-"""ns. Two changes within it may have the same stamp (FAT: 2 s, Linux: some ms)."""
-
+_STAMP_RESOLUTION = 2_000_000_000  # ns; changes within it may have the same stamp (FAT: 2 s)
 Stamps = tuple[int, int]  # last change of the content and of anything, ns since 1970
 
 
@@ -48,8 +46,7 @@ class KnownFile:
     """A file of a log as an ingest found it."""
 
     size: int | None  # bytes; None: it was not there
-    sha256: str | None
-    """SHA-256 of the content; None: it was not read to its end, or changed meanwhile."""
+    sha256: str | None  # of the content; None: not read to its end, or changed meanwhile
     stamps: Stamps | None
     """None: the file changed while it was read, or so shortly before that a later change might
     have the same stamps."""

@@ -31,15 +31,11 @@ from imubench_pipeline.typing import Array
 
 BUCKETS = 400  # default number of intervals of time of an envelope
 BUCKETS_OF_TURNS = 2400  # the same of a recording with turns in it, which should be seen
-MOST_BINS = 120
-"""Bins of a histogram at most; at least half as many, where the samples have as many levels."""
-
+MOST_BINS = 120  # bins of a histogram; at least half as many, if there are the levels
 _BINS = 100  # where no steps show
 
 _DRAWN = 1 << 16  # samples, spread over the recording, that tell the bins of a histogram
-_BEYOND = 0.8
-"""Widths of the middle that bins go beyond it: to 6 standard deviations, of Gaussian samples."""
-
+_BEYOND = 0.8  # widths of the middle that bins go beyond it: to 6 standard deviations
 _SAME = 0.01  # part of the mean gap between levels within which two are one, written in two ways
 _GOLDEN_RATIO = 0.6180339887498949
 _LOW, _HIGH, TOTAL, PRESENT = range(4)

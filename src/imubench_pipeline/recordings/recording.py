@@ -113,8 +113,7 @@ class ChannelLog:
     holes: bool  # samples are missing: blocks have NaN in their place
     temperature: bool = False  # there are readings of the temperature on the same grid
     position: bool = False  # there is a column on the same grid that says how the sensor stood
-    table_rate: bool = False
-    """There is a column on the same grid with the rate of the table that the sensor stood on."""
+    table_rate: bool = False  # a column on the same grid has the rate of the rate table
 
     def blocks(self) -> Iterator[Array]:
         """Yield the samples on the uniform grid in SI, in consecutive blocks; NaN where missing.

@@ -28,19 +28,13 @@ from imubench_pipeline.tables.findings import RecordingError, find
 from imubench_pipeline.typing import Array
 from imubench_pipeline.words.findings.time_base import OwnRate
 
-_MIN_COMMON_RECORDS = 0.5
-"""Least share of common records, of the sparser channel, for two channels of one clock."""
-
-_MIN_CONTAINED_RECORDS = 0.95
-"""Least share of the records of a channel that are also records of the channel it joins."""
-
+_MIN_COMMON_RECORDS = 0.5  # of the sparser channel, for two channels of one clock
+_MIN_CONTAINED_RECORDS = 0.95  # of a channel in the channel it joins
 _MAX_COMMON_IF_SEPARATE = 0.05
 """Largest share of common records of two channels that are not sampled together; also the least
 relative difference of two numbers of records, or rates, that counts."""
 
-_MAX_STRIDE, _MIN_ON_STRIDE = 50, 0.98
-"""Largest period of a slower clock, records, and least share of the samples that are on it."""
-
+_MAX_STRIDE, _MIN_ON_STRIDE = 50, 0.98  # records; share of samples on a slower clock
 ALL_RECORDS = -1  # used instead of a bit mask of columns: all records, also those without a number
 
 

@@ -11,9 +11,7 @@ from numpy.typing import NDArray
 
 from imubench_pipeline.typing import Array
 
-Stamps = Callable[[], Iterator[Array]]
-"""Returns a new iterator over the stamps of a file in s, block by block; NaN where missing."""
-
+Stamps = Callable[[], Iterator[Array]]  # iterates over the stamps of a file, s, by block
 _MAX_GRID_DISTANCE = 0.48
 """Largest distance of a stamp from its grid point, in sampling intervals; beyond it the grid point
 is ambiguous."""
@@ -23,12 +21,8 @@ _TRACKING_GAIN = 0.02
 the square (critical damping)."""
 
 _MIN_DOUBLE_STEP, _MAX_DOUBLE_STEP = 1.75, 2.2  # range of a double step, over the median step
-MIN_SHARED_STAMPS = 0.2
-"""Share of repeated stamps above which each stamp belongs to a group of samples."""
-
-_MAX_ROUNDED_REPEATS = 1.05 * MIN_SHARED_STAMPS
-"""Largest share of repeated stamps that may be due to rounding."""
-
+MIN_SHARED_STAMPS = 0.2  # share of repeated stamps if they are of groups of samples
+_MAX_ROUNDED_REPEATS = 1.05 * MIN_SHARED_STAMPS  # share that may be due to rounding
 _MIN_ROUNDED_REPEATS = 0.02
 """Least share of repeated stamps that is tested: below it, rounding or copies change N by 1 %
 only."""

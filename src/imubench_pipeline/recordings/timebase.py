@@ -32,12 +32,8 @@ from imubench_pipeline.tables.findings import Finding, RecordingError, find
 from imubench_pipeline.typing import Array
 from imubench_pipeline.words.findings import time_base
 
-_MAX_INTERVAL_ERROR = 1e-5
-"""Largest relative error of the interval at which stamps get the same grid points."""
-
-_MIN_INTERVAL, _MAX_INTERVAL = 1e-18, 1e8
-"""Range of the interval between samples, s, wide enough for a wrong unit of time."""
-
+_MAX_INTERVAL_ERROR = 1e-5  # relative error at which stamps get the same grid points
+_MIN_INTERVAL, _MAX_INTERVAL = 1e-18, 1e8  # s, wide enough for a wrong unit of time
 _MAX_MISSING_PER_SAMPLE, _MAX_EXTRA_POINTS = 100, 10_000_000
 """The grid has at most 100 points per record plus 10 million: each point takes memory."""
 
@@ -50,10 +46,7 @@ _RATE_WINDOW, _MIN_REGULAR_STEPS, _MIN_SLOW_WINDOWS = 32, 0.9, 0.05
 """Test for a lower rate in a part of the log: samples of a window, least share of equal steps in a
 regular window, and least share of such windows."""
 
-_MAX_PAIRS = 10_000
-"""Largest number of distinct pairs of size and duration of groups; above it there is no regular
-one."""
-
+_MAX_PAIRS = 10_000  # of size and duration of groups; more are not regular
 _MIN_GROUP_SIZE, _MIN_GROUPS, _MIN_REGULAR_GROUPS = 5, 5, 0.8
 """Least samples per stamp, number of stamps, and share of equal groups, for which the rate is taken
 from the equal groups alone."""
@@ -74,11 +67,9 @@ class TimeBase:
     uniform: bool  # every grid point has one sample, so that stamps need not be stored
     stamped: bool  # the stamps give the grid point of each sample
     findings: tuple[Finding, ...] = ()
-    tracking_interval: float | None = None
-    """Initial interval of the grid that follows the stamps, s."""
+    tracking_interval: float | None = None  # initial one of the grid that follows, s
     repeated: int = 0  # records left out because an earlier one has the same grid point
-    rate_error: float | None = None
-    """Standard deviation of the rate from the scatter of the stamps, Hz; None for a stated rate."""
+    rate_error: float | None = None  # standard deviation, Hz; None for a stated rate
 
     @property
     def missing(self) -> int:

@@ -278,8 +278,7 @@ def _check(options: argparse.Namespace) -> int:
     return worst
 
 
-INSPECTED_S, INSPECTED_BYTES = 10.0, 1 << 29
-"""Time and memory in which a log is listed, or rejected."""
+INSPECTED_S, INSPECTED_BYTES = 10.0, 1 << 29  # time and memory in which a log is listed
 
 
 def _inspect(options: argparse.Namespace) -> int:

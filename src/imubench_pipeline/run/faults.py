@@ -18,9 +18,7 @@ from imubench_pipeline.tables.findings import RecordingError
 from imubench_pipeline.tables.seals import name_place
 
 Of = tuple[str, str, str | None]  # step, sensor and recording; None: a step of the whole sensor
-TOLD = "IMUBENCH_FAILURES_TOLD"
-"""Environment variable of a run whose caller reports the failures itself."""
-
+TOLD = "IMUBENCH_FAILURES_TOLD"  # environment variable: the caller reports the failures itself
 _FAULT_FOLDER = "faults"
 
 

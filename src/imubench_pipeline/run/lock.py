@@ -20,9 +20,7 @@ import psutil
 from imubench_pipeline.run.recovery import was_restarted
 from imubench_pipeline.tables import read_json
 
-INHERITED = "IMUBENCH_LOCK"
-"""Environment variable with the descriptor of a lock that the caller holds for this process."""
-
+INHERITED = "IMUBENCH_LOCK"  # environment variable: descriptor of a lock that the caller holds
 _RETRY_INTERVAL = 0.5  # s between two attempts
 _MAX_COMMAND = 200  # characters
 

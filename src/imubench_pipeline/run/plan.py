@@ -64,8 +64,7 @@ _REPORTED_SECTIONS = {
 _PLACEHOLDER_LOG = {"rate": "1 Hz", "channels": {"gyro_x": {"column": 1, "unit": "rad/s"}}}
 """Placeholder for the log format of a sensor where it does not matter."""
 
-_BRACE_BEFORE_WORD = re.compile(r"\{(?=\s*\w)")
-"""A brace inside a text of JSON; structural braces come before quotes or braces."""
+_BRACE_BEFORE_WORD = re.compile(r"\{(?=\s*\w)")  # inside a text of JSON: others precede quotes
 
 
 class Plan:

@@ -26,8 +26,7 @@ from snakemake_interface_logger_plugins.common import LogEvent
 
 from imubench_pipeline.report.run_summary import fold_text
 
-OURS: Mapping[str, Any] = {"imubench": True}
-"""Marks a record that is shown unchanged: ``logger.info(text, extra=OURS)``."""
+OURS: Mapping[str, Any] = {"imubench": True}  # shown unchanged: `logger.info(text, extra=OURS)`
 
 _EVENTS_OF_PROGRESS_LINE = {
     LogEvent.JOB_INFO,

@@ -26,9 +26,7 @@ _WRITTEN_FOLDERS = (
 )
 """Folders in the results that runs write; nothing else is changed."""
 
-_TEMPORARY_NAME = re.compile(r"\..+\.[a-z0-9_]{8}\.part")
-"""Names of incomplete files of `tables.replacing`, `tables.making` and the ingest."""
-
+_TEMPORARY_NAME = re.compile(r"\..+\.[a-z0-9_]{8}\.part")  # of incomplete files and folders
 STILL_WRITTEN = 60.0  # s; a file that changed so shortly before a run may belong to another command
 _MAX_WRITE_DELAY = 60.0  # s; systems buffer writes in memory for about half a minute
 _MAX_TERMINATION_TIME = 10.0  # s; for a process to end

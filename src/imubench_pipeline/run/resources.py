@@ -22,16 +22,13 @@ _OVERHEAD_MEMORY = 900
 """Memory of a job besides the step, MB: 550 for two Snakemake processes and the process that forks,
 the rest for two small steps of the same group."""
 
-_START_TIME = 60
-"""Start-up time of a job, s: Python from a shared file system, and compilation in a first run."""
-
+_START_TIME = 60  # s; Python from a shared file system, and compilation in a first run
 _BYTES_PER_MB = 10**6
 
 _TIME_MARGIN = 10  # factor on measured times, for a busy node and a slow file system
 _TEXT_SUFFIXES = {".csv", ".txt", ".log", ".tsv", ".dat", ".asc", ".nmea"}
 _BINARY_EXPANSION, _COMPRESSED_EXPANSION = 3, 6  # max. samples per byte of a log, relative to text.
-_BYTES_PER_VALUE = 7
-"""Bytes per value of text. Nine digits take eleven, small counts three; the margin covers these."""
+_BYTES_PER_VALUE = 7  # of text: nine digits take eleven, small counts three
 
 
 @dataclass(frozen=True)
@@ -43,8 +40,7 @@ class Limit:
     memory: int
 
 
-Limits = Callable[[str, str | None], Limit]
-"""Takes the sensor and the recording of a job; None: a step of the whole sensor."""
+Limits = Callable[[str, str | None], Limit]  # of sensor and recording; None: the whole sensor
 
 
 Asked = Callable[[Mapping[str, str], int], int]  # takes the wildcards of a job, and its attempt

@@ -65,8 +65,7 @@ _CHILD_SIGNALS = {signal.SIGCHLD}
 _STOP_SIGNALS = {signal.SIGHUP, signal.SIGINT, signal.SIGTERM, getattr(signal, "SIGIO", None)}
 """Signals that end a step because the run ends."""
 
-_running: dict[int, tuple[Connection[Any, Any], str]] = {}
-"""The connection and the step of each fork, by its process."""
+_running: dict[int, tuple[Connection[Any, Any], str]] = {}  # connection and step of each fork
 
 
 def _reap(signal_number: int, frame: FrameType | None) -> None:

@@ -276,9 +276,7 @@ class _Channel:
 _MIN_SAMPLES_FOR_STEP = 1 << 16  # samples from which the step of a register is found
 _LIKELIHOOD_METHODS = {"likelihood", "likelihood_gm", "compensated"}
 
-_CURVE_METHODS = ("likelihood_gm", "weighted", "paper", "curve")
-"""Methods with a single model, or with the Allan curve only."""
-
+_CURVE_METHODS = ("likelihood_gm", "weighted", "paper", "curve")  # of one model, or of the curve
 _METHODS_BY_PREFERENCE = ("likelihood", "likelihood_gm", "weighted", "paper", "curve")
 """Methods in order of preference: the first requested one is recommended."""
 

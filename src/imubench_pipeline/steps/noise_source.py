@@ -27,8 +27,7 @@ from imubench_pipeline.words.reasons import simulations as texts
 
 NO_MODEL = texts.NO_NOISE_MODEL  # reason of missing results without a `NoiseSource`
 Kept = tuple[RecordingRow, Path]  # a recording, and its folder
-_DRAW_SEED = 20260101
-"""Seed of the drawn models; each recording and channel has an independent stream."""
+_DRAW_SEED = 20260101  # each recording and channel has an independent stream
 
 
 @dataclass(frozen=True)

@@ -123,8 +123,7 @@ def join_tables(
 _KIND_OF_FINDING = {"step": "bias_step", "warm_up": "warm_up_drift"}
 """Kind in ``deterministic``, with a size, of findings that the ingest also reports."""
 
-_MAX_STEP_DISTANCE = 1 / 100
-"""Max. distance of two steps that are treated as one, over the length of the recording."""
+_MAX_STEP_DISTANCE = 1 / 100  # of two steps that count as one, over the length
 
 
 def collect_findings(

@@ -34,11 +34,8 @@ from imubench_pipeline.words.findings.files import Failed
 Cause = Literal["error", "killed", "time"]
 QUALITY = "quality.json"
 _METADATA = b"imubench.failure"
-_BESIDE = ("earth_rotation", "calibration")
-"""Steps that need more than a static log: the rest of what it tells stands without them."""
-
-_NAMED = ("recordings", "findings", "estimate_findings", "failures")
-"""Tables that say why a recording is left out of the others."""
+_BESIDE = ("earth_rotation", "calibration")  # steps that need more than a static log
+_NAMED = ("recordings", "findings", "estimate_findings", "failures")  # tables with the reasons
 
 
 @dataclass(frozen=True)

@@ -10,8 +10,7 @@ from imubench_pipeline.model.recordings import FindingRow
 from imubench_pipeline.model.states import Severity
 from imubench_pipeline.words.findings.base import FindingData
 
-LEFT_OUT = ("rejected", "failed")
-"""Findings that a recording is left out, with the reason: they are listed by themselves."""
+LEFT_OUT = ("rejected", "failed")  # of recordings that are left out: listed by themselves
 
 
 _HALF_REASON = 700

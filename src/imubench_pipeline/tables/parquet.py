@@ -15,9 +15,7 @@ import pyarrow.parquet as pq
 
 SEAL = b"imubench.digest"  # key of the metadata
 
-_END = struct.Struct("<I4s")
-"""How a file ends: the length of its metadata, and the mark of the format."""
-
+_END = struct.Struct("<I4s")  # the end of a file: length of its metadata, mark of the format
 _UNSEALED = b"0" * 64
 # A text in compact Thrift: its field (1 after the last one, binary), its length, itself.
 _PLACE = re.compile(re.escape(SEAL) + rb"\x18\x40([0-9a-f]{64})")

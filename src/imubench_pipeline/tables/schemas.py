@@ -26,12 +26,8 @@ ROWS: dict[str, type[TableRow]] = {
 TABLES: dict[str, tuple[TypedColumn, ...]] = {name: columns_of(row) for name, row in ROWS.items()}
 """The columns of every table; all numbers are SI (temperatures in degC)."""
 
-PARTS_OF = {"curve": "allan", "estimate_findings": "findings"}
-"""Files of a recording that hold rows of another table, and that table."""
-
-SAMPLES = ("envelope", "histogram")
-"""The tables of the samples themselves, for the pages of the recordings."""
-
+PARTS_OF = {"curve": "allan", "estimate_findings": "findings"}  # tables with rows of other ones
+SAMPLES = ("envelope", "histogram")  # tables of the samples, for pages of recordings
 OF_ONE_RECORDING = (*SAMPLES, "samples_of_models", "draws", "error_growth", "drawn_deviations")
 """The tables that are kept with each recording and not joined."""
 
@@ -60,5 +56,4 @@ BY_RECORDING = (
 )
 """The joined tables in which a recording has rows of its own."""
 
-COMPARED = ("recordings", "allan", "parameters", "simulated_truth")
-"""The joined tables from which the figures of all sensors are drawn."""
+COMPARED = ("recordings", "allan", "parameters", "simulated_truth")  # drawn for all sensors

@@ -244,8 +244,7 @@ class _FlatTable:
 # ``parquet.thrift``.
 
 _FIELD_UNPACKED_SIZE, _FIELD_PACKED_SIZE = 2, 3
-_HEADER_PROBE, _MAX_HEADER = 1 << 10, 1 << 20
-"""Bytes of a header that are read first, and at most: it may contain the extremes of its page."""
+_HEADER_PROBE, _MAX_HEADER = 1 << 10, 1 << 20  # bytes of a header that are read first, and at most
 
 
 def check_pages(path: Path, metadata: pq.FileMetaData, names: Sequence[str]) -> None:

@@ -135,9 +135,7 @@ _CLASS_FAULTS = {
 _FLAG_COMPLEX = 0x0800
 _CLASS_TABLE = 17
 _MAX_ELEMENT_HEADER = 1 << 16
-_TAG_ORDER = {"<": 1, ">": -1}
-"""Order of type and size in the tag of a small element, which depends on the byte order."""
-
+_TAG_ORDER = {"<": 1, ">": -1}  # order of type and size in the tag of a small element
 _READ_BLOCK = 1 << 16
 
 

@@ -24,8 +24,7 @@ _KIND_FAULTS = (
 )
 _VARIABLE_NAME = re.compile(rb"[A-Za-z]\w{0,62}\0")
 
-HEADER_BYTES = struct.calcsize(_HEADER_FORMAT) + 64
-"""Length of the longest header with its name, bytes."""
+HEADER_BYTES = struct.calcsize(_HEADER_FORMAT) + 64  # length of the longest header with name, bytes
 
 
 @dataclass(frozen=True)
@@ -35,8 +34,7 @@ class Header:
     name: str
     shape: tuple[int, int]
     dtype: np.dtype[np.generic]
-    begin: int
-    """Bytes of the header and the name."""
+    begin: int  # bytes of the header and the name
     size: int  # bytes of the numbers
     fault: str | None  # reason why they cannot be read, as the end of a sentence
 

@@ -55,8 +55,7 @@ class Clock:
     """The time of a table, as a sensor file states it."""
 
     column: LogColumn
-    entry: Entry
-    """``time`` of the sensor file."""
+    entry: Entry  # `time` of the sensor file
     counts: bool  # the column counts samples, so that `rate` is needed
     order: tuple[int, ...]  # sort key; a lower one is more plausible
 

@@ -16,8 +16,7 @@ class Entry:
     """One entry of a sensor file."""
 
     value: Any
-    comment: str = ""
-    """Origin of a guessed value; empty if nothing was guessed."""
+    comment: str = ""  # origin of a guessed value; empty if nothing was guessed
 
 
 @dataclass
@@ -31,8 +30,7 @@ class Draft:
     time: Entry | None = None
     channels: dict[str, Entry] = field(default_factory=dict)
     temperature: Entry | None = None
-    left_over: list[str] = field(default_factory=list)
-    """Remarks about columns that are not used, for the user to complete the file."""
+    left_over: list[str] = field(default_factory=list)  # remarks about columns that are not used
 
     @property
     def known(self) -> list[tuple[str, Entry]]:

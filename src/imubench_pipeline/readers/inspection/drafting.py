@@ -36,8 +36,7 @@ GRAVITY_BY_UNIT: Mapping[str, float] = {"g": 1.0, "m/s^2": STANDARD_GRAVITY, "mg
 
 _GRAVITY_TOLERANCE, _STATED_GRAVITY_TOLERANCE = 0.1, 0.2
 _NAMELESS_GRAVITY_TOLERANCE = 0.05
-_MIN_CONSTANT_RECORDS = 40
-"""Least number of equal records of all axes of a sensor that was not read."""
+_MIN_CONSTANT_RECORDS = 40  # equal records of all axes of a sensor that was not read
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,8 +45,7 @@ class Group:
 
     quantity: Quantity
     table: LogTable
-    columns: dict[str, LogColumn]
-    """Columns by axis; the key of a temperature is an empty text."""
+    columns: dict[str, LogColumn]  # by axis; the key of a temperature is an empty text
     unit: str | None  # the unit that the file states
     written: str  # text of the file in the place of the unit, if it is no known unit
     rank: int  # see `imubench_pipeline.readers.inspection.names.Meaning`
@@ -207,13 +205,10 @@ class Choice:
     accel: Group | None
     temperature: Group | None
     clock: Clock | None
-    local: bool
-    """The time column is in the table of the channels, in each file."""
-    anchor: LogTable | None
-    """The table with which all others must share their records or their clock."""
+    local: bool  # the time column is in the table of the channels, in each file
+    anchor: LogTable | None  # the table whose records or clock all others must share
     other_clocks: list[Clock]
-    left: list[tuple[Group, str]]
-    """Recognised groups that are not used, each with the reason."""
+    left: list[tuple[Group, str]]  # recognised groups that are not used, with the reason
     unknown: list[LogColumn]  # number columns of the used tables that were not recognised
 
 

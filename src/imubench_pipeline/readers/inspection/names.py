@@ -58,8 +58,7 @@ class Meaning:
     """Meaning of a name."""
 
     quantity: Quantity
-    axis: str
-    """x, y or z; a number for numbered columns; empty if there is none."""
+    axis: str  # x, y or z; a number for numbered columns; empty if there is none
     stem: str  # the rest of the name, which is equal for the axes of one sensor
     unit: str | None  # the unit in the name
     rank: int  # `PLAIN`, `WEAK`, `WITHOUT_GRAVITY` or `DERIVED`

@@ -58,8 +58,7 @@ class Layout:
     figures: int  # number of numbers
     columns: dict[str, int]  # index of each number that can be a column
     units: dict[str, str]  # unit of each column, which ROS fixes
-    covariances: dict[str, int]
-    """Index of the first covariance of a quantity; its value is -1 if it is not measured."""
+    covariances: dict[str, int]  # index of the first one of a quantity; its value is -1: absent
 
 
 LAYOUTS: dict[str, Layout] = {

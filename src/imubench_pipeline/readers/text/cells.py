@@ -17,8 +17,7 @@ class Split:
     """Rule for splitting a line into cells."""
 
     delimiter: str
-    runs: bool = False
-    """A run of spaces or tabs is one delimiter."""
+    runs: bool = False  # a run of spaces or tabs is one delimiter
 
     def cells(self, text: str) -> list[str]:
         """Return the cells of a line."""
@@ -83,9 +82,7 @@ def _list_missing_cells() -> tuple[str, ...]:
     return tuple(sorted(padded | {" " * n for n in range(_MAX_REPEATED_SIGNS + 1)}))
 
 
-MISSING_CELLS = _list_missing_cells()
-"""Cells for missing values as written, with spaces around them."""
-
+MISSING_CELLS = _list_missing_cells()  # missing values as written, with spaces around them
 _STRIPPED_MISSING = frozenset(cell.strip() for cell in MISSING_CELLS)
 
 

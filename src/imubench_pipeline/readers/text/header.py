@@ -67,11 +67,8 @@ def are_units(row: list[str], places: set[int]) -> bool:
     return bool(texts) and not any(is_number(text) or text[0].isdigit() for text in texts)
 
 
-SIMULATED = "SIMULATED by imubench, not measured"
-"""Comment at the top of text logs that this package simulates."""
-
-_SIMULATED_MARKS = {SIMULATED, "SIMULATED, not measured"}
-"""The second one was written by earlier versions."""
+SIMULATED = "SIMULATED by imubench, not measured"  # comment at the top of simulated text logs
+_SIMULATED_MARKS = {SIMULATED, "SIMULATED, not measured"}  # the second is of earlier versions
 
 
 def is_simulated(lines: Iterable[str]) -> bool:

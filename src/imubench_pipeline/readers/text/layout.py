@@ -45,20 +45,17 @@ class TextLayout:
 
     file: str  # name of the file, for messages
     lines_before: int
-    bytes_before: int
-    """Number of lines and bytes before the first record."""
+    bytes_before: int  # number of lines and bytes before the first record
     split: Split
     quoted: bool
     decimal: Decimal
-    names: list[str]
-    """Names of the columns; their positions if there is no header."""
+    names: list[str]  # names of the columns; their positions if there is no header
     rows: list[list[str]]  # cells of the first records; the last record may be incomplete
     comments: tuple[str, ...]  # prefixes of comment lines
     skipped: tuple[bytes, ...]  # the first lines that are skipped because of `skip_lines`
     header: bytes  # the line of names; empty if there is none
     preamble: tuple[bytes, ...]  # the lines before the first record, with the comments
-    passed_over: tuple[tuple[int, str], ...]
-    """Number and text of the lines before the first record that are neither names nor units."""
+    passed_over: tuple[tuple[int, str], ...]  # lines before the first record without meaning
     blank_is_missing: bool  # a blank line among the records is a record with one empty cell
 
     def position(self, column: Column, key: str) -> int:
@@ -392,9 +389,7 @@ _JSON_PREFIXES = (b'{"', b"[{", b"[[", b"{'")
 _JSON_BRACKETS = (b"{", b"[")
 _MIN_ZERO_SHARE_UTF_16 = 0.4  # least share of zero bytes of a line of UTF-16
 _CONTROL_CHARACTERS = bytes({*range(1, 32)} - set(b"\t\n\r\f\x1a\x1b"))
-_MAX_CONTROLS, _MAX_CONTROL_SHARE = 4, 0.05
-"""Largest number and share of control characters of a text; random bytes have a share of 0.1."""
-
+_MAX_CONTROLS, _MAX_CONTROL_SHARE = 4, 0.05  # of a text; random bytes have a share of 0.1
 _INTEGER = re.compile(r"\s*[-+]?\d+")
 
 

@@ -38,9 +38,7 @@ _MIN_LEVEL_ALTERNATION = 5.0
 alternates."""
 
 _PAIRS_PER_PART = 128  # pairs of samples in a part
-_MEDIAN_SD_OVER_MEAN_SD = 1.2533
-"""Standard deviation of a median over the standard deviation of a mean, for normal noise."""
-
+_MEDIAN_SD_OVER_MEAN_SD = 1.2533  # standard deviations, for normal noise
 _SD_OVER_MAD = 1.4826  # standard deviation over the median absolute deviation, of normal noise
 
 

@@ -11,13 +11,9 @@ from numpy.typing import NDArray
 from imubench_pipeline.recordings.quality.summary import BlockStatistics
 from imubench_pipeline.typing import Array
 
-_BLOCKS_ON_EACH_SIDE = 16
-"""Blocks on either side whose median is the reference for a block without a knock."""
-
+_BLOCKS_ON_EACH_SIDE = 16  # their median is the reference of a block without a knock
 _MIN_BLOCKS_AROUND = 2  # least number of blocks with samples for the comparison
-_SETTLED_SIGMAS = 4.0
-"""Standard deviations from the level within which the sensor has settled after a knock."""
-
+_SETTLED_SIGMAS = 4.0  # distance from the level at which a sensor has settled
 _SETTLED_SAMPLES = 5  # consecutive settled samples that end a knock
 _MIN_OUTLIER_STEPS = 2.0
 """Least distance of an outlier from the level, in steps of the register. Clean samples can be one

@@ -14,9 +14,7 @@ from imubench_pipeline.recordings.quality.summary import ColumnSummary, compute_
 from imubench_pipeline.typing import Array
 
 _MAX_RUN_PROBABILITY = 1e-9  # probability that a longer run of one value occurs by chance
-_MIN_BLOCK_STEPS = 8
-"""Least number of steps between block means; they determine an Allan deviation to a third."""
-
+_MIN_BLOCK_STEPS = 8  # steps between block means: an Allan deviation to a third
 _NORMAL_MEDIAN = 0.4549  # median of the square of a standard normal variable
 _MAX_STEP_FOR_PILING = 1.0
 """Largest ratio of step to noise at which neighbouring levels are about equally frequent: a level
@@ -28,9 +26,7 @@ _MIN_PILING_RATIO = 2.5
 rounded to digits somewhat coarser than the register: some digits then have two of its steps."""
 
 _MIN_PILED_SHARE = 0.005  # least share of the samples at a piled-up level
-_MIN_COMPARED_COUNT = 10
-"""Least count that a level is compared with, so that few samples do not pile up by chance."""
-
+_MIN_COMPARED_COUNT = 10  # so that few samples do not pile up by chance
 _MIN_MISSING_SAMPLES = 12.0
 """Expected samples beyond the last level above which their absence means saturation. Noise has none
 of them with a probability of exp(-12)."""
@@ -42,10 +38,8 @@ class Quantisation:
 
     step: float  # least significant bit, SI
     levels: float  # number of levels from the lowest to the highest sample
-    over_noise: float
-    """Ratio of the step to the standard deviation; infinite if most blocks have one value."""
-    hidden: bool = False
-    """The values were rounded again, so their differences are no multiples of the step."""
+    over_noise: float  # step over standard deviation; infinite if blocks have one value
+    hidden: bool = False  # rounded again: differences are no multiples of the step
 
 
 def detect_quantisation(column: ColumnSummary) -> Quantisation | None:

@@ -34,9 +34,7 @@ _MIN_PEAK_HEIGHT = 0.25
 """Least height of A at a period. Without a period, n independent samples reach A with probability
 exp(-n A^2): 1e-27 for 1000 samples at each frequency."""
 
-_MIN_PERIODS = 2.0
-"""Least number of steps between the 5 % and the 95 % quantile: two levels are no register."""
-
+_MIN_PERIODS = 2.0  # steps between the 5 % and the 95 % quantile: two are no register
 _HEIGHT_TOLERANCE = 0.1  # largest difference of a peak from its expected height sinc(d / q)
 _MAX_DIGIT_OVER_STEP = 0.65  # largest ratio of digit to step; above it the rounding hides the step
 _MAX_MEAN_OVER_LEAST_GAP = 1.01

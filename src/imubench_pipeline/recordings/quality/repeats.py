@@ -28,16 +28,11 @@ from imubench_pipeline.typing import Array
 Words = NDArray[np.uint64]
 Numbers = NDArray[np.int64]
 
-WINDOW = 64
-"""Changes of value in a window: equal to the bits of a word, by which the hash is rotated."""
-
+WINDOW = 64  # changes of value: the bits of a word, by which the hash is rotated
 _SLOTS = 1 << 16
-_MAX_WINDOWS = _SLOTS // 2
-"""Largest number of stored windows; beyond it, the half with the lowest hashes is kept."""
-
+_MAX_WINDOWS = _SLOTS // 2  # beyond it, the half with the lowest hashes is kept
 _MAX_STRETCHES = 64  # largest number of stretches that are listed
-_MAX_MISSED_WINDOWS = 12
-"""Longest interruption of a stretch, in mean distances between stored windows."""
+_MAX_MISSED_WINDOWS = 12  # in a stretch, in mean distances between stored ones
 
 # Bit patterns of float64, and the constants of SplitMix64
 

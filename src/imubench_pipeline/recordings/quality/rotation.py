@@ -13,20 +13,16 @@ from imubench_pipeline.typing import Array
 
 _QUARTERS = 4
 _MIN_BLOCKS = 8  # least number of steps between block means: two in a quarter of the log
-_MIN_RATE_SHARE = 0.5
-"""Least rotation rate in every quarter of the log, as a share of the mean rate."""
-
+_MIN_RATE_SHARE = 0.5  # in every quarter of the log, of the mean rotation rate
 _MAX_MISFIT = 0.1  # largest median misfit of the steps between block means, as a share of gravity
-_MIN_OBSERVABLE_SINE_SQUARED = 0.01
-"""Least square of the sine of the angle between gravity and an observable axis of rotation."""
+_MIN_OBSERVABLE_SINE_SQUARED = 0.01  # of the angle of gravity and the axis
 
 
 @dataclass(frozen=True)
 class GravityTurn:
     """A steady rotation of the sensor relative to gravity."""
 
-    rate: tuple[float, float, float]
-    """Rate of the sensor about x, y and z, rad/s; rotation about the vertical is not observable."""
+    rate: tuple[float, float, float]  # about x, y, z, rad/s, without the vertical part
     swept: float  # angle of rotation over the log, rad
 
 

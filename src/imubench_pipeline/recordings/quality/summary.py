@@ -90,8 +90,7 @@ def compute_finite_median(values: Array) -> float:
 
 
 PIECE_SIZE = 4096  # records of a piece
-MAX_PIECES = 16
-"""Number of pieces at which every second one is dropped; a shorter log is stored completely."""
+MAX_PIECES = 16  # every second one is dropped then; a shorter log is stored whole
 
 
 @dataclass(frozen=True)
@@ -205,15 +204,11 @@ class ColumnSummary:
     missing = _StateCount(_MISSING_SAMPLES)  # records without a number
     not_finite = _StateCount(_INFINITE_SAMPLES)  # infinities, and values beyond `MAX_MEASUREMENT`
     repeats = _StateCount(_REPEAT_COUNT)  # samples that equal their predecessor
-    pairs = _StateCount(_PAIR_COUNT)
-    """Pairs of neighbours that were compared. Pieces without equal neighbours may be left out."""
-    far_pairs = _StateCount(_FAR_PAIRS)
-    """Pairs at the distance `FAR_LAG` in the pieces where neighbours were compared."""
+    pairs = _StateCount(_PAIR_COUNT)  # of neighbours that were compared
+    far_pairs = _StateCount(_FAR_PAIRS)  # at the distance `FAR_LAG` in the same pieces
     far_repeats = _StateCount(_FAR_REPEATS)  # pairs among them of equal samples
-    steps = _StateCount(_CHANGE_COUNT)
-    """Unequal neighbours that were compared since the smallest step was found."""
-    single_steps = _StateCount(_SINGLE_STEPS)
-    """Neighbours among them that differ by the smallest step only."""
+    steps = _StateCount(_CHANGE_COUNT)  # unequal neighbours since the smallest step was found
+    single_steps = _StateCount(_SINGLE_STEPS)  # among them, by the smallest step only
 
     def add(self, values: Array) -> Array:
         """Add a piece of the column; return it with non-finite values replaced by NaN."""

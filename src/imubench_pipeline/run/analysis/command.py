@@ -26,8 +26,7 @@ if TYPE_CHECKING:
     from imubench_pipeline.run.analysis.compilation import Compilation
     from imubench_pipeline.run.plan import Plan
 
-_MAX_DRAWING_TIME, _MAX_DRAWING_MEMORY = 600.0, 4 << 30
-"""Max. time, s, and memory, bytes, of a process that draws figures."""
+_MAX_DRAWING_TIME, _MAX_DRAWING_MEMORY = 600.0, 4 << 30  # of a process, s and bytes
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

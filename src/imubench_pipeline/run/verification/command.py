@@ -9,8 +9,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-_PATIENCE = 3.0
-"""Seconds until it is said how far it is, and between two lines where there is no terminal."""
+_PATIENCE = 3.0  # s, until progress is shown, and between its lines in a file
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
