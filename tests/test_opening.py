@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 from imubench_pipeline.readers import RecordingError
+from imubench_pipeline.recordings.availability import check_opening
 from imubench_pipeline.recordings.ingest import ingest_as_planned
-from imubench_pipeline.recordings.opening import check_opening
 from imubench_pipeline.settings.quality import QualitySettings
 from imubench_pipeline.settings.sensor import LogFormat
 from tests.readers.hostile.bags import bag, chunk, connection, message

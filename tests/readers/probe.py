@@ -16,7 +16,7 @@ from imubench_pipeline.readers import RecordingError, read
 from imubench_pipeline.readers.bounded import BoundError, limit_memory, run_bounded
 from imubench_pipeline.readers.formats import FILE_FORMATS
 from imubench_pipeline.readers.inspection import inspect
-from imubench_pipeline.recordings.opening import check_opening
+from imubench_pipeline.recordings.availability import check_opening
 from imubench_pipeline.run.cli import INSPECTED_BYTES, INSPECTED_S
 from imubench_pipeline.settings.config import LimitSettings
 from imubench_pipeline.settings.quality import QualitySettings

@@ -56,7 +56,7 @@ class FileFormat:
     endings: tuple[str, ...]  # usual suffixes of its files, for messages
     signature: Signature
     streamed: bool  # read sequentially: may be compressed or in a zip archive
-    clock_of: Literal["file", "variable", "length"]  # data that share a clock: arrays of a length
+    clock_of: Literal["file", "variable", "length"]  # data that share a clock; length: of arrays
     time_columns: tuple[str, ...]  # names that the format fixes; empty if it fixes none
     settings: tuple[str, ...]  # entries of `log` that apply to this format, but not to all
     code: Callable[[], Code]  # imports and returns the code, when a run needs the format

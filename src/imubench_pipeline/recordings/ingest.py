@@ -17,10 +17,9 @@ from imubench_pipeline.readers import log_files, read
 from imubench_pipeline.readers.content import recognise_folder
 from imubench_pipeline.recordings import timebase
 from imubench_pipeline.recordings.assembly import assemble, count_samples, name_parquet_files
-from imubench_pipeline.recordings.availability import watch_log
+from imubench_pipeline.recordings.availability import check_opening, watch_log
 from imubench_pipeline.recordings.kept import Quality, identify_files
 from imubench_pipeline.recordings.known_logs import KnownFile, identify_log_files, write_known
-from imubench_pipeline.recordings.opening import check_opening
 from imubench_pipeline.recordings.parts import Part, leave_out_knocks, read_part
 from imubench_pipeline.recordings.quality.columns import check_columns
 from imubench_pipeline.recordings.quality.copies import find_copied_channels
@@ -340,8 +339,8 @@ def ingest_as_planned(
     folder : Path
         Where the Parquet files go.
     guarded : bool
-        A process of its own opens the log first (`opening.check_opening`), so that none that hangs
-        or crashes its reader does so here; it takes 0.1 s.
+        A process of its own opens the log first (`availability.check_opening`), so that none that
+        hangs or crashes its reader does so here; it takes 0.1 s.
 
     Raises
     ------

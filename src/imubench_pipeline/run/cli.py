@@ -24,8 +24,7 @@ from imubench_pipeline.report import command as report
 from imubench_pipeline.report import show
 from imubench_pipeline.report.static_figures import command as figures
 from imubench_pipeline.run import formats_command as formats
-from imubench_pipeline.run import init_command as init
-from imubench_pipeline.run import run_command as run
+from imubench_pipeline.run import project
 from imubench_pipeline.run import shortlist_command as shortlist
 from imubench_pipeline.run import simulate_command as simulation
 from imubench_pipeline.run.analysis import command as analysis
@@ -349,14 +348,14 @@ COMMANDS = {
     ),
     "init": Command(
         "make a folder of logs",
-        init.add_arguments,
-        init.run,
+        project.add_init_arguments,
+        project.init,
         ("made", "", "it has one of the files already, or cannot be written"),
     ),
     "run": Command(
         "analyse the logs of a folder, as snakemake does in a checkout",
-        run.add_arguments,
-        run.run,
+        project.add_run_arguments,
+        project.run,
         (
             "done, as snakemake says it",
             "a step failed, a recording was left out, or a setting is wrong, likewise",

@@ -1,11 +1,19 @@
-"""Find the workflow of a folder."""
+"""A folder of logs, which needs no checkout: `imubench init` makes it, `imubench run` runs it."""
 
 from __future__ import annotations
 
+import argparse
+import os
+import sys
+from functools import partial
+from importlib import import_module
 from pathlib import Path
 
+from imubench_pipeline.run.places import has_results
+from imubench_pipeline.settings.extras import require_extra
 from imubench_pipeline.settings.shipped import find_project
 from imubench_pipeline.settings.validation import ConfigError
+from imubench_pipeline.tables.outputs import OutputFolder, add_output
 
 _SNAKEFILE_PATHS = ("Snakefile", "workflow/Snakefile")
 
@@ -35,3 +43,95 @@ def find_snakefile(folder: Path) -> Path:
             "again, from a wheel or a checkout"
         )
     return shipped
+
+
+_DEMONSTRATION = ("config/simulated.yaml", "config/boards")
+
+
+def add_init_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare what `imubench init` is given."""
+    parser.description = (
+        "Make a folder of logs: config/config.yaml with all settings, an example of a sensor file, "
+        "and a README that says how to go on. Nothing that is there is written over."
+    )
+    add_output(
+        parser,
+        "folder",
+        partial(OutputFolder, shared=True),
+        help="where to make it; made if it is not there",
+    )
+    parser.add_argument(
+        "--demonstration",
+        action="store_true",
+        help="with the simulated recordings that a checkout begins with, to try it without a log",
+    )
+
+
+def init(options: argparse.Namespace) -> int:
+    """Make the folder; return the exit status."""
+    output: OutputFolder = options.folder
+    folder = output.path
+    shipped, own = find_project(), Path(__file__).with_name("lab")
+    files = {
+        "config/config.yaml": shipped / "config/config.yaml",
+        "config/example_sensor.yaml": own / "example_sensor.yaml",
+        "README.md": own / "README.md",
+    }
+    for name in _DEMONSTRATION if options.demonstration else ():
+        source = shipped / name
+        for path in [source] if source.is_file() else source.glob("*.yaml"):
+            files[path.relative_to(shipped).as_posix()] = path
+    if there := [name for name in files if (folder / name).exists()]:
+        print(
+            f"{folder / there[0]}: exists already; expected a folder without it: choose "
+            "another one, or rename that file",
+            file=sys.stderr,
+        )
+        return 2
+    absolute = folder.resolve()
+    if results := next((one for one in [absolute, *absolute.parents] if has_results(one)), None):
+        print(
+            f"{folder}: lies in the results of runs ({results}); expected a folder outside of them",
+            file=sys.stderr,
+        )
+        return 2
+    for made in ("logs", "config/sensors"):
+        (folder / made).mkdir(parents=True, exist_ok=True)
+    # The configuration last: it makes the folder a project.
+    for name, source in reversed(files.items()):
+        output.file(name).write(source.read_text("utf-8"))
+    print(f"{folder}: logs go to {folder / 'logs'}/<sensor>/; {folder / 'README.md'} says how")
+    return 0
+
+
+def add_run_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare what `imubench run` is given."""
+    parser.usage = "%(prog)s [-h] [-c N] [folder] [-- FLAG ...]"
+    parser.description = (
+        "Run the workflow in a folder that imubench init has made, or in a checkout. What stands "
+        "after -- goes to snakemake: targets, and flags such as -n or --config allan='{...}'; "
+        "paths in them are taken from the folder."
+    )
+    parser.add_argument(
+        "folder", type=Path, nargs="?", default=Path(), help="of logs; default: this one"
+    )
+    parser.add_argument(
+        "-c", "--cores", default="all", metavar="N", help="cores for snakemake; default: all"
+    )
+
+
+def run(options: argparse.Namespace) -> int:
+    """Become Snakemake, whose exit status is that of the command."""
+    with require_extra("workflow", "run the workflow"):
+        import_module("snakemake")
+    folder: Path = options.folder
+    try:
+        snakefile = find_snakefile(folder)
+        os.chdir(folder)
+    except (ConfigError, OSError) as error:
+        print(f"imubench run: {error}", file=sys.stderr)
+        return 2
+    command = [sys.executable, "-P", "-m", "snakemake", "--snakefile", str(snakefile)]
+    command += ["--cores", options.cores, *options.flags]
+    sys.stdout.flush()
+    os.execv(sys.executable, command)

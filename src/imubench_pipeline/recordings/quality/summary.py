@@ -6,13 +6,17 @@ the whole column is known.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import Generic, TypeVar
 
 import numpy as np
 from numba import njit
 
 from imubench_pipeline.recordings.quality.repeats import Repeats
 from imubench_pipeline.typing import Array
+
+T = TypeVar("T")
 
 MIN_BLOCK_SIZE = 256  # records of a block, until there are `2 * _MAX_BLOCKS` blocks
 _MAX_BLOCKS = 1 << 15  # pairs of blocks are merged when there are twice this number
@@ -181,14 +185,14 @@ def _create_state() -> Array:
     return state
 
 
-class _StateCount:
-    """Descriptor of a count in the state of a column."""
+class _State(Generic[T]):
+    """Descriptor of a number in the state of a column: a count, or a value."""
 
-    def __init__(self, place: int) -> None:
-        self._place = place
+    def __init__(self, kind: Callable[[float], T], place: int) -> None:
+        self._kind, self._place = kind, place
 
-    def __get__(self, column: ColumnSummary, _: type) -> int:
-        return int(column._state[self._place])
+    def __get__(self, column: ColumnSummary, _: type) -> T:
+        return self._kind(column._state[self._place])
 
 
 @dataclass
@@ -200,15 +204,19 @@ class ColumnSummary:
     _excerpts: Excerpts = field(default_factory=Excerpts)
     repeated: Repeats = field(default_factory=Repeats)
 
-    present = _StateCount(_PRESENT_SAMPLES)  # samples that are finite numbers
-    missing = _StateCount(_MISSING_SAMPLES)  # records without a number
-    not_finite = _StateCount(_INFINITE_SAMPLES)  # infinities, and values beyond `MAX_MEASUREMENT`
-    repeats = _StateCount(_REPEAT_COUNT)  # samples that equal their predecessor
-    pairs = _StateCount(_PAIR_COUNT)  # of neighbours that were compared
-    far_pairs = _StateCount(_FAR_PAIRS)  # at the distance `FAR_LAG` in the same pieces
-    far_repeats = _StateCount(_FAR_REPEATS)  # pairs among them of equal samples
-    steps = _StateCount(_CHANGE_COUNT)  # unequal neighbours since the smallest step was found
-    single_steps = _StateCount(_SINGLE_STEPS)  # among them, by the smallest step only
+    present = _State(int, _PRESENT_SAMPLES)  # samples that are finite numbers
+    missing = _State(int, _MISSING_SAMPLES)  # records without a number
+    not_finite = _State(int, _INFINITE_SAMPLES)  # infinities, and values beyond `MAX_MEASUREMENT`
+    repeats = _State(int, _REPEAT_COUNT)  # samples that equal their predecessor
+    pairs = _State(int, _PAIR_COUNT)  # of neighbours that were compared
+    far_pairs = _State(int, _FAR_PAIRS)  # at the distance `FAR_LAG` in the same pieces
+    far_repeats = _State(int, _FAR_REPEATS)  # pairs among them of equal samples
+    steps = _State(int, _CHANGE_COUNT)  # unequal neighbours since the smallest step was found
+    single_steps = _State(int, _SINGLE_STEPS)  # among them, by the smallest step only
+
+    low = _State(float, _LOWEST_SAMPLE)
+    high = _State(float, _HIGHEST_SAMPLE)  # lowest and highest sample, SI
+    step = _State(float, _SMALLEST_STEP)  # between neighbours that differ, SI; infinite if none do
 
     def add(self, values: Array) -> Array:
         """Add a piece of the column; return it with non-finite values replaced by NaN."""
@@ -227,16 +235,6 @@ class ColumnSummary:
         return int(self._state[_LONGEST_GAP]), int(self._state[_GAP_END])
 
     @property
-    def low(self) -> float:
-        """Lowest sample, SI."""
-        return float(self._state[_LOWEST_SAMPLE])
-
-    @property
-    def high(self) -> float:
-        """Highest sample, SI."""
-        return float(self._state[_HIGHEST_SAMPLE])
-
-    @property
     def at_extremes(self) -> tuple[int, int]:
         """Samples at the lowest and at the highest value."""
         return int(self._state[_COUNT_AT_LOWEST]), int(self._state[_COUNT_AT_HIGHEST])
@@ -245,11 +243,6 @@ class ColumnSummary:
     def longest_run(self) -> tuple[int, int]:
         """Length of the longest run of one value, and the record one past its end."""
         return int(self._state[_LONGEST_RUN]), int(self._state[_LONGEST_RUN_END])
-
-    @property
-    def step(self) -> float:
-        """Smallest difference between neighbours that differ, SI; infinite if none do."""
-        return float(self._state[_SMALLEST_STEP])
 
     def excerpts(self) -> list[Excerpt]:
         """Return pieces of the column, spread evenly over its length."""
