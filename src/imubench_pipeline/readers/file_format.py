@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from imubench_pipeline.readers.batch import LogFile
 from imubench_pipeline.settings.extras import Extra, ExtraError, require_extra
 from imubench_pipeline.settings.sensor import LogFormat, Reader
+from imubench_pipeline.settings.validation import cut
 from imubench_pipeline.tables.findings import RecordingError
 
 Kind = Literal["number", "date", "text", "other"]
@@ -96,6 +97,13 @@ class LogColumn:
     be for a date only or a time of day only."""
     address: str | int | None = None  # value of `column` under `time`, if it differs from `source`
 
+    @classmethod
+    def of_numbers(
+        cls, source: str, label: str, values: NDArray[Any], unit: str | None = None
+    ) -> LogColumn:
+        """Return a column of numbers."""
+        return cls(source, label, "number", format_first_numbers(values), values, unit)
+
 
 @dataclass(frozen=True, eq=False)
 class LogTable:
@@ -118,3 +126,9 @@ def format_first_numbers(values: NDArray[Any]) -> tuple[str, ...]:
     """Return the first numbers as text."""
     whole = values.dtype.kind in "iu"
     return tuple(str(value) if whole else f"{value:.10g}" for value in values[:MAX_SHOWN_VALUES])
+
+
+def join_first(names: Iterable[str], most: int = 20) -> str:
+    """Return the first names as text, each cut."""
+    every = list(names)
+    return ", ".join([*(cut(name, str) for name in every[:most]), *["..."] * (len(every) > most)])

@@ -33,7 +33,6 @@ from imubench_pipeline.readers.file_format import (
     FileFormat,
     LogColumn,
     LogTable,
-    format_first_numbers,
 )
 from imubench_pipeline.readers.stamps import WrapState, unwrap
 from imubench_pipeline.readers.ubx_frames import Frames
@@ -415,21 +414,13 @@ def list_messages(path: Path, file_format: FileFormat) -> list[LogTable]:
             values = figures[places == place]
             if len(values):
                 unit = UNITS[column.split("_")[0]]
-                columns.append(
-                    LogColumn(column, column, "number", format_first_numbers(values), values, unit)
-                )
+                columns.append(LogColumn.of_numbers(column, column, values, unit))
         if columns:
             first = tags[places == places[0]].astype(np.float64)
             ticks = first * TICK_MS if kind == ESF_RAW else first
-            columns.append(
-                LogColumn(
-                    "time_tag", "time_tag", "number", format_first_numbers(ticks), ticks, "ms"
-                )
-            )
+            columns.append(LogColumn.of_numbers("time_tag", "time_tag", ticks, "ms"))
             if kind == ESF_RAW:
-                columns.append(
-                    LogColumn("sTtag", "sTtag", "number", format_first_numbers(first), first)
-                )
+                columns.append(LogColumn.of_numbers("sTtag", "sTtag", first))
         about = f"{frames.right[kind]} messages at the beginning"
         described.append(LogTable(file_format, name, tuple(columns), variable=name, about=about))
     if not any(table.columns for table in described):

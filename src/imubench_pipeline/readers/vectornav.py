@@ -17,6 +17,7 @@ import re
 from binascii import crc_hqx
 from collections import Counter
 from collections.abc import Iterable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar
@@ -34,7 +35,6 @@ from imubench_pipeline.readers.file_format import (
     FileFormat,
     LogColumn,
     LogTable,
-    format_first_numbers,
 )
 from imubench_pipeline.readers.stamps import Clock, format_date
 from imubench_pipeline.readers.text.cells import is_number
@@ -209,26 +209,17 @@ def parse_fields(
     kind: str, rows: list[Row], positions: set[int]
 ) -> tuple[dict[int, NDArray[np.float64]], int]:
     """Return fields of records by position, and the number of unreadable sentences."""
-    commas = len(FIELDS[kind]) - 1
-    whole = [number for number, row in enumerate(rows) if row.body.count(b",") == commas]
-    present = sum(1 for row in rows if row.body)
+    width = len(FIELDS[kind])
+    whole = [number for number, row in enumerate(rows) if row.body.count(b",") == width - 1]
+    unread = sum(1 for row in rows if row.body) - len(whole)
     fields = {position: np.full(len(rows), np.nan) for position in positions}
-    read, unread = _parse_numbers([rows[number].body for number in whole], commas + 1, positions)
-    for position, values in read.items():
-        fields[position][whole] = values
-    return fields, unread + present - len(whole)
-
-
-def _parse_numbers(
-    texts: list[bytes], width: int, positions: set[int]
-) -> tuple[dict[int, NDArray[np.float64]], int]:
-    """Return cells of lines of text by position, and the number of unreadable lines."""
+    texts = [rows[number].body for number in whole]
     names = [str(position) for position in range(width)]
     wanted = [str(position) for position in sorted(positions)]
+    table = None
     # Arrow does not accept a plus sign.
-    joined = b"\n".join(texts).replace(b"+", b"")
-    if texts and joined:
-        try:
+    if joined := b"\n".join(texts).replace(b"+", b""):
+        with suppress(pa.ArrowInvalid):
             table = pacsv.read_csv(
                 pa.py_buffer(joined),
                 read_options=pacsv.ReadOptions(use_threads=False, column_names=names),
@@ -237,14 +228,11 @@ def _parse_numbers(
                     column_types=dict.fromkeys(wanted, pa.float64()), include_columns=wanted
                 ),
             )
-        except pa.ArrowInvalid:
-            table = None
-        if table is not None and len(table) == len(texts):
-            columns = {int(name): table.column(name).to_numpy() for name in wanted}
-            return columns, 0
-    fields = {position: np.full(len(texts), np.nan) for position in positions}
-    unread = 0
-    for number, text in enumerate(texts):
+    if table is not None and len(table) == len(texts):
+        for name in wanted:
+            fields[int(name)][whole] = table.column(name).to_numpy()
+        return fields, unread
+    for number, text in zip(whole, texts, strict=True):
         cells = text.split(b",")
         for position in positions:
             try:
@@ -440,9 +428,7 @@ def list_sentences(path: Path, file_format: FileFormat) -> list[LogTable]:
             source = name if len(present) == 1 else f"{kind}.{name}"
             values = fields[place]
             unit = UNITS.get(name)
-            columns.append(
-                LogColumn(source, name, "number", format_first_numbers(values), values, unit)
-            )
+            columns.append(LogColumn.of_numbers(source, name, values, unit))
         columns += _describe_time(HOST_TIME, [row.before.strip(STAMP_PADDING) for row in first])
         columns += _describe_time(COUNTER, [row.counter for row in first])
         about = f"{len(rows[kind])} sentences at the beginning"

@@ -47,7 +47,10 @@ def find_protected_places(path: Path, results: Path | None = None) -> Iterator[P
     for folder in dict.fromkeys(projects):
         if not (folder / _CONFIG_FILE).is_file():
             continue
-        run = _read_run_settings(folder / _CONFIG_FILE)
+        try:
+            run = read_settings(Run, folder / _CONFIG_FILE)
+        except (ConfigError, OSError):  # not readable
+            run = Run()
         stated = [folders for folders in (run.sensors, run.requirements) if folders is not None]
         named = [one for of in stated for one in ([of] if isinstance(of, Path) else of)]
         for one in (Path("config"), *named):
@@ -69,11 +72,3 @@ def find_protected_places(path: Path, results: Path | None = None) -> Iterator[P
 def has_results(folder: Path) -> bool:
     """Return whether a folder contains results of runs."""
     return (folder / "seals").is_dir() or (folder / "tables/recordings.parquet").is_file()
-
-
-def _read_run_settings(file: Path) -> Run:
-    """Return the settings of a run; the defaults if they cannot be read."""
-    try:
-        return read_settings(Run, file)
-    except (ConfigError, OSError):
-        return Run()

@@ -141,18 +141,14 @@ class LogHandler(LogHandlerBase):
     def _end_job(self, job: int | None) -> None:
         if job is not None:
             self._running.pop(job, None)
-            self._tell(self._of.pop(job, None))
+            recording = self._of.pop(job, None)
+            if recording and recording in _expected:
+                _expected[recording] -= 1
+                if _expected[recording] == 0:  # its last job has ended
+                    for told in _told:
+                        self._print(fold_text(told(*recording), _MAX_LINE_LENGTH))
         if not self._running:
             self._hide()
-
-    def _tell(self, recording: Recording | None) -> None:
-        """Print the line about a recording when its last job has ended."""
-        if recording is None or recording not in _expected:
-            return
-        _expected[recording] -= 1
-        if _expected[recording] == 0:
-            for told in _told:
-                self._print(fold_text(told(*recording), _MAX_LINE_LENGTH))
 
     def _hide(self) -> None:
         if self._live is not None:

@@ -121,7 +121,11 @@ def _run(connection: Connection[Any, Any], job: Job, *, imported: bool) -> None:
             _end_with_who_asked(connection)
             Path("/proc/self/comm").write_text(job.name)  # for ps and top
         connection.send(None)
-        _print_to(job.log)
+        job.log.parent.mkdir(parents=True, exist_ok=True)
+        log = os.open(job.log, os.O_WRONLY | os.O_APPEND | os.O_CREAT, 0o666)
+        for stream in (1, 2):
+            os.dup2(log, stream)
+        os.close(log)
         if job.memory is not None:
             limit_memory(job.memory)
         with seal_outputs(job):
@@ -147,15 +151,6 @@ def _run(connection: Connection[Any, Any], job: Job, *, imported: bool) -> None:
             sys.stderr.flush()
         connection.send(outcome)
         os._exit(isinstance(outcome, StepError))
-
-
-def _print_to(log: Path) -> None:
-    """Have this process print to the end of a file."""
-    log.parent.mkdir(parents=True, exist_ok=True)
-    file = os.open(log, os.O_WRONLY | os.O_APPEND | os.O_CREAT, 0o666)
-    for stream in (1, 2):
-        os.dup2(file, stream)
-    os.close(file)
 
 
 def _end_with_who_asked(connection: Connection[Any, Any]) -> None:

@@ -62,7 +62,13 @@ def take_static_noise(
             name = min(gyros, key=lambda name: (name != channel, name))
             every = {estimate.method: estimate for estimate in read_estimates(parameters)[name]}
             papers = every.get("likelihood_gm", best[name]).model
-            source = _words(row, own, name, channel, best[name].method)
+            source = texts.static_noise(
+                row.recording,
+                best[name].method,
+                device=row.device if row.device != own.device else None,
+                simulated=row.simulated,
+                channels=(name, channel) if name != channel else None,
+            )
             rng = channel_rng(_DRAW_SEED, repr(best[name].model), name)
             drawn = tuple(draw_models(best[name], draws, rng)) if draws else ()
             return NoiseSource(best[name].model, papers, source, drawn)
@@ -116,13 +122,3 @@ def take_printed_noise(name: str, sensor: Sensor, channel: str) -> NoiseSource |
 def explain_segments(log: ChannelLog) -> str:
     """Return the reason why a log of several segments cannot be used as one."""
     return texts.several_segments(len(log.segments))
-
-
-def _words(row: RecordingRow, own: RecordingRow, name: str, channel: str, method: str) -> str:
-    return texts.static_noise(
-        row.recording,
-        method,
-        device=row.device if row.device != own.device else None,
-        simulated=row.simulated,
-        channels=(name, channel) if name != channel else None,
-    )

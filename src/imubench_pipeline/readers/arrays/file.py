@@ -52,16 +52,15 @@ from imubench_pipeline.readers.file_format import (
     LogColumn,
     LogTable,
     format_first_numbers,
+    join_first,
 )
 from imubench_pipeline.readers.stamps import Clock, format_date_of_stamp, format_nanoseconds
 from imubench_pipeline.readers.stated_units import find_stated_unit
 from imubench_pipeline.settings.sensor import TimeSource
-from imubench_pipeline.settings.validation import cut
 from imubench_pipeline.tables.findings import RecordingError
 
 _MAX_BLOCK_ROWS = 1 << 18
 _TIME_KEY = "time"
-_MAX_LISTED_NAMES = 20
 _MATRIX_COLUMN = re.compile(r"(.+)\[(\d{1,9})\]")
 
 _Place = tuple[Table, int]
@@ -104,7 +103,7 @@ class ArrayFile(LogFile):
                 "or split them into files with 'file:'"
             )
         if 0 in lengths.values():
-            names = _join_names(table.shown for table in tables)
+            names = join_first(table.shown for table in tables)
             raise UnusableError(f"no record in {names}; expected at least one")
         wanted = {
             table: sorted({position for owner, position in places.values() if owner is table})
@@ -178,7 +177,7 @@ class ArrayFile(LogFile):
             )
         variables = {source.variable for source in self.sources.values()}
         if isinstance(time.column, int) and len(variables) > 1:
-            names = _join_names(str(name) for name in variables)
+            names = join_first(str(name) for name in variables)
             raise UnusableError(
                 f"'time' is column {time.column}, but the channels are from several variables "
                 f"({names}); say which has the stamps, as in 'column: name' or "
@@ -249,7 +248,7 @@ def _find_column(
     if len(matches) == 1:
         return matches[0]
     if matches:
-        names = _join_names(table.shown for table, _ in matches)
+        names = join_first(table.shown for table, _ in matches)
         if len({table for table, _ in matches}) == 1:
             raise UnusableError(
                 f"column {column!r} for {key} stands twice in {names}; take it by its position, "
@@ -272,7 +271,7 @@ def _find_column(
         return _take_numbered(_check_usable(tables[match[1]], key), int(match[2]), key)
     if variable is not None:
         table = _find_table(tables, variable, key)
-        has = _join_names(table.labels) or f"{table.width} columns without names: give a number"
+        has = join_first(table.labels) or f"{table.width} columns without names: give a number"
         raise UnusableError(
             f"no column {column!r} for {key}; {table.shown} has {has}; mend 'column' of {key} in "
             f"{name_settings_file(key)}"
@@ -328,7 +327,7 @@ def _find_table(tables: dict[str, Table], variable: str | None, key: str) -> Tab
         )
     if len(usable) > 1:
         raise UnusableError(
-            f"several variables ({_join_names(table.shown for table in usable)}); name the one of "
+            f"several variables ({join_first(table.shown for table in usable)}); name the one of "
             f"{key} with 'variable:'"
         )
     return usable[0]
@@ -337,7 +336,7 @@ def _find_table(tables: dict[str, Table], variable: str | None, key: str) -> Tab
 def _take_numbered(table: Table, column: int, key: str) -> _Place:
     if column > table.width:
         samples = "" if table.rows is None else f" of {table.rows} samples"
-        names = f" ({_join_names(table.labels)})" if table.labels else ""
+        names = f" ({join_first(table.labels)})" if table.labels else ""
         raise UnusableError(
             f"no column {column} for {key}; {table.shown} has {table.width} columns{samples}"
             f"{names}; mend 'column' of {key} in {name_settings_file(key)}"
@@ -377,16 +376,10 @@ def _describe_contents(tables: dict[str, Table], labels: bool = False) -> str:
     if not has:
         has = [f"{table.width} columns without names" for table in usable]
     return (
-        _join_names(has)
-        or _join_names(f"{table.shown}, which {table.fault}" for table in tables.values())
+        join_first(has)
+        or join_first(f"{table.shown}, which {table.fault}" for table in tables.values())
         or "none"
     )
-
-
-def _join_names(names: Iterable[str]) -> str:
-    every = list(names)
-    shown = [cut(name, str) for name in every[:_MAX_LISTED_NAMES]]
-    return ", ".join(shown + ["..."] * (len(every) > _MAX_LISTED_NAMES))
 
 
 _MAX_TABLES = 1000

@@ -9,9 +9,10 @@ the column. Time columns, with ``unit: ns``: ``header.stamp``, the stamp of the 
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import partial
 from itertools import islice
 from pathlib import Path
 from typing import ClassVar
@@ -30,11 +31,11 @@ from imubench_pipeline.readers.file_format import (
     LogColumn,
     LogTable,
     format_first_numbers,
+    join_first,
 )
 from imubench_pipeline.readers.rosbag.version_1 import Bag
 from imubench_pipeline.readers.rosbag.version_2 import Bag2, check_database, check_folder
 from imubench_pipeline.readers.stamps import Clock, format_date
-from imubench_pipeline.settings.validation import cut
 from imubench_pipeline.tables.findings import RecordingError
 from imubench_pipeline.words.findings import files
 
@@ -117,7 +118,7 @@ def decode_messages(
 
 
 _BATCH_MESSAGES = 1 << 14
-_MAX_LISTED_NAMES = 10
+_join_names = partial(join_first, most=10)
 _SQLITE_MAGIC = b"SQLite format 3"
 HEADER_STAMP, LOG_TIME = "header.stamp", "log_time"  # the columns of time
 
@@ -270,13 +271,6 @@ class RosbagFile(LogFile):
                 self.note(files.TruncatedFile(name, "journal", journal.name), 1)
 
 
-def _join_names(names: Iterable[str]) -> str:
-    """Return the first names as text."""
-    every = list(names)
-    shown = [cut(name, str) for name in every[:_MAX_LISTED_NAMES]]
-    return ", ".join(shown + ["..."] * (len(every) > _MAX_LISTED_NAMES))
-
-
 @contextmanager
 def explain_errors(path: Path) -> Iterator[None]:
     """Convert all exceptions of the libraries about a bag to `RecordingError`."""
@@ -355,10 +349,7 @@ def _describe_topic(
         values = figures[sound, place]
         covariance = layout.covariances.get(name.partition(".")[0])
         if covariance is None or (figures[sound, covariance] != -1).any():  # it is measured
-            unit = layout.units[name]
-            columns.append(
-                LogColumn(name, name, "number", format_first_numbers(values), values, unit)
-            )
+            columns.append(LogColumn.of_numbers(name, name, values, layout.units[name]))
     logged = np.array([time for time, _ in messages], np.int64)
     for name, times in ((HEADER_STAMP, stamps[sound]), (LOG_TIME, logged[sound])):
         values = times.astype(np.float64)
