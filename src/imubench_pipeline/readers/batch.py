@@ -49,8 +49,7 @@ def name_settings_file(key: str) -> str:
 class Batch:
     """Consecutive records of one log file."""
 
-    time: NDArray[np.float64] | None
-    """s since the first stamp of the file, shape (n,); NaN where the stamp is missing."""
+    time: NDArray[np.float64] | None  # s since the first stamp of the file, shape (n,); NaN: none
     columns: Mapping[str, NDArray[np.float64]]  # rad/s, m/s² or °C, shape (n,); NaN: missing
 
     def __len__(self) -> int:
@@ -74,10 +73,8 @@ class LogFile(ABC):
     sources: Mapping[str, ColumnSource]  # columns that are read from this file, with temperature
     started: str | None = None  # ISO 8601 date of the first sample, after the first batch
     rate: float | None = None  # Hz, stated in the file; known after the first batch
-    findings: list[Finding] = field(default_factory=list)
-    """Findings on omitted data; complete after `batches` is exhausted."""
-    units: dict[str, StatedUnit] = field(default_factory=dict)
-    """Units of channels that the file itself states, known after the first batch."""
+    findings: list[Finding] = field(default_factory=list)  # omitted data; complete after `batches`
+    units: dict[str, StatedUnit] = field(default_factory=dict)  # stated in the file; see `started`
     simulated: bool = False  # the file has the mark of a simulated log; known after the first batch
 
     @abstractmethod

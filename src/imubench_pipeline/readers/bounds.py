@@ -11,10 +11,7 @@ MIN_CHECKED_EXPANSION, MAX_EXPANSION_RATIO = 1 << 28, 800
 the repetition of one character expands further."""
 
 MAX_WINDOW = 1 << 27  # memory of the decompression, bytes: the window of zstd, the dictionary of xz
-MAX_UNCHECKED_PARTS, MIN_MEAN_PART = 10_000, 64
-"""Number of compressed parts, such as members of gzip, that may be nearly empty; least mean size of
-more parts, bytes."""
-
+MAX_UNCHECKED_PARTS, MIN_MEAN_PART = 10_000, 64  # that may be nearly empty; mean bytes beyond
 MAX_DIRECTORY, MAX_MEMBERS = 1 << 21, 1 << 16  # bytes of a zip directory; members without one
 MAX_ARCHIVE_PROBES = 1 << 14  # members of an archive that are searched for the only text file
 
@@ -39,8 +36,7 @@ size, and least mean size of more pages, bytes."""
 
 MAX_OBJECTS, MAX_GROUP_DEPTH = 20_000, 64  # objects of an HDF5 file, and depth of nested groups
 MAX_NPY_HEADER = 10_000  # bytes; NumPy has the same limit, but reads a header first
-MAX_STRUCTURE_DEPTH, MAX_MATLAB_NAME, MAX_DIMENSIONS = 16, 256, 32
-"""For MATLAB 5: depth of structures; bytes of a name (MATLAB allows 63); dimensions of an array."""
+MAX_STRUCTURE_DEPTH, MAX_MATLAB_NAME, MAX_DIMENSIONS = 16, 256, 32  # of MATLAB 5; bytes of a name
 
 # --------------------------------------------------------------------------------------- bags
 
@@ -48,8 +44,6 @@ MAX_BAG_CHUNK, MAX_BAG_OVERLAP = 1 << 27, 96 << 20
 """Unpacked bytes of a chunk or record, and of all chunks that overlap in time, which are unpacked
 together to sort their messages: the messages take up to five times as much memory."""
 
-MAX_MESSAGE, MAX_MESSAGE_BATCH = 1 << 16, 1 << 24
-"""Bytes of an inertial message (320 and the name of a frame), and of messages read together."""
-
+MAX_MESSAGE, MAX_MESSAGE_BATCH = 1 << 16, 1 << 24  # bytes of one (320 and a name), and of many
 MAX_TOPICS, MAX_TOPIC_LENGTH = 10_000, 1024  # topics of a bag, and bytes of the name of a topic
 MAX_METADATA = 1 << 20  # bytes of metadata.yaml: a topic takes some 300

@@ -55,9 +55,7 @@ COLUMNS: dict[str, tuple[int, float]] = {
 
 UNITS = {"gyro": "deg/s", "accel": "m/s^2", "temperature": "degC"}  # unit of each quantity
 TICK_MS = 5 / 128  # length of a tick, ms: 1/25.6, which is exact in float64
-_MIN_ZEROS = 512
-"""Least run of zero bytes that is reported, a sector; shorter runs may be part of a message."""
-
+_MIN_ZEROS = 512  # least run of zero bytes that is reported: a sector
 _BATCH_WORDS = 1 << 17
 _MIN_PROBED_BYTES = 1 << 20
 _MAX_HOLE_TICKS = 256_000
@@ -389,8 +387,7 @@ def _group_records(
     return count
 
 
-_MAX_DESCRIBED_BYTES, _MAX_SEARCHED_BYTES = 1 << 22, 1 << 26
-"""Bytes that are examined after a first message was found, and bytes searched for it."""
+_MAX_DESCRIBED_BYTES, _MAX_SEARCHED_BYTES = 1 << 22, 1 << 26  # behind a message, and for one
 
 
 def list_messages(path: Path, file_format: FileFormat) -> list[LogTable]:

@@ -88,14 +88,9 @@ class Row:
     counter: bytes = b""
 
 
-_MIN_ZEROS = 16
-"""Least run of zero bytes that is reported; shorter ones count with the sentences they damage."""
-
-_SENTENCE_CANDIDATES = re.compile(rb"[^$]{6,}")
-"""Text after a ``$`` that may be a sentence; shorter text has not even a name."""
-
-_MAX_OTHER_NAMES, _MAX_SENTENCE_NAME = 1000, 32
-"""Largest number of stored names of other sentences, and length of a name."""
+_MIN_ZEROS = 16  # least run of zero bytes that is reported; shorter ones damage sentences
+_SENTENCE_CANDIDATES = re.compile(rb"[^$]{6,}")  # after a `$`; shorter text has not even a name
+_MAX_OTHER_NAMES, _MAX_SENTENCE_NAME = 1000, 32  # of other sentences; letters of one
 
 
 class Sentences:

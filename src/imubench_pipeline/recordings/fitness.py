@@ -47,8 +47,7 @@ class Doubt:
     unfit: bool = False  # the figures may be of something else
     factor: float | None = None  # of a possible change of a value, if known
     start: float | None = None
-    end: float | None = None
-    """The part of the recording that it concerns, s from the first sample; None: all of it."""
+    end: float | None = None  # the part of the recording, s; None: all of it
 
     @property
     def of_recording(self) -> bool:

@@ -43,13 +43,10 @@ class Ingested:
 
     summary: dict[str, Any]  # a row of the table `recordings` without the names
     findings: list[Finding]
-    channels: dict[str, dict[str, Any]] = field(default_factory=dict)
-    """Rate in Hz, points of the grid, segments and levels of each analysed channel."""
-    kept: dict[str, dict[str, Any]] = field(default_factory=dict)
-    """The files of samples (`imubench_pipeline.recordings.kept.identify_files`)."""
+    channels: dict[str, dict[str, Any]] = field(default_factory=dict)  # rate, grid, segments, level
+    kept: dict[str, dict[str, Any]] = field(default_factory=dict)  # as of `kept.identify_files`
     gravity: GravityTurn | None = None  # how gravity turns against the sensor
-    sources: dict[str, KnownFile] | None = None
-    """The files of the log, by their place in it; None: they were not read to their end."""
+    sources: dict[str, KnownFile] | None = None  # of the log, by place; None: not read to the end
 
     def quality(self, names: dict[str, Any]) -> Quality:
         """Return the content of ``quality.json``, with the names of the recording."""

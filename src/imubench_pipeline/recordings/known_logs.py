@@ -47,9 +47,7 @@ class KnownFile:
 
     size: int | None  # bytes; None: it was not there
     sha256: str | None  # of the content; None: not read to its end, or changed meanwhile
-    stamps: Stamps | None
-    """None: the file changed while it was read, or so shortly before that a later change might
-    have the same stamps."""
+    stamps: Stamps | None  # None: changed while it was read, or shortly before
     version: str = ""  # the name of this content in the settings of the ingest
     inode: int = 0
     """The number of the file. Two files may have the same size and stamps. Some network disks give

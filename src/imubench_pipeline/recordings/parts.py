@@ -45,15 +45,11 @@ class Part:
     patterns: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, np.int64))
     """Number of records for each bit mask of columns with a number: entry 5 counts the records with
     the first and the third column."""
-    knocks: dict[str, int] = field(default_factory=dict)
-    """Number of samples of each column that are left out as part of a knock."""
+    knocks: dict[str, int] = field(default_factory=dict)  # samples of columns left out as knocks
     stamped: bool = False  # records have stamps
-    base: TimeBase | None = None
-    """Time base, if it was set when the columns of a file were separated."""
-    findings: list[Finding] = field(default_factory=list)
-    """Findings about columns whose rate changes within the log."""
-    left_out: dict[str, ColumnSummary] = field(default_factory=dict)
-    """Columns that were not written in the separation, since they have too few samples."""
+    base: TimeBase | None = None  # set when the columns of a file were separated
+    findings: list[Finding] = field(default_factory=list)  # of columns whose rate changes
+    left_out: dict[str, ColumnSummary] = field(default_factory=dict)  # that have too few samples
 
     def stamps(self) -> Iterator[Array]:
         """Yield the stamps in s, read from the scratch file."""

@@ -12,10 +12,7 @@ from numpy.typing import NDArray
 from imubench_pipeline.typing import Array
 
 Stamps = Callable[[], Iterator[Array]]  # iterates over the stamps of a file, s, by block
-_MAX_GRID_DISTANCE = 0.48
-"""Largest distance of a stamp from its grid point, in sampling intervals; beyond it the grid point
-is ambiguous."""
-
+_MAX_GRID_DISTANCE = 0.48  # of a stamp, in intervals; it is ambiguous beyond
 _TRACKING_GAIN = 0.02
 """Gain of the loop that makes the grid follow the stamps. The gain for its interval is a quarter of
 the square (critical damping)."""
@@ -27,17 +24,12 @@ _MIN_ROUNDED_REPEATS = 0.02
 """Least share of repeated stamps that is tested: below it, rounding or copies change N by 1 %
 only."""
 
-_MEDIAN_LEVEL = 0.45
-"""Level of the quantile used as the median, so that of equal numbers of short and long steps the
-short one is chosen."""
-
+_MEDIAN_LEVEL = 0.45  # so that of as many short as long steps the short is chosen
 MIN_SET_BACK = 0.45
 """Least step back, s, of a clock that was set back, as by a leap second. Shorter steps back are
 from records that were written twice or out of order."""
 
-_RECORDS_ON_EACH_SIDE = 16
-"""Records on each side of a step that distinguish a clock that was set back from a late stamp."""
-
+_RECORDS_ON_EACH_SIDE = 16  # to tell a clock that was set back from a late stamp
 _MAX_EXAMINED_STAMPS = 1 << 17  # stamps of a block that are used for its typical interval
 
 
@@ -130,24 +122,18 @@ class Track:
     interval: float  # initial interval of the grid, s
     longest_hole: float  # longest hole within a segment, s; a longer step begins a new segment
     rows: int = 0
-    grid: int = 0
-    """Number of records, and of grid points up to the last record."""
+    grid: int = 0  # number of records, and of grid points up to the last record
     off_grid: int = 0
     duplicates: int = 0
-    unstamped: int = 0
-    """Number of records with a stamp between two points, at a used point, or without a stamp."""
+    unstamped: int = 0  # records between two points, at a used one, without a stamp
     holes: int = 0
     longest: int = 0
-    longest_at: int = 0
-    """Number of holes; length of the longest hole, and its first grid point."""
+    longest_at: int = 0  # number of holes; length of the longest, first point of it
     elapsed: float = 0.0
-    steps: int = 0
-    """Time, s, and number of grid points between stamped records of the same segment."""
+    steps: int = 0  # time, s, and grid points between stamped records of a segment
     starts: list[int] = field(default_factory=list)  # first grid point of each segment
-    jumps: list[float] = field(default_factory=list)
-    """Step of the stamps at the start of each segment, s; NaN at the first."""
-    marks: list[tuple[int, float]] = field(default_factory=list)
-    """Grid point and stamp of every 1024th record, to detect a drift of the rate."""
+    jumps: list[float] = field(default_factory=list)  # at the start of a segment, s; first: NaN
+    marks: list[tuple[int, float]] = field(default_factory=list)  # of every 1024th record
     _state: Array = field(default_factory=lambda: np.array([np.nan, np.nan, np.nan, np.nan, 0.0]))
 
     @property

@@ -34,9 +34,7 @@ from imubench_pipeline.words.findings import time_base
 
 _MAX_INTERVAL_ERROR = 1e-5  # relative error at which stamps get the same grid points
 _MIN_INTERVAL, _MAX_INTERVAL = 1e-18, 1e8  # s, wide enough for a wrong unit of time
-_MAX_MISSING_PER_SAMPLE, _MAX_EXTRA_POINTS = 100, 10_000_000
-"""The grid has at most 100 points per record plus 10 million: each point takes memory."""
-
+_MAX_MISSING_PER_SAMPLE, _MAX_EXTRA_POINTS = 100, 10_000_000  # of the grid: a point takes memory
 MIN_MISSING = 0.01  # least share of missing samples for the test of a change of the sampling rate
 _MAX_RATE_ERROR_WITHOUT_LOSSES = 0.05
 """Largest relative difference of stated and mean rate if no sample is missing; the last burst may
@@ -62,8 +60,7 @@ class TimeBase:
     source: str  # source of the rate: ``stated`` or ``stamps``
     rows: int  # records in the file
     grid: int  # grid points from the first to the last sample, all segments together
-    segments: tuple[tuple[int, int], ...]
-    """First and one-past-last grid point of each; differences must not span two segments."""
+    segments: tuple[tuple[int, int], ...]  # first and one-past-last grid point of each
     uniform: bool  # every grid point has one sample, so that stamps need not be stored
     stamped: bool  # the stamps give the grid point of each sample
     findings: tuple[Finding, ...] = ()

@@ -22,10 +22,7 @@ from typing import Any
 from imubench_pipeline.run.start import ONE_THREAD
 from imubench_pipeline.tables.failures import Cause
 
-COSTS = "IMUBENCH_COSTS"
-"""Environment variable with the file for the cost of each step, one line of JSON each: CPU time in
-s, peak memory in MB."""
-
+COSTS = "IMUBENCH_COSTS"  # environment variable: file for CPU time, s, and MB of each step
 _MAX_KILL_TIME = 60.0  # max. time for the system to end a step, s.
 
 

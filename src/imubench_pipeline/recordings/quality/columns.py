@@ -25,11 +25,8 @@ _MIN_DIFFERENCE_SD, _MAX_DIFFERENCE_SD = 0.6, 300.0
 that the share of one-step changes determines. Below it all changes are by one step, and the share
 depends on the position of the mean between two steps."""
 
-_MAX_HARMLESS_EMPTY_SHARE = 0.01
-"""Share of empty cells of a channel below which the finding is a note only."""
-
-_MIN_STEP_WHERE_ROUNDING_DOMINATES = 1.5
-"""Ratio of step to noise above which rounding makes most of the noise."""
+_MAX_HARMLESS_EMPTY_SHARE = 0.01  # empty cells of a channel that are only noted
+_MIN_STEP_WHERE_ROUNDING_DOMINATES = 1.5  # step over noise from which it does
 
 
 def estimate_excess_repeats(column: ColumnSummary) -> tuple[float, float]:

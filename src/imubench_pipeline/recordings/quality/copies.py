@@ -36,9 +36,7 @@ _MIN_COPY_CORRELATION = 1.0 - 1e-6
 """Least correlation of the increments of a copy. A vibration that both axes measure reaches it only
 if it is 1000 times the noise."""
 
-_MIN_ROUNDED_COPY_CORRELATION = 0.999
-"""Least correlation of a copy that was rounded, if no sample differs by more than the rounding."""
-
+_MIN_ROUNDED_COPY_CORRELATION = 0.999  # if no sample differs by more than rounding
 _MAX_LEVELS_LOW_ENTROPY = 64
 _MIN_CHANGES_LOW_ENTROPY = 4 * WINDOW
 """Least changes of value in a repeated stretch of a column with few levels. A sinusoid in steps of
@@ -46,8 +44,7 @@ _MIN_CHANGES_LOW_ENTROPY = 4 * WINDOW
 random walks and low-passed noise in steps of 0.01 to 8 sigma repeat no window of 64 (24 kinds of
 noise)."""
 
-_MIN_SHARE_LOG_TWICE = 0.1
-"""Least share of repeated samples for which the whole log counts as copied."""
+_MIN_SHARE_LOG_TWICE = 0.1  # repeated samples for which the whole log is copied
 
 
 _FINGERPRINT_FORMAT = ".8e"  # nine digits, to find copies of a log
@@ -183,8 +180,7 @@ _MIN_SHARED_CORRELATION = 0.45
 0.5, an axis and the sum of three 0.58. The accelerometers of an ADIS16405 have 0.36 between y and
 z, other sensors at rest below 0.03."""
 
-_CORRELATION_SIGMAS = 4.0
-"""The correlation must exceed `_MIN_SHARED_CORRELATION` by this number of standard errors."""
+_CORRELATION_SIGMAS = 4.0  # standard errors above `_MIN_SHARED_CORRELATION`
 
 
 def find_shared_noise(columns: Mapping[str, ColumnSummary]) -> Iterator[Finding]:

@@ -17,8 +17,7 @@ _MAX_PERIOD = 256  # longest period of repeats that is tested, records
 _MAX_PIECES = 8  # pieces that are tested; each is tested for every period
 _MIN_REPEATS_OF_PHASE = 0.98  # least share of repeats in the fullest phase of a period
 _MAX_REPEATS_OF_OTHERS = 0.9  # largest share of repeats in any other phase
-_MAX_LOG10_CHANCE = -12.0
-"""Largest decimal logarithm of the probability that the repeats are random."""
+_MAX_LOG10_CHANCE = -12.0  # of the probability that the repeats are random
 
 
 @dataclass(frozen=True)

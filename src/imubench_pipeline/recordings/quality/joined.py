@@ -28,15 +28,10 @@ _MIN_LOG_NOISE_ALTERNATION = math.log(1.05)
 """Least log ratio of alternating noise; only a spectral line at a quarter of the rate makes the
 noise of one sensor alternate."""
 
-_MIN_NOISE_WIDTH, _MAX_NOISE_WIDTH = 8, 64
-"""Range of the number of blocks on either side whose noise is compared."""
-
+_MIN_NOISE_WIDTH, _MAX_NOISE_WIDTH = 8, 64  # blocks on either side that are compared
 _LEVEL_WIDTH = 4  # number of blocks on either side whose mean is compared
 _MIN_STEP_RATIO = 1.2  # least ratio of the steps of two different registers
-_MIN_LEVEL_ALTERNATION = 5.0
-"""Least difference of alternating levels, in standard deviations of the noise, if nothing else
-alternates."""
-
+_MIN_LEVEL_ALTERNATION = 5.0  # in standard deviations, if nothing else alternates
 _PAIRS_PER_PART = 128  # pairs of samples in a part
 _MEDIAN_SD_OVER_MEAN_SD = 1.2533  # standard deviations, for normal noise
 _SD_OVER_MAD = 1.4826  # standard deviation over the median absolute deviation, of normal noise

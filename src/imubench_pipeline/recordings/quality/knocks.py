@@ -28,8 +28,7 @@ class Knock:
     """One knock."""
 
     first: int
-    last: int
-    """First and one-past-last record to leave out."""
+    last: int  # first and one-past-last record to leave out
     size: float  # largest distance from the level, over the noise of `find_outlier_blocks`
 
 

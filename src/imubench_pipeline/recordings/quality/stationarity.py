@@ -14,10 +14,7 @@ from imubench_pipeline.recordings.quality.summary import BlockStatistics, comput
 
 _NUMBER_OF_PARTS = 20
 _MIN_BLOCKS_PER_PART = 8  # least number of blocks in a part; a shorter recording is not tested
-_MAX_MOTION_CREST_FACTOR = 6.0
-"""Largest crest factor of motion: distance of the extremes from the mean, in standard deviations of
-the block. A knock exceeds it."""
-
+_MAX_MOTION_CREST_FACTOR = 6.0  # of extremes over deviation; a knock exceeds it
 _SD_OVER_MAD = 1.4826  # standard deviation over the median absolute deviation, of normal noise
 
 

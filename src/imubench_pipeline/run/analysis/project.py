@@ -19,8 +19,7 @@ from imubench_pipeline.settings.yaml_files import list_files, read_settings
 from imubench_pipeline.tables import write_json
 from imubench_pipeline.tables.findings import RecordingError
 
-INSPECTED_S, INSPECTED_BYTES = 10.0, 1 << 29
-"""Max. time, s, and memory, bytes, for the inspection of a log; beyond them it is rejected."""
+INSPECTED_S, INSPECTED_BYTES = 10.0, 1 << 29  # for the inspection of a log, s and bytes
 
 
 @dataclass(frozen=True)
