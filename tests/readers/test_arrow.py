@@ -11,7 +11,7 @@ import pyarrow.parquet as pq
 import pytest
 from hypothesis import given
 
-from imubench_pipeline.readers.arrays import arrow
+from imubench_pipeline.readers import bounds
 from imubench_pipeline.readers.arrays import file as arrays
 from imubench_pipeline.readers.arrays.arrow import list_page_sizes
 from imubench_pipeline.settings.sensor import LogFormat
@@ -296,13 +296,13 @@ def test_pages_beyond_the_bounds_are_refused(
         out.write_table(table.slice(0, 10))
         out.write_table(table)
     channels = {"gyro_x": {"column": "wx"}}
-    monkeypatch.setattr(arrow, "MAX_PAGE_BYTES", 399)
+    monkeypatch.setattr(bounds, "MAX_PAGE_BYTES", 399)
     refused(
         path, log(channels), r"pages unpack to 4\d\d bytes together; expected at most 399: write"
     )
-    monkeypatch.setattr(arrow, "MAX_PAGE_BYTES", 500)
+    monkeypatch.setattr(bounds, "MAX_PAGE_BYTES", 500)
     assert len(contents(path, log(channels))[0]["gyro_x"]) == 60
-    monkeypatch.setattr(arrow, "MAX_UNCHECKED_PAGES", 1)
+    monkeypatch.setattr(bounds, "MAX_UNCHECKED_PAGES", 1)
     refused(path, log(channels), "more than 1 pages; expected larger ones")
 
 

@@ -18,7 +18,7 @@ from backports import zstd
 from hypothesis import given
 from hypothesis import strategies as st
 
-from imubench_pipeline.readers import RecordingError, compressed, log_files, read
+from imubench_pipeline.readers import RecordingError, bounds, log_files, read
 from imubench_pipeline.readers.contents import list_contents
 from imubench_pipeline.recordings.drop_zone import _stem
 from tests.conftest import few
@@ -232,7 +232,7 @@ def test_an_archive_of_many_without_its_directory_is_refused(
     files = {f"{number}.jpg": b"\xff\xd8\0\0" for number in range(9)} | {"log.csv": text}
     packed = zipped(files).split(b"PK\1\2")[0]
     assert len(columns(written(tmp_path, packed, "r.zip"), log_format())[0]["gyro_x"]) == ROWS
-    monkeypatch.setattr(compressed, "MAX_MEMBERS", 5)
+    monkeypatch.setattr(bounds, "MAX_MEMBERS", 5)
     with pytest.raises(RecordingError, match=r"without its directory, with more than 5 members"):
         columns(written(tmp_path, packed, "s.zip"), log_format())
 
@@ -263,7 +263,7 @@ def test_encrypted_and_odd_members_are_named(tmp_path: Path, text: bytes) -> Non
 
 @pytest.mark.parametrize("way", ["gz", "zst", "xz", "bz2", "zip"])
 def test_bombs_are_stopped(tmp_path: Path, way: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(compressed, "MIN_CHECKED_EXPANSION", 1 << 22)
+    monkeypatch.setattr(bounds, "MIN_CHECKED_EXPANSION", 1 << 22)
     path = written(tmp_path, PACKED[way](b"wx,ax\n1,2\n" + bytes(8 << 20)), "r.csv")
     with pytest.raises(RecordingError, match=r"expands to more than 800 times its size"):
         columns(path, log_format())

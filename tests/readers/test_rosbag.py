@@ -16,10 +16,9 @@ from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin
 from rosbags.rosbag2 import Writer as Writer2
 from rosbags.typesys import Stores, get_typestore
 
-from imubench_pipeline.readers import RecordingError, read
+from imubench_pipeline.readers import RecordingError, bounds, read
 from imubench_pipeline.readers.batch import LogFile
 from imubench_pipeline.readers.rosbag import file as bags
-from imubench_pipeline.readers.rosbag import version_1
 from imubench_pipeline.readers.rosbag.file import RosbagFile
 from imubench_pipeline.readers.rosbag.version_1 import Bag
 from imubench_pipeline.settings.sensor import LogFormat
@@ -343,9 +342,9 @@ def test_a_bag_that_expands_too_far_is_rejected(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, kind: str
 ) -> None:
     path = bag(tmp_path, kind, {"/imu": imu_topic(kind, np.zeros((500, 6)))})
-    monkeypatch.setattr(version_1, "MIN_CHECKED_EXPANSION", 1000)
+    monkeypatch.setattr(bounds, "MIN_CHECKED_EXPANSION", 1000)
     assert len(columns(path, log_format())[0]["gyro_x"]) == 500
-    monkeypatch.setattr(version_1, "MAX_EXPANSION_RATIO", 1)
+    monkeypatch.setattr(bounds, "MAX_EXPANSION_RATIO", 1)
     with pytest.raises(RecordingError, match="its chunks expand to more than 1 times its size"):
         columns(path, log_format())
 

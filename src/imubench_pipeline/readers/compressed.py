@@ -17,15 +17,7 @@ from functools import lru_cache, partial
 from pathlib import Path
 from typing import IO, Any
 
-from imubench_pipeline.readers.bounds import (
-    MAX_DIRECTORY,
-    MAX_EXPANSION_RATIO,
-    MAX_MEMBERS,
-    MAX_UNCHECKED_PARTS,
-    MAX_WINDOW,
-    MIN_CHECKED_EXPANSION,
-    MIN_MEAN_PART,
-)
+from imubench_pipeline.readers import bounds
 from imubench_pipeline.readers.holes import FileWithoutHoles, ZeroRuns
 from imubench_pipeline.settings.validation import cut
 from imubench_pipeline.tables.findings import Finding, RecordingError, find
@@ -65,10 +57,13 @@ class _CompressedParts:
                 if not packed:
                     return b""
                 self._part = self._new()
-                if self._parts >= MAX_UNCHECKED_PARTS and self._size < MIN_MEAN_PART * self._parts:
+                if (
+                    self._parts >= bounds.MAX_UNCHECKED_PARTS
+                    and self._size < bounds.MIN_MEAN_PART * self._parts
+                ):
                     raise OSError(
                         f"{self._parts} compressed parts hold {self._size} bytes, expected more "
-                        f"than {MIN_MEAN_PART} a part"
+                        f"than {bounds.MIN_MEAN_PART} a part"
                     )
                 self._parts += 1
             try:
@@ -118,7 +113,7 @@ def unpack_zstd(data: bytes, most: int) -> bytes:
 
 def _create_zstd() -> zstd.ZstdDecompressor:
     largest: dict[int, int] = {
-        zstd.DecompressionParameter.window_log_max: MAX_WINDOW.bit_length() - 1
+        zstd.DecompressionParameter.window_log_max: bounds.MAX_WINDOW.bit_length() - 1
     }
     return zstd.ZstdDecompressor(options=largest)
 
@@ -127,7 +122,9 @@ DECOMPRESSORS: Mapping[str, Callable[[FileWithoutHoles], Any]] = {
     "gzip": lambda file: _CompressedParts(file, _GzipDecompressor),
     "zstd": lambda file: _CompressedParts(file, _create_zstd),
     # The memory for the dictionary that a file requests is allocated before the first byte.
-    "xz": lambda file: _CompressedParts(file, partial(lzma.LZMADecompressor, memlimit=MAX_WINDOW)),
+    "xz": lambda file: _CompressedParts(
+        file, partial(lzma.LZMADecompressor, memlimit=bounds.MAX_WINDOW)
+    ),
     "bzip2": lambda file: _CompressedParts(file, bz2.BZ2Decompressor),
 }
 """Function that opens a compressed file, by compression."""
@@ -167,7 +164,7 @@ class Bytes:
         self.ended_early = False  # whether the compressed data are truncated
         self._stream = stream
         self._streams = (stream, *under)
-        self._left = max(MIN_CHECKED_EXPANSION, MAX_EXPANSION_RATIO * size)
+        self._left = max(bounds.MIN_CHECKED_EXPANSION, bounds.MAX_EXPANSION_RATIO * size)
 
     def read(self, size: int) -> bytes:
         """Return the next bytes, at most ``size``; none at the end.
@@ -185,8 +182,8 @@ class Bytes:
         self._left -= len(block)
         if self._left < 0:
             raise RecordingError(
-                f"{self.name}: expands to more than {MAX_EXPANSION_RATIO} times its size, which no "
-                "log does; expected compressed text: unpack it and look what it is"
+                f"{self.name}: expands to more than {bounds.MAX_EXPANSION_RATIO} times its size, "
+                "which no log does; expected compressed text: unpack it and look what it is"
             )
         return block
 
@@ -388,7 +385,7 @@ class _Archive(io.FileIO):
     def __init__(self, path: Path) -> None:
         super().__init__(path, "rb")
         self._shown = path.name
-        self.most: int | None = MAX_DIRECTORY
+        self.most: int | None = bounds.MAX_DIRECTORY
 
     def read(self, size: int | None = -1) -> bytes:
         if self.most is not None and size is not None and size > self.most:
@@ -413,10 +410,10 @@ def _scan_for_members(archive: Path) -> list[zipfile.ZipInfo]:
             while at >= 0 and (ended or at + _MAX_HEADER <= len(data)):
                 members += _parse_local_header(data[at : at + _MAX_HEADER], start + at)
                 at = data.find(_ZIP_LOCAL, at + 1)
-            if len(members) > MAX_MEMBERS and not ended:
+            if len(members) > bounds.MAX_MEMBERS and not ended:
                 raise RecordingError(
                     f"{archive.name}: an archive without its directory, with more than "
-                    f"{MAX_MEMBERS} members; expected the log alone: pack it anew"
+                    f"{bounds.MAX_MEMBERS} members; expected the log alone: pack it anew"
                 )
             data = data[at if at >= 0 else max(len(data) - 3, 0) :]
     return members

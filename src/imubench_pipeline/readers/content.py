@@ -6,13 +6,7 @@ from contextlib import closing
 from itertools import chain
 from pathlib import Path
 
-from imubench_pipeline.readers.compressed import (
-    MAX_MAGIC_LENGTH,
-    is_member,
-    list_members,
-    open_bytes,
-    recognise_compression,
-)
+from imubench_pipeline.readers import compressed
 from imubench_pipeline.readers.file_format import FileFormat
 from imubench_pipeline.readers.formats import FILE_FORMATS, TEXT
 from imubench_pipeline.settings.sensor import Reader
@@ -60,12 +54,12 @@ def recognise_content(path: Path) -> tuple[FileFormat, str]:
         return of_folder, ""
     packed = _find_compression(path)
     if packed == "zip" and path.is_file():
-        endings = {member.suffix for member in list_members(path)}
+        endings = {member.suffix for member in compressed.list_members(path)}
         for file_format in FILE_FORMATS.values():
             if file_format.signature.archive_has in endings:
                 return file_format, ""
         return TEXT, packed
-    with closing(open_bytes(path)) as stream:
+    with closing(compressed.open_bytes(path)) as stream:
         begin = stream.filled(_PROBE_BYTES)
     if packed and (again := _name_compression(begin)):
         raise RecordingError(
@@ -92,16 +86,16 @@ def recognise_content(path: Path) -> tuple[FileFormat, str]:
 
 def _find_compression(path: Path) -> str:
     """Return the compression of a file; empty if it is not compressed."""
-    if is_member(path):
+    if compressed.is_member(path):
         return "zip"
     if is_endless(path):
         raise RecordingError(f"{path.name}: is neither a file nor a folder; expected a log")
     try:
         with path.open("rb") as file:
-            return _name_compression(file.read(MAX_MAGIC_LENGTH))
+            return _name_compression(file.read(compressed.MAX_MAGIC_LENGTH))
     except OSError as error:
         raise RecordingError(f"{path.name}: cannot be opened ({error.strerror})") from None
 
 
 def _name_compression(begin: bytes) -> str:
-    return "zip" if begin.startswith(_ZIP_MAGIC) else recognise_compression(begin)
+    return "zip" if begin.startswith(_ZIP_MAGIC) else compressed.recognise_compression(begin)

@@ -13,13 +13,7 @@ from numpy.typing import DTypeLike, NDArray
 
 from imubench_pipeline.readers.batch import SECONDS
 from imubench_pipeline.readers.text.header import SIMULATED
-from imubench_pipeline.settings.sensor import (
-    QUANTITIES,
-    TEMPERATURE,
-    ColumnSource,
-    LogFormat,
-    quantity_of,
-)
+from imubench_pipeline.settings import sensor
 from imubench_pipeline.settings.validation import ConfigError
 from imubench_pipeline.units import find_conversion
 
@@ -53,8 +47,8 @@ class TextLog:
     def __init__(
         self,
         path: Path,
-        log: LogFormat,
-        sources: Mapping[str, ColumnSource],
+        log: sensor.LogFormat,
+        sources: Mapping[str, sensor.ColumnSource],
         rate: float,
         remarks: Iterable[str] = (),
         kind: DTypeLike = np.float64,
@@ -100,7 +94,11 @@ class TextLog:
             stamps = np.arange(self._written, self._written + count) / self._rate / self._stamp_unit
             columns[str(self._log.time.column)] = np.round(stamps, 9)
         for name, source in self._sources.items():
-            dimension = "temperature" if name == TEMPERATURE else QUANTITIES[quantity_of(name)]
+            dimension = (
+                "temperature"
+                if name == sensor.TEMPERATURE
+                else sensor.QUANTITIES[sensor.quantity_of(name)]
+            )
             factor, zero = find_conversion(source.unit, dimension)
             raw = (block[name] - zero) / (factor * source.scale) + source.offset
             columns[str(source.column)] = np.round(raw, _DECIMALS).astype(self._kind)

@@ -24,6 +24,7 @@ from imubench_pipeline.recordings.drop_zone import Recording, account_for, find_
 from imubench_pipeline.recordings.known_logs import plan_recording_versions
 from imubench_pipeline.registry import blocks
 from imubench_pipeline.run.faults import Faults
+from imubench_pipeline.settings import simulated_recordings as simulations
 from imubench_pipeline.settings.config import Run, given_beside, read_run
 from imubench_pipeline.settings.experiments import AT_REST, Kind, kind_of, stated_experiments
 from imubench_pipeline.settings.printed import IN_USE
@@ -38,13 +39,6 @@ from imubench_pipeline.settings.sensor import (
     shipped_sensors,
 )
 from imubench_pipeline.settings.shipped import find_own_folder, list_folders
-from imubench_pipeline.settings.simulated_recordings import (
-    Board,
-    SimulatedRecording,
-    layout,
-    profile_files,
-    read_simulated,
-)
 from imubench_pipeline.settings.validation import ConfigError, UnavailableSettingsError, parse
 from imubench_pipeline.settings.yaml_files import read_yaml
 from imubench_pipeline.tables.digests import compute_digest
@@ -90,8 +84,8 @@ class Plan:
         self.requirements: dict[str, Requirement] = read_requirements(
             self.run.requirements and list_folders(self.run.requirements, "requirements")
         )
-        simulated = read_simulated(self.run.to_simulate, declared)
-        self.boards: dict[str, Board] = simulated.boards
+        simulated = simulations.read_simulated(self.run.to_simulate, declared)
+        self.boards: dict[str, simulations.Board] = simulated.boards
         self.simulated = {(entry.sensor, entry.recording): entry for entry in simulated.recordings}
         self._of_ingest: dict[tuple[str, str], str] = {}
         self._read_notes: dict[Path, object] = {}
@@ -185,7 +179,7 @@ class Plan:
         try:
             log, notes = self._written(recording)
             if recording.simulated:
-                log = layout(self.simulated[recording.sensor, recording.name], log)
+                log = simulations.layout(self.simulated[recording.sensor, recording.name], log)
             else:
                 try:
                     notes.check_gyro(log)
@@ -323,9 +317,11 @@ class Plan:
     def simulated_settings(self, sensor: str, name: str) -> str:
         """Return the parameters and the log format of a simulated recording."""
         recording = self.simulated[sensor, name]
-        written = layout(recording, self.sensors[sensor].log)
+        written = simulations.layout(recording, self.sensors[sensor].log)
         try:
-            profiles = {str(path): compute_digest(path) for path in profile_files(recording)}
+            profiles = {
+                str(path): compute_digest(path) for path in simulations.profile_files(recording)
+            }
         except OSError as error:
             raise ConfigError(
                 f"{sensor}/{name}: {error.filename} cannot be read "
@@ -452,14 +448,14 @@ class Plan:
         return digest_sources(f"{package}.{step}")
 
 
-def _dump_for_samples(recording: SimulatedRecording) -> dict[str, Any]:
+def _dump_for_samples(recording: simulations.SimulatedRecording) -> dict[str, Any]:
     """Return the settings of a simulated recording that affect its samples."""
     of_source = {"published", "figures", "read"}
     without: dict[str, Any] = {"channels": {"__all__": of_source}, "shows": True}
     return recording.model_dump(mode="json", exclude=without)
 
 
-def _describe_board(board: Board) -> dict[str, object]:
+def _describe_board(board: simulations.Board) -> dict[str, object]:
     """Return the description of a board for the report."""
     return {
         "title": board.title,

@@ -37,19 +37,7 @@ from imubench_pipeline.estimators.thermal.path import TemperaturePath, estimate_
 from imubench_pipeline.estimators.thermal.register import estimate_resolution
 from imubench_pipeline.estimators.thermal.result import ThermalFit, add_temperature_effect
 from imubench_pipeline.estimators.white_level import find_white_stretch
-from imubench_pipeline.model.estimates import (
-    AllanRow,
-    CompensatedAllanRow,
-    DeterministicRow,
-    DrawRow,
-    FixedBiasRow,
-    LineRow,
-    LowPassRow,
-    ModelRow,
-    ParameterRow,
-    SpectrumRow,
-    TemperatureRow,
-)
+from imubench_pipeline.model import estimates as model
 from imubench_pipeline.model.recordings import FindingRow
 from imubench_pipeline.noise.simulate import channel_rng
 from imubench_pipeline.recordings.kept import load_static_logs
@@ -69,17 +57,17 @@ from imubench_pipeline.words.reasons import simulations as texts
 class Estimation:
     """Rows of the tables that the estimation of a recording leaves."""
 
-    allan: list[AllanRow] = field(default_factory=list)
-    parameters: list[ParameterRow] = field(default_factory=list)
-    draws: list[DrawRow] = field(default_factory=list)
-    models: list[ModelRow] = field(default_factory=list)
-    lines: list[LineRow] = field(default_factory=list)
-    spectrum: list[SpectrumRow] = field(default_factory=list)
-    fixed_bias: list[FixedBiasRow] = field(default_factory=list)
-    temperature: list[TemperatureRow] = field(default_factory=list)
-    allan_compensated: list[CompensatedAllanRow] = field(default_factory=list)
-    low_pass: list[LowPassRow] = field(default_factory=list)
-    deterministic: list[DeterministicRow] = field(default_factory=list)
+    allan: list[model.AllanRow] = field(default_factory=list)
+    parameters: list[model.ParameterRow] = field(default_factory=list)
+    draws: list[model.DrawRow] = field(default_factory=list)
+    models: list[model.ModelRow] = field(default_factory=list)
+    lines: list[model.LineRow] = field(default_factory=list)
+    spectrum: list[model.SpectrumRow] = field(default_factory=list)
+    fixed_bias: list[model.FixedBiasRow] = field(default_factory=list)
+    temperature: list[model.TemperatureRow] = field(default_factory=list)
+    allan_compensated: list[model.CompensatedAllanRow] = field(default_factory=list)
+    low_pass: list[model.LowPassRow] = field(default_factory=list)
+    deterministic: list[model.DeterministicRow] = field(default_factory=list)
     estimate_findings: list[FindingRow] = field(default_factory=list)
     estimates: dict[str, dict[str, Estimate]] = field(default_factory=dict)
     """By channel and method: what the rows of the tables ``parameters`` and ``draws`` stand for."""
@@ -132,7 +120,7 @@ def estimate_channel(
         recommended = into.estimates[key.channel].get(best)
         N = recommended.parameters["N"].value if recommended else None
         into.add_findings(key, spectral_findings(key.channel, channel.fitted.frame, N))
-    bias = FixedBiasRow(**asdict(key), value=channel.mean, unit=channel.unit)
+    bias = model.FixedBiasRow(**asdict(key), value=channel.mean, unit=channel.unit)
     into.fixed_bias.append(bias)
 
 
@@ -201,7 +189,7 @@ class _Channel:
         for line in fitted.lines:
             about = asdict(line)
             del about["resolution"]
-            into.lines.append(LineRow(**asdict(key), **about))
+            into.lines.append(model.LineRow(**asdict(key), **about))
         into.spectrum += _spectrum_rows(key, fitted)
         into.low_pass += _low_pass_rows(key, fitted)
         if warm is not None:
@@ -209,7 +197,9 @@ class _Channel:
             if warm.compensated:
                 rows = make_limit_rows(limited(left, without))
                 for about, effect in zip(rows, added.deviation, strict=True):
-                    row = CompensatedAllanRow(**asdict(key), **about, temperature=float(effect))
+                    row = model.CompensatedAllanRow(
+                        **asdict(key), **about, temperature=float(effect)
+                    )
                     into.allan_compensated.append(row)
         return estimates
 
@@ -281,13 +271,13 @@ _METHODS_BY_PREFERENCE = ("likelihood", "likelihood_gm", "weighted", "paper", "c
 """Methods in order of preference: the first requested one is recommended."""
 
 
-def _model_rows(key: Key, fit: Likelihood) -> Iterator[ModelRow]:
+def _model_rows(key: Key, fit: Likelihood) -> Iterator[model.ModelRow]:
     """Yield the rows of the table ``models``, the chosen model first."""
     for place, candidate in enumerate(fit.candidates):
         notes = [candidate.goodness.where]
         if place == 0:
             notes += [describe_disagreement(fit.candidates) or ""]
-        yield ModelRow(
+        yield model.ModelRow(
             **asdict(key),
             model=candidate.terms.name,
             chosen=place == 0,
@@ -306,11 +296,11 @@ def _model_rows(key: Key, fit: Likelihood) -> Iterator[ModelRow]:
         )
 
 
-def _spectrum_rows(key: Key, fit: Likelihood) -> Iterator[SpectrumRow]:
+def _spectrum_rows(key: Key, fit: Likelihood) -> Iterator[model.SpectrumRow]:
     """Yield the rows of the table ``spectrum``."""
     spectrum, fitted = fit.spectrum, fit.fitted
     for i, frequency in enumerate(spectrum.frequency):
-        yield SpectrumRow(
+        yield model.SpectrumRow(
             **asdict(key),
             frequency=float(frequency),
             lower=float(spectrum.lower[i]),
@@ -322,7 +312,7 @@ def _spectrum_rows(key: Key, fit: Likelihood) -> Iterator[SpectrumRow]:
         )
 
 
-def _temperature_rows(key: Key, fit: ThermalFit) -> Iterator[TemperatureRow]:
+def _temperature_rows(key: Key, fit: ThermalFit) -> Iterator[model.TemperatureRow]:
     """Yield the rows of the table ``temperature``."""
     unit = SI_UNITS[quantity_of(key.channel)]["B"]
     reason = fit.sensitivity.reason or fit.reason
@@ -334,7 +324,7 @@ def _temperature_rows(key: Key, fit: ThermalFit) -> Iterator[TemperatureRow]:
         "bias": (fit.bias, unit),
     }
     for name, (parameter, its_unit) in figures.items():
-        yield TemperatureRow(
+        yield model.TemperatureRow(
             **asdict(key),
             compensated=fit.compensated,
             parameter=name,
@@ -342,7 +332,7 @@ def _temperature_rows(key: Key, fit: ThermalFit) -> Iterator[TemperatureRow]:
         )
 
 
-def _low_pass_rows(key: Key, fit: Likelihood) -> Iterator[LowPassRow]:
+def _low_pass_rows(key: Key, fit: Likelihood) -> Iterator[model.LowPassRow]:
     """Yield the rows of the table ``low_pass``: none where a band was asked for."""
     low_pass = fit.low_pass
     if low_pass is None:
@@ -352,7 +342,7 @@ def _low_pass_rows(key: Key, fit: Likelihood) -> Iterator[LowPassRow]:
     if low_pass.order is not None:
         figures["floor"] = (Parameter(low_pass.floor), density)
     for name, (parameter, unit) in figures.items():
-        yield LowPassRow(
+        yield model.LowPassRow(
             **asdict(key),
             kind=low_pass.kind,
             order=low_pass.order,

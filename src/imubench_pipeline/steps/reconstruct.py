@@ -15,12 +15,7 @@ from imubench_pipeline.estimators.estimate import Estimate
 from imubench_pipeline.estimators.rows import read_estimates, read_recommended_estimates
 from imubench_pipeline.estimators.score import beats, rms, score
 from imubench_pipeline.model.estimates import ReconstructionRow, ScoreRow
-from imubench_pipeline.noise.simulate import (
-    channel_rng,
-    ensemble,
-    reconstructed_variance,
-    simulate_blocks,
-)
+from imubench_pipeline.noise import simulate
 from imubench_pipeline.recordings.kept import Quality
 from imubench_pipeline.recordings.recording import LogWriter
 from imubench_pipeline.settings.config import ReconstructionSettings
@@ -62,22 +57,22 @@ def reconstruct(
     sizes, samples = measured.cluster_size, measured.samples
 
     def stream(use: str) -> np.random.Generator:
-        return channel_rng(settings.seed, repr(model), key.channel, use)
+        return simulate.channel_rng(settings.seed, repr(model), key.channel, use)
 
     if settings.keep_series:
         about = {"simulated": True, "rate": rate, "rows": samples, "model": asdict(model)}
         columns = {"simulated": pa.float64()}
         with replace_file(series) as temporary, LogWriter(temporary, columns) as log:
-            for block in simulate_blocks(model, rate, samples, stream("member 1")):
+            for block in simulate.simulate_blocks(model, rate, samples, stream("member 1")):
                 log.write({"simulated": block})
             log.finish(about)
     variances = [
-        reconstructed_variance(model, rate, samples, sizes, stream(f"member {number}"))
+        simulate.reconstructed_variance(model, rate, samples, sizes, stream(f"member {number}"))
         for number in range(1, settings.members + 1)
     ]
     reconstructed = np.sqrt(np.mean(variances, axis=0))
     deviations = np.sqrt(
-        ensemble(model, rate, samples, sizes, settings.band_members, stream("band"))
+        simulate.ensemble(model, rate, samples, sizes, settings.band_members, stream("band"))
     )
     quantiles = np.quantile(deviations, [0.025, 0.5, 0.975], axis=0)
     of_model = np.sqrt(model.allan_variance(measured.tau, rate))

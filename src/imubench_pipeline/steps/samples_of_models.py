@@ -19,16 +19,8 @@ from imubench_pipeline.estimators.rows import read_estimates
 from imubench_pipeline.model.estimates import LowPassRow, ModelSampleRow, TemperatureRow
 from imubench_pipeline.noise.low_pass import LowPass
 from imubench_pipeline.noise.simulate import channel_rng
+from imubench_pipeline.recordings import overview
 from imubench_pipeline.recordings.kept import load_static_logs
-from imubench_pipeline.recordings.overview import (
-    BUCKETS,
-    PRESENT,
-    TOTAL,
-    bucket_edges,
-    envelope_rows,
-    gather,
-    no_figures,
-)
 from imubench_pipeline.recordings.recording import ChannelLog
 from imubench_pipeline.simulate.model import SensorModel, TemperatureDrift, before_the_filter
 from imubench_pipeline.simulate.simulation import Signal, simulate_blocks
@@ -118,14 +110,14 @@ def _rows(
 ) -> Iterator[ModelSampleRow]:
     """Yield the deviation of the samples, the samples of a section, and the envelope."""
     row = partial(ModelSampleRow, **asdict(key), of=of)
-    edges = bucket_edges(samples, BUCKETS)
-    figures = no_figures(edges)
+    edges = overview.bucket_edges(samples, overview.BUCKETS)
+    figures = overview.no_figures(edges)
     stretch = round(STRETCH * rate)
     parts: list[Array] = []
     squares, reached, first = 0.0, 0, math.nan
     for block in blocks:
         block = np.ascontiguousarray(block[: samples - reached])
-        gather(block, reached, edges, figures)
+        overview.gather(block, reached, edges, figures)
         if reached < stretch:
             parts.append(block[: stretch - reached])
         present = block[np.isfinite(block)]
@@ -135,11 +127,11 @@ def _rows(
         reached += len(block)
         if reached == samples:
             break
-    number, total = figures[:, PRESENT].sum(), figures[:, TOTAL].sum()
+    number, total = figures[:, overview.PRESENT].sum(), figures[:, overview.TOTAL].sum()
     deviation = math.sqrt(max(squares / number - (total / number - first) ** 2, 0.0))
     yield row(what="deviation", start=0.0, end=samples / rate, mean=deviation)
     for k, value in enumerate(np.concatenate(parts).tolist()):
         mean = None if math.isnan(value) else value
         yield row(what="stretch", start=k / rate, end=(k + 1) / rate, mean=mean)
-    for seen in envelope_rows(edges / rate, figures):
+    for seen in overview.envelope_rows(edges / rate, figures):
         yield row(what="envelope", **{name: seen[name] for name in _ENVELOPE_COLUMNS})

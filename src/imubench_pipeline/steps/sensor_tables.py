@@ -10,30 +10,13 @@ import pyarrow as pa
 
 from imubench_pipeline.datasheets.plausibility import implausible_of
 from imubench_pipeline.datasheets.suspicion import UsualFigures, unusual_rows, usual_of_text
-from imubench_pipeline.model.estimates import (
-    BacktestRow,
-    DeterministicRow,
-    FixedBiasRow,
-    ModelRow,
-    ParameterRow,
-    SimulatedTruthRow,
-)
+from imubench_pipeline.model import estimates as model
 from imubench_pipeline.model.recordings import FindingRow
 from imubench_pipeline.model.table import TableRow
 from imubench_pipeline.navigation.backtest import comparison
 from imubench_pipeline.navigation.drift import drift_rows
 from imubench_pipeline.navigation.pooled import list_pooled_rows
-from imubench_pipeline.recordings.fitness import (
-    WITH_DOUBTS,
-    attach_doubts,
-    attach_doubts_to_pools,
-    derive_doubts,
-    doubt_simulated_recordings,
-    doubt_unsold_sensors,
-    judge_recordings,
-    list_excluded,
-    mask_excluded,
-)
+from imubench_pipeline.recordings import fitness
 from imubench_pipeline.recordings.kept import Quality
 from imubench_pipeline.recordings.quality.copies import find_copied_recordings
 from imubench_pipeline.registry import Hook
@@ -50,7 +33,7 @@ from imubench_pipeline.tables.failures import (
 from imubench_pipeline.units import parse_quantity
 
 SensorTable = Callable[
-    [str, Sequence[SimulatedTruthRow], Mapping[str, pa.Table]], Iterable[TableRow]
+    [str, Sequence[model.SimulatedTruthRow], Mapping[str, pa.Table]], Iterable[TableRow]
 ]
 """Returns the rows of a table of a sensor.
 
@@ -83,14 +66,14 @@ def join_tables(
     about = [quality.row for quality in qualities]
     devices = {(row.sensor, row.recording): row.device for row in about}
     recommended = joined["parameters"].filter(joined["parameters"]["recommended"])
-    estimated = ParameterRow.rows_of(recommended)
-    biases = FixedBiasRow.rows_of(joined["fixed_bias"])
-    models = ModelRow.rows_of(joined["models"])
+    estimated = model.ParameterRow.rows_of(recommended)
+    biases = model.FixedBiasRow.rows_of(joined["fixed_bias"])
+    models = model.ModelRow.rows_of(joined["models"])
     joined["drift"] = build("drift", drift_rows(estimated, biases, about))
     sensors = sensors_of(sensor)
     findings = collect_findings(
         qualities,
-        DeterministicRow.rows_of(joined["deterministic"]),
+        model.DeterministicRow.rows_of(joined["deterministic"]),
         FindingRow.rows_of(joined.pop("estimate_findings")),
         estimated,
         sensors,
@@ -98,21 +81,27 @@ def join_tables(
     )
     findings += find_copied_recordings(models, biases)
     if "backtest" in joined:
-        findings += comparison.findings(BacktestRow.rows_of(joined["backtest"]))
+        findings += comparison.findings(model.BacktestRow.rows_of(joined["backtest"]))
     joined["findings"] = build("findings", findings)
     doubted = [
-        *doubt_simulated_recordings(about),
-        *doubt_unsold_sensors(about, {name for name, sensor in sensors.items() if not sensor.sold}),
-        *derive_doubts(FindingRow.rows_of(joined["findings"]), estimated, models),
+        *fitness.doubt_simulated_recordings(about),
+        *fitness.doubt_unsold_sensors(
+            about, {name for name, sensor in sensors.items() if not sensor.sold}
+        ),
+        *fitness.derive_doubts(FindingRow.rows_of(joined["findings"]), estimated, models),
     ]
-    about = judge_recordings(about, doubted, json.loads(decide).get("include", ()))
+    about = fitness.judge_recordings(about, doubted, json.loads(decide).get("include", ()))
     joined["recordings"] = build("recordings", about)
     joined["doubts"] = build("doubts", (doubt.row() for doubt in doubted))
-    apart = list_excluded(about)
-    pools = list_pooled_rows(mask_excluded(estimated, apart), mask_excluded(biases, apart), devices)
-    joined["pooled"] = build("pooled", attach_doubts_to_pools(pools, about))
-    for name in WITH_DOUBTS.keys() & joined.keys():
-        joined[name] = build(name, attach_doubts(WITH_DOUBTS[name].rows_of(joined[name]), about))
+    apart = fitness.list_excluded(about)
+    pools = list_pooled_rows(
+        fitness.mask_excluded(estimated, apart), fitness.mask_excluded(biases, apart), devices
+    )
+    joined["pooled"] = build("pooled", fitness.attach_doubts_to_pools(pools, about))
+    for name in fitness.WITH_DOUBTS.keys() & joined.keys():
+        joined[name] = build(
+            name, fitness.attach_doubts(fitness.WITH_DOUBTS[name].rows_of(joined[name]), about)
+        )
     truth = list(list_true_parameters(truths))
     joined["simulated_truth"] = build("simulated_truth", truth)
     for name, rows_of in _ADDED.by_key().items():
@@ -128,9 +117,9 @@ _MAX_STEP_DISTANCE = 1 / 100  # of two steps that count as one, over the length
 
 def collect_findings(
     qualities: Sequence[Quality],
-    deterministic: Sequence[DeterministicRow],
+    deterministic: Sequence[model.DeterministicRow],
     of_estimates: Iterable[FindingRow],
-    estimated: Sequence[ParameterRow],
+    estimated: Sequence[model.ParameterRow],
     sensors: Mapping[str, Sensor],
     usual: UsualFigures,
 ) -> list[FindingRow]:
@@ -152,11 +141,11 @@ def collect_findings(
 
 def drop_duplicate_findings(
     findings: Iterable[FindingRow],
-    deterministic: Iterable[DeterministicRow],
+    deterministic: Iterable[model.DeterministicRow],
     durations: Mapping[tuple[str, str], float],
 ) -> Iterator[FindingRow]:
     """Yield the findings of the ingest that are not in ``deterministic``; `durations` in s."""
-    by_place: dict[tuple[str, str, str], list[DeterministicRow]] = {}
+    by_place: dict[tuple[str, str, str], list[model.DeterministicRow]] = {}
     for row in deterministic:
         by_place.setdefault((row.sensor, row.recording, row.channel), []).append(row)
     for finding in findings:
@@ -171,7 +160,7 @@ def drop_duplicate_findings(
             yield finding
 
 
-def list_true_parameters(truths: str) -> Iterator[SimulatedTruthRow]:
+def list_true_parameters(truths: str) -> Iterator[model.SimulatedTruthRow]:
     """Yield the rows of the table ``simulated_truth``."""
     for entry in json.loads(truths):
         recording = SimulatedRecording.model_validate(entry)
@@ -182,7 +171,7 @@ def list_true_parameters(truths: str) -> Iterator[SimulatedTruthRow]:
                 factors = SIMULATIONS.by_key()[key].factors(recording, str(channel))
             for figure in list_true_figures(truth, channel, rate):
                 factor = factors.get(figure.name.removesuffix(" in the log"), 1.0)
-                yield SimulatedTruthRow(
+                yield model.SimulatedTruthRow(
                     sensor=recording.sensor,
                     recording=recording.recording,
                     channel=channel,

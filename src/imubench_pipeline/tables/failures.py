@@ -20,14 +20,7 @@ import pyarrow.parquet as pq
 
 from imubench_pipeline.model.recordings import FailureRow, FindingRow, RecordingRow
 from imubench_pipeline.model.table import R
-from imubench_pipeline.tables.files import (
-    build,
-    join_tables,
-    make_schema,
-    read_json,
-    read_part,
-    write_arrow,
-)
+from imubench_pipeline.tables import files
 from imubench_pipeline.tables.findings import Finding, UnavailableError, find, remove_addresses
 from imubench_pipeline.words.findings.files import Failed
 
@@ -76,7 +69,7 @@ def read_failure(path: Path) -> Failure | None:
     """Return why an output, Parquet or ``quality.json``, is empty; None without a failure."""
     if path.name == QUALITY:
         with contextlib.suppress(ValueError, TypeError, AttributeError):
-            failure = read_json(path).get("failure")
+            failure = files.read_json(path).get("failure")
             return Failure(**failure) if failure else None
     if path.suffix == ".parquet":
         with contextlib.suppress(OSError, ValueError, TypeError, pa.ArrowException):
@@ -92,18 +85,20 @@ def parse_failure(read: pa.Schema) -> Failure | None:
 
 def read_with_failures(table: str, paths: Sequence[Path]) -> tuple[pa.Table, list[Failure]]:
     """Read and join files of one table, and return the failures of the empty ones."""
-    parts = [read_part(table, path) for path in paths]
+    parts = [files.read_part(table, path) for path in paths]
     failures = [
         failure for part in parts if len(part) == 0 and (failure := parse_failure(part.schema))
     ]
-    return join_tables(table, parts), failures
+    return files.join_tables(table, parts), failures
 
 
 def write_empty(tables: Iterable[Path], failure: Failure) -> None:
     """Write the tables that a step declares, without a row and with its failure."""
     metadata = {_METADATA: json.dumps(asdict(failure), sort_keys=True).encode()}
     for path in tables:
-        write_arrow(make_schema(path.stem).empty_table().replace_schema_metadata(metadata), path)
+        files.write_arrow(
+            files.make_schema(path.stem).empty_table().replace_schema_metadata(metadata), path
+        )
 
 
 def mark_failures(
@@ -115,7 +110,7 @@ def mark_failures(
     tables, unless the step needs more than a static log.
     """
     if not failures:
-        return {"failures": make_schema("failures").empty_table()} | dict(tables)
+        return {"failures": files.make_schema("failures").empty_table()} | dict(tables)
     recordings = RecordingRow.rows_of(tables["recordings"])
     kinds = {(row.sensor, row.recording): row.kind for row in recordings}
     reasons = {
@@ -125,7 +120,7 @@ def mark_failures(
         or kinds.get((failure.sensor, failure.recording or "")) != "static"
     }
     marked = remove_recordings(tables, reasons)
-    marked["recordings"] = build(
+    marked["recordings"] = files.build(
         "recordings",
         (
             replace(row, status="failed", reason=reasons[key], fitness=None, decides=False)
@@ -140,9 +135,11 @@ def mark_failures(
     found = [
         failure.finding().row(failure.sensor, str(failure.recording)) for failure in of_recordings
     ]
-    marked["findings"] = build("findings", append_new_rows(listed, found))
+    marked["findings"] = files.build("findings", append_new_rows(listed, found))
     before = FailureRow.rows_of(tables["failures"]) if "failures" in tables else []
-    marked["failures"] = build("failures", append_new_rows(before, [one.row() for one in failures]))
+    marked["failures"] = files.build(
+        "failures", append_new_rows(before, [one.row() for one in failures])
+    )
     return marked
 
 

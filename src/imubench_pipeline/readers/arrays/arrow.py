@@ -21,14 +21,9 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
+from imubench_pipeline.readers import bounds
 from imubench_pipeline.readers.arrays.file import ArrayFile
 from imubench_pipeline.readers.arrays.table import Column, Table, UnusableError
-from imubench_pipeline.readers.bounds import (
-    MAX_ARROW_BATCH,
-    MAX_PAGE_BYTES,
-    MAX_UNCHECKED_PAGES,
-    MIN_MEAN_PAGE,
-)
 
 METADATA = b"imubench"  # metadata key of Parquet files that this package writes; the value is JSON
 _PARQUET_MAGIC, _FEATHER_1_MAGIC = b"PAR1", b"FEA1"
@@ -175,10 +170,10 @@ def check_batches(path: Path, in_file: bool) -> None:
         source.seek(_FILE_PREFIX_BYTES if in_file else 0)
         for message in pa.ipc.MessageReader.open_stream(source):
             unpacked = sum(_read_unpacked_sizes(bytes(message.metadata), message.body))
-            if unpacked > MAX_ARROW_BATCH:
+            if unpacked > bounds.MAX_ARROW_BATCH:
                 raise UnusableError(
                     f"a compressed record batch unpacks to {unpacked} bytes; expected at most "
-                    f"{MAX_ARROW_BATCH}: write it with pyarrow.feather.write_feather, which "
+                    f"{bounds.MAX_ARROW_BATCH}: write it with pyarrow.feather.write_feather, which "
                     "makes smaller ones"
                 )
 
@@ -249,7 +244,7 @@ _HEADER_PROBE, _MAX_HEADER = 1 << 10, 1 << 20  # bytes of a header that are read
 
 def check_pages(path: Path, metadata: pq.FileMetaData, names: Sequence[str]) -> None:
     """Raise `UnusableError` if pages are too many, or the largest of all columns are too large."""
-    most = max(MAX_UNCHECKED_PAGES, path.stat().st_size // MIN_MEAN_PAGE)
+    most = max(bounds.MAX_UNCHECKED_PAGES, path.stat().st_size // bounds.MIN_MEAN_PAGE)
     paths = [metadata.schema.column(place).path for place in range(metadata.num_columns)]
     places = [place for place, name in enumerate(paths) if name in names]
     number = 0
@@ -267,11 +262,11 @@ def check_pages(path: Path, metadata: pq.FileMetaData, names: Sequence[str]) -> 
                             "pyarrow.parquet.write_table"
                         )
                 together += largest
-            if together > MAX_PAGE_BYTES:
+            if together > bounds.MAX_PAGE_BYTES:
                 raise UnusableError(
                     f"pages unpack to {together} bytes together; expected at most "
-                    f"{MAX_PAGE_BYTES}: write it with pyarrow.parquet.write_table, which makes "
-                    "smaller ones"
+                    f"{bounds.MAX_PAGE_BYTES}: write it with pyarrow.parquet.write_table, which "
+                    "makes smaller ones"
                 )
 
 

@@ -13,14 +13,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import BinaryIO
 
-from imubench_pipeline.readers.bounds import (
-    MAX_BAG_CHUNK,
-    MAX_EXPANSION_RATIO,
-    MAX_MESSAGE,
-    MAX_TOPIC_LENGTH,
-    MAX_TOPICS,
-    MIN_CHECKED_EXPANSION,
-)
+from imubench_pipeline.readers import bounds
 from imubench_pipeline.settings.validation import cut
 from imubench_pipeline.tables.findings import RecordingError
 
@@ -72,7 +65,7 @@ class Bag:
         with self._path.open("rb") as file:
             at = 0
             size = os.fstat(file.fileno()).st_size
-            self._left = max(MIN_CHECKED_EXPANSION, MAX_EXPANSION_RATIO * size)
+            self._left = max(bounds.MIN_CHECKED_EXPANSION, bounds.MAX_EXPANSION_RATIO * size)
             try:
                 self.unclosed = not self._start(file)
                 while True:
@@ -111,11 +104,13 @@ class Bag:
         self, header: dict[bytes, bytes], data: bytes, topic: str
     ) -> Iterator[tuple[int, bytes]]:
         (size,) = _UINT32.unpack(header[b"size"])
-        if size > MAX_BAG_CHUNK:
-            raise ValueError(f"a chunk of {size} bytes, expected at most {MAX_BAG_CHUNK}")
+        if size > bounds.MAX_BAG_CHUNK:
+            raise ValueError(f"a chunk of {size} bytes, expected at most {bounds.MAX_BAG_CHUNK}")
         self._left -= size
         if self._left < 0:
-            raise ValueError(f"its chunks expand to more than {MAX_EXPANSION_RATIO} times its size")
+            raise ValueError(
+                f"its chunks expand to more than {bounds.MAX_EXPANSION_RATIO} times its size"
+            )
         compression = header[b"compression"].decode("ascii", "replace")
         if compression == "bz2":
             data = bz2.BZ2Decompressor().decompress(data, size + 1)
@@ -146,17 +141,22 @@ class Bag:
         if header[b"op"] == _OP_MESSAGE:
             if self._connections[_UINT32.unpack(header[b"conn"])[0]][0] == topic:
                 seconds, nanoseconds = _TIME_STRUCT.unpack(header[b"time"])
-                yield seconds * 10**9 + nanoseconds, data if len(data) <= MAX_MESSAGE else b""
+                yield (
+                    seconds * 10**9 + nanoseconds,
+                    data if len(data) <= bounds.MAX_MESSAGE else b"",
+                )
         elif header[b"op"] == _OP_CONNECTION:
             self._connect(header, data)
 
     def _connect(self, header: dict[bytes, bytes], data: bytes) -> None:
         kind = _parse_fields(data)[b"type"].decode("utf-8", "replace")
         topic = header[b"topic"].decode("utf-8", "replace")
-        if max(len(topic), len(kind)) > MAX_TOPIC_LENGTH:
-            raise ValueError(f"a topic or type of more than {MAX_TOPIC_LENGTH} letters")
-        if len(self._connections) >= MAX_TOPICS:
-            raise ValueError(f"more than {MAX_TOPICS} connections, expected those of a vehicle")
+        if max(len(topic), len(kind)) > bounds.MAX_TOPIC_LENGTH:
+            raise ValueError(f"a topic or type of more than {bounds.MAX_TOPIC_LENGTH} letters")
+        if len(self._connections) >= bounds.MAX_TOPICS:
+            raise ValueError(
+                f"more than {bounds.MAX_TOPICS} connections, expected those of a vehicle"
+            )
         # The name of the same type in ROS 2.
         self._connections[_UINT32.unpack(header[b"conn"])[0]] = topic, kind.replace("/", "/msg/", 1)
 
@@ -184,8 +184,8 @@ def _read_exactly(file: BinaryIO, size: bytes) -> bytes:
     # Checked before reading, since a damaged size may exceed the memory.
     if count > os.fstat(file.fileno()).st_size - file.tell():
         raise _TruncatedError
-    if count > MAX_BAG_CHUNK:
-        raise ValueError(f"a record of {count} bytes, expected at most {MAX_BAG_CHUNK}")
+    if count > bounds.MAX_BAG_CHUNK:
+        raise ValueError(f"a record of {count} bytes, expected at most {bounds.MAX_BAG_CHUNK}")
     return file.read(count)
 
 

@@ -18,16 +18,7 @@ from rosbags.rosbag2.reader import DirectoryReader
 from rosbags.rosbag2.storage_mcap import McapReader
 from rosbags.rosbag2.storage_sqlite3 import Sqlite3Reader
 
-from imubench_pipeline.readers.bounds import (
-    MAX_BAG_CHUNK,
-    MAX_BAG_OVERLAP,
-    MAX_EXPANSION_RATIO,
-    MAX_MESSAGE,
-    MAX_METADATA,
-    MAX_TOPIC_LENGTH,
-    MAX_TOPICS,
-    MIN_CHECKED_EXPANSION,
-)
+from imubench_pipeline.readers import bounds
 from imubench_pipeline.readers.compressed import open_bytes, unpack_zstd
 from imubench_pipeline.settings.validation import cut
 from imubench_pipeline.tables.findings import RecordingError
@@ -37,8 +28,8 @@ _READ_BLOCK = 1 << 20
 
 
 def _check_chunk_size(size: int) -> int:
-    if size > MAX_BAG_CHUNK:
-        raise ValueError(f"a chunk of {size} bytes, expected at most {MAX_BAG_CHUNK}")
+    if size > bounds.MAX_BAG_CHUNK:
+        raise ValueError(f"a chunk of {size} bytes, expected at most {bounds.MAX_BAG_CHUNK}")
     return size
 
 
@@ -67,12 +58,15 @@ class Bag2:
         reader.open()
         try:
             self._connections: list[Connection] = list(reader.connections)
-            if len(self._connections) > MAX_TOPICS:
-                raise ValueError(f"more than {MAX_TOPICS} topics, expected those of a vehicle")
+            if len(self._connections) > bounds.MAX_TOPICS:
+                raise ValueError(
+                    f"more than {bounds.MAX_TOPICS} topics, expected those of a vehicle"
+                )
             if any(
-                len(str(c.topic) + str(c.msgtype)) > MAX_TOPIC_LENGTH for c in self._connections
+                len(str(c.topic) + str(c.msgtype)) > bounds.MAX_TOPIC_LENGTH
+                for c in self._connections
             ):
-                raise ValueError(f"a topic or type of more than {MAX_TOPIC_LENGTH} letters")
+                raise ValueError(f"a topic or type of more than {bounds.MAX_TOPIC_LENGTH} letters")
             storages = _list_storages(reader)
             if len({storage.path for storage in storages}) < len(storages):
                 raise ValueError("metadata.yaml names a file twice, expected each once")
@@ -104,8 +98,8 @@ class Bag2:
                 # A damaged database may contain any type.
                 data = message if isinstance(message, bytes) else b""
                 if packed:
-                    data = unpack_zstd(data, MAX_MESSAGE + 1)
-                yield time, data if len(data) <= MAX_MESSAGE else b""
+                    data = unpack_zstd(data, bounds.MAX_MESSAGE + 1)
+                yield time, data if len(data) <= bounds.MAX_MESSAGE else b""
 
     def close(self) -> None:
         """Close the bag."""
@@ -123,8 +117,10 @@ def _check_index(storage: McapReader) -> None:
     """Raise if the chunks expand too far or overlap in time; a damaged index may repeat one."""
     size_of_file = Path(str(storage.path)).stat().st_size
     expanded = sum(chunk.uncompressed_size for chunk in storage.chunks)
-    if expanded > max(MIN_CHECKED_EXPANSION, MAX_EXPANSION_RATIO * size_of_file):
-        raise ValueError(f"its chunks expand to more than {MAX_EXPANSION_RATIO} times its size")
+    if expanded > max(bounds.MIN_CHECKED_EXPANSION, bounds.MAX_EXPANSION_RATIO * size_of_file):
+        raise ValueError(
+            f"its chunks expand to more than {bounds.MAX_EXPANSION_RATIO} times its size"
+        )
     open_until: list[tuple[int, int]] = []
     size = 0
     for chunk in sorted(storage.chunks, key=lambda chunk: chunk.message_start_time):
@@ -132,9 +128,9 @@ def _check_index(storage: McapReader) -> None:
             size -= heapq.heappop(open_until)[1]
         heapq.heappush(open_until, (chunk.message_end_time, chunk.uncompressed_size))
         size += chunk.uncompressed_size
-        if size > MAX_BAG_OVERLAP:
+        if size > bounds.MAX_BAG_OVERLAP:
             raise ValueError(
-                f"chunks of one time have {size} bytes, expected at most {MAX_BAG_OVERLAP}"
+                f"chunks of one time have {size} bytes, expected at most {bounds.MAX_BAG_OVERLAP}"
             )
 
 
@@ -147,9 +143,9 @@ def check_folder(path: Path) -> None:
                 "the bag again"
             )
     size = (path / "metadata.yaml").stat().st_size
-    if size > MAX_METADATA:
+    if size > bounds.MAX_METADATA:
         raise RecordingError(
-            f"{path.name}: metadata.yaml has {size} bytes; expected at most {MAX_METADATA}: "
+            f"{path.name}: metadata.yaml has {size} bytes; expected at most {bounds.MAX_METADATA}: "
             "copy the bag again"
         )
     for packed in sorted(path.glob("*.zstd")):

@@ -21,15 +21,9 @@ from imubench_pipeline.readers.file_format import (
     LogTable,
 )
 from imubench_pipeline.readers.stated_units import find_stated_unit
+from imubench_pipeline.readers.text import header
 from imubench_pipeline.readers.text.cells import MISSING_CELLS, is_missing, is_number
 from imubench_pipeline.readers.text.complete_lines import CompleteLines, Records, read_first_lines
-from imubench_pipeline.readers.text.header import (
-    complete_names,
-    find_stated_rate,
-    find_stated_start,
-    has_units,
-    is_simulated,
-)
 from imubench_pipeline.readers.text.layout import TextLayout, find_layout
 from imubench_pipeline.readers.text.stamps import (
     StampError,
@@ -72,8 +66,11 @@ class CsvFile(LogFile):
             [line.decode("utf-8", "replace") for line in lines]
             for lines in (layout.preamble, layout.skipped)
         )
-        self.rate, self.started = find_stated_rate(preamble), find_stated_start(preamble)
-        self.simulated = is_simulated([*preamble, *skipped])
+        self.rate, self.started = (
+            header.find_stated_rate(preamble),
+            header.find_stated_start(preamble),
+        )
+        self.simulated = header.is_simulated([*preamble, *skipped])
         time = None if self.log.time is None else TextTime(self, layout)
         beside, _ = find_unit_line(layout)
         for name, at in columns.items():
@@ -268,7 +265,7 @@ def find_unit_line(layout: TextLayout) -> tuple[dict[int, str], bytes]:
         text = raw.decode("utf-8", "replace")
         sign = next((sign for sign in layout.comments if text.startswith(sign)), "")
         cells = layout.split.names(text.lstrip(sign) if sign else text, len(layout.names))
-        if complete_names(cells, layout.names) and has_units(cells):
+        if header.complete_names(cells, layout.names) and header.has_units(cells):
             return {place: cell.strip("()[]{}<> ") for place, cell in enumerate(cells)}, raw
     return {}, b""
 
@@ -310,8 +307,8 @@ def describe_table(path: Path, file_format: FileFormat) -> list[LogTable]:
         LogTable(
             file_format,
             columns=tuple(columns),
-            rate=find_stated_rate(before),
-            started=find_stated_start(before),
+            rate=header.find_stated_rate(before),
+            started=header.find_stated_start(before),
             about=f"delimiter {layout.split}, decimal sign {layout.decimal!r}, {names}",
             notes=tuple(
                 text.strip().replace("\t", " ")

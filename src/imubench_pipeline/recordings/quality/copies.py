@@ -22,14 +22,8 @@ from imubench_pipeline.recordings.quality.repeats import WINDOW, Stretch
 from imubench_pipeline.recordings.quality.summary import ColumnSummary, Excerpt, pair_common_samples
 from imubench_pipeline.tables.findings import Finding, find
 from imubench_pipeline.typing import Array
+from imubench_pipeline.words.findings import copies as words
 from imubench_pipeline.words.findings.base import FindingData
-from imubench_pipeline.words.findings.copies import (
-    ChannelTwice,
-    LogTwice,
-    RecordingTwice,
-    RepeatedStretch,
-    SharedNoise,
-)
 
 _MIN_NONZERO_INCREMENTS = 64  # least number of increments of a piece that are not 0
 _MIN_COPY_CORRELATION = 1.0 - 1e-6
@@ -66,7 +60,7 @@ def find_copied_channels(columns: Mapping[str, ColumnSummary]) -> Iterator[Findi
                 if channel in named:
                     continue
                 named.add(channel)
-                yield find(ChannelTwice(of, times), "warning", times, channel)
+                yield find(words.ChannelTwice(of, times), "warning", times, channel)
 
 
 def _find_copy_factor(first: list[Excerpt], other: list[Excerpt]) -> float | None:
@@ -138,9 +132,9 @@ def _describe_repeats(
     begin, end = longest.first / rate, longest.last / rate
     original = begin - longest.lag / rate
     share = total / present
-    data: FindingData = RepeatedStretch(begin, end, original, len(stretches))
+    data: FindingData = words.RepeatedStretch(begin, end, original, len(stretches))
     if share > _MIN_SHARE_LOG_TWICE:
-        data = LogTwice(begin, end, original, len(stretches), share)
+        data = words.LogTwice(begin, end, original, len(stretches), share)
     return find(data, "warning", total, channel, begin, end)
 
 
@@ -167,7 +161,7 @@ def find_copied_recordings(
             copies.setdefault((sensor, recording), {}).setdefault(of, []).append(channel)
     for (sensor, recording), originals in copies.items():
         for of, channels in originals.items():
-            data = RecordingTwice(recording, of, tuple(channels))
+            data = words.RecordingTwice(recording, of, tuple(channels))
             yield find(data, "warning", float(len(channels))).row(sensor, recording)
 
 
@@ -212,7 +206,7 @@ def find_shared_noise(columns: Mapping[str, ColumnSummary]) -> Iterator[Finding]
             if abs(correlation) > abs(strongest.get(channel, (0.0, ""))[0]):
                 strongest[channel] = (correlation, beside)
     for channel, (correlation, beside) in strongest.items():
-        yield find(SharedNoise(beside, correlation), "warning", correlation, channel)
+        yield find(words.SharedNoise(beside, correlation), "warning", correlation, channel)
 
 
 def _autocorrelate(values: Array) -> Array:

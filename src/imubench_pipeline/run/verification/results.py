@@ -17,20 +17,10 @@ from imubench_pipeline.recordings.known_logs import KNOWN
 from imubench_pipeline.run.project import has_snakefile
 from imubench_pipeline.run.recovery import find_unfinished
 from imubench_pipeline.tables import read
+from imubench_pipeline.tables import seals as sealing
 from imubench_pipeline.tables.digests import read_sealed_json
 from imubench_pipeline.tables.findings import RecordingError
 from imubench_pipeline.tables.schemas import OF_ONE_RECORDING, TABLES
-from imubench_pipeline.tables.seals import (
-    NIGHTS,
-    Seal,
-    SealedFile,
-    SealError,
-    compute_form_digest,
-    is_visible,
-    list_places,
-    name_seal_file,
-    read_seal,
-)
 
 _SEALED_FOLDERS = ("recordings", "sensors", "tables", "simulated", "report", "exports")
 """Folders in which every file has a seal, except files with their own digest."""
@@ -54,14 +44,14 @@ class Results:
 
     folder: Path
     read: Callable[[int], None] = lambda _: None
-    seals: dict[str, Seal] = field(default_factory=dict, init=False)
+    seals: dict[str, sealing.Seal] = field(default_factory=dict, init=False)
     _broken: dict[str, str] = field(default_factory=dict, init=False)
 
     def __post_init__(self) -> None:
-        for place in list_places(self.folder):
+        for place in sealing.list_places(self.folder):
             try:
-                self.seals[place] = read_seal(self.folder, place)
-            except (FileNotFoundError, SealError) as error:
+                self.seals[place] = sealing.read_seal(self.folder, place)
+            except (FileNotFoundError, sealing.SealError) as error:
                 self._broken[place] = str(error)
 
     @cached_property
@@ -110,11 +100,14 @@ class Results:
     def _every(self) -> Iterator[Fault]:
         for place, error in self._broken.items():
             words = f"expected the seal of {place}, found one that {error}"
-            yield Fault(name_seal_file(place), words, self._mended(name_seal_file(place), place))
-        if older := sum(seal.form != compute_form_digest() for seal in self.seals.values()):
-            words = (
-                f"expected the form {compute_form_digest()}, found {older} steps of another version"
+            yield Fault(
+                sealing.name_seal_file(place),
+                words,
+                self._mended(sealing.name_seal_file(place), place),
             )
+        form = sealing.compute_form_digest()
+        if older := sum(seal.form != form for seal in self.seals.values()):
+            words = f"expected the form {form}, found {older} steps of another version"
             yield Fault("seals", words, self.run_again)
         for place, seal in self.seals.items():
             yield from self._changed(place, seal)
@@ -130,7 +123,7 @@ class Results:
         for place in self._current:  # made from other inputs that are not newer
             others = [name for name, newer in self._others_now(self.seals[place]) if not newer]
             if others:
-                first = next(iter(self.seals[place].outputs), name_seal_file(place))
+                first = next(iter(self.seals[place].outputs), sealing.name_seal_file(place))
                 words = (
                     f"expected it made of the {others[0]} that is there, found it made of another"
                 )
@@ -142,10 +135,10 @@ class Results:
             words = "expected nothing, found what a run had not completed that was killed"
             yield Fault(place, words, f"where no run goes on: rm -r {self._quoted(place)}")
 
-    def _changed(self, place: str, seal: Seal) -> Iterator[Fault]:
+    def _changed(self, place: str, seal: sealing.Seal) -> Iterator[Fault]:
         """Yield the changed outputs of a step."""
         left = any(os.path.lexists(self.folder / name) for name in seal.outputs)
-        last = place in (f"{NIGHTS}/latest", f"{NIGHTS}/state")
+        last = place in (f"{sealing.NIGHTS}/latest", f"{sealing.NIGHTS}/state")
         if not (left or last or place in self._current):
             return  # all of a recording was removed, or of a night that is long past
         for name, file in seal.outputs.items():
@@ -169,7 +162,7 @@ class Results:
                         self._mended(name, step))  # fmt: skip
         samples = quality.kept or {}
         for file, stated in samples.items():
-            expected = SealedFile(stated["size"], stated["sha256"], 0)
+            expected = sealing.SealedFile(stated["size"], stated["sha256"], 0)
             if words := expected.fault(path.with_name(file), whole=True):
                 yield Fault(f"{place}/{file}", words, self._mended(f"{place}/{file}", step))
             self.read(expected.size)
@@ -181,7 +174,7 @@ class Results:
             words = "expected what is known of the log, found no such file"
             yield Fault(f"{place}/{KNOWN}", words, self.run_again)
 
-    def _others_now(self, seal: Seal) -> list[tuple[str, bool]]:
+    def _others_now(self, seal: sealing.Seal) -> list[tuple[str, bool]]:
         """Return the changed inputs of a step, and whether they are newer."""
         made = min((file.changed for file in seal.outputs.values()), default=0)
         now = ((name, digest, self._left.get(name)) for name, digest in seal.inputs.items())
@@ -192,7 +185,7 @@ class Results:
         ]
 
     @cached_property
-    def _left(self) -> dict[str, SealedFile]:
+    def _left(self) -> dict[str, sealing.SealedFile]:
         """Outputs of all steps, by path."""
         return {name: file for seal in self.seals.values() for name, file in seal.outputs.items()}
 
@@ -216,12 +209,14 @@ class Results:
                 place = path.relative_to(self.folder)
                 own = any(place.match(f"recordings/*/*/{name}") for name in (KNOWN, _SAMPLE_FILES))
                 declared = own or path.is_dir() or place.as_posix() in self._left
-                if not declared and is_visible(place):
+                if not declared and sealing.is_visible(place):
                     yield self._stray(place.as_posix())
-        for path in sorted((self.folder / NIGHTS).glob("[ls]*.*")):  # the latest, and the state
+        for path in sorted(
+            (self.folder / sealing.NIGHTS).glob("[ls]*.*")
+        ):  # the latest, and the state
             name = path.relative_to(self.folder).as_posix()
             if name not in self._left:
-                yield Fault(name, _NO_SEAL, self._mended(name, NIGHTS + "/"))
+                yield Fault(name, _NO_SEAL, self._mended(name, sealing.NIGHTS + "/"))
 
     def _strange_rows(self) -> Iterator[Fault]:
         """Yield the tables that speak of recordings which were not compared."""
@@ -256,9 +251,11 @@ class Results:
 
     def _mended(self, name: str, place: str) -> str:
         """Return how a file is made again that a step left."""
-        if place.startswith(f"{NIGHTS}/"):
+        if place.startswith(f"{sealing.NIGHTS}/"):
             files = (
-                [name] if place == f"{NIGHTS}/" else dict.fromkeys([name, name_seal_file(place)])
+                [name]
+                if place == f"{sealing.NIGHTS}/"
+                else dict.fromkeys([name, sealing.name_seal_file(place)])
             )
             rm = " ".join(["rm -f", *map(self._quoted, files)])
             return f"restore it, or {rm}: the next night writes its own"
