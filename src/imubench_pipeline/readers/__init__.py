@@ -18,14 +18,7 @@ from imubench_pipeline.readers.compressed import (
     list_members,
 )
 from imubench_pipeline.readers.content import find_format, is_endless, recognise_folder
-from imubench_pipeline.settings.sensor import (
-    CHANNELS,
-    POSITION,
-    TABLE_RATE,
-    TEMPERATURE,
-    ColumnSource,
-    LogFormat,
-)
+from imubench_pipeline.settings import sensor
 from imubench_pipeline.settings.validation import cut
 from imubench_pipeline.tables.findings import RecordingError
 
@@ -56,7 +49,7 @@ def log_files(path: Path) -> list[Path]:
     return sorted(files)
 
 
-def read(path: Path, log: LogFormat) -> list[LogFile]:
+def read(path: Path, log: sensor.LogFormat) -> list[LogFile]:
     """Open a recording.
 
     Parameters
@@ -80,12 +73,16 @@ def read(path: Path, log: LogFormat) -> list[LogFile]:
     if is_endless(path):
         raise RecordingError(f"{path.name}: is neither a file nor a folder; expected a log")
     # In a fixed order, independent of the sensor file, so that findings and columns are too.
-    channels = sorted(log.channels, key=CHANNELS.index)
+    channels = sorted(log.channels, key=sensor.CHANNELS.index)
     sources = {str(name): log.channels[name] for name in channels}
-    others = {TEMPERATURE: log.temperature, POSITION: log.position, TABLE_RATE: log.table_rate}
+    others = {
+        sensor.TEMPERATURE: log.temperature,
+        sensor.POSITION: log.position,
+        sensor.TABLE_RATE: log.table_rate,
+    }
     sources |= {name: source for name, source in others.items() if source is not None}
     present = _list_present(path, log)
-    together: dict[tuple[Path, str], dict[str, ColumnSource]] = {}
+    together: dict[tuple[Path, str], dict[str, sensor.ColumnSource]] = {}
     for name, source in sources.items():
         file = _find_file(path, present, source, name)
         clock = ""  # the part of the file with a clock of its own: a topic, or a kind of message
@@ -102,7 +99,7 @@ def read(path: Path, log: LogFormat) -> list[LogFile]:
     return files
 
 
-def _list_present(path: Path, log: LogFormat) -> list[Path] | None:
+def _list_present(path: Path, log: sensor.LogFormat) -> list[Path] | None:
     """Return the files of a folder or an archive; None if the path is one log."""
     if recognise_folder(path) is not None:
         return None
@@ -113,7 +110,9 @@ def _list_present(path: Path, log: LogFormat) -> list[Path] | None:
     return None
 
 
-def _find_file(path: Path, present: list[Path] | None, source: ColumnSource, name: str) -> Path:
+def _find_file(
+    path: Path, present: list[Path] | None, source: sensor.ColumnSource, name: str
+) -> Path:
     if source.file is None:
         return path if present is None else find_only_log(path, present)
     if present is None:

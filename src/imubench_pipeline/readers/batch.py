@@ -13,16 +13,7 @@ from numpy.typing import NDArray
 
 from imubench_pipeline.model.states import Severity
 from imubench_pipeline.readers.stated_units import StatedUnit
-from imubench_pipeline.settings.sensor import (
-    CHANNELS,
-    POSITION,
-    QUANTITIES,
-    TABLE_RATE,
-    TEMPERATURE,
-    ColumnSource,
-    LogFormat,
-    quantity_of,
-)
+from imubench_pipeline.settings import sensor
 from imubench_pipeline.tables.findings import Finding, find
 from imubench_pipeline.units import find_conversion
 from imubench_pipeline.words.findings.base import FindingData
@@ -41,7 +32,7 @@ the next one, of mrad/s and °/s, is 17. Smaller ratios may be a calibration in 
 
 def name_settings_file(key: str) -> str:
     """Return the file with the column of a channel or an additional column, for messages."""
-    notes = "the notes beside the log or " if key == POSITION else ""
+    notes = "the notes beside the log or " if key == sensor.POSITION else ""
     return f"{notes}the sensor file"
 
 
@@ -69,8 +60,10 @@ class LogFile(ABC):
     fixed_by: ClassVar[str] = ""  # name of the format that fixes units by quantity
 
     path: Path
-    log: LogFormat
-    sources: Mapping[str, ColumnSource]  # columns that are read from this file, with temperature
+    log: sensor.LogFormat
+    sources: Mapping[
+        str, sensor.ColumnSource
+    ]  # columns that are read from this file, with temperature
     started: str | None = None  # ISO 8601 date of the first sample, after the first batch
     rate: float | None = None  # Hz, stated in the file; known after the first batch
     findings: list[Finding] = field(default_factory=list)  # omitted data; complete after `batches`
@@ -91,14 +84,14 @@ class LogFile(ABC):
     def contradicted_units(self) -> list[Finding]:
         """Return findings on channels for which log and sensor file state different units."""
         fixed = {
-            name: StatedUnit(self.fixed_units[quantity_of(name)], self.fixed_by)
+            name: StatedUnit(self.fixed_units[sensor.quantity_of(name)], self.fixed_by)
             for name in self.sources
-            if name in CHANNELS and self.fixed_units
+            if name in sensor.CHANNELS and self.fixed_units
         }
         findings = []
         for channel, in_log in (fixed | self.units).items():
             source = self.sources[channel]
-            dimension = QUANTITIES[quantity_of(channel)]
+            dimension = sensor.QUANTITIES[sensor.quantity_of(channel)]
             read = find_conversion(source.unit, dimension)[0] * abs(source.scale)
             factor = find_conversion(in_log.unit, dimension)[0] / read
             if 1.0 / _MIN_FACTOR_OF_OTHER_UNIT < factor < _MIN_FACTOR_OF_OTHER_UNIT:
@@ -126,10 +119,10 @@ class LogFile(ABC):
     def to_si(self, name: str, raw: NDArray[np.float64]) -> NDArray[np.float64]:
         """Convert the values of a column as written to SI: scale * (raw - offset), then unit."""
         source = self.sources[name]
-        if name == POSITION:
+        if name == sensor.POSITION:
             return source.scale * (raw - source.offset)
-        others = {TEMPERATURE: "temperature", TABLE_RATE: "angular_rate"}
-        dimension = others[name] if name in others else QUANTITIES[quantity_of(name)]
+        others = {sensor.TEMPERATURE: "temperature", sensor.TABLE_RATE: "angular_rate"}
+        dimension = others[name] if name in others else sensor.QUANTITIES[sensor.quantity_of(name)]
         factor, zero = find_conversion(source.unit, dimension)
         if source.offset:
             raw = raw - source.offset

@@ -52,7 +52,15 @@ def recognise_content(path: Path) -> tuple[FileFormat, str]:
     """
     if (of_folder := recognise_folder(path)) is not None:
         return of_folder, ""
-    packed = _find_compression(path)
+    packed = "zip"
+    if not compressed.is_member(path):
+        if is_endless(path):
+            raise RecordingError(f"{path.name}: is neither a file nor a folder; expected a log")
+        try:
+            with path.open("rb") as file:
+                packed = _name_compression(file.read(compressed.MAX_MAGIC_LENGTH))
+        except OSError as error:
+            raise RecordingError(f"{path.name}: cannot be opened ({error.strerror})") from None
     if packed == "zip" and path.is_file():
         endings = {member.suffix for member in compressed.list_members(path)}
         for file_format in FILE_FORMATS.values():
@@ -82,19 +90,6 @@ def recognise_content(path: Path) -> tuple[FileFormat, str]:
             f"{packed}; expected it as it is: unpack it"
         )
     return file_format, packed
-
-
-def _find_compression(path: Path) -> str:
-    """Return the compression of a file; empty if it is not compressed."""
-    if compressed.is_member(path):
-        return "zip"
-    if is_endless(path):
-        raise RecordingError(f"{path.name}: is neither a file nor a folder; expected a log")
-    try:
-        with path.open("rb") as file:
-            return _name_compression(file.read(compressed.MAX_MAGIC_LENGTH))
-    except OSError as error:
-        raise RecordingError(f"{path.name}: cannot be opened ({error.strerror})") from None
 
 
 def _name_compression(begin: bytes) -> str:

@@ -26,14 +26,9 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from imubench_pipeline.readers import file_format as formats
 from imubench_pipeline.readers.batch import Batch, LogFile
 from imubench_pipeline.readers.compressed import blocks
-from imubench_pipeline.readers.file_format import (
-    MAX_EXAMINED_RECORDS,
-    FileFormat,
-    LogColumn,
-    LogTable,
-)
 from imubench_pipeline.readers.stamps import WrapState, unwrap
 from imubench_pipeline.readers.ubx_frames import Frames
 from imubench_pipeline.tables.findings import RecordingError
@@ -390,13 +385,13 @@ def _group_records(
 _MAX_DESCRIBED_BYTES, _MAX_SEARCHED_BYTES = 1 << 22, 1 << 26  # behind a message, and for one
 
 
-def list_messages(path: Path, file_format: FileFormat) -> list[LogTable]:
+def list_messages(path: Path, file_format: formats.FileFormat) -> list[formats.LogTable]:
     """Return a table for each message with inertial data; raise `RecordingError` if none."""
     names = list(COLUMNS)
     words = {kind: Words(kind, names) for kind in KINDS}
     frames = Frames(blocks(path, [], _MIN_ZEROS))
     for key, payload in frames:
-        if key in words and len(words[key]) < MAX_EXAMINED_RECORDS * len(names):
+        if key in words and len(words[key]) < formats.MAX_EXAMINED_RECORDS * len(names):
             words[key].add(payload)
         found = any(map(len, words.values()))
         if frames.read > (_MAX_DESCRIBED_BYTES if found else _MAX_SEARCHED_BYTES):
@@ -411,15 +406,17 @@ def list_messages(path: Path, file_format: FileFormat) -> list[LogTable]:
             values = figures[places == place]
             if len(values):
                 unit = UNITS[column.split("_")[0]]
-                columns.append(LogColumn.of_numbers(column, column, values, unit))
+                columns.append(formats.LogColumn.of_numbers(column, column, values, unit))
         if columns:
             first = tags[places == places[0]].astype(np.float64)
             ticks = first * TICK_MS if kind == ESF_RAW else first
-            columns.append(LogColumn.of_numbers("time_tag", "time_tag", ticks, "ms"))
+            columns.append(formats.LogColumn.of_numbers("time_tag", "time_tag", ticks, "ms"))
             if kind == ESF_RAW:
-                columns.append(LogColumn.of_numbers("sTtag", "sTtag", first))
+                columns.append(formats.LogColumn.of_numbers("sTtag", "sTtag", first))
         about = f"{frames.right[kind]} messages at the beginning"
-        described.append(LogTable(file_format, name, tuple(columns), variable=name, about=about))
+        described.append(
+            formats.LogTable(file_format, name, tuple(columns), variable=name, about=about)
+        )
     if not any(table.columns for table in described):
         raise RecordingError(
             f"{path.name}: no inertial figures in ESF-MEAS or ESF-RAW among "

@@ -27,15 +27,9 @@ import pyarrow as pa
 import pyarrow.csv as pacsv
 from numpy.typing import NDArray
 
+from imubench_pipeline.readers import file_format as formats
 from imubench_pipeline.readers.batch import SECONDS, Batch, LogFile
 from imubench_pipeline.readers.compressed import BLOCK_BYTES, blocks
-from imubench_pipeline.readers.file_format import (
-    MAX_EXAMINED_RECORDS,
-    MAX_SHOWN_VALUES,
-    FileFormat,
-    LogColumn,
-    LogTable,
-)
 from imubench_pipeline.readers.stamps import Clock, format_date
 from imubench_pipeline.readers.text.cells import is_number
 from imubench_pipeline.readers.text.stamps import StampError, parse_stamps
@@ -396,7 +390,7 @@ def _shorten_names(names: Iterable[str]) -> tuple[str, ...]:
 _MAX_DESCRIBED_BYTES = 1 << 21  # bytes
 
 
-def list_sentences(path: Path, file_format: FileFormat) -> list[LogTable]:
+def list_sentences(path: Path, file_format: formats.FileFormat) -> list[formats.LogTable]:
     """Return a table for each sentence with inertial data; raise `RecordingError` if none."""
     sentences = {kind: Sentences(kind, stamped=True) for kind in FIELDS}
     rows: dict[str, list[Row]] = {kind: [] for kind in FIELDS}
@@ -416,32 +410,32 @@ def list_sentences(path: Path, file_format: FileFormat) -> list[LogTable]:
         )
     described = []
     for kind in present:
-        first = rows[kind][:MAX_EXAMINED_RECORDS]
+        first = rows[kind][: formats.MAX_EXAMINED_RECORDS]
         fields, _ = parse_fields(kind, first, set(range(len(FIELDS[kind]))))
         columns = []
         for place, name in enumerate(FIELDS[kind]):
             source = name if len(present) == 1 else f"{kind}.{name}"
             values = fields[place]
             unit = UNITS.get(name)
-            columns.append(LogColumn.of_numbers(source, name, values, unit))
+            columns.append(formats.LogColumn.of_numbers(source, name, values, unit))
         columns += _describe_time(HOST_TIME, [row.before.strip(STAMP_PADDING) for row in first])
         columns += _describe_time(COUNTER, [row.counter for row in first])
         about = f"{len(rows[kind])} sentences at the beginning"
-        described.append(LogTable(file_format, kind, tuple(columns), about=about))
+        described.append(formats.LogTable(file_format, kind, tuple(columns), about=about))
     return described
 
 
-def _describe_time(name: str, cells: list[bytes]) -> list[LogColumn]:
+def _describe_time(name: str, cells: list[bytes]) -> list[formats.LogColumn]:
     """Return a list with the column of stamps, empty if there are no stamps."""
     texts = [cell.decode("ascii", "replace") for cell in cells]
-    first = tuple(texts[:MAX_SHOWN_VALUES])
+    first = tuple(texts[: formats.MAX_SHOWN_VALUES])
     if not any(texts):
         return []
     if all(is_number(text, ".") for text in texts if text):
         values = np.array([float(text) if text else np.nan for text in texts])
-        return [LogColumn(name, name, "number", first, values)]
+        return [formats.LogColumn(name, name, "number", first, values)]
     try:
         dates = parse_stamps("iso8601", texts)
-        return [LogColumn(name, name, "date", first, dates, None, ("iso8601",))]
+        return [formats.LogColumn(name, name, "date", first, dates, None, ("iso8601",))]
     except StampError:
-        return [LogColumn(name, name, "text", first)]
+        return [formats.LogColumn(name, name, "text", first)]

@@ -56,18 +56,8 @@ class Doubt:
 
     def row(self) -> DoubtRow:
         """Return the row of the table ``derive_doubts``."""
-        return DoubtRow(
-            sensor=self.sensor,
-            recording=self.recording,
-            channel=self.channel,
-            code=self.code,
-            fitness="unfit" if self.unfit else "fit with doubts",
-            parameters=self.parameters,
-            factor=self.factor,
-            start=self.start,
-            end=self.end,
-            reason=self.reason,
-        )
+        own = {name: value for name, value in vars(self).items() if name != "unfit"}
+        return DoubtRow(fitness="unfit" if self.unfit else "fit with doubts", **own)
 
 
 Estimated = TypeVar("Estimated", ParameterRow, FixedBiasRow)

@@ -73,12 +73,6 @@ class KnownFile:
         """Return the file without digest and stamps, so that it counts as changed."""
         return replace(self, sha256=None, stamps=None)
 
-    def is_unchanged(self, about: os.stat_result) -> bool:
-        """Return whether nothing was done to the file, by its status now."""
-        same_file = self.inode == about.st_ino or about.st_size > MAX_DIGESTED_SIZE
-        same_stamps = (self.size, self.stamps) == (about.st_size, _stamps(about))
-        return same_file and same_stamps
-
 
 def read_known(folder: Path) -> dict[str, KnownFile] | None:
     """Read the evidence of the last ingest from the results of a recording; None: there is none."""
@@ -174,7 +168,8 @@ def plan_versions(source: Path, folder: Path) -> dict[str, str]:
 def _now(path: Path, before: KnownFile) -> KnownFile | None:
     """Return a file with its present stamps where it has its content of before; None otherwise."""
     about = path.stat()
-    if before.is_unchanged(about):
+    same_file = before.inode == about.st_ino or about.st_size > MAX_DIGESTED_SIZE
+    if same_file and (before.size, before.stamps) == (about.st_size, _stamps(about)):
         return before
     if before.sha256 is None or not before.size == about.st_size <= MAX_DIGESTED_SIZE:
         return None

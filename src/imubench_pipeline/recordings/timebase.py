@@ -17,16 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from imubench_pipeline.model.states import Severity
-from imubench_pipeline.recordings.stamps import (
-    MIN_SET_BACK,
-    MIN_SHARED_STAMPS,
-    Interval,
-    Stamps,
-    Track,
-    estimate_interval,
-    is_set_back,
-    track_stamps,
-)
+from imubench_pipeline.recordings import stamps as tracking
 from imubench_pipeline.settings.quality import QualitySettings
 from imubench_pipeline.tables.findings import Finding, RecordingError, find
 from imubench_pipeline.typing import Array
@@ -85,14 +76,18 @@ def assume_stated_rate(rows: int, rate: float) -> TimeBase:
 
 
 def fit_time_base(
-    stamps: Stamps, stated: float | None, settings: QualitySettings, *, known: float | None = None
+    stamps: tracking.Stamps,
+    stated: float | None,
+    settings: QualitySettings,
+    *,
+    known: float | None = None,
 ) -> TimeBase:
     """Return the time base of a file from its stamps, which are read several times.
 
     ``stated``: rate in the sensor file, Hz. ``known``: sampling interval, s; needed if most samples
     are missing. Raises RecordingError if the stamps do not advance, or jump or stop too often.
     """
-    typical = estimate_interval(stamps) if known is None else Interval(known)
+    typical = tracking.estimate_interval(stamps) if known is None else tracking.Interval(known)
     if typical is None:
         raise RecordingError("the time stamps do not advance; is the right column named?")
     interval = typical.mean
@@ -103,11 +98,11 @@ def fit_time_base(
         )
     if typical.other is not None and _is_rate_of(stated, typical.other, settings):
         interval = typical.other
-    track = track_stamps(stamps, interval, settings.longest_hole)
+    track = tracking.track_stamps(stamps, interval, settings.longest_hole)
     mean = track.mean_interval or interval
     if abs(mean / interval - 1.0) > _MAX_INTERVAL_ERROR:
         # The mean interval is more accurate than the typical one: track again.
-        track = track_stamps(stamps, mean, settings.longest_hole)
+        track = tracking.track_stamps(stamps, mean, settings.longest_hole)
     if track.grid > _MAX_EXTRA_POINTS + _MAX_MISSING_PER_SAMPLE * track.rows:
         raise RecordingError(
             f"of {track.grid} samples at {1.0 / interval:.6g} Hz {track.rows} are there; expected "
@@ -119,7 +114,7 @@ def fit_time_base(
     mean = _measure_span(stamps) / max(track.rows - 1, 1)
     complete = stated is not None and abs(mean * stated - 1.0) <= _MAX_RATE_ERROR_WITHOUT_LOSSES
     bursts |= complete and known is None and track.grid > 2 * track.rows
-    shared = track.duplicates > MIN_SHARED_STAMPS * track.rows
+    shared = track.duplicates > tracking.MIN_SHARED_STAMPS * track.rows
     if typical.has_repeats and interval == typical.mean:
         base = _assume_consecutive(stamps, track, stated, settings)
         if stated:
@@ -141,7 +136,7 @@ def fit_time_base(
     findings += _compare_rates(rate, stated, settings)
     findings += _find_drift(track, settings)
     if track.grid - track.rows > MIN_MISSING * track.grid:
-        follow = Track(track.interval, settings.longest_hole)
+        follow = tracking.Track(track.interval, settings.longest_hole)
         findings += find_rate_changes((follow.follow(block) for block in stamps()), rate)
     jitter = math.sqrt(track.scatter / max(track.steps, 1))
     uniform = track.grid == track.rows and len(track.starts) == 1 and not track.duplicates
@@ -161,7 +156,7 @@ def fit_time_base(
 
 
 def locate_samples(
-    base: TimeBase, stamps: Stamps, settings: QualitySettings
+    base: TimeBase, stamps: tracking.Stamps, settings: QualitySettings
 ) -> Iterator[NDArray[np.int64]]:
     """Yield the grid point of each record, block by block; -1 for a repeated stamp."""
     if not base.stamped:
@@ -171,7 +166,7 @@ def locate_samples(
             start += len(block)
         return
     assert base.tracking_interval is not None  # from_stamps sets it if stamped
-    track = Track(base.tracking_interval, settings.longest_hole)
+    track = tracking.Track(base.tracking_interval, settings.longest_hole)
     for block in stamps():
         yield track.follow(block)
 
@@ -222,7 +217,7 @@ def _describe_coarse_stamps(rate: float, other: float) -> Finding:
     return find(time_base.CoarseStamps(rate, other), "warning", rate)
 
 
-def _describe_grid(track: Track, interval: float) -> list[Finding]:
+def _describe_grid(track: tracking.Track, interval: float) -> list[Finding]:
     findings = []
     missing = track.grid - (track.rows - track.duplicates)
     if missing:
@@ -278,7 +273,7 @@ def _compare_rates(rate: float, stated: float | None, settings: QualitySettings)
     return [find(time_base.RateContradictsStamps(stated, rate), "warning", rate)]
 
 
-def _find_drift(track: Track, settings: QualitySettings) -> list[Finding]:
+def _find_drift(track: tracking.Track, settings: QualitySettings) -> list[Finding]:
     """Return a finding if the sampling interval differs in the second half of the log."""
     if len(track.starts) > 1 or len(track.marks) < 8:
         return []
@@ -295,7 +290,7 @@ def _find_drift(track: Track, settings: QualitySettings) -> list[Finding]:
 
 
 def _assume_consecutive(
-    stamps: Stamps, track: Track, stated: float | None, settings: QualitySettings
+    stamps: tracking.Stamps, track: tracking.Track, stated: float | None, settings: QualitySettings
 ) -> TimeBase:
     """Return the time base for stamps on no grid: consecutive samples at the mean rate."""
     # A pause is long compared with the mean interval and with the steps between shared stamps.
@@ -313,8 +308,8 @@ def _assume_consecutive(
         latest = latest[good]
         steps = np.diff(latest)
         cut = np.abs(steps) > gap
-        for i in np.flatnonzero(steps < -MIN_SET_BACK):
-            cut[i] |= is_set_back(latest, i + 1, steps[i], mean)
+        for i in np.flatnonzero(steps < -tracking.MIN_SET_BACK):
+            cut[i] |= tracking.is_set_back(latest, i + 1, steps[i], mean)
         starts += [rows + int(i) for i in np.flatnonzero(cut)]
         jumps += steps[cut].tolist()
         usual = np.where(np.isfinite(steps) & ~cut, steps, 0.0)
@@ -396,7 +391,7 @@ class Groups:
         return 1e9 * counted / duration, self._number - number
 
 
-def _measure_span(stamps: Stamps) -> float:
+def _measure_span(stamps: tracking.Stamps) -> float:
     """Return the time between the earliest and the latest stamp, s."""
     low, high = np.inf, -np.inf
     for block in stamps():

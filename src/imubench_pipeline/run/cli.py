@@ -43,13 +43,7 @@ from imubench_pipeline.settings.extras import ExtraError
 from imubench_pipeline.settings.sensor import RecordingNotes, Sensor
 from imubench_pipeline.settings.simulated_recordings import Board, Simulated
 from imubench_pipeline.settings.validation import ConfigError
-from imubench_pipeline.tables.outputs import (
-    OutputError,
-    OutputFile,
-    add_output,
-    check_outputs,
-    explain,
-)
+from imubench_pipeline.tables import outputs
 from imubench_pipeline.tables.texts import escape_invisible
 
 SCHEMAS: dict[str, type[BaseModel]] = {
@@ -99,11 +93,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = parser.parse_args(own, argparse.Namespace(flags=flags))
     results = getattr(options, "results", None)
     try:
-        check_outputs(options, lambda path: find_protected_places(path, results))
+        outputs.check_outputs(options, lambda path: find_protected_places(path, results))
         status = COMMANDS[options.command].run(options)
         sys.stdout.flush()
         return status
-    except (ExtraError, OutputError) as error:
+    except (ExtraError, outputs.OutputError) as error:
         print(f"imubench {options.command}: {error}", file=sys.stderr)
         return 2
     except BrokenPipeError:
@@ -114,7 +108,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         file = (
             "" if error.filename is None else f"{escape_invisible(os.fsdecode(error.filename))}: "
         )
-        print(f"imubench {options.command}: {file}{explain(error)}", file=sys.stderr)
+        print(f"imubench {options.command}: {file}{outputs.explain(error)}", file=sys.stderr)
         _close_terminal()
         return 2
 
@@ -129,7 +123,7 @@ def _close_terminal() -> None:
 
 def _add_schema(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("file", choices=sorted(SCHEMAS), help="which configuration file")
-    add_output(parser, "--output", help="where to write it; default: the terminal")
+    outputs.add_output(parser, "--output", help="where to write it; default: the terminal")
 
 
 def _add_check(parser: argparse.ArgumentParser) -> None:
@@ -145,10 +139,10 @@ def _add_inspect(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--block", action="store_true", help="print the sensor file alone, and no listing"
     )
-    add_output(
+    outputs.add_output(
         parser,
         "--output",
-        partial(OutputFile, adds_to={"config"}),
+        partial(outputs.OutputFile, adds_to={"config"}),
         help="where to write the sensor file; default: the terminal",
     )
 
@@ -205,7 +199,7 @@ def _add_export(parser: argparse.ArgumentParser) -> None:
         metavar="HZ",
         help="default: the recording's",
     )
-    add_output(parser, "--output", help="where to write; default: the terminal")
+    outputs.add_output(parser, "--output", help="where to write; default: the terminal")
 
 
 def _export(options: argparse.Namespace) -> int:
@@ -288,7 +282,7 @@ def _inspect(options: argparse.Namespace) -> int:
     if isinstance(sys.stdout, io.TextIOWrapper):
         # Names in a log may be in any script, and sensor files are UTF-8.
         sys.stdout.reconfigure(encoding="utf-8", errors="backslashreplace")
-    output: OutputFile | None = options.output
+    output: outputs.OutputFile | None = options.output
     try:
         model = output.path.stem if output is not None else None
         inspected = run_bounded(INSPECTED_S, INSPECTED_BYTES, inspect, options.log, model)

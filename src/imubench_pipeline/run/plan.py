@@ -24,20 +24,12 @@ from imubench_pipeline.recordings.drop_zone import Recording, account_for, find_
 from imubench_pipeline.recordings.known_logs import plan_recording_versions
 from imubench_pipeline.registry import blocks
 from imubench_pipeline.run.faults import Faults
+from imubench_pipeline.settings import sensor as sensor_files
 from imubench_pipeline.settings import simulated_recordings as simulations
 from imubench_pipeline.settings.config import Run, given_beside, read_run
 from imubench_pipeline.settings.experiments import AT_REST, Kind, kind_of, stated_experiments
 from imubench_pipeline.settings.printed import IN_USE
 from imubench_pipeline.settings.requirements import Requirement, read_requirements
-from imubench_pipeline.settings.sensor import (
-    LogFormat,
-    RecordingNotes,
-    Sensor,
-    merged_log,
-    of_ingest,
-    read_sensor_files,
-    shipped_sensors,
-)
 from imubench_pipeline.settings.shipped import find_own_folder, list_folders
 from imubench_pipeline.settings.validation import ConfigError, UnavailableSettingsError, parse
 from imubench_pipeline.settings.yaml_files import read_yaml
@@ -72,8 +64,8 @@ class Plan:
         self.run: Run = read_run(config)
         _check_places(self.run)
         self.faults = Faults(self.run.results)
-        declared = read_sensor_files(list_folders(self.run.sensors, "sensors"))
-        self.sensors: dict[str, Sensor] = {}
+        declared = sensor_files.read_sensor_files(list_folders(self.run.sensors, "sensors"))
+        self.sensors: dict[str, sensor_files.Sensor] = {}
         self.unusable: dict[str, ConfigError] = {}
         """Error of each unusable sensor file, by sensor: all logs of these sensors are rejected."""
         for name, sensor in declared.items():
@@ -186,7 +178,7 @@ class Plan:
                 except ValueError as error:
                     raise ConfigError(f"{recording.notes}: {error}") from None
             files = plan_recording_versions(recording, self.run.results)
-            return settings | of_ingest(log, notes, kind) | {"files": files}
+            return settings | sensor_files.of_ingest(log, notes, kind) | {"files": files}
         except UnavailableSettingsError as error:
             return settings | {"unavailable": self._without_folders(str(error))}
         except ConfigError as error:
@@ -276,15 +268,17 @@ class Plan:
         experiments = notes.model_dump(mode="json", include=set(blocks("notes")), exclude_none=True)
         return to_json(settings | experiments)
 
-    def _written(self, recording: Recording) -> tuple[LogFormat, RecordingNotes]:
+    def _written(
+        self, recording: Recording
+    ) -> tuple[sensor_files.LogFormat, sensor_files.RecordingNotes]:
         """Return the format and the notes of a log; ConfigError if it cannot be used."""
         if recording.error:
             raise ConfigError(recording.error)
         if recording.unavailable:
             raise UnavailableSettingsError(recording.unavailable)
-        notes = RecordingNotes()
+        notes = sensor_files.RecordingNotes()
         if recording.notes:
-            notes = parse(RecordingNotes, self._notes(recording), str(recording.notes))
+            notes = parse(sensor_files.RecordingNotes, self._notes(recording), str(recording.notes))
         if recording.sensor in self.unusable:
             raise self.unusable[recording.sensor]
         if recording.sensor not in self.sensors:
@@ -294,7 +288,9 @@ class Plan:
                 "write one, or move the logs to the folder of their sensor"
             )
         sensor = self.sensors[recording.sensor]
-        return merged_log(sensor, notes, str(recording.notes or recording.sensor)), notes
+        return sensor_files.merged_log(
+            sensor, notes, str(recording.notes or recording.sensor)
+        ), notes
 
     def estimate_settings(self, sensor: str, name: str) -> str:
         """Return the settings of the estimates of a recording."""
@@ -435,7 +431,7 @@ class Plan:
     @cached_property
     def usual(self) -> str:
         """Usual figures of sensors, from the catalogue of the package, which no user edits."""
-        return usual_as_text(usual_figures(shipped_sensors()))
+        return usual_as_text(usual_figures(sensor_files.shipped_sensors()))
 
     def truths(self, sensor: str) -> str:
         """Return the true parameters of the simulated recordings of a sensor."""

@@ -26,17 +26,10 @@ def make_exports(
     """
     for sensor in dict.fromkeys(tables["parameters"]["sensor"].to_pylist()):
         refused = []
+        horizon = parse_quantity(settings.horizon, "time")
+        options = settings.model_dump(exclude={"targets", "horizon"})
         for target in settings.targets:
-            request = Request(
-                sensor=sensor,
-                target=target,
-                axis=settings.axis,
-                horizon=parse_quantity(settings.horizon, "time"),
-                inflation=settings.inflation,
-                because=settings.because,
-                overbound=settings.overbound,
-                most_excess=settings.most_excess,
-            )
+            request = Request(sensor=sensor, target=target, horizon=horizon, **options)
             try:
                 content = make_content(tables, request, recordings)
             except ExportError as error:

@@ -380,7 +380,15 @@ def draft_sensor_file(contents: Contents, model: str | None = None) -> Draft:
             {"column": UNKNOWN, "unit": UNKNOWN}, "no name of a column tells: fill in, or remove"
         )
         drafted.channels = dict.fromkeys(CHANNELS, entry)
-    drafted.left_over += _list_remarks(choice, contents)
+    drafted.left_over += [f"not taken: {_name_group(g)} ({why})" for g, why in choice.left]
+    if choice.other_clocks:
+        names = _join_names(str(clock.entry.value["column"]) for clock in choice.other_clocks)
+        drafted.left_over.append(f"also a time: {names}")
+    if choice.unknown:
+        names = _join_names(c.label or f"column {c.source}" for c in choice.unknown)
+        drafted.left_over.append(f"not recognised: {names}")
+    if contents.files > len({table.file for table in contents.tables}):
+        drafted.left_over.append(f"only some of the {contents.files} files were looked into")
     return drafted
 
 
@@ -448,19 +456,6 @@ def _add_temperature(drafted: Draft, group: Group, alone: bool) -> None:
 def _is_whole(column: LogColumn) -> bool:
     values = column.values[np.isfinite(column.values)]
     return bool(len(values)) and bool((values == np.rint(values)).all()) and bool(values.any())
-
-
-def _list_remarks(choice: Choice, contents: Contents) -> list[str]:
-    remarks = [f"not taken: {_name_group(group)} ({why})" for group, why in choice.left]
-    if choice.other_clocks:
-        names = _join_names(str(clock.entry.value["column"]) for clock in choice.other_clocks)
-        remarks.append(f"also a time: {names}")
-    if choice.unknown:
-        names = _join_names(c.label or f"column {c.source}" for c in choice.unknown)
-        remarks.append(f"not recognised: {names}")
-    if contents.files > len({table.file for table in contents.tables}):
-        remarks.append(f"only some of the {contents.files} files were looked into")
-    return remarks
 
 
 def _name_group(group: Group) -> str:

@@ -23,16 +23,9 @@ from rosbags.rosbag2 import Reader
 from rosbags.rosbag2.storage_mcap import McapReader
 from rosbags.rosbag2.storage_sqlite3 import Sqlite3Reader
 
+from imubench_pipeline.readers import file_format as formats
 from imubench_pipeline.readers.batch import Batch, LogFile
 from imubench_pipeline.readers.bounds import MAX_MESSAGE_BATCH
-from imubench_pipeline.readers.file_format import (
-    MAX_EXAMINED_RECORDS,
-    FileFormat,
-    LogColumn,
-    LogTable,
-    format_first_numbers,
-    join_first,
-)
 from imubench_pipeline.readers.rosbag.version_1 import Bag
 from imubench_pipeline.readers.rosbag.version_2 import Bag2, check_database, check_folder
 from imubench_pipeline.readers.stamps import Clock, format_date
@@ -118,7 +111,7 @@ def decode_messages(
 
 
 _BATCH_MESSAGES = 1 << 14
-_join_names = partial(join_first, most=10)
+_join_names = partial(formats.join_first, most=10)
 _SQLITE_MAGIC = b"SQLite format 3"
 HEADER_STAMP, LOG_TIME = "header.stamp", "log_time"  # the columns of time
 
@@ -316,7 +309,7 @@ def open_bag(path: Path) -> Source:
 _MAX_SLOW_MESSAGES = 20  # largest number of messages of a slow topic that are examined
 
 
-def list_topics(path: Path, file_format: FileFormat) -> list[LogTable]:
+def list_topics(path: Path, file_format: formats.FileFormat) -> list[formats.LogTable]:
     """Return a table for each topic; raise `RecordingError` if there is none."""
     source = open_bag(path)
     try:
@@ -333,15 +326,15 @@ def list_topics(path: Path, file_format: FileFormat) -> list[LogTable]:
 
 
 def _describe_topic(
-    file_format: FileFormat, source: Source, topic: str, kind: str, rows: int | None
-) -> LogTable:
+    file_format: formats.FileFormat, source: Source, topic: str, kind: str, rows: int | None
+) -> formats.LogTable:
     if kind not in LAYOUTS:
         kinds = " or ".join(name.replace("/msg/", "/") for name in LAYOUTS)
-        return LogTable(
+        return formats.LogTable(
             file_format, topic, rows=rows, about=kind, fault=f"is {kind}; only {kinds} are read"
         )
     layout = LAYOUTS[kind]
-    count = MAX_EXAMINED_RECORDS if layout.covariances else _MAX_SLOW_MESSAGES
+    count = formats.MAX_EXAMINED_RECORDS if layout.covariances else _MAX_SLOW_MESSAGES
     messages = [] if rows == 0 else list(islice(source.messages(topic), count))
     stamps, figures, sound = decode_messages([data for _, data in messages], layout, source.ros_1)
     columns = []
@@ -349,11 +342,17 @@ def _describe_topic(
         values = figures[sound, place]
         covariance = layout.covariances.get(name.partition(".")[0])
         if covariance is None or (figures[sound, covariance] != -1).any():  # it is measured
-            columns.append(LogColumn.of_numbers(name, name, values, layout.units[name]))
+            columns.append(formats.LogColumn.of_numbers(name, name, values, layout.units[name]))
     logged = np.array([time for time, _ in messages], np.int64)
     for name, times in ((HEADER_STAMP, stamps[sound]), (LOG_TIME, logged[sound])):
         values = times.astype(np.float64)
-        columns.append(LogColumn(name, name, "number", format_first_numbers(times), values, "ns"))
+        columns.append(
+            formats.LogColumn(
+                name, name, "number", formats.format_first_numbers(times), values, "ns"
+            )
+        )
     fault = None if sound.any() else "has no message that can be read"
     described = tuple(columns) if sound.any() else ()
-    return LogTable(file_format, topic, described, topic, rows=rows, about=kind, fault=fault)
+    return formats.LogTable(
+        file_format, topic, described, topic, rows=rows, about=kind, fault=fault
+    )

@@ -10,28 +10,15 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.csv as pacsv
 
+from imubench_pipeline.readers import file_format as formats
 from imubench_pipeline.readers.batch import Batch, LogFile
 from imubench_pipeline.readers.bounds import MAX_SEARCHED_COLUMNS
-from imubench_pipeline.readers.file_format import (
-    MAX_EXAMINED_RECORDS,
-    MAX_SHOWN_VALUES,
-    NOTHING_STATED,
-    FileFormat,
-    LogColumn,
-    LogTable,
-)
 from imubench_pipeline.readers.stated_units import find_stated_unit
 from imubench_pipeline.readers.text import header
+from imubench_pipeline.readers.text import stamps as text_stamps
 from imubench_pipeline.readers.text.cells import MISSING_CELLS, is_missing, is_number
 from imubench_pipeline.readers.text.complete_lines import CompleteLines, Records, read_first_lines
 from imubench_pipeline.readers.text.layout import TextLayout, find_layout
-from imubench_pipeline.readers.text.stamps import (
-    StampError,
-    TextTime,
-    find_stamp_forms,
-    list_time_columns,
-    parse_stamps,
-)
 from imubench_pipeline.tables.findings import RecordingError
 from imubench_pipeline.words.findings import files
 
@@ -58,7 +45,9 @@ class CsvFile(LogFile):
     def batches(self) -> Iterator[Batch]:
         """Yield the records in the order of the file (see `LogFile.batches`)."""
         figures = [source.column for source in self.sources.values()]
-        layout = find_layout(self.path, self.log, figures, list_time_columns(self.log.time))
+        layout = find_layout(
+            self.path, self.log, figures, text_stamps.list_time_columns(self.log.time)
+        )
         columns = {
             name: layout.position(source.column, name) for name, source in self.sources.items()
         }
@@ -71,7 +60,7 @@ class CsvFile(LogFile):
             header.find_stated_start(preamble),
         )
         self.simulated = header.is_simulated([*preamble, *skipped])
-        time = None if self.log.time is None else TextTime(self, layout)
+        time = None if self.log.time is None else text_stamps.TextTime(self, layout)
         beside, _ = find_unit_line(layout)
         for name, at in columns.items():
             label = layout.names[at] if layout.header else ""
@@ -91,7 +80,7 @@ class CsvFile(LogFile):
         except _SecondSixtyError:
             # Read again, since pyarrow has no leap seconds, and skip the records already given.
             self.findings[:] = before
-            time = TextTime(self, layout, as_text=True)
+            time = text_stamps.TextTime(self, layout, as_text=True)
             for batch in self._batches(layout, columns, time):
                 again = min(rows, len(batch))
                 rows -= again
@@ -99,7 +88,7 @@ class CsvFile(LogFile):
                     yield batch.after(again)
 
     def _batches(
-        self, layout: TextLayout, columns: Mapping[str, int], time: TextTime | None
+        self, layout: TextLayout, columns: Mapping[str, int], time: text_stamps.TextTime | None
     ) -> Iterator[Batch]:
         """Yield all records, with stamps converted by ``time``."""
         records = layout.records()
@@ -107,7 +96,7 @@ class CsvFile(LogFile):
         for part in self._parts(layout, set(columns.values()), time, records):
             try:
                 stamps = None if time is None else time.seconds(part)
-            except StampError as error:
+            except text_stamps.StampError as error:
                 assert time is not None  # there are stamps
                 line = self._line(rows + error.row + 1, layout, blank=False)
                 column = layout.names[time.position]
@@ -126,7 +115,11 @@ class CsvFile(LogFile):
             self.note(files.LeapSecond(self.path.name, number), number, "note")
 
     def _parts(
-        self, layout: TextLayout, figures: set[int], time: TextTime | None, records: Records
+        self,
+        layout: TextLayout,
+        figures: set[int],
+        time: text_stamps.TextTime | None,
+        records: Records,
     ) -> Iterator[pa.RecordBatch]:
         """Yield the required columns, named by their positions, block by block."""
         types = dict.fromkeys(figures, pa.float64()) | (time.types if time else {})
@@ -218,7 +211,7 @@ class CsvFile(LogFile):
         error: pa.ArrowException,
         fault: _WrongWidth,
         layout: TextLayout,
-        time: TextTime | None,
+        time: text_stamps.TextTime | None,
     ) -> RecordingError:
         """Convert an error of pyarrow to an error about a line of the file."""
         text = str(error)
@@ -273,12 +266,14 @@ def find_unit_line(layout: TextLayout) -> tuple[dict[int, str], bytes]:
 _MAX_NOTES = 12
 
 
-def describe_table(path: Path, file_format: FileFormat) -> list[LogTable]:
+def describe_table(path: Path, file_format: formats.FileFormat) -> list[formats.LogTable]:
     """Return the only table of a text log; raise `RecordingError` if it has no records."""
-    layout = find_layout(path, NOTHING_STATED, [], [])
+    layout = find_layout(path, formats.NOTHING_STATED, [], [])
     before = [line.decode("utf-8", "replace") for line in layout.preamble]
     units, units_line = find_unit_line(layout)
-    rows = [row for row in layout.rows[:MAX_EXAMINED_RECORDS] if len(row) >= len(layout.names)]
+    rows = [
+        row for row in layout.rows[: formats.MAX_EXAMINED_RECORDS] if len(row) >= len(layout.names)
+    ]
     rows = rows[:-1] or rows  # the last one may be cut short
     named = layout.names != [str(number) for number in range(1, len(layout.names) + 1)]
     columns = []
@@ -289,22 +284,24 @@ def describe_table(path: Path, file_format: FileFormat) -> list[LogTable]:
         unit = units.get(place)
         unit = None if unit is None or is_missing(unit) else unit
         cells = [row[place] for row in rows]
-        first = tuple(cell.strip() for cell in cells[:MAX_SHOWN_VALUES])
+        first = tuple(cell.strip() for cell in cells[: formats.MAX_SHOWN_VALUES])
         present = [cell for cell in cells if not is_missing(cell)]
         if present and all(is_number(cell, layout.decimal) for cell in present):
             figures = [
                 np.nan if is_missing(cell) else float(cell.strip().replace(layout.decimal, "."))
                 for cell in cells
             ]
-            columns.append(LogColumn(source, name, "number", first, np.array(figures), unit))
-        elif forms := find_stamp_forms(present):
-            values = parse_stamps(forms[0], cells)
-            columns.append(LogColumn(source, name, "date", first, values, None, forms))
+            columns.append(
+                formats.LogColumn(source, name, "number", first, np.array(figures), unit)
+            )
+        elif forms := text_stamps.find_stamp_forms(present):
+            values = text_stamps.parse_stamps(forms[0], cells)
+            columns.append(formats.LogColumn(source, name, "date", first, values, None, forms))
         else:
-            columns.append(LogColumn(source, name, "text", first, unit=unit))
+            columns.append(formats.LogColumn(source, name, "text", first, unit=unit))
     names = "with names" if named else "without names"
     return [
-        LogTable(
+        formats.LogTable(
             file_format,
             columns=tuple(columns),
             rate=header.find_stated_rate(before),
