@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from imubench_pipeline.recordings.quality.held import find_regular_repeats
+from imubench_pipeline.recordings.quality.columns import find_regular_repeats
 from imubench_pipeline.recordings.quality.joined import find_interleaved_samples
 from imubench_pipeline.recordings.quality.levels import detect_quantisation
 from imubench_pipeline.recordings.quality.register import find_hidden_step

@@ -62,7 +62,7 @@ FIELDS: dict[str, tuple[str, ...]] = {
 }
 """The fields of each sentence with angular rate or acceleration."""
 
-UNITS = {
+UNITS = {  # the unit of each field, which the format fixes
     **dict.fromkeys(_make_axis_names("gyro"), "rad/s"),
     **dict.fromkeys(_make_axis_names("accel", "linear_accel", "inertial_accel"), "m/s^2"),
     **dict.fromkeys(_ATTITUDE_FIELDS, "deg"),
@@ -70,7 +70,6 @@ UNITS = {
     "temperature": "degC",
     "pressure": "kPa",
 }
-"""The unit of each field, which the format fixes."""
 
 
 @dataclass(slots=True)

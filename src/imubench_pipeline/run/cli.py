@@ -25,7 +25,6 @@ from imubench_pipeline.report import show
 from imubench_pipeline.report.static_figures import command as figures
 from imubench_pipeline.run import formats_command as formats
 from imubench_pipeline.run import project
-from imubench_pipeline.run import shortlist_command as shortlist
 from imubench_pipeline.run import simulate_command as simulation
 from imubench_pipeline.run.analysis import command as analysis
 from imubench_pipeline.run.places import find_protected_places
@@ -306,6 +305,70 @@ def _inspect(options: argparse.Namespace) -> int:
     return 0 if inspected.complete else 1
 
 
+def _add_shortlist(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "requirement", help="name of a file under --requirements, or such a file: robot.yaml"
+    )
+    parser.add_argument(
+        "--sensors",
+        type=Path,
+        help="folder of the sensor files; default: the catalogue of the package and config/sensors",
+    )
+    parser.add_argument(
+        "--requirements",
+        type=Path,
+        help="folder of the requirements; default: those of the package and config/requirements",
+    )
+    parser.add_argument(
+        "--results",
+        type=Path,
+        help="of a run: what is measured, and what stands for figures that nobody publishes",
+    )
+
+
+def _shortlist(options: argparse.Namespace) -> int:
+    # Only this command draws and computes: the others answer at once.
+    from rich.console import Console
+
+    from imubench_pipeline.report.shortlist import format_shortlist_row, list_assumptions
+    from imubench_pipeline.report.terminal_table import fit_table
+    from imubench_pipeline.settings.requirements import Requirement, read_requirements
+    from imubench_pipeline.settings.sensor import read_sensors
+    from imubench_pipeline.settings.shipped import list_folders
+    from imubench_pipeline.settings.yaml_files import read_settings
+    from imubench_pipeline.steps.shortlist import NEEDED, list_shortlist
+    from imubench_pipeline.tables import find_tables
+
+    try:
+        path = Path(options.requirement)
+        if path.suffix in (".yaml", ".yml"):
+            name, asked = path.stem, read_settings(Requirement, path)
+        else:
+            requirements = read_requirements(
+                list_folders(options.requirements or Run().requirements or (), "requirements")
+            )
+            if options.requirement not in requirements:
+                names = ", ".join(requirements) or "none"
+                raise ConfigError(f"no requirement {options.requirement!r}; there are: {names}")
+            name, asked = options.requirement, requirements[options.requirement]
+        sensors = read_sensors(list_folders(options.sensors or Run().sensors, "sensors"))
+        tables = {}
+        if options.results is not None:
+            tables = find_tables(options.results, NEEDED)
+        rows = [*list_shortlist({name: asked}, sensors, tables)]
+    except (ConfigError, OSError, ValueError) as error:
+        print(error, file=sys.stderr)
+        return 2
+    console = Console(highlight=False, markup=False, emoji=False)
+    margins = [f"Margin\n{which}" for which in ("at best", "at worst", "measured")]
+    heads = ["Sensor", "Verdict", *margins, "Limit"]
+    lines = [format_shortlist_row(row) for row in rows]
+    console.print(fit_table(asked.title, heads, lines, console.width, names=0))
+    for note in list_assumptions(rows):
+        console.print(note, soft_wrap=True)
+    return 0
+
+
 def _add_completion(parser: argparse.ArgumentParser) -> None:
     parser.description = (
         'Print a script for the shell. Now: eval "$(imubench completion bash)"; always: put that '
@@ -396,8 +459,8 @@ COMMANDS = {
     ),
     "shortlist": Command(
         "say by datasheets alone which sensors are worth logging",
-        shortlist.add_arguments,
-        shortlist.run,
+        _add_shortlist,
+        _shortlist,
         ("said", "", NO_RESULTS),
     ),
     "report": Command(

@@ -14,7 +14,7 @@ from imubench_pipeline.settings.yaml_files import read_settings
 from imubench_pipeline.tables.outputs import Place
 
 _CONFIG_FILE = Path("config/config.yaml")
-_RESULT_FOLDERS = (
+_RESULT_FOLDERS = (  # folders in the results that runs write
     "exports",
     "faults",
     "logs",
@@ -26,7 +26,6 @@ _RESULT_FOLDERS = (
     "simulated",
     "tables",
 )
-"""Folders in the results that runs write."""
 
 _WORKFLOW_PARTS = ("Snakefile", "workflow", "profiles", "src", "tests", "pyproject.toml")
 

@@ -40,12 +40,11 @@ from imubench_pipeline.units import parse_quantity
 _INGEST_OUTPUTS = ("quality.json", "envelope.parquet", "histogram.parquet")
 _RANKING_KEYS = ("price_class", "must")  # keys of a requirement that do not affect the error budget
 
-_REPORTED_SECTIONS = {
+_REPORTED_SECTIONS = {  # sections of the settings that the report shows
     *("allan", "estimate", "reconstruction", "quality"),
     *("datasheet", "error_budget", "fusion"),
     *blocks("run"),
 }
-"""Sections of the settings that the report shows."""
 
 _PLACEHOLDER_LOG = {"rate": "1 Hz", "channels": {"gyro_x": {"column": 1, "unit": "rad/s"}}}
 """Placeholder for the log format of a sensor where it does not matter."""

@@ -20,11 +20,10 @@ from typing import Any
 
 import psutil
 
-_WRITTEN_FOLDERS = (
+_WRITTEN_FOLDERS = (  # folders in the results that runs write; nothing else is changed
     *("recordings", "sensors", "tables", "simulated", "report", "exports", "seals", "faults"),
     "nightly",
 )
-"""Folders in the results that runs write; nothing else is changed."""
 
 _TEMPORARY_NAME = re.compile(r"\..+\.[a-z0-9_]{8}\.part")  # of incomplete files and folders
 STILL_WRITTEN = 60.0  # s; a file that changed so shortly before a run may belong to another command

@@ -31,7 +31,7 @@ SAMPLES = ("envelope", "histogram")  # tables of the samples, for pages of recor
 OF_ONE_RECORDING = (*SAMPLES, "samples_of_models", "draws", "error_growth", "drawn_deviations")
 """The tables that are kept with each recording and not joined."""
 
-BY_RECORDING = (
+BY_RECORDING = (  # the joined tables in which a recording has rows of its own
     "recordings",
     "findings",
     "doubts",
@@ -54,6 +54,5 @@ BY_RECORDING = (
     "backtest",
     *(row.table for row in _ADDED if issubclass(row, OfRecordingRow)),
 )
-"""The joined tables in which a recording has rows of its own."""
 
 COMPARED = ("recordings", "allan", "parameters", "simulated_truth")  # drawn for all sensors

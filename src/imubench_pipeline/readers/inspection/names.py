@@ -11,12 +11,11 @@ from imubench_pipeline.settings.sensor import QUANTITIES
 
 Quantity = Literal["gyro", "accel", "temperature"]
 
-DIMENSIONS: dict[Quantity, str] = {
+DIMENSIONS: dict[Quantity, str] = {  # the dimension of the unit of each quantity
     "gyro": QUANTITIES["gyro"],
     "accel": QUANTITIES["accel"],
     "temperature": "temperature",
 }
-"""The dimension of the unit of each quantity."""
 
 PLAIN, WEAK, WITHOUT_GRAVITY, DERIVED = range(4)
 """Ranks of names: the quantity is certain; it is uncertain; an acceleration that may exclude
@@ -44,13 +43,12 @@ _DERIVED_WORDS = frozenset(
     ("free", "user", "grav", "est", "ref", "var", "std", "cov", "cmd", "dv", "lpf", "ned", "enu")
 )
 _LINEAR_ACCELERATION = re.compile(r"lin(?:ear)?acc")
-_SHORT_NAMES: dict[str, tuple[Quantity, int]] = {
+_SHORT_NAMES: dict[str, tuple[Quantity, int]] = {  # short names, which must be a complete word
     **dict.fromkeys(("w", "om", "av"), ("gyro", PLAIN)),
     **dict.fromkeys(("rate", "rates", "g"), ("gyro", WEAK)),
     **dict.fromkeys(("a", "gf"), ("accel", PLAIN)),
     **dict.fromkeys(("f", "sf"), ("accel", WEAK)),
 }
-"""Short names, which must be a complete word."""
 
 
 @dataclass(frozen=True)

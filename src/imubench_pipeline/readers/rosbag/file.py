@@ -55,7 +55,7 @@ class Layout:
     covariances: dict[str, int]  # index of the first one of a quantity; its value is -1: absent
 
 
-LAYOUTS: dict[str, Layout] = {
+LAYOUTS: dict[str, Layout] = {  # the messages that are read, by type
     # Orientation 0 and covariance 4, angular velocity 13 and 16, acceleration 25 and 28.
     "sensor_msgs/msg/Imu": Layout(
         37,
@@ -66,7 +66,6 @@ LAYOUTS: dict[str, Layout] = {
     ),
     "sensor_msgs/msg/Temperature": Layout(2, {"temperature": 0}, {"temperature": "degC"}, {}),
 }
-"""The messages that are read, by type."""
 
 
 def decode_messages(

@@ -50,13 +50,12 @@ _COMPARISON_TABLES = (
     *("error_growth", "drawn_deviations"),
 )
 _RECONSTRUCTION_TABLES = ("reconstruction", "scores")
-_TABLES_OF_STEP: dict[str, tuple[str, ...]] = {
+_TABLES_OF_STEP: dict[str, tuple[str, ...]] = {  # output tables of each step
     "ingest": ("envelope", "histogram"),
     "estimate": (),  # they are written together, and so are those of the reconstruction
     "datasheet": _COMPARISON_TABLES,
     "reconstruct": (),
 }
-"""Output tables of each step."""
 _MIN_REPORTED_TIME = 3.0  # steps that take longer, s, are reported
 
 
