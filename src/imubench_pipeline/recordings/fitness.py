@@ -1,8 +1,7 @@
 """Decide from findings and estimates whether a recording is used in comparisons.
 
-A doubt is *unfit* if the figures may not be the noise of a sensor at rest in the stated unit (it
-was moved, the unit is wrong, an axis is dead), or if no such sensor is sold. Other doubts are
-reported with the figures.
+A doubt is *unfit* if the figures may not be the noise of a sensor at rest in the stated unit, or if
+no such sensor is sold. Other doubts are reported with the figures.
 """
 
 from __future__ import annotations

@@ -1,10 +1,8 @@
 """The evidence of an ingest: the files that were read, and their identity.
 
 The plan must see every change of a log and still be cheap: it compares sizes, mtime, ctime (which
-nobody can set), and a few blocks of a file. The ingest reads whole files, within limits of time and
-memory. The plan reads a whole file only if its size is moderate and its stamps have changed: if its
-content is the same, as after a restored backup, hours of analysis need not be repeated. Any result
-of an ingest, also a rejection, is computed again as soon as the files have changed.
+nobody can set), and a few blocks of a file. It reads a whole file only if its size is moderate and
+its stamps have changed. The ingest reads whole files, and is repeated as soon as they have changed.
 """
 
 from __future__ import annotations

@@ -1,8 +1,7 @@
 """Compute envelope over time and histogram of each channel, to draw 1e8 samples on a page.
 
-Each channel is read twice, in bounded memory. Times are on the uniform grid: point i is i / rate
-after the first sample of the channel's file. Holes have their length, but pauses between segments
-have none. Samples whose stamps lie on no grid are taken as consecutive.
+Each channel is read twice, in bounded memory. Times are on the uniform grid, from the first sample
+of the file on: holes have their length, pauses between segments have none.
 """
 
 from __future__ import annotations

@@ -1,8 +1,7 @@
 """An ingested recording: Parquet files in SI, one for each time base, with its provenance.
 
-The columns are the channels, and ``temperature`` in °C. If stamps are needed there is ``time``
-(s from the first sample), and if samples are missing also ``sample``, the position on the uniform
-grid. A sample that is missing in one channel only is null.
+The columns are the channels, ``temperature`` in °C, if needed ``time`` (s from the first sample),
+and if samples are missing ``sample``, the position on the uniform grid. A null is a missing sample.
 """
 
 from __future__ import annotations

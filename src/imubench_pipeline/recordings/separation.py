@@ -1,9 +1,8 @@
 """Separate the columns of one table by their sampling rates: each clock becomes a part.
 
-Merged logs have a row for each stamp, and empty cells for sensors without a new sample. A channel
-has a clock of its own if its numbers lie on a uniform grid that is slower than the grid of all
-records, or if all records together lie on no grid. An axis of a gyro, or of an accelerometer, with
-fewer numbers than another axis has missing samples.
+Merged logs have empty cells for sensors without a new sample. A channel has a clock of its own if
+its numbers lie on a slower uniform grid than all records, or if all records together lie on no
+grid. An axis with fewer numbers than another axis of its sensor has missing samples.
 """
 
 from __future__ import annotations

@@ -1,9 +1,8 @@
 """The time base of a recording: its rate, its missing samples and its segments.
 
-Samples are put on a uniform grid. Stamps on a grid give the position of every sample, and positions
-without a sample are holes. Stamps that scatter by more than half a sampling interval (for instance,
-stamps of arrival in a host) give only the length of the recording. The samples are then treated as
-consecutive, which is reported as a finding.
+Stamps on a uniform grid give the position of every sample; positions without one are holes. Stamps
+that scatter by more than half a sampling interval, such as those of arrival, give only the length:
+the samples are then treated as consecutive, with a finding.
 """
 
 from __future__ import annotations

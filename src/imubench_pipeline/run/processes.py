@@ -1,8 +1,7 @@
 """Run the scripts of the workflow in forks of one process that already has their imports.
 
 For a short log, a step computes for a tenth of a second, but its imports take a second. One process
-therefore lives as long as the run. It imports the modules of a kind of step once, and forks for
-each step: see `imubench_pipeline.run.step_server`.
+lives as long as the run, and forks for each step: see `imubench_pipeline.run.step_server`.
 """
 
 from __future__ import annotations

@@ -1,8 +1,7 @@
 """Show the progress of a run, a line for each finished recording, and errors.
 
-This is a logger plugin of Snakemake (`snakemake_logger_plugin_imubench`), which a profile asks for
-by ``logger: imubench``. In a terminal one line moves; in a pipe there is one now and then. All that
-Snakemake says itself stands in its log file, which is named at the end.
+This is a logger plugin of Snakemake (`snakemake_logger_plugin_imubench`): ``logger: imubench`` of a
+profile. All that Snakemake says itself is in its log file, which is named at the end.
 """
 
 from __future__ import annotations

@@ -1,8 +1,7 @@
 """Memory and time that a job requests on a cluster, from the size of the log.
 
 The costs in the rules were measured with logs of up to 60 million samples (docs/how-to/cluster.md);
-this module adds a margin. A job has one core for any log: no step uses more. On a single computer
-only the limits apply, which are far above the measured costs.
+this module adds a margin. A job has one core for any log: no step uses more.
 """
 
 from __future__ import annotations

@@ -1,8 +1,7 @@
 """Choose the noise model for the weights of an Earth-rate experiment: the sensor at rest.
 
-The log of a gyro that is turned does not tell its noise: the turns are in it. The model is that of
-a static recording of the same sensor, of the same device where there is one, and the longest of
-several; without any, that of the typical figures of its datasheet.
+The log of a turned gyro does not show its noise. The model is of the longest static recording of
+the same sensor, and device if possible, or else of the typical figures of its datasheet.
 """
 
 from __future__ import annotations

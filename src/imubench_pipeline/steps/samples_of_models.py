@@ -1,8 +1,7 @@
-"""Samples of a log and of its estimated models, before and after the fit.
+"""Samples of a log and of its estimated models, before and after the fit, of about an hour.
 
 Engers (2021, figures 34, 35, 38, 39, 44 and 50) compares them by eye. The model before the fit is
-read from the curve. The model after it is the estimate, with the temperature effect if that is
-removed from the log. Both pass the estimated low-pass. About the first hour is compared.
+read from the curve, the model after it is the estimate. Both pass the estimated low-pass.
 """
 
 from __future__ import annotations

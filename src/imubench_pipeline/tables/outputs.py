@@ -1,15 +1,10 @@
 """Files and folders that a command writes where its user says, so that none destroys another.
 
-One rule for every option that names an output (`add_output`):
-
-- An existing file is refused without ``--force``. A folder may exist if it is empty or an earlier
-  output of the same kind; only its files of the same name change.
-- Only regular files are replaced, each by a rename of a complete file. Devices, pipes, sockets, and
-  folders in place of a file are refused.
-- Symbolic links are followed, and their targets judged by this rule. A loop is refused. Missing
-  parent folders are made.
-- Inputs of the command and the places of a project (`Place`) are never overwritten. Only commands
-  whose output belongs there add new files to such a place.
+One rule for every option that names an output (`add_output`): an existing file is refused without
+``--force``; a folder must be empty or an earlier output of the same kind. Only regular files are
+replaced, each by a rename of a complete file. Symbolic links are followed, missing folders made.
+Inputs and the places of a project (`Place`) are never overwritten; only commands whose output
+belongs there add new files.
 """
 
 from __future__ import annotations

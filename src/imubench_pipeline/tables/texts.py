@@ -1,8 +1,7 @@
 """Make texts from logs, notes and names of folders safe for the programs that open them.
 
-A spreadsheet takes a cell of a CSV file that begins with ``=``, ``+``, ``-`` or ``@`` for a
-formula, quoted or not. An apostrophe before it marks it as text. Where semicolons separate cells,
-a text is divided at them, so that the same applies after a semicolon.
+A spreadsheet takes a cell that begins with ``=``, ``+``, ``-`` or ``@``, also after a semicolon,
+for a formula, quoted or not. An apostrophe before it marks it as text.
 """
 
 from __future__ import annotations

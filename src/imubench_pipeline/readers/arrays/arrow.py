@@ -1,9 +1,8 @@
 """Parquet, and Feather or Arrow IPC files and streams: read by row group or record batch.
 
 A column is a name or a position; ``variable`` is not used. A null is a missing sample. A column of
-timestamps is time with ``format: iso8601``. A corrupt page of Parquet is detected if the file has
-checksums. A record batch of a compressed Feather file is unpacked as a whole, and rejected if it is
-large.
+timestamps is time with ``format: iso8601``. Large compressed record batches are rejected, since
+they are unpacked as a whole.
 """
 
 from __future__ import annotations

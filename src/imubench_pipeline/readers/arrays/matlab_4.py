@@ -1,9 +1,8 @@
-"""MATLAB files of version 4 (-v4): the header of each variable.
+"""MATLAB files of version 4 (-v4): the header of each variable. See "MAT-File Format" of MATLAB.
 
-A file is a sequence of variables: five integers of 4 bytes (type, rows, columns, whether it is
-complex, bytes of the name), the name with a terminating zero, and the numbers, column by column.
-The decimal digits of the type are the byte order, 0, the type of the numbers and the kind of the
-variable. See "MAT-File Format" of MATLAB.
+A variable is five integers of 4 bytes (type, rows, columns, whether it is complex, bytes of the
+name), the name with a terminating zero, and the numbers, column by column. The decimal digits of
+the type are the byte order, 0, the type of the numbers and the kind of the variable.
 """
 
 from __future__ import annotations

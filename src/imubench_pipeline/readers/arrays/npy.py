@@ -1,9 +1,8 @@
 """NumPy files: one array (NPY), or several in a zip archive (NPZ), streamed in both cases.
 
-An array is a matrix, a vector, or a vector of records with named fields (a structured dtype).
-``variable`` is the name of an array in an archive; an NPY file has one array, without a name.
-Dates (datetime64) are time stamps with ``format: iso8601``. Arrays of Python objects, which are
-pickled, are rejected: reading them would execute code in the file.
+An array is a matrix, a vector, or a vector of records. ``variable`` names an array in an archive.
+Dates (datetime64) are time stamps with ``format: iso8601``. Arrays of Python objects are rejected:
+unpickling them would execute code in the file.
 """
 
 from __future__ import annotations

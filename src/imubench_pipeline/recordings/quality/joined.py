@@ -1,8 +1,7 @@
 """Find logs of two sensors in one: one after the other, or with alternating samples.
 
-Level, noise and register step are compared. Motion changes the level, and vibration the noise.
-Where two of the three change at once, the data of another sensor begin, or of another range of the
-same sensor.
+Where two of level, noise and register step change at once, the data of another sensor begin, or of
+another range. Motion changes the level alone, and vibration the noise.
 """
 
 from __future__ import annotations

@@ -1,8 +1,7 @@
 """Run the steps of the workflow for a few logs while the user waits.
 
-It calls the same functions as the rules, with the same settings, so that the numbers are the same.
-Forks of one process share the work, as in a run. The channels of a recording are estimated and
-reconstructed in parallel.
+The functions and settings are those of the rules, so that the numbers are the same. The channels of
+a recording are estimated and reconstructed in parallel, in forks of one process.
 """
 
 from __future__ import annotations
