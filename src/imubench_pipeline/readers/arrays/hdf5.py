@@ -6,10 +6,7 @@ records, or a data set in the group that ``variable`` names. HDF5 has no dates o
 
 from __future__ import annotations
 
-import json
 import math
-import subprocess
-import sys
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import ExitStack
 from functools import lru_cache
@@ -23,6 +20,7 @@ from numpy.typing import NDArray
 
 from imubench_pipeline.readers.arrays.file import ArrayFile
 from imubench_pipeline.readers.arrays.table import Array, Table, UnusableError
+from imubench_pipeline.readers.bounded import run_bounded
 from imubench_pipeline.readers.bounds import (
     MAX_CHUNK_BYTES,
     MAX_CHUNKS,
@@ -237,37 +235,26 @@ _MAX_MEMORY = 1 << 29
 def _read_variable_length_texts(path: str, *_: int) -> dict[str, str]:
     """Return the units of a file by data set; empty if they cannot be read.
 
-    The library may crash or hang on damaged texts of variable length: a process of its own reads
-    them, and stops at the first one that is too long for a unit, whose length is known only
-    unpacked.
+    The library may crash or hang on damaged texts of variable length: another process reads them,
+    and stops at the first one that is too long for a unit, whose length is known only unpacked.
     """
-    try:
-        limits = str(_MAX_STORED_LENGTH), str(_MAX_MEMORY)
-        command = [sys.executable, "-c", _READER_SCRIPT, path, *limits, *_UNIT_ATTRIBUTES]
-        done = subprocess.run(command, capture_output=True, timeout=_MAX_WAIT, check=True)
-        units = json.loads(done.stdout)
-    except (subprocess.SubprocessError, OSError, ValueError):
-        return {}
-    return {str(name): str(unit) for name, unit in units.items()}
+    units: dict[str, str] = {}
 
-
-_READER_SCRIPT = """
-import json, resource, sys
-import h5py
-
-resource.setrlimit(resource.RLIMIT_DATA, (int(sys.argv[3]),) * 2)
-units = {}
-
-def visit(name, item):
-    if isinstance(item, h5py.Dataset):
-        for key in sys.argv[4:]:
+    def visit(name: str, item: h5py.HLObject) -> str | None:
+        for key in _UNIT_ATTRIBUTES if isinstance(item, h5py.Dataset) else ():
             if key in item.attrs:
                 text = item.attrs[key]
-                if len(text) > int(sys.argv[2]):
+                if len(text) > _MAX_STORED_LENGTH:
                     return "no unit"
-                units["/" + name] = text if isinstance(text, str) else text.decode()
+                units[f"/{name}"] = text if isinstance(text, str) else text.decode()
+        return None
 
-with h5py.File(sys.argv[1], "r") as file:
-    file.visititems(visit)
-print(json.dumps(units))
-"""
+    def read() -> dict[str, str]:
+        with h5py.File(path, "r") as file:
+            file.visititems(visit)
+        return units
+
+    try:
+        return run_bounded(_MAX_WAIT, _MAX_MEMORY, read)
+    except Exception:  # the library raises nearly every kind on damaged files
+        return {}
