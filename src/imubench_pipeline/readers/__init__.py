@@ -8,15 +8,9 @@ import unicodedata
 from itertools import islice
 from pathlib import Path
 
+from imubench_pipeline.readers import compressed
 from imubench_pipeline.readers.batch import Batch, LogFile, name_settings_file
 from imubench_pipeline.readers.bounds import MAX_ARCHIVE_PROBES
-from imubench_pipeline.readers.compressed import (
-    holds_text,
-    is_archive,
-    is_member,
-    is_visible,
-    list_members,
-)
 from imubench_pipeline.readers.content import find_format, is_endless, recognise_folder
 from imubench_pipeline.settings import sensor
 from imubench_pipeline.settings.validation import cut
@@ -40,7 +34,7 @@ def log_files(path: Path) -> list[Path]:
         with os.scandir(waiting.pop()) as entries:
             for entry in entries:
                 file = Path(entry.path)
-                if not is_visible(Path(entry.name)):
+                if not compressed.is_visible(Path(entry.name)):
                     continue
                 if entry.is_dir(follow_symlinks=False):
                     waiting.append(file)
@@ -86,13 +80,13 @@ def read(path: Path, log: sensor.LogFormat) -> list[LogFile]:
     for name, source in sources.items():
         file = _find_file(path, present, source, name)
         clock = ""  # the part of the file with a clock of its own: a topic, or a kind of message
-        if source.variable is not None and not is_member(file):
+        if source.variable is not None and not compressed.is_member(file):
             own = find_format(file, log.reader).clock_of == "variable"
             clock = source.variable if own else ""
         together.setdefault((file, clock), {})[name] = source
     files = []
     for (file, _), columns in sorted(together.items(), key=lambda item: item[0]):
-        inside = None if is_member(file) else _list_present(file, log)
+        inside = None if compressed.is_member(file) else _list_present(file, log)
         if inside is not None:
             file = find_only_log(file, inside)  # an archive with one log, among other files
         files.append(find_format(file, log.reader).load().log_file(file, log, columns))
@@ -105,8 +99,8 @@ def _list_present(path: Path, log: sensor.LogFormat) -> list[Path] | None:
         return None
     if path.is_dir():
         return log_files(path)
-    if is_archive(path) and find_format(path, log.reader).streamed:
-        return list_members(path)
+    if compressed.is_archive(path) and find_format(path, log.reader).streamed:
+        return compressed.list_members(path)
     return None
 
 
@@ -153,7 +147,7 @@ def find_only_log(path: Path, present: list[Path]) -> Path:
         )
     logs = [file for file in present if file.parent == path] or present
     if 1 < len(logs) <= MAX_ARCHIVE_PROBES and not path.is_dir():
-        logs = list(islice(filter(holds_text, logs), 2))  # two are enough for the error
+        logs = list(islice(filter(compressed.holds_text, logs), 2))  # two are enough for the error
     if len(logs) != 1:
         kind = "folder" if path.is_dir() else "archive"
         raise RecordingError(

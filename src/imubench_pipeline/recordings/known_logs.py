@@ -20,11 +20,7 @@ from pathlib import Path
 from imubench_pipeline.readers import log_files
 from imubench_pipeline.readers.holes import FileWithoutHoles
 from imubench_pipeline.recordings.drop_zone import Recording
-from imubench_pipeline.tables.digests import (
-    open_without_waiting,
-    read_sealed_json,
-    write_sealed_json,
-)
+from imubench_pipeline.tables import digests
 
 KNOWN = "log.json"  # the file of the evidence, beside `quality.json`
 MAX_DIGESTED_SIZE = 1 << 26
@@ -77,7 +73,7 @@ def read_known(folder: Path) -> dict[str, KnownFile] | None:
     with contextlib.suppress(OSError, ValueError, TypeError, KeyError):
         return {
             name: KnownFile(**{**file, "stamps": file["stamps"] and tuple(file["stamps"])})
-            for name, file in read_sealed_json(folder / KNOWN)["files"].items()
+            for name, file in digests.read_sealed_json(folder / KNOWN)["files"].items()
         }
     return None
 
@@ -96,7 +92,7 @@ def write_known(
             for name, file in (absent | dict(files)).items()
         }
     rows = {name: asdict(file) for name, file in sorted(files.items())}
-    write_sealed_json({"files": rows}, folder / KNOWN)
+    digests.write_sealed_json({"files": rows}, folder / KNOWN)
 
 
 def identify_log_files(
@@ -240,7 +236,7 @@ def _digest(path: Path, size: int, is_stopped: Callable[[], bool]) -> str | None
 
 
 def _opened(path: Path) -> io.FileIO:
-    return open(path, "rb", buffering=0, opener=open_without_waiting)
+    return open(path, "rb", buffering=0, opener=digests.open_without_waiting)
 
 
 def _places(source: Path) -> dict[str, Path]:

@@ -17,13 +17,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from imubench_pipeline.model.estimates import EnvelopeRow, HistogramRow
-from imubench_pipeline.recordings.recording import (
-    ChannelLog,
-    list_log_files,
-    open_channel_logs,
-    read_metadata,
-    was_at_rest,
-)
+from imubench_pipeline.recordings import recording as kept
 from imubench_pipeline.settings.sensor import TEMPERATURE
 from imubench_pipeline.tables.keys import Key
 from imubench_pipeline.typing import Array
@@ -56,20 +50,22 @@ def overview(folder: Path, sensor: str, recording: str, buckets: int | None = No
     intervals of time of an envelope; by default more if the sensor was turned.
     """
     result = Overview([], [])
-    logs = [*open_channel_logs(folder).values()]
-    for path in list_log_files(folder):
+    logs = [*kept.open_channel_logs(folder).values()]
+    for path in kept.list_log_files(folder):
         if TEMPERATURE in pq.read_schema(path).names:
-            about = read_metadata(path)
-            logs.append(ChannelLog(path, TEMPERATURE, about["rate"], about["grid"], (), holes=True))
+            about = kept.read_metadata(path)
+            logs.append(
+                kept.ChannelLog(path, TEMPERATURE, about["rate"], about["grid"], (), holes=True)
+            )
     if buckets is None:
-        buckets = BUCKETS if was_at_rest(folder) else BUCKETS_OF_TURNS
+        buckets = BUCKETS if kept.was_at_rest(folder) else BUCKETS_OF_TURNS
     for log in logs:
         names = asdict(Key(sensor, recording, log.channel))
         edges = bucket_edges(log.grid, buckets)
         figures, drawn = _follow(log, edges)
         if len(drawn) == 0:
             continue
-        times = edges / log.rate + read_metadata(log.path).get("begins", 0.0)
+        times = edges / log.rate + kept.read_metadata(log.path).get("begins", 0.0)
         result.envelope.extend(EnvelopeRow(**names, **row) for row in envelope_rows(times, figures))
         if log.channel != TEMPERATURE:
             low, high = float(figures[:, _LOW].min()), float(figures[:, _HIGH].max())
@@ -95,7 +91,7 @@ def no_figures(edges: NDArray[np.int64]) -> Array:
     return np.tile([np.inf, -np.inf, 0.0, 0.0], (len(edges) - 1, 1))
 
 
-def _follow(log: ChannelLog, edges: NDArray[np.int64]) -> tuple[Array, Array]:
+def _follow(log: kept.ChannelLog, edges: NDArray[np.int64]) -> tuple[Array, Array]:
     """Return the figures of each bucket, shape (b, 4), and samples drawn from all of them."""
     stride = max(1.0, pq.read_metadata(log.path).num_rows / _DRAWN)
     figures = no_figures(edges)

@@ -10,15 +10,7 @@ from pathlib import Path
 
 from imubench_pipeline.report.folder import list_report_files
 from imubench_pipeline.run.processes import Job
-from imubench_pipeline.tables.seals import (
-    Seal,
-    SealError,
-    compute_digests,
-    compute_form_digest,
-    name_place,
-    read_seal,
-    seal_files,
-)
+from imubench_pipeline.tables import seals as sealed
 
 
 @contextlib.contextmanager
@@ -27,9 +19,9 @@ def seal_outputs(job: Job) -> Iterator[None]:
     if job.results is None:
         yield
         return
-    inputs = compute_digests(job.results, map(Path, job.input))
+    inputs = sealed.compute_digests(job.results, map(Path, job.input))
     yield
-    place = name_place(job.name, job.wildcards.get("sensor"), job.wildcards.get("recording"))
+    place = sealed.name_place(job.name, job.wildcards.get("sensor"), job.wildcards.get("recording"))
     outputs = [Path(path) for path in job.output]
     folder = outputs[0].parent
     # Outputs that no rule can declare: pages, and a series of each channel.
@@ -37,7 +29,9 @@ def seal_outputs(job: Job) -> Iterator[None]:
         outputs = list_report_files(folder)
     elif job.name == "reconstruct" and (folder / "series").is_dir():
         outputs.append(folder / "series")
-    seal_files(job.results, place, outputs, inputs, digest_settings(dict(job.params.items())))
+    sealed.seal_files(
+        job.results, place, outputs, inputs, digest_settings(dict(job.params.items()))
+    )
 
 
 def digest_settings(params: Mapping[str, object]) -> str:
@@ -54,16 +48,16 @@ def find_unsound_jobs(results: Path, jobs: Mapping[str, str]) -> Iterator[str]:
     another machine. A file with unchanged size and date is not read. `jobs` has the
     `digest_settings` of each.
     """
-    seals: dict[str, Seal] = {}
+    seals: dict[str, sealed.Seal] = {}
     for place in jobs:
-        with contextlib.suppress(FileNotFoundError, SealError):
-            seals[place] = read_seal(results, place)
+        with contextlib.suppress(FileNotFoundError, sealed.SealError):
+            seals[place] = sealed.read_seal(results, place)
     left = {name: file.sha256 for seal in seals.values() for name, file in seal.outputs.items()}
     for place, settings in jobs.items():
         seal = seals.get(place)
         if (
             seal is None
-            or (seal.settings, seal.form) != (settings, compute_form_digest())
+            or (seal.settings, seal.form) != (settings, sealed.compute_form_digest())
             or any(left.get(name) != digest for name, digest in seal.inputs.items())
             or any(file.fault(results / name, whole=False) for name, file in seal.outputs.items())
         ):

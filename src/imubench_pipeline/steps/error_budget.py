@@ -11,15 +11,11 @@ from imubench_pipeline.estimators.estimate import Estimate
 from imubench_pipeline.estimators.rows import read_recommended_estimates
 from imubench_pipeline.model.estimates import DeterministicRow, DrawnDeviationRow, TemperatureRow
 from imubench_pipeline.model.table import TableRow
+from imubench_pipeline.navigation import expected_errors
 from imubench_pipeline.navigation.backtest.of_recording import list_backtest_rows
 from imubench_pipeline.navigation.compared import ComparedChannel
 from imubench_pipeline.navigation.error_budget.printed_errors import collect_figures_in_use
 from imubench_pipeline.navigation.error_growth import list_growth_rows
-from imubench_pipeline.navigation.expected_errors import (
-    list_error_rows,
-    list_requirement_questions,
-    list_standard_questions,
-)
 from imubench_pipeline.navigation.ratios import list_deviation_rows
 from imubench_pipeline.recordings.kept import Quality, load_static_logs
 from imubench_pipeline.settings.config import ErrorBudgetSettings, FusionSettings
@@ -40,9 +36,9 @@ def compute_error_tables(
     window = parse_quantity(how.static_window, "time")
     latitude = parse_quantity(how.latitude, "angle")
     requirements = validate_requirements(sections["requirements"])
-    questions = list(list_standard_questions(times, window, latitude, how.axes))
+    questions = list(expected_errors.list_standard_questions(times, window, latitude, how.axes))
     for name, requirement in requirements.items():
-        questions += list_requirement_questions(name, requirement)
+        questions += expected_errors.list_requirement_questions(name, requirement)
     estimates = read_recommended_estimates(folder / "parameters.parquet", folder / "draws.parquet")
     if not estimates:
         return {name: iter(()) for name in _OUTPUT_TABLES}
@@ -54,7 +50,7 @@ def compute_error_tables(
         Datasheet.model_validate(sections["datasheet"]), estimates, temperature
     )
     tables = (
-        list_error_rows(names, estimates, questions, figures=figures, **drawn),
+        expected_errors.list_error_rows(names, estimates, questions, figures=figures, **drawn),
         list_backtest_rows(names, logs, estimates, requirements, apart, **drawn),
         list_growth_rows(names, estimates, times=times, window=window, figures=figures, **drawn),
         _deviations(names, Quality.read(folder / "quality.json"), estimates, sections),

@@ -14,6 +14,7 @@ from pathlib import Path
 
 from imubench_pipeline.readers import bounds
 from imubench_pipeline.readers.batch import name_settings_file
+from imubench_pipeline.readers.text import complete_lines
 from imubench_pipeline.readers.text.cells import (
     MAX_COLUMNS,
     Decimal,
@@ -21,11 +22,6 @@ from imubench_pipeline.readers.text.cells import (
     are_figures,
     is_datum,
     is_number,
-)
-from imubench_pipeline.readers.text.complete_lines import (
-    Records,
-    describe_missing_text,
-    read_first_lines,
 )
 from imubench_pipeline.readers.text.header import are_units, complete_names, find_header, is_heading
 from imubench_pipeline.settings.sensor import LogFormat
@@ -82,11 +78,11 @@ class TextLayout:
             )
         return self.names.index(column)
 
-    def records(self) -> Records:
+    def records(self) -> complete_lines.Records:
         """Return the converter of lines, from the first record on, to records."""
         runs, blank = self.split.runs, self.blank_is_missing
         signs = [sign.encode() for sign in self.comments]
-        return Records(signs, self.header, self.preamble, runs, blank)
+        return complete_lines.Records(signs, self.header, self.preamble, runs, blank)
 
 
 @dataclass(frozen=True)
@@ -125,9 +121,8 @@ class _Search:
         self._comments, self._lines = self._head(path)
         if not self._comments and not self._lines:
             skipped = f" behind {log.skip_lines} lines (skip_lines)" if log.skip_lines else ""
-            raise RecordingError(
-                f"{self._file}: {describe_missing_text(path)}; expected lines of a log{skipped}"
-            )
+            fault = complete_lines.describe_missing_text(path)
+            raise RecordingError(f"{self._file}: {fault}; expected lines of a log{skipped}")
 
     def layout(self) -> TextLayout:
         """Return the most plausible layout."""
@@ -194,7 +189,7 @@ class _Search:
         number, start, line_bytes, comment_bytes = 0, 0, 0, 0
         # A semicolon may begin a comment or be the delimiter, which is not yet known.
         signs = tuple(sign for sign in self._signs(None) if sign != ";")
-        for raw in read_first_lines(path, bounds.MAX_BYTES_BEFORE):
+        for raw in complete_lines.read_first_lines(path, bounds.MAX_BYTES_BEFORE):
             number, here, start = number + 1, start, start + len(raw)
             if number > bounds.MAX_LINES_BEFORE + self._log.skip_lines:
                 break
