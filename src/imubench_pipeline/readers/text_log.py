@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +21,7 @@ from imubench_pipeline.units import find_conversion
 _DECIMALS = 12  # more are rounding errors, and would double the size of the file
 
 
-class TextLog:
+class TextLog(AbstractContextManager["TextLog"]):
     """A text file in the layout of the logs of a sensor.
 
     Parameters
@@ -79,9 +80,6 @@ class TextLog:
         self._file.write(b"\n" * log.skip_lines)
         if any(isinstance(source.column, str) for source in sources.values()):
             self._file.write((delimiter.join(self._names) + "\n").encode())
-
-    def __enter__(self) -> TextLog:
-        return self
 
     def __exit__(self, *_: object) -> None:
         self._file.close()

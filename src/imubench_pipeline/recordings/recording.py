@@ -9,6 +9,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Iterable, Iterator, Mapping
+from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -31,7 +32,7 @@ BESIDE = frozenset({TEMPERATURE, POSITION, TABLE_RATE})  # columns that are no c
 _NOT_CHANNELS = BESIDE | {"time", "sample"}
 
 
-class LogWriter:
+class LogWriter(AbstractContextManager["LogWriter"]):
     """Writes columns to one Parquet file, in row groups of `ROW_GROUP` rows."""
 
     def __init__(self, path: Path, columns: Mapping[str, pa.DataType]) -> None:
@@ -50,9 +51,6 @@ class LogWriter:
         )
         self._waiting: list[pa.RecordBatch] = []
         self._rows = 0
-
-    def __enter__(self) -> LogWriter:
-        return self
 
     def __exit__(self, *_: object) -> None:
         self._writer.close()

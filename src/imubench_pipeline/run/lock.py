@@ -10,7 +10,7 @@ import shlex
 import sys
 import time
 from collections.abc import Mapping
-from contextlib import suppress
+from contextlib import AbstractContextManager, suppress
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
@@ -34,7 +34,7 @@ def locate_lock(results: Path) -> Path:
     return results / "nightly/lock"
 
 
-class Lock:
+class Lock(AbstractContextManager["Lock"]):
     """A lock on a folder of results, which the system releases if the process is killed.
 
     All processes with an open ``descriptor`` hold it, such as Snakemake, which inherits it. While
@@ -107,9 +107,6 @@ class Lock:
             # Unlock for all processes: a step that outlives Snakemake must not hold the lock.
             fcntl.flock(self.descriptor, fcntl.LOCK_UN)
             self._close()
-
-    def __enter__(self) -> Lock:
-        return self
 
     def __exit__(self, *_: object) -> None:
         self.release()

@@ -5,7 +5,7 @@ from __future__ import annotations
 import codecs
 import re
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from contextlib import closing
+from contextlib import AbstractContextManager, closing
 from pathlib import Path
 
 import numpy as np
@@ -85,7 +85,7 @@ class _Text:
         return _ZERO_RUN.sub(b"\0", block.lstrip(b"\0") if goes_on else block)
 
 
-class CompleteLines:
+class CompleteLines(AbstractContextManager["CompleteLines"]):
     """A file for reading that ends with the last complete line, also if it is compressed and cut.
 
     The text after the last line break was being written when the power was cut, and may lack
@@ -113,9 +113,6 @@ class CompleteLines:
         # Stored as well as raised, since a parser in between may wrap the exception.
         self.error: RecordingError | None = None
         self._text = _Text(path, skipped, most)
-
-    def __enter__(self) -> CompleteLines:
-        return self
 
     def __exit__(self, *_: object) -> None:
         self.close()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable
-from contextlib import suppress
+from contextlib import AbstractContextManager, suppress
 
 from imubench_pipeline.estimators.compilation import compile_kernels
 from imubench_pipeline.readers.bounded import Bounded
@@ -13,7 +13,7 @@ _MAX_COMPILE_TIME, _MAX_COMPILE_MEMORY = 600.0, 4 << 30
 _MESSAGE_DELAY = 3.0  # delay of the message about the compilation, s
 
 
-class Compilation:
+class Compilation(AbstractContextManager["Compilation"]):
     """Compiles the kernels of estimates unless they are cached; a context ends its process."""
 
     def __init__(self, say: Callable[[str], None]) -> None:
@@ -36,9 +36,6 @@ class Compilation:
             if self._process.answered:
                 return
             self._say("compiling, once after the installation: some seconds")
-
-    def __enter__(self) -> Compilation:
-        return self
 
     def __exit__(self, *_: object) -> None:
         self._told.cancel()
