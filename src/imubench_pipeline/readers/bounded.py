@@ -38,9 +38,10 @@ class BoundError(Exception):
 
 
 def limit_memory(more: int) -> None:
-    """Limit the additional memory of this process to ``more`` bytes, on Linux; more is an error.
+    """Limit the additional memory of this process to ``more`` bytes, on Linux.
 
-    Unlike RLIMIT_AS, this does not count reserved addresses, of which Arrow and numba have many.
+    Larger allocations fail. Unlike RLIMIT_AS, the limit does not count reserved addresses, of which
+    Arrow and numba have many.
     """
     if sys.platform != "linux":
         return

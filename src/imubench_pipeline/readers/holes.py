@@ -19,7 +19,7 @@ _REPLACEMENT_ZEROS = 512  # bytes: the zeros that are returned in place of a lon
 
 
 def find_next_data(descriptor: int, offset: int) -> int | None:
-    """Return the offset of the first stored byte from an offset on, or None; moves the file."""
+    """Return the offset of the first stored byte at or after an offset, or None; seeks there."""
     if not hasattr(os, "SEEK_DATA"):
         return offset
     try:

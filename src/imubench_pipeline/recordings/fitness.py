@@ -161,7 +161,7 @@ def judge_fitness(of_recording: Iterable[Doubt]) -> Fitness:
 def judge_recordings(
     recordings: Sequence[RecordingRow], doubts: Iterable[Doubt], included: Collection[str]
 ) -> list[RecordingRow]:
-    """Return rows of recordings with whether they decide, as ``included`` do, and their doubts."""
+    """Return the recordings with their doubts, and whether they decide, as ``included`` ones do."""
     by_recording: dict[Key, list[Doubt]] = defaultdict(list)
     for doubt in doubts:
         by_recording[doubt.sensor, doubt.recording].append(doubt)
@@ -212,7 +212,7 @@ def attach_doubts(
     recordings: Iterable[RecordingRow],
     named: Collection[tuple[str, str]] = (("sensor", "recording"),),
 ) -> Iterator[Doubted]:
-    """Yield rows with the doubts about their recordings, which the columns ``named`` name."""
+    """Yield rows with the doubts about the recordings in their columns ``named``."""
     by_recording: dict[tuple[str, str | None], list[str]] = {
         _key(row): [doubt.code for doubt in row.doubts] for row in recordings
     }

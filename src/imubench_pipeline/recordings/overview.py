@@ -176,7 +176,7 @@ def _lattice(ordered: Array) -> tuple[float, float] | None:
 
 @njit(cache=True, nogil=True)
 def gather(values: Array, reached: int, edges: NDArray[np.int64], figures: Array) -> None:
-    """Take values from ``reached`` on into their buckets, by edges; figures of shape (b, 4)."""
+    """Add values from grid point ``reached`` on to the figures, shape (b, 4), of their buckets."""
     bucket, begin = 0, 0
     while edges[bucket + 1] <= reached:
         bucket += 1

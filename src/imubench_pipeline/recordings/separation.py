@@ -101,9 +101,9 @@ class _Records:
             yield chosen[chosen >= 0]
 
     def stride(self, base: TimeBase, bits: int) -> int:
-        """Return the sampling interval of a channel, in intervals of all records; 1: none.
+        """Return the sampling interval of a channel, in intervals of all records.
 
-        It is found with any number of missing samples.
+        It is found with any number of missing samples. 1: the samples are not on a slower clock.
         """
         hits = np.zeros(_MAX_STRIDE + 1)
         total = 0

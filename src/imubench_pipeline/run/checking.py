@@ -54,7 +54,7 @@ def _check_recording(plan: Plan, recording: Recording, folder: Path) -> Quality:
 def findings_of_channel(
     channel: str, log: ChannelLog, bandwidth: float | None, settings: AllanSettings
 ) -> list[Finding]:
-    """Return lines and the end of the band of a channel; `bandwidth` of the sensor, Hz."""
+    """Return findings on lines and the end of the band of a channel; `bandwidth` in Hz."""
     if log.holes:
         # Filling gaps needs a model, which only the estimation has.
         return (

@@ -50,7 +50,7 @@ _told: list[Callable[[str, str], str]] = []
 
 
 def follow(jobs: Iterable[Recording], told: Callable[[str, str], str]) -> None:
-    """Show what `told` returns for a recording as the last of its `jobs` ends, one entry each."""
+    """Show what `told` returns for a recording when the last of its `jobs` has ended."""
     _expected.clear()
     _expected.update(jobs)
     _told[:] = [told]

@@ -23,7 +23,7 @@ def write_sealed_json(data: Mapping[str, Any], path: Path) -> None:
 
 
 def read_sealed_json(path: Path) -> dict[str, Any]:
-    """Return the data of `write_sealed_json`; ValueError if a byte changed, OSError if unread."""
+    """Return the data of `write_sealed_json`; ValueError if any byte has changed, or OSError."""
     # All letters count, and not only what they mean.
     with open(path, "rb", opener=open_without_waiting) as file:
         text = file.read().decode()

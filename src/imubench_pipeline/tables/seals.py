@@ -136,7 +136,7 @@ def compute_digests(results: Path, paths: Iterable[Path]) -> dict[str, str]:
 
 
 def read_seal(results: Path, place: str) -> Seal:
-    """Return the seal of a place; FileNotFoundError without one, `SealError` if it is another."""
+    """Return the seal of a place; FileNotFoundError without one, `SealError` if it is damaged."""
     try:
         data = read_sealed_json(results / name_seal_file(place))
         outputs = {name: SealedFile(**file) for name, file in data["outputs"].items()}

@@ -221,7 +221,7 @@ _TAB_TO_SPACE = bytes.maketrans(b"\t", b" ")
 
 
 class Records:
-    """Removes all that are no records from the lines of a file.
+    """Removes everything but the records from the lines of a file.
 
     ``preamble``: the lines before the first record, which a restarted logger repeats. ``runs``: of
     spaces or tabs separate columns, and become one space. ``blank_is_missing``: a blank line is a

@@ -14,7 +14,7 @@ _MESSAGE_DELAY = 3.0  # delay of the message about the compilation, s
 
 
 class Compilation(AbstractContextManager["Compilation"]):
-    """Compiles the kernels of estimates unless they are cached; a context ends its process."""
+    """Compiles the kernels of estimates unless cached; as a context manager it ends its process."""
 
     def __init__(self, say: Callable[[str], None]) -> None:
         self._say = say
