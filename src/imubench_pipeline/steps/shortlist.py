@@ -11,11 +11,11 @@ from imubench_pipeline.model.comparisons import RankingRow, ShortlistRow
 from imubench_pipeline.model.estimates import ParameterRow
 from imubench_pipeline.model.recordings import RecordingRow
 from imubench_pipeline.model.table import R
-from imubench_pipeline.navigation.shortlist.figures import (
+from imubench_pipeline.navigation.shortlist import (
     collect_measured_ranges,
     collect_printed_ranges,
+    list_shortlist_rows,
 )
-from imubench_pipeline.navigation.shortlist.rows import list_shortlist_rows
 from imubench_pipeline.settings.requirements import Requirement, validate_requirements
 from imubench_pipeline.settings.sensor import Sensor, sensors_of
 from imubench_pipeline.tables import read, write_each
