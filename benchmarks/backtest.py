@@ -37,7 +37,7 @@ import simulators
 from imubench_pipeline.allan import cluster_sizes, of_blocks
 from imubench_pipeline.estimators.rows import read_recommended_estimates
 from imubench_pipeline.model.estimates import BacktestRow
-from imubench_pipeline.navigation.backtest.of_recording import list_backtest_rows
+from imubench_pipeline.navigation.backtest.comparison import list_backtest_rows
 from imubench_pipeline.recordings.recording import LogWriter, open_channel_logs
 from imubench_pipeline.settings.config import ErrorBudgetSettings, EstimateSettings
 from imubench_pipeline.settings.requirements import read_requirements

@@ -147,7 +147,7 @@ def test_parameters_doubts_and_rejections_are_printed(
     assert "good: 50 s at 100 Hz, 2 channels\n" in said
     assert "rejected: bad.csv, line 3, column 'ax': found 'x'" in said
     assert "Gyroscopes" in said and "°/√h" in said and " to " in said
-    assert "short recording: The recording lasts 50 s" in said
+    assert "short recording, affects slow noise: The recording lasts 50 s" in said
 
 
 # Every day pages are made of one log, in tests/workflow/test_failures.py, and figures in the

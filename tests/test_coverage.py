@@ -86,13 +86,17 @@ def test_a_row_says_what_is_printed_and_where() -> None:
         quantity="gyro",
         figure="N",
         published="yes",
-        as_printed="0.1 deg/sqrt(h) typ (A); 0.2 deg/sqrt(h) max; 0.1 deg/s typ over 47 Hz",
+        as_printed=(
+            "0.1 deg/sqrt(h) typ (A)",
+            "0.2 deg/sqrt(h) max",
+            "0.1 deg/s typ over 47 Hz",
+        ),
         document="D, revision C",
         source="primary and secondary",
     )
-    assert by_figure["offset"].as_printed == "-250 to 250 deg/h range"
-    assert by_figure["B"].as_printed == "x 1, yz 2 deg/h typ"
-    assert by_figure["K"].as_printed is None
+    assert by_figure["offset"].as_printed == ("-250 to 250 deg/h range",)
+    assert by_figure["B"].as_printed == ("x 1, yz 2 deg/h typ",)
+    assert by_figure["K"].as_printed == ()
 
 
 def test_vendors_are_counted() -> None:

@@ -55,7 +55,7 @@ def test_table_4_of_the_first_paper_both_ways() -> None:
     assert one.comparable == pytest.approx(8.64e-5, rel=1e-3)
     assert one.delta == pytest.approx(-0.03, abs=0.005)
     assert one.verdict == "as printed"
-    assert "assumed, as the data sheet does not state it" in (one.reason or "")
+    assert "assumed, as the data sheet does not state it" in "; ".join(one.reasons)
 
 
 def test_the_accelerometer_of_the_same_table() -> None:
@@ -96,7 +96,7 @@ def test_a_curve_that_only_falls_has_no_minimum_to_compare() -> None:
         "adev_minimum", None
     ]
     assert row.verdict == "not measured"
-    assert "no minimum" in (row.reason or "")
+    assert "no minimum" in "; ".join(row.reasons)
 
 
 def test_what_is_read_from_the_curve_is_its_minimum() -> None:
@@ -133,7 +133,7 @@ def test_what_is_not_measured_has_its_reason() -> None:
         "plateau", None
     ]
     assert row.verdict == "not measured"
-    assert row.reason == "not in the model: no such term"
+    assert row.reasons == ("not in the model: no such term",)
     assert row.delta is None
 
 
@@ -244,7 +244,7 @@ def test_a_verdict_takes_the_whole_interval(
     assert row.delta_lower == pytest.approx(lower - 1) and row.delta_upper == pytest.approx(
         upper - 1
     )
-    assert ("the 95 % interval extends from" in (row.reason or "")) == (verdict == "not sure")
+    assert ("the 95 % interval extends from" in "; ".join(row.reasons)) == (verdict == "not sure")
 
 
 def test_limits_decide_where_there_is_no_value() -> None:
@@ -255,7 +255,7 @@ def test_limits_decide_where_there_is_no_value() -> None:
         found = replace(known, parameters=known.parameters | {"N": absent})
         row = rows(sheet(random_walk=printed), found)["N", None]
         assert row.verdict == verdict
-        assert (row.reason or "").startswith("not in the model: too small to see")
+        assert "; ".join(row.reasons).startswith("not in the model: too small to see")
 
 
 def all_rows(datasheet: Datasheet, found: Estimate, channel: str = "gyro_x") -> list[Delta]:
@@ -311,7 +311,7 @@ def test_figures_of_an_option_are_compared_where_the_logs_have_it() -> None:
         for row, grade in zip(noise(*options), "AB", strict=True):
             assert row.verdict == "not comparable (condition)"
             assert row.comparable is None and row.delta is None
-            assert f"printed for the option {grade}{said}" in (row.reason or "")
+            assert f"printed for the option {grade}{said}" in "; ".join(row.reasons)
             assert row.measured == pytest.approx(DEG)
 
 
@@ -328,7 +328,7 @@ def test_what_no_static_log_can_be_compared_with(
 ) -> None:
     row = next(r for r in all_rows(sheet(**{name: figure}), estimate(N=1.0)) if r.printed)
     assert row.verdict == "not comparable (condition)"
-    assert reason in (row.reason or "")
+    assert reason in "; ".join(row.reasons)
 
 
 def test_a_figure_by_axis_holds_for_its_axis() -> None:
@@ -455,9 +455,11 @@ def test_a_fitted_sensitivity_is_compared_with_the_coefficient_by_its_size() -> 
     limits = [row.delta, row.delta_lower, row.delta_upper]
     assert limits == pytest.approx([0.2, 0.12, 0.4])
     assert row.verdict == "worse than typ"
-    assert "slope at 27 °C, from readings of 21 to 34 °C" in (row.reason or "")
+    assert "slope at 27 °C, from readings of 21 to 34 °C" in "; ".join(row.reasons)
     bent = coefficient(thermal((0.05, 0.049, 0.051), True, q=1e-6))
-    assert bent.verdict == "as printed" and "slope changes with temperature" in (bent.reason or "")
+    assert bent.verdict == "as printed" and "slope changes with temperature" in "; ".join(
+        bent.reasons
+    )
 
 
 @pytest.mark.parametrize(
@@ -478,7 +480,7 @@ def test_a_sensitivity_that_is_not_told_has_limits_at_most(
 
 def test_without_readings_of_the_temperature_there_is_no_sensitivity() -> None:
     row = coefficient([])
-    assert row.verdict == "not measured" and "no temperature readings" in (row.reason or "")
+    assert row.verdict == "not measured" and "no temperature readings" in "; ".join(row.reasons)
 
 
 ACCEL = Datasheet.model_validate({"accel": {"offset": {"value": 20, "unit": "mg"}}})
@@ -494,7 +496,7 @@ def test_gravity_tells_the_offset_of_a_vertical_axis_alone() -> None:
     for channel in ("accel_x", "accel_y"):
         row = bias_rows(ACCEL, channel, means)["offset"]
         assert row.verdict == "not comparable (condition)"
-        assert "cannot be separated from tilt" in (row.reason or "")
+        assert "cannot be separated from tilt" in "; ".join(row.reasons)
         assert row.measured is None and row.printed == 20.0
 
 

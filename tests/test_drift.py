@@ -89,9 +89,9 @@ def test_bias_is_the_t_test_of_one_against_the_earlier_ones(rng: np.random.Gener
         limits = (rows[n]["expected_lower"], rows[n]["expected_upper"])
         assert limits == pytest.approx((values[:n].mean() - half, values[:n].mean() + half))
         assert rows[n]["change"] is None
-    assert rows[0]["reason"] == "the first value"
+    assert "; ".join(rows[0]["reasons"]) == "the first value"
     assert rows[2]["expected"] == pytest.approx(values[:2].mean())
-    assert "only 2 earlier recordings at this level: the spread" in rows[2]["reason"]
+    assert "only 2 earlier recordings at this level: the spread" in "; ".join(rows[2]["reasons"])
 
 
 def test_the_spread_is_the_one_about_a_line_from_eight_on(rng: np.random.Generator) -> None:
@@ -223,9 +223,9 @@ def test_what_follows_a_step_is_compared_with_the_new_level(rng: np.random.Gener
     rows = rows_of(y)
     assert [row["recording"] for row in rows if row["verdict"] == "changed"] == ["night_15"]
     assert rows[15]["change"] == pytest.approx(math.e - 1.0, rel=0.05)
-    assert rows[15]["reason"] == "above the range expected from 15 earlier recordings"
+    assert "; ".join(rows[15]["reasons"]) == "above the range expected from 15 earlier recordings"
     assert [row["verdict"] for row in rows[16:18]] == [None, None]
-    assert rows[17]["reason"].startswith("only 2 earlier recordings at this level")
+    assert "; ".join(rows[17]["reasons"]).startswith("only 2 earlier recordings at this level")
     assert {row["verdict"] for row in rows[18:]} == {"as before"}
     assert rows[29]["expected"] == pytest.approx(math.exp(y[15:29].mean()), rel=1e-3)
 
@@ -235,8 +235,11 @@ def test_an_odd_night_does_not_end_the_level(rng: np.random.Generator) -> None:
     y[15] -= 1.0
     rows = rows_of(y)
     assert [row["recording"] for row in rows if row["verdict"] == "changed"] == ["night_15"]
-    assert rows[15]["reason"].startswith("below")
-    assert (rows[16]["verdict"], rows[16]["reason"]) == ("as before", "night_15 was an outlier")
+    assert "; ".join(rows[15]["reasons"]).startswith("below")
+    assert (rows[16]["verdict"], "; ".join(rows[16]["reasons"])) == (
+        "as before",
+        "night_15 was an outlier",
+    )
     without = np.delete(y[:24], 15)
     assert rows[24]["expected"] == pytest.approx(math.exp(without.mean()), rel=1e-3)
 
@@ -361,8 +364,9 @@ def test_rows_fit_the_table() -> None:
         "lower": rows[0]["lower"], "upper": rows[0]["upper"], "unit": "rad/s/sqrt(Hz)",
         "expected": pytest.approx(2.0), "expected_lower": None, "expected_upper": None,
         "change": pytest.approx(0.0), "p_value": None, "verdict": None,
-        "reason": "only 1 earlier recording at this level: the spread between recordings is not "
-        "known",
+        "reasons": (
+            "only 1 earlier recording at this level: the spread between recordings is not known",
+        ),
     }  # fmt: skip
 
 
@@ -380,7 +384,7 @@ def test_what_has_no_value_is_not_judged_and_does_not_count() -> None:
         "the value has no 95 % limits",
         "not in the model",
     ]
-    assert [row["reason"] for row in found[4:8]] == reasons
+    assert ["; ".join(row["reasons"]) for row in found[4:8]] == reasons
     assert [row["value"] for row in found[4:8]] == [None, None, 5.0, None]
     assert {(row["verdict"], row["expected"]) for row in found[4:8]} == {(None, None)}
     assert (found[4]["upper"], found[7]["unit"]) == (3.0, "rad/s/sqrt(Hz)")
@@ -400,14 +404,14 @@ def test_flicker_noise_is_not_compared_with_a_gauss_markov_process() -> None:
     by_term = {term: [r for r in found if r["parameter"] == term] for term in ("N", "B")}
     assert by_term["N"][4]["verdict"] == "changed"
     assert "changed" not in {row["verdict"] for row in by_term["B"]}
-    assert by_term["B"][4]["reason"] == "the first value with F"
+    assert "; ".join(by_term["B"][4]["reasons"]) == "the first value with F"
     assert [row["verdict"] for row in by_term["B"][8:]] == ["as before"] * 2
 
 
 def test_values_without_scatter_judge_nothing() -> None:
     rows = of_biases([0.1] * 5 + [0.2])
     assert {row["verdict"] for row in rows} == {None}
-    assert rows[5]["reason"] == "all earlier values are equal"
+    assert "; ".join(rows[5]["reasons"]) == "all earlier values are equal"
     assert "changed" in {row["verdict"] for row in of_biases([0.1] * 40 + [0.2] * 4)}
     assert not list(drift_rows([], [], [recording(name) for name in names(3)]))
 
@@ -416,13 +420,16 @@ def test_limits_far_narrower_than_before_are_not_judged() -> None:
     listed = names(5)
     rows = [parameter(name, 1.0, 0.3) for name in listed[:4]] + [parameter(listed[4], 1.5, 0.001)]
     found = list(drift_rows(rows, [], [recording(name) for name in listed]))[4]
-    assert (found["verdict"], found["reason"]) == (None, "its limits are far narrower than before")
+    assert (found["verdict"], "; ".join(found["reasons"])) == (
+        None,
+        "its limits are far narrower than before",
+    )
 
 
 def test_an_accelerometer_may_have_been_laid_differently() -> None:
     values = [9.81, 9.8, 9.81, 9.8, 9.81, 9.8]
-    assert "gravity" in of_biases([*values, -9.8], "accel_z")[-1]["reason"]
-    assert "gravity" not in of_biases([*values, -9.8])[-1]["reason"]
+    assert "gravity" in "; ".join(of_biases([*values, -9.8], "accel_z")[-1]["reasons"])
+    assert "gravity" not in "; ".join(of_biases([*values, -9.8])[-1]["reasons"])
 
 
 series = st.lists(

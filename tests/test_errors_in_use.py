@@ -12,6 +12,7 @@ from scipy.integrate import quad
 
 from imubench_pipeline.earth import EARTH_RATE
 from imubench_pipeline.model.estimates import TemperatureRow
+from imubench_pipeline.model.states import Cause
 from imubench_pipeline.navigation.error_budget import (
     Contribution,
     Figure,
@@ -22,7 +23,6 @@ from imubench_pipeline.navigation.error_budget import (
     time_until,
 )
 from imubench_pipeline.navigation.error_budget.in_use import (
-    Cause,
     levers,
     of_pulse,
     of_rise,
@@ -37,6 +37,7 @@ from imubench_pipeline.navigation.error_budget.printed_errors import (
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.growth import Calibrated, Uncalibrated
 from imubench_pipeline.settings.printed import IN_USE, Datasheet
+from imubench_pipeline.words.verdicts import source_text
 from tests.rows import typed
 
 G = 9.80665
@@ -74,7 +75,7 @@ def test_growth_is_the_integral_of_what_grows(order: int, time: float, over: flo
 
 def parts_of(quantity: Quantity, start: Start, use: Use = USE, **given_: Any) -> dict[str, float]:
     found = budget(quantity, 60.0, gyro=NOTHING, accel=NOTHING, start=start, use=use, **given_)
-    return {one.source: one.sigma for one in found.contributions if one.sigma}
+    return {source_text(one.source): one.sigma for one in found.contributions if one.sigma}
 
 
 def test_what_each_figure_adds_after_a_static_window() -> None:
@@ -141,11 +142,11 @@ def test_what_is_not_known_is_missing_and_what_is_adds_up(
     found = budget(quantity, 9.0, gyro_figures=known, accel_figures=known, **given_)
     sources = {one.source: one for one in whole.contributions if one.figure and one.sigma}
     left = {one.source for one in found.contributions if one.figure and one.sigma}
-    assert left == {name for name, one in sources.items() if one.cause not in unknown}
+    assert left == {name for name, one in sources.items() if one.source.source not in unknown}
     for one in found.missing:
-        assert one.cause in unknown
+        assert one.source.source in unknown
         assert one.lever * 1e-3 == pytest.approx(sources[one.source].sigma)
-    missed = {one.cause for one in found.missing}
+    missed = {one.source.source for one in found.missing}
     assert missed <= {"turn_on_bias", "temperature", "scale_factor", "g_sensitivity"} | {
         "vibration_rectification"
     }
@@ -181,7 +182,9 @@ def test_north_has_the_bias_of_the_gyro() -> None:
     known = figures(turn_on_bias=1e-6, repeatability=2e-6)
     compass = Gyrocompass(gyro=NoiseModel(N=1e-6), latitude=0.0, figures=known)
     found = compass.heading(400.0)
-    biases = {one.source: one.sigma for one in found.contributions if one.cause != "noise"}
+    biases = {
+        source_text(one.source): one.sigma for one in found.contributions if not one.source.is_noise
+    }
     assert biases == {
         "gyro turn-on bias": pytest.approx(1e-6 / EARTH_RATE),
         "gyro repeatability": pytest.approx(2e-6 / EARTH_RATE),
@@ -190,7 +193,7 @@ def test_north_has_the_bias_of_the_gyro() -> None:
     assert compass.time_needed(2.2e-6 / EARTH_RATE) is None
     assert compass.time_needed(found.total) == pytest.approx(400.0)
     (missing,) = Gyrocompass(gyro=NoiseModel(N=1e-6), latitude=0.0).heading(9.0).missing
-    assert (missing.cause, missing.lever) == ("turn_on_bias", pytest.approx(1 / EARTH_RATE))
+    assert (missing.source.source, missing.lever) == ("turn_on_bias", pytest.approx(1 / EARTH_RATE))
 
 
 def test_nothing_happens_without_a_use() -> None:

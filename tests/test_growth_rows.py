@@ -11,6 +11,7 @@ from imubench_pipeline.navigation.compared import ComparedChannel
 from imubench_pipeline.navigation.error_growth import list_growth_rows
 from imubench_pipeline.navigation.expected_errors import list_error_rows, list_standard_questions
 from imubench_pipeline.navigation.ratios import compare_deviations, list_deviation_rows
+from imubench_pipeline.words.verdicts import source_text
 
 NAMES = {"sensor": "alpha", "recording": "night"}
 DRAWS = 9
@@ -48,7 +49,7 @@ def grown() -> list[ErrorGrowthRow]:
 def test_errors_that_grow_are_those_of_the_budget() -> None:
     questions = list(list_standard_questions([10.0, 45.0], 90.0, 0.8, ["worst"]))
     asked = {
-        (row["error"], row["time"], row["source"]): row
+        (row.error, row.time, source_text(row)): row
         for row in list_error_rows(NAMES, ESTIMATES, questions, **HOW)
         if row["error"] != "north"
     }
@@ -59,7 +60,7 @@ def test_errors_that_grow_are_those_of_the_budget() -> None:
     ]
     assert len(of_table) == len(asked) > 40
     for row in of_table:
-        of_budget = asked[row["error"], row["time"], row["source"]]
+        of_budget = asked[row.error, row.time, source_text(row)]
         for name in ("gyro", "accel", "unit"):
             assert row[name] == of_budget[name]
         for name in ("sigma", "lower", "upper"):

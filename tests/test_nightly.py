@@ -405,7 +405,7 @@ def drift(name: str, verdict: str | None) -> dict[str, Any]:
     return {"sensor": "s", "device": "1", "channel": "gyro_x", "parameter": "bias",
             "recording": name, "position": 4, "value": 2e-3, "unit": "rad/s",
             "expected_lower": 0.0, "expected_upper": 1e-3, "verdict": verdict,
-            "reason": "above what the 3 before it lead one to expect"}  # fmt: skip
+            "reasons": ["above what the 3 before it lead one to expect"]}  # fmt: skip
 
 
 def standing(sensor: str, verdict: str = "meets", margin: float = 2.0) -> dict[str, Any]:

@@ -216,18 +216,18 @@ def test_turn_on_bias_by_hand() -> None:
         [-2.0, 2.0, -1.0 - np.sqrt(2), None, -1.0 + np.sqrt(2), float("nan")]
     )
     assert (found.recordings, found.left_out) == (4, 2)
-    assert found.mean == pytest.approx(-0.5)
+    assert found.value == pytest.approx(-0.5)
     squares = 1.5**2 + 2.5**2 + (0.5 + np.sqrt(2)) ** 2 + (0.5 - np.sqrt(2)) ** 2
-    assert found.deviation == pytest.approx(np.sqrt(squares / 3))
-    assert found.deviation_lower == pytest.approx(np.sqrt(squares / 9.348404))
-    assert found.deviation_upper == pytest.approx(np.sqrt(squares / 0.2157953))
+    assert found.spread == pytest.approx(np.sqrt(squares / 3))
+    assert found.spread_lower == pytest.approx(np.sqrt(squares / 9.348404))
+    assert found.spread_upper == pytest.approx(np.sqrt(squares / 0.2157953))
     assert found.upper == pytest.approx(-0.5 + 3.182446 * np.sqrt(squares / 3) / 2)
 
 
 def test_one_mean_has_no_deviation() -> None:
     found = estimate_turn_on_bias([-0.3])
-    assert (found.mean, found.deviation, found.upper) == (-0.3, None, None)
-    assert estimate_turn_on_bias([]).mean is None
+    assert (found.value, found.spread, found.upper) == (-0.3, None, None)
+    assert estimate_turn_on_bias([]).value is None
 
 
 def parameter(recording, name="N", value=1.0, status="ok", half=0.01, **more):
@@ -265,7 +265,7 @@ def test_rows_of_one_device() -> None:
     assert row["spread"] == pytest.approx(alone.spread * alone.value)
     assert (row["recordings"], row["left_out"], row["verdict"]) == (3, 0, "differ")
     assert row["unit"] == "rad/s/sqrt(Hz)"
-    assert row["reason"] == "the recordings differ: the sensor is not stationary"
+    assert "; ".join(row["reasons"]) == "the recordings differ: the sensor is not stationary"
 
 
 def test_devices_that_differ_are_told_from_recordings_that_do(rng: np.random.Generator) -> None:
@@ -287,8 +287,8 @@ def test_devices_that_differ_are_told_from_recordings_that_do(rng: np.random.Gen
     )
     for name in ("N", "bias"):
         assert set(key[0] for key in apart) == {None, "x", "y", "z"}
-        assert "differ more than repeated" in apart[None, "gyro_x", name]["reason"]
-        assert "no more than" in alike[None, "gyro_x", name]["reason"]
+        assert "differ more than repeated" in "; ".join(apart[None, "gyro_x", name]["reasons"])
+        assert "no more than" in "; ".join(alike[None, "gyro_x", name]["reasons"])
     assert apart[None, "gyro_x", "N"]["verdict"] == "differ"
     assert apart["y", "gyro_x", "N"]["verdict"] == "agree"
     assert alike["y", "gyro_x", "N"]["verdict"] == "differ"
@@ -300,14 +300,14 @@ def test_devices_are_compared_by_analysis_of_variance(rng: np.random.Generator) 
     rows = [parameter(name, value=float(np.exp(y))) for name, _, y in names]
     found = by_key(list_pooled_rows(rows, [], {("S", name): device for name, device, _ in names}))
     expected = f_oneway(*groups).pvalue
-    assert f"(p = {number_text(expected, 2)})" in found[None, "gyro_x", "N"]["reason"]
+    assert f"(p = {number_text(expected, 2)})" in "; ".join(found[None, "gyro_x", "N"]["reasons"])
 
 
 def test_one_recording_a_device_cannot_tell_which() -> None:
     rows = [parameter("a"), parameter("b", value=2.0)]
     found = by_key(list_pooled_rows(rows, [], {}))
     assert list(found) == [(None, "gyro_x", "N")]
-    reason = found[None, "gyro_x", "N"]["reason"]
+    reason = "; ".join(found[None, "gyro_x", "N"]["reasons"])
     assert reason == "the recordings differ: the devices differ, or the sensor is not stationary"
 
 
@@ -322,7 +322,7 @@ def test_a_term_absent_in_some_is_no_agreement() -> None:
     assert set(key[2] for key in found) == {"N", "K", "T_B"}
     walk = found[None, "gyro_x", "K"]
     assert (walk["recordings"], walk["left_out"], walk["verdict"]) == (2, 2, None)
-    assert "not in the model of 2 of 4 recordings" in walk["reason"]
+    assert "not in the model of 2 of 4 recordings" in "; ".join(walk["reasons"])
     times = found[None, "gyro_x", "T_B"]
     assert (times["recordings"], times["left_out"], times["verdict"]) == (2, 0, "agree")
 
@@ -334,15 +334,17 @@ def test_reasons_say_what_is_left_out() -> None:
     row = by_key(list_pooled_rows(rows, [], {}))[None, "gyro_x", "N"]
     assert (row["recordings"], row["left_out"]) == (2, 3)
     for why in ("not determined", "bounded", "no 95 % limits"):
-        assert f"1 recording not used ({why})" in row["reason"]
-    assert "2 recordings not used have limits outside the predicted range" in row["reason"]
+        assert f"1 recording not used ({why})" in "; ".join(row["reasons"])
+    assert "2 recordings not used have limits outside the predicted range" in "; ".join(
+        row["reasons"]
+    )
 
 
 def test_none_identified_gives_a_row_without_a_value() -> None:
     rows = [parameter(r, "B", None, "not_identified") for r in "ab"]
     row = by_key(list_pooled_rows(rows, [], {}))[None, "gyro_x", "B"]
     assert (row["recordings"], row["left_out"], row["value"], row["spread"]) == (0, 2, None, None)
-    assert row["reason"] == "2 recordings not used (not determined)"
+    assert "; ".join(row["reasons"]) == "2 recordings not used (not determined)"
 
 
 def test_biases() -> None:
@@ -353,7 +355,7 @@ def test_biases() -> None:
     assert (row["recordings"], row["left_out"], row["unit"]) == (2, 1, "rad/s")
     assert row["spread"] == pytest.approx(np.sqrt(2) * 1e-3)
     assert (row["verdict"], row["p_value"]) == (None, None)
-    assert "gravity" in found[None, "accel_z", "bias"]["reason"]
+    assert "gravity" in "; ".join(found[None, "accel_z", "bias"]["reasons"])
 
 
 @pytest.mark.release

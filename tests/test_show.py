@@ -9,7 +9,8 @@ from rich.cells import cell_len
 
 from imubench_pipeline.model.verdicts import UnitFactor
 from imubench_pipeline.report import show
-from imubench_pipeline.tables import write
+from imubench_pipeline.report.terminal import render_logs
+from imubench_pipeline.tables import build, write
 
 DEGREE = 3.141592653589793 / 180
 N = DEGREE / 60  # 1 °/√h
@@ -53,7 +54,7 @@ RANKING = [
              recordings=1, longest_log=660.0, evidence="weak",
              evidence_reasons=("one_specimen", "short_log")),
     standing("third", rank=None, verdict="not_enough_data", sigma=None, margin=None,
-             reason="no accelerometer in the recording",
+             reasons=["no accelerometer in the recording"],
              corrected_verdict="meets", corrected_margin=7.5,
              corrected_units=(UnitFactor("gyro", DEGREE),)),
     standing("made", requirement="drone"),
@@ -275,3 +276,26 @@ def test_other_commands_do_not_wait_for_what_draws() -> None:
     code = "import sys, imubench_pipeline.report.show; sys.exit(sum(n in sys.modules for n in %r))"
     names = ("rich", "pyarrow", "numpy", "imubench_pipeline.units")
     assert subprocess.run([sys.executable, "-c", code % (names,)], check=False).returncode == 0
+
+
+def test_a_problem_of_a_log_is_printed_once_with_the_parameters_that_it_affects() -> None:
+    names = {"sensor": "good", "recording": "run", "channel": "gyro_x"}
+    finding = names | {"finding": "knocks", "severity": "warning", "detail": "3 knocks"}
+    doubts = [
+        names | {"code": "knocks", "fitness": "fit with doubts", "parameters": ["N", "Q"],
+                 "reason": "3 knocks"},
+        names | {"code": "doubtful", "fitness": "fit with doubts", "parameters": ["K"],
+                 "reason": "the walk is doubtful"},
+    ]  # fmt: skip
+    tables = {
+        "recordings": [recording("good")],
+        "findings": [finding | {"affects": ["N", "Q"]}],
+        "doubts": doubts,
+        "parameters": PARAMETERS[:1],
+        "allan": [],
+    }
+    built = {name: build(name, rows) for name, rows in tables.items()}
+    text = "".join(str(part) for part in render_logs(built, "practical", 80))
+    assert text.count("3 knocks") == 1
+    assert "gyro_x (knocks, affects N, Q): 3 knocks" in text
+    assert "gyro_x K: the walk is doubtful" in text

@@ -198,6 +198,6 @@ def test_texts_in_lists_and_structs_show_each_character() -> None:
 def test_numbers_in_structs_are_finite_or_null() -> None:
     row = {"requirement": "r", "sensor": "s", "verdict": "meets", "decides": True, "unit": "rad",
            "error": "heading", "time": 1.0, "limit_verdict": "meets"}  # fmt: skip
-    parts = tuple(Share("gyro N", share) for share in (0.5, *NOT_FINITE))
+    parts = tuple(Share("N", "gyro", share=share) for share in (0.5, *NOT_FINITE))
     (made,) = build("ranking", [row | {"parts": parts}]).to_pylist()
     assert [part["share"] for part in made["parts"]] == [0.5, None, None, None]

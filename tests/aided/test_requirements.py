@@ -73,7 +73,7 @@ def test_a_sensor_is_held_against_the_error_of_one_axis() -> None:
     assert row["sigma"] == pytest.approx(1.0 / math.sqrt(2.0))
     assert row["margin"] == pytest.approx(allowed * math.sqrt(2.0))
     assert (row["verdict"], row["trajectory"], row["time"]) == ("meets", "field", 30.0)
-    assert "simulated drives" in row["reason"]
+    assert "simulated drives" in "; ".join(row["reasons"])
     assert verdict(2.0)["verdict"] == "fails"
     near = allowed * math.sqrt(2.0)
     assert verdict(0.97 * near)["verdict"] == "likely_meets"
@@ -88,7 +88,7 @@ def test_a_sensor_is_held_against_the_error_of_one_axis() -> None:
 def test_a_run_of_something_else_does_not_answer(changes: dict[str, Any]) -> None:
     row = verdict(1.0, **changes)
     assert row["verdict"] == "not_enough_data"
-    assert "navigate" in row["reason"]
+    assert "navigate" in "; ".join(row["reasons"])
 
 
 def test_what_settings_and_requirements_may_ask_for_is_there() -> None:

@@ -3,10 +3,10 @@ import math
 import numpy as np
 import pytest
 
-from imubench_pipeline.navigation.backtest.covariance import WindowCovariance
 from imubench_pipeline.navigation.backtest.windows import (
     Errors,
     Window,
+    WindowCovariance,
     choose_window,
     compute_window_errors,
 )

@@ -11,8 +11,7 @@ from imubench_pipeline.estimators.likelihood import fit
 from imubench_pipeline.model.estimates import BacktestRow, DeterministicRow
 from imubench_pipeline.model.recordings import RecordingRow
 from imubench_pipeline.model.verdicts import DoubtMark
-from imubench_pipeline.navigation.backtest.comparison import findings
-from imubench_pipeline.navigation.backtest.of_recording import list_backtest_rows
+from imubench_pipeline.navigation.backtest.comparison import findings, list_backtest_rows
 from imubench_pipeline.navigation.expected_errors import list_error_rows, list_requirement_questions
 from imubench_pipeline.recordings.fitness import derive_doubts, judge_recordings
 from imubench_pipeline.recordings.recording import ChannelLog, LogWriter, open_channel_logs
@@ -98,7 +97,7 @@ def test_a_drift_that_no_model_has_is_a_doubt_and_stands_in_the_ranking(
     )
     heading = next(row for row in rows if row["error"] == "heading")
     assert heading["ratio"] > 1.5 * heading["ratio_upper"] and heading["contradicted"]
-    assert heading["taken_out"] == "periodic_drift"
+    assert heading["taken_out"] == ("periodic_drift",)
     (finding,) = findings(rows)
     assert finding["channel"] == "gyro_x" and finding["value"] == heading["ratio"]
     assert "periodic drift" in finding["detail"] and "600 s" in finding["detail"]
@@ -130,7 +129,7 @@ def test_a_drift_that_no_model_has_is_a_doubt_and_stands_in_the_ranking(
     assert by_error["heading"]["backtest_ratio"] == heading["ratio"]
     assert by_error["heading"]["backtest_windows"] == heading["windows"]
     # Of a velocity error the gyro's tilt is the larger part here, and its log answers.
-    largest = by_error["velocity"]["source"].split()[0]
+    largest = by_error["velocity"]["parts"][0]["quantity"]
     assert by_error["velocity"]["backtest_channel"] == f"{largest}_x"
 
 

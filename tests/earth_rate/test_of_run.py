@@ -66,7 +66,7 @@ def test_the_rate_is_found_within_what_is_said_of_it(found: Found) -> None:
     assert rows["filter"]["model_from"] == "static recording night; method likelihood"
     given = rows["known_rate"]
     assert (given["status"], given["sigma"]) == ("given", None)
-    assert "whatever rate" in given["reason"]
+    assert "whatever rate" in "; ".join(given["reasons"])
     last = by_method(found["earth_rate"], "last 5 min")["pairs"]
     assert last["dwells"] == 10
     assert last["sigma"] == pytest.approx(rows["pairs"]["sigma"] * math.sqrt(2), rel=0.05)
@@ -102,7 +102,7 @@ def test_sixty_seconds_never_know_the_rate_better_than_white_noise_allows(
     for method in ("pairs", "filter", "smoother"):
         assert rows[method]["sigma"] > least > 0.38 * EARTH
     assert rows["triples"]["status"] == "not_shown"
-    assert "no three dwells" in rows["triples"]["reason"]
+    assert "no three dwells" in "; ".join(rows["triples"]["reasons"])
     assert all(one["sigma"] > least for one in found["earth_rate_series"]
                if one["quantity"] == "rate" and one["sigma"] is not None)  # fmt: skip
 
@@ -134,8 +134,10 @@ def test_a_sense_that_is_not_known_is_said(tmp_path: Path, rest: Path) -> None:
     found = briefly(put(tmp_path / "a", turned_log(first=-1)), [rest], first=None)
     row = by_method(found["earth_rate"])["pairs"]
     assert row["status"] == "ambiguous" and row["value"] < 0.0
-    assert "state 'first: north' or 'first: south'" in row["reason"]
-    assert any("assumed" in one["doubts"] for one in found["turning"] if one["what"] == "doubt")
+    assert "state 'first: north' or 'first: south'" in "; ".join(row["reasons"])
+    assert any(
+        "assumed" in "; ".join(one["doubts"]) for one in found["turning"] if one["what"] == "doubt"
+    )
 
 
 @pytest.mark.release
@@ -148,13 +150,13 @@ def test_turns_that_the_schedule_alone_says_are_a_doubt(
     folder = put(tmp_path / "a", log)
     doubted = by_method(briefly(folder, [rest])["earth_rate"])
     assert {doubted[name]["status"] for name in ("pairs", "filter")} == {"ambiguous"}
-    assert "19 of 19 turns rest on the schedule" in doubted["filter"]["reason"]
-    assert "state 'trust_schedule: true'" in doubted["filter"]["reason"]
+    assert "19 of 19 turns rest on the schedule" in "; ".join(doubted["filter"]["reasons"])
+    assert "state 'trust_schedule: true'" in "; ".join(doubted["filter"]["reasons"])
     assert doubted["known_rate"]["status"] == "given"
     trusted = by_method(briefly(folder, [rest], trust_schedule=True)["earth_rate"])["filter"]
-    assert trusted["status"] == "ok" and "19 of 19" in trusted["reason"]
+    assert trusted["status"] == "ok" and "19 of 19" in "; ".join(trusted["reasons"])
     seen = by_method(found["earth_rate"])["filter"]
-    assert seen["status"] == "ok" and "reason" not in seen
+    assert seen["status"] == "ok" and not seen["reasons"]
 
 
 @pytest.mark.release
@@ -187,8 +189,10 @@ def test_times_count_from_the_first_sample_of_the_recording(tmp_path: Path, rest
 def test_a_log_without_turns_says_so(tmp_path: Path, rest: Path) -> None:
     found = briefly(put(tmp_path / "a", {"gyro_x": turned([], 600.0)}), [rest])
     assert {row["status"] for row in found["earth_rate"]} == {"no_turns"}
-    assert "nothing shows that the log was turned every 30 s" in found["earth_rate"][0]["reason"]
-    assert "check 'dwell' and 'channel'" in found["earth_rate"][0]["reason"]
+    assert "nothing shows that the log was turned every 30 s" in "; ".join(
+        found["earth_rate"][0]["reasons"]
+    )
+    assert "check 'dwell' and 'channel'" in "; ".join(found["earth_rate"][0]["reasons"])
     assert found["earth_rate_series"] == [] and found["earth_rate_prediction"]
 
 
@@ -196,21 +200,21 @@ def test_a_log_without_turns_says_so(tmp_path: Path, rest: Path) -> None:
 def test_a_position_that_never_changes_says_so(tmp_path: Path, rest: Path) -> None:
     log = turned_log()
     found = briefly(put(tmp_path / "a", log | {"position": np.ones(len(log["gyro_x"]))}), [rest])
-    assert "the log never turns" in found["earth_rate"][0]["reason"]
+    assert "the log never turns" in "; ".join(found["earth_rate"][0]["reasons"])
 
 
 @pytest.mark.release
 def test_a_log_that_is_too_short_says_so(tmp_path: Path, rest: Path) -> None:
     short = {"gyro_x": turned_log()["gyro_x"][: round(40 * RATE)]}
     found = briefly(put(tmp_path / "a", short), [rest])
-    assert "less than two dwells of 30 s" in found["earth_rate"][0]["reason"]
+    assert "less than two dwells of 30 s" in "; ".join(found["earth_rate"][0]["reasons"])
 
 
 def test_segments_of_unknown_distance_are_refused(tmp_path: Path, rest: Path) -> None:
     log = turned_log()
     half = len(log["gyro_x"]) // 2
     folder = put(tmp_path / "a", log, segments=[[0, half], [half, 2 * half]])
-    assert "2 segments" in briefly(folder, [rest])["earth_rate"][0]["reason"]
+    assert "2 segments" in briefly(folder, [rest])["earth_rate"][0]["reasons"][0]
 
 
 def test_a_position_on_another_clock_is_refused(tmp_path: Path, rest: Path) -> None:
@@ -220,7 +224,7 @@ def test_a_position_on_another_clock_is_refused(tmp_path: Path, rest: Path) -> N
     (other / "log.parquet").rename(folder / "log.position.parquet")
     path = folder / "quality.json"
     replace(Quality.read(path), kept=identify_files(list_log_files(folder))).write(path)
-    assert "a clock of its own" in briefly(folder, [rest])["earth_rate"][0]["reason"]
+    assert "a clock of its own" in briefly(folder, [rest])["earth_rate"][0]["reasons"][0]
 
 
 @pytest.mark.parametrize("stated", [{"channel": "gyro_x"}, {}])
@@ -230,7 +234,7 @@ def test_a_gyro_that_cannot_be_used_is_said_beside_what_can(
     log = {"accel_x": np.zeros(1000)}
     found = briefly(put(tmp_path / "a", log, unusable=["gyro_x"]), [rest], **stated)
     assert {row["status"] for row in found["earth_rate"]} == {"not_shown"}
-    assert all("gyro_x cannot be used" in row["reason"] for row in found["earth_rate"])
+    assert all("gyro_x cannot be used" in "; ".join(row["reasons"]) for row in found["earth_rate"])
     build("earth_rate", found["earth_rate"])
 
 
@@ -246,7 +250,7 @@ def test_without_a_static_recording_the_turns_are_found_and_nothing_is_estimated
 ) -> None:
     found = briefly(put(tmp_path / "a", turned_log()), [])
     assert {row["status"] for row in found["earth_rate"]} == {"no_model"}
-    assert "Add a static log of this sensor" in found["earth_rate"][0]["reason"]
+    assert "Add a static log of this sensor" in "; ".join(found["earth_rate"][0]["reasons"])
     assert sum(row["what"] == "turn" for row in found["turning"]) == 19
     assert found["earth_rate_prediction"] == []
 

@@ -61,7 +61,7 @@ def test_what_temperature_adds_is_not_averaged_away() -> None:
     assert row["lower"] < row["n"] < row["upper"]
     better = candidate("good", known(N=math.sqrt(0.9e-10 * 10.0)))
     row = rows_of(candidate("bad", noise, temperature=warm), better)["bad", "good"]
-    assert not row["reachable"] and "floor" in row["reason"]
+    assert not row["reachable"] and "floor" in "; ".join(row["reasons"])
 
 
 def test_a_run_takes_temperature_from_its_tables() -> None:
@@ -109,7 +109,7 @@ def test_a_pair_is_compared_both_ways() -> None:
     one = rows["a", "b"]
     assert one["n"] == pytest.approx(9.0)
     assert one["adev"] == pytest.approx(3e-4 / math.sqrt(10))
-    assert (one["reachable"], one["reason"], one["common_share"]) == (True, None, 0.0)
+    assert (one["reachable"], one["reasons"], one["common_share"]) == (True, [], 0.0)
     assert rows["b", "a"]["n"] == pytest.approx(1 / 9)
     # log n is normal with 2 sqrt(2) times the spread of log N.
     assert one["upper"] / 9 == pytest.approx(1.1 ** (2 * math.sqrt(2)), rel=0.1)
@@ -123,7 +123,10 @@ def test_where_the_common_part_is_a_floor_no_number_is_enough() -> None:
     long = rows_of(poor, good, tau=1000.0, common={"K": 0.5})["a", "b"]
     assert (long["n"], long["lower"], long["upper"]) == (None, None, None)
     assert long["reachable"] is False
-    assert long["reason"] == "no number of them reaches it at 1000 s: the common part is a floor"
+    assert (
+        "; ".join(long["reasons"])
+        == "no number of them reaches it at 1000 s: the common part is a floor"
+    )
     assert long["floor"] == pytest.approx(1e-5 * math.sqrt(1000 / 6))
     assert long["common_share"] == pytest.approx(0.5, abs=0.01)
 
@@ -132,14 +135,16 @@ def test_near_a_floor_the_upper_limit_is_open() -> None:
     poor, good = candidate("a", known(1.5, N=1e-3)), candidate("b", known(N=3.3e-4))
     row = rows_of(poor, good, common={"N": 0.1})["a", "b"]
     assert row["n"] is not None and row["upper"] is None and row["lower"] < row["n"]
-    assert row["reason"] == "within the limits of the parameters, no number may reach it"
+    assert (
+        "; ".join(row["reasons"]) == "within the limits of the parameters, no number may reach it"
+    )
 
 
 def test_beyond_what_the_logs_tell_there_is_no_number() -> None:
     short = candidate("a", known(N=3e-4), duration=90.0)
     row = rows_of(short, candidate("b", known(N=1e-4)), tau=11.0)["a", "b"]
     assert (row["n"], row["adev"]) == (None, None) and row["other_adev"] is not None
-    assert row["reason"] == "the logs of a tell tau up to 10 s alone"
+    assert "; ".join(row["reasons"]) == "the logs of a tell tau up to 10 s alone"
 
 
 def test_a_parameter_that_is_not_known_leaves_no_number_where_it_matters() -> None:
@@ -147,10 +152,10 @@ def test_a_parameter_that_is_not_known_leaves_no_number_where_it_matters() -> No
     vague = {**known(N=3e-4), "K": K}
     other = candidate("b", known(N=1e-4))
     short = rows_of(candidate("a", vague), other, tau=1.0)["a", "b"]
-    assert short["n"] == pytest.approx(9.0, rel=1e-3) and short["reason"] is None
+    assert short["n"] == pytest.approx(9.0, rel=1e-3) and not short["reasons"]
     long = rows_of(candidate("a", vague), other, tau=1000.0)["a", "b"]
     assert long["n"] is None
-    assert long["reason"] == "K of a/r gyro x is not determined"
+    assert "; ".join(long["reasons"]) == "K of a/r gyro x is not determined"
     assert long["upper"] > 1.5 * long["lower"] > 9.0
 
 
@@ -159,7 +164,7 @@ def test_an_unknown_correlation_time_is_a_matter_of_its_process() -> None:
     other = candidate("b", known(N=1e-4))
     assert rows_of(candidate("a", vague), other, tau=1.0)["a", "b"]["n"] is not None
     row = rows_of(candidate("a", vague), other, tau=100.0)["a", "b"]
-    assert row["reason"] == "T_B of a/r gyro x is bounded"
+    assert "; ".join(row["reasons"]) == "T_B of a/r gyro x is bounded"
 
 
 def test_the_median_measured_channel_answers() -> None:
@@ -182,7 +187,7 @@ def test_the_median_measured_channel_answers() -> None:
 def test_what_has_no_noise_model_has_no_number() -> None:
     nothing = {"N": Parameter(None, "not_shown")}
     row = rows_of(candidate("a", nothing), candidate("b", known(N=1e-4)))["a", "b"]
-    assert (row["n"], row["reason"]) == (None, "no noise model of a")
+    assert (row["n"], "; ".join(row["reasons"])) == (None, "no noise model of a")
 
 
 def test_quantities_are_not_mixed() -> None:
@@ -206,4 +211,4 @@ def test_the_tables_of_a_run_give_its_rows() -> None:
     ]
     assert rows[0]["n"] == pytest.approx(1.0)
     assert rows[0]["lower"] < 1.0 < rows[0]["upper"]
-    assert rows[-1]["n"] is None and "tell tau up to 800 s alone" in rows[-1]["reason"]
+    assert rows[-1]["n"] is None and "tell tau up to 800 s alone" in "; ".join(rows[-1]["reasons"])

@@ -4,14 +4,15 @@ import importlib
 import inspect
 import pkgutil
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, get_args
 
 import pytest
 import yaml
 
 from imubench_pipeline.estimators.estimate import FAMILY, SI_UNITS
 from imubench_pipeline.estimators.model_choice import CANDIDATE_MODELS
-from imubench_pipeline.navigation.verdicts.evidence import find_noise_parameters
+from imubench_pipeline.model.states import NoiseSource
+from imubench_pipeline.navigation.verdicts.evidence import PARAMETERS_OF_SOURCE
 from imubench_pipeline.noise import (
     PARAMETERS,
     TERMS,
@@ -127,7 +128,8 @@ def test_pages_know_it(kind: type[Term]) -> None:
     for quantity in ("gyro", "accel"):
         assert "{" not in TERM_NAMES[quantity][kind.symbol]
     symbols = [one.symbol for one in kind.parameters]
-    assert set(symbols) <= find_noise_parameters(f"gyro {example(kind).source}")
+    assert kind.word in get_args(NoiseSource)
+    assert set(symbols) <= PARAMETERS_OF_SOURCE[kind.word]
     for symbol in symbols:
         assert symbol in SYMBOLS
         for quantity in ("gyro", "accel"):

@@ -246,12 +246,12 @@ def test_equal_window_and_motion_give_the_allan_variance(term: Term) -> None:
         found = term.growth(0, tau, Calibrated(tau)) / tau**2
         assert found == pytest.approx(2.0 * continuous(term, tau), rel=1e-9)
     if term.role is not Role.WHITE:
-        ((name, sigma),) = term.sources(0, 70.0, Calibrated(70.0))
+        ((path, sigma),) = term.sources(0, 70.0, Calibrated(70.0))
     else:
-        (name, sigma), (in_window, of_window) = term.sources(0, 70.0, Calibrated(70.0))
-        assert in_window.startswith(name)
+        (path, sigma), (in_window, of_window) = term.sources(0, 70.0, Calibrated(70.0))
+        assert in_window == "static_window"
         sigma = math.hypot(sigma, of_window)
-    assert name.split()[0] == term.word
+    assert path is None
     assert sigma**2 == pytest.approx(term.growth(0, 70.0, Calibrated(70.0)))
 
 

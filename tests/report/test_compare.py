@@ -23,10 +23,12 @@ ROWS = {
     ],
     "error_growth": [
         {"axis": "worst", "gyro": "gyro_x", "window": 60.0, "error": "heading", "time": time,
-         "source": source, "sigma": sigma, "lower": 0.9 * sigma, "upper": 1.1 * sigma,
-         "unit": "rad"}
+         "source": source, "quantity": quantity, "sigma": sigma,
+         "lower": 0.9 * sigma, "upper": 1.1 * sigma, "unit": "rad"}
         for time in (1.0, 10.0)
-        for source, sigma in (("total", 5e-3), ("gyro N", 4e-3), ("gyro K", 3e-3))
+        for source, quantity, sigma in (
+            ("total", None, 5e-3), ("N", "gyro", 4e-3), ("K", "gyro", 3e-3)
+        )
     ],
 }  # fmt: skip
 

@@ -88,8 +88,10 @@ def test_an_unpublished_figure_is_told_from_one_that_cannot_be_compared() -> Non
     nothing = dict.fromkeys(("comparable", "measured", "lower", "upper", "delta", "delta_lower",
                              "delta_upper"))  # fmt: skip
     missing = FIGURE | nothing | {"printed": None, "unit": None, "kind": None}
-    other = FIGURE | nothing | {"verdict": "not comparable", "reason": "another convention"}
-    unpublished, incomparable = deltas(missing | {"verdict": "not published", "reason": "x"}, other)
+    other = FIGURE | nothing | {"verdict": "not comparable", "reasons": ["another convention"]}
+    unpublished, incomparable = deltas(
+        missing | {"verdict": "not published", "reasons": ["x"]}, other
+    )
     assert (unpublished["published"], unpublished["printed"]) == (False, "–")
     assert unpublished["reason"] == ""
     assert incomparable["published"] is True
@@ -199,7 +201,7 @@ def test_who_publishes_what_is_counted() -> None:
     rows = [
         *covered("b", {"N": "yes", "temperature_coefficient": "not looked up"}),
         *covered("a", {"N": "yes", "temperature_coefficient": "other convention"}, document=None),
-        *covered("c", {"N": "no", "temperature_coefficient": "yes"}, as_printed="7 ppm/K"),
+        *covered("c", {"N": "no", "temperature_coefficient": "yes"}, as_printed=["7 ppm/K"]),
         *covered("c", {"N": "no", "offset": "no"}, quantity="accel"),
     ]
     gyro, accel = make_coverage_tables(CoverageRow.rows_of(build("coverage", rows)))
@@ -234,7 +236,7 @@ def test_the_spread_of_turn_ons_stands_beside_what_is_printed() -> None:
         upper=12 * HOUR,
         delta=-0.5,
         verdict="not sure",
-        reason="why",
+        reasons=("why",),
     )
     (line,) = format_repeatability([row, replace(row, sensor="b")], "a", "practical")
     assert (line["printed"], line["about"], line["delta"]) == ("4 deg/h", "typ", "−50 %")

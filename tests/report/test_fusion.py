@@ -37,7 +37,7 @@ def test_numbers_are_rounded_up() -> None:
 
 
 def test_what_no_number_reaches_is_said() -> None:
-    found = line(n=None, lower=None, upper=None, reachable=False, reason="a floor")
+    found = line(n=None, lower=None, upper=None, reachable=False, reasons=["a floor"])
     assert (found["number"], found["limits"], found["reason"]) == ("not possible", "", "a floor")
     assert line(upper=None)["limits"] == "8 or more"
     assert line(n=None)["number"] == "–"
@@ -50,7 +50,7 @@ def test_only_the_worse_of_two_is_multiplied() -> None:
 
 def test_what_is_not_known_of_a_pair_is_said_once() -> None:
     nothing = dict.fromkeys(("adev", "floor", "common_share", "n", "lower", "upper", "reachable"))
-    one = ROW | nothing | {"reason": "too short"}
+    one = ROW | nothing | {"reasons": ["too short"]}
     two = one | {"sensor": "b", "other": "a", "adev": 1e-5, "other_adev": None}
     (found,) = make_pair_lines(FusionRow.rows_of(build("fusion", [one, two])))
     assert (found["sensor"], found["number"], found["common"]) == ("a", "–", "–")
@@ -137,7 +137,7 @@ def test_a_matrix_has_the_quietest_first_and_a_number_where_one_is_not_enough() 
 
 
 def test_a_sensor_of_which_nothing_is_known_is_in_no_matrix() -> None:
-    row = ROW | {"adev": None, "n": None, "lower": None, "upper": None, "reason": "too short"}
+    row = ROW | {"adev": None, "n": None, "lower": None, "upper": None, "reasons": ["too short"]}
     assert (
         list(make_matrices(list(make_pair_lines(FusionRow.rows_of(build("fusion", [row])))))) == []
     )

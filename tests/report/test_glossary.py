@@ -32,8 +32,6 @@ from imubench_pipeline.model.states import (
     ShortlistVerdict,
     Verdict,
 )
-from imubench_pipeline.navigation import pooled
-from imubench_pipeline.navigation.backtest import comparison
 from imubench_pipeline.navigation.error_budget import Gyrocompass, Start, budget
 from imubench_pipeline.noise import FLOOR, GaussMarkov, NoiseModel
 from imubench_pipeline.report import glossary as module
@@ -44,6 +42,7 @@ from imubench_pipeline.tables import findings
 from imubench_pipeline.units import convert_from_si, convert_to_si
 from imubench_pipeline.words.estimates import STATUS_WORDS
 from imubench_pipeline.words.findings import FINDINGS
+from imubench_pipeline.words.verdicts import source_text
 from tests.conftest import PROJECT
 from tests.rows import DATASHEET_VERDICTS
 
@@ -293,8 +292,8 @@ def values_in_tables() -> Iterator[tuple[str, str]]:
         yield severity, ""
     for verdict in [
         *DATASHEET_VERDICTS,
-        *get_args(pooled.Verdict),
-        *get_args(comparison.Verdict),
+        *get_args(PoolVerdict),
+        *get_args(BacktestVerdict),
     ]:
         yield verdict, "verdict"
     yield DEPENDS, "verdict"
@@ -503,7 +502,7 @@ def test_the_minimum_of_the_curve() -> None:
 
 def test_the_budget_of_the_example() -> None:
     found = budget("heading", 600.0, gyro=GYRO, accel=NOTHING, start=Start.calibrated(60.0))
-    shares = {part.source: math.degrees(part.sigma) for part in found.contributions}
+    shares = {source_text(part.source): math.degrees(part.sigma) for part in found.contributions}
     assert math.degrees(found.total) == pytest.approx(1.9, abs=0.05)
     assert shares["gyro flicker"] == pytest.approx(1.8, abs=0.05)
     assert shares["gyro K"] == pytest.approx(0.41, abs=0.005)

@@ -98,11 +98,12 @@ def budget(**changes: Any) -> list[dict[str, Any]]:
     names = {"sensor": "s", "recording": "r", "error": "heading", "unit": "rad"}
     sizes = {60.0: 0.01, 600.0: 0.04}
     return [
-        names | {"axis": axis, "time": time, "source": source, "sigma": part * sigma}
+        names | {"axis": axis, "time": time, "source": source, "sigma": part * sigma,
+                 "quantity": None if source == "total" else "gyro"}
         | ({"lower": sigma / 2, "upper": 2 * sigma} if source == "total" else {}) | changes
         for axis in ("worst", "median")
         for time, sigma in sizes.items()
-        for source, part in (("total", 1.0), ("gyro N", 0.8), ("gyro K", 0.6))
+        for source, part in (("total", 1.0), ("N", 0.8), ("K", 0.6))
     ]  # fmt: skip
 
 
@@ -158,7 +159,7 @@ def test_an_error_of_more_than_a_right_angle_is_no_number() -> None:
 
 def test_what_is_assumed_is_said_once_with_the_errors_that_it_is_about() -> None:
     note = "K of gyro_x is not identified"
-    rows = budget(reason=note) + budget(reason=note, error="attitude")
+    rows = budget(reasons=[note]) + budget(reasons=[note], error="attitude")
     rows += budget(error="position", unit="m")
     assert shown(rows)["notes"] == [f"Heading, attitude: {note}"]
 
@@ -177,7 +178,8 @@ def ranked(**changes: Any) -> tuple[Group, LimitLine]:
     row = {"requirement": "robot", "sensor": "s", "rank": 1, "verdict": "meets", "decides": True,
            "recording": "r", "error": "heading", "time": 100.0, "limit": 0.01, "sigma": 0.005,
            "lower": 0.004, "upper": 0.006, "unit": "rad", "margin": 2.0, "chance": 0.987,
-           "limit_verdict": "meets", "source": "gyro N", "share": 0.75,
+           "limit_verdict": "meets", "source": "N", "share": 0.75,
+           "parts": [{"source": "N", "quantity": "gyro", "share": 0.75}],
            "reached_after": 7200.0}  # fmt: skip
     rows = RankingRow.rows_of(build("ranking", [row | changes]))
     (one,) = format_rankings(rows, {"robot": ROBOT}, {("s", "r"): True}, "practical")
@@ -204,7 +206,7 @@ def test_a_limit_that_is_not_known_is_dashes_and_its_reason() -> None:
     nothing = dict.fromkeys(
         ("rank", "sigma", "lower", "upper", "margin", "chance", "source", "share", "reached_after")
     )
-    group, limit = ranked(**nothing, reason="no gyro", verdict="not_enough_data")
+    group, limit = ranked(**nothing, parts=[], reasons=["no gyro"], verdict="not_enough_data")
     dashes = {group.rank, limit.sigma, limit.interval, limit.margin, limit.chance, limit.source}
     assert dashes == {"–"} and (limit.reached, limit.parts) == ("–", ["–"])
     assert limit.reason == "no gyro"

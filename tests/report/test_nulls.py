@@ -61,7 +61,7 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> Tables:
     drift = names | {"channel": "gyro_x", "parameter": "N", "position": 1, "value": 1e-5,
                      "expected": 9e-6, "expected_lower": 8e-6, "expected_upper": 1e-5,
                      "change": 0.1, "p_value": 1e-3, "unit": "rad/s/sqrt(Hz)",
-                     "verdict": "changed", "reason": "of a test"}  # fmt: skip
+                     "verdict": "changed", "reasons": ["of a test"]}  # fmt: skip
     rows = [
         *test_boards.some(),
         *test_earth_rate.some(turned),

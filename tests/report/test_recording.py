@@ -42,7 +42,7 @@ def test_a_back_test_stands_on_the_pages_of_recording_and_comparison(
             "predicted": 0.25 * DEGREE, "predicted_lower": 0.2 * DEGREE,
             "predicted_upper": 0.3 * DEGREE, "ratio": 2.0, "ratio_lower": 0.93,
             "ratio_upper": 1.08, "chance": 1e-9, "verdict": "more than predicted",
-            "contradicted": True, "taken_out": "warm_up_drift"}  # fmt: skip
+            "contradicted": True, "taken_out": ["warm_up_drift"]}  # fmt: skip
     short = {"reason": "log too short: it needs 6000 s", "time": 2000.0}
     rows["backtest"] = [place | done, place | short]
     publish(site(joined(rows, requirements=asked), requirements=asked), tmp_path)

@@ -26,12 +26,12 @@ OTHERS: list[dict[str, Any]] = [
         "verdict": "cannot_meet",
         "shortfalls": (Shortfall("mass", "", "15 g", (0.02,)),),
     },
-    {"requirement": "robot", "sensor": "silent", "verdict": "not_judged", "reason": "no gyro"},
+    {"requirement": "robot", "sensor": "silent", "verdict": "not_judged", "reasons": ["no gyro"]},
 ]
 REPEATED = {"sensor": "one", "device": "unit 7", "channel": "gyro_x", "recordings": 3,
             "power_cycled": "unknown", "printed": 4.0, "unit": "deg/h", "kind": "typ",
             "comparable": 4 * HOUR, "measured": 2 * HOUR, "lower": HOUR, "upper": 12 * HOUR,
-            "delta": -0.5, "verdict": "not sure", "reason": "the power"}  # fmt: skip
+            "delta": -0.5, "verdict": "not sure", "reasons": ["the power"]}  # fmt: skip
 
 
 @pytest.fixture(scope="module")

@@ -65,7 +65,7 @@ def test_a_simulated_best_sensor_is_called_so() -> None:
 
 
 def test_what_the_decisive_figure_leaves_out_is_said() -> None:
-    _, lines = said(row(reason="K of gyro_x is not identified"))
+    _, lines = said(row(reasons=["K of gyro_x is not identified"]))
     assert lines == [f"{LIMIT} Not counted: K of gyro_x is not identified. {DATA}"]
 
 
@@ -99,7 +99,7 @@ def test_a_verdict_that_a_corrected_unit_changes_is_said() -> None:
     _, lines = said(
         row("a"),
         row("b", verdict="not_enough_data", **UNKNOWN, logged_verdict="fails", logged_margin=0.1,
-            corrected_verdict="meets", corrected_margin=7.0, reason="no data",
+            corrected_verdict="meets", corrected_margin=7.0, reasons=["no data"],
             corrected_units=(UnitFactor("gyro", 0.017453292519943295),)),
     )  # fmt: skip
     assert lines[1:] == [

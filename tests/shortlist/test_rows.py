@@ -11,12 +11,12 @@ from imubench_pipeline.model.comparisons import RankingRow
 from imubench_pipeline.model.estimates import ParameterRow
 from imubench_pipeline.model.recordings import RecordingRow
 from imubench_pipeline.model.states import ShortlistVerdict
-from imubench_pipeline.navigation.shortlist.figures import (
+from imubench_pipeline.navigation.shortlist import (
     MeasuredRanges,
     collect_measured_ranges,
     collect_printed_ranges,
+    list_shortlist_rows,
 )
-from imubench_pipeline.navigation.shortlist.rows import list_shortlist_rows
 from imubench_pipeline.noise import FLOOR, Flicker, GaussMarkov
 from imubench_pipeline.noise.growth import Uncalibrated
 from imubench_pipeline.settings.requirements import Requirement
@@ -154,9 +154,11 @@ def test_options_are_all_there_to_buy_unless_one_is_stated() -> None:
 
 def test_what_is_not_judged_says_why() -> None:
     (row,) = judged(sensor(bias_instability={"value": 3, "unit": "deg/h"}))
-    assert row["verdict"] == "not_judged" and "no noise density of the gyro" in row["reason"]
+    assert row["verdict"] == "not_judged" and "no noise density of the gyro" in "; ".join(
+        row["reasons"]
+    )
     (row,) = judged(sensor(noise_density=DENSITY), asked=requirement(price_class=["tactical"]))
-    assert (row["verdict"], row["reason"]) == ("not_judged", None)
+    assert (row["verdict"], row["reasons"]) == ("not_judged", [])
     (price,) = row["shortfalls"]
     assert (price["property"], price["asked"]) == ("price_class", "tactical")
     assert price["subject"] == row["price_class"]

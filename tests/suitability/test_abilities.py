@@ -5,7 +5,7 @@ from typing import Any
 import pytest
 
 from imubench_pipeline.model.verdicts import Condition, Shortfall
-from imubench_pipeline.navigation.suitability.abilities import judge, read_abilities
+from imubench_pipeline.navigation.suitability import judge, read_abilities
 from imubench_pipeline.settings.requirements import Must
 from imubench_pipeline.settings.sensor import CHANNELS, Sensor
 from imubench_pipeline.words.verdicts import shortfall_text, subject_text

@@ -56,8 +56,8 @@ UNITS = {
 def test_a_sensor_whose_figures_are_known_passes_without_a_condition() -> None:
     row = ranking(requirement(), known={"gyro": GYRO})["known"]
     assert (row["verdict"], row["conditions"]) == ("meets", [])
-    kinds = {part["source"]: part["kind"] for part in row["parts"]}
-    assert kinds["gyro scale factor"] == "typ" and kinds["gyro N"] is None
+    kinds = {part["source"]: part["kind"] for part in row["parts"] if part["quantity"] == "gyro"}
+    assert kinds["scale_factor"] == "typ" and kinds["N"] is None
 
 
 @pytest.mark.parametrize("missing", [("scale_factor_error",), tuple(GYRO)])
@@ -91,8 +91,9 @@ def test_a_tilt_has_the_turn_on_bias_of_the_datasheet() -> None:
     assert found["known"]["verdict"] == "meets"
     (known,), (condition,) = found["known"]["conditions"], found["unknown"]["conditions"]
     assert known == condition | {"largest": pytest.approx(condition["largest"], rel=1e-6)}
-    assert found["known"]["source"] == "initial tilt by accel turn-on bias"
+    assert found["known"]["source"] == "turn_on_bias"
     (part,) = found["known"]["parts"]
+    assert (part["quantity"], part["through"]) == ("accel", "initial_tilt")
     assert (part["source"], part["kind"]) == (found["known"]["source"], "typ")
     assert found["unknown"]["verdict"] == "meets"
     assert (condition["figure"], condition["subject"]) == ("turn_on_bias", "accel")

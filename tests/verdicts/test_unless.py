@@ -57,7 +57,7 @@ def test_a_failure_that_a_unit_would_lift_may_leave_another_limit_open() -> None
     rows, _ = judge({"s": {"r": gyro(7.5 / DEGREES)}}, {"robot": both}, doubts=UNIT)
     assert (rows[0]["verdict"], rows[0]["corrected_verdict"]) == ("fails", "not_enough_data")
     assert rows[0]["corrected_margin"] is None
-    assert rows[0]["corrected_reason"] == "the recording has no accelerometer"
+    assert rows[0]["corrected_reasons"] == ["the recording has no accelerometer"]
     assert words(rows[0]) == (
         "it cannot be judged if the gyro data are in °/s, not rad/s "
         "(the recording has no accelerometer)"

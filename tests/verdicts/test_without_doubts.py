@@ -8,7 +8,7 @@ from tests.verdicts.budgets import HEADING, about, doubt, gyro, judge, marked, r
 
 SAID = {
     "doubts", "evidence", "evidence_reasons", "left_out", "corrected_units",
-    "corrected_verdict", "corrected_margin", "corrected_reason", "logged_verdict", "logged_margin",
+    "corrected_verdict", "corrected_margin", "corrected_reasons", "logged_verdict", "logged_margin",
 }  # fmt: skip
 """Columns of the table ``ranking`` that doubts may change."""
 

@@ -6,7 +6,7 @@ import pytest
 
 from imubench_pipeline.model.comparisons import NextStepRow
 from imubench_pipeline.model.states import Action
-from imubench_pipeline.model.verdicts import Condition
+from imubench_pipeline.model.verdicts import Condition, DoubtMark
 from imubench_pipeline.words.verdicts import next_step_text
 
 FIGURES = (
@@ -25,7 +25,7 @@ def step(action: Action, turned: int = 1, strengthened: int = 0, **values: Any) 
         "specimens": 3,
         "quantities": ("gyro",),
         "figures": FIGURES,
-        "doubts": ("motion",),
+        "doubts": (DoubtMark("night", "motion", ("gyro_x",)),),
     }
     return next_step_text(
         NextStepRow(sensor="s", requirements=("robot",), action=action, verdicts_turned=turned,

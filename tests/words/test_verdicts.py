@@ -11,6 +11,7 @@ from imubench_pipeline.model.comparisons import RankingRow
 from imubench_pipeline.model.states import ShortlistVerdict, SpreadOf, Verdict
 from imubench_pipeline.model.verdicts import (
     Condition,
+    DoubtMark,
     Figure,
     Property,
     Share,
@@ -165,8 +166,8 @@ def test_an_excluded_sensor_has_its_shortfalls() -> None:
 
 
 def test_a_share_has_its_source() -> None:
-    assert share_text(Share("gyro N", 0.404)) == "gyro N 40 %"
-    assert share_text(Share("gyro scale factor", 0.1, "typ")) == (
+    assert share_text(Share("N", "gyro", share=0.404)) == "gyro N 40 %"
+    assert share_text(Share("scale_factor", "gyro", share=0.1, kind="typ")) == (
         "gyro scale factor (data sheet, typ) 10 %"
     )
 
@@ -196,6 +197,8 @@ def test_evidence_is_weak_for_reasons() -> None:
         "no log longer than 11 min; wide interval from 2 units"
     )
     assert weak("wide_interval") == "wide interval"
+    marks = (DoubtMark("a", "motion", ("gyro_x",)), DoubtMark("a", "suspicious_unit", ("gyro_z",)))
+    assert weak("suspicious_unit", doubts=marks) == "the unit of gyro z looks wrong"
 
 
 @pytest.mark.parametrize("of", get_args(SpreadOf))
@@ -316,7 +319,7 @@ def test_the_others_are_listed_by_their_verdicts_in_the_order_of_merit() -> None
     rows = [
         row("b", "fails"),
         row("c", "likely_fails"),
-        row("d", "not_enough_data", reason="no accelerometer"),
+        row("d", "not_enough_data", reasons=("no accelerometer",)),
         row("e", "likely_meets"),
         row("f", "excluded", shortfalls=(Shortfall("price_class", "chip", "tactical"),)),
         row("h", "meets"),
@@ -331,9 +334,9 @@ def test_the_others_are_listed_by_their_verdicts_in_the_order_of_merit() -> None
 
 def test_sensors_without_enough_data_stand_by_their_reasons() -> None:
     rows = [
-        row("a", "not_enough_data", reason="no gyro"),
+        row("a", "not_enough_data", reasons=("no gyro",)),
         row("b", "not_enough_data"),
-        row("c", "not_enough_data", reason="no gyro"),
+        row("c", "not_enough_data", reasons=("no gyro",)),
     ]
     assert others(rows) == "Not enough data (no gyro): A, C. Not enough data: B."
 

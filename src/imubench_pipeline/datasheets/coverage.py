@@ -40,7 +40,7 @@ class Coverage:
     # temperature for the coefficient; ``no``: looked up (null), and not published; ``not looked
     # up``: the sensor file does not say, so it counts neither as published nor as unpublished
     published: Published
-    as_printed: str | None  # all its printed figures, with unit and kind
+    as_printed: tuple[str, ...]  # all its printed figures, with unit and kind
     document: str | None  # with its revision
     source: str | None  # ``primary`` or ``secondary``, of the figures or else of the datasheet
 
@@ -89,7 +89,7 @@ def coverage(sensors: Mapping[str, Sensor]) -> list[Coverage]:
                 quantity=quantity,
                 figure=figure,
                 published=published,
-                as_printed="; ".join(map(_format_figure, printed)) or None,
+                as_printed=tuple(map(_format_figure, printed)),
                 document=f"{datasheet.document}{revision}" if datasheet.document else None,
                 source=" and ".join(filter(None, sources)) or datasheet.source,
             )

@@ -53,7 +53,7 @@ class Delta:
     delta_lower: float | None
     delta_upper: float | None
     verdict: str
-    reason: str | None
+    reasons: tuple[str, ...]
 
 
 def deltas(
@@ -134,19 +134,21 @@ def compare(entry: Comparable, parameter: Parameter, tolerance: float) -> Delta:
         delta_lower=None,
         delta_upper=None,
         verdict="not published" if entry.looked_up else "not looked up",
-        reason=entry.reason,
+        reasons=(entry.reason,) if entry.reason else (),
     )
     if figure is None:
         return row
     if entry.value is None:
-        return replace(row, verdict="not comparable (condition)", reason=entry.obstacle)
+        return replace(
+            row, verdict="not comparable (condition)", reasons=tuple(filter(None, [entry.obstacle]))
+        )
     if value is None:
         reason = status_reason(parameter.status, parameter.reason)
         if upper is not None:
             least = _classify_value(entry, lower or 0.0, tolerance)
             if least == _classify_value(entry, upper, tolerance) != "as printed":
-                return replace(row, verdict=least, reason=texts.limits_decide(reason))
-        return replace(row, verdict="not measured", reason=reason)
+                return replace(row, verdict=least, reasons=(texts.limits_decide(reason),))
+        return replace(row, verdict="not measured", reasons=(reason,))
     row = replace(
         row,
         delta=_compute_relative_difference(value, entry.value),
@@ -155,11 +157,11 @@ def compare(entry: Comparable, parameter: Parameter, tolerance: float) -> Delta:
     )
     low, high = (value, value) if lower is None or upper is None else (lower, upper)
     least, largest = (_classify_value(entry, end, tolerance) for end in (low, high))
-    reasons = [entry.reason, parameter.reason]
+    reasons = [reason for reason in (entry.reason, parameter.reason) if reason]
     if least != largest:
         reasons.append(texts.interval_spans(least, largest))
-    words = "; ".join(reason for reason in reasons if reason)
-    return replace(row, verdict=least if least == largest else "not sure", reason=words or None)
+    verdict = least if least == largest else "not sure"
+    return replace(row, verdict=verdict, reasons=tuple(reasons))
 
 
 def _classify_value(entry: Comparable, value: float, tolerance: float) -> str:

@@ -103,7 +103,7 @@ class Comparison(Shown, Sequence[Compared]):
                 "lower": each.ratio.lower,
                 "upper": each.ratio.upper,
                 "verdict": each.verdict,
-                "reason": each.ratio.reason,
+                "reasons": each.ratio.reasons,
             }
             for each in self
         )
@@ -123,7 +123,7 @@ class Comparison(Shown, Sequence[Compared]):
                 interval = f"above {number_text(lower, digits)}"
             ratio = "–" if each.ratio.value is None else number_text(each.ratio.value, 3)
             row += [unit.sign, ratio, interval, each.verdict]
-            row.append(cut(each.ratio.reason or "", 50))
+            row.append(cut("; ".join(each.ratio.reasons), 50))
             rows.append([f"{each.names[0]} / {each.names[1]}", *row] if several else row)
         if several:
             heads = ["a / b of", *heads]

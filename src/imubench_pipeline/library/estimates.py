@@ -281,13 +281,12 @@ def estimate(
         estimate_channel(key, kept, curve, how, log.bandwidth, into)
         found = into.estimates[channel].get(method)
         if found is None:
-            reasons = [
+            reasons = (
                 row.reason or "the data do not favour it"
                 for row in into.temperature
                 if (row.channel, row.parameter) == (channel, "sensitivity")
-            ]
-            reason = "its clock has no readings of the temperature"
-            left_out[channel] = "; ".join(reasons) or reason
+            )
+            left_out[channel] = next(reasons, "its clock has no readings of the temperature")
         else:
             estimates.append(ChannelEstimate.of(found, channel, curve, log.name))
     if not estimates:

@@ -11,6 +11,7 @@ from imubench_pipeline.model.states import (
     Origin,
     PoolVerdict,
     ShortlistVerdict,
+    SourceCode,
     SpreadOf,
     Verdict,
 )
@@ -20,6 +21,11 @@ from imubench_pipeline.model.table import (
     LowerLimit,
     OfRecordingRow,
     SensorRow,
+    SourceColumn,
+    SourceFrequency,
+    SourceQuantity,
+    SourceThrough,
+    SourceTime,
     TableRow,
     Unit,
     UpperLimit,
@@ -60,7 +66,7 @@ class DriftRow(SensorRow):
         float | None, Column("chance of such a difference, if the device has not changed")
     ] = None
     verdict: Annotated[DriftVerdict | None, Column("null: cannot be judged")] = None
-    reason: Annotated[str | None, Column("in words")] = None
+    reasons: Annotated[tuple[str, ...], Column("in words")] = ()
 
 
 @table("pooled")
@@ -94,7 +100,7 @@ class PooledRow(SensorRow):
         float | None, Column("chance of such differences, if the recordings agree")
     ] = None
     verdict: Annotated[PoolVerdict | None, Column("at a level of 1 %")] = None
-    reason: Annotated[str | None, Column("in words")] = None
+    reasons: Annotated[tuple[str, ...], Column("in words")] = ()
     doubts: Annotated[tuple[DoubtMark, ...], Column("of the pooled recordings")] = ()
 
 
@@ -133,7 +139,7 @@ class DatasheetRow(ChannelRow):
     delta_lower: Annotated[float | None, Column("least that both intervals allow")] = None
     delta_upper: Annotated[float | None, Column("largest that both intervals allow")] = None
     verdict: Annotated[str, Column("better than typ, as printed, worse than typ, not sure, ...")]
-    reason: Annotated[str | None, Column("in words")] = None
+    reasons: Annotated[tuple[str, ...], Column("in words")] = ()
     doubts: DoubtCodes = ()
 
 
@@ -157,7 +163,7 @@ class RepeatabilityRow(SensorRow):
     upper: Annotated[float | None, Column("upper 95 % limit of measured", "SI")] = None
     delta: Annotated[float | None, Column("measured / comparable - 1")] = None
     verdict: Annotated[str, Column("as of the table datasheet")]
-    reason: Annotated[str | None, Column("in words, with the conditions")] = None
+    reasons: Annotated[tuple[str, ...], Column("in words, with the conditions")] = ()
 
 
 @table("datasheet_curve")
@@ -192,9 +198,14 @@ class ErrorBudgetRow(OfRecordingRow):
         str, Column("attitude, heading, velocity, position; north: heading found at rest")
     ]
     time: Annotated[float, Column("of dead reckoning; of rest for north", "s")]
-    source: Annotated[str, Column("total, or what the error comes of")]
+    source: SourceColumn
+    quantity: SourceQuantity = None
+    through: SourceThrough = None
+    T_B: SourceTime = None
+    frequency: SourceFrequency = None
     sigma: Annotated[
-        float | None, Column("standard deviation; null where reason says why", "as in unit")
+        float | None,
+        Column("standard deviation; null: see reasons", "as in unit"),
     ] = None
     lower: Annotated[float | None, Column("lower 95 % limit of a total", "as in unit")] = None
     upper: Annotated[float | None, Column("upper 95 % limit of a total", "as in unit")] = None
@@ -209,9 +220,6 @@ class ErrorBudgetRow(OfRecordingRow):
     reached_after: Annotated[
         float | None, Column("time after which the limit is reached; null: never", "s")
     ] = None
-    cause: Annotated[
-        str | None, Column("of a source: noise, start, turn_on_bias, temperature, ...")
-    ] = None
     origin: Annotated[Origin | None, Column("of the figure of a source")] = None
     kind: Annotated[str | None, Column("of a printed figure: typ, max, 1sigma, ...")] = None
     convention: Annotated[str | None, Column("how a figure became a standard deviation")] = None
@@ -219,7 +227,7 @@ class ErrorBudgetRow(OfRecordingRow):
         float | None, Column("1 sigma with which the limit is kept", "as in largest_unit")
     ] = None
     largest_unit: Annotated[str | None, Column("SI unit of the figure")] = None
-    reason: Annotated[str | None, Column("what is not known")] = None
+    reasons: Annotated[tuple[str, ...], Column("unknown figures")] = ()
     doubts: DoubtCodes = ()
 
 
@@ -255,7 +263,7 @@ class RankingRow(TableRow):
         float | None, Column("that sigma is within limit, as far as logs and specimens tell")
     ] = None
     limit_verdict: Annotated[Verdict, Column("of this limit alone")]
-    source: Annotated[str | None, Column("the largest contribution")] = None
+    source: Annotated[SourceCode | None, Column("the largest contribution: see parts")] = None
     share: Annotated[float | None, Column("its part of the variance")] = None
     reached_after: Annotated[float | None, Column("time after which the limit is reached", "s")] = (
         None
@@ -267,7 +275,7 @@ class RankingRow(TableRow):
         tuple[Shortfall, ...], Column("demanded properties that it lacks; has: its own, SI")
     ] = ()
     parts: Annotated[tuple[Share, ...], Column("every source of 1 % of the variance or more")] = ()
-    reason: Annotated[str | None, Column("what is not known")] = None
+    reasons: Annotated[tuple[str, ...], Column("unknown figures")] = ()
     doubts: Annotated[tuple[DoubtMark, ...], Column("of the recordings that are used")] = ()
     left_out: Annotated[
         tuple[DoubtMark, ...], Column("recordings of the sensor that are not used, and why")
@@ -289,9 +297,9 @@ class RankingRow(TableRow):
     ] = ()
     corrected_verdict: Annotated[Verdict | None, Column("with these factors")] = None
     corrected_margin: Annotated[float | None, Column("with these factors")] = None
-    corrected_reason: Annotated[
-        str | None, Column("why it cannot be judged with these factors")
-    ] = None
+    corrected_reasons: Annotated[
+        tuple[str, ...], Column("why it cannot be judged with these factors")
+    ] = ()
     logged_verdict: Annotated[Verdict | None, Column("with unused recordings, as logged")] = None
     logged_margin: Annotated[float | None, Column("with unused recordings, as logged")] = None
     backtest_channel: Annotated[
@@ -316,7 +324,7 @@ class NextStepRow(SensorRow):
     action: Annotated[Action, Column("what to do")]
     quantities: Annotated[tuple[str, ...], Column("whose unit or axes it is about")] = ()
     figures: Annotated[tuple[Condition, ...], Column("to find in data sheets")] = ()
-    doubts: Annotated[tuple[str, ...], Column("codes of doubts that it removes")] = ()
+    doubts: Annotated[tuple[DoubtMark, ...], Column("doubts that it removes")] = ()
     verdicts_turned: Annotated[int, Column("verdicts that it can change, or settle")]
     verdicts_strengthened: Annotated[int, Column("verdicts whose evidence it makes stronger")]
     duration: Annotated[float | None, Column("length of the log that it takes", "s")] = None
@@ -351,7 +359,7 @@ class ShortlistRow(TableRow):
     shortfalls: Annotated[
         tuple[Shortfall, ...], Column("demanded properties that it lacks; has: its own, SI")
     ] = ()
-    reason: Annotated[str | None, Column("why it is not judged")] = None
+    reasons: Annotated[tuple[str, ...], Column("why the sensor is not judged")] = ()
 
 
 @table("coverage")
@@ -363,7 +371,7 @@ class CoverageRow(SensorRow):
     quantity: Annotated[str, Column("gyro or accel")]
     figure: Annotated[str, Column("N, B, K, T_B, temperature_coefficient or offset")]
     published: Annotated[str, Column("yes, no, other convention, not looked up")]
-    as_printed: Annotated[str | None, Column("every figure of it")] = None
+    as_printed: Annotated[tuple[str, ...], Column("every figure of it")] = ()
     document: Annotated[str | None, Column("with its revision")] = None
     source: Annotated[str | None, Column("primary or secondary")] = None
 

@@ -15,6 +15,11 @@ from imubench_pipeline.model.table import (
     FittedValue,
     LowerLimit,
     OfRecordingRow,
+    SourceColumn,
+    SourceFrequency,
+    SourceQuantity,
+    SourceThrough,
+    SourceTime,
     Unit,
     UpperLimit,
     table,
@@ -366,8 +371,8 @@ class BacktestRow(ChannelRow):
     ] = None
     unit: Unit
     taken_out: Annotated[
-        str | None, Column("in the log, not in the model: kinds of deterministic")
-    ] = None
+        tuple[str, ...], Column("in the log, not in the model: kinds of deterministic")
+    ] = ()
     duration_needed: Annotated[
         float | None, Column("length of a log that can be tested so", "s")
     ] = None
@@ -385,8 +390,8 @@ class DrawnDeviationRow(ChannelRow):
     ] = None
     adev: Annotated[float, Column("Allan deviation of the noise model", "rad/s or m/s^2")]
     unknown: Annotated[
-        str | None, Column("parameters that matter and that the log does not tell")
-    ] = None
+        tuple[str, ...], Column("parameters that matter and are not determined")
+    ] = ()
 
 
 @table("deterministic")
@@ -455,7 +460,11 @@ class ErrorGrowthRow(OfRecordingRow):
     ]
     error: Annotated[str, Column("attitude, heading, velocity or position")]
     time: Annotated[float, Column("of dead reckoning", "s")]
-    source: Annotated[str, Column("total, or what the error comes of")]
+    source: SourceColumn
+    quantity: SourceQuantity = None
+    through: SourceThrough = None
+    T_B: SourceTime = None
+    frequency: SourceFrequency = None
     sigma: Annotated[float, Column("standard deviation", "as in unit")]
     lower: Annotated[float | None, Column("lower 95 % limit of a total", "as in unit")] = None
     upper: Annotated[float | None, Column("upper 95 % limit of a total", "as in unit")] = None

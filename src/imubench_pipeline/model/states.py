@@ -51,12 +51,40 @@ Action = Literal[
 ]
 """Next steps, the cheapest first."""
 
+Measured = Literal["gyro", "accel"]
+"""Quantity that a sensor measures."""
+
+NoiseSource = Literal["Q", "N", "flicker", "GM", "K", "R", "line"]
+"""Source of an error that is a term of the noise model (`Term.word`)."""
+
+Cause = Literal[
+    "turn_on_bias",
+    "repeatability",
+    "temperature",
+    "temperature_squared",
+    "scale_factor",
+    "nonlinearity",
+    "g_sensitivity",
+    "vibration_rectification",
+]
+"""Source of an error that is a figure of the sensor, which a static log does not show."""
+
+SourceCode = Literal["total", NoiseSource, Cause, "initial_tilt", "initial_heading"]
+"""Source of an error: noise, a figure, a stated angle, or the total of all sources."""
+
+SourcePath = Literal["static_window", "initial_tilt"]
+"""Way of a source into an error, if it is not by the motion.
+
+White noise in the static window; or levelling by the accelerometers.
+"""
+
 Origin = Literal["measured", "datasheet", "requirement", "not known"]
 """Origin of a figure in an error budget."""
 
 BacktestVerdict = Literal["as predicted", "more than predicted", "less than predicted"]
 PoolVerdict = Literal["agree", "differ"]
 DriftVerdict = Literal["changed", "as before"]
+RatioVerdict = Literal["lower", "higher", "not significant", "not determined"]
 
 ShortlistVerdict = Literal["cannot_meet", "worth_logging", "meets_at_worst", "not_judged"]
 """Verdict on a sensor by its data sheet alone."""

@@ -34,7 +34,7 @@ from typing import (
 
 import pyarrow as pa
 
-from imubench_pipeline.model.states import Status
+from imubench_pipeline.model.states import Measured, SourceCode, SourcePath, Status
 
 TYPES: Mapping[type, pa.DataType] = {
     str: pa.string(),
@@ -70,6 +70,11 @@ EstimateReason = Annotated[str | None, Column("why there is no plain value")]
 FittedValue = Annotated[
     float | None, Column("what the model has where there is no value; no estimate", "as in unit")
 ]
+SourceColumn = Annotated[SourceCode, Column("total, or the source of the error")]
+SourceQuantity = Annotated[Measured | None, Column("sensor of the source")]
+SourceThrough = Annotated[SourcePath | None, Column("null: the source acts by the motion")]
+SourceTime = Annotated[float | None, Column("correlation time of a source GM", "s")]
+SourceFrequency = Annotated[float | None, Column("of a source line", "Hz")]
 EstimateStatus = Annotated[Status, Column("whether there is a value, and its quality")]
 
 

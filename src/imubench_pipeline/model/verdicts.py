@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Literal
+from dataclasses import dataclass, field
+from typing import Literal, get_args
+
+from imubench_pipeline.model.states import Measured, NoiseSource, SourceCode, SourcePath
+
+_NOISE_SOURCES = get_args(NoiseSource)
 
 Property = Literal[
     "price_class",
@@ -53,11 +57,26 @@ class Shortfall:
 
 
 @dataclass(frozen=True, slots=True)
-class Share:
+class ErrorSource:
+    """Source of an error; ``T_B`` (s) and ``frequency`` (Hz) distinguish terms of one kind."""
+
+    source: SourceCode
+    quantity: Measured | None = None
+    through: SourcePath | None = None
+    T_B: float | None = None
+    frequency: float | None = None
+
+    @property
+    def is_noise(self) -> bool:
+        """Whether it is a term of the noise model."""
+        return self.source in _NOISE_SOURCES
+
+
+@dataclass(frozen=True, slots=True)
+class Share(ErrorSource):
     """A source of an error, and its part of the variance."""
 
-    source: str
-    share: float
+    share: float = field(kw_only=True)
     kind: str | None = None
     """Kind of a figure of the data sheet, such as typ; None: not from the data sheet."""
 

@@ -195,7 +195,7 @@ def _make_rows(
                 change=change,
                 p_value=p_value,
                 verdict=verdict,
-                reason="; ".join(reasons) or None,
+                reasons=tuple(reasons),
             )
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import asdict
 from functools import cache, partial
 from itertools import product
 
@@ -109,10 +110,12 @@ def list_growth_rows(
                 time=question.time,
                 unit=SI_UNITS[DIMENSIONS[question.error]],
             )
-            sure = math.fsum(p.sigma**2 for p in budget.contributions if p.cause != "noise")
+            sure = math.fsum(
+                part.sigma**2 for part in budget.contributions if not part.source.is_noise
+            )
             ends = np.quantile(np.sqrt(drawn + sure), [_TAIL_PROBABILITY, 1.0 - _TAIL_PROBABILITY])
             # Draws of an absent term are above 0: extend the limits to the value.
             lower, upper = min(float(ends[0]), budget.total), max(float(ends[1]), budget.total)
             yield row(source="total", sigma=budget.total, lower=lower, upper=upper)
             for part in sorted(budget.contributions, key=lambda one: -one.sigma):
-                yield row(source=part.source, sigma=part.sigma)
+                yield row(**asdict(part.source), sigma=part.sigma)

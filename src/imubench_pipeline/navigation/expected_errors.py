@@ -27,7 +27,6 @@ from imubench_pipeline.navigation.error_budget import (
     compute_chance_within,
     compute_interval,
     draw_models,
-    has_joint_draws,
     time_until,
 )
 from imubench_pipeline.navigation.error_budget.parts import Largest
@@ -203,7 +202,7 @@ def list_error_rows(
                     missing.append(
                         texts.noise_not_known(silent, _find_reason(estimates[silent[0]]))
                     )
-            yield replace(asked, reason="; ".join(missing))
+            yield replace(asked, reasons=tuple(missing))
             continue
         pair = [axes[c] if c else _NO_AXIS_ERRORS for c in chosen.values()]
         many = [drawn[c] if c else [_NO_AXIS_ERRORS] * draws for c in chosen.values()]
@@ -214,8 +213,8 @@ def list_error_rows(
         # Draws of an absent term are above 0: extend the limits to the value.
         lower, upper = min(lower, nominal.total), max(upper, nominal.total)
         used = [channel for channel in chosen.values() if channel]
-        apart = [channel for channel in used if not has_joint_draws(estimates[channel])]
-        reasons = [
+        apart = [channel for channel in used if estimates[channel].draws is None]
+        reasons = (
             *nominal.assumptions,
             *(
                 texts.parameter_status(name, channel, parameter.status)
@@ -229,7 +228,7 @@ def list_error_rows(
                 for channel, estimate in estimates.items()
                 if quantity_of(channel) in question.needs and not estimate.model.terms
             ),
-        ]
+        )
         yield replace(
             asked,
             sigma=nominal.total,
@@ -237,7 +236,7 @@ def list_error_rows(
             upper=upper,
             drawn="one by one" if apart else "jointly",
             within=question.limit and compute_chance_within(question.limit, budgets),
-            reason="; ".join(reasons) or None,
+            reasons=reasons,
             reached_after=question.reached(*pair),
         )
         largest = Largest.of(nominal, question.limit, upper)

@@ -25,17 +25,17 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import Literal, TypeGuard, TypeVar
+from typing import TypeGuard, TypeVar
 
 from scipy.special import chdtrc, chdtri, fdtrc, stdtrit
 
 from imubench_pipeline.model.comparisons import PooledRow
 from imubench_pipeline.model.estimates import FixedBiasRow, ParameterRow
+from imubench_pipeline.model.states import PoolVerdict
+from imubench_pipeline.settings.sensor import quantity_of
 from imubench_pipeline.words.reasons import pools as texts
-
-Verdict = Literal["agree", "differ"]
 
 SIGNIFICANCE_LEVEL = 0.01
 """Significance level of Cochran's Q: probability of ``differ`` if recordings agree."""
@@ -55,7 +55,7 @@ _Group = tuple[str, str | None, str, str]  # sensor, device, channel and paramet
 
 @dataclass(frozen=True)
 class Pool:
-    """One noise parameter of several recordings."""
+    """A noise parameter, or the fixed bias, of several recordings."""
 
     # value, lower, upper: pooled value and its 95 % limits, in the unit of the values; None if no
     # recording has a value with limits. With one recording, its own value and limits
@@ -69,7 +69,8 @@ class Pool:
     contradicting: int = 0
     # error, spread, spread_lower, spread_upper: standard error of ln value; tau, the standard
     # deviation of the logarithm between recordings (relative, where small), with 95 % limits: both
-    # 0 where values agree better than errors do
+    # 0 where values agree better than errors do. For a bias, the standard deviation between
+    # recordings in its unit
     error: float | None = None
     spread: float | None = None
     spread_lower: float | None = None
@@ -77,24 +78,7 @@ class Pool:
     # p_value, verdict: of Cochran's Q, chi-squared with K - 1 degrees of freedom where recordings
     # agree; ``differ`` if it is below `SIGNIFICANCE_LEVEL`, else ``agree``: not significant
     p_value: float | None = None
-    verdict: Verdict | None = None
-
-
-@dataclass(frozen=True)
-class TurnOnBias:
-    """The fixed bias of a channel over recordings: d(u) in equation 1 of Maia et al."""
-
-    recordings: int
-    left_out: int
-    # mean, lower, upper: rad/s or m/s^2; the limits are the mean's, 95 %, by Student's t
-    mean: float | None = None
-    lower: float | None = None
-    upper: float | None = None
-    # deviation, deviation_lower, deviation_upper: standard deviation between recordings with its
-    # chi-squared 95 % limits
-    deviation: float | None = None
-    deviation_lower: float | None = None
-    deviation_upper: float | None = None
+    verdict: PoolVerdict | None = None
 
 
 def pool(
@@ -223,28 +207,35 @@ def _solve_spread_squared(points: list[_Point], target: float) -> float:
     return spread_squared
 
 
-def estimate_turn_on_bias(means: Iterable[float | None]) -> TurnOnBias:
-    """Return the spread of the fixed bias from recording to recording.
+def estimate_turn_on_bias(means: Iterable[float | None]) -> Pool:
+    """Return the fixed bias over recordings, and its spread: d(u) in equation 1 of Maia et al.
 
-    Its limits follow from the chi-squared distribution of (K - 1) s^2 / sigma^2. The spread
-    includes slow noise and changes of tilt. The means are in rad/s or m/s^2; None and NaN are left
-    out.
+    The limits of the mean are by Student's t, of the spread by the chi-squared distribution of
+    (K - 1) s^2 / sigma^2. The spread includes slow noise and changes of tilt. The means are in
+    rad/s or m/s^2; None and NaN are left out.
     """
     listed = list(means)
     present = [mean for mean in listed if mean is not None and math.isfinite(mean)]
     counts = (len(present), len(listed) - len(present))
     if not present:
-        return TurnOnBias(*counts)
+        return Pool(None, None, None, *counts)
     mean = math.fsum(present) / len(present)
     freedom = len(present) - 1
     if not freedom:
-        return TurnOnBias(*counts, mean)
+        return Pool(mean, None, None, *counts)
     squares = math.fsum((value - mean) ** 2 for value in present)
     low_q, high_q, t = _compute_quantiles(freedom)
     deviation = math.sqrt(squares / freedom)
     half = t * deviation / math.sqrt(len(present))
-    limits = (math.sqrt(squares / high_q), math.sqrt(squares / low_q))
-    return TurnOnBias(*counts, mean, mean - half, mean + half, deviation, *limits)
+    return Pool(
+        mean,
+        mean - half,
+        mean + half,
+        *counts,
+        spread=deviation,
+        spread_lower=math.sqrt(squares / high_q),
+        spread_upper=math.sqrt(squares / low_q),
+    )
 
 
 def list_pooled_rows(
@@ -316,8 +307,7 @@ def _group_rows(
 def _make_parameter_row(
     group: _Group, present: Sequence[tuple[str, ParameterRow]], absent: int, several: bool
 ) -> PooledRow:
-    sensor, device, channel, parameter = group
-    of_devices = several and device is None
+    of_devices = several and group[1] is None
     triples = [
         (row.value if row.status == "ok" else None, row.lower, row.upper) for _, row in present
     ]
@@ -340,52 +330,50 @@ def _make_parameter_row(
         reasons.append(texts.CLOSE_AGREEMENT)
     spread = (pooled.spread, pooled.spread_lower, pooled.spread_upper)
     in_unit = [None if part is None else part * (pooled.value or 0.0) for part in spread]
+    reasons += _describe_device_effects(logs, of_devices)
+    pooled = replace(
+        pooled,
+        left_out=pooled.left_out + absent,
+        spread=in_unit[0],
+        spread_lower=in_unit[1],
+        spread_upper=in_unit[2],
+        verdict=None if absent and pooled.verdict == "agree" else pooled.verdict,
+    )
+    return _make_row(group, pooled, present[0][1].unit, reasons)
+
+
+def _make_row(group: _Group, pooled: Pool, unit: str, reasons: Iterable[str]) -> PooledRow:
+    sensor, device, channel, parameter = group
     return PooledRow(
         sensor=sensor,
         device=device,
         channel=channel,
         parameter=parameter,
         recordings=pooled.recordings,
-        left_out=pooled.left_out + absent,
+        left_out=pooled.left_out,
         value=pooled.value,
         lower=pooled.lower,
         upper=pooled.upper,
-        unit=present[0][1].unit,
-        spread=in_unit[0],
-        spread_lower=in_unit[1],
-        spread_upper=in_unit[2],
+        unit=unit,
+        spread=pooled.spread,
+        spread_lower=pooled.spread_lower,
+        spread_upper=pooled.spread_upper,
         p_value=pooled.p_value,
-        verdict=None if absent and pooled.verdict == "agree" else pooled.verdict,
-        reason="; ".join(reasons + _describe_device_effects(logs, of_devices)) or None,
+        verdict=pooled.verdict,
+        reasons=tuple(reasons),
     )
 
 
 def _make_bias_row(
     group: _Group, present: Sequence[tuple[str, FixedBiasRow]], several: bool
 ) -> PooledRow:
-    sensor, device, channel, parameter = group
     pairs = [(row.value, of) for of, row in present]
     bias = estimate_turn_on_bias(value for value, _ in pairs)
     reasons = [texts.not_pooled(bias.left_out, texts.WITHOUT_MEAN)] * (bias.left_out > 0)
-    if channel.startswith("accel"):
+    if quantity_of(group[2]) == "accel":
         reasons.append(texts.GRAVITY_IN_MEAN)
-    reasons += _describe_device_effects(pairs, several and device is None)
-    return PooledRow(
-        sensor=sensor,
-        device=device,
-        channel=channel,
-        parameter=parameter,
-        recordings=bias.recordings,
-        left_out=bias.left_out,
-        value=bias.mean,
-        lower=bias.lower,
-        upper=bias.upper,
-        unit=present[0][1].unit,
-        spread=bias.deviation,
-        spread_lower=bias.deviation_lower,
-        spread_upper=bias.deviation_upper,
-        reason="; ".join(reasons) or None,
-    )
+    reasons += _describe_device_effects(pairs, several and group[1] is None)
+    return _make_row(group, bias, present[0][1].unit, reasons)
 
 
 def _describe_device_effects(pairs: Iterable[tuple[float | None, str]], several: bool) -> list[str]:

@@ -17,19 +17,17 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import Literal
 
 import numpy as np
 
 from imubench_pipeline.estimators.estimate import Parameter
 from imubench_pipeline.model.estimates import DrawnDeviationRow
+from imubench_pipeline.model.states import RatioVerdict
 from imubench_pipeline.navigation.compared import ComparedChannel, compute_number_needed
 from imubench_pipeline.noise.model import sum_over_terms
 from imubench_pipeline.noise.simulate import channel_rng
 from imubench_pipeline.typing import Array
 from imubench_pipeline.words.reasons import pools as texts
-
-Verdict = Literal["lower", "higher", "not told apart", "not known"]
 
 _TAIL_PROBABILITY = 0.025  # probability beyond each 95 % limit
 
@@ -44,17 +42,17 @@ class Ratio:
     # 95 % limits; None: unbounded above, or not known
     lower: float | None
     upper: float | None
-    reason: str | None = None
+    reasons: tuple[str, ...] = ()
 
     @property
-    def verdict(self) -> Verdict:
+    def verdict(self) -> RatioVerdict:
         """How the first compares with the second, from the interval alone."""
         if self.upper is not None and self.upper < 1.0:
             return "lower"
         if self.lower is not None and self.lower > 1.0:
             return "higher"
         limited = self.lower is not None and (self.upper is not None or self.lower > 0.0)
-        return "not told apart" if limited else "not known"
+        return "not significant" if limited else "not determined"
 
 
 def compare_parameters(first: Parameter, second: Parameter) -> Ratio:
@@ -62,19 +60,18 @@ def compare_parameters(first: Parameter, second: Parameter) -> Ratio:
 
     If one has limits but no value, the interval is that of all quotients within the limits.
     """
-    doubts = [
+    reasons = tuple(
         texts.operand_status(which, parameter.status)
         for which, parameter in (("first", first), ("second", second))
         if parameter.status != "ok"
-    ]
-    reason = "; ".join(doubts) or None
+    )
     a, b = first.value, second.value
     if not a or not b:
         low = _divide(first.lower or 0.0, second.upper)
         high = _divide(first.upper, second.lower)
         if high is None and low in (None, 0.0):
             low = None
-        return Ratio(None, low, high, reason)
+        return Ratio(None, low, high, reasons)
     middle = math.log(a / b)
     below = _add_in_quadrature(
         _compute_log_ratio(first.lower, a), _compute_log_ratio(b, second.upper)
@@ -86,7 +83,7 @@ def compare_parameters(first: Parameter, second: Parameter) -> Ratio:
         a / b,
         None if below is None else math.exp(middle - below),
         None if above is None or math.isinf(above) else math.exp(middle + above),
-        reason,
+        reasons,
     )
 
 
@@ -124,16 +121,16 @@ def compare_deviations(
     """
     longest_tau = longest * min(first.duration, second.duration)
     if tau > longest_tau:
-        return Ratio(None, None, None, texts.tau_beyond(longest_tau))
+        return Ratio(None, None, None, (texts.tau_beyond(longest_tau),))
     if not first.model.terms or not second.model.terms:
-        return Ratio(None, None, None, texts.NO_MODEL)
+        return Ratio(None, None, None, (texts.NO_MODEL,))
     value = math.sqrt(float(compute_number_needed(first.variance(tau), 0.0, second.variance(tau))))
     own, other = (_draw_variances(channel, draws, seed, [tau])[0] for channel in (first, second))
     ratios = np.sqrt(compute_number_needed(own[:, None], 0.0, other[None, :]))
     lower, upper = np.quantile(
         ratios, [_TAIL_PROBABILITY, 1.0 - _TAIL_PROBABILITY], method="inverted_cdf"
     )
-    unknown = "; ".join(dict.fromkeys([*first.unknown(tau), *second.unknown(tau)])) or None
+    unknown = tuple(dict.fromkeys([*first.unknown(tau), *second.unknown(tau)]))
     # Draws of an absent term are above 0: extend the limits to the value.
     limits = min(float(lower), value), max(float(upper), value)
     return Ratio(None if unknown else value, *limits, unknown)
@@ -174,7 +171,7 @@ def list_deviation_rows(
         channel=channel.channel,
     )
     for tau, deviations in zip(taus, drawn, strict=True):
-        unknown = "; ".join(dict.fromkeys(channel.unknown(tau))) or None
+        unknown = tuple(dict.fromkeys(channel.unknown(tau)))
         yield row(tau=tau, adev=math.sqrt(channel.variance(tau)), unknown=unknown)
         for number, deviation in enumerate(np.sort(deviations).tolist()):
             yield row(tau=tau, draw=number, adev=deviation)

@@ -40,18 +40,20 @@ def repeatability_rows(
         # The first recording of a device has no previous one: its flag does not matter.
         unknown = sum(row.power_cycled is None for row, _ in several) > 1
         if channel.startswith("accel"):
-            spread = Parameter(None, "not_shown", texts.GRAVITY_IN_MEAN)
+            assumptions = [texts.GRAVITY_IN_MEAN]
+            spread = Parameter(None, "not_shown")
         else:
             assumptions = [texts.SAME_HEADING_ASSUMED]
             if unknown:
                 assumptions.append(texts.POWER_CYCLES_ASSUMED)
-            reason = "; ".join(assumptions)
             bias = estimate_turn_on_bias(value for _, value in several)
-            limits = bias.deviation_lower, bias.deviation_upper
-            spread = Parameter(bias.deviation, "ok", reason, *limits)
+            limits = bias.spread_lower, bias.spread_upper
+            spread = Parameter(bias.spread, "ok", None, *limits)
         for entry in read_repeatability_comparables(sensors[sensor].datasheet, channel):
             found = compare(entry, spread, tolerance)
-            unsaid = found.delta is None and spread.reason and entry.value is not None
+            reasons = found.reasons
+            if entry.value is not None:
+                reasons = (*(reasons if found.delta is not None else ()), *assumptions)
             yield RepeatabilityRow(
                 sensor=sensor,
                 device=device,
@@ -68,5 +70,5 @@ def repeatability_rows(
                 upper=found.upper,
                 delta=found.delta,
                 verdict=found.verdict,
-                reason=spread.reason if unsaid else found.reason,
+                reasons=reasons,
             )

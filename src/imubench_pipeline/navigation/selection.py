@@ -57,8 +57,8 @@ def _make_row(
     factors = unless.factors if unless and corrected else {}
     # The back-test of the channel that contributes most to the error.
     channels = {"gyro": total.gyro, "accel": total.accel}
-    words = (standing.source or "").split()
-    channel = next((channels[word] for word in words if word in channels), None)
+    source = standing.source
+    channel = channels[source.quantity] if source and source.quantity else None
     tested = basis.backtest(total, judgement.name, channel)
     if tested is not None and tested.ratio is None:
         tested = None
@@ -83,13 +83,13 @@ def _make_row(
         margin=_get_margin(standing),
         chance=standing.chance if known else None,
         limit_verdict=standing.verdict,
-        source=standing.source,
+        source=source.source if source else None,
         share=standing.share,
         reached_after=total.reached_after,
         conditions=judgement.conditions,
         shortfalls=judgement.shortfalls,
         parts=standing.parts,
-        reason=total.reason,
+        reasons=total.reasons,
         doubts=tuple(
             doubt
             for row in standing.totals or [total]
@@ -111,7 +111,7 @@ def _make_row(
         ),
         corrected_verdict=corrected.verdict if corrected else None,
         corrected_margin=_get_margin(corrected),
-        corrected_reason=corrected.total.reason if corrected and not corrected.known else None,
+        corrected_reasons=corrected.total.reasons if corrected and not corrected.known else (),
         logged_verdict=logged.verdict if logged else None,
         logged_margin=_get_margin(logged),
         backtest_channel=tested.channel if tested else None,

@@ -6,12 +6,17 @@ The script computes the ratios of the recordings that the reader chooses, like `
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import fields
+from math import isnan
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pyarrow as pa
 
 from imubench_pipeline.estimators.estimate import COMPARED
+from imubench_pipeline.model.table import CATEGORY
+from imubench_pipeline.model.verdicts import ErrorSource
 from imubench_pipeline.report.comparison import Comparison
 from imubench_pipeline.report.glossary import find_term
 from imubench_pipeline.report.payload import Arrays, Json, pack_styles
@@ -22,6 +27,7 @@ from imubench_pipeline.settings.requirements import DIMENSIONS, Requirement
 from imubench_pipeline.tables import read
 from imubench_pipeline.units import parse_quantity
 from imubench_pipeline.words.numbers import duration_text, number_text
+from imubench_pipeline.words.verdicts import source_kind_text, source_text
 
 KEPT = ("error_growth", "drawn_deviations")
 """The tables of each recording that the page uses, besides the joined tables."""
@@ -101,7 +107,9 @@ def _read_columns(path: Path) -> Mapping[str, Any]:
         return {}
     rows = read(path.stem, [path])
     names = set(rows.column_names) - {"sensor", "recording", "unit"}
-    return {name: rows[name].to_numpy() for name in names}
+    # A category with nulls loses them in NumPy.
+    plain = {name: rows[name].cast(pa.string()) for name in names if rows[name].type == CATEGORY}
+    return {name: plain.get(name, rows[name]).to_numpy() for name in names}
 
 
 def _describe_recording(view: RecordingView) -> Json:
@@ -135,12 +143,12 @@ def _pack_draws(
     for channel in dict.fromkeys(kept["channel"].tolist()):
         own = (kept["channel"] == channel) & wanted
         best = own & ~of_draw
-        unknown = kept["unknown"][best].tolist()
+        unknown = [list(texts) for texts in kept["unknown"][best]]
         drawn = {
             "tau": arrays.exact(kept["tau"][best]),
             "adev": arrays.exact(kept["adev"][best]),
             "drawn": arrays.log(kept["adev"][own & of_draw]),
-            "unknown": {place: text for place, text in enumerate(unknown) if text},
+            "unknown": {place: texts for place, texts in enumerate(unknown) if texts},
         }
         yield channel, drawn
 
@@ -175,20 +183,25 @@ def _pack_errors(kept: Mapping[str, Any], of_axis: Any, arrays: Arrays) -> Json:
         columns = (kept[name][total].tolist() for name in ("window", "time"))
         places = {key: place for place, key in enumerate(zip(*columns, strict=True))}
         rest = own & ~total
-        sources = {
-            source: np.zeros(len(variance))
-            for source in dict.fromkeys(kept["source"][rest].tolist())
-        }
-        columns = (kept[name][rest].tolist() for name in ("window", "time", "source", "sigma"))
-        for window, time, source, sigma in zip(*columns, strict=True):
+        sources: dict[ErrorSource, Any] = {}
+        names = ("window", "time", "sigma", *(field.name for field in fields(ErrorSource)))
+        columns = (kept[name][rest].tolist() for name in names)
+        for window, time, sigma, *values in zip(*columns, strict=True):
             place = places[window, time]
+            plain: Any = (None if isinstance(v, float) and isnan(v) else v for v in values)
+            source = ErrorSource(*plain)
+            if source not in sources:
+                sources[source] = np.zeros(len(variance))
             sources[source][place] = sigma**2 / variance[place] if variance[place] else 0.0
         errors[error] = {
             **{name: arrays.log(kept[name][total]) for name in ("sigma", "lower", "upper")},
             "gyro": _merge_axes(kept["gyro"][total]),
             "accel": _merge_axes(kept["accel"][total]),
             "sources": {
-                source: arrays.even(share)
+                source_text(source): {
+                    "kind": source_kind_text(source),
+                    "shares": arrays.even(share),
+                }
                 for source, share in sources.items()
                 if np.any(share > 0.0)
             },

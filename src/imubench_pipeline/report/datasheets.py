@@ -93,7 +93,7 @@ def merge_verdicts(readings: Sequence[DatasheetRow]) -> tuple[str, str]:
     judged = minima or list(readings)
     verdicts = list(dict.fromkeys(row.verdict for row in judged))
     if len(verdicts) == 1:
-        return verdicts[0], judged[0].reason or ""
+        return verdicts[0], "; ".join(judged[0].reasons)
     each = "; ".join(f"as {row.sidedness}: {row.verdict}" for row in judged)
     return DEPENDS, each
 
@@ -182,7 +182,7 @@ def format_repeatability(
             "unit": unit.sign,
             "delta": _format_percent(row.delta),
             "verdict": row.verdict,
-            "reason": row.reason or "",
+            "reasons": row.reasons,
         }
 
 
@@ -245,7 +245,7 @@ def make_coverage_tables(rows: Sequence[CoverageRow]) -> Iterator[Json]:
             )
             line["cells"][row.figure] = {
                 "text": _COVERAGE_SIGNS[row.published],
-                "note": row.as_printed or "",
+                "note": "; ".join(row.as_printed),
                 "class": "" if row.published == "yes" else "none",
             }
         if not lines:

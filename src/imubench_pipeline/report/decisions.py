@@ -202,7 +202,7 @@ def _cell(row: RankingRow, scale: Scale) -> Cell:
     elif row.left_out:
         reason = doubts_text(row.left_out[:1])
     else:
-        reason = row.reason or "too little is known"
+        reason = "; ".join(row.reasons) or "too little is known"
     # Margins with the recordings that are not used, and with corrected units.
     alternatives = [
         (words, source_number(row, name, number_text(size, 2)), scale.place(size))

@@ -11,7 +11,7 @@ from markupsafe import Markup
 
 from imubench_pipeline.model.comparisons import ErrorBudgetRow, RankingRow
 from imubench_pipeline.model.estimates import BacktestRow
-from imubench_pipeline.navigation.suitability.conditions import compute_variance_shares
+from imubench_pipeline.navigation.suitability import compute_variance_shares
 from imubench_pipeline.report.payload import Json
 from imubench_pipeline.report.practical import System, choose_unit
 from imubench_pipeline.settings.requirements import DIMENSIONS, Requirement
@@ -28,6 +28,8 @@ from imubench_pipeline.words.verdicts import (
     corrected_text,
     evidence_text,
     share_text,
+    source_kind_text,
+    source_text,
     stated_verdict,
     used_doubts_text,
 )
@@ -114,6 +116,7 @@ _NAMES = {
     "position": "position, one axis",
     "north": "north, found at rest",
 }
+_NAMES_IN_NOTES = {**_NAMES, "attitude": "attitude"}
 _ERRORS = tuple(_NAMES)
 _QUARTER_TURN = math.pi / 2.0
 
@@ -220,11 +223,11 @@ def _limit(row: RankingRow, system: System) -> LimitLine:
         margin=size[0] if size else NO_VALUE,
         margins=SourcedInterval(size[1], size[2]) if size else "",
         chance=chance,
-        source=f"{row.source} ({_percent(row.share)})" if row.source else NO_VALUE,
+        source=f"{source_text(row.parts[0])} ({_percent(row.share)})" if row.parts else NO_VALUE,
         parts=[share_text(share) for share in row.parts] or [NO_VALUE],
         reached=duration_text(row.reached_after),
         decides=row.decides,
-        reason=row.reason or "",
+        reason="; ".join(row.reasons),
         backtest=describe_backtest(row),
     )
 
@@ -287,7 +290,7 @@ def make_budget_tables(
             chosen = [row for row in parts if (row.error, row.axis) == (error, axis)]
             sigmas = tuple(row.sigma for row in chosen if row.source == "total")
             if not any(sigmas):
-                missing[f"{_NAMES[error]}: {chosen[0].reason or 'not known'}"] = None
+                missing[f"{_NAMES[error]}: {'; '.join(chosen[0].reasons) or 'not known'}"] = None
             elif (error, sigmas) in lines:
                 # One channel is the worst and the median.
                 lines[error, sigmas]["axis"] += f", {axis}"
@@ -295,9 +298,9 @@ def make_budget_tables(
                 cells = [_cell([r for r in chosen if r.time == t], system) for t in times]
                 lines[error, sigmas] = {"error": _NAMES[error], "axis": axis, "cells": cells}
         notes: dict[str, dict[str, None]] = {}  # the errors of each note
-        for line in lines.values():
+        for (error, _), line in lines.items():
             for note in (cell["note"] for cell in line["cells"] if cell["note"]):
-                notes.setdefault(note, {})[line["error"].split(" (")[0]] = None
+                notes.setdefault(note, {})[_NAMES_IN_NOTES[error]] = None
         yield {
             "sensor": key[0],
             "recording": key[1],
@@ -327,7 +330,7 @@ def make_budget_bars(rows: Sequence[ErrorBudgetRow], system: System) -> list[Jso
             continue
         size = _format_error(total, sigma, choose_unit(DIMENSIONS[error], system, sigma))
         shares = [
-            (row.source, float(f"{(row.sigma / sigma) ** 2:.3g}"))
+            (source_text(row), float(f"{(row.sigma / sigma) ** 2:.3g}"), source_kind_text(row))
             for row in parts
             if row.source != "total" and row.sigma
         ]
@@ -344,7 +347,11 @@ def _cell(rows: Sequence[ErrorBudgetRow], system: System) -> Json:
     """Return an error with its interval and its sources."""
     total = _total(rows)
     if total is None or total.sigma is None:
-        return {"lines": [NO_VALUE], "note": (total and total.reason) or "", "known": False}
+        return {
+            "lines": [NO_VALUE],
+            "note": "; ".join(total.reasons) if total else "",
+            "known": False,
+        }
     unit = choose_unit(DIMENSIONS[total.error], system, total.sigma)
     lines = [_format_error(total, total.sigma, unit)]
     if _is_sensible(total, total.sigma):
@@ -355,7 +362,7 @@ def _cell(rows: Sequence[ErrorBudgetRow], system: System) -> Json:
         lines += [share_text(share) for share in compute_variance_shares(total.sigma, sources)] or [
             ""
         ]
-    return {"lines": lines, "note": total.reason or "", "known": True}
+    return {"lines": lines, "note": "; ".join(total.reasons), "known": True}
 
 
 def _is_sensible(row: ErrorRow, sigma: float) -> bool:
@@ -417,7 +424,9 @@ def format_backtest(
             independent = f"({number_text(row.independent, 2)} independent)"
             line["windows"] = f"{number_text(row.windows, 9)} {independent}"
         if row.taken_out and not row.reason:
-            line["why"] = f"in the log, not in the model: {row.taken_out.replace('_', ' ')}"
+            line["why"] = (
+                f"in the log, not in the model: {', '.join(row.taken_out).replace('_', ' ')}"
+            )
         lines.append(line)
     return lines
 

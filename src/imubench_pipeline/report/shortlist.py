@@ -54,16 +54,16 @@ def format_shortlist_row(row: ShortlistRow) -> list[str]:
         _format_margin(row.best_margin),
         _format_margin(row.worst_margin) if row.best_margin is not None else "–",
         measured,
-        row.decides or row.reason or "; ".join(map(shortfall_text, row.shortfalls)),
+        row.decides or "; ".join(row.reasons) or "; ".join(map(shortfall_text, row.shortfalls)),
     ]
 
 
 def list_assumptions(rows: Sequence[ShortlistRow]) -> Iterator[str]:
     """Yield a line per sensor with its assumptions, or the reason why it is not judged."""
     for row in rows:
-        remarks = [*map(shortfall_text, row.shortfalls), row.reason, *row.assumed]
-        if any(remarks):
-            yield f"{row.sensor}: {'; '.join(filter(None, remarks))}"
+        remarks = [*map(shortfall_text, row.shortfalls), *row.reasons, *row.assumed]
+        if remarks:
+            yield f"{row.sensor}: {'; '.join(remarks)}"
 
 
 def _format_margin(value: float | None) -> str:

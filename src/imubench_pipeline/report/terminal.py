@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from textwrap import wrap
 from typing import TypeVar
 
@@ -28,7 +29,15 @@ from imubench_pipeline.report.terminal_table import fit_table
 from imubench_pipeline.settings.requirements import Requirement
 from imubench_pipeline.settings.sensor import quantity_of
 from imubench_pipeline.words.estimates import STATUS_WORDS, symbol_text
-from imubench_pipeline.words.numbers import NO_VALUE, Unit, counted, duration_text, rates_text
+from imubench_pipeline.words.findings.base import WHITE
+from imubench_pipeline.words.numbers import (
+    NO_VALUE,
+    Unit,
+    counted,
+    duration_text,
+    rates_text,
+)
+from imubench_pipeline.words.verdicts import used_doubts_text
 
 R = TypeVar("R", bound=OfRecordingRow)
 
@@ -44,6 +53,7 @@ _STYLES: Mapping[Verdict, str] = {
     "fails": "red",
     "excluded": "dim",
 }
+_MAX_AFFECTED = 3  # parameters that are named in a warning
 _LONGEST_FINDING = 400
 _STEPS = 3
 _BESIDE = 34  # columns of the remarks below a verdict
@@ -117,11 +127,14 @@ def render_logs(
         if row.status != "ok":
             yield Text(f"  {row.status}: {fold_text(row.reason or '', _LONGEST_FINDING)}\n")
             continue
-        yield from _listed("Warnings", map(_of_log, select_warnings(findings)))
+        warnings = list(select_warnings(findings))
+        yield from _listed("Warnings", map(_of_log, warnings))
         doubts = []
+        warned = {(warning.channel, warning.finding) for warning in warnings}
         for doubt in _of(row, every_doubt):
-            of = " ".join(filter(None, (doubt.channel, ", ".join(doubt.parameters)))) or "all"
-            doubts.append(f"{of}: {doubt.reason}")
+            if (doubt.channel, doubt.code) not in warned:
+                of = " ".join(filter(None, (doubt.channel, ", ".join(doubt.parameters)))) or "all"
+                doubts.append(f"{of}: {doubt.reason}")
         yield from _listed("In doubt", doubts)
         notes = [line for line in findings if line.severity == "note"]
         yield from _listed("Notes", map(_of_log, notes), cut=True)
@@ -156,6 +169,10 @@ def _length(
 
 def _of_log(row: FindingRow) -> str:
     name = row.finding.replace("_", " ")
+    if 0 < len(row.affects) <= _MAX_AFFECTED:
+        name += f", affects {', '.join(row.affects)}"
+    elif row.affects and WHITE.isdisjoint(row.affects):
+        name += ", affects slow noise"
     place = f"{row.channel} ({name})" if row.channel else name
     return f"{place}: {row.detail}"
 
@@ -223,9 +240,12 @@ def _ranking_lines(group: Group, *, every: bool) -> Iterator[list[str | Text]]:
     verdict = Text(fold_text(group.stated), style=style)
     if group.weak:
         verdict.stylize("dim")
+    # A doubt that makes the evidence weak is printed there.
+    doubts = tuple(doubt for doubt in row.doubts if doubt.code not in row.evidence_reasons)
+    others = used_doubts_text(replace(row, doubts=doubts)) if group.doubts else ""
     for line in (
         f"weak evidence: {group.weak}" * bool(group.weak),
-        f"doubts: {group.doubts}" * bool(group.doubts),
+        f"doubts: {others}" * bool(others),
         group.corrected,
     ):
         # The column of names gets the rest of the width.

@@ -19,7 +19,7 @@ from typing import Any
 from pydantic import BaseModel
 
 from imubench_pipeline.datasheets.suspicion import usual_as_text, usual_figures
-from imubench_pipeline.navigation.suitability.abilities import read_abilities
+from imubench_pipeline.navigation.suitability import read_abilities
 from imubench_pipeline.recordings.drop_zone import Recording, account_for, find_logs
 from imubench_pipeline.recordings.known_logs import plan_recording_versions
 from imubench_pipeline.registry import blocks

@@ -285,8 +285,6 @@ FIGURE_DIMENSIONS: dict[str, dict[str, tuple[str, ...]]] = {
 }
 """Dimensions that each datasheet figure may have, the usual one first, by quantity."""
 
-Measured = Literal["gyro", "accel"]  # what a sensor measures
-
 SENSORS: Mapping[str, str] = {"gyro": "gyro", "accel": "accelerometer"}  # what measures it
 
 IN_USE = (

@@ -12,7 +12,7 @@ from imubench_pipeline.estimators.rows import read_recommended_estimates
 from imubench_pipeline.model.estimates import DeterministicRow, DrawnDeviationRow, TemperatureRow
 from imubench_pipeline.model.table import TableRow
 from imubench_pipeline.navigation import expected_errors
-from imubench_pipeline.navigation.backtest.of_recording import list_backtest_rows
+from imubench_pipeline.navigation.backtest.comparison import list_backtest_rows
 from imubench_pipeline.navigation.compared import ComparedChannel
 from imubench_pipeline.navigation.error_budget.printed_errors import collect_figures_in_use
 from imubench_pipeline.navigation.error_growth import list_growth_rows

@@ -11,8 +11,11 @@ from imubench_pipeline.model.comparisons import RankingRow, ShortlistRow
 from imubench_pipeline.model.estimates import ParameterRow
 from imubench_pipeline.model.recordings import RecordingRow
 from imubench_pipeline.model.table import R
-from imubench_pipeline.navigation.shortlist import figures
-from imubench_pipeline.navigation.shortlist.rows import list_shortlist_rows
+from imubench_pipeline.navigation.shortlist import (
+    collect_measured_ranges,
+    collect_printed_ranges,
+    list_shortlist_rows,
+)
 from imubench_pipeline.settings.requirements import Requirement, validate_requirements
 from imubench_pipeline.settings.sensor import Sensor, sensors_of
 from imubench_pipeline.tables import read, write_each
@@ -37,8 +40,8 @@ def list_shortlist(
 
     recordings = rows_of(RecordingRow)
     classes = {name: sensor.price_class for name, sensor in sensors.items()}
-    measured = figures.collect_measured_ranges(rows_of(ParameterRow), recordings, classes)
-    ranges = replace(measured, printed=figures.collect_printed_ranges(sensors))
+    measured = collect_measured_ranges(rows_of(ParameterRow), recordings, classes)
+    ranges = replace(measured, printed=collect_printed_ranges(sensors))
     yield from list_shortlist_rows(requirements, sensors, ranges, rows_of(RankingRow), recordings)
 
 

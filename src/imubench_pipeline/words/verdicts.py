@@ -8,11 +8,13 @@ from decimal import ROUND_DOWN, Decimal
 from typing import get_args
 
 from imubench_pipeline.earth import STANDARD_GRAVITY
-from imubench_pipeline.model.comparisons import NextStepRow, RankingRow
-from imubench_pipeline.model.states import Action, ShortlistVerdict, SpreadOf, Verdict
+from imubench_pipeline.model.comparisons import ErrorBudgetRow, NextStepRow, RankingRow
+from imubench_pipeline.model.estimates import ErrorGrowthRow
+from imubench_pipeline.model.states import Action, ShortlistVerdict, SourceCode, SpreadOf, Verdict
 from imubench_pipeline.model.verdicts import (
     Condition,
     DoubtMark,
+    ErrorSource,
     Figure,
     Property,
     Share,
@@ -81,6 +83,17 @@ SHORTLIST_WORDS: Mapping[ShortlistVerdict, str] = {
     "not_judged": "not judged",
 }
 """Verdict by the data sheet alone."""
+
+_SOURCES: Mapping[SourceCode, str] = {
+    "turn_on_bias": "turn-on bias",
+    "temperature_squared": "temperature squared",
+    "scale_factor": "scale factor",
+    "g_sensitivity": "g-sensitivity",
+    "vibration_rectification": "vibration rectification",
+    "initial_tilt": "initial tilt",
+    "initial_heading": "initial heading",
+}
+"""Sources of errors whose code is not their name."""
 
 _NOUNS: Mapping[Figure, tuple[str, str, str]] = {
     "turn_on_bias": ("bias after calibration", "deg/s", "mg"),
@@ -197,7 +210,27 @@ def shortfall_text(shortfall: Shortfall) -> str:
 def share_text(share: Share) -> str:
     """Return a source of an error with its share: ``gyro N 40 %``."""
     origin = f" (data sheet, {share.kind})" if share.kind else ""
-    return f"{share.source}{origin} {100.0 * share.share:.0f} %"
+    return f"{source_text(share)}{origin} {100.0 * share.share:.0f} %"
+
+
+def source_text(source: ErrorSource | ErrorBudgetRow | ErrorGrowthRow) -> str:
+    """Return a source of an error: ``gyro N``, ``initial tilt by accel GM 89.5 s``."""
+    size = "" if source.T_B is None else f" {source.T_B:.4g} s"
+    size += "" if source.frequency is None else f" {source.frequency:.4g} Hz"
+    return _name_source(source, size)
+
+
+def source_kind_text(source: ErrorSource | ErrorBudgetRow | ErrorGrowthRow) -> str:
+    """Return a source without the time or frequency, which differs between logs."""
+    return _name_source(source)
+
+
+def _name_source(source: ErrorSource | ErrorBudgetRow | ErrorGrowthRow, size: str = "") -> str:
+    sensor = f"{source.quantity} " if source.quantity else ""
+    name = f"{sensor}{_SOURCES.get(source.source, source.source)}{size}"
+    if source.through == "static_window":
+        return f"{name} in the static window"
+    return f"initial tilt by {name}" if source.through == "initial_tilt" else name
 
 
 def evidence_text(row: RankingRow) -> str:
@@ -221,7 +254,8 @@ def _describe_weakness(code: str, row: RankingRow) -> str:
             return "wide interval"
         case "few_axes":
             return "fewer than three axes"
-    return doubt_text(code)
+    marks = (doubt for doubt in row.doubts if doubt.code == code)
+    return doubt_text(code, list(dict.fromkeys(name for mark in marks for name in mark.channels)))
 
 
 def doubts_text(doubts: Iterable[DoubtMark], *, named: bool = False, most: int = 3) -> str:
@@ -256,7 +290,7 @@ def corrected_text(row: RankingRow) -> str:
     if row.corrected_verdict is not None:
         outcome = _describe_outcome(row.corrected_verdict, row.corrected_margin)
         still = "still " * (row.logged_verdict == row.corrected_verdict)
-        why = f" ({row.corrected_reason})" * bool(row.corrected_reason)
+        why = f" ({'; '.join(row.corrected_reasons)})" * bool(row.corrected_reasons)
         parts.append(f"it {still}{outcome} if {_describe_units(row.corrected_units)}{why}")
     return "; ".join(parts)
 
@@ -334,8 +368,8 @@ def list_others(rows: Iterable[RankingRow], names: Mapping[str, str]) -> list[st
         for row in listed:
             if row.verdict == verdict:
                 heading = _HEADINGS[verdict] + " on conditions" * bool(row.conditions)
-                if verdict == "not_enough_data" and row.reason:
-                    heading += f" ({row.reason})"
+                if verdict == "not_enough_data" and row.reasons:
+                    heading += f" ({'; '.join(row.reasons)})"
                 why = f" ({'; '.join(map(shortfall_text, row.shortfalls))})" * bool(row.shortfalls)
                 by_heading.setdefault(heading, []).append(names[row.sensor] + why)
     return [
@@ -358,7 +392,7 @@ def _describe_action(step: NextStepRow) -> str:
         case "find_figures":
             return f"Look up the {join_names(list(map(subject_text, step.figures)))}"
         case "record_again":
-            doubts = "; ".join(map(doubt_text, step.doubts))
+            doubts = "; ".join(doubt_text(doubt.code, doubt.channels) for doubt in step.doubts)
             return f"Record {step.recording} again" + f" ({doubts})" * bool(doubts)
         case "add_channels":
             if quantities:

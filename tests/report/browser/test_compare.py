@@ -55,8 +55,8 @@ def words(ratio: Ratio) -> str:
     return {
         "lower": "A better",
         "higher": "B better",
-        "not told apart": "not significant",
-        "not known": "not determined",
+        "not significant": "not significant",
+        "not determined": "not determined",
     }[ratio.verdict]
 
 

@@ -2,6 +2,8 @@
 
 import pytest
 
+from imubench_pipeline.model.comparisons import ErrorBudgetRow
+from imubench_pipeline.words.verdicts import source_text
 from tests.report.browser import made
 from tests.report.browser.made import Report
 from tests.report.browser.reader import Open, Reader, traces
@@ -48,7 +50,7 @@ def test_bars_of_a_budget_are_its_parts(night: Reader, bench: Report) -> None:
     figure = night.figure("budget")
     names = figure.locator(".canvas").evaluate("canvas => canvas.layout.yaxis.ticktext")
     rows = {
-        row["source"]: row["sigma"]
+        source_text(ErrorBudgetRow.from_json(row)): row["sigma"]
         for row in bench.of("error_budget", recording=made.NIGHT.recording, requirement=None)
         if (row["axis"], row["error"], row["time"]) == ("worst", "heading", 60.0)
     }

@@ -60,7 +60,7 @@ def _make_row(
         source="total",
         limit=allowed,
         unit=SI_UNITS[DIMENSIONS[limit.error]],
-        reason="no filter was run for this sensor (setting navigate: of)",
+        reasons=("no filter was run for this sensor (setting navigate: of)",),
     )
     if isinstance(run, RecordingRow):
         return unknown
@@ -69,7 +69,7 @@ def _make_row(
         reason = (
             f"the filter of this sensor goes astray: NEES is inside in {inside:.0f} % instead of 95"
         )
-        return replace(unknown, reason=reason)
+        return replace(unknown, reasons=(reason,))
     found = {
         "position": (run.position, run.position_lower, run.position_upper),
         "velocity": (run.velocity, run.velocity_lower, run.velocity_upper),
@@ -77,7 +77,7 @@ def _make_row(
     }[limit.error]
     sizes = [size / _AXIS_FACTORS[limit.error] for size in found if size is not None]
     if len(sizes) < len(found):
-        return replace(unknown, reason=f"the runs do not tell the error of the {limit.error}")
+        return replace(unknown, reasons=(f"the runs do not tell the error of the {limit.error}",))
     sigma, lower, upper = sizes
     spread = math.log(upper / lower) / (2.0 * NORMAL_QUANTILE)
     reason = "simulated drives; the limits are those of the runs, not of the estimate"
@@ -87,5 +87,5 @@ def _make_row(
         lower=lower,
         upper=upper,
         within=float(ndtr(math.log(allowed / sigma) / spread)),
-        reason=reason + (f"; assumed: {run.assumed}" if run.assumed else ""),
+        reasons=(reason + (f"; assumed: {run.assumed}" if run.assumed else ""),),
     )

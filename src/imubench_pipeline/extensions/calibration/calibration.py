@@ -196,7 +196,8 @@ def _attitude(
         return
     at_rest = load_noise_at_rest(static)
     if at_rest is not None and any(channel.startswith("accel") for channel in at_rest.models):
-        models = [*at_rest.three("gyro").values(), *at_rest.three("accel").values()]
+        names = (*at_rest.select_axes("gyro"), *at_rest.select_axes("accel"))
+        models = [at_rest.models[name] for name in names]
         words = f"static recording {at_rest.recording}"
     else:
         printed = [take_printed_noise(key.sensor, sensor, channel) for channel in TRIAD]

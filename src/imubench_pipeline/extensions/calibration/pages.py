@@ -179,7 +179,9 @@ def list_without_result(
     for view in views:
         rows = rows_of(view)
         if rows and all(row.value is None for row in rows):
-            yield {"view": view, "reason": sentence(rows[0].reason)}
+            row = rows[0]
+            reason = row.reason if isinstance(row, CalibrationRow) else "; ".join(row.reasons)
+            yield {"view": view, "reason": sentence(reason)}
 
 
 NOT_CALIBRATED = Section(

@@ -233,7 +233,7 @@ def _turning_rows(
     """Yield the rows of the table ``turning``."""
     names = asdict(key)
     for text in turning.doubts:
-        yield TurningRow(**names, what="doubt", doubts=text)
+        yield TurningRow(**names, what="doubt", doubts=(text,))
     for number, (dwell, part) in enumerate(dwells, 1):
         values = used[part.start : part.stop]
         finite = np.isfinite(values)
@@ -246,7 +246,7 @@ def _turning_rows(
             sense=dwell.sense,
             found_by=dwell.found_by,
             mean=float(values[finite].mean()) if finite.any() else None,
-            doubts="; ".join(dwell.doubts) or None,
+            doubts=tuple(dwell.doubts),
         )
     for number, turn in enumerate(turning.turns, 1):
         yield TurningRow(
@@ -258,7 +258,7 @@ def _turning_rows(
             time=turn.time + begins,
             found_by=turn.found_by,
             peak=turn.peak,
-            doubts="; ".join(turn.doubts) or None,
+            doubts=tuple(turn.doubts),
         )
     for number, (start, stop) in enumerate(turning.knocks, 1):
         start, stop = start + begins, stop + begins
@@ -288,7 +288,7 @@ def _unsure(turning: Turning, trusted: bool) -> dict[str, Any]:
     if not reasons:
         return {}
     doubtful = turning.ambiguous or (unseen and not trusted)
-    return {"status": "ambiguous" if doubtful else "ok", "reason": "; ".join(reasons)}
+    return {"status": "ambiguous" if doubtful else "ok", "reasons": tuple(reasons)}
 
 
 def _estimates(
@@ -313,13 +313,14 @@ def _estimates(
     for course in courses.courses:
         row: dict[str, Any] = {"method": course.method, **ranges.get(course.method, {})}
         if course.reason is not None:
-            row |= {"status": "not_shown", "reason": course.reason}
+            row |= {"status": "not_shown", "reasons": (course.reason,)}
         elif course.sigma is None:
             row |= {"value": float(course.rate[-1]), "status": "given"}
-            row |= {
-                "reason": "bias tracking with known rate: the filter is given the Earth's rate and "
+            given = (
+                "bias tracking with known rate: the filter is given the Earth's rate and "
                 "returns it; whatever rate it is given, it finds"
-            }
+            )
+            row |= {"reasons": (given,)}
             row |= {"settled": None if course.settled in (None, math.inf) else course.settled}
         else:
             value, sigma = float(course.rate[-1]), float(course.sigma[-1])
@@ -340,7 +341,7 @@ def _without(names: dict[str, Any], part: str, status: str, reason: str) -> Iter
             unit="rad/s",
             truth=EARTH_RATE,
             status=status,
-            reason=reason,
+            reasons=(reason,),
         )
 
 

@@ -79,7 +79,7 @@ def make_turned_context(site: Site, view: RecordingView, folder: Path) -> dict[s
         "channel": channel,
         "summary": summarise_recording(view, summary),
         "answer": summarise_earth_rate(whole, site.system),
-        "doubts": [sentence(row.doubts) for row in turning if row.what == "doubt"],
+        "doubts": [sentence("; ".join(row.doubts)) for row in turning if row.what == "doubt"],
         "findings": view.findings,
         "lines": [format_estimate(row) for row in rows],
         "given": describe_settling(rows),
@@ -116,7 +116,7 @@ def summarise_earth_rate(rows: Sequence[EarthRateRow], system: System) -> str:
     if best is None:
         return "This recording has no estimate of the Earth's rate."
     if best.value is None:
-        return sentence(best.reason)
+        return sentence("; ".join(best.reasons))
     unit = choose_page_unit("gyro", "adev", system)
     value, truth = (unit.text(number, 4) for number in (best.value, best.truth))
     size = None if best.upper is None else best.upper - best.value
@@ -131,7 +131,7 @@ def summarise_earth_rate(rows: Sequence[EarthRateRow], system: System) -> str:
             " Noise does not explain this error. Check sense, axis and latitude, a warm-up, and "
             "whether the noise is that at rest."
         )
-    return text + (f" {sentence(best.reason)}" if best.reason else "")
+    return text + (f" {sentence('; '.join(best.reasons))}" if best.reasons else "")
 
 
 def describe_settling(rows: Sequence[EarthRateRow]) -> str:
@@ -167,7 +167,7 @@ def format_estimate(row: EarthRateRow) -> dict[str, Any]:
         "words": _METHODS[row.method][1],
         "digits": limit_digits(row.lower, row.upper, 4),
         "off": "–" if row.off_sigma is None else f"{number_text(row.off_sigma, 2)} σ",
-        "why": sentence(row.reason),
+        "why": sentence("; ".join(row.reasons)),
         "use": row.method == "filter" and row.status == "ok",
     }
 
@@ -500,8 +500,8 @@ def _describe_missing_axes(row: AlignmentRow) -> str:
     """Return which axes are missing in the log and replaced by others, in a sentence."""
     lent_axes = []
     for channels, words in ((row.gyros, "gyro"), (row.accelerometers, "accelerometer")):
-        pairs = [entry.split(": ") for entry in channels.split(", ")]
-        lent = [axis for axis, channel in pairs if not channel.endswith(f"_{axis}")]
+        pairs = zip("xyz", channels, strict=True)
+        lent = [axis for axis, channel in pairs if channel[-1] != axis]
         if lent:
             lent_axes.append(f"{words} {' and '.join(lent)}")
     if not lent_axes:

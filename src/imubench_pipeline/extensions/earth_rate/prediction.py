@@ -267,15 +267,17 @@ class Noise:
     rate: float  # Hz
     models: dict[str, NoiseModel]  # by channel
 
-    def three(self, quantity: str) -> dict[str, NoiseModel]:
-        """Return the models of x, y and z by axis; a missing axis has the noise of another."""
+    def select_axes(self, quantity: str) -> tuple[str, ...]:
+        """Return the channels whose models the axes x, y and z of a quantity have.
+
+        An axis that is missing in the log has the noise of another one.
+        """
         names = [name for name in self.models if name.startswith(quantity)]
-        models = {}
-        for place, axis in enumerate("xyz"):
-            own = f"{quantity}_{axis}"
-            name = own if own in self.models else names[place % len(names)]
-            models[f"{axis}: {name}"] = self.models[name]
-        return models
+        wanted = (f"{quantity}_{axis}" for axis in "xyz")
+        return tuple(
+            own if own in self.models else names[place % len(names)]
+            for place, own in enumerate(wanted)
+        )
 
 
 def load_noise_at_rest(folders: Sequence[Path]) -> Noise | None:
@@ -324,12 +326,12 @@ def make_outlook_tables(
 def _predict_alignment(
     sensor: str, noise: Noise, printed: Datasheet, how: EarthRateSettings
 ) -> Iterator[AlignmentRow]:
-    gyros, accelerometers = noise.three("gyro"), noise.three("accel")
+    gyros, accelerometers = noise.select_axes("gyro"), noise.select_axes("accel")
     gyro_bias, gyro_words = _find_bias(printed, "gyro", how)
     accelerometer_bias, accelerometer_words = _find_bias(printed, "accel", how)
     triad = Triad(
-        gyros=tuple(gyros.values()),
-        accelerometers=tuple(accelerometers.values()),
+        gyros=tuple(noise.models[name] for name in gyros),
+        accelerometers=tuple(noise.models[name] for name in accelerometers),
         gyro_bias=gyro_bias,
         accelerometer_bias=accelerometer_bias,
     )
@@ -360,8 +362,8 @@ def _predict_alignment(
             gyro_bias_from=gyro_words,
             accelerometer_bias=accelerometer_bias,
             accelerometer_bias_from=accelerometer_words,
-            gyros=", ".join(gyros),
-            accelerometers=", ".join(accelerometers),
+            gyros=gyros,
+            accelerometers=accelerometers,
         )
 
 

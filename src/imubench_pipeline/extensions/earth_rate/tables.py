@@ -7,7 +7,6 @@ from typing import Annotated
 from imubench_pipeline.model.table import (
     Column,
     Estimate,
-    EstimateReason,
     EstimateUnit,
     LowerLimit,
     OfRecordingRow,
@@ -41,7 +40,7 @@ class EarthRateRow(OfRecordingRow):
     status: Annotated[
         str, Column("ok; ambiguous (sign); given (input); no_turns, no_model, too_short, not_shown")
     ]
-    reason: EstimateReason = None
+    reasons: Annotated[tuple[str, ...], Column("why there is no plain value")] = ()
     sigma: Annotated[float | None, Column("standard deviation by the noise model", "rad/s")] = None
     sigma_lower: Annotated[float | None, Column("lower 95 % limit of sigma", "rad/s")] = None
     sigma_upper: Annotated[float | None, Column("upper 95 % limit of sigma", "rad/s")] = None
@@ -91,7 +90,7 @@ class TurningRow(OfRecordingRow):
     found_by: Annotated[str | None, Column("column, transient, step or schedule")] = None
     peak: Annotated[float | None, Column("of a turn: largest rate or step", "rad/s")] = None
     mean: Annotated[float | None, Column("of a dwell", "rad/s")] = None
-    doubts: Annotated[str | None, Column("in words")] = None
+    doubts: Annotated[tuple[str, ...], Column("in words")] = ()
 
 
 @table("earth_rate_prediction")
@@ -154,8 +153,8 @@ class AlignmentRow(OfRecordingRow):
     gyro_bias_from: Annotated[str, Column("source of this figure")]
     accelerometer_bias: Annotated[float, Column("standard deviation of the fixed biases", "m/s^2")]
     accelerometer_bias_from: Annotated[str, Column("source of this figure")]
-    gyros: Annotated[str, Column("channels whose noise the axes x, y, z have")]
-    accelerometers: Annotated[str, Column("likewise")]
+    gyros: Annotated[tuple[str, ...], Column("channels whose noise the axes x, y, z have")]
+    accelerometers: Annotated[tuple[str, ...], Column("likewise")]
 
 
 TURNED = (

@@ -28,7 +28,7 @@ class Answer:
     common: float  # of its common part
     drawn_own: Array  # shape (draws,); the same for the drawn models
     drawn_common: Array
-    unknown: str | None  # unknown parameters that matter; the number is then not given
+    unknown: tuple[str, ...]  # unknown parameters that matter; the number is then not given
 
 
 def answer(
@@ -62,7 +62,7 @@ def answer(
     if chosen.temperature is not None:
         common = common + chosen.of_temperature(tau)
         drawn_common = drawn_common + chosen.temperature.drawn(tau, draws, stream)
-    unknown = "; ".join(dict.fromkeys(chosen.unknown(tau))) or None
+    unknown = tuple(dict.fromkeys(chosen.unknown(tau)))
     return Answer(chosen, float(own[0]), float(common[0]), drawn_own, drawn_common, unknown)
 
 
@@ -103,8 +103,8 @@ def equivalence_rows(
 
 def _compare_pair(row: FusionRow, a: Answer | str, b: Answer | str) -> FusionRow:
     """Return the row of two sensors at a tau with the number needed, or why there is none."""
-    answers = [each if isinstance(each, str) else each.unknown for each in (a, b)]
-    reasons = [reason for reason in answers if reason]
+    answers = [(each,) if isinstance(each, str) else each.unknown for each in (a, b)]
+    reasons = [reason for each in answers for reason in each]
     plain = not reasons
     if not isinstance(a, str):
         whole = a.own + a.common
@@ -127,7 +127,7 @@ def _compare_pair(row: FusionRow, a: Answer | str, b: Answer | str) -> FusionRow
             other_adev=math.sqrt(b.own + b.common),
         )
     if isinstance(a, str) or isinstance(b, str):
-        return replace(row, reason="; ".join(reasons))
+        return replace(row, reasons=tuple(reasons))
     number = float(compute_number_needed(a.own, a.common, b.own + b.common))
     drawn = compute_number_needed(a.drawn_own, a.drawn_common, b.drawn_own + b.drawn_common)
     # Infinite numbers cannot be interpolated.
@@ -145,5 +145,5 @@ def _compare_pair(row: FusionRow, a: Answer | str, b: Answer | str) -> FusionRow
         lower=low if math.isfinite(low) else None,
         upper=high if math.isfinite(high) else None,
         reachable=math.isfinite(number),
-        reason="; ".join(reasons) or None,
+        reasons=tuple(reasons),
     )

@@ -22,6 +22,7 @@ from imubench_pipeline.model.recordings import RecordingRow
 from imubench_pipeline.model.table import ChannelRow, TableRow
 from imubench_pipeline.navigation.compared import ComparedChannel, TemperaturePart
 from imubench_pipeline.navigation.error_budget.printed_errors import SIGMAS
+from imubench_pipeline.navigation.shortlist import parse_price_class
 from imubench_pipeline.recordings.fitness import attach_doubts, list_excluded
 from imubench_pipeline.settings.config import FusionSettings
 from imubench_pipeline.settings.printed import Datasheet
@@ -203,7 +204,7 @@ def yield_grades_of_run(
     grades = [
         Grade(name, f"{sensor.vendor} {sensor.model}", sensor.datasheet)
         for name, sensor in sensors.items()
-        if (sensor.price_class or "").split(" ")[0].strip(",") == TACTICAL_CLASS
+        if parse_price_class(sensor.price_class) == TACTICAL_CLASS
     ]
     not_sold = {name for name, sensor in sensors.items() if not sensor.sold}
     return yield_grade_rows(yield_candidates(tables, None, not_sold), grades)

@@ -70,6 +70,7 @@ def make_pair_lines(rows: Sequence[FusionRow]) -> Iterator[dict[str, Any]]:
             common += f" (temperature {percent_text(row.temperature_share)})"
         yield {
             **row.columns(),
+            "reason": "; ".join(row.reasons),
             "quantity": QUANTITY_NAMES[row.quantity],
             "symbol": f"{row.quantity}.adev",
             "tau": f"{number_text(row.tau)} s",

@@ -59,7 +59,7 @@ class FusionRow(TableRow):
     lower: Annotated[float | None, Column("lower 95 % limit of n; null: none is enough")] = None
     upper: Annotated[float | None, Column("upper 95 % limit of n; null: maybe none")] = None
     reachable: Annotated[bool | None, Column("some number is enough")] = None
-    reason: Annotated[str | None, Column("why there is no n or no limit")] = None
+    reasons: Annotated[tuple[str, ...], Column("why there is no n or no limit")] = ()
     doubts: DoubtCodes = ()
 
 

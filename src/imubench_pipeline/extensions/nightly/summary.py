@@ -273,7 +273,7 @@ class Drift(BaseModel):
     expected_lower: float | None
     expected_upper: float | None
     unit: str
-    reason: str | None
+    reasons: tuple[str, ...]
 
 
 class First(BaseModel):
@@ -444,7 +444,7 @@ def _describe_drift(drift: Drift) -> str:
         expected = f", expected {drift.expected_lower:.4g} to {drift.expected_upper:.4g}"
     return (
         f"{drift.sensor}, device {drift.device}: {drift.channel} {drift.parameter}{value} in "
-        f"{drift.recording}{expected}" + f" ({drift.reason})" * bool(drift.reason)
+        f"{drift.recording}{expected}" + f" ({'; '.join(drift.reasons)})" * bool(drift.reasons)
     )
 
 

@@ -21,22 +21,36 @@ J. A. Hausman, "Specification tests in econometrics", Econometrica 46(6), 1978.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
-from typing import Literal
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.special import gammaincc, gammaincinv
 
-from imubench_pipeline.model.estimates import BacktestRow
+from imubench_pipeline.earth import STANDARD_GRAVITY
+from imubench_pipeline.estimators.estimate import Estimate
+from imubench_pipeline.model.estimates import BacktestRow, DeterministicRow
 from imubench_pipeline.model.recordings import FindingRow
-from imubench_pipeline.navigation.backtest.covariance import Spread, WindowCovariance
-from imubench_pipeline.navigation.backtest.windows import Window, compute_window_errors
+from imubench_pipeline.model.states import BacktestVerdict
+from imubench_pipeline.navigation.backtest.windows import (
+    Spread,
+    Window,
+    WindowCovariance,
+    average_blocks,
+    choose_window,
+    compute_window_errors,
+)
+from imubench_pipeline.navigation.error_budget import draw_models
 from imubench_pipeline.navigation.error_budget.budget import of_sensor
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.growth import Calibrated
+from imubench_pipeline.noise.simulate import channel_rng
+from imubench_pipeline.recordings.recording import ChannelLog
+from imubench_pipeline.settings.requirements import DIMENSIONS, Error, Requirement
+from imubench_pipeline.settings.sensor import quantity_of
 from imubench_pipeline.tables.findings import find
 from imubench_pipeline.typing import Array
+from imubench_pipeline.units import SI_UNITS, parse_quantity
 from imubench_pipeline.words.findings.backtest import BacktestContradicts
 from imubench_pipeline.words.reasons import pools as texts
 
@@ -46,10 +60,27 @@ better known than the error itself, the difference is unreliable. On 600 logs wi
 the ranges cover 94.3 % with 0.2, 95.5 % with 0.3 and 97.1 % with 0.5."""
 
 
-Verdict = Literal["as predicted", "more than predicted", "less than predicted"]
-
 MIN_WINDOWS = 3
 """Minimum number of consecutive windows in a log."""
+
+
+CONTRADICTION_LEVEL = 0.01
+"""Significance level of a contradiction, for all rows of a recording together (Bonferroni)."""
+
+MIN_CONTRADICTING_RATIO = 1.1
+"""Minimum ratio of a contradiction. A day at 1 Hz has 30,000 windows of 10 s, so that a ratio of
+1.01 is significant, but it does not matter for a requirement."""
+
+_INTEGRATIONS: Mapping[tuple[str, Error], tuple[int, float]] = {
+    ("gyro", "attitude"): (0, 1.0),
+    ("gyro", "heading"): (0, 1.0),
+    ("gyro", "velocity"): (1, STANDARD_GRAVITY),
+    ("gyro", "position"): (2, STANDARD_GRAVITY),
+    ("accel", "velocity"): (0, 1.0),
+    ("accel", "position"): (1, 1.0),
+}
+"""Number of integrations minus one, and multiplier of the integral, by quantity and error. The
+attitude error of a gyro projects gravity into velocity and position."""
 
 
 @dataclass(frozen=True)
@@ -107,7 +138,7 @@ class DeadReckoning:
     def sigma(self, model: NoiseModel) -> float:
         """Return the standard deviation of the error, from the error budget of a noise model."""
         start = Calibrated(self.rest)
-        parts = of_sensor("", model, self.order, self.time, start, self.factor)
+        parts = of_sensor("gyro", model, self.order, self.time, start, self.factor)
         return math.hypot(*(part.sigma for part in parts))
 
 
@@ -135,7 +166,7 @@ class Comparison:
         return None if self.measured is None else self.measured / self.predicted
 
     @property
-    def verdict(self) -> Verdict | None:
+    def verdict(self) -> BacktestVerdict | None:
         """Position of the measured rms relative to the predicted range."""
         if self.measured is None or self.least is None or self.most is None:
             return None
@@ -155,19 +186,9 @@ def compare(
 ) -> Comparison:
     """Return the comparison of the errors of a log with those that its noise model predicts.
 
-    Parameters
-    ----------
-    asked : DeadReckoning
-    cut : Window
-        Window for the times at rest and in motion.
-    means : sequence of ndarray
-        Block means of each segment of the log, NaN where samples are missing.
-    model : NoiseModel
-        Model of the log, with at least one term.
-    drawn : sequence of NoiseModel
-        Models drawn from the estimate of the log.
-    efficient : bool
-        Whether they are drawn jointly from a likelihood (`Predicted`).
+    ``cut`` is the window for the times at rest and in motion; ``means`` are the block means of each
+    segment of the log, NaN where samples are missing. The model has at least one term; ``drawn``
+    are models from the estimate of the log, and ``efficient`` is as in `Predicted`.
     """
     predicted = asked.sigma(model)
     lower, upper = np.quantile([asked.sigma(candidate) for candidate in drawn], [0.025, 0.975])
@@ -176,11 +197,12 @@ def compare(
     covariance = WindowCovariance(cut, asked.order, asked.factor)
     window_errors = compute_window_errors(means, covariance.weights, covariance.lags)
     if window_errors.count <= (MIN_WINDOWS - 1) * cut.blocks:
-        return Comparison(
-            window_errors.count,
-            *budget,
-            reason=_explain_too_few_windows(asked, cut, means, window_errors.count),
-        )
+        span, needed = asked.rest + asked.time, asked.duration_needed
+        longest = cut.block * max(len(segment) for segment in means)
+        reason = texts.gaps_between_windows(window_errors.count, MIN_WINDOWS, span, needed)
+        if longest < needed:
+            reason = texts.short_for_windows(MIN_WINDOWS, span, needed, longest)
+        return Comparison(window_errors.count, *budget, reason=reason)
     possible = [candidate for candidate in drawn if candidate.terms] or [model]
     by_draws = Predicted(
         [covariance.spread(candidate, window_errors) for candidate in possible], efficient
@@ -195,17 +217,6 @@ def compare(
         most=math.sqrt(most),
         chance=by_draws.chance_above(window_errors.mean_square),
     )
-
-
-def _explain_too_few_windows(
-    asked: DeadReckoning, cut: Window, means: Sequence[Array], count: int
-) -> str:
-    """Return why a log has too few windows."""
-    span, needed = asked.rest + asked.time, asked.duration_needed
-    longest = cut.block * max(len(segment) for segment in means)
-    if longest < needed:
-        return texts.short_for_windows(MIN_WINDOWS, span, needed, longest)
-    return texts.gaps_between_windows(count, MIN_WINDOWS, span, needed)
 
 
 def findings(rows: Iterable[BacktestRow]) -> Iterator[FindingRow]:
@@ -229,6 +240,118 @@ def findings(rows: Iterable[BacktestRow]) -> Iterator[FindingRow]:
             row.ratio_upper,
             row.windows,
             row.independent,
-            tuple(row.taken_out.split(", ")) if row.taken_out else (),
+            row.taken_out,
         )
         yield find(data, "warning", ratio, channel).row(sensor, recording)
+
+
+def list_backtest_rows(
+    names: Mapping[str, str],
+    logs: Mapping[str, ChannelLog],
+    estimates: Mapping[str, Estimate],
+    requirements: Mapping[str, Requirement],
+    deterministic: Iterable[DeterministicRow],
+    *,
+    draws: int,
+    seed: int,
+) -> Iterator[BacktestRow]:
+    """Yield the rows of the table ``backtest`` of a recording.
+
+    The logs are used as recorded, with lines, temperature drift and other ``deterministic``
+    signals, which the models do not include, since a user of the sensor gets them too. ``names``
+    are ``sensor`` and ``recording``; ``estimates`` the recommended one of each channel; ``draws``
+    the number of noise models drawn from each. Each channel has its own random stream of the seed.
+    """
+    apart: dict[str, dict[str, None]] = {}
+    for component in deterministic:
+        apart.setdefault(component.channel, {})[component.kind] = None
+    rows = [
+        replace(row, taken_out=tuple(apart.get(channel, ())))
+        for channel, log in logs.items()
+        if channel in estimates
+        for row in _test_channel(names, channel, log, estimates[channel], requirements, draws, seed)
+    ]
+    compared = sum(row.chance is not None for row in rows)
+    for row in rows:
+        if row.chance is None or row.ratio is None:
+            yield row
+        else:
+            contradicted = (
+                row.chance * compared < CONTRADICTION_LEVEL and row.ratio >= MIN_CONTRADICTING_RATIO
+            )
+            yield replace(row, contradicted=contradicted)
+
+
+def _test_channel(
+    names: Mapping[str, str],
+    channel: str,
+    log: ChannelLog,
+    estimate: Estimate,
+    requirements: Mapping[str, Requirement],
+    draws: int,
+    seed: int,
+) -> Iterator[BacktestRow]:
+    """Yield the rows of one channel."""
+    listed: list[tuple[BacktestRow, DeadReckoning | str]] = []
+    for name, requirement in requirements.items():
+        for limit in requirement.by_dead_reckoning:
+            key = quantity_of(channel), limit.error
+            # The error that the limit needs, or why the log cannot show it.
+            asked: DeadReckoning | str
+            if key == ("gyro", "north"):
+                asked = texts.NORTH_NOT_TESTED
+            elif key not in _INTEGRATIONS:
+                continue
+            elif requirement.static_window is None:
+                asked = texts.TURN_ON_NOT_TESTED
+            elif not estimate.model.terms:
+                asked = texts.NOISE_NOT_KNOWN
+            else:
+                order, factor = _INTEGRATIONS[key]
+                rest = parse_quantity(requirement.static_window, "time")
+                asked = DeadReckoning(order, rest, limit.seconds, factor)
+            about = BacktestRow(
+                sensor=names["sensor"],
+                recording=names["recording"],
+                channel=channel,
+                requirement=name,
+                error=limit.error,
+                time=limit.seconds,
+                unit=SI_UNITS[DIMENSIONS[limit.error]],
+            )
+            listed.append((about, asked))
+    cuts = {
+        asked: choose_window(asked.rest, asked.time, log.rate)
+        for _, asked in listed
+        if isinstance(asked, DeadReckoning)
+    }
+    lengths = {cut.block for cut in cuts.values() if cut}
+    means = average_blocks(log.blocks(), log.segments, log.rate, lengths)
+    drawn = draw_models(
+        estimate, draws, channel_rng(seed, repr(estimate.model), channel, "backtest")
+    )
+    jointly = estimate.draws is not None
+    for about, asked in listed:
+        if not isinstance(asked, DeadReckoning):
+            yield replace(about, reason=asked)
+        elif (cut := cuts[asked]) is None:
+            yield replace(about, reason=texts.long_sampling_interval(log.rate))
+        else:
+            found = compare(asked, cut, means[cut.block], estimate.model, drawn, efficient=jointly)
+            yield replace(
+                about,
+                window=asked.rest,
+                windows=found.windows,
+                independent=found.independent,
+                measured=found.measured,
+                predicted=found.predicted,
+                predicted_lower=found.lower,
+                predicted_upper=found.upper,
+                ratio=found.ratio,
+                ratio_lower=None if found.least is None else found.least / found.predicted,
+                ratio_upper=None if found.most is None else found.most / found.predicted,
+                chance=found.chance,
+                verdict=found.verdict,
+                duration_needed=asked.duration_needed,
+                reason=found.reason,
+            )

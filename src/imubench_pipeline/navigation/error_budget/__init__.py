@@ -15,7 +15,6 @@ from imubench_pipeline.navigation.error_budget.uncertainty import (
     compute_chance_within,
     compute_interval,
     draw_models,
-    has_joint_draws,
 )
 from imubench_pipeline.noise.growth import Calibrated, Uncalibrated
 
@@ -39,6 +38,5 @@ __all__ = [
     "compute_chance_within",
     "compute_interval",
     "draw_models",
-    "has_joint_draws",
     "time_until",
 ]

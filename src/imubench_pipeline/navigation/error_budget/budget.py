@@ -23,13 +23,13 @@ import numpy as np
 from scipy.optimize import brentq
 
 from imubench_pipeline.earth import STANDARD_GRAVITY
+from imubench_pipeline.model.states import Cause, Measured, SourcePath
+from imubench_pipeline.model.verdicts import ErrorSource
 from imubench_pipeline.navigation.error_budget.in_use import (
     BIAS_CAUSES,
-    CAUSE_NAMES,
     NO_FIGURES,
     NO_USE,
     STATED_FIGURE,
-    Cause,
     Figures,
     Use,
     check_not_negative,
@@ -41,10 +41,10 @@ from imubench_pipeline.navigation.error_budget.parts import (
     Missing,
     Quantity,
     compute_figure_contribution,
+    describe_term,
 )
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.growth import Calibrated, SensorStart, Uncalibrated, of_constant
-from imubench_pipeline.settings.printed import Measured
 from imubench_pipeline.words.reasons import budgets as texts
 
 GYRO_ORDER: dict[Quantity, int] = {"attitude": 0, "heading": 0, "velocity": 1, "position": 2}
@@ -206,27 +206,28 @@ def budget(
     if quantity in ACCEL_ORDER:
         contributions.extend(of_sensor("accel", accel, ACCEL_ORDER[quantity], time, start.accel))
     if quantity == "heading":
-        contributions.append(Contribution("initial heading", start.heading, "start", STATED_FIGURE))
+        heading = ErrorSource("initial_heading")
+        contributions.append(Contribution(heading, start.heading, STATED_FIGURE))
     elif isinstance(start.tilt, Levelled):
         if quantity == "attitude" and isinstance(start.accel, Calibrated):
             for term in accel.terms:
                 variance = term.mean_variance(start.accel.window, start.tilt.on_time)
                 sigma = math.sqrt(variance) / STANDARD_GRAVITY
-                contributions.append(Contribution(f"initial tilt by accel {term.source}", sigma))
-            if start.tilt.bias is not None:
-                sigma, source = (
-                    start.tilt.bias / STANDARD_GRAVITY,
-                    "initial tilt by accel turn-on bias",
+                contributions.append(
+                    Contribution(describe_term("accel", term, "initial_tilt"), sigma)
                 )
-                contributions.append(Contribution(source, sigma, "turn_on_bias", STATED_FIGURE))
+            if start.tilt.bias is not None:
+                source = ErrorSource("turn_on_bias", "accel", "initial_tilt")
+                sigma = start.tilt.bias / STANDARD_GRAVITY
+                contributions.append(Contribution(source, sigma, STATED_FIGURE))
     else:
         tilt = start.tilt * gravity * of_constant(order - 1, time)
-        contributions.append(Contribution("initial tilt", tilt, "start", STATED_FIGURE))
+        contributions.append(Contribution(ErrorSource("initial_tilt"), tilt, STATED_FIGURE))
     missing: list[Missing] = []
     assumptions: list[str] = []
-    for measured, cause, source, lever in _list_levers(quantity, time, start, use):
+    for measured, cause, lever, through in _list_levers(quantity, time, start, use):
         figures = gyro_figures if measured == "gyro" else accel_figures
-        part = compute_figure_contribution(measured, cause, source, lever, figures)
+        part = compute_figure_contribution(measured, cause, lever, figures, through)
         if isinstance(part, Contribution):
             contributions.append(part)
         elif part is not None:
@@ -238,36 +239,39 @@ def budget(
 
 def _list_levers(
     quantity: Quantity, time: float, start: Start, use: Use
-) -> Iterator[tuple[Measured, Cause, str, float]]:
-    """Yield sensor, cause, source and lever of the figures of the sensors."""
+) -> Iterator[tuple[Measured, Cause, float, SourcePath | None]]:
+    """Yield sensor, cause, lever and path of the figures of the sensors."""
     order = GYRO_ORDER[quantity]
     gravity = STANDARD_GRAVITY if order > 0 else 1.0
     for cause, lever in levers("gyro", order, time, start.gyro, use, seen=order == 0):
-        yield "gyro", cause, f"gyro {CAUSE_NAMES[cause]}", gravity * lever
+        yield "gyro", cause, gravity * lever, None
     if quantity in ACCEL_ORDER:
         of_accel = levers("accel", ACCEL_ORDER[quantity], time, start.accel, use, seen=True)
         for cause, lever in of_accel:
-            yield "accel", cause, f"accel {CAUSE_NAMES[cause]}", lever
+            yield "accel", cause, lever, None
     if quantity == "attitude" and isinstance(start.tilt, Levelled) and start.tilt.bias is None:
         for cause in BIAS_CAUSES:
-            source = f"initial tilt by accel {CAUSE_NAMES[cause]}"
-            yield "accel", cause, source, 1.0 / STANDARD_GRAVITY
+            yield "accel", cause, 1.0 / STANDARD_GRAVITY, "initial_tilt"
 
 
 def of_sensor(
-    sensor: str, model: NoiseModel, order: int, time: float, start: SensorStart, factor: float = 1.0
+    measured: Measured,
+    model: NoiseModel,
+    order: int,
+    time: float,
+    start: SensorStart,
+    factor: float = 1.0,
 ) -> Iterator[Contribution]:
     """Yield the contributions of one sensor axis, after ``order + 1`` integrations.
 
-    ``sensor`` is its name in the sources, ``order`` m, 0 to 2; the time is in s, and the sigmas are
-    multiplied by ``factor``.
+    ``order`` is m, 0 to 2; the time is in s, and the sigmas are multiplied by ``factor``.
     """
     for term in model.terms:
-        for source, sigma in term.sources(order, time, start):
-            yield Contribution(f"{sensor} {source}", factor * sigma)
+        for through, sigma in term.sources(order, time, start):
+            yield Contribution(describe_term(measured, term, through), factor * sigma)
     if isinstance(start, Uncalibrated) and start.bias is not None:
         grown = factor * start.bias * of_constant(order, time)
-        yield Contribution(f"{sensor} turn-on bias", grown, "turn_on_bias", STATED_FIGURE)
+        yield Contribution(ErrorSource("turn_on_bias", measured), grown, STATED_FIGURE)
 
 
 def time_until(

@@ -10,16 +10,15 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq, minimize_scalar
 
 from imubench_pipeline.earth import EARTH_RATE
+from imubench_pipeline.model.verdicts import ErrorSource
 from imubench_pipeline.navigation.error_budget.in_use import (
     BIAS_CAUSES,
-    CAUSE_NAMES,
     STATED_FIGURE,
     Figures,
     check_not_negative,
@@ -29,6 +28,7 @@ from imubench_pipeline.navigation.error_budget.parts import (
     Contribution,
     Missing,
     compute_figure_contribution,
+    describe_term,
 )
 from imubench_pipeline.noise import NoiseModel, Sinusoid
 from imubench_pipeline.words.reasons import budgets as texts
@@ -38,50 +38,27 @@ _WINDOW_LENGTHS: NDArray[np.float64] = np.geomspace(1e-3, 1e9, 601)
 
 @dataclass(frozen=True, kw_only=True)
 class Gyrocompass:
-    """A gyro that is used for north-finding.
+    """A horizontal gyro that is used for north-finding.
 
-    Parameters
-    ----------
-    gyro : NoiseModel
-        The horizontal gyro.
-    latitude : float
-        rad, between the poles.
-    bias : float, optional
-        Turn-on bias of the gyro, 1 sigma, rad/s; None: from ``figures``, else left out with a note.
-    on_time : float
-        Time from switch-on to the beginning, s (see `growth.Uncalibrated`).
-    positions : {1, 2}
-        2: the gyro is turned by 180 degrees after half the time, and half the difference of the two
-        means is used, which removes the turn-on bias.
-    figures : mapping of str to Figure
-        Figures of the gyro other than its noise.
-
-    Raises
-    ------
-    ValueError
-        If a value is out of its range.
+    Raises a ValueError if a value is out of its range.
     """
 
     gyro: NoiseModel
-    latitude: float
+    latitude: float  # rad, between the poles
+    # turn-on bias, 1 sigma, rad/s; None: from ``figures``, else left out with a note
     bias: float | None = None
-    on_time: float = 0.0
-    positions: Literal[1, 2] = 1
     figures: Figures = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         if not abs(self.latitude) < math.pi / 2.0:
             raise ValueError(f"latitude is {self.latitude}, expected one between the poles, in rad")
-        check_not_negative(bias=self.bias or 0.0, on_time=self.on_time)
-        if self.positions not in (1, 2):
-            raise ValueError(f"positions is {self.positions}, expected 1 or 2")
+        check_not_negative(bias=self.bias or 0.0)
 
     def heading(self, time: float) -> Budget:
         """Return the heading error after a static window, s, by source, rad.
 
-        At one position the error of the mean has, by term, the variance `Term.mean_variance`; at
-        two positions sigma^2(t/2) / 2, with sigma^2 the Allan variance (Britting, "Inertial
-        Navigation Systems Analysis", Wiley 1971). Raises a ValueError if the time is not above 0.
+        The error of the mean has, by term, the variance `Term.mean_variance`. Raises a ValueError
+        if the time is not above 0.
         """
         if not (math.isfinite(time) and time > 0):
             raise ValueError(f"time is {time}, expected a time above 0")
@@ -144,15 +121,11 @@ class Gyrocompass:
 
     def _list_bias_errors(self) -> list[Contribution | Missing]:
         """Return the contributions of the gyro bias, which do not decrease with time."""
-        if self.positions == 2:
-            return []
         if self.bias is not None:
             sigma = self.bias / self._north_rate
-            return [Contribution("gyro turn-on bias", sigma, "turn_on_bias", STATED_FIGURE)]
+            return [Contribution(ErrorSource("turn_on_bias", "gyro"), sigma, STATED_FIGURE)]
         parts = (
-            compute_figure_contribution(
-                "gyro", cause, f"gyro {CAUSE_NAMES[cause]}", 1.0 / self._north_rate, self.figures
-            )
+            compute_figure_contribution("gyro", cause, 1.0 / self._north_rate, self.figures)
             for cause in BIAS_CAUSES
         )
         return [part for part in parts if part is not None]
@@ -160,13 +133,9 @@ class Gyrocompass:
     def _list_noise_errors(self, time: float, *, swings: bool) -> Iterator[Contribution]:
         for term in self.gyro.terms:
             if isinstance(term, Sinusoid) and not swings:
-                # The mean of a line is 0 after each whole period: use its envelope, of
-                # |sin(x) / x| at one position, of sin^2(x/2) / (x/2) at two.
-                x = math.pi * term.frequency * time / self.positions
-                most = min(1.0, 1.0 / x) if self.positions == 1 else min(x, 1.0 / x)
+                # The mean of a line is 0 after each whole period: use the envelope of |sin x / x|.
+                most = min(1.0, 1.0 / (math.pi * term.frequency * time))
                 sigma = term.amplitude * most / math.sqrt(2.0)
-            elif self.positions == 1:
-                sigma = math.sqrt(term.mean_variance(time, self.on_time))
             else:
-                sigma = math.sqrt(float(term.allan_variance(np.array([time / 2.0]))[0]) / 2.0)
-            yield Contribution(f"gyro {term.source}", sigma / self._north_rate)
+                sigma = math.sqrt(term.mean_variance(time, 0.0))
+            yield Contribution(describe_term("gyro", term), sigma / self._north_rate)

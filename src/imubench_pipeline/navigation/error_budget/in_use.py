@@ -21,35 +21,10 @@ import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Literal
 
+from imubench_pipeline.model.states import Cause, Measured, Origin
 from imubench_pipeline.noise.growth import Calibrated, SensorStart, Uncalibrated, of_constant
-from imubench_pipeline.settings.printed import Measured
 from imubench_pipeline.words.reasons import budgets as texts
-
-Cause = Literal[
-    "turn_on_bias",
-    "repeatability",
-    "temperature",
-    "temperature_squared",
-    "scale_factor",
-    "nonlinearity",
-    "g_sensitivity",
-    "vibration_rectification",
-]
-Origin = Literal["measured", "datasheet", "requirement", "not known"]
-
-CAUSE_NAMES: Mapping[Cause, str] = {
-    "turn_on_bias": "turn-on bias",
-    "repeatability": "repeatability",
-    "temperature": "temperature",
-    "temperature_squared": "temperature squared",
-    "scale_factor": "scale factor",
-    "nonlinearity": "nonlinearity",
-    "g_sensitivity": "g-sensitivity",
-    "vibration_rectification": "vibration rectification",
-}
-"""Name of each cause in a source."""
 
 _SUBSTITUTE_CAUSES: Mapping[tuple[Measured, Cause], Cause] = {
     ("gyro", "turn_on_bias"): "repeatability",

@@ -7,37 +7,42 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from typing import Literal
 
 from imubench_pipeline.model.comparisons import ErrorBudgetRow
-from imubench_pipeline.navigation.error_budget.in_use import Cause, Figure, Figures, needed
+from imubench_pipeline.model.states import Cause, Measured, SourcePath
+from imubench_pipeline.model.verdicts import ErrorSource
+from imubench_pipeline.navigation.error_budget.in_use import Figure, Figures, needed
 from imubench_pipeline.navigation.error_budget.printed_errors import DATASHEET_KEY_OF_CAUSE
-from imubench_pipeline.settings.printed import FIGURE_DIMENSIONS, Measured
+from imubench_pipeline.noise.terms.base import Term
+from imubench_pipeline.settings.printed import FIGURE_DIMENSIONS
 from imubench_pipeline.units import SI_UNITS
 from imubench_pipeline.words.reasons import budgets as texts
 
 Quantity = Literal["attitude", "heading", "velocity", "position"]
 
 
+def describe_term(measured: Measured, term: Term, through: SourcePath | None = None) -> ErrorSource:
+    """Return a noise term as the source of an error."""
+    values = term.values
+    return ErrorSource(term.word, measured, through, values.get("T_B"), values.get("frequency"))
+
+
 @dataclass(frozen=True)
 class Contribution:
     """Contribution of one source to an error."""
 
-    source: str  # such as ``gyro N``, ``accel GM 89.5 s``, ``gyro turn-on bias``
+    source: ErrorSource
     sigma: float  # 1 sigma, rad, m/s or m
-    cause: Cause | Literal["noise", "start"] = "noise"  # ``start``: a stated angle
     figure: Figure | None = None  # the figure that it follows from, if it is not noise
-    quantity: Measured | None = None  # sensor of a figure of the sensor file or the log
 
 
 @dataclass(frozen=True)
 class Missing:
     """A source whose figure is not known."""
 
-    source: str  # as in `Contribution`
-    quantity: Measured
-    cause: Cause
+    source: ErrorSource
     lever: float  # error from a figure of 1 SI unit
     reason: str  # why it is not known
 
@@ -59,7 +64,11 @@ class Budget:
 
 
 def compute_figure_contribution(
-    measured: Measured, cause: Cause, source: str, lever: float, figures: Figures
+    measured: Measured,
+    cause: Cause,
+    lever: float,
+    figures: Figures,
+    through: SourcePath | None = None,
 ) -> Contribution | Missing | None:
     """Return the contribution of a figure of a sensor to an error, or that it is missing.
 
@@ -67,10 +76,11 @@ def compute_figure_contribution(
     used.
     """
     figure = figures.get(cause, Figure(reason=texts.NOT_STATED))
+    source = ErrorSource(cause, measured, through)
     if figure.sigma is not None:
-        return Contribution(source, lever * figure.sigma, cause, figure, measured)
+        return Contribution(source, lever * figure.sigma, figure)
     if needed(measured, cause, figures):
-        return Missing(source, measured, cause, lever, figure.reason or texts.NOT_KNOWN)
+        return Missing(source, lever, figure.reason or texts.NOT_KNOWN)
     return None
 
 
@@ -93,7 +103,7 @@ class Largest:
         biases = tuple(
             contribution
             for contribution in budget.contributions
-            if contribution.cause == "turn_on_bias"
+            if contribution.source.source == "turn_on_bias"
             and contribution.figure
             and contribution.figure.origin == "datasheet"
         )
@@ -112,37 +122,24 @@ class Largest:
         figure = contribution.figure
         row = replace(
             of,
-            source=contribution.source,
+            **asdict(contribution.source),
             sigma=contribution.sigma,
-            cause=contribution.cause,
             origin=figure.origin if figure else "measured",
             kind=figure.kind if figure else None,
             convention=figure.convention if figure else None,
         )
-        quantity = contribution.quantity
-        if not self.room or contribution not in self.biases or quantity is None:
+        if not self.room or contribution not in self.biases or figure is None or not figure.sigma:
             return row
-        if figure is None or not figure.sigma:
-            return row
-        return self._add_largest(
-            row, quantity, contribution.cause, contribution.sigma / figure.sigma
-        )
+        return self._add_largest(row, contribution.sigma / figure.sigma)
 
     def of_missing(self, of: ErrorBudgetRow, missing: Missing) -> ErrorBudgetRow:
         """Return the row of a source with a missing figure; ``of`` is the row of the error."""
-        row = replace(
-            of,
-            source=missing.source,
-            cause=missing.cause,
-            origin="not known",
-            reason=missing.reason,
-        )
-        return self._add_largest(row, missing.quantity, missing.cause, missing.lever)
+        row = replace(of, **asdict(missing.source), origin="not known", reasons=(missing.reason,))
+        return self._add_largest(row, missing.lever)
 
-    def _add_largest(
-        self, row: ErrorBudgetRow, quantity: str, cause: str, lever: float
-    ) -> ErrorBudgetRow:
-        dimension = FIGURE_DIMENSIONS[quantity][DATASHEET_KEY_OF_CAUSE[cause]][0]  # type: ignore[index]  # a cause
+    def _add_largest(self, row: ErrorBudgetRow, lever: float) -> ErrorBudgetRow:
+        name = DATASHEET_KEY_OF_CAUSE[row.source]  # type: ignore[index]  # a figure of a quantity
+        dimension = FIGURE_DIMENSIONS[row.quantity or ""][name][0]
         return replace(
             row,
             largest=self.room / lever if self.room else None,

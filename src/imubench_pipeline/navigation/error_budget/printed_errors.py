@@ -12,7 +12,8 @@ from collections.abc import Iterable, Mapping
 
 from imubench_pipeline.datasheets.comparable import Comparable, PrintedAxis
 from imubench_pipeline.model.estimates import TemperatureRow
-from imubench_pipeline.navigation.error_budget.in_use import Cause, Figure
+from imubench_pipeline.model.states import Cause
+from imubench_pipeline.navigation.error_budget.in_use import Figure
 from imubench_pipeline.settings.printed import FIGURE_DIMENSIONS, Datasheet
 from imubench_pipeline.words.reasons import budgets as texts
 

@@ -83,11 +83,6 @@ def draw_models(estimate: Estimate, draws: int, rng: np.random.Generator) -> lis
     ]
 
 
-def has_joint_draws(estimate: Estimate) -> bool:
-    """Return whether `draw_models` draws the parameters of an estimate together."""
-    return estimate.draws is not None
-
-
 def _draw_lines(estimate: Estimate, rng: np.random.Generator) -> list[Sinusoid]:
     lines = [_draw_values(group, rng) for group in estimate.lines]
     return [Sinusoid(line["amplitude"], line["frequency"]) for line in lines]

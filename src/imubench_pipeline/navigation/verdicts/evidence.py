@@ -18,16 +18,15 @@ from imubench_pipeline.noise.terms.base import Role
 from imubench_pipeline.settings.requirements import Requirement
 from imubench_pipeline.units import parse_quantity
 
-_PARAMETERS_OF_SOURCE: dict[str, frozenset[str]] = {}
-"""Noise parameters by the first word of a term's name (`Term.source`). Bias instability determines
-the lowest part of the curve, so its terms include the parameters of the curve."""
+PARAMETERS_OF_SOURCE: dict[str, frozenset[str]] = {}
+"""Noise parameters by the code of a source (`Term.word`). Bias instability determines the lowest
+part of the curve, so its terms include the parameters of the curve."""
 
 for _kind in TERMS:
     _symbols = frozenset(parameter.symbol for parameter in _kind.parameters)
     if "B" in _symbols or _kind.role is Role.GAUSS_MARKOV:
         _symbols |= frozenset(CURVE)
-    _PARAMETERS_OF_SOURCE[_kind.word] = _symbols
-
+    PARAMETERS_OF_SOURCE[_kind.word] = _symbols
 
 Reason = Literal["one_specimen", "short_log", "wide_interval", "few_axes"]
 """Reasons for weak evidence, in addition to the codes of doubts."""
@@ -39,24 +38,6 @@ MAX_TIME_SHARE = 1 / 9
 8 differences of adjacent clusters, and a relative error of about a quarter."""
 
 _AXIS_COUNT = 3
-
-
-def find_noise_quantity(source: str) -> str | None:
-    """Return gyro or accel if a source is sensor noise estimated from the log; else None.
-
-    Sources belong to the table ``error_budget``, such as ``gyro N`` or ``initial tilt by accel
-    GM 89.5 s``. A turn-on bias is stated, and not estimated from the log.
-    """
-    words = source.removeprefix("initial tilt by ").split()
-    noise = len(words) > 1 and words[0] in ("gyro", "accel") and words[1] in _PARAMETERS_OF_SOURCE
-    return words[0] if noise else None
-
-
-def find_noise_parameters(source: str) -> frozenset[str]:
-    """Return the noise parameters of a source; empty if it is not noise of the log."""
-    if find_noise_quantity(source) is None:
-        return frozenset()
-    return _PARAMETERS_OF_SOURCE[source.removeprefix("initial tilt by ").split()[1]]
 
 
 def list_weaknesses(standing: Standing, requirement: Requirement, basis: Basis) -> list[str]:
@@ -84,8 +65,8 @@ def list_weaknesses(standing: Standing, requirement: Requirement, basis: Basis) 
             if requirement.axis == "worst" and axes is not None and axes < _AXIS_COUNT:
                 own.append("few_axes")
         if standing.source is not None:
-            behind = find_noise_parameters(standing.source)
-            channel = answering[find_noise_quantity(standing.source) or "gyro"]
+            behind = PARAMETERS_OF_SOURCE.get(standing.source.source, frozenset())
+            channel = answering[standing.source.quantity or "gyro"]
             for doubt in basis.doubts.get(key, ()):
                 affected = behind.intersection(doubt.parameters) if doubt.parameters else behind
                 if doubt.channel in (None, channel) and affected:

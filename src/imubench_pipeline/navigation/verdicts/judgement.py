@@ -13,14 +13,13 @@ from imubench_pipeline.model.comparisons import ErrorBudgetRow
 from imubench_pipeline.model.states import Verdict
 from imubench_pipeline.model.verdicts import Condition, DoubtMark, Shortfall
 from imubench_pipeline.navigation.pooled import NORMAL_QUANTILE
-from imubench_pipeline.navigation.suitability.abilities import Abilities
-from imubench_pipeline.navigation.suitability.conditions import (
+from imubench_pipeline.navigation.suitability import (
+    Abilities,
     Conditions,
-    judge_once_calibrated,
     select_known_errors,
 )
 from imubench_pipeline.navigation.verdicts.basis import Basis, Key
-from imubench_pipeline.navigation.verdicts.evidence import find_noise_quantity, list_weaknesses
+from imubench_pipeline.navigation.verdicts.evidence import PARAMETERS_OF_SOURCE, list_weaknesses
 from imubench_pipeline.navigation.verdicts.specimens import Spread, pool_spreads
 from imubench_pipeline.navigation.verdicts.standing import (
     Standing,
@@ -88,10 +87,10 @@ def judge_with_corrected_units(
 def scale_errors(parts: Sequence[ErrorBudgetRow], factors: Factors) -> list[ErrorBudgetRow]:
     """Return the rows of one error of one recording, with quantities multiplied by factors."""
     own = [row for row in parts if row.source != "total"]
-    sources = [
-        (row, factors.get(find_noise_quantity(row.source) or "", 1.0) * sigma)
-        for row, sigma in select_known_errors(own)
-    ]
+    sources = []
+    for row, sigma in select_known_errors(own):
+        quantity = row.quantity if row.source in PARAMETERS_OF_SOURCE else None
+        sources.append((row, factors.get(quantity or "", 1.0) * sigma))
     missing = [row for row in own if row.sigma is None]
     (total,) = (row for row in parts if row.source == "total")
     if not total.sigma or not sources or total.lower is None or total.upper is None:
@@ -158,16 +157,7 @@ class Judgement:
     @property
     def _verdict_on_errors(self) -> Verdict:
         """Verdict on the known errors: by the deciding limit, or by all after calibration."""
-        once = [
-            judge_once_calibrated(
-                each.verdict,
-                each.total.limit,
-                each.expected.sigma,
-                each.expected.upper,
-                each.conditions,
-            )
-            for each in self.standings
-        ]
+        once = [standing.calibrated_verdict for standing in self.standings]
         if self.decides.known and once != [standing.verdict for standing in self.standings]:
             return min(once, key=_WORST_FIRST.index)
         return self.decides.verdict
@@ -247,7 +237,7 @@ def _select_deciding_rows(rows: Sequence[ErrorBudgetRow], basis: Basis) -> list[
         if doubts is not None:
             reason = texts.recording_not_used(row.recording, doubts_text(doubts))
             row = replace(row, sigma=None, lower=None, upper=None, within=None)
-            row = replace(row, reached_after=None, reason=reason)
+            row = replace(row, reached_after=None, reasons=(reason,))
         selected.append(row)
     return selected
 

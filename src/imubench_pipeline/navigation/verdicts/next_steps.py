@@ -11,7 +11,7 @@ from scipy.special import stdtrit
 
 from imubench_pipeline.model.comparisons import NextStepRow
 from imubench_pipeline.model.states import Action
-from imubench_pipeline.model.verdicts import Condition
+from imubench_pipeline.model.verdicts import Condition, DoubtMark
 from imubench_pipeline.navigation.verdicts.basis import Basis, Key
 from imubench_pipeline.navigation.verdicts.evidence import (
     MAX_TIME_SHARE,
@@ -47,7 +47,7 @@ class _Step:
     specimens: int | None = None
     quantities: tuple[str, ...] = ()
     figures: tuple[Condition, ...] = ()
-    doubts: tuple[str, ...] = ()
+    doubts: tuple[DoubtMark, ...] = ()
 
 
 def list_next_step_rows(judged: Sequence[Judgement], basis: Basis) -> list[NextStepRow]:
@@ -67,7 +67,7 @@ def list_next_step_rows(judged: Sequence[Judgement], basis: Basis) -> list[NextS
             action=action,
             quantities=_unite(name for step in steps for name in step.quantities),
             figures=_unite(figure for step in steps for figure in step.figures),
-            doubts=_unite(code for step in steps for code in step.doubts),
+            doubts=_unite(doubt for step in steps for doubt in step.doubts),
             verdicts_turned=len(turned),
             verdicts_strengthened=len({step.requirement for step in steps} - turned),
             duration=max((step.duration for step in steps if step.duration), default=None),
@@ -96,8 +96,8 @@ def _list_steps(judgement: Judgement, basis: Basis) -> Iterator[_Step]:
         same = None not in either and len({each.verdict for each in either if each}) == 1
         for key, doubts in unless.doubts.items():
             quantities = tuple(basis.factors(key))
-            codes = () if quantities else tuple(doubt.code for doubt in doubts)
-            yield _Step(action, key, name, not same, quantities=quantities, doubts=codes)
+            removed = () if quantities else tuple(doubts)
+            yield _Step(action, key, name, not same, quantities=quantities, doubts=removed)
     if not judgement.decides.known:
         # Channels may be missing, or the recording too short.
         total = judgement.decides.total
@@ -176,7 +176,9 @@ def _find_strengthening_steps(judgement: Judgement, reason: str, basis: Basis) -
                 quantities = tuple(basis.factors(own))
                 yield _Step("check_unit", own, name, False, quantities=quantities)
             elif doubts:
-                yield _Step("record_again", own, name, False, doubts=(reason,))
+                channels = _unite(row.channel for row in doubts if row.channel)
+                mark = DoubtMark(total.recording, reason, channels)
+                yield _Step("record_again", own, name, False, doubts=(mark,))
 
 
 def _find_longest(sensor: str, standing: Standing, basis: Basis) -> tuple[Key, float | None]:

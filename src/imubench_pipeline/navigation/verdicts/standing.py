@@ -11,7 +11,8 @@ from imubench_pipeline.model import table
 from imubench_pipeline.model.comparisons import ErrorBudgetRow
 from imubench_pipeline.model.states import SURE_PROBABILITY, Verdict
 from imubench_pipeline.model.verdicts import Share
-from imubench_pipeline.navigation.suitability.conditions import (
+from imubench_pipeline.navigation.suitability import (
+    PASSING_VERDICTS,
     compute_variance_shares,
     is_condition,
     select_known_errors,
@@ -44,7 +45,7 @@ class Standing:
     total: ErrorBudgetRow
     totals: Sequence[ErrorBudgetRow]  # one for each recording with a figure
     expected: Expected  # the error, of the next specimen where there are several
-    source: str | None = None  # the largest contribution
+    source: ErrorBudgetRow | None = None  # the largest contribution
     share: float | None = None  # its part of the variance
     parts: tuple[Share, ...] = ()  # all relevant sources
     # rows of sources with an unknown figure, or with one above the limit before calibration
@@ -93,6 +94,19 @@ class Standing:
             return "not_enough_data"
         return "likely_meets" if self.chance >= 0.5 else "likely_fails"
 
+    @property
+    def calibrated_verdict(self) -> Verdict:
+        """Verdict after calibration of the biases that exceed the limit."""
+        squares = [size**2 for _, size in select_known_errors(self.conditions)]
+        limit = self.total.limit
+        if squares and limit is not None and self.verdict not in PASSING_VERDICTS:
+            # The square of a bias is a term of every draw of the total.
+            sizes = self.expected.upper, self.expected.sigma
+            for size, better in zip(sizes, PASSING_VERDICTS, strict=True):
+                if size is not None and size**2 - math.fsum(squares) < limit**2:
+                    return better
+        return self.verdict
+
 
 def list_standings(
     rows: Iterable[ErrorBudgetRow],
@@ -111,8 +125,8 @@ def list_standings(
             needed = ("sigma", "lower", "upper", "within", "limit")
             missing = [name for name in needed if getattr(row, name) is None]
             if missing:
-                reason = row.reason or texts.missing_numbers(missing)
-                row = replace(row, sigma=None, reason=reason)
+                reasons = row.reasons or (texts.missing_numbers(missing),)
+                row = replace(row, sigma=None, reasons=reasons)
         by_limit.setdefault(make_limit_key(row), []).append(row)
     listed = []
     for key, parts in by_limit.items():
@@ -134,7 +148,7 @@ def list_standings(
         if sources and sigma > 0.0:
             largest, size = max(sources, key=lambda source: source[1])
             share, shares = (size / sigma) ** 2, compute_variance_shares(sigma, own)
-            standing = replace(standing, source=largest.source, share=share, parts=shares)
+            standing = replace(standing, source=largest, share=share, parts=shares)
         listed.append(standing)
     return listed
 

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, ClassVar, Protocol, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from imubench_pipeline.model.states import NoiseSource, SourcePath
 from imubench_pipeline.noise.growth import SensorStart, Uncalibrated
 from imubench_pipeline.noise.state_space import ContinuousSpace, StateSpace, factor_covariance
 from imubench_pipeline.typing import Array
@@ -134,8 +135,8 @@ class Term(ABC):
     """The field's name; ``{signal}`` and ``{integral}``: rate and angle, or acceleration and
     velocity."""
 
-    word: ClassVar[str]
-    """In the source of an error: its first word."""
+    word: ClassVar[NoiseSource]
+    """Its code as the source of an error (`model.states.NoiseSource`)."""
 
     role: ClassVar[Role]
     parameters: ClassVar[tuple[TermParameter, ...]]
@@ -228,11 +229,6 @@ class Term(ABC):
         return ", ".join(f"{symbol} = {value:.3e}" for symbol, value in self.values.items())
 
     @property
-    def source(self) -> str:
-        """Its name as the source of an error, such as ``K`` or ``GM 89.5 s``."""
-        return self.word
-
-    @property
     def gauss_markov(self) -> GaussMarkov | None:
         """The term as a first-order Gauss-Markov process, if this is its role; else None."""
         return None
@@ -257,9 +253,11 @@ class Term(ABC):
         """
         return 1.0, self
 
-    def sources(self, order: int, time: float, start: SensorStart) -> Iterator[tuple[str, float]]:
-        """Yield name and standard deviation of its contribution to an error, see `growth`."""
-        yield self.source, math.sqrt(self.growth(order, time, start))
+    def sources(
+        self, order: int, time: float, start: SensorStart
+    ) -> Iterator[tuple[SourcePath | None, float]]:
+        """Yield path and standard deviation of its contributions to an error, see `growth`."""
+        yield None, math.sqrt(self.growth(order, time, start))
 
     def mean_variance(self, time: float, on_time: float) -> float:
         """Return the variance of its mean over a window of length ``time``, (rad/s)^2 or (m/s^2)^2.

@@ -216,11 +216,6 @@ class GaussMarkov(Term):
         """B and T_B."""
         return f"Gauss-Markov process B = {self.B:.3e}, T_B = {self.T_B:.4g} s"
 
-    @property
-    def source(self) -> str:
-        """Name with the correlation time, which distinguishes several processes."""
-        return f"{self.word} {self.T_B:.4g} s"
-
 
 def compute_driving_density(B: float, T_B: float) -> float:
     """Return S_B of a bias instability B with correlation time T_B (Maia et al., eq. 8)."""

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from imubench_pipeline.model.states import SourcePath
 from imubench_pipeline.noise.growth import (
     Calibrated,
     SensorStart,
@@ -172,13 +173,14 @@ class WhiteNoise(Term):
         """N^2 (t^(2m+1) / ((2m+1) m!^2) + c^2 / W), the last where calibrated (Groves, 2013)."""
         return self.N**2 * (of_white(order, time) + of_white_mean(order, time, start))
 
-    def sources(self, order: int, time: float, start: SensorStart) -> Iterator[tuple[str, float]]:
+    def sources(
+        self, order: int, time: float, start: SensorStart
+    ) -> Iterator[tuple[SourcePath | None, float]]:
         """Yield motion and static window apart: white noise in one does not know the other."""
         moving = Uncalibrated(bias=0.0, on_time=0.0)
-        yield self.source, math.sqrt(self.growth(order, time, moving))
+        yield None, math.sqrt(self.growth(order, time, moving))
         if isinstance(start, Calibrated):
-            mean = self.N * math.sqrt(of_white_mean(order, time, start))
-            yield f"{self.source} in the static window", mean
+            yield "static_window", self.N * math.sqrt(of_white_mean(order, time, start))
 
     def growth_from_known(self, time: Array) -> tuple[Array, Array]:
         """N^2 t and N^2 t^3 / 3."""

@@ -125,8 +125,3 @@ class Sinusoid(Deterministic):
     def in_words(self) -> str:
         """Amplitude and frequency."""
         return f"line of amplitude {self.amplitude:.3e} at {self.frequency:.6g} Hz"
-
-    @property
-    def source(self) -> str:
-        """Its frequency is its name."""
-        return f"{self.word} {self.frequency:.4g} Hz"

@@ -136,12 +136,10 @@ function comparedFigures() {
   return figures;
 }
 
-const RATIO_VERDICTS = { "not told apart": "not significant", "not known": "not determined" };
-
 // Less noise is better.
 function verdictOf(ratio, first, second) {
   const better = { lower: first, higher: second }[ratio.verdict];
-  return better ? { text: `${better.letter} better`, letter: better.letter, kind: "told" } : { text: RATIO_VERDICTS[ratio.verdict], kind: ratio.verdict === "not known" ? "unknown" : "even" };
+  return better ? { text: `${better.letter} better`, letter: better.letter, kind: "told" } : { text: ratio.verdict, kind: ratio.verdict === "not determined" ? "unknown" : "even" };
 }
 
 function compareChosen(root) {
@@ -158,7 +156,7 @@ function verdictCell(ratio, first, second) {
   const better = chosen.find((one) => one.letter === letter);
   if (better) cell.append(signOf({ ...pageData.looks.sensors[better.sensor], line: false }));
   cell.append(text);
-  if (ratio.reason) cell.append(" ", element("span", { className: "why", textContent: ratio.reason }));
+  if (ratio.reasons.length > 0) cell.append(" ", element("span", { className: "why", textContent: ratio.reasons.join("; ") }));
   return cell;
 }
 
@@ -224,12 +222,12 @@ function sentenceOf(figures, first, second, place) {
   const groups = new Map();
   for (const figure of figures) {
     const ratio = figure.ratios[place];
-    const { text } = verdictOf(ratio, first, second);
+    const { text, kind } = verdictOf(ratio, first, second);
     const times = ratio.value === null ? "" : ` (${numberText(ratio.value < 1 ? 1 / ratio.value : ratio.value, 2)} times)`;
-    if (!groups.has(text)) groups.set(text, []);
-    groups.get(text).push((figure.tau ? `σ(${numberText(figure.tau, 4)} s)` : symbolText(figure.symbol)) + (text.endsWith("better") ? times : ""));
+    if (!groups.has(text)) groups.set(text, { better: kind === "told", of: [] });
+    groups.get(text).of.push((figure.tau ? `σ(${numberText(figure.tau, 4)} s)` : symbolText(figure.symbol)) + (kind === "told" ? times : ""));
   }
-  const parts = [...groups].sort(([a], [b]) => b.endsWith("better") - a.endsWith("better")).map(([text, of]) => `${text}: ${of.join(", ")}`);
+  const parts = [...groups].sort(([, a], [, b]) => b.better - a.better).map(([text, { of }]) => `${text}: ${of.join(", ")}`);
   const pair = chosen.length > 2 ? `${first.letter} or ${second.letter}? ` : "";
   return parts.length > 0 ? `${pair}${parts.join("; ")}.` : "";
 }

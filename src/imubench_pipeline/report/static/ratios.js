@@ -5,14 +5,13 @@ const RATIO_TAIL = 0.025;
 
 // The ratio of { value, lower, upper, status }; limits by the MOVER method on logarithms.
 function ratioOfParameters(first, second) {
-  const doubts = [["the first", first], ["the second", second]]
+  const reasons = [["the first", first], ["the second", second]]
     .filter(([, one]) => one.status !== "ok").map(([which, one]) => `${which} is ${statusText(one.status)}`);
-  const reason = doubts.join("; ") || null;
   if (!first.value || !second.value) {
     let low = over(first.lower ?? 0, second.upper);
     const high = over(first.upper, second.lower);
     if (high === null && !low) low = null;
-    return ratioOf(null, low, high, reason);
+    return ratioOf(null, low, high, reasons);
   }
   const middle = Math.log(first.value / second.value);
   const below = together(distance(first.lower, first.value), distance(second.value, second.upper));
@@ -21,7 +20,7 @@ function ratioOfParameters(first, second) {
     first.value / second.value,
     below === null ? null : Math.exp(middle - below),
     above === null || above === Infinity ? null : Math.exp(middle + above),
-    reason,
+    reasons,
   );
 }
 
@@ -29,12 +28,12 @@ const over = (numerator, denominator) => (numerator === null || !denominator ? n
 const distance = (low, high) => (low === null || high === null ? null : low > 0 ? Math.log(high / low) : Infinity);
 const together = (...sides) => (sides.includes(null) ? null : Math.hypot(...sides));
 
-function ratioOf(value, lower, upper, reason) {
+function ratioOf(value, lower, upper, reasons) {
   const limited = lower !== null && (upper !== null || lower > 0);
-  let verdict = limited ? "not told apart" : "not known";
+  let verdict = limited ? "not significant" : "not determined";
   if (upper !== null && upper < 1) verdict = "lower";
   else if (lower !== null && lower > 1) verdict = "higher";
-  return { value, lower, upper, reason, verdict };
+  return { value, lower, upper, reasons, verdict };
 }
 
 // The ratios of the Allan deviations of two channels at each tau of both logs, over all pairs of
@@ -56,10 +55,10 @@ function deviationRatio(first, place, second, other) {
   own.forEach((a, i) => theirs.forEach((b, j) => (pairs[i * theirs.length + j] = a / b)));
   pairs.sort();
   const at = (share) => pairs[Math.max(0, Math.ceil(pairs.length * share - 1e-9) - 1)];
-  const unknown = [...new Set([first.unknown[place], second.unknown[other]].filter(Boolean))].join("; ") || null;
+  const unknown = [...new Set([first.unknown[place] ?? [], second.unknown[other] ?? []].flat())];
   const limits = [Math.min(at(RATIO_TAIL), value), Math.max(at(1 - RATIO_TAIL), value)];
   return {
-    ...ratioOf(unknown ? null : value, ...limits, unknown),
+    ...ratioOf(unknown.length > 0 ? null : value, ...limits, unknown),
     values: [array(first.adev)[place], array(second.adev)[other]],
   };
 }

@@ -80,7 +80,7 @@ kinds.pair = (figure) => {
     const label = `${chosen[0].letter} / ${other.one.letter}`;
     traces.push({
       group: "ratio", yaxis: "y2", type: "scatter", mode: "lines+markers", x, y, name: label, meta: { low, high, of: "ratio" },
-      line: lineOf(other.look), marker: { color: colourOf(other.look), size: 6, symbol: ratios.map((ratio) => (ratio.verdict === "not told apart" || ratio.verdict === "not known" ? `${(other.look.plain ?? other.look.marker)}-open` : other.look.plain ?? other.look.marker)) },
+      line: lineOf(other.look), marker: { color: colourOf(other.look), size: 6, symbol: ratios.map((ratio) => (["not significant", "not determined"].includes(ratio.verdict) ? `${(other.look.plain ?? other.look.marker)}-open` : other.look.plain ?? other.look.marker)) },
       text: ratios.map((ratio, i) => `σ<sub>${chosen[0].letter}</sub>/σ<sub>${other.one.letter}</sub> at ${numberText(x[i], 3)} s: <b>${numberText(y[i], limitDigits(low[i], high[i], 2))}</b><br>95 %: ${ratioText(ratio)}<br>${verdictOf(ratio, chosen[0], other.one).text}`),
       hovertemplate: "%{text}<extra></extra>",
     });
@@ -343,7 +343,7 @@ kinds.growth = () => {
 
 kinds.sources = (figure) => {
   const here = chosen.filter(grownOf).reverse();
-  const shares = here.map((one) => Object.entries(grownOf(one).sources).map(([source, of]) => [source, array(of)[chosenPlace(one).at]]));
+  const shares = here.map((one) => Object.entries(grownOf(one).sources).map(([source, of]) => [source, array(of.shares)[chosenPlace(one).at], of.kind]));
   return stackedShares(
     here.map((one) => {
       const ends = ["sigma", "lower", "upper"].map((name) => array(grownOf(one)[name])[chosenPlace(one).at]);
@@ -354,20 +354,21 @@ kinds.sources = (figure) => {
   );
 };
 
-// Bars of shares of a variance; shares below 2 % are merged.
+// Bars of shares of a variance: [source, share, kind]. Shares below 2 % are merged. Sources of two
+// sensors are merged by kind, without the correlation time, which differs by log.
 function stackedShares(rows, shares, titles, width) {
   const inner = Math.max(width - 190, 100); // px of a whole bar, about
   const total = new Map();
   const large = shares.map((parts) => {
     const kept = parts.filter(([, share]) => share >= 0.02);
     const rest = 1 - kept.reduce((sum, [, share]) => sum + share, 0);
-    return rest > 0.005 ? [...kept, ["others", rest]] : kept;
+    return rest > 0.005 ? [...kept, ["others", rest, "others"]] : kept;
   });
-  large.flat().forEach(([source, share]) => total.set(sourceKind(source), Math.max(total.get(sourceKind(source)) ?? 0, share)));
+  large.flat().forEach(([, share, kind]) => total.set(kind, Math.max(total.get(kind) ?? 0, share)));
   const order = [...total].sort(([a, x], [b, y]) => (a === "others") - (b === "others") || y - x).map(([source]) => source);
   const looks = order.map((source, number) => (source === "others" ? { light: "#8a9299", dark: "#6b7680" } : TERM_COLOURS[number % TERM_COLOURS.length]));
   const traces = order.map((source, number) => {
-    const own = large.map((parts) => parts.filter(([name]) => sourceKind(name) === source));
+    const own = large.map((parts) => parts.filter(([, , kind]) => kind === source));
     const sums = own.map((parts) => parts.reduce((sum, [, share]) => sum + share, 0));
     return {
       group: `source ${source}`, type: "bar", orientation: "h", name: source, x: sums.map((share) => 100 * share), y: rows.map((_, i) => i), meta: { flat: true },
@@ -391,6 +392,3 @@ function stackedShares(rows, shares, titles, width) {
     },
   };
 }
-
-// Sources of two sensors are merged by kind, without the correlation time, which differs by log.
-const sourceKind = (source) => source.replace(/ GM [\d.e+-]+ s$/, " GM").replace(/line [\d.e+-]+ Hz/, "line");

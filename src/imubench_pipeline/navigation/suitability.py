@@ -1,19 +1,25 @@
-"""Compare the properties of a sensor other than noise with the hard requirements."""
+"""Hard requirements of a sensor other than noise, and the conditions of a verdict.
+
+Several unknown figures share the remaining error budget: with all of them at their largest, the
+limit is just reached. If the printed turn-on bias alone exceeds a limit, the sensor meets it
+if calibrated to within the remaining error budget.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Literal, get_args
 
 from pydantic import Field
 
-from imubench_pipeline.model.verdicts import Condition, Property, Shortfall
+from imubench_pipeline.model.comparisons import ErrorBudgetRow
+from imubench_pipeline.model.states import Measured, Verdict
+from imubench_pipeline.model.verdicts import Condition, Figure, Property, Share, Shortfall
 from imubench_pipeline.settings.printed import (
     FIGURE_DIMENSIONS,
     SENSORS,
     Datasheet,
-    Measured,
     PrintedFigure,
 )
 from imubench_pipeline.settings.requirements import Must
@@ -138,7 +144,17 @@ def _compare(must: Must, has: Abilities) -> Iterator[_Point]:
             # The sensor may have axes that are not in its logs.
             logged = f"{quantity}_{axis}" in has.channels or None
             yield _Point("axis", f"{quantity}_{axis}", logged, text)
-    yield from _compare_full_scales(must, has)
+    for measured in get_args(Measured):
+        text = getattr(must.full_scale, measured)
+        if text is None:
+            continue
+        if measured in has.without:
+            yield _Point("quantity", measured, False, text)
+            continue
+        largest = has.full_scale.get(measured)
+        least = parse_quantity(text, QUANTITIES[measured])
+        enough = None if largest is None else largest * _ROUNDING_MARGIN >= least
+        yield _Point("full_scale", measured, enough, text, _list_known(largest))
     if must.bandwidth is not None:
         # Of the quantities with required axes, or else of all.
         asked = {axes.split("_")[0] for axes in must.axes} or set(SENSORS)
@@ -175,18 +191,85 @@ def _list_known(value: float | None) -> tuple[float, ...]:
     return () if value is None else (value,)
 
 
-def _compare_full_scales(must: Must, has: Abilities) -> Iterator[_Point]:
-    asked: dict[Measured, str | None] = {
-        "gyro": must.full_scale.gyro,
-        "accel": must.full_scale.accel,
-    }
-    for measured, text in asked.items():
-        if text is None:
-            continue
-        if measured in has.without:
-            yield _Point("quantity", measured, False, text)
-            continue
-        largest = has.full_scale.get(measured)
-        least = parse_quantity(text, QUANTITIES[measured])
-        enough = None if largest is None else largest * _ROUNDING_MARGIN >= least
-        yield _Point("full_scale", measured, enough, text, _list_known(largest))
+FIGURES: tuple[Figure, ...] = get_args(Figure)
+
+PASSING_VERDICTS: tuple[Verdict, ...] = ("meets", "likely_meets")
+"""Verdicts that a condition changes. A sensor that fails without a condition fails with it."""
+
+
+@dataclass(frozen=True)
+class Conditions:
+    """Conditions of a verdict on a sensor."""
+
+    shortfalls: tuple[Shortfall, ...]
+    unknown: tuple[Condition, ...]  # demanded properties that are not known
+    # figures that are not known, or too large, by quantity and figure: the largest one within
+    # every limit, SI
+    figures: Mapping[tuple[str, Figure], float]
+
+    @classmethod
+    def of(cls, must: Must, has: Abilities, conditions: Iterable[ErrorBudgetRow]) -> Conditions:
+        """Return the conditions of the verdict on a sensor.
+
+        ``must`` are the hard requirements, ``has`` the properties of the sensor. ``conditions`` are
+        the rows of the table ``error_budget`` that the limits depend on.
+        """
+        lacking, unknown = judge(must, has)
+        figures: dict[tuple[str, Figure], float] = {}
+        for row in conditions:
+            largest = row.largest or 0.0
+            for figure in FIGURES:
+                if row.quantity and row.source == figure:
+                    key = row.quantity, figure
+                    figures[key] = min(figures.get(key, largest), largest)
+        return cls(tuple(lacking), tuple(unknown), figures)
+
+    def judge(self, verdict: Verdict) -> tuple[Verdict, tuple[Condition, ...]]:
+        """Return the verdict, and the conditions on which it holds."""
+        if self.shortfalls:
+            return "excluded", ()
+        return verdict, self.conditions if verdict in PASSING_VERDICTS else ()
+
+    @property
+    def conditions(self) -> tuple[Condition, ...]:
+        """Unknown figures and properties."""
+        figures = (
+            Condition(figure, None, quantity, largest)
+            for (quantity, figure), largest in self.figures.items()
+        )
+        return (*figures, *self.unknown)
+
+
+def is_condition(row: ErrorBudgetRow) -> bool:
+    """Return whether meeting a limit depends on the figure of a source."""
+    return row.largest_unit is not None and row.source in FIGURES
+
+
+def select_known_errors(rows: Iterable[ErrorBudgetRow]) -> list[tuple[ErrorBudgetRow, float]]:
+    """Return the rows with a figure, each with its standard deviation."""
+    return [(row, row.sigma) for row in rows if row.sigma is not None]
+
+
+def compute_variance_shares(
+    total: float, sources: Iterable[ErrorBudgetRow], least: float = 0.01
+) -> tuple[Share, ...]:
+    """Return the sources of an error with their shares of the variance, the largest first.
+
+    ``total`` is 1 sigma. Shares below ``least`` are left out.
+    """
+    if total <= 0.0:
+        return ()
+    shares = (
+        Share(
+            row.source,
+            row.quantity,
+            row.through,
+            row.T_B,
+            row.frequency,
+            share=(sigma / total) ** 2,
+            kind=row.kind if row.origin == "datasheet" else None,
+        )
+        for row, sigma in select_known_errors(sources)
+    )
+    kept = (share for share in shares if share.share >= least)
+    return tuple(sorted(kept, key=lambda share: -share.share))

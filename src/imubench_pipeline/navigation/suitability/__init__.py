@@ -1,1 +1,0 @@
-"""Check the suitability of a sensor for an application: hard requirements and conditions."""
