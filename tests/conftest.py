@@ -11,6 +11,7 @@ os.environ |= {f"{library}_NUM_THREADS": "1" for library in ("OMP", "OPENBLAS", 
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 
 from collections.abc import Generator, Iterable
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +22,7 @@ from xdist.scheduler import LoadScopeScheduling
 
 from imubench_pipeline.estimators import posterior
 from imubench_pipeline.run.kernels import compile_once
+from imubench_pipeline.settings.sensor import Sensor, read_sensors
 from tests.scheduling import ByUnit, place
 
 # The first example may have to wait for a compiler; how fast the code is, benchmarks/ tells.
@@ -96,6 +98,12 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> LoadScopeSch
 def pytest_make_parametrize_id(val: object, argname: str) -> str | None:
     """Name a long text by its length: names go between the workers with every report."""
     return f"{argname} of {len(val)}" if isinstance(val, str | bytes) and len(val) > 60 else None
+
+
+@cache
+def catalogue() -> dict[str, Sensor]:
+    """Return the sensors that come with the project: 35 files, which are read once a worker."""
+    return read_sensors(PROJECT / "config/sensors")
 
 
 def few(chosen: Iterable[Any], others: Iterable[Any]) -> list[Any]:

@@ -45,7 +45,7 @@ def merged(*streams: tuple[float, float], jitter: float = 0.0) -> tuple[np.ndarr
 
 
 @pytest.mark.parametrize("stamped", [True, False])
-@pytest.mark.parametrize(("every", "phase"), [(2, 0), (2, 1), (3, 2), (10, 4)])
+@pytest.mark.parametrize(("every", "phase"), few([(2, 1), (10, 4)], [(2, 0), (3, 2)]))
 def test_a_channel_in_every_nth_record_has_its_own_rate(
     tmp_path: Path, every: int, phase: int, stamped: bool
 ) -> None:
@@ -107,7 +107,7 @@ def test_three_rates_and_a_temperature_with_records_of_its_own(tmp_path: Path) -
 
 
 @pytest.mark.parametrize("stamped", [True, False])
-@pytest.mark.parametrize("lost", [0.005, 0.2, 0.45, 0.6, 0.8])
+@pytest.mark.parametrize("lost", few([0.005, 0.45, 0.8], [0.2, 0.6]))
 def test_samples_lost_at_random_stay_on_the_common_grid(
     tmp_path: Path, lost: float, stamped: bool
 ) -> None:
@@ -183,7 +183,7 @@ HALF = ROWS // 2
 
 
 @pytest.mark.parametrize("stamped", [True, False])
-@pytest.mark.parametrize(("first", "then"), [(1, 2), (2, 4), (2, 6), (3, 1)])
+@pytest.mark.parametrize(("first", "then"), few([(1, 2), (3, 1)], [(2, 4), (2, 6)]))
 def test_a_sensor_that_changes_its_rate_is_named(
     tmp_path: Path, first: int, then: int, stamped: bool
 ) -> None:
@@ -216,7 +216,7 @@ def test_random_losses_are_no_change_of_rate(tmp_path: Path, lost: float) -> Non
     assert "rate_changes" not in {found.finding for found in log.findings}
 
 
-@pytest.mark.parametrize(("rate", "step"), [(125.0, 0.01), (1250.0, 0.001), (125.01, 0.01)])
+@pytest.mark.parametrize(("rate", "step"), few([(1250.0, 0.001), (125.01, 0.01)], [(125.0, 0.01)]))
 @pytest.mark.parametrize("stated", [True, False])
 @pytest.mark.parametrize("round_to", [np.round, np.floor])
 def test_five_samples_in_four_steps_of_the_stamps_are_all_taken(
