@@ -1,13 +1,14 @@
 """Check that every channel of a run has one N, B and K: in tables, models, pages, exports, budgets.
 
-python .ci/check_one_number.py RESULTS [SENSOR=LOG ...]
+python .ci/check_one_number.py RESULTS [SENSOR=LOG ...] [--channels CHANNEL ...]
 
 With LOG, the file or folder of a recording, and the sensor file that it is read by, the library is
-asked for the same numbers.
+asked for the same numbers: of all channels, or of some.
 """
 
 from __future__ import annotations
 
+import argparse
 import base64
 import contextlib
 import io
@@ -138,7 +139,7 @@ def narrow(lower: float, upper: float) -> bool:
     return 0.0 < upper <= 4.0 * lower
 
 
-def main(results: Path, logs: list[str]) -> int:
+def main(results: Path, logs: list[str], channels: list[str] | None) -> int:
     """Compare all numbers of a run; return the exit status."""
     values: dict[Channel, Numbers] = {}
     for row in pq.read_table(results / "tables/parameters.parquet").to_pylist():
@@ -176,7 +177,7 @@ def main(results: Path, logs: list[str]) -> int:
             check("budget", channel, "N", values[channel]["N"], row["sigma"])
     for log in logs:
         sensor, _, path = log.partition("=")
-        estimates = imu.estimate(imu.read_log(path, sensor=sensor))
+        estimates = imu.estimate(imu.read_log(path, sensor=sensor), channels=channels)
         for name, estimate in estimates.items():
             channel = (estimates.log.sensor, estimates.log.recording, name)
             for symbol in NAMES:
@@ -188,4 +189,8 @@ def main(results: Path, logs: list[str]) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main(Path(sys.argv[1]), sys.argv[2:]))
+    parser = argparse.ArgumentParser()
+    parser.add_argument("results", type=Path)
+    parser.add_argument("logs", nargs="*")
+    parser.add_argument("--channels", nargs="*")
+    sys.exit(main(**vars(parser.parse_args())))

@@ -111,24 +111,31 @@ class Piece:
         )
 
 
-def recordings(folder: Path) -> Iterator[Recording]:
-    """Yield the real recordings of a folder: ADIS16405, CATS and MPU-6050."""
+def recordings(folder: Path, only: str = "") -> Iterator[Recording]:
+    """Yield the real recordings with a part of a name: of ADIS16405, CATS and MPU-6050."""
     import pandas as pd
 
-    for path in sorted(folder.glob("adis16405/*.csv.gz")):
+    def find(pattern: str) -> Iterator[tuple[Path, str]]:
+        for path in sorted(folder.glob(pattern)):
+            name = path.name.split(".")[0].removeprefix("mpu6050_")
+            name = f"{path.parent.name}/{name}"
+            if only in name:
+                yield path, name
+
+    for path, name in find("adis16405/*.csv.gz"):
         samples = pd.read_csv(path)[list(CHANNELS)].to_numpy()
         samples = samples * np.repeat([np.pi / 180.0, STANDARD_GRAVITY], 3)
-        yield Recording(f"adis16405/{path.name.split('.')[0]}", samples, 100.0, CHANNELS)
-    for path in sorted(folder.glob("cats/*.csv.gz")):
+        yield Recording(name, samples, 100.0, CHANNELS)
+    for path, name in find("cats/*.csv.gz"):
         table = pd.read_csv(path)
         gyros, accels = ([c for c in table if c.startswith(q)] for q in ("gyro", "accel"))
         samples = np.column_stack([table[gyros].to_numpy() * 1e-3, table[accels].to_numpy()])
-        yield Recording(f"cats/{path.name.split('.')[0]}", samples, 1.0, CHANNELS)
-    for name, unit, channels in (
+        yield Recording(name, samples, 1.0, CHANNELS)
+    for kind, unit, channels in (
         ("gyroscope", np.pi / 180.0, CHANNELS[:3]),
         ("accelerometer", STANDARD_GRAVITY, CHANNELS[3:]),
     ):
-        for path in folder.glob(f"mpu6050/mpu6050_{name}.mat"):
+        for path, name in find(f"mpu6050/mpu6050_{kind}.mat"):
             import h5py
 
             with h5py.File(path) as file:
@@ -136,7 +143,7 @@ def recordings(folder: Path) -> Iterator[Recording]:
                 matrix = next(array for array in arrays if array.ndim == 2 and 4 in array.shape)
             rows = matrix if matrix.shape[1] == 4 else matrix.T
             rate = (len(rows) - 1) / float(rows[-1, 0] - rows[0, 0])
-            yield Recording(f"mpu6050/{name}", rows[:, 1:] * unit, rate, channels)
+            yield Recording(name, rows[:, 1:] * unit, rate, channels)
 
 
 def tables(paths: Iterable[str], rate: float) -> Iterator[Recording]:
@@ -308,7 +315,11 @@ def main() -> int:
     warnings.simplefilter("ignore")
     if options.tables and not options.rate:
         parser.error("--rate is missing; expected the sampling rate of the logs in Hz")
-    source = tables(options.tables, options.rate) if options.tables else recordings(options.logs)
+    source = (
+        tables(options.tables, options.rate)
+        if options.tables
+        else recordings(options.logs, options.only)
+    )
     every: list[Piece] = []
     for recording in source:
         if options.only not in recording.name:

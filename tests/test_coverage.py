@@ -1,9 +1,9 @@
 import pytest
 
 from imubench_pipeline.datasheets.coverage import Coverage, by_vendor, coverage
-from imubench_pipeline.settings.sensor import QUANTITIES, Sensor, read_sensors
+from imubench_pipeline.settings.sensor import QUANTITIES, Sensor
 from imubench_pipeline.settings.validation import parse
-from tests.conftest import PROJECT
+from tests.conftest import catalogue
 from tests.test_configuration import SENSOR
 
 FIGURES = ("N", "B", "K", "T_B", "temperature_coefficient", "offset")
@@ -119,7 +119,7 @@ def test_vendors_are_counted() -> None:
 
 def test_what_the_first_paper_asks_of_the_catalogue() -> None:
     """Vendors print white noise and hardly what else a filter needs: no K, no T_B."""
-    sensors = read_sensors(PROJECT / "config/sensors")
+    sensors = catalogue()
     rows = coverage(sensors)
     quantities = sum(
         getattr(s.datasheet, q) is not None for s in sensors.values() for q in QUANTITIES

@@ -17,8 +17,7 @@ from imubench_pipeline.estimators.estimate import Estimate, Parameter
 from imubench_pipeline.model.estimates import TemperatureRow
 from imubench_pipeline.noise import FLOOR, NoiseModel
 from imubench_pipeline.settings.printed import Datasheet
-from imubench_pipeline.settings.sensor import read_sensors
-from tests.conftest import PROJECT
+from tests.conftest import catalogue
 from tests.rows import DATASHEET_VERDICTS, typed
 
 DEG = math.pi / 180
@@ -159,7 +158,7 @@ def paper_tables(shared: Path, paper: str) -> dict[str, Any]:
 
 def test_table_4_of_the_first_paper_as_printed_and_with_the_root_of_two(shared: Path) -> None:
     """The manufacturer's column is the density taken for N; one-sided it is √2 too large."""
-    sensor = read_sensors(PROJECT / "config/sensors")["mti_7"]
+    sensor = catalogue()["mti_7"]
     table = paper_tables(shared, "000")["table_4"]["rows"]
     expected = {"gyro": (-0.30, -0.03), "acc": (-0.20, 0.15)}
     for row in (row for row in table if row["quantity"] == "N"):
@@ -208,7 +207,7 @@ OFFSETS = [
 def test_offsets_of_the_second_paper(
     shared: Path, name: str, table: str, kind: str, expected: dict[str, tuple[float, str]]
 ) -> None:
-    sensor = read_sensors(PROJECT / "config/sensors")[name]
+    sensor = catalogue()[name]
     printed = paper_tables(shared, "001")[table]["rows"]
     means = {f"gyro_{row['axis']}": row["fixed_drift"] * DEG for row in printed}
     assert len(means) == len(expected)
@@ -560,7 +559,7 @@ def test_typical_figures_make_the_lines() -> None:
 def test_every_shipped_datasheet_gives_rows() -> None:
     means = {f"gyro_{a}": 1e-3 for a in "xyz"} | {"accel_x": 0.1, "accel_y": 0.1, "accel_z": G}
     found = estimate(N=1e-4, B=1e-4, T_B=10.0, K=1e-6)
-    for sensor in read_sensors(PROJECT / "config/sensors").values():
+    for sensor in catalogue().values():
         for channel in means:
             listed = [*all_rows(sensor.datasheet, found, channel)]
             listed += bias_deltas(sensor.datasheet, channel, means, 0.1)

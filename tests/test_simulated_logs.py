@@ -5,10 +5,10 @@ import numpy as np
 import pytest
 
 from imubench_pipeline.readers import read
-from imubench_pipeline.settings.sensor import LogFormat, read_sensors
+from imubench_pipeline.settings.sensor import LogFormat
 from imubench_pipeline.settings.simulated_recordings import SimulatedRecording, read_simulated
 from imubench_pipeline.steps.simulate import write_simulated
-from tests.conftest import PROJECT
+from tests.conftest import PROJECT, catalogue
 
 RECORDING = SimulatedRecording.model_validate(
     {
@@ -70,7 +70,7 @@ def test_the_reader_of_a_layout_reads_what_is_written(log: dict[str, Any], tmp_p
 
 
 def test_the_shipped_ones_can_all_be_written() -> None:
-    sensors = read_sensors(PROJECT / "config/sensors")
+    sensors = catalogue()
     shipped = read_simulated(PROJECT / "config/simulated.yaml", sensors).recordings
     assert len(shipped) == 14
     assert all(sensors[entry.sensor].log.reader == "csv" for entry in shipped)

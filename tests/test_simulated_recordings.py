@@ -12,7 +12,7 @@ import yaml
 from imubench_pipeline.readers import read
 from imubench_pipeline.run.plan import Plan
 from imubench_pipeline.settings.profile_forms import DayCycleForm
-from imubench_pipeline.settings.sensor import LogFormat, Sensor, read_sensors
+from imubench_pipeline.settings.sensor import LogFormat, Sensor
 from imubench_pipeline.settings.simulated_recordings import (
     SimulatedRecording,
     ToSimulate,
@@ -24,7 +24,7 @@ from imubench_pipeline.settings.validation import ConfigError, parse
 from imubench_pipeline.simulate.models import list_true_figures
 from imubench_pipeline.steps.simulate import write_simulated
 from imubench_pipeline.units import parse_quantity
-from tests.conftest import PROJECT
+from tests.conftest import PROJECT, catalogue
 from tests.test_configuration import SENSOR
 
 DEGREE = np.pi / 180
@@ -458,7 +458,7 @@ def test_a_figure_out_of_its_range_names_recording_and_channel(tmp_path: Path) -
 
 
 def shipped() -> list[SimulatedRecording]:
-    sensors = read_sensors(PROJECT / "config/sensors")
+    sensors = catalogue()
     found = read_simulated(PROJECT / "config/simulated.yaml", sensors)
     return [one for one in found.recordings if one.recording == "sim_engers"]
 

@@ -12,14 +12,14 @@ from imubench_pipeline.datasheets.suspicion import (
     usual_figures,
 )
 from imubench_pipeline.model.estimates import ParameterRow
-from imubench_pipeline.settings.sensor import Sensor, read_sensors
+from imubench_pipeline.settings.sensor import Sensor
 from imubench_pipeline.settings.validation import parse
 from imubench_pipeline.words.findings.plausibility import UnusualFigure
-from tests.conftest import PROJECT
+from tests.conftest import catalogue
 from tests.rows import typed
 from tests.test_configuration import SENSOR
 
-CATALOGUE = read_sensors(PROJECT / "config/sensors")
+CATALOGUE = catalogue()
 DEG = math.pi / 180
 
 

@@ -15,16 +15,15 @@ from imubench_pipeline.extensions.calibration.settings import TRIAD, InPositions
 from imubench_pipeline.extensions.calibration.simulated import compute_readings
 from imubench_pipeline.recordings.kept import Quality, identify_files
 from imubench_pipeline.recordings.recording import list_log_files
-from imubench_pipeline.settings.sensor import read_sensors
 from imubench_pipeline.settings.simulated_recordings import SimulatedRecording
 from imubench_pipeline.steps.simulate import _blocks
 from imubench_pipeline.tables import build
-from tests.conftest import PROJECT
+from tests.conftest import catalogue
 from tests.kept import kept
 
 DEGREE = math.pi / 180.0
 RATE, DWELL, TURN = 8.0, 40.0, 2.0
-SENSOR = read_sensors(PROJECT / "config/sensors")["sirrs01_03_triad"]
+SENSOR = catalogue()["sirrs01_03_triad"]
 DECLARED = {"latitude": "50 deg", "dwell": "40 s", "turning": "2 s", "turned": ["0 deg", "180 deg"],
             "gyro_bias": "0.05 deg/s"}  # fmt: skip
 EARTH, GRAVITY = 7.292115e-5, 9.80665

@@ -107,7 +107,7 @@ def test_n_off_the_curve_fails_the_check(monkeypatch: pytest.MonkeyPatch) -> Non
 
     rows = np.zeros((10, 1))
     recording = real_logs.Recording("log", rows, 1.0, ("gyro_x",))
-    monkeypatch.setattr(real_logs, "recordings", lambda _: [recording])
+    monkeypatch.setattr(real_logs, "recordings", lambda *_: [recording])
     monkeypatch.setattr(sys, "argv", ["real_logs.py", "--check", "--pieces", "1"])
     for values, status in (([1.01] * 9 + [1.05], 0), ([1.01] * 8 + [1.05] * 2, 1), ([1.08], 1)):
         made = [piece(value) for value in values]

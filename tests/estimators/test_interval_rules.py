@@ -11,7 +11,7 @@ from imubench_pipeline.estimators.identifiability import make_ideal_spectrum
 from imubench_pipeline.estimators.intervals import (
     add_upper_limits,
     compute_mixture_limits,
-    compute_mixture_quantile,
+    compute_mixture_quantiles,
     describe,
     is_as_good,
 )
@@ -162,20 +162,11 @@ def test_b_of_several_terms_is_another_quantity(whittle: Whittle) -> None:
 def test_quantiles_of_a_mixture_are_those_of_all_draws_by_weight() -> None:
     first, second = np.arange(1.0, 101.0), np.arange(201.0, 401.0)
     # Of weight 2 to 1: a half of the whole is three quarters of the first.
-    assert compute_mixture_quantile([(first, 2.0), (second, 1.0)], 0.5) == pytest.approx(
-        75.0, abs=1.0
-    )
-    assert compute_mixture_quantile([(first, 2.0), (second, 1.0)], 0.9) == pytest.approx(
-        340.0, abs=1.0
-    )
-    assert compute_mixture_quantile([(first, 1.0), (second, 0.0)], 0.999) <= 100.0
+    found = compute_mixture_quantiles([(first, 2.0), (second, 1.0)], 0.5, 0.9)
+    assert found == pytest.approx((75.0, 340.0), abs=1.0)
+    assert compute_mixture_quantiles([(first, 1.0), (second, 0.0)], 0.999)[0] <= 100.0
     few = [(np.array([1.0, 2.0]), 1.0), (np.array([3.0]), 1.0)]
-    assert [compute_mixture_quantile(few, level) for level in (0.2, 0.4, 0.6, 1.0)] == [
-        1.0,
-        2.0,
-        3.0,
-        3.0,
-    ]
+    assert compute_mixture_quantiles(few, 0.2, 0.4, 0.6, 1.0) == (1.0, 2.0, 3.0, 3.0)
     low, high = compute_mixture_limits(
         [(first, 1.0), (second, 1.0)], [(np.arange(401.0, 500.0), 1.0)]
     )

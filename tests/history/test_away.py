@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import os
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -12,6 +13,8 @@ from imubench_pipeline.recordings.kept import Quality
 from tests.conftest import few
 from tests.history.project import Project, on_access
 from tests.workflow.project import put_log
+
+Outcome = dict[str, Any]
 
 MAX_ACCESSES = 400
 EVERY = pytest.mark.parametrize("step", few([11], [1]))
@@ -27,6 +30,14 @@ def put(project: Project) -> dict[str, Path]:
     (logs / "a.yaml").write_text("device: '7'\n")
     return {"file": logs / "a.csv", "folder": logs / "b", "bad": logs / "c.csv",
             "inside": logs / "b/b.csv", "notes": logs / "a.yaml", "sensor": logs}  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def expected(tmp_path_factory: pytest.TempPathFactory) -> Outcome:
+    """What a run finds that nothing disturbs."""
+    undisturbed = Project(tmp_path_factory.mktemp("undisturbed"))
+    put(undisturbed)
+    return undisturbed.from_nothing()
 
 
 class Mover:
@@ -54,11 +65,8 @@ class Mover:
 @pytest.mark.parametrize("stays", few([2], [1, 5, MAX_ACCESSES]))
 @pytest.mark.parametrize("which", ["file", "folder", "inside", "bad", "notes", "sensor"])
 def test_a_log_that_is_away_for_a_moment_is_looked_at_again(
-    which: str, stays: int, step: int, tmp_path: Path
+    which: str, stays: int, step: int, expected: Outcome, tmp_path: Path
 ) -> None:
-    undisturbed = Project(tmp_path / "undisturbed")
-    put(undisturbed)
-    expected = undisturbed.from_nothing()
     assert expected["s/c"][0]["status"] == "rejected"
     first = count = 0
     while first <= count:
@@ -105,11 +113,8 @@ class FailingDisk:
 @EVERY
 @pytest.mark.parametrize("number", few([errno.EIO, errno.ENOENT], [errno.ESTALE, errno.EACCES]))
 def test_an_error_of_the_disk_is_no_property_of_a_log(
-    number: int, step: int, tmp_path: Path
+    number: int, step: int, expected: Outcome, tmp_path: Path
 ) -> None:
-    undisturbed = Project(tmp_path / "undisturbed")
-    put(undisturbed)
-    expected = undisturbed.from_nothing()
     at, count = 0, 1
     while at < count:
         at += step

@@ -11,12 +11,11 @@ from imubench_pipeline.extensions.papers.engers import AXES, DEGREE, compute_cut
 from imubench_pipeline.extensions.papers.papers import make_rows
 from imubench_pipeline.extensions.papers.printed import Evidence, read_paper
 from imubench_pipeline.extensions.papers.tables import PublishedRow
-from imubench_pipeline.settings.sensor import read_sensors
 from imubench_pipeline.settings.simulated_recordings import read_simulated
 from imubench_pipeline.tables import build
-from tests.conftest import PROJECT
+from tests.conftest import PROJECT, catalogue
 
-SENSORS = read_sensors(PROJECT / "config/sensors")
+SENSORS = catalogue()
 ROWS = list(make_rows(read_paper("engers"), Evidence()))
 
 

@@ -28,9 +28,8 @@ from imubench_pipeline.extensions.papers.papers import make_rows
 from imubench_pipeline.extensions.papers.printed import Evidence, read_paper
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.simulate import simulate
-from imubench_pipeline.settings.sensor import read_sensors
 from imubench_pipeline.settings.simulated_recordings import read_simulated
-from tests.conftest import PROJECT, few
+from tests.conftest import PROJECT, catalogue, few
 
 GYRO = MTI_GYRO.table_2
 PRINTED = {
@@ -84,9 +83,7 @@ def test_the_tables_are_typed_as_printed() -> None:
 
 
 def test_the_demonstration_simulates_table_2_and_has_table_1_beside_it() -> None:
-    run = read_simulated(
-        PROJECT / "config/simulated.yaml", read_sensors(PROJECT / "config/sensors")
-    )
+    run = read_simulated(PROJECT / "config/simulated.yaml", catalogue())
     entries = {(entry.sensor, entry.recording): entry for entry in run.recordings}
     for channel in CHANNELS.values():
         entry = entries[channel.sensor, "sim_published"]

@@ -22,12 +22,12 @@ from imubench_pipeline.model.recordings import FindingRow
 from imubench_pipeline.recordings.fitness import derive_doubts, judge_fitness
 from imubench_pipeline.recordings.ingest import ingest
 from imubench_pipeline.settings.quality import QualitySettings
-from imubench_pipeline.settings.sensor import CHANNELS, RecordingNotes, Sensor, read_sensors
+from imubench_pipeline.settings.sensor import CHANNELS, RecordingNotes, Sensor
 from imubench_pipeline.settings.validation import parse
-from tests.conftest import PROJECT, few
+from tests.conftest import catalogue, few
 
 NAMES = {"sensor": "s", "device": "d", "recording": "r", "kind": "static"}
-CATALOGUE = read_sensors(PROJECT / "config/sensors")
+CATALOGUE = catalogue()
 ROWS = 30_000
 
 Rows = list[FindingRow]

@@ -17,12 +17,12 @@ from imubench_pipeline.recordings.ingest import ingest
 from imubench_pipeline.recordings.recording import open_channel_logs, read_metadata
 from imubench_pipeline.run.cli import main
 from imubench_pipeline.settings.quality import QualitySettings
-from imubench_pipeline.settings.sensor import RecordingNotes, merged_log, read_sensors
+from imubench_pipeline.settings.sensor import RecordingNotes, merged_log
 from imubench_pipeline.settings.validation import parse
 from imubench_pipeline.settings.yaml_files import read_yaml
 from imubench_pipeline.tables import write, write_arrow
 from imubench_pipeline.tables.keys import Key
-from tests.conftest import PROJECT, few
+from tests.conftest import PROJECT, catalogue, few
 from tests.report.tables import HOUR, joined, recording_rows
 
 SENSORS = PROJECT / "config/sensors"
@@ -36,7 +36,7 @@ def simulate(*arguments: object) -> int:
 def ingested(path: Path, sensor: str, folder: Path) -> dict[str, np.ndarray]:
     """Read a log as a run does, with its sensor file and the notes beside it."""
     notes = parse(RecordingNotes, read_yaml(path.with_suffix(".yaml")), "notes")
-    log = merged_log(read_sensors(SENSORS)[sensor], notes, "notes")
+    log = merged_log(catalogue()[sensor], notes, "notes")
     kept = ingest(path, log, notes, QualitySettings(), folder, {})
     assert kept.summary["rate"] == 100.0
     found = {
@@ -70,7 +70,7 @@ def test_a_log_is_read_with_its_sensor_file(sensor: str, tmp_path: Path, capsys)
 def test_a_text_log_of_a_sensor_with_names_needs_no_notes(tmp_path: Path) -> None:
     path = tmp_path / "log.csv"
     assert simulate("bno055", "--duration", "40 s", "--out", path) == 0
-    log = read_sensors(SENSORS)["bno055"].log
+    log = catalogue()["bno055"].log
     ingest(path, log, RecordingNotes(), QualitySettings(), tmp_path / "kept", {})
     (block,) = open_channel_logs(tmp_path / "kept")["gyro_x"].blocks()
     steps = np.degrees(block) * 16  # 16 LSB/(deg/s)
@@ -274,10 +274,10 @@ def test_a_wrong_file_of_models_names_the_key(change: dict, said: str, tmp_path,
     assert said in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("names", few([["mti_7", "bno055"]], [sorted(read_sensors(SENSORS))]))
+@pytest.mark.parametrize("names", few([["mti_7", "bno055"]], [sorted(catalogue())]))
 def test_a_log_of_every_sensor_file_is_read(tmp_path: Path, names: Sequence[str]) -> None:
     """Whatever a sensor file says of its logs, the notes say what is otherwise."""
-    for name, sensor in ((name, read_sensors(SENSORS)[name]) for name in names):
+    for name, sensor in ((name, catalogue()[name]) for name in names):
         axes = {str(channel): {"bias": "0.25 rad/s" if "gyro" in channel else "0.25 m/s^2"}
                 for channel in sensor.log.channels}  # fmt: skip
         model = tmp_path / f"{name}.model.yaml"

@@ -20,10 +20,10 @@ from imubench_pipeline.navigation.shortlist import (
 from imubench_pipeline.noise import FLOOR, Flicker, GaussMarkov
 from imubench_pipeline.noise.growth import Uncalibrated
 from imubench_pipeline.settings.requirements import Requirement
-from imubench_pipeline.settings.sensor import Sensor, read_sensors
+from imubench_pipeline.settings.sensor import Sensor
 from imubench_pipeline.settings.validation import parse
 from imubench_pipeline.tables import build
-from tests.conftest import PROJECT
+from tests.conftest import catalogue
 from tests.rows import typed
 from tests.test_configuration import SENSOR
 
@@ -209,7 +209,7 @@ def test_ranges_are_those_of_real_logs_that_decide() -> None:
 
 
 def test_the_whole_catalogue_is_judged() -> None:
-    sensors = read_sensors(PROJECT / "config/sensors")
+    sensors = catalogue()
     drone = Requirement.model_validate(
         {"title": "t", "static_window": "5 s",
          "limits": [{"error": "position", "after": "10 s", "at_most": "3 m"}]}

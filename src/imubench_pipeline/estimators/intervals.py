@@ -115,7 +115,7 @@ def describe(
     if "K" in described and described["K"].checked().status == "ok":
         weighted_draws = _over_models("K", chosen, alike, draws)
         if len(weighted_draws) > 1:
-            median = compute_mixture_quantile(weighted_draws, 0.5)
+            (median,) = compute_mixture_quantiles(weighted_draws, 0.5)
             described["K"] = replace(described["K"], value=median)
     for number in ("", " 2"):
         if f"B{number}" in described and described[f"B{number}"].status == "absent":
@@ -149,26 +149,27 @@ def _over_models(
     ]
 
 
-def compute_mixture_quantile(parts: Sequence[tuple[Array, float]], level: float) -> float:
-    """Return a quantile of draws that come from several models, each with its weight."""
+def compute_mixture_quantiles(
+    parts: Sequence[tuple[Array, float]], *levels: float
+) -> tuple[float, ...]:
+    """Return quantiles of draws that come from several models, each with its weight."""
     if len(parts) == 1:
-        return float(np.quantile(parts[0][0], level))  # without the sorting
+        return tuple(np.quantile(parts[0][0], levels).tolist())  # without the sorting
     values = np.concatenate([part for part, _ in parts])
     mass = np.concatenate([np.full(len(part), weight / len(part)) for part, weight in parts])
     order = np.argsort(values, kind="stable")
     share = np.cumsum(mass[order])
-    place = np.searchsorted(share / share[-1], level)
-    return float(values[order][min(int(place), len(values) - 1)])
+    places = np.minimum(np.searchsorted(share / share[-1], levels), len(values) - 1)
+    return tuple(values[order[places]].tolist())
 
 
 def compute_mixture_limits(
     parts: Sequence[tuple[Array, float]], own: Sequence[tuple[Array, float]]
 ) -> tuple[float, float]:
     """Return the 95 % limits of draws of several models; those of one of them lie inside."""
-    return (
-        min(compute_mixture_quantile(parts, 0.025), compute_mixture_quantile(own, 0.025)),
-        max(compute_mixture_quantile(parts, 0.975), compute_mixture_quantile(own, 0.975)),
-    )
+    lower, upper = compute_mixture_quantiles(parts, 0.025, 0.975)
+    own_lower, own_upper = compute_mixture_quantiles(own, 0.025, 0.975)
+    return min(lower, own_lower), max(upper, own_upper)
 
 
 def _draws_of(name: str, terms: Terms, draws: dict[Terms, Posterior]) -> Array:

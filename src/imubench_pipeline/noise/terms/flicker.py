@@ -24,7 +24,6 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from scipy.optimize import nnls
 
 from imubench_pipeline.noise.growth import Calibrated, SensorStart
 from imubench_pipeline.noise.state_space import StateSpace
@@ -218,6 +217,8 @@ def compute_bank_ripple(interval: float, longest: float) -> tuple[float, float]:
 @lru_cache(maxsize=16)
 def _fit_unit_bank(decades: float) -> tuple[Array, Array, float]:
     """Return correlation times, their B, and N, for B = 1 and tau from 1 s to 10^decades s."""
+    from scipy.optimize import nnls  # half a second at the start of each command
+
     first, last = 0.5, max(10.0**decades / PEAK_TAU * _LAST_TIME_FACTOR, 1.0)
     members = 1 + math.ceil(math.log10(last / first) * _MEMBERS_PER_DECADE)
     times = np.geomspace(first, last, members)

@@ -241,7 +241,11 @@ def evaluate_gauss_markov_shape(tau: Array, T_B: float | Array) -> Array:
     shape = np.asarray((1.0 - (3.0 - decayed * (4.0 - decayed)) / (2.0 * x)) / x)
     if small.any():
         r = ratio[small]
-        shape[small] = r * np.polynomial.polynomial.polyval(r, _SERIES_COEFFICIENTS)
+        series = np.full_like(r, _SERIES_COEFFICIENTS[-1])
+        for coefficient in _SERIES_COEFFICIENTS[-2::-1]:  # in place: half the time of polyval
+            series *= r
+            series += coefficient
+        shape[small] = r * series
     return np.asarray(T_B * shape)
 
 
