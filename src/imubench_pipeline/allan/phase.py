@@ -118,7 +118,7 @@ class Phase:
     def every(
         self, n: int, start: int = 0, stop: int | None = None
     ) -> tuple[Array, NDArray[np.integer[Any]] | None]:
-        """Return sums and counts at every n-th point from ``start`` to ``stop``, that included."""
+        """Return sums and counts at every n-th point from ``start`` to ``stop`` inclusive."""
         points = slice(start, None if stop is None else stop + 1, n)
         return self.theta[points], None if self.present is None else self.present[points]
 
