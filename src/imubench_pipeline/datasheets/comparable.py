@@ -47,10 +47,10 @@ class Comparable:
     sidedness: str | None = None  # of a noise density, in this reading
     # SI; None if nothing is published, or it cannot be compared. The worse end of a range
     value: float | None = None
-    reason: str | None = None  # how it was converted, or why there is no value
+    reason: str | None = None  # how it was converted, or the reason without a value
     printed: float | None = None  # as printed for the axis
     least: float | None = None  # the better end of a printed range
-    # lower, upper: least and largest figure that the vendor prints for it, such as typ and max
+    # lower, upper: smallest and largest printed value, such as typ and max
     lower: float | None = None
     upper: float | None = None
     obstacle: str | None = None  # why it cannot be compared with a static log

@@ -63,7 +63,7 @@ def deltas(
     tau: NDArray[np.float64],
     tolerance: float,
 ) -> Iterator[Delta]:
-    """Compare an estimate, SI, with the figures of a datasheet, one row for each reading of them.
+    """Compare an estimate, SI, with a datasheet: one row for each interpretation of its figures.
 
     tau, shape (m,), s, are the averaging times at which the curve is accurate enough to find its
     minimum. The tolerance is the relative difference that still counts as printed.
