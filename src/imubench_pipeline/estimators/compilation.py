@@ -1,4 +1,4 @@
-"""The kernels that every estimate of a noise model calls, compiled before any does."""
+"""Compile the kernels of noise estimates in advance."""
 
 from __future__ import annotations
 

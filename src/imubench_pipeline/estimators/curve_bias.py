@@ -41,7 +41,7 @@ class Models:
     terms: Terms
     parameters: Array  # (d, p): the linear parameters in their order, then B of each process; SI
     times: Array  # (d, g): T_B of each process, s
-    weight: float = 1.0  # of all of them together, among those of other terms
+    weight: float = 1.0  # of all of them together, within the T_B of other terms
 
     def parameter(self, letter: str) -> Array:
         """Return Q, N, B of flicker noise (F) or K, shape (d,); zeros where there is none."""
@@ -55,7 +55,7 @@ class Models:
         return self.parameters[:, len(self.terms.linear) :]
 
     def fewer(self) -> Models:
-        """Return every n-th of them, some `_MAX_DRAWS`."""
+        """Thin the draws to about `_MAX_DRAWS`."""
         every = max(1, len(self.parameters) // _MAX_DRAWS)
         return replace(self, parameters=self.parameters[::every], times=self.times[::every])
 
@@ -269,6 +269,6 @@ def estimate_lowest_point(
 
 
 def _compute_limits(parts: Sequence[tuple[Array, float]], value: float) -> tuple[float, float]:
-    """Return the 95 % limits of draws of several models; those of the first lie inside."""
+    """Return the 95 % limits of draws of several models; they include the limits of the first."""
     lower, upper = compute_mixture_limits(parts, [(parts[0][0], 1.0)])
     return min(lower, value), max(upper, value)

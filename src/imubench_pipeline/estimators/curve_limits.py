@@ -1,6 +1,6 @@
 """The limits of an Allan curve from the spectrum that was fitted to the same log.
 
-The power law identified at each tau does not know the noise a decade away: near the hump of a
+The power law identified at each tau ignores the noise a decade away: near the hump of a
 Gauss-Markov process its degrees of freedom are too many. The fitted model does, where it explains
 the log. A log that happens to show little random walk has too low a curve at its end: the upper
 limit there allows for a walk one standard error above the fitted one. (Without this, limits of 100

@@ -184,7 +184,7 @@ def _describe_filter(
     gained: float,
     beside_rounding: float,
 ) -> Cutoff:
-    """Return the best filter, without rounding; the gains are over none, and quantization noise."""
+    """Return the best filter without rounding, with its gains over no filter and over rounding."""
     best = tried[0]
     # Trials with a floor count only if the best has one: with a floor no high cut-off is known.
     alike = [
@@ -306,7 +306,7 @@ def _explain_ambiguity(
     gained: float,
     stated: float | None,
 ) -> tuple[str, float] | None:
-    """Return why a process may be a first-order filter, and N before it; None if it may not."""
+    """Return a reason if a process may be a first-order filter, and N before it; else None."""
     first = next(
         (trial for trial in tried if trial.is_first_order_analogue and not trial.floor), None
     )

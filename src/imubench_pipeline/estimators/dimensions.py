@@ -1,4 +1,4 @@
-"""The dimension of each noise parameter, as its term states it: the SI unit that it is kept in."""
+"""Dimension of each noise parameter, as declared by its term: its SI unit in tables."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Result of every estimator: parameters with their status, and the noise model of them."""
+"""Result of every estimator: parameters with their status, and their noise model."""
 
 from __future__ import annotations
 

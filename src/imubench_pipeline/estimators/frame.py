@@ -63,7 +63,7 @@ class FitSelection:
 
     @property
     def band_words(self) -> str:
-        """Why the spectrum is fitted up to this frequency."""
+        """Reason for the highest fitted frequency."""
         low_pass = self.low_pass.words if self.low_pass is not None else ""
         return texts.band_text(self.band.source, self.band.highest, low_pass)
 

@@ -73,7 +73,7 @@ class Mixture:
         return Mixture(weights[:number] / weights[:number].sum(), means[:number], scales[:number])
 
     def beside(self, other: Mixture, part: float) -> Mixture:
-        """Return this mixture combined with another, which has the weight ``part``."""
+        """Combine this mixture with another one, of weight ``part``."""
         return Mixture(
             np.concatenate([(1.0 - part) * self.weights, part * other.weights]),
             np.concatenate([self.means, other.means]),

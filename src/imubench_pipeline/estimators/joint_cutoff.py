@@ -58,7 +58,7 @@ _MIN_INTERVAL_WEIGHT = 0.05
 
 
 def select_joint_models(candidates: Sequence[Candidate], always: Terms) -> list[Candidate]:
-    """Return the models that are fitted jointly with a cut-off, and the one of ``always``."""
+    """Return the models to fit jointly with a cut-off, always with the model ``always``."""
     best = candidates[0]
     return [
         candidate

@@ -57,7 +57,7 @@ def fit(curve: AllanCurve, *, method: Method = "weighted", longest: float = 1 / 
 
     - ``weighted``: w = 1 / (2 sqrt(n/2L) variance)^2, the variance of the Allan variance;
     - ``paper``: w = 1 / (2 sqrt(n/2L) deviation)^2 (Maia et al., eq. 25), for the papers' figures.
-      Its dimension is not that of the cost: the bottom of the curve counts less, which makes little
+      Its dimension differs from the cost: the bottom of the curve counts less, which makes little
       difference on these tau (`tests/papers/test_panel.py`).
 
     Parameters
@@ -180,7 +180,7 @@ def _predict(curve: AllanCurve, used: NDArray[np.bool_], model: NoiseModel) -> t
 
 
 def _fit_curve(curve: AllanCurve, used: NDArray[np.bool_], method: Method) -> Estimate:
-    """Fit the continuous model, or the sampled one where the log can tell the difference."""
+    """Fit the continuous model, or the sampled one if the log resolves the difference."""
     fitted = _Search(curve, used, method, sampled=False).estimate()
     # Sampling adds (S_B + S_K) T^2 / (6 tau), which has the shape of white noise: left out, it
     # goes into N.

@@ -322,7 +322,7 @@ class _InTheLog:
         self.wider = list(self._merged(wider))
 
     def _merged(self, candidates: Sequence[Candidate]) -> Iterator[Candidate]:
-        """Yield each model once, without the processes that count into N, and keep its draws."""
+        """Yield each model once, without the processes that are part of N, and store its draws."""
         merged: set[Terms] = set()
         for candidate in candidates:
             terms, times = candidate.terms, candidate.maximum.times

@@ -40,7 +40,7 @@ def make_allan_rows(key: Key, curve: AllanCurve) -> Iterator[AllanRow]:
 
 
 def make_limit_rows(curve: AllanCurve) -> Iterator[dict[str, Any]]:
-    """Yield what every table of a measured curve says at each tau."""
+    """Yield the columns at each tau that all tables of a measured curve share."""
     lower, upper = curve.limits(0.95)
     for i, tau in enumerate(curve.tau):
         yield {
@@ -73,7 +73,7 @@ def make_parameter_rows(
 
 
 def make_draw_rows(key: Key, estimate: Estimate) -> Iterator[DrawRow]:
-    """Yield the rows of the table ``read_draws``; none of an estimate that has no joint draws."""
+    """Yield the rows of the table ``read_draws``; none for an estimate without joint draws."""
     if estimate.draws is None:
         return
     for number, (first, further) in enumerate(
@@ -130,7 +130,7 @@ def _estimates(table: pa.Table, joint: Path | None) -> dict[str, list[Estimate]]
 
 
 def make_estimate(method: str, rows: Iterable[ParameterRow]) -> Estimate:
-    """Return the estimate that rows of the table ``parameters`` stand for."""
+    """Return the estimate from its rows of the table ``parameters``."""
     components: dict[int, dict[str, Parameter]] = {}
     lines: dict[int, dict[str, Parameter]] = {}
     of_curve: dict[str, Parameter] = {}

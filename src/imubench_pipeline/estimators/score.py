@@ -1,4 +1,4 @@
-"""Agreement of a model with the measured curve: of its own curve, and of simulated logs.
+"""Agreement of a model's curve, and of logs simulated from it, with the measured curve.
 
 At long tau the curve of one simulated log scatters widely: a single draw (Maia et al., Table 3)
 ranks no method. The scores use the curve of the model, and the distribution over many draws. Each

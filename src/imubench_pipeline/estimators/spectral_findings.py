@@ -68,7 +68,7 @@ def describe_lines(channel: str, lines: Iterable[Line], white: float | None) -> 
 def find_missing_slow_noise(
     channel: str, spectrum: Spectrum, fitted: Array, white: float | None
 ) -> Finding | None:
-    """Return a finding where the lowest frequencies hold less than white noise.
+    """Return a finding if the lowest frequencies have less power than white noise.
 
     Slow noise only adds to the density of white noise, N^2, below a sensor's low-pass. A log with
     less had its bias zeroed repeatedly at rest, passed a high-pass, or had a curve or means of its

@@ -30,7 +30,7 @@ class Shapes:
         width = spectrum.upper - spectrum.lower
         # A bin of one ordinate is its frequency, not the surroundings.
         single = width < 0.75 / spectrum.length
-        # Shape (6, b), as all that is asked at frequencies.
+        # Shape (6, b), like all results at frequencies.
         frequency = np.where(single, spectrum.frequency, spectrum.lower + width * inside)
         self._omega = 2.0 * np.pi * frequency * m * self._interval
         self._cosine = np.cos(self._omega)

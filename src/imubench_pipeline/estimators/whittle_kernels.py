@@ -1,7 +1,7 @@
-"""The compiled inner loops of the Whittle likelihood; data and densities are in units near 1.
+"""The compiled inner loops of the Whittle likelihood; data and densities are scaled to about 1.
 
-They loop over scalars: numba takes longer to compile NumPy's functions (`max`, `flatnonzero`, `@`,
-assignments of slices) than the kernel.
+The loops are over scalars: numba takes longer to compile NumPy functions (`max`, `flatnonzero`,
+`@`, assignments of slices) than the kernel.
 """
 
 from __future__ import annotations

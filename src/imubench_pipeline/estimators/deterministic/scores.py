@@ -125,7 +125,7 @@ def _orthonormalise(columns: Sequence[Array], w: Array) -> Array:
 
 
 def _compute_gains(columns: Array, w: Array, r: Array, basis: Array) -> Array:
-    """Return the gain of each of several columns, shape (c, k)."""
+    """Return the gain of log likelihood by each column, shape (c, k)."""
     weighted = columns * w
     whole = np.einsum("ck,ck->c", weighted, columns)
     left = whole - np.sum((weighted @ basis.T) ** 2, axis=1)

@@ -67,7 +67,7 @@ _CERTAIN_GAIN_FACTOR = 3.0  # on the minimum gain; above it the noise is not ref
 
 
 def find_candidates(ordinates: Ordinates, fit: Fit) -> list[tuple[Score, Array]]:
-    """Return candidates to add to a fit, each with the noise density that it was detected in."""
+    """Return candidates for a fit, each with the noise density used for its detection."""
     scores: dict[Regressor, tuple[Score, Array]] = {}
     pauses = [x for x in list_restarts(ordinates) if x not in fit.regressors]
     for score in find_best_scores(ordinates, fit, fit.density):

@@ -1,1 +1,1 @@
-"""What temperature does to a sensor: its path, the sensitivity and lag, and the noise without."""
+"""Effect of temperature on a sensor: path, sensitivity and lag, and the noise without it."""
