@@ -113,7 +113,7 @@ def _find_objection(fit: Mapping[str, TemperatureRow], span: float, horizon: flo
 
 
 class ExportError(ValueError):
-    """Raised for an export that the program cannot load; says what is missing, or what to do."""
+    """Raised for an export that the program cannot load; the message states the remedy."""
 
 
 @dataclass(frozen=True)
