@@ -1,1 +1,1 @@
-"""What goes beyond static logs, estimates and comparisons: packages that nothing else imports."""
+"""Extensions beyond static logs, estimates and comparisons; the core imports none of them."""

@@ -393,7 +393,7 @@ def _predict(
 
 @njit(cache=True, nogil=True)
 def _update(P: Array, fix: Array, p: Array, v: Array, C: Array, spread: Array) -> Array:
-    """Take a fix, one number after the other; return the estimated errors, shape (total,)."""
+    """Update with a fix, one component at a time; return the estimated errors, shape (total,)."""
     total = len(P)
     x = np.zeros(total)
     column = np.empty(total)
@@ -421,7 +421,7 @@ def _update(P: Array, fix: Array, p: Array, v: Array, C: Array, spread: Array) -
 
 @njit(cache=True, nogil=True)
 def _orthonormal(C: Array) -> None:
-    """Take rounding out of an attitude, in place: one step towards the nearest rotation."""
+    """Orthonormalise an attitude, in place: one step towards the nearest rotation."""
     square, cube = np.empty((3, 3)), np.empty((3, 3))
     for i in range(3):
         for j in range(3):

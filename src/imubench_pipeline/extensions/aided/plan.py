@@ -1,4 +1,4 @@
-"""Which sensors filters are run for, and the settings of that."""
+"""Select the sensors for navigation runs, and their settings."""
 
 from __future__ import annotations
 

@@ -36,7 +36,7 @@ def _of_filter(text: str) -> str:
 
 
 class NavigateSettings(Strict):
-    """Filters tuned by all that is known of a sensor, on simulated drives with outages of GNSS."""
+    """Filters with every available tuning of a sensor, on simulated drives with GNSS outages."""
 
     of: Literal["none", "simulated", "all"] = Field(
         "simulated", description="sensors: of simulated recordings alone, all, or none"

@@ -56,8 +56,8 @@ _RTK_RECEIVER = Gnss(0.02, 0.03)
 _STANDALONE_RECEIVER = Gnss(1.5, 0.1)
 _TWO_ANTENNA_RECEIVER = Gnss(1.5, 0.1, math.radians(0.5))
 """Receiver for a vehicle at rest, where the heading is not observable otherwise. Without it, a
-filter that is linearised about its estimate takes the drift of its heading for a turn, which would
-separate biases from tilt: it becomes overconfident."""
+filter that is linearised about its estimate mistakes the drift of its heading for a turn, which
+would separate biases from tilt: it becomes overconfident."""
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""Bias and scale factor of a gyro from rates that are known: at rest, and on a rate table."""
+"""Bias and scale factor of a gyro from known rates: at rest, and on a rate table."""
 
 from imubench_pipeline.registry import Block, Extension
 

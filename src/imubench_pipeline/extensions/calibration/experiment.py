@@ -128,27 +128,27 @@ class Blocks:
 
     @property
     def seen(self) -> Array:
-        """Sensitivity of each to the Earth's rate: sense times cos(latitude), shape (b,)."""
+        """Sensitivity of each block to the Earth's rate: sense times cos(latitude), shape (b,)."""
         return self.sense * math.cos(self.latitude)
 
     @property
     def end(self) -> Array:
-        """Time at the end of each, s from the first sample of the first, shape (b,)."""
+        """Time at the end of each block, s from the first sample, shape (b,)."""
         return np.asarray((self.stop - self.start[0]) / self.rate)
 
     @property
     def middle(self) -> Array:
-        """Mean time of the samples of each, s from the first sample of the first, shape (b,)."""
+        """Mean time of the samples of each block, s from the first sample, shape (b,)."""
         return np.asarray((0.5 * (self.start + self.stop - 1) - self.start[0]) / self.rate)
 
     @property
     def duration(self) -> float:
-        """Time from the first sample of the first to the end of the last, s."""
+        """Time from the first sample to the end of the last block, s."""
         return float(self.stop[-1] - self.start[0]) / self.rate
 
     @property
     def time_in_blocks(self) -> float:
-        """Time that the samples present stand for, s."""
+        """Total duration of the samples present, s."""
         return float(self.count.sum()) / self.rate
 
     def check_means(self, means: Array) -> None:
@@ -172,7 +172,7 @@ class Blocks:
         )
 
     def of_dwells(self) -> Blocks:
-        """Return one block a dwell, from the first sample of its blocks to the last."""
+        """Return one block per dwell, from the first sample of its blocks to the last."""
         first = np.flatnonzero(np.diff(self.dwell, prepend=-1))
         last = np.append(first[1:], len(self)) - 1
         count = np.add.reduceat(self.count, first)

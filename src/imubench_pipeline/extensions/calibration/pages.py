@@ -79,7 +79,7 @@ def summarise_calibration(rows: Sequence[CalibrationRow], system: System) -> str
 def _format_half_width(
     limits: Sequence[float | None], as_text: Callable[[float | None, int], str]
 ) -> str:
-    """Return a value with half of its interval as text, from value, lower and upper limit."""
+    """Return a value and half the width of its interval as text, such as ``1.2 ± 0.3``."""
     value, lower, upper = limits
     half = None if lower is None or upper is None else (upper - lower) / 2.0
     return f"{as_text(value, limit_digits(lower, upper, 3))} ± {as_text(half, 2)}"
@@ -260,7 +260,7 @@ def describe_noise_model(rows: Sequence[Estimated]) -> str:
 
 
 def _rate_table(site: Site, view: RecordingView, folder: Path) -> dict[str, Any]:
-    """Return what the template needs; ``folder`` is the recording's."""
+    """Return the context of the template; ``folder`` is the recording's."""
     rows = view.rows(CalibrationRow)
     points = view.rows(CalibrationPointRow)
     arrays, summary = Arrays(), []
@@ -300,7 +300,7 @@ RATE_TABLE = RecordingPage("rate_table.html.jinja", _rate_table, "rate table")
 
 
 def _positions(site: Site, view: RecordingView, folder: Path) -> dict[str, Any]:
-    """Return what the template needs; ``folder`` is the recording's."""
+    """Return the context of the template; ``folder`` is the recording's."""
     rows = view.rows(CalibrationRow)
     number = rows[0].rates if rows else None
     return {

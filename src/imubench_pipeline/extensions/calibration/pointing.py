@@ -1,4 +1,4 @@
-"""The Earth's rate along an axis whose direction is known, or known in part.
+"""The Earth's rate along an axis of fully or partly known direction.
 
 With latitude L, heading h (from north towards east) and elevation e (above the horizon) the axis
 senses

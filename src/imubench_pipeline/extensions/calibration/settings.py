@@ -61,7 +61,7 @@ class Direction(Strict):
 
 
 class AtRest(Direction, Experiment):
-    """A static log of a gyro whose axis points where it is known, or known in part."""
+    """A static log of a gyro whose axis direction is fully or partly known."""
 
     is_static: ClassVar[bool] = True
 
@@ -142,7 +142,7 @@ class OnRateTable(Experiment):
         return self
 
     def si(self, name: str, dimension: str) -> float:
-        """Return one of its figures in SI."""
+        """Return one of its values in SI."""
         return parse_quantity(getattr(self, name), dimension)
 
     def moved_gyro(self, channels: Sequence[str], *, column: bool) -> str:
@@ -185,7 +185,7 @@ class InPositions(Experiment):
         return self
 
     def seconds(self, name: str) -> float:
-        """Return one of its times in s."""
+        """Return one of its time settings, s."""
         return parse_quantity(getattr(self, name), "time")
 
     @property
@@ -199,7 +199,7 @@ class InPositions(Experiment):
         return angles[number % len(angles)] + 2.0 * math.pi * (number // len(angles))
 
     def moved_gyro(self, channels: Sequence[str], *, column: bool = False) -> None:
-        """Raise ValueError if the log lacks an axis; it is about all of them."""
+        """Raise ValueError if the log lacks one of the six axes."""
         missing = [name for name in TRIAD if name not in channels]
         if missing:
             raise ValueError(
@@ -226,7 +226,7 @@ class SimulatedTable(OnRateTable):
 
 
 class SimulatedPositions(InPositions):
-    """A triad that is turned by the clock, and senses gravity and the Earth's rate."""
+    """A triad that is turned by a schedule, and senses gravity and the Earth's rate."""
 
     roll: Angle = Field("0 deg", description="true one, in the first position")
     pitch: Angle = Field("0 deg", description="likewise")

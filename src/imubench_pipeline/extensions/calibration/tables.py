@@ -1,4 +1,4 @@
-"""Gyros and accelerometers whose rates or directions are known."""
+"""Tables of gyros and accelerometers with known rates or directions."""
 
 from __future__ import annotations
 

@@ -66,7 +66,7 @@ _Z_95 = 1.96  # standard deviations of a 95 % limit
 def make_earth_rate_tables(
     folder: Path, static: Sequence[Path], sensor: str, recording: str, settings: str
 ) -> dict[str, list[TableRow]]:
-    """Return the rows of the tables of a gyro that was turned; none of a rejected recording.
+    """Return the rows of the tables of a turned gyro; none for a rejected recording.
 
     `folder`: of the recording; `static`: of the static recordings of the same sensor; `settings`:
     of `imubench_pipeline.run.plan.Plan.experiment_settings`.

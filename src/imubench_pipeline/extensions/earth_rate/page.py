@@ -56,7 +56,7 @@ ESTIMATES = ("filter", "pairs", "triples")
 
 
 def make_turned_context(site: Site, view: RecordingView, folder: Path) -> dict[str, Any]:
-    """Return what the template needs; ``folder`` is the recording's."""
+    """Return the context of the template; ``folder`` is the recording's."""
     arrays = Arrays()
     rows = view.rows(EarthRateRow)
     channel = rows[0].channel if rows else ""

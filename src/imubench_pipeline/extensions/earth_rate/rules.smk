@@ -1,4 +1,4 @@
-"""Gyros that were turned between north and south, and what sensors at rest could find."""
+"""Tables of gyros turned between north and south, and of predictions for sensors at rest."""
 
 from imubench_pipeline.extensions.earth_rate.plan import select_outlook_settings
 

@@ -80,7 +80,7 @@ class TwoPosition(Experiment):
         return self
 
     def seconds(self, name: Literal["dwell", "turning", "start"]) -> float:
-        """Return one of its times in s."""
+        """Return one of its time settings, s."""
         return parse_quantity(getattr(self, name), "time")
 
     @property
@@ -104,12 +104,12 @@ class TwoPosition(Experiment):
         return parse_quantity(self.drift, "gyro_ramp") if self.drift else 0.0
 
     def moved_gyro(self, channels: Sequence[str], *, column: bool = False) -> str:
-        """Return the one of the log's channels that was turned, as of `stated_gyro`."""
+        """Return the channel of the turned gyro (see `stated_gyro`)."""
         return stated_gyro(self.channel, channels, "was turned")
 
 
 class PublishedRate(Strict):
-    """What a source prints of the Earth's rate that it found."""
+    """A published estimate of the Earth's rate."""
 
     where: Text = Field(description="such as section 6")
     printed: _Rate = Field(description="with its unit, as printed")
@@ -117,7 +117,7 @@ class PublishedRate(Strict):
 
 
 class SimulatedTurns(TwoPosition):
-    """A gyro that is turned between north and south, by the clock."""
+    """A gyro that is turned between north and south by a schedule."""
 
     transient: _Rate = Field("0 deg/s", description="largest rate that is sensed of a turn, about")
     assumed: tuple[Text, ...] = Field((), description="figures that no source publishes")
@@ -138,7 +138,7 @@ class SimulatedTurns(TwoPosition):
 
 
 class EarthRateSettings(Strict):
-    """The Earth's rate from gyros that were turned, and what it would take."""
+    """The Earth's rate from turned gyros, and the recordings required for it."""
 
     margin: TimeFromZero = Field(
         "0.5 s", description="left out on both sides of a turn that is seen"

@@ -143,7 +143,7 @@ def compute_true_rate(experiment: Experiment, earth_rate: float, transient: Arra
 
 
 def simulate_turned_gyro(recording: SimulatedRecording, rate: float) -> dict[str, SampledProfile]:
-    """Return the readings of a gyro that is turned by the clock; the transients differ."""
+    """Return the readings of a gyro that is turned by a schedule; the transients differ."""
     turns, samples = recording.block(SimulatedTurns), recording.samples
     assert turns is not None
     dwell, turning = turns.seconds("dwell"), turns.seconds("turning")

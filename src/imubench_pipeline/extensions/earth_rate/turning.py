@@ -1,7 +1,7 @@
 """Dwells and turning points of a gyro that is turned end for end, from its log.
 
 Turning a sensitive axis end for end is a rotation about an axis perpendicular to it: the gyro
-senses cross-axis coupling and handling, which may be much or nothing. A column with the position
+senses cross-axis coupling and handling, which may be strong or absent. A column with the position
 decides if there is one, else the events in the log, and without these the schedule. `find_stays`
 reads turns from such a column.
 """
@@ -46,7 +46,7 @@ _POSITION_TOLERANCE = 0.1  # about a position, as a share of the distance betwee
 class Stays:
     """Stays of the sensor in its positions."""
 
-    # start, stop: shape (n,); s; what lies between two of them is turning
+    # start, stop: shape (n,); s; between two of them, the gyro turns
     start: Array
     stop: Array
     high: NDArray[np.bool_]  # shape (n,); whether it is the larger position; alternates

@@ -1,4 +1,4 @@
-"""Several sensors together: boards, a virtual IMU, how many of one equal another."""
+"""Several sensors together: boards, a virtual IMU, and the number that equals a better sensor."""
 
 from imubench_pipeline.registry import Block, Extension
 

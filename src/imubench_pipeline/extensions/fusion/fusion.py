@@ -115,7 +115,7 @@ def yield_candidates(
     joint: Mapping[tuple[str, str], Path] | None,
     besides: Container[str] = (),
 ) -> Iterator[ComparedChannel]:
-    """Yield the channels of recordings that decide, and of the sensors in ``besides``.
+    """Yield the channels of the recordings used in comparisons, and of the sensors in ``besides``.
 
     The estimate is the recommended one, or the one after removal of the temperature effect.
     ``tables``: `NEEDED`; ``joint``: files of the table ``draws``, by sensor and recording.
@@ -200,7 +200,7 @@ TACTICAL_CLASS = "tactical"  # first word of the price class of the target datas
 def yield_grades_of_run(
     tables: Mapping[str, pa.Table], sensors: Mapping[str, Sensor]
 ) -> Iterator[GradeRow]:
-    """Return the rows of the table ``grades``, with sensors that are not sold, such as boards."""
+    """Return the rows of the table ``grades``, including sensors not for sale, such as boards."""
     grades = [
         Grade(name, f"{sensor.vendor} {sensor.model}", sensor.datasheet)
         for name, sensor in sensors.items()

@@ -1,4 +1,4 @@
-"""The page of fusion: how many of one sensor match one of another."""
+"""The page of fusion: how many cheap sensors match one good sensor."""
 
 from __future__ import annotations
 

@@ -122,7 +122,7 @@ S = TypeVar("S", bound=ParameterRow | SimulatedTruthRow)
 
 
 def _slowest(rows: Iterable[S]) -> dict[_Place, S]:
-    """Return rows by their place; of several processes the slowest, the floor of the curve."""
+    """Return rows by key; of several processes the slowest, the floor of the curve."""
     with_value = [row for row in rows if row.value is not None]
     times = {
         (_place(row, "B"), row.component): row.value

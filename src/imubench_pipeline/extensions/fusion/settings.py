@@ -12,7 +12,7 @@ from imubench_pipeline.settings.simulated_sensor import AxisSettings
 
 
 class Specimens(SimulatedSensors):
-    """Several of one sensor on a board, fused to one log."""
+    """Several units of one sensor on a board, fused to one log."""
 
     number: int = Field(ge=2, le=1000)
     spread: float = Field(

@@ -30,7 +30,7 @@ _SPREAD_PARAMETERS = ("N", "B", "K")  # which differ between specimens
 
 
 def make_specimens(recording: SimulatedRecording) -> list[ImuModel]:
-    """Return the models of the specimens of a recording: one where none are declared."""
+    """Return the models of the specimens of a recording; one if none is declared."""
     whole = make_imu_model(recording.channels, recording)
     stated = recording.block(Specimens)
     if stated is None:

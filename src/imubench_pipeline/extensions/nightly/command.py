@@ -19,7 +19,7 @@ _TIME_TYPE = make_number_type(0.0, LONGEST, "a time, such as 10 s", parse_second
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare what the command is given."""
+    """Declare the arguments of the command."""
     parser.usage = "%(prog)s [options] [folder] [-- FLAG ...]"
     parser.description = "What stands after -- goes to snakemake, such as --workflow-profile DIR."
     parser.add_argument(

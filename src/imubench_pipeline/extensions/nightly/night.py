@@ -1,4 +1,4 @@
-"""One nightly run: lock, recover, hold back incomplete logs, run, compare, report."""
+"""One nightly run: lock, recover, postpone incomplete logs, run, compare, report."""
 
 from __future__ import annotations
 
@@ -229,7 +229,7 @@ class Night:
         lock.left_over = {}
 
     def _run_snakemake(self, cores: str, skips: Sequence[Skip], lock: Lock) -> list[str]:
-        """Run Snakemake; return why it failed, if it did."""
+        """Run Snakemake; return the reason of a failure, if any."""
         names = {*self._always_held_back, *(skip.recording for skip in skips if skip.held_back)}
         held_back = self.folder / "held_back.yaml"
         write_json({"held_back": sorted(names)}, held_back)
@@ -315,7 +315,7 @@ class Night:
 
 @contextmanager
 def _interrupt_on_signals() -> Iterator[None]:
-    """Handle the signals that end a service like Ctrl-C, for an orderly end."""
+    """Handle termination signals like Ctrl-C, for an orderly end."""
 
     def stop(number: int, frame: FrameType | None) -> None:
         raise KeyboardInterrupt

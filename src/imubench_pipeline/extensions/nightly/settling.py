@@ -46,7 +46,7 @@ class Found:
 
 @dataclass(frozen=True)
 class Skip:
-    """A log, or a part of one, that is not read in this run."""
+    """A log, or part of a log, that is not read in this run."""
 
     recording: str  # sensor and name, such as mti_7/night
     reason: str
@@ -77,7 +77,7 @@ def scan_drop_zone(logs: Path) -> dict[str, Found]:
 def find_complete_name(name: str) -> str | None:
     """Return the name of a partial file (.part, hidden, rsync) once complete; None if it is."""
     if name.startswith("._"):
-        return None  # what macOS keeps beside a file
+        return None  # files of attributes that macOS adds
     whole = name.lstrip(".")
     if whole != name and (of_rsync := _RSYNC_NAME.fullmatch(name)):
         return of_rsync[1]
@@ -166,7 +166,7 @@ def _stat_file(path: Path, below: Path | None = None) -> tuple[str, int, int]:
 
 
 def _find_partial_files(path: Path) -> Iterator[tuple[str, int, int]]:
-    """Yield the partial files of a recording that is a folder; the folder itself may be one."""
+    """Yield the partial files of a recording in a folder, or the folder if it is partial."""
     if path.is_dir():
         if path.suffix.lower() in PARTIAL:
             yield _stat_file(path, path.parent)

@@ -219,7 +219,7 @@ _MAX_LINES = 20
 
 
 class Changed(BaseModel):
-    """A recording with another outcome than at the last run."""
+    """A recording with a different outcome than in the last run."""
 
     recording: str
     because: str
@@ -243,7 +243,7 @@ class Rejected(BaseModel):
 
 
 class Failed(BaseModel):
-    """A step that failed for a recording, or for a whole sensor, which is left out."""
+    """A step that failed for a recording or a whole sensor, which is omitted."""
 
     sensor: str
     recording: str | None

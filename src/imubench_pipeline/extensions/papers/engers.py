@@ -1,4 +1,4 @@
-"""Counterparts of the lines of Engers (2021), and of his aim: cheap gyros, fused."""
+"""Counterparts of the results of Engers (2021), and of his aim: the fusion of cheap gyros."""
 
 from __future__ import annotations
 
@@ -43,16 +43,16 @@ class Axis(Strict):
 
     @property
     def density(self) -> float:
-        """N, if the figure under "PSD" is the ordinate at 1 h, (deg/s)/sqrt(Hz)."""
+        """N, if the value in the column "PSD" is the ordinate at 1 h, (deg/s)/sqrt(Hz)."""
         return self.psd * math.sqrt(READ_AT)
 
     @property
     def log(self) -> Log:
-        """The channel that is simulated of it."""
+        """The simulated channel."""
         return Log(self.sensor, RECORDING, f"gyro_{self.axis}")
 
     def meeting(self, scaled: bool) -> float:
-        """Return where the -1/2 line, of N or (not scaled) of the figure, meets the floor, s."""
+        """Return the tau, s, at which the -1/2 line of N (or of the printed value) meets B."""
         return ((self.density if scaled else self.psd) / self.floor) ** 2
 
 
@@ -112,7 +112,7 @@ def derive_from_axis(_: Evidence, sensor: str, axis: str) -> Result:
 
 
 def compare_axes(_: Evidence, sensor: str) -> Result:
-    """Return the noise of each axis of a sensor over that of x, and over the datasheet's."""
+    """Return the noise of each axis of a sensor over the x axis, and over the datasheet."""
     axes = [axis for axis in AXES.values() if axis.sensor == sensor]
     over_x = {axis.axis: axis.psd / axes[0].psd for axis in axes}
     return Result(fields=over_x | {f"sheet_{one.axis}": one.density / one.sheet for one in axes})
@@ -146,7 +146,7 @@ def compute_share_in_band(run: Evidence, sensor: str, axis: str) -> Result | Non
 
 
 def _get_sample_deviations(run: Evidence, sensor: str) -> dict[tuple[str, str], float]:
-    """Return the deviation of samples by channel, of the log and of the models; maybe none."""
+    """Return the deviation of samples by channel, of the log and of the models, if known."""
     rows = run.rows(ModelSampleRow, sensor=sensor, recording=RECORDING, what="deviation")
     return {(row.channel, row.of): row.mean for row in rows if row.mean is not None}
 
@@ -165,7 +165,7 @@ def compare_sample_deviations(run: Evidence, sensor: str, if_alike: Verdict) -> 
 
 
 def compare_deviations_with_x(run: Evidence, sensor: str) -> Result | None:
-    """Return the deviations of samples of y and z over that of x, of log and fitted model."""
+    """Return the deviations of samples of y and z over x, of log and fitted model."""
     by = _get_sample_deviations(run, sensor)
     if not by:
         return None
@@ -204,7 +204,7 @@ def correlate_adjacent_samples(run: Evidence, sensor: str, of: str) -> Result | 
 
 
 def count_equal(run: Evidence, grade: str, option: str) -> Result | None:
-    """Return how many sensors equal one of a grade, by white noise and by lowest point."""
+    """Return the number of sensors that equals a grade, by white noise and by lowest point."""
     words = []
     for sensor, name in ((_SINGLE_SENSOR, ""), (_FUSED_SENSOR, f"of {_FUSED_COUNT} fused ")):
         rows = run.rows(

@@ -222,7 +222,7 @@ def _describe(row: ParameterRow | None, what: str) -> str:
 
 
 def get_optimised_estimate(run: Evidence, key: str, symbol: str) -> Result | None:
-    """Return the result of the optimisation in the simulated log, with that of the likelihood."""
+    """Return the results of optimisation and likelihood for the simulated log."""
     log = CHANNELS[key].log
     row = run.parameter(log, symbol, "paper")
     if row is None:
@@ -234,7 +234,7 @@ def get_optimised_estimate(run: Evidence, key: str, symbol: str) -> Result | Non
 
 
 def read_curve(run: Evidence, key: str, symbol: str) -> Result:
-    """Return the value read from the curve of Table 2: of the model, and of single logs."""
+    """Return the value read from the curve of the model of Table 2, and of single logs."""
     channel = CHANNELS[key]
     model = channel.table_2
     tau, level = find_lowest_point(model)
@@ -268,7 +268,7 @@ def find_lowest_of_table_1(_: Evidence, key: str, quantity: str) -> Result:
 
 
 def compute_error_in_use(_: Evidence, key: str, quantity: Quantity) -> Result:
-    """Return the error of dead reckoning by the noise of one channel alone, with Table 2's."""
+    """Return the error of dead reckoning by the noise of one channel, and the one for Table 2."""
     channel = CHANNELS[key]
     quiet = NoiseModel()
 
@@ -325,7 +325,7 @@ def compute_chance_of_order(_: Evidence, key: str) -> Result:
     """Return the chance that a reconstruction by Table 1 has the lower RMS."""
     steps, every = (simulate_lottery(CHANNELS[key], grid) for grid in GRIDS)
     return Result(
-        value=round(steps.beats, 2),  # so few draws do not tell it finer
+        value=round(steps.beats, 2),  # so few draws do not resolve a smaller share
         verdict="agrees" if steps.beats < 0.05 else "differs",
         fields={"every": every.beats, "slow": _format_share(steps.slow)},
     )
@@ -340,7 +340,7 @@ def get_weighted_rms(run: Evidence, key: str, method: str) -> Result | None:
 
 
 def convert_vendor_figure(_: Evidence, symbol: str, key: str) -> float:
-    """Return the figure of the vendor behind one of Table 4, SI."""
+    """Return the vendor's figure from which a value of Table 4 derives, SI."""
     row = _TABLE_4[symbol][key]
     return convert_to_si(float(row["vendor"]), row["in"], row["dimension"])
 
@@ -371,7 +371,7 @@ def compute_slopes(_: Evidence) -> Result:
 
 
 def compare_distances(run: Evidence, key: str) -> Result | None:
-    """Return the distance of two curves from that of the log, decades."""
+    """Return the distances of two curves from the curve of the log, decades."""
     scores = {row.method: row.rms_log10 for row in run.of_log(ScoreRow, CHANNELS[key].log)}
     authors, optimised = scores.get("authors"), scores.get("paper")
     if authors is None or optimised is None:
@@ -478,7 +478,7 @@ def evaluate_equation(_: Evidence, number: str) -> Result:
 
 
 def compute_spread_over_weight(_: Evidence) -> Result:
-    """Return the spread of the Allan variance over the one that the intended weight assumes."""
+    """Return the spread of the Allan variance over the value that the intended weight assumes."""
     return Result(fields={f"at_{tau:.0f}": compute_weight_ratios(tau)[0] for tau in WEIGHED_AT})
 
 

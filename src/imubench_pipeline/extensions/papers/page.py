@@ -146,7 +146,7 @@ def format_cells(row: PublishedRow) -> dict[str, str]:
 
 
 def find_lines(site: Site) -> Iterator[Found]:
-    """Yield every line of the papers, for the search."""
+    """Yield every line of the papers for the search index."""
     sections = {paper.name: f"papers.html#{paper.key}" for paper in read_papers()}
     for row in site.rows(PublishedRow):
         words = f"{row.paper} {row.printed_as} {row.verdict}"

@@ -189,7 +189,7 @@ def write_published(tables: Iterable[Path], outputs: Iterable[Path]) -> None:
 
 
 def make_published_rows(evidence: Evidence) -> Iterator[PublishedRow]:
-    """Yield the rows of the table ``published`` for the papers with logs in the run."""
+    """Yield the rows of the table ``published`` for papers with logs in the run."""
     for paper in read_papers():
         if any(evidence.has(*log) for log in paper.logs):
             yield from make_rows(paper, evidence)

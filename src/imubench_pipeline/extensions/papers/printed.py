@@ -132,7 +132,7 @@ def _expand(
     fields: Mapping[str, str],
     tables: Mapping[str, Sequence[Mapping[str, str]]],
 ) -> Iterator[dict[str, Any]]:
-    """Yield the lines of entries, which may have lines of their own, one for each of a table."""
+    """Yield the lines of entries; an entry may have several, one for each row of a table."""
     for entry in entries:
         own = {**inherited, **entry}
         each, lines = own.pop("each", [{}]), own.pop("lines", None)

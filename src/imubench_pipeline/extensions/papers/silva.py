@@ -98,7 +98,7 @@ def count_turns(evidence: Evidence, run: str) -> float | None:
 
 @cache
 def make_printed_run(run: str) -> PrintedRun:
-    """Return a run as printed, with the sigma that the printed noise gives the mean over pairs."""
+    """Return a printed run, and the sigma of the mean over pairs by the printed noise."""
     duration = 60.0 * PAPER_MINUTES[run]
     sigma = compute_allowed_sigmas(PAPER_DESIGN, duration, PAPER_MODEL)["sigma"]
     return PrintedRun(duration, PRINTED[run] * DEGREE, float(sigma))
@@ -122,7 +122,7 @@ def compute_allowed_rates(evidence: Evidence, run: str) -> Result:
 
 
 def explain_errors(_: Evidence) -> Result:
-    """Return the size of each cause that would explain runs 2, 3 and 4, and the limits of it."""
+    """Return the size of each cause that would explain runs 2, 3 and 4, with limits."""
     runs = {run: make_printed_run(run) for run in "234"}
     last = make_printed_run("4, last 13 min")
     first = runs["4"].without(last)
@@ -243,7 +243,7 @@ def compute_filter_gain(_: Evidence) -> Result:
 
 
 def get_aligned_heading(run: Evidence) -> Result | None:
-    """Return the heading of the triad, with the half of its interval and the truth, degrees."""
+    """Return the heading of the triad, half the width of its interval, and the truth, degrees."""
     rows = run.rows(
         CalibrationRow, sensor=f"{SENSOR}_triad", recording="sim_aligned", parameter="heading"
     )

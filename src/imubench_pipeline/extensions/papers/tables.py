@@ -1,4 +1,4 @@
-"""Rows of the printed figures of papers, with the computed ones."""
+"""Rows of the printed values of papers, with the computed values."""
 
 from __future__ import annotations
 

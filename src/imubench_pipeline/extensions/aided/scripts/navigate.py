@@ -1,4 +1,4 @@
-"""Run filters on simulated drives, tuned by all that is known of a sensor."""
+"""Run filters on simulated drives, with every available tuning of a sensor."""
 
 from pathlib import Path
 

@@ -1,6 +1,6 @@
 """Fine alignment: a Kalman filter of attitude and sensor errors at rest.
 
-The body stands on the Earth, so its attitude is constant, or is turned by known angles between
+The body is at rest on the Earth, so its attitude is constant, or is turned by known angles between
 positions. The residual of the block means for an attitude C~ = (I - [psi x]) C is linear in psi,
 
     y - T^T C~^T v = T^T C~^T [v x] psi + mean error + white noise,

@@ -1,4 +1,4 @@
-"""Find bias and scale factor of a gyro whose rates are known; nothing of a rejected recording."""
+"""Estimate bias and scale factor from known rates; no rows for a rejected recording."""
 
 from pathlib import Path
 

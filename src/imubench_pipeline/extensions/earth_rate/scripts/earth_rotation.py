@@ -1,4 +1,4 @@
-"""Find the turns of a gyro in its log, and the Earth's rate; nothing of a rejected recording."""
+"""Find the turns of a gyro in its log, and the Earth's rate; no rows for a rejected recording."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""Say how many of one sensor are as good as one of another."""
+"""Compute how many cheap sensors match one good sensor."""
 
 from pathlib import Path
 

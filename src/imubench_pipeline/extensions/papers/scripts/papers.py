@@ -1,4 +1,4 @@
-"""Say what the papers print, and what is found of it."""
+"""Compare printed values of the papers with the results."""
 
 from pathlib import Path
 
