@@ -1,1 +1,1 @@
-"""What the program knows, typed: the rows of every table, and what passes between rooms."""
+"""Types of the data: the rows of every table, and the values passed between packages."""

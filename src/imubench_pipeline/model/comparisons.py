@@ -1,4 +1,4 @@
-"""Sensors compared: with their data sheets, over time, with each other and with requirements."""
+"""Rows of comparisons: with data sheets, over time, with other sensors and with requirements."""
 
 from __future__ import annotations
 

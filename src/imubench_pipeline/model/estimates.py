@@ -1,4 +1,4 @@
-"""What is estimated from a recording: curves, spectra, parameters and models."""
+"""Rows of the estimates of a recording: curves, spectra, parameters and models."""
 
 from __future__ import annotations
 

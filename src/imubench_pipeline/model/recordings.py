@@ -1,4 +1,4 @@
-"""What is known of each recording: its state, findings, doubts and failed steps."""
+"""Rows about each recording: its state, findings, doubts and failed steps."""
 
 from __future__ import annotations
 

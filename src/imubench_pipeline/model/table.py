@@ -50,7 +50,7 @@ CATEGORY = pa.dictionary(pa.int32(), pa.string())
 
 @dataclass(frozen=True, slots=True)
 class Column:
-    """What a column means; ``unit`` is ``-`` for a text, a count or a ratio.
+    """Meaning of a column; ``unit`` is ``-`` for a text, a count or a ratio.
 
     ``single``: single precision, for columns of very many numbers.
     """
@@ -109,7 +109,7 @@ class TypedColumn:
 if TYPE_CHECKING:
 
     class _Attributes:
-        """Rows have attributes alone for mypy, so that it finds each misspelt column."""
+        """Rows have only attributes for mypy, so that it finds each misspelt column."""
 
 else:
     _Attributes = Mapping  # templates and tests may also take a column by its name
@@ -180,7 +180,7 @@ def table(name: str) -> Callable[[type[R]], type[R]]:
 
 @dataclass_transform(frozen_default=True, kw_only_default=True, eq_default=False)
 def row(cls: type[R]) -> type[R]:
-    """Make a class a part of the rows of tables; it is declared as a dataclass."""
+    """Declare a class as a part of rows of tables; it becomes a dataclass."""
     # Rows are equal as mappings are.
     return dataclass(frozen=True, slots=True, kw_only=True, eq=False)(cls)
 
@@ -247,20 +247,20 @@ def _make_struct(kind: type, values: Mapping[str, Any]) -> Any:
 
 @row
 class SensorRow(TableRow):
-    """What names a sensor in a table."""
+    """Key columns of a sensor in a table."""
 
     sensor: Annotated[str, Column("name of the sensor file")]
 
 
 @row
 class OfRecordingRow(SensorRow):
-    """What names a recording in a table."""
+    """Key columns of a recording in a table."""
 
     recording: Annotated[str, Column("name of the recording")]
 
 
 @row
 class ChannelRow(OfRecordingRow):
-    """What names a channel in a table."""
+    """Key columns of a channel in a table."""
 
     channel: Annotated[str, Column("axis and quantity, gyro_x to accel_z")]

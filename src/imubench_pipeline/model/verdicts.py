@@ -1,4 +1,4 @@
-"""What verdicts on sensors consist of, beside their codes (`imubench_pipeline.model.states`)."""
+"""Components of verdicts on sensors, besides their codes (`imubench_pipeline.model.states`)."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ class Condition:
 
 @dataclass(frozen=True, slots=True)
 class Shortfall:
-    """A demanded property that a sensor does not have.
+    """A required property that a sensor does not have.
 
     ``subject`` is the quantity or axis, or the price class of the sensor; ``asked`` is as in the
     requirement; ``has`` are the figures of the sensor, SI (empty: it has none).
