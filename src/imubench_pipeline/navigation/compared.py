@@ -1,4 +1,4 @@
-"""Channels that may represent their sensor, and how many of one equal another."""
+"""Channels that may represent their sensor, and the number of sensors that equals a better one."""
 
 from __future__ import annotations
 

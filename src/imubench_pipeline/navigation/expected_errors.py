@@ -281,7 +281,7 @@ def _list_channels(quantity: str, channels: Iterable[str]) -> list[str]:
 
 
 def _draw_figures(figures: Figures, draws: int, rng: np.random.Generator) -> list[Figures]:
-    """Return draws of the figures of an axis, from the spread of the measured ones."""
+    """Return draws of the figures of an axis, from the spread of measured sensors."""
     spread = {
         cause: figure
         for cause, figure in figures.items()

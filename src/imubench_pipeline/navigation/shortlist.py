@@ -96,7 +96,7 @@ def collect_measured_ranges(
     recordings: Iterable[RecordingRow],
     price_classes: Mapping[str, str | None],
 ) -> MeasuredRanges:
-    """Return the measured ranges of a run, from real sensors and recordings that decide.
+    """Return the measured ranges of a run, from real sensors and recordings used in comparisons.
 
     They are the 95 % limits of parameters with a value. A random walk that is not significant in a
     log may be 0; its upper limit is used only if no log of the sensor determines one.
@@ -168,7 +168,7 @@ class Figures:
 
 
 def read_figure_ranges(sensor: Sensor, quantity: str, ranges: MeasuredRanges) -> Figures | str:
-    """Return the ranges that a datasheet allows for a quantity, or why there are none."""
+    """Return the ranges that a datasheet allows for a quantity, or the reason without one."""
     if getattr(sensor.datasheet, quantity) is None:
         return texts.no_quantity(quantity)
     printed, options = _read_printed(sensor.datasheet, quantity)

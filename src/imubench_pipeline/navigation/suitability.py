@@ -50,7 +50,7 @@ class Abilities(Strict):
 
 @dataclass(frozen=True)
 class _Point:
-    """One demanded property; ``fulfilled`` is None if not known."""
+    """One required property; ``fulfilled`` is None if not known."""
 
     property: Property
     subject: str
@@ -117,7 +117,7 @@ def _find_largest(datasheet: Datasheet, quantity: Measured, name: str) -> float 
 
 
 def judge(must: Must, has: Abilities) -> tuple[list[Shortfall], list[Condition]]:
-    """Return the demanded properties that a sensor does not have, and those that are not known."""
+    """Return the required properties that a sensor lacks, and the unknown ones."""
     points: dict[tuple[Property, str], _Point] = {}
     for point in _compare(must, has):
         points.setdefault((point.property, point.subject), point)

@@ -184,7 +184,7 @@ def compare(
     *,
     efficient: bool = True,
 ) -> Comparison:
-    """Return the comparison of the errors of a log with those that its noise model predicts.
+    """Compare the errors of a log with the prediction of its noise model.
 
     ``cut`` is the window for the times at rest and in motion; ``means`` are the block means of each
     segment of the log, NaN where samples are missing. The model has at least one term; ``drawn``

@@ -107,7 +107,7 @@ def compute_window_errors(means: Sequence[Array], weights: Array, lags: int) -> 
     """Return the errors of all windows of a log.
 
     ``means`` are the block means of each segment, NaN where one is missing; ``weights``, shape
-    (blocks,), those of the blocks of a window; ``lags`` the number of lags for the pair counts.
+    (blocks,): weights of the blocks of a window; ``lags`` the number of lags for the pair counts.
     """
     total, count = 0.0, 0
     pairs = np.zeros(lags)

@@ -97,7 +97,7 @@ class Largest:
 
     @classmethod
     def of(cls, budget: Budget, limit: float | None, upper: float) -> Largest:
-        """Return the remaining error budget under a limit, SI; ``upper`` is that of the total."""
+        """Return the remaining budget under a limit, SI; ``upper``: upper limit of the total."""
         if limit is None:
             return cls(0.0)
         biases = tuple(

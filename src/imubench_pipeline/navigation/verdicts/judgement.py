@@ -151,7 +151,7 @@ class Judgement:
 
     @property
     def shortfalls(self) -> tuple[Shortfall, ...]:
-        """Demanded properties that the sensor does not have."""
+        """Required properties that the sensor does not have."""
         return (self.price,) if self.price else self.open.shortfalls
 
     @property
@@ -230,7 +230,7 @@ def _map_specimens(
 
 
 def _select_deciding_rows(rows: Sequence[ErrorBudgetRow], basis: Basis) -> list[ErrorBudgetRow]:
-    """Return rows, with figures removed for recordings that do not decide."""
+    """Return rows without the figures of recordings that are not used in comparisons."""
     selected = []
     for row in rows:
         doubts = basis.apart.get((row.sensor, row.recording))

@@ -143,7 +143,7 @@ def _find_settling_steps(judgement: Judgement, basis: Basis) -> Iterator[_Step]:
 
 
 def count_specimens_needed(expected: Expected, away: float) -> int | None:
-    """Return how many more specimens would bring the limits of an error within a distance.
+    """Return the number of additional specimens that narrows the limits of an error to a distance.
 
     ``away`` is the logarithm of the margin, the maximum half width t sqrt(tau^2 (1 + 1/n)) of the
     prediction interval. The errors of the logs are neglected. None if 20 specimens are not enough.
