@@ -1,4 +1,4 @@
-"""The noise terms of an inertial sensor, with all that follows from each (IEEE Std 952-2020, 647).
+"""The noise terms of an inertial sensor and their properties (IEEE Std 952-2020, 647).
 
 Models, fits, simulation, budgets, exports and pages take everything from here. A new kind of term
 is a module here, and an entry of `TERMS`.

@@ -302,7 +302,7 @@ class Deterministic(Term):
         return np.zeros_like(lags)
 
     def growth_from_known(self, time: Array) -> tuple[Array, Array]:
-        """0: a filter with the term predicts it exactly."""
+        """Return 0: a filter with the term predicts it exactly."""
         return np.zeros_like(time), np.zeros_like(time)
 
     def block_covariance(self, lags: Array, block: float) -> Array:

@@ -134,7 +134,7 @@ class GaussMarkov(Term):
 
         x = t/T_B, y = W/T_B; with E_k(x) = x^k phi_k(-x) (`exponentials.phi`) P_m(x) is the
         integral of E_{m+1}^2 from 0 to x, and d_x = (m+1)! x phi_{m+2}(-x) and
-        d_y = y phi_2(-y) are what is lost of the state at the start, forward and backward. Where
+        d_y = y phi_2(-y) are the decay of the state at the start, forward and backward. Where
         not calibrated S_B (T_B^(2m+3) P_m(x) + c^2 T_B (1 - d_x)^2 / 2).
         """
         x, constant = time / self.T_B, of_constant(order, time)
@@ -202,7 +202,7 @@ class GaussMarkov(Term):
         return covariance
 
     def block_sums(self, blocks: int, width: int, rate: float, rng: np.random.Generator) -> Array:
-        """Drawn jointly with the states at the ends of the blocks."""
+        """Draw them jointly with the states at the ends of the blocks."""
         interval = 1.0 / rate
         space = self.state_space(interval)
         return draw_block_sums(space, self.start(rng, interval), blocks, width, rng)

@@ -67,7 +67,7 @@ class Sinusoid(Deterministic):
         )
 
     def start(self, rng: np.random.Generator, interval: float) -> Array:
-        """Draw the phase; the amplitude is as it is."""
+        """Draw the phase; the amplitude is given."""
         phase = rng.uniform(0.0, 2.0 * math.pi)
         return self.amplitude * np.array([math.cos(phase), math.sin(phase)])
 
@@ -111,7 +111,7 @@ class Sinusoid(Deterministic):
         return gain * np.cos(half * (2.0 * firsts + width - 1) + phase)
 
     def swing(self, weights: Array, block: float) -> tuple[float, float]:
-        """Return half the square of the amplitude that is left of it, at a random phase."""
+        """Return half the square of the remaining amplitude, at a random phase."""
         turn = 2.0 * math.pi * self.frequency * block
         middle = np.arange(len(weights)) + 0.5
         seen = np.sinc(self.frequency * block) * (weights @ np.exp(1j * turn * middle))
