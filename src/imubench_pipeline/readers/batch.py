@@ -109,7 +109,7 @@ class LogFile(ABC):
 
     def seconds(self, stamps: NDArray[Any], first: Any) -> NDArray[np.float64]:
         """Convert stamps as written to s since the first one; exact for integers."""
-        assert self.log.time is not None  # asked for where there are stamps
+        assert self.log.time is not None  # requested if there are stamps
         unit, scale = self.log.time.unit or "ns", self.log.time.scale
         if unit == "samples":
             assert self.log.rate_hz is not None  # checked with the sensor file

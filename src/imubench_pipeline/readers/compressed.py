@@ -314,7 +314,7 @@ def list_members(archive: Path) -> list[Path]:
 
 
 def is_visible(path: Path) -> bool:
-    """Return whether a path within a folder is no hidden file of the operating system."""
+    """Return whether a path within a folder is not a hidden file of the operating system."""
     return not any(part.startswith((".", "__MACOSX")) for part in path.parts)
 
 

@@ -1,4 +1,4 @@
-"""Handle zeros that are no part of a log: holes of sparse files, and runs of zero bytes.
+"""Skip zeros that are not part of a log: holes of sparse files, and runs of zero bytes.
 
 A logger that reserves space leaves zeros after the log when it loses its power. A file system may
 not store them: such a hole is found and skipped without reading it.

@@ -87,7 +87,7 @@ def split_unit(label: str, dimension: str) -> tuple[str, str | None]:
 
 
 def find_bracketed(label: str) -> list[str]:
-    """Return the texts in brackets in a name that are no numbers."""
+    """Return the texts in brackets in a name, except for numbers."""
     return [text for text in _BRACKETED.findall(label) if text.strip() and not text.isdigit()]
 
 

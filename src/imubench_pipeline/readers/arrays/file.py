@@ -165,7 +165,7 @@ class ArrayFile(LogFile):
 
     def _time_place(self, tables: dict[str, Table]) -> _Place:
         time = self.log.time
-        assert time is not None  # asked for where there are stamps
+        assert time is not None  # requested if there are stamps
         if time.date is not None:
             raise UnusableError(
                 "'date' of 'time' is for text; expected one column of dates or numbers"
@@ -503,7 +503,7 @@ class ArrayTime:
         self._dated = False
 
     def seconds(self, raw: NDArray[Any]) -> NDArray[np.float64]:
-        """Return s since the first stamp of the file; NaN where the stamp is missing."""
+        """Return the time since the first stamp of the file, s; NaN where the stamp is missing."""
         missing = np.ma.getmaskarray(raw).copy()
         values = np.ma.getdata(raw)
         self._dated = values.dtype.kind == DATE_KIND

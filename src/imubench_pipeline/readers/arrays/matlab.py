@@ -1,7 +1,7 @@
 """MATLAB files: version 7.3, which is HDF5, 5 (-v6, -v7) and 4 (-v4), all streamed.
 
 A column is a number, the column of a matrix as MATLAB shows it, counted from 1; or the name of a
-variable that is a vector. ``variable`` names the matrix; what is in a structure is ``imu/gyro``.
+variable that is a vector. ``variable`` names the matrix; a field of a structure is ``imu/gyro``.
 Tables, timetables and cells are not arrays: save ``table2array`` of them.
 """
 

@@ -1,1 +1,1 @@
-"""Logs in text: what separates, heads and stamps their records is found in the file."""
+"""Text logs, with automatic detection of delimiter, header and time stamps."""

@@ -20,7 +20,7 @@ _READ_BLOCK = 1 << 16
 _ZERO_RUN = re.compile(rb"\0{2,}")
 _BYTE_ORDER_MARKS: Mapping[bytes, str] = {
     codecs.BOM_UTF8: "",
-    # Before UTF-16, whose mark is the beginning of this one.
+    # Before UTF-16, whose mark is a prefix of this one.
     codecs.BOM_UTF32_LE: "utf-32-le",
     codecs.BOM_UTF32_BE: "utf-32-be",
     codecs.BOM_UTF16_LE: "utf-16-le",

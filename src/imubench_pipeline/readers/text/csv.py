@@ -232,7 +232,7 @@ class CsvFile(LogFile):
 
 
 class _WrongWidth:
-    """The first record with too many or too few columns; allowed if it is the last one."""
+    """The first record with a wrong number of columns; allowed if it is the last one."""
 
     def __init__(self) -> None:
         self.row: pacsv.InvalidRow | None = None

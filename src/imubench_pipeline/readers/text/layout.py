@@ -1,6 +1,6 @@
 """Find the layout of a text log: delimiter, decimal sign, comments, header and first record.
 
-All is found from the first lines; statements of the sensor file are used as they are.
+Everything is detected from the first lines; statements of the sensor file are used unchanged.
 """
 
 from __future__ import annotations
