@@ -1,1 +1,1 @@
-"""A recording: found, read in parts, put onto a time base, judged, and kept as Parquet in SI."""
+"""Recordings: find and read logs, build time bases, check quality, store Parquet in SI."""

@@ -1,4 +1,4 @@
-"""Combine the files of a recording into one Parquet file per clock, and account for all samples."""
+"""Combine the files of a recording into one Parquet file per clock, and count all samples."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Distinguish errors of a log from errors of its surroundings: a mount, a disk, a permission.
+"""Distinguish errors of a log from errors of the system: mounts, disks, permissions.
 
 An error of a log rejects it until it changes. The surroundings may be different an hour later: the
 ingest fails, nothing is concluded, and the next run tries again.

@@ -41,7 +41,7 @@ class Recording:
 
     @property
     def files(self) -> list[Path]:
-        """The files of its log and its notes as they are now; the folder if it cannot be listed."""
+        """The present files of its log and notes; the folder if it cannot be listed."""
         alone = self.simulated or _holds_itself(self.path)
         try:
             logs = [self.path] if alone else log_files(self.path)
@@ -73,7 +73,7 @@ class FoundFile:
 
 
 def find_logs(logs: Path) -> list[Recording]:
-    """Return the recordings of a drop zone, in order; two logs of one name are there twice.
+    """Return the recordings of a drop zone, in order; two logs of one name give two entries.
 
     Logs in no folder of a sensor have the reason why they cannot be analysed.
     """
@@ -191,7 +191,7 @@ def _logs_of(folder: Path) -> Iterator[Recording]:
 
 
 def _holds_itself(path: Path) -> bool:
-    """Return whether a path is a link to a folder that it lies in."""
+    """Return whether a path is a link to one of its parent folders."""
     if not path.is_symlink():
         return False
     try:
@@ -223,7 +223,7 @@ def _shown(folder: Path) -> list[Path]:
 
 
 def _is_log(path: Path) -> bool:
-    """Return whether a file of the drop zone is to be a log, by its name."""
+    """Return whether a file of the drop zone is a log, by its name."""
     return path.suffix.lower() not in _NOT_LOGS
 
 
@@ -243,7 +243,7 @@ def _usable(name: str) -> str:
 
 
 def _fault(path: Path, name: str) -> str | None:
-    """Return why a file of the drop zone cannot be used, if its name or place says so."""
+    """Return why a file of the drop zone cannot be used, by its name or place."""
     shown = ascii(path.name)
     folder = path.parent.name
     for what, name_shown, stem in (("file", shown, name), ("folder", ascii(folder), folder)):

@@ -50,7 +50,7 @@ class Doubt:
 
     @property
     def of_recording(self) -> bool:
-        """Whether it is one of the log, and not only of a parameter that it tells badly."""
+        """Whether the doubt is about the log, not only about a poorly determined parameter."""
         return self.code != "doubtful"
 
     def row(self) -> DoubtRow:
@@ -66,7 +66,7 @@ Doubted = TypeVar("Doubted", bound=TableRow)
 def derive_doubts(
     findings: Iterable[FindingRow], parameters: Iterable[ParameterRow], models: Iterable[ModelRow]
 ) -> Iterator[Doubt]:
-    """Yield doubts about recordings, the unfit first; ``parameters``: by recommended methods."""
+    """Yield doubts about recordings, the most serious first, from recommended ``parameters``."""
     every: list[Doubt] = []
     for finding in findings:
         code = finding.finding
@@ -109,7 +109,7 @@ def derive_doubts(
 def doubt_unsold_sensors(
     recordings: Iterable[RecordingRow], sensors: Collection[str]
 ) -> Iterator[Doubt]:
-    """Yield a doubt for each recording of sensors that cannot be bought: they decide nothing."""
+    """Yield a doubt for each recording of sensors not for sale, which are not compared."""
     for row in recordings:
         if row.sensor in sensors:
             yield Doubt(*_key(row), None, "not_sold", texts.NOT_SOLD, unfit=True)
@@ -125,7 +125,7 @@ def doubt_simulated_recordings(recordings: Sequence[RecordingRow]) -> Iterator[D
 
 
 def exclude_simulated(recordings: Sequence[RecordingRow]) -> tuple[list[RecordingRow], list[Doubt]]:
-    """Return the recordings of all sensors, judged anew, and the doubts that are new.
+    """Return the recordings of all sensors with new verdicts, and the new doubts.
 
     A simulated recording of one sensor decides until a measured one of another sensor is known.
     """
@@ -177,7 +177,7 @@ def judge_recordings(
 
 
 def mark_doubts(of_recording: Iterable[Doubt]) -> tuple[DoubtMark, ...]:
-    """Return the codes of the doubts of a recording, each with its channels, the unfit first."""
+    """Return the codes of the doubts of a recording with channels, the most serious first."""
     channels: dict[tuple[str, str], dict[str, None]] = {}
     for doubt in of_recording:
         if doubt.of_recording:

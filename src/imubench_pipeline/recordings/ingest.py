@@ -39,7 +39,7 @@ _MAX_TIMES = 5  # of knocks that are listed
 
 @dataclass(frozen=True)
 class Ingested:
-    """What was kept of a recording."""
+    """The stored data of a recording."""
 
     summary: dict[str, Any]  # a row of the table `recordings` without the names
     findings: list[Finding]
@@ -69,7 +69,7 @@ def ingest(
     folder: Path,
     provenance: dict[str, Any],
 ) -> Ingested:
-    """Read a recording and keep it as Parquet in ``folder``.
+    """Read a recording and store it as Parquet in ``folder``.
 
     Parameters
     ----------
@@ -79,10 +79,9 @@ def ingest(
     notes : RecordingNotes
         The part to use, and when it started.
     settings : QualitySettings
-    folder : Path
-        Where the Parquet files go; those of an earlier run are replaced.
+    folder : Path Folder of the Parquet files; files of an earlier run are replaced.
     provenance : dict
-        Goes into the metadata of every file, as it is. Its ``kind`` says whether the sensor was at
+        Stored unchanged in the metadata of every file. Its ``kind`` says whether the sensor was at
         rest: knocks and changes are looked for then alone.
 
     Raises
@@ -197,7 +196,7 @@ def _ingest(
 
 
 def _unused_files(source: Path, parts: list[Part]) -> list[Finding]:
-    """Return a note of the files of a folder that no channel is read from."""
+    """Return a note on the unused files of a folder."""
     if not source.is_dir() or recognise_folder(source) is not None:
         return []
     used = {path for part in parts for path in (part.source.path, *part.source.path.parents)}
@@ -265,7 +264,7 @@ def _of_clock(parts: list[Part], base: timebase.TimeBase) -> dict[str, Any]:
 
 
 def _gravity(parts: list[Part], bases: list[timebase.TimeBase]) -> GravityTurn | None:
-    """Return how gravity turns against the sensor; None: it does not, or it is not seen."""
+    """Return the rotation of gravity relative to the sensor; None if none is detected."""
     axes = [f"accel_{axis}" for axis in "xyz"]
     place = {name: n for n, part in enumerate(parts) for name in part.columns if name in axes}
     if len({(parts[n].digest(), parts[n].rows) for n in place.values()}) != 1 or len(place) < 3:
@@ -324,7 +323,7 @@ def _summary(
 def ingest_as_planned(
     source: Path, settings: str, sensor: str, recording: str, folder: Path, *, guarded: bool = False
 ) -> Quality:
-    """Ingest a recording as the plan says; one that cannot be used is rejected, with its reason.
+    """Ingest a recording by its plan; reject an unusable one, with the reason.
 
     Parameters
     ----------
@@ -334,7 +333,7 @@ def ingest_as_planned(
         As `imubench_pipeline.run.plan.Plan.ingest_settings` gives them.
     sensor, recording : str
     folder : Path
-        Where the Parquet files go.
+        Folder of the Parquet files.
     guarded : bool
         A process of its own opens the log first (`availability.check_opening`), so that none that
         hangs or crashes its reader does so here; it takes 0.1 s.
@@ -398,7 +397,7 @@ def write_failed(settings: str, failure: Failure, path: Path) -> None:
 
 
 def _stated_simulated(plan: dict[str, Any]) -> bool:
-    """Return whether the run makes the recording, or the notes beside its log say so."""
+    """Return whether the recording is simulated, by the run or by the notes beside its log."""
     return bool(plan["simulated"] or plan.get("notes", {}).get("simulated"))
 
 

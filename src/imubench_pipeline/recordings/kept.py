@@ -119,7 +119,7 @@ def _footer(path: Path) -> str:
 
 
 def load_logs(folder: Path) -> dict[str, ChannelLog]:
-    """Return the channels of a recording that can be analysed, by name; none of a rejected one.
+    """Return the usable channels of a recording, by name; none of a rejected one.
 
     ``folder`` contains its ``quality.json``. Raises RecordingError if files of samples are not
     there, are not those that the ingest left, or are damaged.
@@ -135,6 +135,6 @@ def load_logs(folder: Path) -> dict[str, ChannelLog]:
 
 
 def load_static_logs(folder: Path) -> dict[str, ChannelLog]:
-    """Return `load_logs` of a sensor that was at rest all the time; none of a turned sensor."""
+    """Return `load_logs` of a sensor at rest; empty for a turned sensor."""
     logs = load_logs(folder)
     return logs if was_at_rest(folder) else {}

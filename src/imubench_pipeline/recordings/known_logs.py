@@ -1,4 +1,4 @@
-"""The evidence of an ingest: the files that were read, and their identity.
+"""Identity of the files that an ingest read.
 
 The plan must see every change of a log and still be cheap: it compares sizes, mtime, ctime (which
 nobody can set), and a few blocks of a file. It reads a whole file only if its size is moderate and
@@ -37,7 +37,7 @@ Stamps = tuple[int, int]  # last change of the content and of anything, ns since
 
 @dataclass(frozen=True)
 class KnownFile:
-    """A file of a log as an ingest found it."""
+    """Identity of a file of a log at its ingest."""
 
     size: int | None  # bytes; None: it was not there
     sha256: str | None  # of the content; None: not read to its end, or changed meanwhile
@@ -49,7 +49,7 @@ class KnownFile:
 
     @classmethod
     def of(cls, path: Path, is_stopped: Callable[[], bool] = lambda: False) -> KnownFile:
-        """Read a file; it may not be there. Of a large one, `is_stopped` ends the reading."""
+        """Read a file, which may be missing; `is_stopped` ends the reading of a large one."""
         try:
             begin = time.time_ns()
             before = path.stat()
@@ -69,7 +69,7 @@ class KnownFile:
 
 
 def read_known(folder: Path) -> dict[str, KnownFile] | None:
-    """Read the evidence of the last ingest from the results of a recording; None: there is none."""
+    """Read the file identities of the last ingest of a recording; None if there are none."""
     with contextlib.suppress(OSError, ValueError, TypeError, KeyError):
         return {
             name: KnownFile(**{**file, "stamps": file["stamps"] and tuple(file["stamps"])})
@@ -81,7 +81,7 @@ def read_known(folder: Path) -> dict[str, KnownFile] | None:
 def write_known(
     files: Mapping[str, KnownFile], folder: Path, versions: Mapping[str, str] | None = None
 ) -> None:
-    """Write the evidence of an ingest to the results of a recording: files by place in the log.
+    """Write the file identities of an ingest to the results of a recording.
 
     ``versions``: as the plan named them; a file of the plan that is not in ``files`` was not there.
     """
@@ -107,7 +107,7 @@ def identify_log_files(
 
 
 def read_identity(source: Path) -> dict[str, tuple[int, ...]]:
-    """Return size, stamps and inode of the files of a log and of their folder, by their place.
+    """Return size, times and inode of the files of a log and of their folder, by relative path.
 
     It is another value whenever a file was changed, replaced, renamed, or moved away and back.
     Raises OSError if the log is not there, or cannot be listed.
@@ -121,7 +121,7 @@ def read_identity(source: Path) -> dict[str, tuple[int, ...]]:
 
 
 def plan_versions(source: Path, folder: Path) -> dict[str, str]:
-    """Return a name of the content of each file of a log; an ingest is needed where it changes.
+    """Return a version of each file of a log; a changed version requires an ingest.
 
     It stays as long as the evidence of the last ingest holds. New stamps of unchanged files are
     noted in ``folder``, the results of the log.
@@ -160,7 +160,7 @@ def plan_versions(source: Path, folder: Path) -> dict[str, str]:
 
 
 def _now(path: Path, before: KnownFile) -> KnownFile | None:
-    """Return a file with its present stamps where it has its content of before; None otherwise."""
+    """Return a file with its present times if its content is unchanged, else None."""
     about = path.stat()
     same_file = before.inode == about.st_ino or about.st_size > MAX_DIGESTED_SIZE
     if same_file and (before.size, before.stamps) == (about.st_size, _stamps(about)):
@@ -194,7 +194,7 @@ def is_changed(source: Path, folder: Path) -> bool:
 
 
 def plan_recording_versions(recording: Recording, results: Path) -> dict[str, str]:
-    """Return `plan_versions` of a recording; of one that is to be simulated, none."""
+    """Return `plan_versions` of a recording; empty for a simulated one."""
     if recording.simulated:
         return {}
     folder = results / "recordings" / recording.sensor / recording.name

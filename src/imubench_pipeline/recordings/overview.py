@@ -43,7 +43,7 @@ class Overview:
 
 
 def overview(folder: Path, sensor: str, recording: str, buckets: int | None = None) -> Overview:
-    """Return envelopes and histograms of a kept recording; no row if it was rejected.
+    """Return envelopes and histograms of a recording; no row if it was rejected.
 
     Channels that cannot be analysed are left out. The temperature has an envelope alone.
     ``folder``: of its ``log*.parquet``; ``sensor``, ``recording``: names; ``buckets``: max.
@@ -129,7 +129,7 @@ def bin_edges(drawn: Array, low: float, high: float) -> Array:
     """
     if low == high:
         return np.array([low, high])
-    # The samples in order without the outermost, few of which may be outliers.
+    # The sorted samples without the outermost ones, of which few may be outliers.
     ordered = np.sort(drawn)
     size = len(ordered)
     for tail in (max(size // 100, 2), size // 1000, size // 10000, 0):
@@ -156,7 +156,7 @@ def bin_edges(drawn: Array, low: float, high: float) -> Array:
 
 
 def _lattice(ordered: Array) -> tuple[float, float] | None:
-    """Return the step and one level of samples that are quantised; None where no steps show."""
+    """Return the step and one level of quantised samples; None if no steps are visible."""
     levels = np.unique(ordered)
     if not 1 < len(levels) <= 0.5 * len(ordered):
         return None
@@ -164,7 +164,8 @@ def _lattice(ordered: Array) -> tuple[float, float] | None:
     levels = levels[np.append(True, gaps > _SAME * gaps.mean())]
     gaps = np.diff(levels)
     centre = levels.mean()
-    # Steps of 0.0061 are printed as 0.006 or 0.007: their number tells, unless levels are missing.
+    # Steps of 0.0061 are printed as 0.006 or 0.007: their number decides, unless levels are
+    # missing.
     counted = np.append(0.0, np.cumsum(np.rint(gaps / gaps.min())))
     for number in (np.arange(float(len(levels))), counted):
         centred = number - number.mean()

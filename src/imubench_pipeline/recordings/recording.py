@@ -56,7 +56,7 @@ class LogWriter(AbstractContextManager["LogWriter"]):
         self._writer.close()
 
     def write(self, columns: Mapping[str, NDArray[Any]]) -> None:
-        """Take consecutive rows; NaN is kept as null."""
+        """Add consecutive rows; NaN is stored as null."""
         rows = len(next(iter(columns.values())))
         if rows == 0:
             return
@@ -100,7 +100,7 @@ def _to_numpy(column: pa.ChunkedArray) -> NDArray[Any]:
 
 @dataclass(frozen=True)
 class ChannelLog:
-    """One channel of a kept recording."""
+    """One channel of an ingested recording."""
 
     path: Path  # its Parquet file
     channel: str
@@ -131,7 +131,7 @@ class ChannelLog:
                     points = _to_numpy(table.column("sample"))
                     start = 0
                     while start < len(points):
-                        # Long holes: a row group can stand for many times its rows on the grid.
+                        # Long holes: a row group can represent many times its rows on the grid.
                         stop = int(np.searchsorted(points, max(reached, points[start]) + ROW_GROUP))
                         block = np.full(int(points[stop - 1]) + 1 - reached, np.nan)
                         block[points[start:stop] - reached] = values[start:stop]
@@ -165,7 +165,7 @@ class ChannelLog:
 
 
 def average_blocks(blocks: Iterable[Array]) -> float:
-    """Return the mean of the samples present in consecutive blocks; NaN of none."""
+    """Return the mean of the samples present in consecutive blocks; NaN if there are none."""
     total, number = 0.0, 0
     for values in blocks:
         present = values[np.isfinite(values)]
@@ -182,24 +182,24 @@ def read_metadata(path: Path) -> dict[str, Any]:
 
 
 def list_log_files(folder: Path) -> list[Path]:
-    """Return the Parquet files of a kept recording, one a time base."""
+    """Return the Parquet files of an ingested recording, one per time base."""
     return sorted(folder.glob("log*.parquet"))
 
 
 def open_static_logs(folder: Path) -> dict[str, ChannelLog]:
-    """Return the channels that were at rest all the time: none of a sensor that was turned."""
+    """Return the channels that were at rest all the time; none of a turned sensor."""
     return open_channel_logs(folder) if was_at_rest(folder) else {}
 
 
 def was_at_rest(folder: Path) -> bool:
-    """Return whether the sensor of a kept recording was to be at rest all the time."""
+    """Return whether the sensor of an ingested recording is stated to be at rest all the time."""
     return all(
         read_metadata(path).get("kind", "static") == "static" for path in list_log_files(folder)
     )
 
 
 def open_channel_logs(folder: Path) -> dict[str, ChannelLog]:
-    """Return the channels of a kept recording that can be analysed, by name, in order."""
+    """Return the channels of an ingested recording that can be analysed, by name, in order."""
     logs: dict[str, ChannelLog] = {}
     for path in list_log_files(folder):
         metadata = read_metadata(path)

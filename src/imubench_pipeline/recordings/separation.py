@@ -60,7 +60,7 @@ class _Records:
         }
 
     def count(self, channel: str) -> int:
-        """Return the number of records with a number of a channel."""
+        """Return the number of records in which a channel has a number."""
         return self.common[channel, channel]
 
     def times(self, *, numbered: bool = False) -> Iterator[Array]:
@@ -129,7 +129,7 @@ def separate_clocks(
     settings: QualitySettings,
     scratch: Path,
 ) -> list[Part]:
-    """Return one part for each clock of a file; the part itself if there is only one clock.
+    """Return one part for each clock of a file, or the part itself if there is only one clock.
 
     ``stated``: rate of its records, Hz. ``whole`` returns the time base of all records.
     ``scratch``: folder for the scratch files. Raises RecordingError if channels have no clock of

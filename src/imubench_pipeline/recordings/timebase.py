@@ -173,7 +173,7 @@ def locate_samples(
 def find_rate_changes(
     points: Iterator[NDArray[np.int64]], rate: float, channel: str | None = None
 ) -> list[Finding]:
-    """Return a finding if a part of a log has every second (third, ...) sample only.
+    """Return a finding if a part of a log has only every second (third, ...) sample.
 
     ``points``: grid points of the samples, below 0 for those left out; ``rate``: of the grid, Hz.
     Random losses do not give 32 equal steps in a row.
@@ -291,7 +291,7 @@ def _find_drift(track: tracking.Track, settings: QualitySettings) -> list[Findin
 def _assume_consecutive(
     stamps: tracking.Stamps, track: tracking.Track, stated: float | None, settings: QualitySettings
 ) -> TimeBase:
-    """Return the time base for stamps on no grid: consecutive samples at the mean rate."""
+    """Return the time base for stamps without a grid: consecutive samples at the mean rate."""
     # A pause is long compared with the mean interval and with the steps between shared stamps.
     mean = _measure_span(stamps) / max(track.rows - 1, 1)
     gap = max(1.0, 100 * mean, 10 * track.interval) * (1 + 1e-6)

@@ -1,1 +1,1 @@
-"""What is wrong with a recording, in findings with a severity."""
+"""Quality checks of a recording, as findings with a severity."""

@@ -319,7 +319,7 @@ def _is_rounding_dominant(steps: levels.Quantisation | None) -> bool:
 
 
 def _has_few_levels(steps: levels.Quantisation | None, settings: QualitySettings) -> bool:
-    """Return whether a channel has so few levels that rounding makes its noise."""
+    """Return whether a channel has so few levels that rounding dominates its noise."""
     return steps is not None and round(steps.levels) < settings.fewest_levels
 
 
