@@ -1,4 +1,4 @@
-"""`imubench report`: the report of a finished run again, elsewhere or in one file."""
+"""`imubench report`: write the report of a finished run again, elsewhere or in one file."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Write the report; return the exit status: 2 where there are no results."""
+    """Write the report; return the exit status: 2 if there are no results."""
     # Imported here, because templates and figures take half a second to load.
     with require_extra("workflow", "write the report"):
         from imubench_pipeline.report.publish import load_site

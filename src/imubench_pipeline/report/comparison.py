@@ -1,4 +1,4 @@
-"""Channels of many recordings as pages compare them: curves, and tables of parameters."""
+"""Channels of many recordings for comparison on pages: curves, and tables of parameters."""
 
 from __future__ import annotations
 

@@ -37,7 +37,7 @@ _COVERAGE_SIGNS = {"yes": "yes", "no": "no", "other convention": "other", "not l
 def compare_with_datasheet(
     view: ChannelView, coverage: Mapping[tuple[str, str, str], str], system: System
 ) -> Iterator[Json]:
-    """Yield each figure of the datasheet with all its readings, the measured value and a verdict.
+    """Yield each printed figure with its interpretations, the measured value and a verdict.
 
     ``coverage`` has the publication status by sensor, quantity and figure.
     """
@@ -75,7 +75,7 @@ _Figure = tuple[str, str, float | None, str | None, str | None, str | None]
 
 
 def _group_by_figure(rows: Iterable[DatasheetRow]) -> dict[_Figure, list[DatasheetRow]]:
-    """Return the readings of each printed figure."""
+    """Return the interpretations of each printed figure."""
     figures: dict[_Figure, list[DatasheetRow]] = {}
     for row in rows:
         name = (row.channel, row.quantity, row.printed, row.unit, row.kind, row.condition)
@@ -84,7 +84,7 @@ def _group_by_figure(rows: Iterable[DatasheetRow]) -> dict[_Figure, list[Datashe
 
 
 def merge_verdicts(readings: Sequence[DatasheetRow]) -> tuple[str, str]:
-    """Return the verdict on a printed figure from the rows of its readings, and its reason.
+    """Return the verdict on a printed figure from the rows of its interpretations, and its reason.
 
     A bias instability is judged by the minimum of the curve, as vendors print it. A density of
     unknown sidedness has a verdict only if both readings have the same.
@@ -191,7 +191,7 @@ def _name_figure(row: DatasheetRow) -> str:
 
 
 def _name_reading(row: DatasheetRow) -> str:
-    """Return the name of a reading of a printed figure, if there are several readings."""
+    """Return the name of an interpretation of a printed figure, if there are several."""
     if row.sidedness:
         return f"read as {row.sidedness}"
     return _STATISTIC_TEXTS.get(row.statistic, "")

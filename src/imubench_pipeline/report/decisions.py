@@ -49,13 +49,13 @@ class Scale:
 
     @classmethod
     def of(cls, margins: Iterable[float]) -> Scale:
-        """Return the scale that shows margins, half and twice the limit at least."""
+        """Return a scale that shows all margins, at least from 0.5 to 2."""
         logs = [math.log10(value) for value in margins if 0.0 < value < math.inf]
         low, high = min([*logs, math.log10(0.5)]), max([*logs, math.log10(2.0)])
         return cls(max(low, -_MAX_BAR_DECADES) - 0.08, min(high, _MAX_BAR_DECADES) + 0.08)
 
     def place(self, value: float) -> float:
-        """Return where a margin is drawn, % of the width, within the scale."""
+        """Return the position of a margin on the scale, % of the width."""
         log = math.log10(value) if value > 0.0 else -math.inf
         share = (min(max(log, self.low), self.high) - self.low) / (self.high - self.low)
         return round(100.0 * share, 2)
@@ -121,7 +121,7 @@ class Matrix:
 
 
 def make_decision_matrix(site: Site) -> Matrix | None:
-    """Return the matrix of a report; None where nothing is asked of its sensors."""
+    """Return the matrix of a report; None if there are no requirements."""
     requirements = site.settings["requirements"]
     rows = {(row.requirement, row.sensor): row for row in site.rows(RankingRow) if row.decides}
     if not rows:
@@ -143,7 +143,7 @@ def make_decision_matrix(site: Site) -> Matrix | None:
     }
 
     def order(sensor: str) -> tuple[object, ...]:
-        """Put first the sensor that meets most limits, and so on."""
+        """Return the sort key: sensors that meet the most limits come first."""
         met = Counter(cell.verdict for cell in lines[sensor] if cell.margin)
         counts = [-met[verdict] for verdict in _VERDICTS]
         return (*counts, -sum(cell.order for cell in lines[sensor]), site.names[sensor])
@@ -171,7 +171,7 @@ def make_decision_matrix(site: Site) -> Matrix | None:
 
 
 def explain_missing_rank(own: Iterable[RecordingView]) -> str:
-    """Return why a sensor is in no ranking, from its recordings."""
+    """Return the reason why a sensor is not ranked, from its recordings."""
     at_rest = [view for view in own if view.static]
     if not at_rest:
         return "no recording at rest"
@@ -179,7 +179,7 @@ def explain_missing_rank(own: Iterable[RecordingView]) -> str:
 
 
 def _empty(site: Site, requirement: str, sensor: str) -> Cell:
-    """Return the cell of a sensor that is in no ranking."""
+    """Return the cell of a sensor that is not ranked."""
     reason = explain_missing_rank(view for view in site.views if view.sensor == sensor)
     verdict: Verdict = "not_enough_data"
     return Cell(requirement, sensor, verdict, 0, None, None, "", "", reason, (), -math.inf)
@@ -228,7 +228,7 @@ def _cell(row: RankingRow, scale: Scale) -> Cell:
 
 
 def summarise_counts(site: Site) -> list[dict[str, object]]:
-    """Return the content of the report in numbers: each with its words and its link."""
+    """Return the counts of the report, each with its noun and link."""
     views = site.views
     rejected = sum(view.rejected for view in views)
     failed = sum(view.left_out for view in views) - rejected

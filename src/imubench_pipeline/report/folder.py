@@ -15,18 +15,18 @@ _FAILED_PAGES_FILE = "failed_pages.json"
 
 
 def read_failed_pages(folder: Path) -> dict[str, str]:
-    """Return the pages of a report that could not be made, and why."""
+    """Return the failed pages of a report, with the reasons."""
     return _read_failed(folder)[1]
 
 
 def count_attempt(folder: Path) -> int:
-    """Return the number of the next attempt at pages that could not be made; 0: there are none."""
+    """Return the number of the next attempt at failed pages; 0 if no page failed."""
     attempt, failed = _read_failed(folder)
     return attempt + bool(failed)
 
 
 def write_failed_pages(failed: Mapping[str, str], folder: Path) -> None:
-    """Write which pages could not be made, and why."""
+    """Write the names of failed pages, with the reasons."""
     if failed:
         content = {"attempt": count_attempt(folder), "pages": dict(failed)}
         write_content(json.dumps(content, indent=1) + "\n", folder / _FAILED_PAGES_FILE)

@@ -40,7 +40,7 @@ class Term:
 
 
 class UnknownTermError(KeyError):
-    """A term that the glossary does not have."""
+    """A term that is missing in the glossary."""
 
     def __str__(self) -> str:
         return str(self.args[0])
@@ -55,7 +55,7 @@ class _Glossary(dict[str, Term]):
 
 @lru_cache(maxsize=1)
 def read_glossary() -> dict[str, Term]:
-    """Return all terms by their keys, in the order of the file; read once, not to be changed.
+    """Return all terms by key, in the order of the file; do not change them: they are cached.
 
     An unknown key raises an UnknownTermError with similar terms. Raises ConfigError if the file
     cannot be used, or a key is in two sections.

@@ -26,7 +26,7 @@ from imubench_pipeline.words.verdicts import doubts_text
 
 @cache  # compiling the templates takes longer than writing pages of a small report
 def make_templates(system: System) -> jinja2.Environment:
-    """Return the templates, with the units in which the pages open."""
+    """Return the templates, with the initial units of the pages."""
     templates = jinja2.Environment(
         loader=jinja2.FileSystemLoader(
             [Path(__file__).with_name("templates"), *files_of("templates")]
@@ -39,7 +39,7 @@ def make_templates(system: System) -> jinja2.Environment:
     )
 
     def si(value: float | None, unit: str, digits: int = 4, *, inside: bool = False) -> Markup:
-        """Return a SI number that the reader can switch to another unit.
+        """Return an SI number that the reader can switch to another unit.
 
         ``inside``: an element around it has the unit, and the digits where they are not 4.
         """
@@ -52,7 +52,7 @@ def make_templates(system: System) -> jinja2.Environment:
         return Markup(f'<data value="{rounded}"{of}>{text}</data>')
 
     def parameter_cell(cell: Mapping[str, Any], unit: str) -> Markup:
-        """Return a cell of `report.parameters` with its intervals; there are many of them."""
+        """Return a cell of `report.parameters` with its intervals, as compact HTML."""
         digits = cell["digits"]
         number = partial(si, unit=unit, digits=digits, inside=True)
         parts = []
@@ -116,7 +116,7 @@ def _link_term(context: Context, key: str, text: str | None = None) -> Markup:
 
 @cache
 def _explain_term(key: str, text: str | None = None) -> Markup:
-    """Return a term with its explanation alone, for tables of many rows.
+    """Return a term with only its explanation, for tables with many rows.
 
     An empty key, such as the status of a plain value that is not there, is `NO_VALUE`.
     """
@@ -127,7 +127,7 @@ def _explain_term(key: str, text: str | None = None) -> Markup:
 
 
 def _make_json(value: Any) -> Markup:
-    """Return JSON for the inside of a script element."""
+    """Return JSON that is safe inside a script element."""
     return Markup(_make_compact_json(value).replace("<", "\\u003c"))
 
 

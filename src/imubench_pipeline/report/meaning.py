@@ -1,4 +1,4 @@
-"""Rankings and error budgets as the pages and the terminal show them."""
+"""Rankings and error budgets, formatted for pages and terminal."""
 
 from __future__ import annotations
 
@@ -175,7 +175,7 @@ def format_rankings(
     simulated: Simulated,
     system: System,
 ) -> Iterator[Ranking]:
-    """Yield the ranking for each requirement; ``requirements`` are as the plan wrote them."""
+    """Yield the ranking for each requirement; ``requirements``: text from the plan."""
     for name, declared in requirements.items():
         by_sensor: dict[str, list[RankingRow]] = {}
         for row in rows:
@@ -261,14 +261,14 @@ def _interval(row: ErrorRow, system: System) -> str:
 
 
 def format_recording_error(total: ErrorBudgetRow, system: System) -> tuple[str, str]:
-    """Return the error of a recording and its limits, of a total of ``error_budget``."""
+    """Return the error of a recording and its limits, from a total of ``error_budget``."""
     if total.sigma is None:
         return "–", ""
     return _expected(total, system), _interval(total, system)
 
 
 def describe_limit(row: RankingRow) -> str:
-    """Return the error and the time of a limit, of a row of ``ranking``."""
+    """Return the error and the time of a limit, from a row of ``ranking``."""
     drive = f" without GNSS ({row.trajectory})" if row.trajectory else ""
     return f"{_NAMES[row.error]}, {duration_text(row.time)}{drive}"
 
@@ -276,9 +276,9 @@ def describe_limit(row: RankingRow) -> str:
 def make_budget_tables(
     rows: Sequence[ErrorBudgetRow], simulated: Simulated, system: System
 ) -> Iterator[Json]:
-    """Yield the error budget of each recording: a line an error and axis, a column a time.
+    """Yield the error budget of each recording: a line per error and axis, a column per time.
 
-    ``rows`` are those of ``error_budget``; errors that requirements ask for are left out.
+    ``rows``: of ``error_budget``; errors of requirements are omitted.
     """
     own = [row for row in rows if row.requirement is None]
     for key in dict.fromkeys((row.sensor, row.recording) for row in own):
@@ -366,12 +366,12 @@ def _cell(rows: Sequence[ErrorBudgetRow], system: System) -> Json:
 
 
 def _is_sensible(row: ErrorRow, sigma: float) -> bool:
-    """Tell whether an error is below a quarter turn, beyond which an angle means nothing."""
+    """Return whether an error is below 90°, beyond which an angle has no meaning."""
     return DIMENSIONS[row.error] != "angle" or sigma <= _QUARTER_TURN
 
 
 def _format_error(row: ErrorRow, sigma: float, unit: Unit) -> str:
-    """Return the error of a row with its unit, with the digits that its limits leave."""
+    """Return the error of a row with its unit, and as many digits as its limits allow."""
     if not _is_sensible(row, sigma):
         north = row.error == "north"
         return "not to be found" if north else f"over {unit.text(_QUARTER_TURN, 3)} {unit.sign}"
@@ -384,7 +384,7 @@ def _percent(share: float | None) -> str:
 
 
 def explain_budget(settings: Mapping[str, Any]) -> str:
-    """Return the meaning of a budget, by the section ``error_budget`` of the settings."""
+    """Return an explanation of the budget, from the section ``error_budget`` of the settings."""
     return (
         "Errors that the noise causes in dead reckoning, with 95 % intervals and the parts of the "
         f"variance of 1 % or more. Biases and tilt are taken over {settings['static_window']} at "

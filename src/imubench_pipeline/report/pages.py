@@ -83,7 +83,7 @@ ENTRIES: Sequence[Entry] = (
 
 
 def list_pages(site: Site) -> Iterator[Page]:
-    """Yield the pages of the report, the start page last: it marks a finished report."""
+    """Yield the pages of the report; the start page is last and marks a finished report."""
     for view in site.views:
         kind = "" if view.left_out else view.row.kind
         yield recording.make_recording_page(

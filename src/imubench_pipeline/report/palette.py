@@ -1,6 +1,6 @@
 """The appearance of sensors and methods in all figures: colour, dash and marker.
 
-The colours are those of Okabe and Ito for colour-blind readers. Pale ones are darkened on light
+The colours are from Okabe and Ito, for colour-blind readers. Pale ones are darkened on light
 pages and dark ones lightened on dark pages, for a contrast of 3 : 1 with the background.
 """
 
@@ -55,7 +55,7 @@ _METHOD_STYLES = {
 
 
 def assign_sensor_styles(sensors: list[str]) -> dict[str, Appearance]:
-    """Return the appearance of each sensor, by its place among all sensors of the run.
+    """Return the appearance of each sensor, by its position among all sensors of the run.
 
     Colours repeat after eight sensors; marker and dash then differ.
     """
@@ -73,10 +73,10 @@ def get_method_style(method: str) -> Appearance:
 
 
 def make_recording_styles(sensor_style: Appearance) -> list[Appearance]:
-    """Return the appearances of the recordings of a sensor, by their place; they repeat.
+    """Return the appearances of the recordings of a sensor, by their order; they repeat.
 
-    The first is that of the sensor; the others are shades of its colour towards the ink of the
-    page, with another marker, and finally another dash.
+    The first equals the appearance of the sensor; the others have darker shades of its colour,
+    other markers, and finally other dashes.
     """
     own = sensor_style
     first, shades = _MARKERS.index(own.marker), len(_INK_SHARES)

@@ -1,4 +1,4 @@
-"""Parameters in a table: a cell has a value with its interval, or the reason why there is none."""
+"""Table of parameters: a cell has a value with its interval, or the reason for a missing value."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def select_symbols(rows: Iterable[ParameterRow]) -> list[str]:
 def make_methods_table(
     channel: ChannelView, duration: float | None, system: System
 ) -> tuple[list[str], list[Json]]:
-    """Return the symbols, and one line per method; of a simulation also the true parameters."""
+    """Return the symbols, and one line per method; also the true parameters of a simulation."""
     symbols = select_symbols(chain(*channel.parameters.values()))
     lines: list[Json] = [
         {

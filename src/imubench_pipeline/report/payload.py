@@ -46,7 +46,7 @@ def pack_logarithms(values: ArrayLike) -> Packed:
 
 
 def _quantise(values: NDArray[np.float64], levels: int) -> tuple[float, float, NDArray[np.float64]]:
-    """Return begin and step of the codes of numbers, and the codes; 0 means no number."""
+    """Return start and step of the codes of numbers, and the codes; 0 means no number."""
     finite = np.isfinite(values)
     present = values[finite]
     low, high = (float(present.min()), float(present.max())) if len(present) else (0.0, 0.0)
@@ -65,20 +65,20 @@ class Arrays:
         self._places: dict[Packed, int] = {}
 
     def exact(self, values: ArrayLike) -> int:
-        """Return the place of an array that is stored as float32."""
+        """Store an array as float32; return its index."""
         return self.place(("f", 0.0, 0.0, np.asarray(values, dtype="<f4").tobytes()))
 
     def log(self, values: ArrayLike) -> int:
-        """Return the place of an array of positive numbers with a relative error of a few 1e-4."""
+        """Store positive numbers with a relative error of a few 1e-4; return their index."""
         return self.place(pack_logarithms(values))
 
     def even(self, values: ArrayLike) -> int:
-        """Return the place of an array that is drawn on an even axis, in 254 steps."""
+        """Store an array for a linear axis in 254 steps; return its index."""
         low, step, codes = _quantise(np.asarray(values, dtype=np.float64), 254)
         return self.place(("e", low, step, codes.astype("<u1").tobytes()))
 
     def place(self, packed: Packed) -> int:
-        """Return the place of an array that is packed."""
+        """Store a packed array; return its index."""
         return self._places.setdefault(packed, len(self._places))
 
     @property
@@ -110,7 +110,7 @@ class ComparedChannel:
     models: Mapping[str, tuple[Packed, Packed]]  # tau and deviation, by method
 
     def among(self, arrays: Arrays) -> Json:
-        """Return it with the places of its arrays among the arrays of a page."""
+        """Return the data with arrays replaced by their indices on the page."""
         return {
             **self.about,
             **{name: arrays.place(packed) for name, packed in self.curve.items()},

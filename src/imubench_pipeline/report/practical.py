@@ -1,4 +1,4 @@
-"""The units in which engineers state inertial errors, and numbers as they are printed.
+"""Practical units of inertial errors, and the format of numbers on pages.
 
 A page can show each quantity in several units (`list_page_units`). The first choice is the
 practical one, the last is SI.
@@ -23,7 +23,7 @@ System = Literal["practical", "si"]
 def _make_signs(
     level: str, *, Q: str, N: str, K: str, R: str, psd: str, signal: str | None = None
 ) -> dict[str, str]:
-    """Return the signs of all symbols; ``level`` is the sign of B and of the Allan deviation."""
+    """Return the units of all symbols; ``level``: unit of B and of the Allan deviation."""
     return {
         **{"Q": Q, "N": N, "N_sensor": N, "B": level, "B_curve": level, "sigma_min": level},
         **{"T_B": "s", "tau_min": "s", "K": K, "R": R},
@@ -65,7 +65,7 @@ _MIN_SIZE_OF_PREFIX = ((1e3, "k"), (0.1, ""), (1e-4, "m"), (0.0, "µ"))
 
 
 def choose_page_unit(quantity: str, symbol: str, system: System) -> Unit:
-    """Return the unit in which a page first shows a figure of a quantity.
+    """Return the initial unit of a figure of a quantity on a page.
 
     The symbol is a parameter, or ``adev``, ``psd`` (root of a density) or ``signal`` (the log
     itself).
@@ -74,7 +74,7 @@ def choose_page_unit(quantity: str, symbol: str, system: System) -> Unit:
 
 
 def list_page_units() -> dict[str, dict[str, dict[str, Unit]]]:
-    """Return quantity -> name of the choice -> symbol -> unit, the practical choice first."""
+    """Return quantity -> choice of units -> symbol -> unit, the practical choice first."""
     return {
         quantity: {
             name: {symbol: _find_unit(quantity, symbol, name) for symbol in symbols}
@@ -85,7 +85,7 @@ def list_page_units() -> dict[str, dict[str, dict[str, Unit]]]:
 
 
 def choose_first_units(system: System) -> Mapping[str, str]:
-    """Return the name of the choice with which a page opens, by quantity."""
+    """Return the initial choice of units of a page, by quantity."""
     place = 0 if system == "practical" else -1
     return {quantity: list(choices)[place] for quantity, choices in _UNIT_CHOICES.items()}
 
@@ -105,7 +105,7 @@ def _find_unit(quantity: str, symbol: str, choice: str) -> Unit:
 
 
 def choose_unit(dimension: str, system: System, size: float | None = None) -> Unit:
-    """Return the unit in which a page shows an angle, a velocity or a length.
+    """Return the unit of an angle, a velocity or a length on a page.
 
     A prefix is chosen for ``size`` (SI) in practical units.
     """
@@ -115,7 +115,7 @@ def choose_unit(dimension: str, system: System, size: float | None = None) -> Un
 
 
 def list_units_by_size(dimension: str, system: System) -> list[tuple[float, Unit]]:
-    """Return the units of an angle, a velocity or a length, each from a size in SI on."""
+    """Return the units of an angle, a velocity or a length, each with its smallest value in SI."""
     sign = _SIGNS_OF_DIMENSIONS[system][dimension]
     prefixed = system == "practical" and dimension in _PREFIXED_DIMENSIONS
     prefixes = _MIN_SIZE_OF_PREFIX if prefixed else ((0.0, ""),)
@@ -136,7 +136,7 @@ def format_temperature(row: RecordingRow) -> str:
 
 
 def format_printed(row: DatasheetRow | RepeatabilityRow) -> str:
-    """Return the figure of a datasheet as it is printed; `NO_VALUE` where there is none."""
+    """Return the figure of a datasheet as printed; `NO_VALUE` if there is none."""
     if row.printed is None:
         return NO_VALUE
     return f"{row.printed:g} {row.unit or ''}".rstrip()

@@ -1,4 +1,4 @@
-"""Writing the report: changed pages of a folder, or one file."""
+"""Write the report: the changed pages of a folder, or one file."""
 
 from __future__ import annotations
 
@@ -89,7 +89,7 @@ def publish(site: Site, folder: Path, say: Progress = lambda _: None) -> list[st
 
 
 def remove_old_pages(folder: Path, made: Path) -> None:
-    """Remove the pages of an earlier report that the new one does not have, and no other file."""
+    """Remove pages of an earlier report that are not in the new one, and no other file."""
     gone = _read_keys(folder / KEYS).keys() - _read_keys(made / KEYS).keys()
     for path in folder.rglob("*.html"):
         if path.relative_to(folder).as_posix() in gone and not path.is_symlink():
@@ -207,7 +207,7 @@ def render_one_file(site: Site) -> str:
 
 
 def make_site(tables: Mapping[str, pa.Table], settings: str, results: Path) -> Site:
-    """Return the site of a run, by its settings as the plan gives them."""
+    """Return the site of a run, from the settings of its plan."""
     return Site(tables, json.loads(settings), results, ENTRIES, digest_sources("report.publish"))
 
 

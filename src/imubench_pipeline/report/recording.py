@@ -149,7 +149,7 @@ def _summarise(view: RecordingView, channels: int) -> str:
 
 
 def summarise_recording(view: RecordingView, parts: Sequence[str]) -> str:
-    """Return length and rate of a recording, and parts that say more, as a sentence."""
+    """Return length and rate of a recording, and additional parts, as a sentence."""
     row = view.row
     length = f"{duration_text(row.duration)} at {rates_text(row.rate, view.rates)}"
     kind = "Simulated from known parameters, not measured: " if view.simulated else ""
@@ -207,7 +207,7 @@ def _describe_channel(
 
 
 def _describe_missing(symbols: Sequence[str], cells: Sequence[Mapping[str, Any]]) -> Iterator[str]:
-    """Yield why parameters have no plain value; the same reason once for sigma_min and tau_min."""
+    """Yield the reasons for missing or doubtful values; sigma_min and tau_min share one."""
     of = dict(zip(symbols, cells, strict=True))
     statuses = {symbol: {part["status"] for part in cell["parts"]} for symbol, cell in of.items()}
     words, of_time = (
@@ -229,7 +229,7 @@ def _describe_missing(symbols: Sequence[str], cells: Sequence[Mapping[str, Any]]
 
 
 def _describe_values(channel: ChannelView, system: System) -> str:
-    """Return the values to use, with how well they are known, in a sentence."""
+    """Return the values to use and their uncertainty in a sentence."""
     parts = []
     for symbol in ("N", "B_curve", "B", "T_B", "K"):
         unit = choose_page_unit(channel.quantity, symbol, system)
@@ -249,7 +249,7 @@ def _describe_values(channel: ChannelView, system: System) -> str:
 def _compare_deviations(rows: Sequence[ModelSampleRow], channel: str) -> str:
     """Return the standard deviations of the simulated samples relative to the log, as a sentence.
 
-    ``rows`` are those of ``samples_of_models`` of a recording; empty without such rows.
+    ``rows``: of ``samples_of_models`` of a recording; empty without such rows.
     """
     own = {row.of: row for row in rows if row.channel == channel and row.what == "deviation"}
     log = own.get("log")

@@ -72,7 +72,7 @@ def summarise_run(results: Path) -> str:
 
 
 def list_failed_pages(results: Path) -> str:
-    """Return which pages of the report could not be made, and why; nothing if there are none."""
+    """Return the failed pages of the report, with the reasons; empty if there are none."""
     failed = read_failed_pages(results / "report")
     lines = (f"\n  {fold_text(f'{path}: {reason}')}" for path, reason in failed.items())
     return "pages that could not be made; the next run tries again" * bool(failed) + "".join(lines)
@@ -132,7 +132,7 @@ class Failed(Protocol):
 
     @property
     def recording(self) -> str | None:
-        """The recording that is left out."""
+        """The omitted recording."""
 
     @property
     def reason(self) -> str:
@@ -160,7 +160,7 @@ def list_warnings(findings: Iterable[FindingRow]) -> Iterator[str]:
 
 
 def select_warnings(findings: Iterable[FindingRow]) -> Iterator[FindingRow]:
-    """Yield the findings that put results in doubt: no notes, nor that a recording is left out."""
+    """Yield warnings and errors, except the finding that a recording is omitted."""
     for row in findings:
         if row.severity != "note" and row.finding not in LEFT_OUT:
             yield row
@@ -194,7 +194,7 @@ def fold_text(text: str, longest: int = _MOST_LETTERS) -> str:
 
 
 def _bounded(lines: Iterable[str]) -> list[str]:
-    """Return the first lines, and how many more there are."""
+    """Return the first lines, and the number of further ones."""
     listed = list(lines)
     more = len(listed) - _MOST_LINES
     return listed if more <= 1 else [*listed[:_MOST_LINES], f"  and {more} more"]

@@ -99,7 +99,7 @@ def show(parts: Callable[[int], Iterable[RenderableType]], width: int | None = N
 
 
 class _ShowError(ValueError):
-    """The results lack what was asked for."""
+    """The results do not contain the requested data."""
 
 
 def _load(results: Path) -> dict[str, pa.Table]:

@@ -1,4 +1,4 @@
-"""The pages of the report, and the digests that decide which are written again."""
+"""The pages of the report, with digests that show whether a page must be written again."""
 
 from __future__ import annotations
 
@@ -66,13 +66,13 @@ class Page:
 
     @property
     def root(self) -> str:
-        """The way from the page to the folder of the report."""
+        """Relative path from the page to the folder of the report."""
         return "../" * self.path.count("/")
 
 
 @dataclass(frozen=True, kw_only=True)
 class Entry:
-    """A page that a report has once, as declared in the module of its content."""
+    """A page that occurs once in a report, declared in the module of its content."""
 
     file: str  # its name; its template is called so, too, with ``.jinja``
     title: str  # its name in the navigation
@@ -83,7 +83,7 @@ class Entry:
     views: Callable[[Site], Sequence[RecordingView]] = lambda _: ()
     # returns the files of recordings that it shows: likewise
     files: Callable[[Site], Iterable[Path]] = lambda _: ()
-    exists: Callable[[Site], bool] = lambda _: True  # tells whether a report has it
+    exists: Callable[[Site], bool] = lambda _: True  # returns whether a report has it
     place: int = 0  # in the navigation, among the pages of extensions
 
     @property
@@ -115,7 +115,7 @@ class Section:
 
     page: str  # the file of its `Entry`
     template: str  # gets the result of `context` as `section`
-    context: Callable[[Site], Any]  # returns None where the section is left out
+    context: Callable[[Site], Any]  # returns None if the section is omitted
     tables: tuple[str, ...] = ()  # further joined tables that it shows
 
 
@@ -127,7 +127,7 @@ class Site:
     """The data of all pages."""
 
     tables: Mapping[str, pa.Table]  # all joined tables
-    settings: Mapping[str, Any]  # as `imubench_pipeline.run.plan.Plan.report_settings` gives them
+    settings: Mapping[str, Any]  # from `imubench_pipeline.run.plan.Plan.report_settings`
     results: Path  # folder of the results, for the tables of each recording
     entries: Sequence[Entry]  # pages that exist once, in the order of the navigation
     code: str = ""  # digest of the code that makes the pages
@@ -142,13 +142,13 @@ class Site:
 
     @property
     def system(self) -> System:
-        """Units in which the pages open."""
+        """Initial units of the pages."""
         system: System = self.settings["report"]["units"]
         return system
 
     @property
     def results_name(self) -> str:
-        """The folder of the results, as in the commands on the pages."""
+        """The folder of the results for the commands on the pages."""
         return str(self.settings.get("results", "results"))
 
     @property
@@ -170,7 +170,7 @@ class Site:
 
     @cached_property
     def views(self) -> list[RecordingView]:
-        """The recordings, with the pages that they have."""
+        """The recordings that have a page."""
         views = gather_recordings(self.tables)
         together = Counter((view.sensor, view.row.device, view.simulated) for view in views)
         for view in views:
@@ -211,7 +211,7 @@ class Site:
         return name_sensors(self.sensors, self.settings["sensors"])
 
     def is_sold(self, sensor: str) -> bool:
-        """Tell whether a sensor can be bought; True if it has no sensor file."""
+        """Return whether a sensor can be bought; True if it has no sensor file."""
         sold: bool = self.settings["sensors"].get(sensor, {}).get("sold", True)
         return sold
 
@@ -243,7 +243,7 @@ class Site:
         return {(row.sensor, row.quantity, row.figure): row.published for row in rows}
 
     def changed_devices(self) -> list[Mapping[str, object]]:
-        """Return the recordings that show a change of their device, with the changed parameters."""
+        """Return the recordings with a change of their device, and the changed parameters."""
         devices: dict[Name, tuple[DriftRow, list[str]]] = {}
         for row in self.rows(DriftRow):
             if row.verdict != "changed":

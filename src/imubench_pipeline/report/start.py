@@ -1,4 +1,4 @@
-"""The pages that compare: the start page, all recordings, all datasheets."""
+"""The overview pages: start page, all recordings, all datasheets."""
 
 from __future__ import annotations
 
@@ -102,7 +102,7 @@ def summarise_recordings(views: Sequence[RecordingView], several: bool = True) -
 
 
 def describe_dates(views: Sequence[RecordingView]) -> str:
-    """Return when recordings were made; empty where none says."""
+    """Return the dates of recordings; empty if none is known."""
     started = sorted(view.row.started[:10] for view in views if view.row.started)
     if not started:
         return ""
@@ -114,7 +114,7 @@ def describe_dates(views: Sequence[RecordingView]) -> str:
 
 
 def describe_simulated(views: Sequence[RecordingView]) -> str:
-    """Return in a sentence how many recordings are simulated; empty where none is."""
+    """Return the number of simulated recordings in a sentence; empty if there are none."""
     number = sum(view.simulated for view in views)
     if not number:
         return ""
@@ -123,7 +123,7 @@ def describe_simulated(views: Sequence[RecordingView]) -> str:
 
 
 def fold_reason(reason: str | None) -> tuple[str, str]:
-    """Return the beginning of a reason that fits on a line, and the whole; empty if that is all."""
+    """Return the beginning of a reason that fits on a line, and the full text if it is longer."""
     if reason is None or len(reason) <= _LINE:
         return reason or "", ""
     begin = reason[: _LINE - 1]
@@ -142,7 +142,7 @@ def _group_findings(rows: Sequence[FindingRow]) -> list[tuple[str, str]]:
 
 @dataclass(frozen=True)
 class _Answer:
-    """The ranking for a requirement, with the answer in sentences."""
+    """The ranking for a requirement, with a summary in sentences."""
 
     name: str
     requirement: Requirement

@@ -1,4 +1,4 @@
-"""The comparison of the sensors as a terminal shows it."""
+"""The comparison of the sensors in the terminal."""
 
 from __future__ import annotations
 
@@ -148,7 +148,7 @@ def render_logs(
 
 
 def _of(recording: RecordingRow, rows: Iterable[R]) -> list[R]:
-    """Return the rows that are of a recording."""
+    """Return the rows of a recording."""
     key = (recording.sensor, recording.recording)
     return [row for row in rows if (row.sensor, row.recording) == key]
 
@@ -198,7 +198,7 @@ def _parameter_tables(
 
 
 def _listed(title: str, lines: Iterable[str], *, cut: bool = False) -> Iterator[Text]:
-    """Yield a line each, cut at the edge of the terminal or wrapped."""
+    """Yield the lines, cut at the edge of the terminal or wrapped."""
     listed = list(lines)
     if listed:
         yield Text(f"{title}: {len(listed)}", style="bold")
@@ -211,7 +211,7 @@ def _listed(title: str, lines: Iterable[str], *, cut: bool = False) -> Iterator[
 def _ranking_tables(
     rows: Sequence[RankingRow], requirement: str | None, about: About, system: System, width: int
 ) -> Iterator[RenderableType]:
-    # The table tells neither title nor rest before, and neither is shown.
+    # The title is neither known from the table nor printed.
     asked = {
         name: Requirement.model_construct(title=name, static_window="-", limits=())
         for name in dict.fromkeys(row.requirement for row in rows)
@@ -264,7 +264,7 @@ def _ranking_lines(group: Group, *, every: bool) -> Iterator[list[str | Text]]:
 def _parameter_lines(
     quantity: str, rows: Sequence[ParameterRow], about: About, system: System
 ) -> tuple[list[str], list[list[str | Text]]]:
-    """Return the heads and a line a channel, with a column a parameter that some channel has."""
+    """Return the header, and a line per channel with a column per parameter."""
     symbols = select_symbols(rows)
     units = {symbol: choose_page_unit(quantity, symbol, system) for symbol in symbols}
     by_channel: dict[tuple[str, str, str], list[ParameterRow]] = {}
@@ -289,7 +289,7 @@ def _parameter_lines(
 
 
 def _cell(rows: Sequence[ParameterRow], unit: Unit, duration: float | None) -> str:
-    """Return the value of each component with its interval, or why there is none."""
+    """Return the value of each component with its interval, or the reason without one."""
     lines = []
     for row in rows:
         words = STATUS_WORDS[row.status]

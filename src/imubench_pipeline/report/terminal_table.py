@@ -22,7 +22,7 @@ def fit_table(
     *,
     names: int,
 ) -> Table:
-    """Return a table in which no word or number is broken, but the names.
+    """Return a table that breaks no word or number, except for names.
 
     Columns for which there is no room in the width are left out from the right. The head of a
     column of numbers has their unit on a second line; ``names`` is the column that may be broken

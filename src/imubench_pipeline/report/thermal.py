@@ -1,4 +1,4 @@
-"""Effect of temperature and of the sensor's own low-pass on a channel, for the pages."""
+"""Effect of temperature and of the sensor's low-pass filter on a channel, for the pages."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ _MIN_SHOWN_RATIO = 1.05
 
 
 def list_thermal_figures(channel: ChannelView) -> Iterator[Mapping[str, object]]:
-    """Yield the lines of the table: temperature effect, where it was fitted, and low-pass."""
+    """Yield the lines of the table: temperature effect, if it was fitted, and low-pass."""
     estimated = channel.parameters.get("likelihood", ())
     before = {row.parameter: row for row in estimated if row.parameter == SENSOR}
     low_pass: Mapping[str, _Figure] = {**channel.low_pass, **before}

@@ -86,7 +86,7 @@ class ChannelView:
 
     @property
     def truth(self) -> dict[str, SimulatedTruthRow]:
-        """The true parameters of a simulation, of a repeated term the first."""
+        """The true parameters of a simulation; only the first of a repeated term."""
         return {name: rows[0] for name, rows in self.true_components.items()}
 
     @property
@@ -118,7 +118,7 @@ class ChannelView:
         return f"{self.sensor} / {self.recording}" + " (simulated)" * self.simulated
 
     def bin_limits(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return the 95 % limits of the density of the bins, if the fit of the spectrum is right.
+        """Return the 95 % limits of the density of the bins, given the fit of the spectrum.
 
         A bin scatters as chi squared of its degrees of freedom over their number.
         """
@@ -133,7 +133,7 @@ class ChannelView:
         return self._models[method]
 
     def named(self, method: str, symbol: str) -> list[ParameterRow]:
-        """Return the rows of a parameter of a method, one a component."""
+        """Return the rows of a parameter of a method, one per component."""
         return [row for row in self.parameters[method] if row.parameter == symbol]
 
 
@@ -141,8 +141,8 @@ class ChannelView:
 class RecordingView:
     """All data of one recording from the tables.
 
-    The channels of a thousand recordings do not fit into memory at once: they are made when they
-    are asked for, and are not stored.
+    The channels of a thousand recordings do not fit into memory at once: they are made on request,
+    and are not stored.
     """
 
     row: RecordingRow  # of the table ``recordings``
@@ -175,7 +175,7 @@ class RecordingView:
 
     @property
     def left_out(self) -> bool:
-        """Whether it was rejected, or a step failed for it."""
+        """Whether the recording was rejected, or one of its steps failed."""
         return self.row.status != "ok"
 
     @property
@@ -195,7 +195,7 @@ class RecordingView:
 
     @cached_property
     def findings(self) -> list[FindingRow]:
-        """Its findings, except that it is left out."""
+        """Findings of the recording, except that it is omitted."""
         return [row for row in self.rows(FindingRow) if row.finding not in LEFT_OUT]
 
     @property
@@ -205,7 +205,7 @@ class RecordingView:
 
     @property
     def budget(self) -> list[ErrorBudgetRow]:
-        """Its errors after the times of the settings."""
+        """Errors of the recording after the times of the settings."""
         return [row for row in self.rows(ErrorBudgetRow) if row.requirement is None]
 
     def rows(self, of: type[R]) -> list[R]:

@@ -68,7 +68,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def _make_list_reader(choices: Sequence[str]) -> Callable[[str], tuple[str, ...]]:
-    """Return a reader of names with commas between them; ``all`` stands for every one."""
+    """Return a parser for names separated by commas; ``all`` selects every name."""
     expected = f"expected all, or some of {', '.join(choices)}"
 
     def names(text: str) -> tuple[str, ...]:
@@ -113,7 +113,7 @@ def _load(results: Path) -> dict[str, pa.Table]:
 def select(
     tables: Mapping[str, pa.Table], sensor: str | None, recording: str | None, channel: str | None
 ) -> dict[str, pa.Table]:
-    """Return the part of the tables that a sensor, recording and channel have; None: all.
+    """Return the rows of the tables for a sensor, recording and channel; None: all.
 
     Raises SelectionError if there is no such curve; it lists the choices.
     """
@@ -151,7 +151,7 @@ def _select_rows(table: pa.Table, column: str, asked: str) -> pa.Table:
 def _write(
     tables: Mapping[str, pa.Table], chosen: Mapping[str, pa.Table], arguments: argparse.Namespace
 ) -> int:
-    """Write the figures, and say which; return how many files."""
+    """Write the figures and print their names; return the number of files."""
     # Matplotlib is loaded only if there is something to draw.
     with require_extra("workflow", "draw figures"):
         from imubench_pipeline.report.static_figures.files import save

@@ -196,7 +196,7 @@ def make_marks(view: ChannelView, symbol: str, place: float, spread: float = 0.0
 
 @dataclass(frozen=True)
 class _Block:
-    """The row of one sensor: its recordings and where they stand, mm from the top."""
+    """The row of one sensor: its recordings and their positions, mm from the top."""
 
     sensor: str
     views: Sequence[ChannelView]
@@ -256,7 +256,7 @@ def draw_forest_figure(
 
 
 def _make_blocks(views: Sequence[ChannelView], sensors: Sequence[str]) -> list[_Block]:
-    """Return the rows of the sensors; their height grows with the recordings, within a page."""
+    """Return the rows of the sensors; their height grows with the recordings, up to a page."""
     by_sensor = {sensor: [view for view in views if view.sensor == sensor] for sensor in sensors}
     by_sensor = {sensor: own for sensor, own in by_sensor.items() if own}
     slot = _SLOT_HEIGHT
@@ -282,7 +282,7 @@ def _draw_panel(
     *,
     ticks: int,
 ) -> set[str]:
-    """Draw one parameter of all sensors; return the kinds of marks there are."""
+    """Draw one parameter of all sensors; return the kinds of marks that occur."""
     unit = choose_page_unit(blocks[0].views[0].quantity, symbol, system)
     drawn: list[Mark] = []
     truths: list[tuple[float, float]] = []

@@ -177,7 +177,7 @@ def _draw_reconstruction(axes: Axes, ratio: Axes, view: ChannelView, scale: floa
 
 @set_style()
 def draw_terms_figure(view: ChannelView, system: System = "practical") -> Figure | None:
-    """Draw every term of the recommended model, their sum, and where N, B and K are read.
+    """Draw every term of the recommended model, their sum, and the points that show N, B and K.
 
     N is the white noise at tau = 1 s, 0.664 B the plateau of flicker noise or the peak of a
     Gauss-Markov process, K the random walk at tau = 3 s (Maia et al., Figure 1; Silva et al.,

@@ -124,7 +124,7 @@ def save(figure: Figure, path: Path) -> None:
 
 
 def encode_figure(figure: Figure) -> str:
-    """Return a figure as SVG in a data URI, which a page can hold."""
+    """Return a figure as SVG in a data URI, for use in a page."""
     return "data:image/svg+xml;base64," + base64.b64encode(_write_bytes(figure, "svg")).decode()
 
 

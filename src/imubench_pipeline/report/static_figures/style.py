@@ -35,7 +35,7 @@ _EDGE_WIDTH = 4.0  # pt
 _LEGEND_ROW_HEIGHT = 3.7  # mm
 _HANDLE_WIDTH = 24.0  # pt: the sample of a line in a legend, and the space beside it
 _COLUMN_GAP = 9.0  # pt: between columns of a legend
-_MIN_SPAN = 0.7  # decades of an axis, below which its ticks would say too little
+_MIN_SPAN = 0.7  # decades of an axis, below which its ticks would be too few
 _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 # Newer releases of Matplotlib have a type of their own for the names of settings.
@@ -148,7 +148,7 @@ def name_log(view: ChannelView) -> str:
 
 @contextlib.contextmanager
 def set_style() -> Iterator[None]:
-    """Set the look of figures that are made or saved inside; settings of the user do not count."""
+    """Set the style of figures that are made or saved inside; user settings are ignored."""
     with mpl.rc_context():
         mpl.rcdefaults()
         mpl.rcParams.update(_STYLE_SETTINGS)
@@ -198,7 +198,7 @@ def shorten_name(figure: Figure, name: str, width: float) -> str:
 
 
 def write_title(figure: Figure, name: str, rest: str) -> None:
-    """Write a name of the user and the rest of the title above all axes."""
+    """Write a title above all axes: a user-defined name and a text."""
     width = figure.get_figwidth() * 72.0
     enlarged = _TITLE_SIZE / FONT_SIZE
     room = (width - 2.0 * _EDGE_WIDTH) / enlarged - measure_text(figure, rest)
@@ -211,7 +211,7 @@ def write_title(figure: Figure, name: str, rest: str) -> None:
 
 
 def draw_legend_below(figure: Figure, handles: Sequence[Artist]) -> None:
-    """Name lines below the axes, in as many columns as fit; the figure grows by the rows."""
+    """Draw a legend below the axes, in as many columns as fit; the figure grows by its rows."""
     width, height = figure.get_size_inches()
     room = width * 72.0 - 2.0 * _EDGE_WIDTH
     labels = []
@@ -234,14 +234,14 @@ def draw_legend_below(figure: Figure, handles: Sequence[Artist]) -> None:
 
 
 def fix_layout(figure: Figure) -> Figure:
-    """Return a figure whose layout is made and stays: it is the same in every format."""
+    """Return a figure with a fixed layout, which is the same in every format."""
     # A figure that has an engine of its own is laid out, and drawn twice, whenever it is saved.
     ConstrainedLayoutEngine().execute(figure)
     return figure
 
 
 def compute_limits(*values: ArrayLike, margin: float = 1.25) -> tuple[float, float]:
-    """Return limits of a logarithmic axis that holds all values above 0, and some margin."""
+    """Return limits of a logarithmic axis for all values above 0, with some margin."""
     joined = np.concatenate([np.ravel(np.asarray(each, dtype=np.float64)) for each in values])
     positive = joined[np.isfinite(joined) & (joined > 0)]
     low, high = (positive.min(), positive.max()) if len(positive) else (1.0, 1.0)
