@@ -1,1 +1,1 @@
-"""A run: its plan, its processes and what they may use, its progress, its nights, its commands."""
+"""A run: plan, processes with their limits, progress, and commands."""

@@ -1,4 +1,4 @@
-"""`imubench check`: is last night's log good? Everything but the estimation, nothing kept."""
+"""`imubench check`: check new logs; no estimation, no stored results."""
 
 from __future__ import annotations
 

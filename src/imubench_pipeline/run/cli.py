@@ -59,7 +59,7 @@ _CLOSED_PIPE = 141  # exit status that shells give a command whose reader has go
 
 
 def make_parser() -> argparse.ArgumentParser:
-    """Return what reads the commands and their options."""
+    """Return the parser of the commands and their options."""
     parser = argparse.ArgumentParser(prog="imubench", description="Inertial sensor benchmark.")
     parser.add_argument(
         "--version", action="version", version=f"imubench {version('imubench_pipeline')}"

@@ -1,4 +1,4 @@
-"""The records of steps that failed for one recording or one sensor, in the folder ``faults``."""
+"""Records of steps that failed for one recording or sensor, in the folder ``faults``."""
 
 from __future__ import annotations
 
@@ -106,7 +106,7 @@ class Faults:
 
 
 class _Record(BaseModel):
-    """A step that failed, now or before."""
+    """A step that failed, in this run or before."""
 
     step: str
     sensor: str

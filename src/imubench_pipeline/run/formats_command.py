@@ -1,4 +1,4 @@
-"""`imubench formats`: the log files that are read, and the programs that files are written for."""
+"""`imubench formats`: list the supported log formats and export programs."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ def run(_: argparse.Namespace) -> int:
 
 
 def list_log_formats() -> Iterator[Line]:
-    """Yield a line a format of log files, the heads first."""
+    """Yield the header and a line per format of log files."""
     # Only this command needs these: the others answer at once.
     from imubench_pipeline.readers.formats import FILE_FORMATS
 
@@ -35,7 +35,7 @@ def list_log_formats() -> Iterator[Line]:
 
 
 def list_export_targets() -> Iterator[Line]:
-    """Yield a line a program that noise models are exported for, the heads first."""
+    """Yield the header and a line per program for exported noise models."""
     from imubench_pipeline.export.targets import TARGETS
 
     yield "target", "program", "file", "terms"

@@ -1,4 +1,4 @@
-"""Lock on a folder of results: one run at a time, also after a run that was killed."""
+"""Lock a folder of results: one run at a time, also after a killed run."""
 
 from __future__ import annotations
 

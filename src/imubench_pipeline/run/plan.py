@@ -131,7 +131,7 @@ class Plan:
         return sorted(chain.from_iterable(by_name.values()), key=lambda log: log.path)
 
     def _as_it_is(self, key: str, logs: list[Recording]) -> list[Recording]:
-        """Return a recording that is held back, if its results exist; its log may be missing."""
+        """Return a postponed recording, if its results exist; its log may be missing."""
         sensor, _, name = key.partition("/")
         folder = self.run.results / "recordings" / sensor / name
         if (sensor, name) in self.simulated or not all(
@@ -192,7 +192,7 @@ class Plan:
         return reason.replace(str(self.run.logs), "logs") if self.run.logs.is_absolute() else reason
 
     def kind(self, sensor: str, name: str) -> Kind:
-        """Return what was done with the sensor; what its notes were to say, if they are wrong."""
+        """Return the experiment of a recording; if its notes are invalid, the intended one."""
         recording = self.recordings[sensor, name]
         if recording.simulated:
             return self.simulated[sensor, name].kind
@@ -439,7 +439,7 @@ class Plan:
 
     @staticmethod
     def code(step: str, package: str = "steps") -> str:
-        """Return the digest of the code that a step runs: the module of its name in a package."""
+        """Return the digest of the code of a step, which is the module of its name in a package."""
         return digest_sources(f"{package}.{step}")
 
 

@@ -43,7 +43,7 @@ class StepError(Exception):
 
 @dataclass(frozen=True)
 class Job:
-    """A script with the attributes of ``snakemake`` in it, which are pickled."""
+    """A script with its attributes of ``snakemake``, which are pickled."""
 
     script: Path
     input: Any
@@ -61,7 +61,7 @@ class Job:
 
 
 class Processes:
-    """Runs scripts in forks of one process, which begins with the first of them.
+    """Runs scripts in forks of one process, which starts with the first script.
 
     It ends with the process of this object, even if that is killed; on Linux the forks end, too,
     and each has the name of its script. A fork does not depend on the forking process.
@@ -90,7 +90,7 @@ class Processes:
                 file.write(json.dumps(about) + "\n")
 
     def close(self) -> None:
-        """End the process that forks, and with it the scripts that run."""
+        """End the forking process and the running scripts."""
         with self._lock:
             if self._server is not None:
                 process, requests = self._server

@@ -19,7 +19,7 @@ _SNAKEFILE_PATHS = ("Snakefile", "workflow/Snakefile")
 
 
 def has_snakefile(folder: Path) -> bool:
-    """Return whether a folder has a workflow of its own, which `snakemake` finds there."""
+    """Return whether a folder has its own workflow, which `snakemake` finds there."""
     return any((folder / own).is_file() for own in _SNAKEFILE_PATHS)
 
 

@@ -1,4 +1,4 @@
-"""Memory and time that a job requests on a cluster, from the size of the log.
+"""Memory and time requests of a job on a cluster, from the size of the log.
 
 The costs in the rules were measured with logs of up to 60 million samples (docs/how-to/cluster.md);
 this module adds a margin. A job has one core for any log: no step uses more.
@@ -185,12 +185,12 @@ def _estimate_extent(plan: Plan, recording: Recording) -> Extent:
     try:
         size = sum(estimate_text_size(path) for path in recording.files)
     except OSError:
-        size = 0  # the ingest says what is wrong with it
+        size = 0  # the ingest reports the fault
     return Extent(size / (_BYTES_PER_VALUE * channels) / 1e6, channels)
 
 
 def estimate_text_size(path: Path) -> int:
-    """Return the size that a file of a log might have as text, in bytes; 0 if there is none.
+    """Return the estimated size of a log file as text, in bytes; 0 if there is none.
 
     Its samples may be packed: counts in binary, compressed text.
     """

@@ -1,4 +1,4 @@
-"""Run the scripts of the rules; the failure of one recording does not end the run."""
+"""Run the scripts of the rules; a failure of one recording does not end the run."""
 
 from __future__ import annotations
 

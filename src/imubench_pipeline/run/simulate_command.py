@@ -1,4 +1,4 @@
-"""`imubench simulate`: a log of a sensor, to test a filter on."""
+"""`imubench simulate`: simulate a log of a sensor, for example to test a filter."""
 
 from __future__ import annotations
 
@@ -216,7 +216,7 @@ def _declared(name: str, stated: Path | None) -> Any:
 
 
 def _origin(options: argparse.Namespace) -> tuple[Origin, Any]:
-    """Return the model, and the sensor file where there is one."""
+    """Return the model, and the sensor file if there is one."""
     from imubench_pipeline.settings.sensor import CHANNELS
     from imubench_pipeline.simulate import models
     from imubench_pipeline.simulate.from_datasheet import from_datasheet
@@ -327,7 +327,7 @@ def _profiles(
 
 
 def _section(path: Path, key: str) -> Any:
-    """Return what a YAML file has under a key, or all of it."""
+    """Return the value of a key in a YAML file, or the whole file."""
     content = read_yaml(path)
     return content.get(key, content) if isinstance(content, dict) else content
 
@@ -335,7 +335,7 @@ def _section(path: Path, key: str) -> Any:
 def _list_short_files(
     duration: float, motion: Mapping[str, Profile], temperature: Profile | None
 ) -> list[str]:
-    """List the files that do not cover the log."""
+    """List the profile files that do not cover the log."""
     from imubench_pipeline.simulate.profiles import FileColumn
 
     profiles = [*motion.values(), *([] if temperature is None else [temperature])]

@@ -1,4 +1,4 @@
-"""Where `imubench` begins: it says where it cannot run, before it imports what is not there."""
+"""Entry point of `imubench`: check the platform before imports that it may lack."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ ONE_THREAD = {
     f"{library}_NUM_THREADS": "1" for library in ("OMP", "OPENBLAS", "MKL", "VECLIB_MAXIMUM")
 } | {"JE_ARROW_MALLOC_CONF": "background_thread:false"}
 """The environment of a process that computes with one core, and forks for the others: threads of a
-library that spin for work in each fork take more of a core than what they wait for, and Python from
+library that spin for work in each fork take more core time than the work itself, and Python from
 3.12 on warns of each fork of a process that has another thread, as pyarrow starts for an allocator
 that it does not use. NumPy and pyarrow ask for it when they are imported, and never again."""
 
 
 def main() -> int:
-    """Run the command that is given; return its exit status."""
+    """Run the command of the command line; return its exit status."""
     if os.name != "posix":
         print(
             f"imubench: found the platform {sys.platform}; expected Linux, as it forks processes "

@@ -69,7 +69,7 @@ _running: dict[int, tuple[Connection[Any, Any], str]] = {}  # connection and ste
 
 
 def _reap(signal_number: int, frame: FrameType | None) -> None:
-    """Say of the forks that were killed, by what: they cannot."""
+    """Report the signals of killed forks, which cannot report themselves."""
     with suppress(ChildProcessError):
         while True:
             process, status = os.waitpid(-1, os.WNOHANG)
@@ -90,10 +90,10 @@ def _reap(signal_number: int, frame: FrameType | None) -> None:
 
 
 def _import_modules_of(script: Path) -> bool:
-    """Import what a script does; return whether that was possible."""
+    """Import the modules that a script imports; return whether that was possible."""
     try:
         runpy.run_path(str(script), run_name="imports")
-        # What two libraries put off until they are first used: half of what imports cost.
+        # Deferred imports of two libraries: half of the cost of imports.
         importlib.import_module("pyarrow.dataset")
         _nothing()
     except (Exception, SystemExit):
@@ -105,11 +105,11 @@ def _import_modules_of(script: Path) -> bool:
 
 @njit(cache=True)
 def _nothing() -> None:
-    """Make numba load what every function needs that it has compiled before."""
+    """Make numba load the common parts of all compiled functions."""
 
 
 def _run(connection: Connection[Any, Any], job: Job, *, imported: bool) -> None:
-    """Run a script in this fork, say how it ended, and end."""
+    """Run a script in this fork, report its outcome, and exit."""
     outcome: dict[str, float] | StepError = StepError(f"{job.name}.py failed")
     try:
         for other, _ in _running.values():
@@ -154,7 +154,7 @@ def _run(connection: Connection[Any, Any], job: Job, *, imported: bool) -> None:
 
 
 def _end_with_who_asked(connection: Connection[Any, Any]) -> None:
-    """Have the system end this process when the other end of a connection closes or sends.
+    """Make the system end this process when the peer of a connection closes or sends.
 
     The end of the server would come later: it may be importing for another step.
     """
@@ -166,7 +166,7 @@ def _end_with_who_asked(connection: Connection[Any, Any]) -> None:
 
 
 def _trace(error: BaseException, script: str) -> str:
-    """Return where the script failed, without how it was started."""
+    """Return the traceback within the script, without the frames that started it."""
     trace = error.__traceback__
     while trace is not None and trace.tb_frame.f_code.co_filename != script:
         trace = trace.tb_next

@@ -1,1 +1,1 @@
-"""`imubench analyse`: logs at once, by the steps of the workflow, without a project."""
+"""`imubench analyse`: analyse logs directly by the steps of the workflow, without a project."""

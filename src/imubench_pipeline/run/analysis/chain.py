@@ -51,7 +51,7 @@ _COMPARISON_TABLES = (
 _RECONSTRUCTION_TABLES = ("reconstruction", "scores")
 _TABLES_OF_STEP: dict[str, tuple[str, ...]] = {  # output tables of each step
     "ingest": ("envelope", "histogram"),
-    "estimate": (),  # they are written together, and so are those of the reconstruction
+    "estimate": (),  # they are written together, like the tables of the reconstruction
     "datasheet": _COMPARISON_TABLES,
     "reconstruct": (),
 }
@@ -59,7 +59,7 @@ _MIN_REPORTED_TIME = 3.0  # steps that take longer, s, are reported
 
 
 class Analysis:
-    """The steps of all recordings of a plan: first for the numbers, then for the pages.
+    """The steps of all recordings of a plan: first the estimates, then the results for pages.
 
     `cores`: number of parallel processes; `say` is called with progress messages.
     """
@@ -95,7 +95,7 @@ class Analysis:
         return self._join_tables((*_ESTIMATE_TABLES, *_COMPARISON_TABLES, *_RECONSTRUCTION_TABLES))
 
     def _read(self, sensor: str, recording: str) -> list[str]:
-        """Read a log and take its curves; return its channels."""
+        """Read a log and compute its Allan curves; return its channels."""
         folder = self._get_folder(sensor, recording)
         source = self._plan.recordings[sensor, recording].path
         settings = self._plan.ingest_settings(sensor, recording)
@@ -180,7 +180,7 @@ class Analysis:
         return {key: beside.submit(self._run_bounded, step, function, key) for key in keys}
 
     def _run_bounded(self, step: str, function: Callable[..., T], key: tuple[str, ...]) -> T | None:
-        """Call a step in a separate process; if it fails, its recording is left out."""
+        """Call a step in a separate process; if it fails, its recording is omitted."""
         sensor, recording, *_ = key
         folder = self._get_folder(sensor, recording)
         tables = (folder / f"{name}.parquet" for name in _TABLES_OF_STEP[step])

@@ -1,4 +1,4 @@
-"""`imubench analyse`: the noise parameters of logs, at once."""
+"""`imubench analyse`: estimate the noise parameters of logs directly."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ _MAX_DRAWING_TIME, _MAX_DRAWING_MEMORY = 600.0, 4 << 30  # of a process, s and b
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare what the command is given."""
+    """Declare the arguments of the command."""
     parser.description = (
         "Read static logs, say what is wrong with them, and estimate the noise parameters of each "
         "axis, as a run of the workflow does."
@@ -78,7 +78,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Analyse logs, print the parameters and write what is asked for; return the exit status."""
+    """Analyse logs, print the parameters, write the requested outputs; return the exit status."""
     from imubench_pipeline.run.analysis.compilation import Compilation
 
     # Compiling and importing create many permanent objects: the default frequency of garbage

@@ -1,4 +1,4 @@
-"""Logs of a command line as a project of their own: links to them, and their sensor files."""
+"""Make a temporary project of the logs of a command line: links to them, and sensor files."""
 
 from __future__ import annotations
 
@@ -110,7 +110,7 @@ def _find_sensor_file(sensor: Path, catalogue: Sequence[Path]) -> Path:
 
 
 def _name_recordings(logs: Sequence[Path]) -> list[str]:
-    """Return the names of the recordings: with that of their folder where two are alike."""
+    """Return the names of the recordings, with the folder name where two are equal."""
     names = [get_recording_name(log.resolve().name) for log in logs]
     times = Counter(names)
     longer = [

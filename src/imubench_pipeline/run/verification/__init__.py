@@ -1,1 +1,1 @@
-"""`imubench verify`: whether all that runs have left is as they left it."""
+"""`imubench verify`: verify that the outputs of runs are unchanged."""

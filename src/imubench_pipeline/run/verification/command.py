@@ -1,4 +1,4 @@
-"""The command `imubench verify`: whether all that runs have left is as they left it."""
+"""The command `imubench verify`: verify that the outputs of runs are unchanged."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ _PATIENCE = 3.0  # s, until progress is shown, and between its lines in a file
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare what the command is given."""
+    """Declare the arguments of the command."""
     parser.description = (
         "Read all that runs have left, and hold it against the digests that they left, too. Each "
         "line says what is wrong with a file, and the command that has it made again."
@@ -22,7 +22,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Print what is wrong; return the exit status."""
+    """Print the faults; return the exit status."""
     # Arrow is loaded for this command only: the others answer at once.
     from imubench_pipeline.report.run_summary import describe_drop_zone
     from imubench_pipeline.run.verification.results import Results
@@ -63,7 +63,7 @@ def run(options: argparse.Namespace) -> int:
 
 @contextmanager
 def _progress(size: int) -> Iterator[Callable[[int], None]]:
-    """Give what is told how many bytes were read, and shows it where it takes longer."""
+    """Give a callback for the number of bytes read, which shows the progress of long reads."""
     begun = last = time.monotonic()
     terminal = sys.stderr.isatty()
     done = 0

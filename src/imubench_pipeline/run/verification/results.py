@@ -40,7 +40,7 @@ class Fault:
 
 @dataclass
 class Results:
-    """The files in a folder of results; `read` is called with the number of bytes read."""
+    """Files in a folder of results; `read` is called with the number of bytes read."""
 
     folder: Path
     read: Callable[[int], None] = lambda _: None
@@ -69,7 +69,7 @@ class Results:
 
     @cached_property
     def run_again(self) -> str:
-        """The command of the run, as far as the report says how it was called."""
+        """The command of the run, as far as the report states it."""
         config: list[str] = []
         try:
             settings = json.loads((self.folder / "report/settings.json").read_text("utf-8"))
@@ -203,7 +203,7 @@ class Results:
         return sorted(current)
 
     def _unsealed(self) -> Iterator[Fault]:
-        """Yield the files that no step is known to have left."""
+        """Yield the files that no known step has written."""
         for folder in _SEALED_FOLDERS:
             for path in sorted((self.folder / folder).rglob("*")):
                 place = path.relative_to(self.folder)
@@ -219,7 +219,7 @@ class Results:
                 yield Fault(name, _NO_SEAL, self._mended(name, sealing.NIGHTS + "/"))
 
     def _strange_rows(self) -> Iterator[Fault]:
-        """Yield the tables that speak of recordings which were not compared."""
+        """Yield the tables with recordings that were not compared."""
         if "tables" not in self.seals:
             return
         compared = {
@@ -240,7 +240,7 @@ class Results:
                     continue
                 rows = read(name, [self.folder / place])
             except (OSError, ValueError):
-                continue  # it is told that it is damaged, or of another version
+                continue  # reported as damaged, or of another version
             keys = zip(rows["sensor"].to_pylist(), rows["recording"].to_pylist(), strict=True)
             if strange := {key for key in keys if key[1] is not None} - compared:
                 words = "expected rows of the recordings compared, found some of {}/{}"
