@@ -1,4 +1,4 @@
-"""What users declare, checked: a run, a sensor, its logs and data sheet, requirements, simulations.
+"""Validated declarations of users: run, sensors, logs, data sheets, requirements, simulations.
 
 Pydantic models of the YAML files, with the units in which they are written.
 """

@@ -1,4 +1,4 @@
-"""Types of the options of commands. Every command imports this, so it loads nothing slow."""
+"""Types of command-line options. All commands import this module, so it imports nothing slow."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def parse_path(text: str) -> Path:
 
 
 def parse_seconds(text: str) -> float:
-    """Return a time in s, with its unit or without."""
+    """Return a time in s from a text with or without unit."""
     from imubench_pipeline.units import UnitError, parse_quantity
 
     try:
@@ -35,7 +35,7 @@ def parse_seconds(text: str) -> float:
 def make_number_type(
     least: float, most: float, words: str, read: Callable[[str], float] = float
 ) -> Callable[[str], float]:
-    """Return the type of a finite number in a range, its ends included.
+    """Return an argument type for a finite number in a closed range.
 
     ``words`` are the expected value in the error; ``read`` converts a text to a number.
     """
@@ -43,7 +43,7 @@ def make_number_type(
 
 
 def make_integer_type(least: int, most: int, words: str) -> Callable[[str], int]:
-    """Return the type of a whole number in a range, its ends included; see `make_number_type`."""
+    """Return an argument type for an integer in a closed range; see `make_number_type`."""
     return _make_type(least, most, words, int)
 
 
@@ -67,7 +67,7 @@ LONGEST = 1e10  # s, three centuries
 
 
 NO_RESULTS = "what was asked for is not there, or cannot be used"
-"""What the exit status 2 of a command means that shows results."""
+"""Meaning of the exit status 2 of commands that show results."""
 
 
 class Command(NamedTuple):

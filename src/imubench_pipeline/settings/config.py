@@ -54,7 +54,7 @@ Method = Literal["likelihood", "likelihood_gm", "compensated", "curve", "paper",
 
 
 class EstimateSettings(Strict):
-    """How the noise parameters are estimated."""
+    """Settings of the estimation of noise parameters."""
 
     methods: tuple[Method, ...] = Field(
         ("likelihood", "likelihood_gm", "compensated", "curve", "paper", "weighted"), min_length=1
@@ -83,7 +83,7 @@ class EstimateSettings(Strict):
 
 
 class ReconstructionSettings(Strict):
-    """The simulated logs that a model is judged by."""
+    """Settings of the simulated logs with which a model is tested."""
 
     members: int = Field(1, ge=1, description="full-length logs per channel and method")
     band_members: int = Field(200, ge=200, description="members of the 95 % band")
@@ -100,7 +100,7 @@ class DatasheetSettings(Strict):
 
 
 class ErrorBudgetSettings(Strict):
-    """What the noise means for dead reckoning, for every recording."""
+    """Settings of the dead-reckoning error budget of every recording."""
 
     times: tuple[Time, ...] = Field(
         ("1 s", "10 s", "60 s", "600 s"), min_length=1, description="of dead reckoning, and of rest"
@@ -115,7 +115,7 @@ class ErrorBudgetSettings(Strict):
 
 
 class DecideSettings(Strict):
-    """Which recordings decide although something speaks against it."""
+    """Recordings that are used in comparisons in spite of doubts."""
 
     include: tuple[HeldBack, ...] = Field(
         (), description="unfit recordings that enter rankings, pools and exports all the same"
@@ -123,7 +123,7 @@ class DecideSettings(Strict):
 
 
 class ExportSettings(Strict):
-    """The files that filters and simulators load, of every sensor."""
+    """Export files of every sensor for filters and simulators."""
 
     targets: tuple[Text, ...] = Field(
         ("kalibr", "json"), description="programs; `imubench export` knows their names"
@@ -146,7 +146,7 @@ class ExportSettings(Strict):
 
 
 class CommonSettings(Strict):
-    """Part of the variance that specimens of one sensor have in common, 0 to 1."""
+    """Common share of the variance of all units of one sensor, 0 to 1."""
 
     N: float = Field(0.0, ge=0, le=1, description="of the white noise, such as of a shared supply")
     B: float = Field(0.0, ge=0, le=1, description="of flicker noise and Gauss-Markov processes")
@@ -155,7 +155,7 @@ class CommonSettings(Strict):
 
 
 class FusionSettings(Strict):
-    """How many of one sensor equal one of another."""
+    """Settings of the number of cheap sensors that match a good one."""
 
     tau: tuple[Time, ...] = Field(
         ("1 s", "10 s", "100 s", "1000 s"), min_length=1, description="where they are compared"
@@ -171,7 +171,7 @@ class FusionSettings(Strict):
 
 
 class LimitSettings(Strict):
-    """What a step may take of one recording or sensor, which is left out beyond."""
+    """Limits of a step; a recording or sensor that exceeds them is omitted."""
 
     recording: Duration = Field("10 min", description="each step of a recording")
     million_values: Duration = Field(
@@ -210,7 +210,7 @@ def _path_or_none(value: object) -> object:
 
 @with_blocks("run")
 class Run(WithBlocks):
-    """One run: where the logs are, and the settings of each step."""
+    """One run: the folders of logs and results, and the settings of each step."""
 
     logs: NamedPath = Field(Path("logs"), description="the drop zone: logs/<sensor>/<recording>")
     results: NamedPath = Field(Path("results"), description="where a run leaves its results")
@@ -255,7 +255,7 @@ class Run(WithBlocks):
 
     @property
     def to_simulate(self) -> Path | None:
-        """The list of simulated recordings; a folder of logs need not have that of a checkout."""
+        """The list of simulated recordings; optional in a folder of logs."""
         by_default = (
             self.simulated == _SIMULATED_RECORDINGS_FILE and not _SIMULATED_RECORDINGS_FILE.exists()
         )
@@ -263,12 +263,12 @@ class Run(WithBlocks):
 
 
 def read_run(config: Mapping[str, object], file: str = "config/config.yaml or --config") -> Run:
-    """Validate the configuration of a run, as Snakemake hands it over (numbers may be text)."""
+    """Validate the configuration of a run from Snakemake (numbers may be text)."""
     return parse(Run, config, file)
 
 
 def read_config(file: Path) -> dict[str, Any]:
-    """Return the settings in a configuration, unchecked; none if it does not exist.
+    """Return the unchecked settings of a configuration; empty if it does not exist.
 
     Raises ConfigError if it is not YAML, or has no keys.
     """
@@ -279,10 +279,10 @@ def read_config(file: Path) -> dict[str, Any]:
 
 
 def given_beside(run: Run, file: Path) -> list[str]:
-    """Return what a run was given beside its file, as ``snakemake --config`` takes it.
+    """Return the settings that a run got besides its file, in the form of ``snakemake --config``.
 
-    What does not matter to the results of a recording is left out. `file` is the configuration that
-    Snakemake reads by itself.
+    Settings that do not affect the results of a recording are omitted. `file` is the configuration
+    that Snakemake reads by itself.
     """
     try:
         written = read_settings(Run, file)
@@ -296,7 +296,7 @@ def given_beside(run: Run, file: Path) -> list[str]:
 
 
 def _differing(settings: Mapping[str, Any], other_settings: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the settings that the other ones lack, or have otherwise."""
+    """Return the settings that are missing or different in the others."""
     differing: dict[str, Any] = {}
     for key, value in settings.items():
         other = other_settings.get(key)

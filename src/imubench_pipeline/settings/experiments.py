@@ -1,4 +1,4 @@
-"""Blocks of settings that extensions add, and what notes state of a sensor that is moved."""
+"""Settings of extensions, and statements of notes about a moved sensor."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from imubench_pipeline.settings.simulated_sensor import AxisSettings
 
 Kind = str
-"""What was done with a sensor during a recording: ``static``, or the key of its block of notes."""
+"""Experiment with a sensor during a recording: ``static``, or the key of its block of notes."""
 
 AT_REST: Kind = "static"
 """Nothing: it was at rest all the time."""
@@ -30,7 +30,7 @@ class WithBlocks(Strict):
     """Settings to which extensions may add blocks."""
 
     def block(self, model: type[_Block]) -> _Block | None:
-        """Return the block of a class; None where none is stated."""
+        """Return the block of a class; None if it is not stated."""
         return next((value for _, value in self if isinstance(value, model)), None)
 
 
@@ -58,14 +58,14 @@ def with_blocks(place: Place) -> Callable[[type[_Model]], type[_Model]]:
 
 
 class Experiment(Strict):
-    """What was done with a sensor during a recording, or how it stood, as its notes state it."""
+    """Experiment, or attitude, of a sensor during a recording, as stated in its notes."""
 
     is_static: ClassVar[bool] = False
     """Whether the sensor was at rest all the time."""
 
     @abstractmethod
     def moved_gyro(self, channels: Sequence[str], *, column: bool) -> str | None:
-        """Return the one of the log's channels that it is about; None: it is about all axes.
+        """Return the channel of the experiment; None: it uses all axes.
 
         `column`: the log has a column with the rate of a table. Raises ValueError if the log lacks
         what it takes; the text begins with the key.
@@ -73,11 +73,11 @@ class Experiment(Strict):
 
 
 class SimulatedSensors(Strict):
-    """What is simulated instead of one sensor."""
+    """A simulated recording of more than one static sensor."""
 
     @abstractmethod
     def check(self, channels: Mapping[Any, AxisSettings]) -> None:
-        """Raise ValueError if the channels have what it cannot take."""
+        """Raise ValueError if the experiment does not support the settings of its channels."""
 
 
 def stated_experiments(settings: WithBlocks) -> dict[str, Experiment]:
@@ -86,7 +86,7 @@ def stated_experiments(settings: WithBlocks) -> dict[str, Experiment]:
 
 
 def kind_of(notes: object) -> Kind:
-    """Return what the notes make of a recording, though they may be wrong otherwise."""
+    """Return the kind of a recording from its notes, even if they have other errors."""
     if isinstance(notes, Mapping):
         for key, block in blocks("notes").items():
             if notes.get(key) is not None and not load(block.model).is_static:
@@ -95,7 +95,7 @@ def kind_of(notes: object) -> Kind:
 
 
 def stated_gyro(stated: Gyro | None, channels: Sequence[str], what: str) -> str:
-    """Return the gyro that an experiment is about: the one that its notes state, or the only one.
+    """Return the gyro of an experiment: the gyro stated in its notes, or the only one.
 
     `what` completes "the gyro whose axis ..." of the error. Raises ValueError if it is not among
     the channels of the log, or is not stated and the log has another number of gyros than one; the

@@ -1,4 +1,4 @@
-"""The extras of the package: optional dependencies of some of its uses."""
+"""Optional dependencies of the package, as extras."""
 
 from __future__ import annotations
 

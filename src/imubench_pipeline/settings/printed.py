@@ -169,7 +169,7 @@ class PrintedFigure(Strict):
         return self
 
     def on_axis(self, axis: str) -> float | tuple[float, ...] | None:
-        """Return what is printed for an axis, ``x``, ``y`` or ``z``; None: nothing."""
+        """Return the printed value for an axis, ``x``, ``y`` or ``z``; None if there is none."""
         if isinstance(self.value, dict):
             return next((v for axes, v in self.value.items() if axis in axes), None)
         return self.value
@@ -248,7 +248,7 @@ class QuantityDatasheet(Strict):
 
     @model_serializer(mode="wrap")
     def _as_written(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """Omit missing figures: they were not looked up, and null is not published."""
+        """Omit missing figures, which were not looked up; null means not published."""
         return {name: v for name, v in handler(self).items() if name in self.model_fields_set}
 
     def printed(self, name: str) -> tuple[PrintedFigure, ...]:
@@ -302,7 +302,7 @@ _MAX_ACCELERATION_NOISE = 1.0  # largest printed noise density of an acceleromet
 
 
 def _check_unit(key: str, quantity: str, name: str, figure: PrintedFigure) -> None:
-    """Raise for another unit, and for 400 g/√Hz, where a document lost the sign of micro."""
+    """Raise for a wrong unit, and for values such as 400 g/√Hz, where µ was lost in a document."""
     dimensions = FIGURE_DIMENSIONS[quantity].get(name)
     if dimensions is None:
         raise ValueError(f"{key}: found under {quantity}; expected under gyro alone")
@@ -357,7 +357,7 @@ class Datasheet(Strict):
         return self
 
     def only(self, names: Collection[str]) -> dict[str, Any]:
-        """Return some figures as the file has them, such as `IN_USE`, and the options."""
+        """Return a selection of figures, such as `IN_USE`, and the options, as in the file."""
         written = self.model_dump(mode="json", include={"options", *FIGURE_DIMENSIONS})
         for quantity in FIGURE_DIMENSIONS:
             if (sheet := written[quantity]) is not None:

@@ -21,7 +21,7 @@ from imubench_pipeline.units import UnitError, parse_difference, parse_quantity
 
 
 def _check_time(text: str, above_zero: str | None = None) -> None:
-    """Raise for a text that is no time, or one that is not above 0 under the name of its key."""
+    """Raise, with the key, for a text that is not a time above 0."""
     if parse_quantity(text, "time") <= 0 and above_zero:
         raise ValueError(f"{above_zero} is {text}, expected a time above 0")
 
@@ -34,7 +34,7 @@ class ConstantForm(Strict):
 
 
 class StepsForm(Strict):
-    """Values that hold from their times on."""
+    """Values that are constant from their times on."""
 
     form: Literal["steps"]
     times: tuple[Text, ...] = Field(min_length=1)
@@ -96,7 +96,7 @@ Part = Annotated[ConstantForm | StepsForm | DayCycleForm | WarmUpForm, Field(dis
 
 
 class SumForm(Strict):
-    """Several formulas together: a value, and differences that the others add to it."""
+    """A sum of formulas: a value, and differences that are added to it."""
 
     form: Literal["sum"]
     parts: tuple[Part, ...] = Field(min_length=2)
@@ -140,7 +140,7 @@ class Surroundings(Strict):
 
 
 def _check_units(form: Form, dimension: str) -> None:
-    """Raise UnitError if a figure of a form has a unit of another dimension."""
+    """Raise UnitError if a value of a formula has a unit of the wrong dimension."""
     match form:
         case ConstantForm():
             parse_quantity(form.value, dimension)

@@ -67,7 +67,7 @@ IN_OUTAGES = ("position", "velocity", "heading")
 
 
 class Limit(Strict):
-    """The largest error that is allowed after a time, or at the end of an outage of GNSS."""
+    """The largest permitted error after a time, or at the end of a GNSS outage."""
 
     error: Error
     after: Time | None = Field(None, description="of dead reckoning; of rest, for north")
@@ -170,14 +170,14 @@ class Environment(Strict):
 
 
 class FullScale(Strict):
-    """Values that must be within the range of a sensor."""
+    """Largest rate and acceleration of the application, which a sensor must measure."""
 
     gyro: Rate | None = Field(None, description="±")
     accel: Acceleration | None = Field(None, description="±, gravity included")
 
 
 class Must(Strict):
-    """Hard requirements, as far as the sensor file has the figures; none by default."""
+    """Hard requirements, checked against the figures of the sensor file; none by default."""
 
     full_scale: FullScale = FullScale()
     bandwidth: Frequency | None = Field(None, description="-3 dB, of each quantity, at least")
@@ -230,12 +230,12 @@ class Requirement(Strict):
 
     @property
     def by_dead_reckoning(self) -> tuple[Limit, ...]:
-        """The limits that an error budget answers."""
+        """Limits that are compared with an error budget."""
         return tuple(limit for limit in self.limits if limit.outage is None)
 
     @property
     def in_outages(self) -> tuple[Limit, ...]:
-        """The limits that a filter on a simulated drive answers."""
+        """Limits that are compared with a filter on a simulated drive."""
         return tuple(limit for limit in self.limits if limit.outage is not None)
 
     @property
@@ -258,5 +258,5 @@ def read_requirements(folders: Path | Iterable[Path] | None) -> dict[str, Requir
 
 
 def validate_requirements(sections: Mapping[str, object]) -> dict[str, Requirement]:
-    """Return the requirements of a plan."""
+    """Return the requirements from the text of a plan."""
     return {name: Requirement.model_validate(section) for name, section in sections.items()}

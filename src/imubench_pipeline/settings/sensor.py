@@ -1,4 +1,4 @@
-"""The file of one sensor: how its logs are written and what its datasheet says."""
+"""The file of one sensor: the format of its logs, and its datasheet."""
 
 from __future__ import annotations
 
@@ -43,21 +43,21 @@ TEMPERATURE = "temperature"
 """Name of the temperature column of a recording."""
 
 POSITION = "position"
-"""Name of the column that says how a sensor that is turned stands."""
+"""Name of the column with the position of a turned sensor."""
 
 TABLE_RATE = "table_rate"
-"""Name of the column with the rate of the table that a sensor stands on."""
+"""Name of the column with the rate of the rate table."""
 
 Channel = Literal["gyro_x", "gyro_y", "gyro_z", "accel_x", "accel_y", "accel_z"]
 
 
 def quantity_of(channel: str) -> str:
-    """Return the quantity, ``gyro`` or ``accel``, that a channel is an axis of."""
+    """Return the quantity of a channel: ``gyro`` or ``accel``."""
     return channel.split("_", maxsplit=1)[0]
 
 
 class ColumnSource(Strict):
-    """Where one column of a recording is found, and the unit it is written in."""
+    """Location and unit of one column of a recording."""
 
     column: str | int = Field(
         description="name in the header, or position counted from 1 (as spreadsheets, awk and "
@@ -85,7 +85,7 @@ class ColumnSource(Strict):
 
 
 class PositionSource(ColumnSource):
-    """Where the column is found that says how a sensor that is turned stands."""
+    """Location of the column with the position of a turned sensor."""
 
     unit: str = Field(
         "1", description="of no importance: two positions are told apart by any two numbers"
@@ -93,7 +93,7 @@ class PositionSource(ColumnSource):
 
 
 class TimeSource(Strict):
-    """Where the time stamps are found, and how they are written."""
+    """Location and format of the time stamps."""
 
     column: str | int = Field(description="name in the header, or position counted from 1")
     unit: Literal["s", "ms", "us", "ns", "samples"] | None = Field(
@@ -167,7 +167,7 @@ _MIN_RATE, _MAX_RATE = 1e-6, 1e9
 
 
 class LogFormat(Strict):
-    """How the logs of a sensor are written."""
+    """Format of the logs of a sensor."""
 
     reader: Reader | None = Field(
         None, description="format of the files; null: found in the file by its first bytes"
@@ -245,7 +245,7 @@ def _check_unit(unit: str, dimension: str, key: str) -> None:
 
 
 class Sensor(Strict):
-    """One IMU model: its logs, what it needs of a vehicle, and its datasheet."""
+    """One IMU model: its logs, its demands on a vehicle, and its datasheet."""
 
     vendor: Text
     model: Text
@@ -288,7 +288,7 @@ class UsedPart(Strict):
 
 @with_blocks("notes")
 class RecordingNotes(WithBlocks):
-    """What may stand in ``<recording>.yaml`` beside a log."""
+    """Contents of ``<recording>.yaml`` beside a log."""
 
     device: Text | None = Field(None, description="serial number; default: the recording's name")
     started: Text | None = Field(None, description="date and time of the first sample")
@@ -316,11 +316,11 @@ class RecordingNotes(WithBlocks):
 
     @property
     def kind(self) -> Kind:
-        """What was done with the sensor."""
+        """Experiment of the recording, as stated in its notes."""
         return kind_of(stated_experiments(self))
 
     def check_gyro(self, log: LogFormat) -> None:
-        """Check that the gyro of an experiment is in the log, and all that it takes.
+        """Check that the log has the gyro of an experiment, and all else that it requires.
 
         Raises ValueError if it is not; the text begins with the key.
         """
@@ -338,7 +338,7 @@ def read_sensors(folders: Path | Iterable[Path]) -> dict[str, Sensor]:
 
 
 def read_sensor_files(folders: Path | Iterable[Path]) -> dict[str, Sensor | ConfigError]:
-    """Read every sensor file of one or several folders; why, of those that are of no use.
+    """Read every sensor file of one or several folders; return the errors of invalid ones.
 
     Raises ConfigError if there is no folder.
     """
@@ -353,18 +353,18 @@ def shipped_sensors() -> Mapping[str, Sensor]:
 
 
 def sensors_of(catalogue: str) -> dict[str, Sensor]:
-    """Return the sensors as the plan wrote them."""
+    """Return the sensors from the text that the plan wrote."""
     return {name: Sensor.model_validate(section) for name, section in json.loads(catalogue).items()}
 
 
 def merged_log(sensor: Sensor, notes: RecordingNotes, file: str) -> LogFormat:
-    """Return the log format of one recording: the keys of its notes over the sensor's."""
+    """Return the log format of one recording: the keys of its notes override the sensor file."""
     merged = _merge(sensor.log.model_dump(exclude_unset=True), notes.log)
     return parse(LogFormat, merged, f"{file}: log")
 
 
 def of_ingest(log: LogFormat, notes: RecordingNotes, kind: Kind) -> dict[str, Any]:
-    """Return what of a log's format, of its notes, and of what was done, the ingest depends on."""
+    """Return the parts of log format, notes and experiment that the ingest depends on."""
     if kind != "rate_table":
         log = log.model_copy(update={"table_rate": None})
     return {
@@ -375,7 +375,7 @@ def of_ingest(log: LogFormat, notes: RecordingNotes, kind: Kind) -> dict[str, An
 
 
 def _merge(base: Mapping[str, Any], over: Mapping[str, Any]) -> dict[str, Any]:
-    """Return ``base`` with the keys of ``over``; a key that is null there is taken out."""
+    """Return ``base`` updated with the keys of ``over``; null removes a key."""
     merged = dict(base)
     for key, value in over.items():
         both = isinstance(value, Mapping) and isinstance(merged.get(key), Mapping)

@@ -1,4 +1,4 @@
-"""Files that come with the package: the workflow, and a catalogue of its configuration.
+"""Files of the package: the workflow, and the catalogue of sensors and requirements.
 
 A checkout has them at its root, a wheel in the package.
 """
@@ -10,19 +10,19 @@ from pathlib import Path
 from typing import Literal
 
 CATALOGUE = Path("catalogue")
-"""Stands in a configuration for the folder of such files that comes with the package."""
+"""Placeholder in a configuration for the folder of such files in the package."""
 
 Folders = Path | Sequence[Path]
 
 
 def find_project() -> Path:
-    """Return the folder that holds the Snakefile, workflow/, config/ and profiles/."""
+    """Return the folder with the Snakefile, workflow/, config/ and profiles/."""
     inside = Path(__file__).parents[1] / "project"
     return inside if inside.is_dir() else Path(__file__).parents[3]
 
 
 def list_folders(stated: Folders, kind: Literal["sensors", "requirements"]) -> list[Path]:
-    """Return the folders that a configuration names, each once; a later one has precedence.
+    """Return the folders named in a configuration, without duplicates; later ones have precedence.
 
     The folder of a project, ``config/<kind>``, may be missing beside another one.
     """
@@ -37,6 +37,6 @@ def list_folders(stated: Folders, kind: Literal["sensors", "requirements"]) -> l
 
 
 def find_own_folder(stated: Folders) -> Path:
-    """Return the folder for a missing file: the last that is not the package's."""
+    """Return the folder for a new file: the last one outside the package."""
     named = [stated] if isinstance(stated, Path) else stated
     return next((folder for folder in reversed(named) if folder != CATALOGUE), named[-1])

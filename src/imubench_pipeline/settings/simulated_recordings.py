@@ -1,4 +1,4 @@
-"""What is simulated before a run: recordings, boards of sensors that share a place, experiments.
+"""Simulated recordings of a run: single sensors, boards of several sensors, experiments.
 
 An experiment has what its notes would say, and what is true of it.
 """
@@ -51,7 +51,7 @@ _MAX_SAMPLES = 1e10  # 80 GB per channel; more is due to a wrong unit
 
 
 class PublishedFigure(Strict):
-    """A figure that the source prints, and what it stands for in the conventions of the project."""
+    """A printed value, and its meaning in the conventions of the project."""
 
     where: Text = Field(description="such as Table 5")
     figure: Text = Field(description="its name there")
@@ -63,7 +63,7 @@ class PublishedFigure(Strict):
     why: Text | None = Field(None, description="why it differs from what an estimate gives")
 
     def si(self, quantity: str) -> float:
-        """Return what it stands for in SI."""
+        """Return its meaning in SI."""
         dimensions = {
             "N": f"{quantity}_density",
             "sensitivity": f"{quantity}_temperature_coefficient",
@@ -72,7 +72,7 @@ class PublishedFigure(Strict):
 
 
 class ReadByAuthors(Strict):
-    """What a source reads from the curve of its own log, which was not published."""
+    """Values that a source read from the curve of its own, unpublished log."""
 
     N: Text | None = Field(None, description="white noise density, two-sided")
     B: Text | None = Field(None, description="bias instability: the floor of the curve / 0.664")
@@ -80,7 +80,7 @@ class ReadByAuthors(Strict):
     K: Text | None = Field(None, description="rate or acceleration random walk")
 
     def si(self, channel: str) -> dict[str, float]:
-        """Return the figures that there are, in SI."""
+        """Return the stated figures in SI."""
         return AxisSettings(**self.model_dump()).si(channel)
 
 
@@ -95,7 +95,7 @@ class SimulatedChannel(AxisSettings):
     figures: Text | None = Field(None, description="figures of the source that show this channel")
 
     def check(self, channel: str) -> None:
-        """Raise UnitError if a unit has another dimension than its figure."""
+        """Raise UnitError if a unit has the wrong dimension for its figure."""
         super().check(channel)
         if self.read is not None:
             with add_key_to_errors("read."):
@@ -113,7 +113,7 @@ class SimulatedChannel(AxisSettings):
 
 
 class OfASensor(ImuSettings):
-    """What is simulated of one sensor."""
+    """Settings of one simulated sensor."""
 
     sensor: str = Field(description="name of the sensor file whose log format it is written in")
     duration: Duration = Field(description="length with its unit, such as 10 h")
@@ -144,7 +144,7 @@ class OfASensor(ImuSettings):
 
 @with_blocks("simulated")
 class SimulatedRecording(OfASensor, Surroundings, WithBlocks):
-    """A recording that is made before the run, from known figures."""
+    """A recording that is simulated before the run, from known parameters."""
 
     recording: str = Field(pattern=_NAME_PATTERN, description="starts with sim_")
     seed: int
@@ -160,7 +160,7 @@ class SimulatedRecording(OfASensor, Surroundings, WithBlocks):
 
     @property
     def simulated_sensors(self) -> dict[str, SimulatedSensors]:
-        """What is simulated instead of one sensor, by its key: one at most."""
+        """The special simulation, by its key: one at most."""
         return {key: value for key, value in self if isinstance(value, SimulatedSensors)}
 
     @model_validator(mode="after")
@@ -182,7 +182,7 @@ class SimulatedRecording(OfASensor, Surroundings, WithBlocks):
 
     @property
     def moved_gyro(self) -> str | None:
-        """The gyro of its experiment; None where it has none, or one of all axes.
+        """The gyro of its experiment; None without one, or if it uses all axes.
 
         Raises ValueError if it is not stated, or not simulated.
         """
@@ -193,12 +193,12 @@ class SimulatedRecording(OfASensor, Surroundings, WithBlocks):
 
     @property
     def kind(self) -> Kind:
-        """What is done with the sensor."""
+        """Experiment with the sensor."""
         return kind_of(stated_experiments(self))
 
 
 class Simulated(Strict):
-    """The file that lists what is simulated."""
+    """The file with the list of simulated recordings."""
 
     recordings: tuple[SimulatedRecording, ...] = ()
     boards: tuple[NamedPath, ...] = Field(
@@ -249,14 +249,14 @@ class Board(Surroundings):
 
 @dataclass(frozen=True)
 class ToSimulate:
-    """What a run simulates: recordings, those of the boards among them, and the boards by name."""
+    """Simulations of a run: recordings, including recordings of boards, and boards by name."""
 
     recordings: list[SimulatedRecording]
     boards: dict[str, Board]
 
 
 def read_simulated(path: Path | None, sensors: Mapping[str, Sensor | ConfigError]) -> ToSimulate:
-    """Read what is simulated; nothing where ``path`` is None. Raises `ConfigError`."""
+    """Read the list of simulations; empty if ``path`` is None. Raises `ConfigError`."""
     if path is None:
         return ToSimulate([], {})
     declared = read_settings(Simulated, path)
@@ -314,7 +314,7 @@ def _check(entry: OfASensor, sensors: Mapping[str, Sensor | ConfigError], key: s
 
 
 def _found_from(around: _Around, path: Path, key: str = "") -> _Around:
-    """Return the same, with the files of its profiles named from the folder of its own file."""
+    """Return the same with profile files relative to the folder of the list."""
 
     def placed(form: Form | None, name: str) -> Form | None:
         if not isinstance(form, FileForm):
@@ -333,16 +333,16 @@ def _found_from(around: _Around, path: Path, key: str = "") -> _Around:
 
 
 def profile_files(recording: SimulatedRecording) -> list[Path]:
-    """Return the files that its temperature and motion are read from."""
+    """Return the files of its temperature and motion profiles."""
     forms = (recording.temperature, *recording.motion.values())
     return sorted({form.file for form in forms if isinstance(form, FileForm)})
 
 
 def layout(recording: SimulatedRecording, log: LogFormat) -> LogFormat:
-    """Return how the log of a simulated recording is written: with its columns and its rate.
+    """Return the log format of a simulated recording, with its columns and rate.
 
-    Where the sensor's `log` has no temperature, and the recording has one, that gets a column (or a
-    file, where each channel has one) of its own, in degC.
+    Where the sensor's `log` has no temperature, and the recording has one, the temperature gets its
+    own column (or file, if each channel has one), in degC.
     """
     channels = {name: log.channels[name] for name in recording.channels}
     temperature = None
@@ -367,6 +367,6 @@ def _free_column(channels: Sequence[ColumnSource], time: TimeSource | None) -> C
     places = stamps + [source.column for source in channels]
     if any(isinstance(place, str) for place in places):
         return ColumnSource(file=file, column="temperature", unit="degC")
-    # In a file of its own it stands beside the stamps alone.
+    # Its own file contains only the stamps and the temperature.
     beside = [int(place) for place in (stamps if file else places)]
     return ColumnSource(file=file, column=max(beside, default=0) + 1, unit="degC")

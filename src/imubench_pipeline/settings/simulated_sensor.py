@@ -73,7 +73,7 @@ class LowPassSettings(Strict):
 
 
 class AxisSettings(Strict):
-    """One axis: its noise (N is two-sided, before the low-pass), and what else it does."""
+    """One axis: its noise (N is two-sided, before the low-pass), and its other errors."""
 
     N: Text | None = Field(None, description="white noise density, two-sided")
     B: Text | None = Field(
@@ -116,7 +116,7 @@ class AxisSettings(Strict):
         return _in_si({name: (getattr(self, name), of) for name, of in dimensions.items()})
 
     def check(self, channel: str) -> None:
-        """Raise a UnitError, with the key, if a unit has another dimension than its figure."""
+        """Raise UnitError, with the key, if a unit has the wrong dimension for its figure."""
         quantity = quantity_of(channel)
         self.si(channel)
         for number, process in enumerate(self.further):
@@ -140,7 +140,7 @@ Matrix = Annotated[tuple[tuple[float, ...], ...], AfterValidator(_matrix)]
 
 
 class ImuSettings(Strict):
-    """What belongs to a sensor as a whole."""
+    """Settings that are common to all axes of a sensor."""
 
     misalignment: dict[str, Matrix] = Field(
         default_factory=dict,
@@ -171,7 +171,7 @@ class ModelSettings(ImuSettings):
 
 
 def check_axes(axes: Mapping[Channel, AxisSettings], key: str) -> None:
-    """Raise a ValueError, with the key, if a unit has another dimension than its figure."""
+    """Raise ValueError, with the key, if a unit has the wrong dimension for its figure."""
     for channel, axis in axes.items():
         try:
             axis.check(channel)
