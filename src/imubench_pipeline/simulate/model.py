@@ -371,7 +371,7 @@ def sources_of(terms: Sequence[Term]) -> Sources:
 
 
 def bank_for(model: SensorModel, rate: float, duration: float) -> list[GaussMarkov]:
-    """Return the processes that approximate flicker noise at the input of the model's filter.
+    """Return processes that approximate flicker noise at the input of the model's filter.
 
     The list is empty without flicker noise, or without a filter. The rate is in Hz. The density is
     approximated down to the frequency 1 / (2 duration), with the duration in s.

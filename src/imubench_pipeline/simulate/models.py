@@ -89,7 +89,7 @@ _NOISE_PARAMETERS = ("N", "B", "T_B", "K", "R", "Q")
 
 @dataclass(frozen=True)
 class Simulation:
-    """How a recording is simulated that is not of one sensor."""
+    """Simulation of a recording of several sensors or of an experiment."""
 
     # yields the blocks of its channels, with its motion and its temperature
     blocks: Callable[

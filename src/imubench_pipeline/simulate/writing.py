@@ -1,4 +1,4 @@
-"""Write a simulated log as a file that the readers of the project read, with its notes.
+"""Write a simulated log as a file that the readers support, with its notes.
 
 Parquet files have the form of ingested recordings, in SI. CSV files have the columns, units and
 delimiter of the sensor file if it names columns of one text file, otherwise the columns and units
@@ -71,7 +71,7 @@ def write_log(
 
 
 def notes_text(name: str, log: LogFormat, sensor: LogFormat | None, words: str) -> str:
-    """Return the notes of a log, with its format where it differs from the sensor file.
+    """Return the notes of a log, with its log format if it differs from the sensor file.
 
     ``name``: file name of the log. ``words``: description of the log.
     """
@@ -84,7 +84,7 @@ def notes_text(name: str, log: LogFormat, sensor: LogFormat | None, words: str) 
 
 
 def check_notes(notes: Path, path: Path) -> None:
-    """Check that the notes of a simulated log are the notes of no other recording.
+    """Check that the notes of a simulated log do not belong to another recording.
 
     ``notes``, ``path``: the notes, and the log; they need not exist. Raises ConfigError if another
     log or folder has the same name, which the notes would belong to as well, or the notes that
