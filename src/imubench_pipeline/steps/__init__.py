@@ -1,1 +1,1 @@
-"""What the rules of the workflow compute: files and settings in, library calls, rows out."""
+"""Steps of the workflow: read files and settings, call the library, write rows."""

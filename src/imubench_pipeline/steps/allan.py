@@ -24,14 +24,14 @@ from imubench_pipeline.words.findings.samples import TooShort
 
 
 def report_too_sparse(channel: str, log: ChannelLog) -> Finding:
-    """Return why a channel has no Allan variance, and so no estimates."""
+    """Return why a channel has no Allan variance, and therefore no estimates."""
     return find(TooShort(log.grid, rate=log.rate), "fatal", log.grid, channel)
 
 
 def yield_allan_rows(
     folder: Path, sensor: str, recording: str, settings: AllanSettings
 ) -> Iterator[AllanRow]:
-    """Yield the rows of the table ``allan``; none of a rejected recording."""
+    """Yield the rows of the table ``allan``; none for a rejected recording."""
     for channel, log in load_static_logs(folder).items():
         yield from make_allan_rows(
             Key(sensor, recording, channel), compute_channel_curve(log, settings)

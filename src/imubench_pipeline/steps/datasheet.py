@@ -23,7 +23,7 @@ from imubench_pipeline.tables import read
 def compare_with_datasheet(
     folder: Path, sensor: str, recording: str, settings: str
 ) -> dict[str, list[Any]]:
-    """Return the rows of ``datasheet`` and ``datasheet_curve``; none of a rejected recording."""
+    """Return the rows of ``datasheet`` and ``datasheet_curve``; none for a rejected recording."""
     quality = Quality.read(folder / "quality.json")
     measured = read_curves(folder / "allan.parquet", quality.grids)
     temperatures = [quality.row.temperature_min, quality.row.temperature_max]

@@ -1,4 +1,4 @@
-"""Say what the estimated noise of a recording means for dead reckoning, and what its log shows."""
+"""Compute the dead-reckoning errors of a recording by its noise, and compare them with its log."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from imubench_pipeline.units import parse_quantity
 def compute_error_tables(
     folder: Path, sensor: str, recording: str, settings: str
 ) -> dict[str, Iterator[TableRow]]:
-    """Return the rows of the tables of the step, from a folder; none of a rejected log."""
+    """Return the rows of the tables of the step from a folder; none for a rejected log."""
     names = {"sensor": sensor, "recording": recording}
     sections = json.loads(settings)
     how = ErrorBudgetSettings.model_validate(sections["error_budget"])

@@ -55,7 +55,7 @@ from imubench_pipeline.words.reasons import simulations as texts
 
 @dataclass
 class Estimation:
-    """Rows of the tables that the estimation of a recording leaves."""
+    """Rows of the tables of the estimation of a recording."""
 
     allan: list[model.AllanRow] = field(default_factory=list)
     parameters: list[model.ParameterRow] = field(default_factory=list)
@@ -70,12 +70,12 @@ class Estimation:
     deterministic: list[model.DeterministicRow] = field(default_factory=list)
     estimate_findings: list[FindingRow] = field(default_factory=list)
     estimates: dict[str, dict[str, Estimate]] = field(default_factory=dict)
-    """By channel and method: what the rows of the tables ``parameters`` and ``draws`` stand for."""
+    """By channel and method: the estimates in the tables ``parameters`` and ``draws``."""
     paths: dict[Path, TemperaturePath] = field(default_factory=dict)
     """Of the temperature, by the file of the log: its channels have one."""
 
     def add_findings(self, key: Key, findings: Iterable[Finding]) -> None:
-        """Take what is found of a channel."""
+        """Add the results of a channel."""
         self.estimate_findings += [finding.row(key.sensor, key.recording) for finding in findings]
 
 
@@ -87,7 +87,7 @@ def estimate_channel(
     bandwidth: float | None,
     into: Estimation,
 ) -> None:
-    """Estimate the noise of a channel by every method of the settings; `into` takes the rows.
+    """Estimate the noise of a channel by every method of the settings; add the rows to `into`.
 
     `curve`: with limits by the identified power laws; `bandwidth`: known cut-off of the sensor, Hz.
     """
@@ -125,7 +125,7 @@ def estimate_channel(
 
 
 class _Channel:
-    """A channel, with what is taken out of it before its noise is estimated."""
+    """A channel, with the deterministic signals that are removed before the estimation."""
 
     def __init__(
         self,
@@ -142,7 +142,7 @@ class _Channel:
         self._bandwidth = bandwidth
         self._band = parse_quantity(settings.band, "frequency") if settings.band else None
         limits = [limit for limit in (self._band, 0.5 * (bandwidth or 0.0)) if limit]
-        unfiltered = min(limits, default=None)  # the noise is as it is up to this frequency
+        unfiltered = min(limits, default=None)  # the noise is not attenuated up to this frequency
         self.signals = find_deterministic_signals(
             log.blocks, log.grid, log.rate, segments=log.segments, highest=unfiltered
         )
@@ -164,7 +164,7 @@ class _Channel:
         return estimates
 
     def by_likelihood(self, into: Estimation) -> dict[str, Estimate]:
-        """Return the estimates from the spectrum; the rows that go with them are taken."""
+        """Return the estimates from the spectrum, and store the associated rows."""
         key, log = self.key, self.log
         self.fitted = fitted = self._fitted(self._blocks)
         estimates = {estimate.method: estimate for estimate in fitted.estimates}
@@ -204,7 +204,7 @@ class _Channel:
         return estimates
 
     def _curve_of(self, blocks: Iterator[Array], *, whole: bool = False) -> AllanCurve:
-        """Return the Allan variance of what stands in place of the log, at the same clusters."""
+        """Return the Allan variance of the log without deterministic signals, at equal clusters."""
         log, sizes = self.log, self.curve.cluster_size
         there = None if whole else self._presence
         return of_blocks(
@@ -218,13 +218,13 @@ class _Channel:
         )
 
     def _temperature(self, fitted: Likelihood, into: Estimation) -> ThermalFit:
-        """Return what temperature explains of the channel."""
+        """Return the temperature effect of the channel."""
         log = self.log
         if log.path not in into.paths:
             of_clock = f"{log.path.name} {average_blocks(log.temperatures())!r}"
             rng = channel_rng(self.settings.seed, of_clock, "temperature")
             into.paths[log.path] = estimate_temperature_path(log.temperatures(), log.segments, rng)
-        # A warm-up is what temperature explains: it stays in the log that they are fitted to.
+        # Temperature explains a warm-up, so it remains in the log to which they are fitted.
         plain = self._fitted(log.blocks) if self.signals.signals else fitted
         return fit_temperature(
             log.blocks,
@@ -255,11 +255,11 @@ class _Channel:
         )
 
     def _blocks(self) -> Iterator[Array]:
-        """Yield the log without what is deterministic in it."""
+        """Yield the log without deterministic signals."""
         return self.signals.subtract_from(self.log.blocks())
 
     def _stream(self, use: str) -> np.random.Generator:
-        """Return a random stream that depends on the samples, and on no name of a file."""
+        """Return a random stream that depends only on the samples, not on file names."""
         return channel_rng(self.settings.seed, f"{self.mean!r}", f"{self.log.grid}", use)
 
 
@@ -359,7 +359,7 @@ def _estimate_columns(parameter: Parameter, unit: str) -> dict[str, Any]:
 
 
 def estimate_register_step(log: ChannelLog) -> float:
-    """Return the step of the register that a log shows at its beginning, SI; 0 where none shows."""
+    """Return the quantisation step at the beginning of a log, SI; 0 if none is visible."""
     values = next((block for block in log.blocks() if np.isfinite(block).any()), np.empty(0))
     present = values[np.isfinite(values)][:_MIN_SAMPLES_FOR_STEP]
     return estimate_resolution(np.unique(present), len(present))
@@ -368,7 +368,7 @@ def estimate_register_step(log: ChannelLog) -> float:
 def estimate_recording(
     folder: Path, sensor: str, recording: str, settings: str, channels: Container[str] | None = None
 ) -> Estimation:
-    """Return the rows of all or some channels in a folder; none of a rejected recording."""
+    """Return the rows of all or some channels in a folder; none for a rejected recording."""
     sections = json.loads(settings)
     into = Estimation()
     logs = load_static_logs(folder)

@@ -1,4 +1,4 @@
-"""The exports of a run: a folder a sensor, with a file a program."""
+"""The exports of a run: a folder per sensor with a file per program."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def make_exports(
 
 
 def write_exports(tables: Path, settings: str, folder: Path) -> None:
-    """Write a folder a sensor, with a file a program; all appear together."""
+    """Write a folder per sensor with a file per program; all appear together."""
     how = ExportSettings.model_validate_json(settings)
     with make_folder(folder) as made:
         for place, content in make_exports(load(tables), how, recordings_of(tables)):

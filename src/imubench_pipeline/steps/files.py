@@ -1,4 +1,4 @@
-"""What became of every file in the drop zone: analysed, rejected, failed, or skipped."""
+"""Outcome of every file in the drop zone: analysed, rejected, failed, or skipped."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def list_files(
 
 
 def write_files(tables: Mapping[str, Path], files: str, outputs: Iterable[Path]) -> None:
-    """Write the table ``files``, as Parquet and CSV; `files` is what the plan found, as JSON."""
+    """Write the table ``files``, as Parquet and CSV; `files`: files found by the plan, as JSON."""
     recordings = RecordingRow.rows_of(read("recordings", [tables["recordings"]]))
     failures = FailureRow.rows_of(read("failures", [tables["failures"]]))
     write_each({"files": list_files(json.loads(files), recordings, failures)}, outputs)

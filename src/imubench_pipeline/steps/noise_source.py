@@ -34,7 +34,7 @@ class NoiseSource:
     """A noise model and its source, SI."""
 
     model: NoiseModel  # the best one for the data of its source
-    papers: NoiseModel  # N, B, T_B and K of the same source, for the papers' filter; or some
+    papers: NoiseModel  # N, B, T_B and K of the same source, for the papers' filter
     words: str  # the source
     drawn: tuple[NoiseModel, ...] = ()  # from the uncertainty of the model, if it is known
 
@@ -93,8 +93,8 @@ def find_noise_source(
 ) -> NoiseSource | None:
     """Return the noise of a gyro: `take_static_noise`, or else `take_printed_noise`.
 
-    `folder` is that of the recording that was turned, `static` those of the static recordings of
-    its sensor; `draws`: models that are drawn from what a static log leaves open.
+    `folder`: of the turned recording; `static`: of the static recordings of its sensor; `draws`:
+    number of models drawn from the uncertainty of a static log.
     """
     own = Quality.read(folder / "quality.json").row
     return take_static_noise(static, own, key.channel, draws) or take_printed_noise(
@@ -103,7 +103,7 @@ def find_noise_source(
 
 
 def take_printed_noise(name: str, sensor: Sensor, channel: str) -> NoiseSource | None:
-    """Return the noise of a gyro as its datasheet prints it; None where none is printed."""
+    """Return the printed noise of a gyro; None if the datasheet prints none."""
     try:
         origin = from_datasheet(name, sensor, 0)
     except ConfigError:

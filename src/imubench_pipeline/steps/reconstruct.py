@@ -1,4 +1,4 @@
-"""Reconstruction of a log from an estimate, and how well it repeats the measured curve."""
+"""Reconstruction of a log from an estimate, and its agreement with the measured curve."""
 
 from __future__ import annotations
 
@@ -100,7 +100,7 @@ class ReconstructionRows:
 def reconstruct_recording(
     folder: Path, settings: ReconstructionSettings, channels: Container[str] | None = None
 ) -> ReconstructionRows:
-    """Return the rows of a recording, of all channels that have estimates or of some of them."""
+    """Return the rows of all or some channels of a recording that have estimates."""
     about = Quality.read(folder / "quality.json")
     measured = read_curves(folder / "allan.parquet", about.grids)
     left = read_compensated_curves(folder / "allan_compensated.parquet", measured)

@@ -80,7 +80,7 @@ def simulate_samples_of_models(
 def _warmed(
     model: SensorModel, rows: Mapping[str, TemperatureRow], log: ChannelLog
 ) -> tuple[SensorModel, Signal]:
-    """Return a model with its drift with temperature, and the temperature of the log."""
+    """Return a model with its temperature effect, and the temperature of the log."""
     value = {name: row.fitted if row.value is None else row.value for name, row in rows.items()}
     reference, bias = value["T_0"], value.get("bias")
     assert reference is not None  # the mean temperature is never unknown

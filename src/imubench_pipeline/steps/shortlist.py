@@ -1,4 +1,4 @@
-"""The shortlist of a run, or of the catalogue without one."""
+"""The shortlist of a run or, without a run, of the catalogue."""
 
 from __future__ import annotations
 

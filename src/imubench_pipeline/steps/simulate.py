@@ -1,4 +1,4 @@
-"""Simulated recordings, written as the logger of their sensor would write them."""
+"""Write simulated recordings in the log format of their sensor."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ _MOTIONS: Hook[Motion] = Hook("motions")
 
 
 def write_simulated(recording: SimulatedRecording, log: LogFormat, folder: Path) -> None:
-    """Simulate a recording and write it as text, by its `layout` of the sensor's logs.
+    """Simulate a recording and write it as text in the `layout` of the sensor's logs.
 
     A ConfigError is raised if the logs of the sensor are not text.
     """
@@ -58,7 +58,7 @@ def write_simulated(recording: SimulatedRecording, log: LogFormat, folder: Path)
 
 
 def _blocks(recording: SimulatedRecording, rate: float) -> Iterator[dict[str, NDArray[np.float64]]]:
-    """Return the blocks of the channels in SI and, where there is one, of the temperature."""
+    """Return the blocks of the channels, and of the temperature if there is one, in SI."""
     try:
         model = make_imu_model(recording.channels, recording)
     except ValueError as error:

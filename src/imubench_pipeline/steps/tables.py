@@ -14,7 +14,7 @@ from imubench_pipeline.tables.failures import Failure, mark_failures, read_with_
 
 
 def join_all_tables(parts: Mapping[str, Sequence[Path]]) -> dict[str, pa.Table]:
-    """Return every table, of its files in their order, and what failed in ``failures``."""
+    """Return every table, joined from its files in order, with failed steps in ``failures``."""
     joined, failures = {}, dict[Failure, None]()
     for name, paths in parts.items():
         joined[name], failed = read_with_failures(name, paths)
