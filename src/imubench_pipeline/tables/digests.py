@@ -39,7 +39,7 @@ def read_sealed_json(path: Path) -> dict[str, Any]:
 
 
 def open_without_waiting(path: str, flags: int) -> int:
-    """Open a file; a pipe that nobody writes to is empty."""
+    """Open a file without blocking: a pipe without a writer is empty."""
     return os.open(path, flags | os.O_NONBLOCK)
 
 

@@ -43,7 +43,7 @@ class Failure:
 
     @property
     def name(self) -> str:
-        """Name of the recording or sensor that is left out."""
+        """Name of the omitted recording or sensor."""
         return f"{self.sensor}/{self.recording}" if self.recording else self.sensor
 
     def row(self) -> FailureRow:
@@ -93,7 +93,7 @@ def read_with_failures(table: str, paths: Sequence[Path]) -> tuple[pa.Table, lis
 
 
 def write_empty(tables: Iterable[Path], failure: Failure) -> None:
-    """Write the tables that a step declares, without a row and with its failure."""
+    """Write the tables of a failed step: no rows, and the failure as metadata."""
     metadata = {_METADATA: json.dumps(asdict(failure), sort_keys=True).encode()}
     for path in tables:
         files.write_arrow(
@@ -144,7 +144,7 @@ def mark_failures(
 
 
 def append_new_rows(listed: Sequence[R], rows: Iterable[R]) -> list[R]:
-    """Return rows, and after them those others that are not among them."""
+    """Append other rows that are not yet among the rows."""
     known = {tuple(row.columns().values()) for row in listed}
     return [*listed, *(row for row in rows if tuple(row.columns().values()) not in known)]
 
@@ -152,7 +152,7 @@ def append_new_rows(listed: Sequence[R], rows: Iterable[R]) -> list[R]:
 def remove_recordings(
     tables: Mapping[str, pa.Table], left_out: Container[tuple[str, str | None]]
 ) -> dict[str, pa.Table]:
-    """Return tables without the rows of some (sensor, recording); those with the reason remain."""
+    """Return tables without the rows of some (sensor, recording), except rows with the reason."""
     filtered = dict(tables)
     for name, table in tables.items():
         if "recording" in table.schema.names and name not in _NAMED:

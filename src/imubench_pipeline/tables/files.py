@@ -31,7 +31,7 @@ class TableError(ValueError):
 
 
 def get_columns(table: str) -> tuple[TypedColumn, ...]:
-    """Return the columns of a table, or of the table that a file of a recording has rows of."""
+    """Return the columns of a table, by its name or by the name of a file of a recording."""
     return TABLES[PARTS_OF.get(table, table)]
 
 
@@ -82,7 +82,7 @@ def build(table: str, rows: Iterable[AnyRow]) -> pa.Table:
 
 
 def _plain(value: Any) -> Any:
-    """Return a value as Arrow takes it: texts are printable, structs are mappings."""
+    """Convert a value for Arrow: texts become printable, structs become mappings."""
     if isinstance(value, str):  # a reason may have several lines
         return "\n".join(map(escape_invisible, value.split("\n")))
     if isinstance(value, (tuple, list)):
@@ -102,7 +102,7 @@ def _plain_part(value: Any) -> Any:
 
 
 def _not_finite(table: pa.Table) -> str:
-    """Return the first cell of a table that is NaN or infinite, in words; empty if none is."""
+    """Describe the first cell of a table that is NaN or infinite; empty if there is none."""
     for name, column in zip(table.column_names, table.columns, strict=True):
         if pa.types.is_floating(column.type):
             finite = pc.is_finite(column)  # null where there is no value

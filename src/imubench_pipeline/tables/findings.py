@@ -58,7 +58,7 @@ def make_finding(row: FindingRow) -> Finding:
 
 
 def remove_addresses(reason: str) -> str:
-    """Return a text without addresses of objects, which are others in each run."""
+    """Return a text without addresses of objects, which differ between runs."""
     return _ADDRESS.sub("", reason)
 
 

@@ -1,4 +1,4 @@
-"""The names of a channel in every table, and division of tables by them."""
+"""Key columns of a channel in tables, and grouping of rows by them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Files and folders that a command writes where its user says, so that none destroys another.
+"""Output files and folders of commands, protected against accidental overwriting.
 
 One rule for every option that names an output (`add_output`): an existing file is refused without
 ``--force``; a folder must be empty or an earlier output of the same kind. Only regular files are
@@ -25,7 +25,7 @@ from imubench_pipeline.tables.texts import escape_invisible
 
 
 class OutputError(ValueError):
-    """An output that cannot be written where it is asked for; the text says how to mend it."""
+    """An output that cannot be written to the requested place; the text states the correction."""
 
 
 @dataclass(frozen=True)
@@ -42,7 +42,7 @@ class Place:
 
 @dataclass
 class Output:
-    """An output that the user of a command has named."""
+    """An output named by the user of a command."""
 
     path: Path  # as it was named
     adds_to: Collection[str] = ()  # kinds of places to which it may add new files
@@ -54,11 +54,11 @@ class Output:
         return escape_invisible(str(self.path))
 
     def check(self) -> Path:
-        """Return the path that is written, links followed; raises an `OutputError`."""
+        """Return the output path with links resolved; raises an `OutputError`."""
         raise NotImplementedError
 
     def _resolve(self) -> tuple[Path, os.stat_result | None]:
-        """Return the path behind all links, and the status of what is there."""
+        """Return the path with links resolved, and its file status."""
         if not str(self.path).isprintable():
             raise OutputError(f"{self}: expected a name of printable characters")
         try:
@@ -94,7 +94,7 @@ class Output:
             raise
 
     def _check_place(self, real: Path, *, exists: bool) -> None:
-        """Raise unless a path is in no place, or is a new one that belongs there."""
+        """Raise if a path is in a protected place, unless it is new and belongs there."""
         for place in self.places(real):
             if not _is_in(real, place.path) or (place.kind in self.adds_to and not exists):
                 continue
@@ -114,7 +114,7 @@ class OutputFile(Output):
     """A file that a command writes."""
 
     def check(self) -> Path:
-        """Return the path that is written, links followed."""
+        """Return the output path with links resolved."""
         real, status = self._resolve()
         if status is not None and stat.S_ISDIR(status.st_mode):
             raise OutputError(f"{self}: is a folder; name a file in it")
@@ -142,7 +142,7 @@ class OutputFile(Output):
             temporary.write_bytes(content.encode() if isinstance(content, str) else content)
 
     def beside(self, path: Path) -> OutputFile:
-        """Return another file of the same output."""
+        """Return a second file of the same output."""
         return replace(self, path=path)
 
 
@@ -155,7 +155,7 @@ class OutputFolder(Output):
     shared: bool = False  # it may have other files: only its own are refused where they exist
 
     def check(self) -> Path:
-        """Return the folder that is filled, links followed."""
+        """Return the output folder with links resolved."""
         real, status = self._resolve()
         if status is not None and not stat.S_ISDIR(status.st_mode):
             raise OutputError(f"{self}: is a file; name a folder")
@@ -285,7 +285,7 @@ def _is_at(path: Path, status: os.stat_result) -> bool:
 
 
 def _is_in(path: Path, folder: Path) -> bool:
-    """Return whether a path without links is a folder, or is in it; neither need be there."""
+    """Return whether a path without links is a folder or inside it; neither must exist."""
     try:
         status = folder.stat()
     except OSError:

@@ -56,7 +56,7 @@ def write_sealed(table: pa.Table, path: Path, compression: str) -> None:
 
 
 def is_seal_broken(path: Path) -> bool:
-    """Return whether the metadata are not as `write_sealed` wrote them; False without a digest."""
+    """Return whether metadata were changed after `write_sealed`; False without a digest."""
     footer = read_footer(path)
     place = _PLACE.search(footer)
     if place is None:
@@ -66,7 +66,7 @@ def is_seal_broken(path: Path) -> bool:
 
 
 def read_footer(path: Path) -> bytes:
-    """Return the metadata at the end of a Parquet file; empty if its end is another."""
+    """Return the metadata at the end of a Parquet file; empty if the end is invalid."""
     with path.open("rb") as file:
         size = file.seek(0, 2)
         file.seek(max(size - _END.size, 0))

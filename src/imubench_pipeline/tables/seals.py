@@ -33,7 +33,7 @@ def compute_form_digest() -> str:
 
 @dataclass(frozen=True)
 class SealedFile:
-    """A file as it was left: its size in bytes, its digest, its last change in ns since 1970."""
+    """State of an output file: size in bytes, digest, time of modification in ns since 1970."""
 
     size: int
     sha256: str
@@ -81,18 +81,18 @@ class Seal:
 
 
 class SealError(ValueError):
-    """A seal that is not as it was written."""
+    """A damaged or altered seal."""
 
 
 def name_place(step: str, sensor: str | None = None, recording: str | None = None) -> str:
-    """Return the place of the seal of a step, of a recording, a sensor, or all of them."""
+    """Return the path of the seal of a step, of a recording, a sensor, or all of them."""
     if recording is not None:
         return f"recordings/{sensor}/{recording}/{step}"
     return f"sensors/{sensor}/{step}" if sensor is not None else step
 
 
 def name_night_place(name: str) -> str:
-    """Return the place of the seal of the results of a nightly run."""
+    """Return the path of the seal of the results of a nightly run."""
     return f"{NIGHTS}/{name}"
 
 
@@ -112,7 +112,7 @@ def seal_files(
 
 
 def seal_again(results: Path, place: str, outputs: Iterable[Path]) -> None:
-    """Seal files that a command has written in place of a step; without a seal none is made."""
+    """Update the seal of files that a command has rewritten; do nothing without a seal."""
     try:
         before = read_seal(results, place)
     except (FileNotFoundError, SealError):
@@ -131,7 +131,7 @@ def list_missing_inputs(results: Path, place: str) -> list[str]:
 
 
 def compute_digests(results: Path, paths: Iterable[Path]) -> dict[str, str]:
-    """Return the digests of files below the results, and in folders there, by their places."""
+    """Return the digests of files and of files in folders, by path below the results."""
     return {name: compute_digest(path) for name, path in sorted(_below(results, paths))}
 
 
@@ -177,12 +177,12 @@ def is_visible(path: Path) -> bool:
 
 
 def name_seal_file(place: str) -> str:
-    """Return where below the results a seal is kept."""
+    """Return the path of a seal below the results."""
     return f"{FOLDER}/{place}.json"
 
 
 def _below(results: Path, paths: Iterable[Path]) -> Iterator[tuple[str, Path]]:
-    """Yield the files of paths below the results, with their places there."""
+    """Yield the files of paths, each with its path below the results."""
     for path in paths:
         if path.is_relative_to(results):
             inside = path.rglob("*") if path.is_dir() else [path]

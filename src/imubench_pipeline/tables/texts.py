@@ -1,4 +1,4 @@
-"""Make texts from logs, notes and names of folders safe for the programs that open them.
+"""Escape texts from logs, notes and folder names for the programs that open them.
 
 A spreadsheet takes a cell that begins with ``=``, ``+``, ``-`` or ``@``, also after a semicolon,
 for a formula, quoted or not. An apostrophe before it marks it as text.
@@ -31,7 +31,7 @@ def escape_cell(text: str) -> str:
 
 
 def escape_cells(table: pa.Table) -> pa.Table:
-    """Return a table with its texts as `escape_cell` gives them, and lists as texts."""
+    """Return a table with texts escaped by `escape_cell`, and lists as texts."""
     for place, field in enumerate(table.schema):
         if pa.types.is_list(field.type):
             texts = [
