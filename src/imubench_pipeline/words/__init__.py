@@ -1,1 +1,1 @@
-"""Sentences about data, made from typed values: the only room with texts that people read."""
+"""Sentences about data, made from typed values: the only package with texts for readers."""

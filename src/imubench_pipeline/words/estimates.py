@@ -43,7 +43,7 @@ def status_text(status: str) -> str:
 
 
 def symbol_text(symbol: str) -> str:
-    """Return the symbol of a parameter as it is printed."""
+    """Return the printed symbol of a parameter."""
     return _SYMBOLS.get(symbol, symbol)
 
 

@@ -1,4 +1,4 @@
-"""Numbers as they are printed: their digits, rounding and nouns, for pages, terminal and tables."""
+"""Formatting of numbers: digits, rounding and nouns, for pages, terminal and tables."""
 
 from __future__ import annotations
 
@@ -77,12 +77,12 @@ def digits_by(
 
 
 def _find_first_digit(value: float) -> int:
-    """Return the power of ten of the first digit; a rounding error below a power of ten is none."""
+    """Return the power of ten of the first digit, ignoring rounding errors below a power of ten."""
     return math.floor(math.log10(value) + 1e-9)
 
 
 def limit_digits(lower: float | None, upper: float | None, least: int = 3) -> int:
-    """Return with how many digits limits are printed, so that they are seen to differ."""
+    """Return the number of digits at which printed limits differ visibly."""
     if lower is None or upper is None or not upper > lower:
         return least
     ratio = max(abs(lower), abs(upper)) / (upper - lower)
@@ -90,7 +90,7 @@ def limit_digits(lower: float | None, upper: float | None, least: int = 3) -> in
 
 
 def duration_text(seconds: float | None) -> str:
-    """Return a time in the unit in which it is easily read; `NO_VALUE` where there is none."""
+    """Return a time in a suitable unit; `NO_VALUE` if there is none."""
     if seconds is None:
         return NO_VALUE
     for size, name in ((86400.0, "days"), (3600.0, "h"), (60.0, "min")):
@@ -110,12 +110,12 @@ def rates_text(rate: float | None, of_channels: Iterable[float]) -> str:
 
 
 def percent_text(share: float | None, digits: int = 3) -> str:
-    """Return a share of 1 in per cent; `NO_VALUE` where there is none."""
+    """Return a fraction in per cent; `NO_VALUE` if there is none."""
     return NO_VALUE if share is None else f"{number_text(100.0 * share, digits)} %"
 
 
 def degrees_text(angle: float | None, digits: int = 4) -> str:
-    """Return an angle in rad in degrees; `NO_VALUE` where there is none."""
+    """Return an angle, given in rad, in degrees; `NO_VALUE` if there is none."""
     return NO_VALUE if angle is None else f"{number_text(math.degrees(angle), digits)}°"
 
 
@@ -127,18 +127,18 @@ class Unit:
     per_si: float
 
     def text(self, value: float | None, digits: int = 4) -> str:
-        """Return a SI value in this unit, rounded to some digits; a dash where there is none."""
+        """Return an SI value in this unit, rounded to some digits; a dash if there is none."""
         return number_text(None if value is None else value * self.per_si, digits)
 
     def digits(self, value: float | None, lower: float | None, upper: float | None) -> int:
-        """Return the number of digits of a SI value and its limits in this unit."""
+        """Return the number of digits of an SI value and its limits in this unit."""
         if value is None or lower is None or upper is None:
             return digits_by(value, None, None)
         return digits_by(value * self.per_si, lower * self.per_si, upper * self.per_si)
 
 
 def interval_text(lower: float | None, upper: float | None, unit: Unit, least: int = 3) -> str:
-    """Return ``lower to upper``; a dash where they are not known."""
+    """Return ``lower to upper``; a dash if they are not known."""
     if lower is None or upper is None:
         return NO_VALUE
     digits = limit_digits(lower, upper, least)

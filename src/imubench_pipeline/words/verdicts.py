@@ -318,7 +318,7 @@ def _describe_units(factors: Iterable[UnitFactor]) -> str:
 def answer_text(
     rows: Sequence[RankingRow], names: Mapping[str, str], asked: int, excluded: int = 0
 ) -> str:
-    """Return in a line which sensor to choose: the best first, of those that are judged.
+    """Return the recommended sensors in one line, the best first; only judged ones.
 
     ``rows`` are the deciding rows of the judged sensors, the best first. ``asked`` is the number of
     sensors, judged or not; ``excluded`` the number of those that lack a demanded property.
@@ -361,7 +361,7 @@ _MAX_NAMES = 4  # maximum number of sensors that are named with one verdict
 
 
 def list_others(rows: Iterable[RankingRow], names: Mapping[str, str]) -> list[str]:
-    """Return the sensors with each verdict, or their number, from their deciding rows."""
+    """Return the sensors, or their number, by verdict, from their deciding rows."""
     by_heading: dict[str, list[str]] = {}
     listed = list(rows)
     for verdict in get_args(Verdict):

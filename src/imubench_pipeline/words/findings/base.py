@@ -87,7 +87,7 @@ class FindingData:
 
 
 def channel_name(channel: str) -> str:
-    """Return a channel as it stands in a sentence: ``gyro x``."""
+    """Return a channel in words: ``gyro x``."""
     return channel.replace("_", " ")
 
 

@@ -79,7 +79,7 @@ class PeriodicDrift(FindingData, affects=SLOW, doubt="the bias of {channels} osc
 class TelegraphNoise(
     FindingData, affects=SLOW | {"bias"}, doubt="the bias of {channels} steps repeatedly"
 ):
-    """The bias steps again and again between levels."""
+    """The bias steps repeatedly between levels."""
 
     steps: int  # minimum number of steps
 

@@ -28,7 +28,7 @@ def _at(seconds: float) -> str:
 
 
 def _change_of_n(correct: float, used: float) -> str:
-    """Return by what share N is too low or too high if another rate is correct: N ∝ rate^(-1/2)."""
+    """Return the relative error of N if another rate is correct: N ∝ rate^(-1/2)."""
     change = math.sqrt(used / correct) - 1.0
     return f"{percent_text(abs(change), 2)} {'higher' if change > 0.0 else 'lower'}"
 
@@ -196,7 +196,7 @@ class JitteredStamps(FindingData, affects=_TIMED, doubt="the time stamps are irr
 class IrregularStamps(
     FindingData, affects=_TIMED, doubt="some time stamps have more or fewer samples than others"
 ):
-    """Stamps that more or fewer samples share than others."""
+    """Time stamps shared by more or fewer samples than others."""
 
     stamps: int
     rate: float

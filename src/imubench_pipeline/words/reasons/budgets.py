@@ -42,7 +42,7 @@ NOT_KNOWN = "not known"
 
 
 def bias_not_known(quantity: str) -> str:
-    """Return that a budget has no turn-on bias of ``gyro`` or ``accel``."""
+    """Return the note that a budget has no turn-on bias of ``gyro`` or ``accel``."""
     return f"the turn-on bias of the {SENSORS[quantity]} is not known and not included"
 
 
@@ -78,7 +78,7 @@ def independent_draws(method: str, channel: str) -> str:
 
 
 def missing_numbers(names: Sequence[str]) -> str:
-    """Return which numbers an error lacks; ``names``: of columns."""
+    """Return the missing numbers of an error; ``names``: column names."""
     return f"the error has {join_names([f'no {_NUMBERS[name]}' for name in names])}"
 
 
@@ -119,7 +119,7 @@ def assumed_range(quantity: str, symbol: str, low: float, high: float, source: s
 
 
 def range_source(sensors: Sequence[str], price_class: str, *, measured: bool) -> str:
-    """Return where an assumed range is from; ``price_class`` is empty if it is of any class."""
+    """Return the source of an assumed range; ``price_class`` is empty if it is from all classes."""
     source = "measured sensors" if measured else "data sheets"
     which = f"class {price_class}" if price_class else "any class, as its own has none"
     return f"as in {source} of {which} ({', '.join(sensors)})"

@@ -110,7 +110,7 @@ def broadband_peak(tau: float, longest: float) -> str:
 
 
 def rises_to_end(tau: float) -> str:
-    """Return why the peak of processes that still rise at ``tau``, s, is not known."""
+    """Return why a curve that still rises at ``tau``, s, has no known peak."""
     return (
         f"the processes still rise at {number_text(tau)} s, a ninth of the log: only the interval "
         "is given"

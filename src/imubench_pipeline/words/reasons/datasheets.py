@@ -53,7 +53,7 @@ def density_of_rms(bandwidth: str | None = None, low_pass: str | None = None) ->
 
 
 def curve_plateau(floor: float) -> str:
-    """Return what else it is compared with; ``floor``: Allan deviation of flicker noise over B."""
+    """Return its second interpretation; ``floor``: Allan deviation of flicker noise over B."""
     return f"compared with the plateau of the bias instability, {number_text(floor, 3)} B"
 
 

@@ -62,7 +62,7 @@ def channel_not_printed(channel: str) -> str:
 
 
 def bias_instability_printed(floor: float, *, timed: bool) -> str:
-    """Return how a printed bias instability is used; ``floor``: over B."""
+    """Return the interpretation of a printed bias instability; ``floor``: its ratio to B."""
     text = f"B is the printed bias instability / {number_text(floor, 3)}"
     return text if timed else f"{text}, as flicker noise, because no correlation time is printed"
 
@@ -117,7 +117,7 @@ def static_noise(
     simulated: bool = False,
     channels: tuple[str, str] | None = None,
 ) -> str:
-    """Return from which static recording a noise model is.
+    """Return the static recording from which a noise model is.
 
     ``device``: of the recording if it is another one; ``channels``: the channel that is used, and
     the channel without an estimate, if they differ.

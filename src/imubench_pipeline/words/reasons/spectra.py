@@ -88,7 +88,7 @@ def fast_process_or_filter(time: float) -> str:
 
 
 def unfiltered_noise(share: float, low_pass: str, factor: float) -> str:
-    """Return how much of N_sensor bypasses a filter.
+    """Return the part of N_sensor that bypasses a filter.
 
     ``share``: power of the noise that bypasses it over that of the other; ``factor``: of N_sensor.
     """
