@@ -5,10 +5,10 @@ The front door
 ``import imubench_pipeline as imu`` gives
 
 ===========================  ======================================================================
-imu.read_log(path, sensor)   a log of any format in SI, on a time base, with what is wrong of it
+imu.read_log(path, sensor)   a log of any format in SI, on a time base, with its findings
 imu.allan_variance(data)     Allan curves with 95 % limits, of a log, an array or a table
 imu.estimate(data)           noise parameters with 95 % intervals, status and reason, and models
-imu.compare(a, b)            how many times the noise of one log is that of another
+imu.compare(a, b)            ratio of the noise of two logs
 imu.simulate(model, rate)    samples of a noise model
 imu.NoiseModel(N=, B=, ...)  Allan variance, spectrum and state space of a sum of noise terms
 imu.convert(x, unit, to)     figures from one unit of a vendor to another
@@ -29,8 +29,8 @@ rate           sampling rate, Hz; its inverse is the sampling interval T
 tau            cluster length, s; n samples are a cluster of n T
 Q              angle or velocity quantization, rad or m/s
 N              angle or velocity random walk, rad/sqrt(s) or m/s/sqrt(s)
-B              bias instability as IEEE Std 952 has it: the curve's plateau is 0.664 B; rad/s, m/s^2
-T_B            correlation time of the Gauss-Markov process that stands for B, s
+B              bias instability as in IEEE Std 952: the curve's plateau is 0.664 B; rad/s, m/s^2
+T_B            correlation time of the Gauss-Markov process that models B, s
 K              rate or acceleration random walk, rad/s/sqrt(s) or m/s^2/sqrt(s)
 R              rate or acceleration ramp, rad/s^2 or m/s^3
 F, GM          flicker noise; a first-order Gauss-Markov process
@@ -53,8 +53,7 @@ files), `recordings` (logs, judged and kept), `estimators` (parameters), `datash
 whole sensor), `navigation` (what noise means in use), `experiments` (known rates), `export`,
 `report`, `steps` (one module a rule of the workflow), `library` (the front door) and `run` (plan,
 processes, commands). Only `report`, `steps` and `run` know the files and the settings of a run
-together. ``docs/architecture.md`` says what may
-use what.
+together. ``docs/architecture.md`` lists the permitted imports.
 
 References
 ----------
@@ -99,7 +98,7 @@ _WHERE = {
     "estimate": "library.estimates",
     "read_log": "library.logs",
 }
-"""The module of each name, imported when it is asked for: numerics take a second to load."""
+"""The module of each name, imported on first use: numerics take a second to load."""
 
 
 def __getattr__(name: str) -> Any:

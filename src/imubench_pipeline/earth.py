@@ -1,4 +1,4 @@
-"""What the Earth does to a sensor at rest: its rate of rotation, and gravity."""
+"""Effect of the Earth on a sensor at rest: rate of rotation, and gravity."""
 
 from __future__ import annotations
 

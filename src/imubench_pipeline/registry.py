@@ -1,6 +1,6 @@
-"""What the packages in `extensions/` add to the core, which imports none of them.
+"""Registry of the extensions, which the core never imports directly.
 
-Each declares one `Extension`, as ``EXTENSION``. What it adds is named by references, such as
+Each declares one `Extension`, as ``EXTENSION``. Its contributions are named by references, such as
 ``"aided.limits:yield_outage_rows"``: an object of a module in `extensions/`, imported when the core
 asks for it through a `Hook`, which states its type. So each process of a run imports only what it
 needs.
@@ -29,7 +29,7 @@ recording."""
 
 @dataclass(frozen=True)
 class Block:
-    """A block of settings: where it stands, and a reference to the class of its model."""
+    """A block of settings: its location, and a reference to the class of its model."""
 
     place: Place
     key: str
@@ -39,7 +39,7 @@ class Block:
 
 @dataclass(frozen=True)
 class Extension:
-    """What one extension adds; references are named from the folder `extensions/`."""
+    """Contributions of one extension; references are relative to the folder `extensions/`."""
 
     name: str
     needs: tuple[str, ...] = ()  # other extensions, without which it is not used
@@ -62,7 +62,7 @@ class Extension:
 
 @cache
 def installed_extensions() -> tuple[Extension, ...]:
-    """Return the extensions whose packages are there, in alphabetical order."""
+    """Return the installed extensions, in alphabetical order."""
     names = sorted(module.name for module in pkgutil.iter_modules([str(FOLDER)]) if module.ispkg)
     found: list[Extension] = [
         import_module(f"{__package__}.extensions.{name}").EXTENSION for name in names
@@ -81,7 +81,7 @@ def files_of(what: File) -> list[Path]:
 
 
 class Hook(Generic[T]):
-    """A place of the core where extensions add objects of one type.
+    """A hook of the core, to which extensions add objects of one type.
 
     Parameters
     ----------
@@ -128,7 +128,7 @@ def load(reference: str) -> Any:
 
 
 def sources(of: str, name: str) -> list[Path]:
-    """Return the files that a module uses where it asks for what extensions add.
+    """Return the files of extensions that a module loads through the registry.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""The types that every room shares."""
+"""Types that are shared by all packages."""
 
 from __future__ import annotations
 

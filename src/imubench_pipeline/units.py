@@ -96,7 +96,7 @@ watt = [power] = W
 
 
 class UnitError(ValueError):
-    """An unknown unit, or one of another dimension than expected."""
+    """An unknown unit, or a unit of an unexpected dimension."""
 
 
 @contextmanager
@@ -119,7 +119,7 @@ def _registry() -> pint.UnitRegistry[float]:
 
 
 _MEANT: tuple[tuple[str, str], ...] = (
-    # what stands behind a unit: a condition, a remark, what kind of figure it is
+    # text after a unit: a condition, a remark, the kind of value
     (r"(?:,|\bover\b).*$", ""),
     (r"\s*\((?:OCR|total|typ|max|min)\.?\)\s*$", ""),
     (r"[\s-]*(?:\(?\brms\b\)?|1\s*[σs]igma|1\s*σ)\s*$", ""),
@@ -146,7 +146,7 @@ _MEANT: tuple[tuple[str, str], ...] = (
     (r"\bhour\b", "h"),
     (r"\bhr\b", "h"),
 )
-"""What vendors write, and what it means, in the order in which it is put right."""
+"""Spellings of vendors with their meaning, in the order of their replacement."""
 
 _REWRITTEN = tuple((re.compile(written, re.IGNORECASE), meant) for written, meant in _MEANT)
 _LOST_SIGN = re.compile(r"\(.*\blost\b.*\)")
@@ -174,7 +174,7 @@ def _expected(dimension: str) -> str:
 
 
 def _parsed(unit: str) -> tuple[float, pint.Unit]:
-    """Return a unit of the registry and the power of two beside it.
+    """Return the power of two in a unit as a factor, and the unit of the registry.
 
     Raises a `UnitError` without the expected unit.
     """
@@ -230,7 +230,7 @@ def _tokens(text: str) -> Iterator[str]:
 
 
 def _product(tokens: list[str], place: int) -> tuple[list[tuple[str, float]], int]:
-    """Return the units of a product and their exponents, and where it ends."""
+    """Return the units of a product with their exponents, and the end position."""
     exponents: list[tuple[str, float]] = []
     if tokens[place : place + 2] == ["1", "/"]:
         place += 1  # one over a unit
@@ -247,7 +247,7 @@ def _product(tokens: list[str], place: int) -> tuple[list[tuple[str, float]], in
 
 
 def _power(tokens: list[str], place: int) -> tuple[list[tuple[str, float]], int]:
-    """Return a unit or a bracket, raised to what stands behind it, and where that ends."""
+    """Return a unit or a bracket with its exponent, and the end position."""
     if place >= len(tokens):
         raise UnitError("something is missing at its end")
     token = tokens[place]
@@ -269,7 +269,7 @@ def _power(tokens: list[str], place: int) -> tuple[list[tuple[str, float]], int]
 
 
 def _exponent(tokens: list[str], place: int) -> tuple[float, int]:
-    """Return a number, or a ratio in brackets, and where it ends."""
+    """Return a number, or a ratio in brackets, and the end position."""
     bracket = tokens[place : place + 1] == ["("]
     exponent, place = _number(tokens, place + bracket)
     if bracket and tokens[place : place + 1] == ["/"]:

@@ -1,4 +1,4 @@
-"""What Snakemake looks for by this name where a profile says ``logger: imubench``."""
+"""Logger plug-in of Snakemake, for a profile with ``logger: imubench``."""
 
 from imubench_pipeline.run.progress import LogHandler
 

@@ -1,4 +1,4 @@
-"""Say what vendors publish of the sensors of the catalogue."""
+"""List the figures that vendors publish for the sensors of the catalogue."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""Say what the estimated noise of a recording means for dead reckoning, and what its log shows."""
+"""Compute the dead-reckoning errors of a recording by its noise, and compare them with its log."""
 
 from pathlib import Path
 

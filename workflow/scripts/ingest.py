@@ -1,4 +1,4 @@
-"""Read a recording into Parquet; one that cannot be used is recorded as rejected."""
+"""Convert a recording to Parquet; an unusable one is recorded as rejected."""
 
 from pathlib import Path
 

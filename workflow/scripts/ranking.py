@@ -1,4 +1,4 @@
-"""Rank the sensors for each requirement, and say what would help the verdicts most."""
+"""Rank the sensors for each requirement, and recommend next steps."""
 
 from pathlib import Path
 
