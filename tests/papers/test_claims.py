@@ -19,13 +19,13 @@ RUN = Evidence()
         (Result(value=2.11), "differs"),
         (Result(value=2.5, lower=1.9, upper=3.1), "agrees"),
         (Result(value=2.5, lower=2.2, upper=3.1), "differs"),
-        (Result(), "not to be had"),
+        (Result(), "not available"),
     ],
 )
 def test_the_verdict_follows_from_the_numbers(result: Result, verdict: str) -> None:
     assert judge(2.0, result, 0.05) == verdict
     assert judge(-2.0, Result(value=-2.09), 0.05) == "agrees"
-    assert judge(None, result, 0.05) == "not to be had"
+    assert judge(None, result, 0.05) == "not available"
 
 
 @pytest.mark.parametrize(

@@ -139,7 +139,7 @@ def test_what_the_log_is_made_of_is_said_to_come_back(lines: dict[str, Any]) -> 
     weighted = [row for row in lines["Table 3"] if row["quantity"].startswith("weighted")]
     assert len(weighted) == 8
     for row in [*weighted, *(line for n in range(2, 6) for line in lines[f"Figure {n}"])]:
-        assert row["basis"] == "come back"
+        assert row["basis"] == "round trip"
         assert row["ratio"] is None and row["tolerance"] is None
 
 

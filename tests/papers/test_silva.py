@@ -59,7 +59,7 @@ def test_a_week_shows_k_by_reading_and_two_days_seldom_do() -> None:
 def test_a_filter_improves_the_pairs_by_a_per_cent() -> None:
     gains = silva.compute_filter_gain(Evidence()).fields
     assert 0.3 < gains["least"] and gains["most"] < 1.35
-    assert ROWS["Section 8", "what a Kalman filter improves"]["found_words"] == (
+    assert ROWS["Section 8", "improvement by a Kalman filter"]["found_words"] == (
         "σ is 0.4 to 1.2 % less than that of the mean over pairs"
     )
 
@@ -101,7 +101,7 @@ def test_each_hypothesis_is_possible_or_refuted() -> None:
         if quantity.startswith("hypothesis: ")
     }
     possible = {"warm-up", "turns miscounted", "samples of the turns in the means",
-                "dwells cut by a clock that is off"}  # fmt: skip
+                "dwells cut with a wrong clock rate"}  # fmt: skip
     assert {name for name, verdict in verdicts.items() if verdict == "possible"} == possible
     assert len(verdicts) == 8 and set(verdicts.values()) == {"possible", "refuted"}
 
@@ -141,7 +141,7 @@ def test_errors_are_those_of_the_earths_rate() -> None:
     for along in (3.50, 7.35):
         assert f"{along / math.cos(math.radians(23.3)):.1f}" in row["found_words"]
     white = 0.0122 * 3600.0 / math.sqrt(56.0) / math.cos(math.radians(23.3))
-    said = float(row["reason"].split("tells it to ")[1].split()[0])
+    said = float(row["reason"].split("gives ")[1].split()[0])
     assert white < said < 1.1 * white
 
 

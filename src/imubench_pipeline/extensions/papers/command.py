@@ -46,7 +46,7 @@ def run(arguments: argparse.Namespace) -> int:
         from imubench_pipeline.extensions.papers.papers import make_rows_without_run
 
         rows = list(make_rows_without_run())
-        expected = "without the results of a run: what needs no log"
+        expected = "without the results of a run: only lines that need no log"
     else:
         from imubench_pipeline.tables import find_tables, read
 
@@ -108,7 +108,7 @@ def _make_parts(title: str, rows: Sequence[PublishedRow], width: int) -> Iterato
 
 
 COMMAND = Command(
-    "print the figures of the papers, line by line, with the computed ones",
+    "print the values of the papers, line by line, with the computed ones",
     add_arguments,
     run,
     ("printed", "", NO_RESULTS),

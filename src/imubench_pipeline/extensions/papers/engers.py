@@ -214,7 +214,7 @@ def count_equal(run: Evidence, grade: str, option: str) -> Result | None:
             return None
         if all(row.printed is None for row in rows):
             reason = f"noise of {rows[0].grade_name}: {rows[0].reason}"
-            return Result(words="", verdict="not to be had", reason=reason)
+            return Result(words="", verdict="not available", reason=reason)
         by = {row.statistic: row for row in reversed(rows)}
         shown = []
         for statistic, what in (("N", "white noise"), ("sigma_min", "lowest point")):

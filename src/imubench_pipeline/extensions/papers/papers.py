@@ -114,14 +114,14 @@ def evaluate(line: Line, evidence: Evidence) -> Result:
     if callable(found):
         found = found(evidence, *arguments)
     if found is None:
-        return Result(words="", verdict="not to be had", reason=line.missing)
+        return Result(words="", verdict="not available", reason=line.missing)
     return found if isinstance(found, Result) else Result(value=found)
 
 
 def judge(printed: float | None, result: Result, tolerance: float) -> Verdict:
     """Return the verdict on a printed number from the numbers of the result."""
     if result.value is None or printed is None:
-        return "not to be had"
+        return "not available"
     inside = (
         result.lower is not None
         and result.upper is not None

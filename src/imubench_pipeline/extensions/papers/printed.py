@@ -20,11 +20,11 @@ from imubench_pipeline.settings.yaml_files import read_yaml
 _FOLDER = Path(__file__).with_name("data")
 KEYS = ("maia", "silva", "engers")  # names of the files, in the order of display
 
-Basis = Literal["come back", "simulated", "computed", "checked"]
+Basis = Literal["round trip", "simulated", "computed", "checked"]
 """Basis of a result; `Terms.bases` describes it."""
 
 Verdict = Literal[
-    "agrees", "differs", "possible", "refuted", "misprint", "done here", "not to be had"
+    "agrees", "differs", "possible", "refuted", "misprint", "new result", "not available"
 ]
 
 _POWERS = str.maketrans("⁰¹²³⁴⁵⁶⁷⁸⁹⁻,", "0123456789-.")

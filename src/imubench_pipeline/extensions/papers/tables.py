@@ -27,11 +27,11 @@ class PublishedRow(TableRow):
     scale: Annotated[float, Column("one printed unit", "as in unit")]
     basis: Annotated[str, Column("basis of the result: come back, simulated, computed or checked")]
     verdict: Annotated[
-        str, Column("agrees, differs, possible, refuted, misprint, done here or not to be had")
+        str, Column("agrees, differs, possible, refuted, misprint, new result or not available")
     ]
     reason: Annotated[str | None, Column("why they differ")] = None
-    page: Annotated[str | None, Column("of the report, where its counterpart is")] = None
-    check: Annotated[str, Column("test or benchmark that stands behind the line")]
+    page: Annotated[str | None, Column("page of the report with its counterpart")] = None
+    check: Annotated[str, Column("test or benchmark of the line")]
 
 
 @table("accuracy")
@@ -46,5 +46,5 @@ class AccuracyRow(TableRow):
     bias: Annotated[float | None, Column("their mean error over the truth")] = None
     bound: Annotated[float, Column("Cramér-Rao bound of the standard deviation over the truth")]
     ratio: Annotated[float | None, Column("rmse over bound")] = None
-    ratio_lower: Annotated[float | None, Column("lower 95 % limit of it, as logs are few")] = None
-    ratio_upper: Annotated[float | None, Column("upper 95 % limit of it")] = None
+    ratio_lower: Annotated[float | None, Column("lower 95 % limit for this number of logs")] = None
+    ratio_upper: Annotated[float | None, Column("upper 95 % limit for this number of logs")] = None
