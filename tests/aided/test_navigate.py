@@ -189,4 +189,4 @@ def test_accelerometers_alone_say_why_they_do_not_navigate(tmp_path: Path) -> No
     put(tmp_path / "a", ("accel_x",))
     (row,) = run(tmp_path / "a", [], None)
     assert row["position"] is None
-    assert row["reason"] == "the recording tells no white noise of a gyro"
+    assert row["reason"] == "the recording has no estimate of gyro white noise"

@@ -112,7 +112,7 @@ def test_where_there_is_no_heading_the_words_say_why(tmp_path: Path) -> None:
             assert row["heading"] is None
         assert (row["heading"] is None) == (row["reason"] is not None)
     said = {row["positions"]: row["reason"] for row in rows if row["reason"]}
-    assert "biases is more than the horizontal part" in said[1] and "takes longer" in said[2]
+    assert "biases exceeds the horizontal part" in said[1] and "record for longer" in said[2]
 
 
 @pytest.mark.release

@@ -65,7 +65,8 @@ COLUMN = {"column": 4, "unit": "deg/s"}
         ),
         (
             {"rate_table": {"steps": STEPS}, "log": {"channels": THREE}},
-            "rate_table.channel: missing; expected the gyro whose axis is along that of the table",
+            "rate_table.channel: missing; expected the gyro whose axis is along the axis of the "
+            "table",
         ),
         (
             {"rate_table": {}, "log": {"table_rate": COLUMN | {"unit": "m/s"}}},

@@ -102,12 +102,12 @@ def test_what_cannot_be_told_is_said():
     blocks = RUN.blocks(8)
     ones = np.ones((len(blocks), 1))
     for x, says in (
-        (np.hstack([ones, 2.0 * ones]), "from each other .bias, rate"),
+        (np.hstack([ones, 2.0 * ones]), "cannot separate these .bias, rate"),
         (np.hstack([ones, 0.0 * ones]), "0 throughout"),
     ):
         with pytest.raises(NotObservableError, match=says):
             LeastSquares(blocks, MODELS["N"], x, names=["bias", "rate"])
-    with pytest.raises(NotObservableError, match="1 means cannot tell 2"):
+    with pytest.raises(NotObservableError, match="1 means cannot determine 2"):
         LeastSquares(blocks.chosen(slice(0, 1)), MODELS["N"], np.ones((1, 2)))
 
 

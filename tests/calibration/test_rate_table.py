@@ -170,7 +170,7 @@ def test_the_direction_of_the_axis_is_in_the_bias():
 def test_one_rate_tells_no_scale_factor():
     one = Schedule.from_steps([(0, 20, 0.5), (25, 50, 0.5)], 8.0)
     with pytest.raises(
-        NotObservableError, match=r"one rate only, 0\.5 rad/s: a scale factor cannot"
+        NotObservableError, match=r"one rate only, 0\.5 rad/s: scale factor and bias cannot"
     ):
         calibrate(np.zeros(400), one, MODELS["N"])
 

@@ -36,7 +36,7 @@ def test_what_is_declared_in_si() -> None:
         ({"latitude": None}, "latitude is missing; expected where the log was recorded, such as"),
         ({"dwell": None}, "dwell is missing; expected the time from one turn to the next"),
         ({"latitude": "90 deg"}, "latitude: found '90 deg'; expected a latitude between the poles"),
-        ({"latitude": "89.5 deg"}, "at a pole a horizontal axis sees nothing"),
+        ({"latitude": "89.5 deg"}, "at a pole a horizontal axis does not sense"),
         ({"latitude": 45}, "latitude: found"),
         ({"dwell": "0 s"}, "dwell: found '0 s'; expected a time above zero"),
         ({"dwell": "30 deg"}, "dwell: found '30 deg'"),

@@ -179,7 +179,7 @@ def test_without_a_transient_the_schedule_decides_and_the_result_says_so() -> No
     assert ways(found) == {"schedule"}
     assert {dwell.found_by for dwell in found.dwells} == {"schedule"}
     assert all("schedule" in dwell.doubts[0] for dwell in found.dwells)
-    assert any("the schedule decides" in doubt for doubt in found.doubts)
+    assert any("the schedule is used" in doubt for doubt in found.doubts)
     assert found.turns[0].stop - found.turns[0].start == pytest.approx(2.0 * 3.0 + TURN)
 
 

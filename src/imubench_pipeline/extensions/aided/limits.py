@@ -67,7 +67,8 @@ def _make_row(
     if run.consistent is False:
         inside = 100.0 * (run.nees_inside or 0.0)
         reason = (
-            f"the filter of this sensor goes astray: NEES is inside in {inside:.0f} % instead of 95"
+            f"the filter of this sensor is inconsistent: NEES is inside its bounds in {inside:.0f} "
+            "% instead of 95"
         )
         return replace(unknown, reasons=(reason,))
     found = {

@@ -39,37 +39,43 @@ class NavigateSettings(Strict):
     """Filters with every available tuning of a sensor, on simulated drives with GNSS outages."""
 
     of: Literal["none", "simulated", "all"] = Field(
-        "simulated", description="sensors: of simulated recordings alone, all, or none"
+        "simulated", description="sensors: only those with simulated recordings, all, or none"
     )
     trajectories: tuple[Trajectory, ...] = Field(("field",), min_length=1)
     outages: tuple[Outage, ...] = Field(
-        ("10 s", "30 s", "60 s"), min_length=1, description="without GNSS, one after the other"
+        ("10 s", "30 s", "60 s"),
+        min_length=1,
+        description="durations without GNSS, one after the other",
     )
     duration: Annotated[Duration, AfterValidator(_of_drive)] = Field(
-        "310 s", description="of a run; the first 120 s have GNSS; at least what its outages take"
+        "310 s",
+        description="duration of a run; the first 120 s have GNSS; long enough for its outages",
     )
     rate: Annotated[Frequency, AfterValidator(_of_filter)] = Field(
-        "50 Hz", description="of the samples that a filter is given"
+        "50 Hz", description="sampling rate of the filter input"
     )
     runs: int = Field(
         12,
         ge=4,
         le=10_000,
-        description="of each trajectory; 100 of 10 min make the errors sure to 5 %",
+        description="number of runs of each trajectory; 100 runs of 10 min determine the errors to "
+        "5 %",
     )
     gyro_bias: RateFromZero = Field(
-        "0.1 deg/s", description="standard deviation of the bias that is another at each switch-on"
+        "0.1 deg/s", description="standard deviation of the turn-on bias"
     )
     accel_bias: AccelerationFromZero = Field("3 mg", description="likewise of accelerometers")
     accel_noise: _AccelerationDensity = Field(
         "100 ug/sqrt(Hz)",
-        description="two-sided density of the accelerometers that stand in where a log has none",
+        description="two-sided density of the assumed accelerometers if a log has none",
     )
     gyro_scale: float = Field(
         0.0, ge=0, lt=0.1, description="standard deviation of the error of the scale factor"
     )
     accel_scale: float = Field(0.0, ge=0, lt=0.1, description="likewise of accelerometers")
     temperature_change: Annotated[Text, _difference] | None = Field(
-        None, examples=["10 K"], description="over a run, where the drift of a sensor is known"
+        None,
+        examples=["10 K"],
+        description="temperature change over a run, for sensors with a known temperature drift",
     )
     seed: int = Field(20260101, ge=0)

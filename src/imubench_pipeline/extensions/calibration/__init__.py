@@ -10,20 +10,20 @@ EXTENSION = Extension(
             "notes",
             "rate_table",
             "calibration.settings:OnRateTable",
-            "a gyro on a rate table, for scale factor and bias; null: it was on none",
+            "a gyro on a rate table, for scale factor and bias; null: not on a rate table",
         ),
         Block(
             "notes",
             "positions",
             "calibration.settings:InPositions",
-            "a triad that stood in several positions, to find its attitude; null: in one",
+            "a triad in several positions, to find its attitude; null: in one position",
         ),
         Block(
             "notes",
             "pointing",
             "calibration.settings:AtRest",
-            "where the axis of a gyro at rest points, for its bias without what the Earth "
-            "adds; null: not known",
+            "direction of the axis of a gyro at rest, for its bias without the Earth's rate; null: "
+            "not known",
         ),
         Block("simulated", "rate_table", "calibration.settings:SimulatedTable"),
         Block("simulated", "positions", "calibration.settings:SimulatedPositions"),

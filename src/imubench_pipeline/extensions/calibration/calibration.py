@@ -188,7 +188,7 @@ def _attitude(
 
     missing = [name for name in TRIAD if name not in logs]
     if missing:
-        reason = f"{', '.join(missing)} cannot be used; the findings of the recording say why"
+        reason = f"{', '.join(missing)} cannot be used; see the findings of the recording"
         yield from without("not_shown", reason)
         return
     if any(len(logs[name].segments) > 1 for name in TRIAD):
@@ -357,8 +357,8 @@ def _schedule(gyro: GyroLog, declared: OnRateTable) -> Schedule:
     if not declared.steps:
         if not log.table_rate:
             raise ValueError(
-                "log.table_rate: the column has another clock than the gyro; give it as a column "
-                "of the same file, or state the steps (rate_table: steps)"
+                "log.table_rate: the column has another clock than the gyro; put it into the same "
+                "file, or state the steps (rate_table: steps)"
             )
         try:
             return Schedule.from_column(

@@ -222,7 +222,7 @@ def block_means(parts: Iterable[Array], experiment: Experiment, longest: int) ->
         raise ValueError(f"the log has {length} samples, the last dwell ends at {whole.stop[-1]}")
     enough = count >= np.maximum(_MIN_PRESENT_SHARE * whole.count, 1)
     if not enough.any():
-        raise ValueError("no block has enough samples: all of the dwells is missing")
+        raise ValueError("no block has enough samples: all dwells are missing")
     return Measured(
         replace(whole.chosen(enough), count=count[enough]),
         (total[enough] / count[enough])[None, :],

@@ -85,7 +85,7 @@ def compute_limits(value: Array, sigma: Array | float) -> Limits:
 def compute_half_width(level: float = CONFIDENCE_LEVEL) -> float:
     """Return half of a two-sided normal interval, in standard deviations, for a level in (0, 1)."""
     if not 0 < level < 1:
-        raise ValueError(f"level is {level}, expected one between 0 and 1")
+        raise ValueError(f"level is {level}, expected a number between 0 and 1")
     return float(norm.ppf(0.5 + level / 2.0))
 
 
@@ -109,7 +109,7 @@ class LeastSquares:
         listed = f" ({', '.join(names)})" if names else ""
         if len(blocks) < regressors.shape[1]:
             raise NotObservableError(
-                f"{len(blocks)} means cannot tell {regressors.shape[1]} parameters{listed}"
+                f"{len(blocks)} means cannot determine {regressors.shape[1]} parameters{listed}"
             )
         self._blocks = blocks
         covariance = block_mean_covariance(model, blocks)
@@ -122,7 +122,7 @@ class LeastSquares:
             raise NotObservableError(f"a regressor is 0 throughout{listed}")
         basis, values, turn = np.linalg.svd(white / length, full_matrices=False)
         if values[-1] < _MIN_SINGULAR_VALUE:
-            raise NotObservableError(f"the data cannot tell these from each other{listed}")
+            raise NotObservableError(f"the data cannot separate these{listed}")
         self._basis = basis
         self._back = (turn.T / values) / length[:, None]
         self.covariance = self._back @ self._back.T

@@ -147,8 +147,8 @@ class RateTable:
         open_heading = pointing is not None and pointing.heading is None
         if pointing and open_heading and pointing.half_width > _MAX_UNKNOWN_RATE:
             raise ValueError(
-                "the heading of the table's axis is not known: give it, or leave the direction out "
-                "and the Earth's rate is a part of the bias"
+                "the heading of the table's axis is not known: state it, or omit the direction; "
+                "the Earth's rate is then a part of the bias"
             )
         earth = 0.0 if pointing is None else pointing.rate
         self._earth_sigma = 0.0 if pointing is None else pointing.rate_sigma
@@ -162,8 +162,8 @@ class RateTable:
         self._rates = np.array([rate[self._levels == level][0] for level in range(number)])
         if number < 2:
             raise NotObservableError(
-                f"the table has one rate only, {rate[0]:g} rad/s: a scale factor cannot be told "
-                "from a bias; another rate is needed, best of the other sense"
+                f"the table has one rate only, {rate[0]:g} rad/s: scale factor and bias cannot be "
+                "separated; add another rate, best of the opposite sense"
             )
         further = setting_sigma**2 * np.equal.outer(blocks.dwell, blocks.dwell)
         ones = np.ones(len(blocks))
@@ -183,17 +183,15 @@ class RateTable:
             self._each = squares(*np.eye(number)[self._levels].T)
         else:
             for name in ("quadratic", "linearity"):
-                self._open.append(
-                    NotObservable(name, "two rates lie on a line whatever the gyro does")
-                )
+                self._open.append(NotObservable(name, "two rates always lie on a line"))
         try:
             self._asymmetry = squares(ones, rate, np.abs(rate) / 2.0)
         except NotObservableError:
             self._open.append(
                 NotObservable(
                     "asymmetry",
-                    "it takes three rates, and both senses among them: otherwise it is a bias or a "
-                    "scale factor",
+                    "three rates with both senses are required: otherwise it cannot be separated "
+                    "from bias or scale factor",
                 )
             )
 

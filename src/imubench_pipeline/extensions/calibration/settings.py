@@ -66,7 +66,7 @@ class AtRest(Direction, Experiment):
     is_static: ClassVar[bool] = True
 
     channel: Gyro | None = Field(
-        None, description="whose axis that is; null: the only gyro of the log"
+        None, description="channel of this axis; null: the only gyro of the log"
     )
 
     def moved_gyro(self, channels: Sequence[str], *, column: bool = False) -> str:
@@ -77,9 +77,11 @@ class AtRest(Direction, Experiment):
 class Step(Strict):
     """A steady rate of the table."""
 
-    start: TimeFromZero = Field(description="from the first sample of the recording")
+    start: TimeFromZero = Field(description="time from the first sample of the recording")
     end: TimeFromZero = Field(description="likewise")
-    rate: Rate = Field(description="of the table, positive where a good gyro reads more")
+    rate: Rate = Field(
+        description="rate of the table, positive if a correct gyro reads a positive rate"
+    )
 
     @model_validator(mode="after")
     def _check_end(self) -> Self:
@@ -158,22 +160,27 @@ class OnRateTable(Experiment):
                 f"steps: found {len(self.steps)} of them, and the column log.table_rate; expected "
                 "one of the two: leave one out"
             )
-        return stated_gyro(self.channel, channels, "is along that of the table")
+        return stated_gyro(self.channel, channels, "is along the axis of the table")
 
 
 class InPositions(Experiment):
     """A triad that is turned about its z axis, by the clock, and stands still between the turns."""
 
-    latitude: Latitude = Field(description="of the place, with its unit; south is negative")
+    latitude: Latitude = Field(
+        description="latitude of the place, with its unit; south is negative"
+    )
     dwell: Time = Field(description="from the start of one turn to the start of the next")
-    turning: TimeFromZero = Field("2 s", description="of it at the end that the turn takes")
+    turning: TimeFromZero = Field(
+        "2 s", description="part of this time, at its end, that the turn takes"
+    )
     turned: tuple[Angle, ...] = Field(
         ("0 deg", "180 deg"),
         min_length=1,
-        description="angle of each position from the first, about z; they follow each other again "
-        "and again",
+        description="angle of each position from the first, about z; the sequence repeats",
     )
-    gyro_bias: RateFromZero = Field("0.5 deg/s", description="standard deviation of each")
+    gyro_bias: RateFromZero = Field(
+        "0.5 deg/s", description="standard deviation of the fixed bias of each gyro"
+    )
     accelerometer_bias: AccelerationFromZero = Field("20 mg", description="likewise")
 
     @model_validator(mode="after")
@@ -211,7 +218,7 @@ class SimulatedTable(OnRateTable):
     """A gyro on a rate table that keeps to its steps, with ramps between them."""
 
     scale_factor: float = Field(1.0, gt=0, description="true one: indicated over true rate")
-    assumed: tuple[Text, ...] = Field((), description="figures that no source publishes")
+    assumed: tuple[Text, ...] = Field((), description="values that no source publishes")
 
     @model_validator(mode="after")
     def _require_steps(self) -> Self:
@@ -231,7 +238,7 @@ class SimulatedPositions(InPositions):
     roll: Angle = Field("0 deg", description="true one, in the first position")
     pitch: Angle = Field("0 deg", description="likewise")
     heading: Angle = Field("0 deg", description="likewise, from north towards east")
-    assumed: tuple[Text, ...] = Field((), description="figures that no source publishes")
+    assumed: tuple[Text, ...] = Field((), description="values that no source publishes")
 
     @property
     def true_angles(self) -> dict[str, float]:
@@ -251,8 +258,8 @@ class SimulatedPositions(InPositions):
 class SimulatedRest(AtRest):
     """A gyro at rest that senses its part of the Earth's rate."""
 
-    true_heading: Angle = Field("0 deg", description="of the axis, where heading is null")
-    assumed: tuple[Text, ...] = Field((), description="figures that no source publishes")
+    true_heading: Angle = Field("0 deg", description="true heading of the axis, if heading is null")
+    assumed: tuple[Text, ...] = Field((), description="values that no source publishes")
 
     @property
     def declared(self) -> AtRest:

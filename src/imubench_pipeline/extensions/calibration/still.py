@@ -115,13 +115,12 @@ def not_observable(pointing: Pointing) -> tuple[NotObservable, ...]:
     quantities = [
         NotObservable(
             "earth_rate",
-            "in one position the Earth's rate and the bias enter every reading as the same sum: "
-            "the rate has to be known for the bias, and the bias for the rate",
+            "in one position, only the sum of Earth's rate and bias is observable: each can be "
+            "found only if the other is known",
         ),
         NotObservable(
             "scale_factor",
-            "one rate is sensed throughout: an error of the scale factor is a part of the bias, "
-            "of that rate times the error",
+            "only one rate is present, so a scale factor error cannot be separated from the bias",
         ),
     ]
     if pointing.heading is None and pointing.half_width > _MIN_HEADING_SENSITIVITY * abs(
@@ -130,8 +129,8 @@ def not_observable(pointing: Pointing) -> tuple[NotObservable, ...]:
         quantities.append(
             NotObservable(
                 "heading",
-                "the heading is not known: the bias is told only to plus or minus w_ie "
-                "cos(latitude) cos(elevation), beside its noise",
+                "the heading is not known: besides the noise, the bias is uncertain by ± w_ie "
+                "cos(latitude) cos(elevation)",
                 pointing.half_width,
             )
         )

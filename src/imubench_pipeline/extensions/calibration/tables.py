@@ -50,7 +50,7 @@ class CalibrationRow(OfRecordingRow):
     elevation: Annotated[float | None, Column("of the axis above the horizon", "rad")] = None
     duration: Annotated[float | None, Column("from the first to the last sample used", "s")] = None
     samples: Annotated[int | None, Column("used")] = None
-    rates: Annotated[int | None, Column("of the table that are steady")] = None
+    rates: Annotated[int | None, Column("number of steady rates of the table")] = None
     model: Annotated[str | None, Column("terms of the noise model")] = None
     model_from: Annotated[str | None, Column("source of the noise model")] = None
 
@@ -66,7 +66,7 @@ class CalibrationPointRow(OfRecordingRow):
     table_rate: Annotated[float, Column("of the table", "rad/s")]
     earth_rate: Annotated[float, Column("along the axis; 0 if unknown", "rad/s")]
     mean: Annotated[float, Column("mean reading", "rad/s")]
-    line: Annotated[float, Column("bias and scale factor at that rate", "rad/s")]
+    line: Annotated[float, Column("value of the fitted line at this rate", "rad/s")]
     residual: Annotated[float, Column("mean less line", "rad/s")]
     sigma: Annotated[float, Column("standard deviation of the residual by the noise", "rad/s")]
 

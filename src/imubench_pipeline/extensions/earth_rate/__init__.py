@@ -12,8 +12,8 @@ EXTENSION = Extension(
             "notes",
             "two_position",
             "earth_rate.settings:TwoPosition",
-            "a gyro that was turned between north and south to find the Earth's rate; "
-            "null: the sensor was at rest all the time",
+            "a gyro turned between north and south to find the Earth's rate; null: the sensor was "
+            "at rest",
         ),
         Block("simulated", "two_position", "earth_rate.settings:SimulatedTurns"),
     ),

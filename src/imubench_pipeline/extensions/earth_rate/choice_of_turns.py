@@ -101,7 +101,10 @@ def find_turns(
         doubts.append("handling at the ends of the log is left out")
     silent = sum(turn.found_by == "schedule" for turn in seen)
     if silent:
-        doubts.append(f"{silent} of {len(seen)} turns rest on the schedule: nothing shows them")
+        doubts.append(
+            f"{silent} of {len(seen)} turns are from the schedule only: they are not visible in "
+            "the log"
+        )
     usual = float(np.median(np.diff([turn.time for turn in seen]))) if len(seen) > 1 else declared
     if abs(usual / declared - 1.0) > 0.25:
         doubts.append(f"the usual dwell is {usual:.1f} s, not {declared:g} s")
@@ -132,10 +135,10 @@ def _merge_into_turns(
                     start, stop = min(start, other.start), max(stop, other.stop)
                     peak = max(peak, other.peak)
                     used.add(i)
-                    doubts = ["overrun and come back, or handled beside the turn"]
+                    doubts = ["overrun and returned, or handled near the turn"]
                 i += step
         if event.likelihood < CLEAR_LOG_LIKELIHOOD:
-            doubts.append("hardly above the noise")
+            doubts.append("only slightly above the noise")
         if event.haste:
             doubts.append("as short as a knock")
         if event.kind == "step":
@@ -182,7 +185,7 @@ def _fill_gaps(
 
 def _make_silent_turn(time: float, schedule: TurnSchedule) -> Turn:
     half = _compute_half_width(schedule)
-    words = ("nothing is seen of it: the schedule says so",)
+    words = ("not visible: from the schedule only",)
     return Turn(time - half, time + half, time, "schedule", None, words)
 
 
@@ -223,7 +226,7 @@ def _follow_schedule(
                 "the schedule's word)"
             )
         doubts.append(
-            f"no turns are seen: the schedule decides, and the level alternates with it by "
+            f"no turns are visible: the schedule is used, and the level alternates with it by "
             f"{size:.1f} standard errors"
         )
     turns, used = [], set()

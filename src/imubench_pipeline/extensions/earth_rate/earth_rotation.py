@@ -85,7 +85,7 @@ def make_earth_rate_tables(
     channel = declared.moved_gyro([*logs, *metadata["unusable"]])
     key = Key(sensor, recording, channel)
     if channel not in logs:
-        reason = f"{channel} cannot be used; the findings of the recording say why"
+        reason = f"{channel} cannot be used; see the findings of the recording"
         rows["earth_rate"] = list(_without(_names(key, declared), WHOLE, "not_shown", reason))
         return rows
     how = EarthRateSettings.model_validate(sections["earth_rate"])

@@ -27,7 +27,7 @@ _Rate = Annotated[Text, make_validator("angular_rate")]
 TimeFromZero = Annotated[Text, _from_zero("time", "a time"), Field(examples=["2 s"])]
 
 _REQUIRED_KEYS = {
-    "latitude": "where the log was recorded, such as latitude: 45.1 deg (south: negative)",
+    "latitude": "the latitude of the place, such as latitude: 45.1 deg (south: negative)",
     "dwell": "the time from one turn to the next, such as dwell: 30 s",
 }
 
@@ -66,7 +66,7 @@ class TwoPosition(Experiment):
     def _check_latitude(cls, latitude: str) -> str:
         if abs(parse_quantity(latitude, "angle")) > parse_quantity("89 deg", "angle"):
             raise ValueError(
-                "expected at most 89 deg: at a pole a horizontal axis sees nothing of the Earth's "
+                "expected at most 89 deg: at a pole a horizontal axis does not sense the Earth's "
                 "rate"
             )
         return latitude
@@ -112,15 +112,17 @@ class PublishedRate(Strict):
     """A published estimate of the Earth's rate."""
 
     where: Text = Field(description="such as section 6")
-    printed: _Rate = Field(description="with its unit, as printed")
-    part: Text = Field("whole", description="of the run: whole, or such as 'last 13 min'")
+    printed: _Rate = Field(description="printed value, with its unit")
+    part: Text = Field("whole", description="part of the run: whole, or such as 'last 13 min'")
 
 
 class SimulatedTurns(TwoPosition):
     """A gyro that is turned between north and south by a schedule."""
 
-    transient: _Rate = Field("0 deg/s", description="largest rate that is sensed of a turn, about")
-    assumed: tuple[Text, ...] = Field((), description="figures that no source publishes")
+    transient: _Rate = Field(
+        "0 deg/s", description="approximate largest rate that is sensed during a turn"
+    )
+    assumed: tuple[Text, ...] = Field((), description="values that no source publishes")
     published: tuple[PublishedRate, ...] = ()
 
     @model_validator(mode="after")
@@ -141,25 +143,27 @@ class EarthRateSettings(Strict):
     """The Earth's rate from turned gyros, and the recordings required for it."""
 
     margin: TimeFromZero = Field(
-        "0.5 s", description="left out on both sides of a turn that is seen"
+        "0.5 s", description="time omitted on both sides of a visible turn"
     )
     goals: tuple[float, ...] = Field(
         (1.0, 0.1, 0.01),
         min_length=1,
-        description="standard deviations that are asked for, as a part of the Earth's rate",
+        description="required standard deviations, as a fraction of the Earth's rate",
     )
-    run_time: Time = Field("1 h", description="of a run, for which the best dwell is sought")
+    run_time: Time = Field(
+        "1 h", description="duration of a run for which the best dwell is computed"
+    )
     latitude: Latitude = Field(
-        "45 deg", description="where sensors at rest are to find the Earth's rate, and north"
+        "45 deg", description="latitude for predictions of the Earth's rate and north"
     )
     gyro_bias: RateFromZero = Field(
         "0.5 deg/s",
         description="standard deviation of the fixed bias of gyros whose datasheet prints none",
     )
     accelerometer_bias: AccelerationFromZero = Field(
-        "20 mg", description="standard deviation of that of accelerometers, likewise"
+        "20 mg", description="the same for accelerometers"
     )
-    draws: int = Field(60, ge=20, description="noise models that give the range of a sigma")
+    draws: int = Field(60, ge=20, description="number of noise models for the range of a sigma")
 
     @field_validator("goals")
     @classmethod

@@ -15,11 +15,11 @@ from imubench_pipeline.model.table import (
 )
 
 TurnedGyro = Annotated[str, Column("the gyro that was turned")]
-Part = Annotated[str, Column("whole, or the last minutes of the recording")]
+Part = Annotated[str, Column("part: whole, or the last minutes of the recording")]
 Method = Annotated[
     str,
     Column(
-        "pairs, triples, filter, smoother; known_rate is given the rate and starts with 0.1 "
+        "pairs, triples, filter, smoother; known_rate (input: the true rate) starts with 0.1 "
         "(deg/s)^2, known_rate_radians with 0.1 (rad/s)^2"
     ),
 ]
@@ -79,7 +79,7 @@ class TurningRow(OfRecordingRow):
     """A row of the table ``turning``."""
 
     channel: TurnedGyro
-    what: Annotated[str, Column("dwell, turn, knock, or a doubt about the whole")]
+    what: Annotated[str, Column("dwell, turn, knock, or a doubt about the whole log")]
     number: Annotated[int | None, Column("in order, from 1")] = None
     start: Annotated[float | None, Column("from the first sample of the recording", "s")] = None
     stop: Annotated[float | None, Column("its end; of a turn: end of the time left out", "s")] = (
@@ -136,8 +136,8 @@ class EarthRatePublishedRow(OfRecordingRow):
 class AlignmentRow(OfRecordingRow):
     """A row of the table ``alignment``."""
 
-    recording: Annotated[str, Column("static recording that its noise is from")]
-    positions: Annotated[int, Column("1; or 2, opposite about the vertical")]
+    recording: Annotated[str, Column("static recording with its noise")]
+    positions: Annotated[int, Column("number of positions: 1, or 2 (opposite about the vertical)")]
     method: Annotated[str, Column("coarse or fine")]
     time: Annotated[float, Column("of rest, the turn between two positions included", "s")]
     roll: Annotated[float | None, Column("standard deviation, level, facing north", "rad")] = None
@@ -147,8 +147,8 @@ class AlignmentRow(OfRecordingRow):
     error_roll: Annotated[float | None, Column("rms error of simulated triads over roll")] = None
     error_pitch: Annotated[float | None, Column("likewise, over pitch")] = None
     error_heading: Annotated[float | None, Column("likewise, over heading")] = None
-    simulated: Annotated[int | None, Column("triads of that check; null: none")] = None
-    latitude: Annotated[float, Column("as set (earth_rate: latitude)", "rad")]
+    simulated: Annotated[int | None, Column("number of triads of this check; null: none")] = None
+    latitude: Annotated[float, Column("latitude, as set (earth_rate: latitude)", "rad")]
     gyro_bias: Annotated[float, Column("standard deviation of the fixed biases", "rad/s")]
     gyro_bias_from: Annotated[str, Column("source of this figure")]
     accelerometer_bias: Annotated[float, Column("standard deviation of the fixed biases", "m/s^2")]

@@ -87,7 +87,9 @@ def find_stays(position: Array, rate: float, shortest: float) -> Stays:
         else:
             merged.append([start, stop, state[a]])
     if len(merged) < 2:
-        raise ValueError("the column with the position shows no two stays: the log never turns")
+        raise ValueError(
+            "the column with the position does not show two positions: the log has no turns"
+        )
     table = np.array(merged)
     return Stays(
         table[:, 0],
@@ -147,7 +149,7 @@ def find_turning(
     events.sort(key=lambda event: event.time)
     doubts = []
     if blocks.rough:
-        doubts.append("the noise of the log is not that of the model: the log's is used")
+        doubts.append("the noise of the log differs from the model: the noise of the log is used")
     column_sense = None
     if position is not None:
         turns, knocks, column_sense, more_doubts = _find_turns_in_column(
@@ -169,7 +171,7 @@ def find_turning(
         doubts.append(f"the first sense is {first:+d} by the column, {first_sense:+d} was given")
     ambiguous = first_sense is None and column_sense is None
     if ambiguous:
-        doubts.append("the sense of the first dwell is assumed: all may be the other way round")
+        doubts.append("the sense of the first dwell is assumed: all signs may be wrong")
     place = find_contradiction(signs, stretches)
     if place is not None:
         doubts.append(

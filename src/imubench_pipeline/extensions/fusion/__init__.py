@@ -10,7 +10,7 @@ EXTENSION = Extension(
             "simulated",
             "specimens",
             "fusion.settings:Specimens",
-            "fused to this log; left out: one sensor",
+            "number of sensors fused to this log; omitted: one sensor",
         ),
     ),
     simulations={"specimens": "fusion.specimens:SPECIMENS"},

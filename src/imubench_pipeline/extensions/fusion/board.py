@@ -69,7 +69,8 @@ class Board:
             ratio = rate / self.rate
             if abs(ratio - round(ratio)) > _RATIO_TOLERANCE * ratio:
                 raise ValueError(
-                    f"a rate of {rate:g} Hz is no whole multiple of the lowest, {self.rate:g} Hz; "
+                    f"a rate of {rate:g} Hz is not a whole multiple of the lowest, {self.rate:g} "
+                    "Hz; "
                     "resample that sensor first"
                 )
         for process in self.shared:

@@ -136,7 +136,9 @@ def _compare_pair(row: FusionRow, a: Answer | str, b: Answer | str) -> FusionRow
     # Draws of an absent term are above 0: extend the limits to the value.
     low, high = min(float(low), number), max(float(high), number)
     if math.isinf(number):
-        reasons.append(f"no number of them reaches it at {row.tau:g} s: the common part is a floor")
+        reasons.append(
+            f"no number of them reaches it at {row.tau:g} s, because the common part remains"
+        )
     elif math.isinf(high):
         reasons.append("within the limits of the parameters, no number may reach it")
     return replace(

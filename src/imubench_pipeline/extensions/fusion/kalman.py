@@ -60,7 +60,7 @@ def steady_covariance(transition: Array, process_noise: Array, information: Arra
         p = grown
         if change < _CONVERGENCE_TOLERANCE:
             return np.asarray(p * scale**2)
-    raise ValueError("the filter has no steady state: a process that grows is not seen")
+    raise ValueError("the filter has no steady state: a growing process is not observable")
 
 
 class KalmanFusion:

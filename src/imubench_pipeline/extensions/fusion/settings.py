@@ -16,7 +16,10 @@ class Specimens(SimulatedSensors):
 
     number: int = Field(ge=2, le=1000)
     spread: float = Field(
-        0.0, ge=0, le=1, description="standard deviation of the logarithm of N, B and K of each"
+        0.0,
+        ge=0,
+        le=1,
+        description="standard deviation of the logarithm of N, B and K between units",
     )
 
     def check(self, channels: Mapping[Any, AxisSettings]) -> None:

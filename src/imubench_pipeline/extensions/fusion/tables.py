@@ -22,9 +22,9 @@ class PublishedFigureRow(ChannelRow):
     place: Annotated[str, Column("table of the source")]
     figure: Annotated[str, Column("its name there")]
     printed: Annotated[str, Column("as printed, with its unit")]
-    of: Annotated[str, Column("log or datasheet: the subject of the figure")]
+    of: Annotated[str, Column("subject of the printed value: log or datasheet")]
     parameter: Annotated[str, Column("N, B, bias or sensitivity")]
-    means: Annotated[float, Column("value as that parameter", "as in unit")]
+    means: Annotated[float, Column("value in the convention of this parameter", "as in unit")]
     unit: Annotated[str, Column("SI unit of the numbers")]
     truth: Annotated[float | None, Column("of the simulation", "as in unit")] = None
     curve: Annotated[float | None, Column("read from the curve; bias: mean", "as in unit")] = None
@@ -42,8 +42,10 @@ class FusionRow(TableRow):
 
     quantity: Annotated[str, Column("gyro or accel")]
     tau: Annotated[float, Column("averaging time at which they are compared", "s")]
-    sensor: Annotated[str, Column("several of these are averaged")]
-    recording: Annotated[str | None, Column("that answers for it: of its median channel")] = None
+    sensor: Annotated[str, Column("sensor of which several are averaged")]
+    recording: Annotated[
+        str | None, Column("recording that represents it: of its median channel")
+    ] = None
     channel: Annotated[str | None, Column("that answers")] = None
     simulated: Annotated[bool | None, Column("that recording is simulated")] = None
     adev: Annotated[float | None, Column("of one of them, by its model", "rad/s or m/s^2")] = None
@@ -51,9 +53,9 @@ class FusionRow(TableRow):
     common_share: Annotated[float | None, Column("the same as a part of the variance")] = None
     temperature_share: Annotated[float | None, Column("part of the variance by temperature")] = None
     other: Annotated[str, Column("sensor to be matched")]
-    other_recording: Annotated[str | None, Column("that answers for it")] = None
+    other_recording: Annotated[str | None, Column("recording that represents it")] = None
     other_channel: Annotated[str | None, Column("that answers")] = None
-    other_simulated: Annotated[bool | None, Column("that one is simulated")] = None
+    other_simulated: Annotated[bool | None, Column("whether this recording is simulated")] = None
     other_adev: Annotated[float | None, Column("its Allan deviation", "rad/s or m/s^2")] = None
     n: Annotated[float | None, Column("number that equals it; below 1: one is better")] = None
     lower: Annotated[float | None, Column("lower 95 % limit of n; null: none is enough")] = None
@@ -68,15 +70,15 @@ class GradeRow(TableRow):
     """A row of the table ``grades``."""
 
     quantity: Annotated[str, Column("gyro or accel")]
-    sensor: Annotated[str, Column("several of these are averaged")]
-    recording: Annotated[str, Column("that answers for it: of its middle channel")]
+    sensor: Annotated[str, Column("sensor of which several are averaged")]
+    recording: Annotated[str, Column("recording that represents it: of its median channel")]
     channel: Annotated[str, Column("that answers")]
-    simulated: Annotated[bool, Column("that recording is simulated")]
-    grade: Annotated[str, Column("sensor of the class that is to be reached, by its datasheet")]
+    simulated: Annotated[bool, Column("whether this recording is simulated")]
+    grade: Annotated[str, Column("sensor of the target class, by its datasheet")]
     grade_name: Annotated[str, Column("its vendor and model")]
     option: Annotated[str | None, Column("of that one")] = None
     statistic: Annotated[str, Column("N, or sigma_min: the lowest point of the curve")]
-    value: Annotated[float | None, Column("of one of them", "SI")] = None
+    value: Annotated[float | None, Column("value of one sensor", "SI")] = None
     lower: Annotated[float | None, Column("lower 95 % limit", "SI")] = None
     upper: Annotated[float | None, Column("upper 95 % limit", "SI")] = None
     printed: Annotated[float | None, Column("of the grade, in the same convention", "SI")] = None

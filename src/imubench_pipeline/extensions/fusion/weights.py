@@ -67,7 +67,7 @@ def best_constant(board: Board, tau: float | None = None) -> Constant:
     else:
         parts = board.allan_parts([tau])
     if not np.all(parts.own + parts.shared @ parts.sensitivities**2 > 0.0):
-        raise ValueError("a sensor without noise cannot be weighed by it")
+        raise ValueError("a sensor without noise cannot be weighted by its noise")
     return Constant(least(parts)[0])
 
 

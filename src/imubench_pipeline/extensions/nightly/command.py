@@ -21,9 +21,9 @@ _TIME_TYPE = make_number_type(0.0, LONGEST, "a time, such as 10 s", parse_second
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of the command."""
     parser.usage = "%(prog)s [options] [folder] [-- FLAG ...]"
-    parser.description = "What stands after -- goes to snakemake, such as --workflow-profile DIR."
+    parser.description = "Arguments after -- go to snakemake, such as --workflow-profile DIR."
     parser.add_argument(
-        "folder", type=Path, nargs="?", help="of logs, or a checkout; default: this one"
+        "folder", type=Path, nargs="?", help="folder of logs, or a checkout; default: this one"
     )
     parser.add_argument("--project", type=Path, metavar="DIR", help="the folder, as an option")
     parser.add_argument(
@@ -37,14 +37,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=_TIME_TYPE,
         default="10 s",
         metavar="TIME",
-        help="a log is complete when nothing of it has changed for so long; default: 10 s",
+        help="a log is complete if unchanged for this time; default: 10 s",
     )
     parser.add_argument(
         "--wait",
         type=_TIME_TYPE,
         default="0 s",
         metavar="TIME",
-        help="how long to wait for a run that goes on; default: not at all",
+        help="time to wait for another run; default: no waiting",
     )
     parser.add_argument(
         "--quiet", action="store_true", help="print the summary only if the exit status is not 0"
@@ -85,7 +85,7 @@ COMMAND = Command(
     (
         "fine",
         "a log was rejected, a warning is new or a device has changed since the last run",
-        "failed, for one recording at least, or another run goes on",
+        "failed for at least one recording, or another run is active",
     ),
     passes_on=True,
 )

@@ -204,12 +204,12 @@ class Night:
             except OSError as error:
                 failure = [str(error)]
             except KeyboardInterrupt:
-                failure = ["it was stopped by a signal; the next run goes on where it was"]
+                failure = ["it was stopped by a signal; the next run continues"]
             summary, after = self._summarise(before, seen, skips, failure)
             try:
                 self._keep(summary, after)
             except OSError as error:
-                why = [f"the summary cannot be kept: {error}", *self._describe_disk_space()]
+                why = [f"the summary cannot be saved: {error}", *self._describe_disk_space()]
                 failure = [*summary.failure, *why]
                 return summary.model_copy(update={"outcome": "failed", "failure": failure})
         return summary

@@ -114,7 +114,7 @@ def find_unsettled_logs(
         if latest.partial and latest.incomplete:
             yield Skip(key, _describe_transfer(latest.partial, now))
         elif was.files != latest.files:
-            yield Skip(key, "it changed while it was looked at")
+            yield Skip(key, "it changed during the check")
         elif by is not None:
             yield Skip(key, f"{by} has it open for writing")
         # A time far in the future comes from a clock that was not set, and is ignored.

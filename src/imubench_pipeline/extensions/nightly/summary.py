@@ -402,13 +402,13 @@ def format_summary(summary: Summary) -> str:
         lines.append(f"recordings, {since}: {counts}")
     rejected = sorted(summary.rejected, key=lambda rejection: not rejection.new)
     sections = {
-        "failed, left out of a report that is there, and tried again next time": [
+        "failed, omitted in the report, and tried again next time": [
             *list_failures(summary.failed)
         ],
         "new": summary.new,
         "analysed again": [f"{change.recording}: {change.because}" for change in summary.changed],
         "removed": summary.removed,
-        "skipped, and looked at again next time": [
+        "skipped, and checked again next time": [
             f"{skip.recording}: {skip.reason}{'; its results stay' * skip.keeps_results} "
             f"(since {_format_time(skip.since)})"
             for skip in summary.skipped
@@ -426,7 +426,7 @@ def format_summary(summary: Summary) -> str:
         "first for a requirement": [
             lead.said + f" (before: {lead.before})" * bool(lead.before) for lead in summary.first
         ],
-        "put right after an earlier run": summary.put_right,
+        "repaired after an earlier run": summary.put_right,
     }
     for title, entries in sections.items():
         if entries:

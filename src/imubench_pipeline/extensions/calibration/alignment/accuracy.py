@@ -88,19 +88,19 @@ class Accuracy:
         """Reason for a missing angle; None if there is none."""
         if not np.all(np.isfinite(self.sigma)):
             return (
-                "the noise is so small that rounding errors hide the angles: no sensor is that "
-                "quiet, look at the findings about it"
+                "the noise is so small that rounding errors hide the angles: no sensor is so "
+                "quiet; check the findings about it"
             )
         if self.sigma[2] < UNIFORM_HEADING_SIGMA:
             return None
         if self.positions == 1:
             return (
-                "what is not known of the gyros' biases is more than the horizontal part of the "
-                "Earth's rate: it takes turns about the vertical, or better gyros"
+                "the uncertainty of the gyro biases exceeds the horizontal part of the Earth's "
+                "rate: turn the triad about the vertical, or use better gyros"
             )
         return (
-            "the noise of the gyros in this time is more than the horizontal part of the Earth's "
-            "rate: it takes longer, or better gyros"
+            "the noise of the gyros in this time exceeds the horizontal part of the Earth's rate: "
+            "record for longer, or use better gyros"
         )
 
 

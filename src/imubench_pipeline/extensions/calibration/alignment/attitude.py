@@ -75,7 +75,7 @@ def euler_jacobian(attitude: Array) -> Array:
     _, pitch, heading = euler_angles(attitude)
     cp, sp, ch, sh = np.cos(pitch), np.sin(pitch), np.cos(heading), np.sin(heading)
     if cp < MIN_COS_PITCH:
-        raise ValueError("the x axis is vertical: roll and heading cannot be told from each other")
+        raise ValueError("the x axis is vertical: roll and heading cannot be separated")
     # Columns: small rotations in the navigation frame due to roll, pitch and heading.
     turns = np.array([[cp * ch, -sh, 0.0], [cp * sh, ch, 0.0], [-sp, 0.0, 1.0]])
     return -np.linalg.inv(turns)

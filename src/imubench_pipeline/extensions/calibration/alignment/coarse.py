@@ -96,5 +96,5 @@ def _build_triad(first: Array, second: Array) -> Array:
 def _normalise(vector: Array) -> Array:
     length = np.linalg.norm(vector, axis=-1, keepdims=True)
     if np.any(length == 0.0):
-        raise ValueError("specific force and rate are along each other: they give no attitude")
+        raise ValueError("specific force and rate are parallel: they do not determine the attitude")
     return np.asarray(vector / length)

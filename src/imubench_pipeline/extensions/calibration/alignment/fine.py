@@ -89,8 +89,8 @@ class FineAlignment:
         if self.sigma[-1, 2] < UNIFORM_HEADING_SIGMA:
             return ()
         reason = (
-            "what is not known of the east gyro's bias is more than the horizontal part of the "
-            "Earth's rate: turn the triad about the vertical, or state its bias better"
+            "the uncertainty of the east gyro's bias exceeds the horizontal part of the Earth's "
+            "rate: turn the triad about the vertical, or state the bias more precisely"
         )
         return (NotObservable("heading", reason),)
 
