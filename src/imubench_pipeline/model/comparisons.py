@@ -33,21 +33,23 @@ from imubench_pipeline.model.table import (
 )
 from imubench_pipeline.model.verdicts import Condition, DoubtMark, Share, Shortfall, UnitFactor
 
-DoubtCodes = Annotated[tuple[str, ...], Column("codes of doubts about the recording: table doubts")]
+DoubtCodes = Annotated[
+    tuple[str, ...], Column("codes of doubts about the recording (see table doubts)")
+]
 
 
 @table("drift")
 class DriftRow(SensorRow):
     """A row of the table ``drift``."""
 
-    device: Annotated[str, Column("whose recordings are compared")]
-    channel: Annotated[str, Column("axis and quantity, gyro_x to accel_z")]
+    device: Annotated[str, Column("device with the compared recordings")]
+    channel: Annotated[str, Column("channel, gyro_x to accel_z")]
     parameter: Annotated[
         str, Column("N, B_curve, sigma_min, K, B, T_B, Q, R, or bias: the fixed bias")
     ]
     recording: Annotated[str, Column("name of the recording")]
     position: Annotated[int, Column("place in the order of the device's recordings, from 1")]
-    started: Annotated[str | None, Column("date and time of the first sample, where known")] = None
+    started: Annotated[str | None, Column("date and time of the first sample, if known")] = None
     value: Annotated[float | None, Column("estimate of this recording", "as in unit")] = None
     lower: LowerLimit = None
     upper: UpperLimit = None
@@ -74,16 +76,16 @@ class PooledRow(SensorRow):
     """A row of the table ``pooled``."""
 
     device: Annotated[str | None, Column("null: all recordings of the sensor")] = None
-    channel: Annotated[str, Column("axis and quantity, gyro_x to accel_z")]
+    channel: Annotated[str, Column("channel, gyro_x to accel_z")]
     parameter: Annotated[
         str, Column("N, B_curve, sigma_min, K, B, T_B, Q, R, or bias: the fixed bias")
     ]
     recordings: Annotated[int, Column("recordings pooled")]
-    left_out: Annotated[int, Column("recordings that have no value to pool")]
+    left_out: Annotated[int, Column("number of recordings without a value")]
     value: Annotated[float | None, Column("pooled estimate", "as in unit")] = None
     lower: Annotated[
         float | None,
-        Column("lower 95 % limit, the spread between recordings included", "as in unit"),
+        Column("lower 95 % limit, including the spread between recordings", "as in unit"),
     ] = None
     upper: UpperLimit = None
     unit: Unit
@@ -114,7 +116,7 @@ class DatasheetRow(ChannelRow):
     quantity: Annotated[str, Column("N, bias_instability, K, T_B, allan_deviation, offset, ...")]
     statistic: Annotated[
         str,
-        Column("what is compared: N, adev_minimum, plateau (0.664 B), K, T_B, mean, sensitivity"),
+        Column("compared quantity: N, adev_minimum, plateau (0.664 B), K, T_B, mean, sensitivity"),
     ]
     printed: Annotated[
         float | None, Column("figure as printed; null: the verdict says why", "as in unit")
@@ -122,7 +124,9 @@ class DatasheetRow(ChannelRow):
     unit: Annotated[str | None, Column("unit as printed")] = None
     kind: Annotated[str | None, Column("typ, max, min, range, 1sigma or derived")] = None
     condition: Annotated[str | None, Column("as printed")] = None
-    sidedness: Annotated[str | None, Column("of a noise density, as assumed in this row")] = None
+    sidedness: Annotated[
+        str | None, Column("sidedness of a noise density, as assumed in this row")
+    ] = None
     comparable: Annotated[
         float | None, Column("the printed figure in the convention of measured", "SI")
     ] = None
@@ -136,8 +140,8 @@ class DatasheetRow(ChannelRow):
     lower: Annotated[float | None, Column("lower 95 % limit of measured", "SI")] = None
     upper: Annotated[float | None, Column("upper 95 % limit of measured", "SI")] = None
     delta: Annotated[float | None, Column("measured / comparable - 1")] = None
-    delta_lower: Annotated[float | None, Column("least that both intervals allow")] = None
-    delta_upper: Annotated[float | None, Column("largest that both intervals allow")] = None
+    delta_lower: Annotated[float | None, Column("lower limit by both intervals")] = None
+    delta_upper: Annotated[float | None, Column("upper limit by both intervals")] = None
     verdict: Annotated[str, Column("better than typ, as printed, worse than typ, not sure, ...")]
     reasons: Annotated[tuple[str, ...], Column("in words")] = ()
     doubts: DoubtCodes = ()
@@ -147,10 +151,10 @@ class DatasheetRow(ChannelRow):
 class RepeatabilityRow(SensorRow):
     """A row of the table ``repeatability``."""
 
-    device: Annotated[str, Column("whose recordings are compared")]
-    channel: Annotated[str, Column("axis and quantity, gyro_x to accel_z")]
-    recordings: Annotated[int, Column("turn-ons that count")]
-    power_cycled: Annotated[str, Column("between all of them: yes or unknown")]
+    device: Annotated[str, Column("device with the compared recordings")]
+    channel: Annotated[str, Column("channel, gyro_x to accel_z")]
+    recordings: Annotated[int, Column("number of turn-ons")]
+    power_cycled: Annotated[str, Column("power cycle between all of them: yes or unknown")]
     printed: Annotated[float | None, Column("bias repeatability as printed", "as in unit")] = None
     unit: Annotated[str | None, Column("unit as printed")] = None
     kind: Annotated[str | None, Column("typ, max, min, range, 1sigma or derived")] = None
@@ -179,7 +183,7 @@ class DatasheetCurveRow(ChannelRow):
     ] = None
     rms: Annotated[
         float | None,
-        Column("RMS over tau of measured Allan deviation minus the lines'", "rad/s or m/s^2"),
+        Column("RMS over tau of measured Allan deviation minus the lines", "rad/s or m/s^2"),
     ] = None
     rms_log10: Annotated[
         float | None, Column("RMS over tau of the difference of log10", "decades")
@@ -190,7 +194,9 @@ class DatasheetCurveRow(ChannelRow):
 class ErrorBudgetRow(OfRecordingRow):
     """A row of the table ``error_budget``."""
 
-    requirement: Annotated[str | None, Column("that asks; null: the times of the settings")] = None
+    requirement: Annotated[str | None, Column("requirement; null: the times of the settings")] = (
+        None
+    )
     axis: Annotated[str, Column("worst or median axis of the sensor")]
     gyro: Annotated[str | None, Column("channel that answers")] = None
     accel: Annotated[str | None, Column("channel that answers")] = None
@@ -235,17 +241,23 @@ class ErrorBudgetRow(OfRecordingRow):
 class RankingRow(TableRow):
     """A row of the table ``ranking``."""
 
-    requirement: Annotated[str, Column("file under config/requirements, without .yaml")]
+    requirement: Annotated[str, Column("requirement: file in config/requirements, without .yaml")]
     sensor: Annotated[str, Column("name of the sensor file")]
     rank: Annotated[int | None, Column("1 is the best; null: not ranked")] = None
-    tied_with: Annotated[tuple[str, ...], Column("sensors whose intervals overlap")] = ()
-    verdict: Annotated[Verdict, Column("on the conditions in the column conditions")]
+    tied_with: Annotated[tuple[str, ...], Column("sensors with overlapping intervals")] = ()
+    verdict: Annotated[Verdict, Column("verdict, subject to the column conditions")]
     decides: Annotated[bool, Column("the limit with the least margin")]
-    recording: Annotated[str | None, Column("that answers: of several, nearest to sigma")] = None
+    recording: Annotated[
+        str | None, Column("representative recording: with the error nearest to sigma")
+    ] = None
     error: Annotated[str, Column("as in error_budget")]
-    time: Annotated[float, Column("as in error_budget; of an outage with trajectory", "s")]
-    trajectory: Annotated[str | None, Column("of an outage of GNSS; null: an error budget")] = None
-    at_most: Annotated[float | None, Column("the limit as it was asked for", "as in unit")] = None
+    time: Annotated[float, Column("error as in error_budget; for an outage with trajectory", "s")]
+    trajectory: Annotated[
+        str | None, Column("trajectory of a GNSS outage; null: an error budget")
+    ] = None
+    at_most: Annotated[
+        float | None, Column("the limit as stated in the requirement", "as in unit")
+    ] = None
     confidence: Annotated[
         float | None, Column("chance of an error within it that was asked for")
     ] = None
@@ -269,31 +281,36 @@ class RankingRow(TableRow):
         None
     )
     conditions: Annotated[
-        tuple[Condition, ...], Column("unknown figures and properties; largest: 1 sigma, SI")
+        tuple[Condition, ...],
+        Column("unknown figures and properties; largest: permitted 1 sigma, SI"),
     ] = ()
     shortfalls: Annotated[
-        tuple[Shortfall, ...], Column("demanded properties that it lacks; has: its own, SI")
+        tuple[Shortfall, ...], Column("required properties that it lacks; has: its own value, SI")
     ] = ()
     parts: Annotated[tuple[Share, ...], Column("every source of 1 % of the variance or more")] = ()
     reasons: Annotated[tuple[str, ...], Column("unknown figures")] = ()
     doubts: Annotated[tuple[DoubtMark, ...], Column("of the recordings that are used")] = ()
     left_out: Annotated[
-        tuple[DoubtMark, ...], Column("recordings of the sensor that are not used, and why")
+        tuple[DoubtMark, ...], Column("recordings of the sensor that are not used, with reasons")
     ] = ()
-    specimens: Annotated[int | None, Column("devices that the figures stand on")] = None
-    recordings: Annotated[int | None, Column("recordings that they stand on")] = None
-    longest_log: Annotated[float | None, Column("duration of the longest of them", "s")] = None
+    specimens: Annotated[int | None, Column("number of devices with data")] = None
+    recordings: Annotated[int | None, Column("number of recordings with data")] = None
+    longest_log: Annotated[
+        float | None, Column("duration of the longest of these recordings", "s")
+    ] = None
     spread: Annotated[
         float | None, Column("standard deviation of ln sigma between specimens; null: unknown")
     ] = None
     spread_of: Annotated[SpreadOf | None, Column("compared units or recordings")] = None
-    evidence: Annotated[Evidence | None, Column("for this limit; null: there is no figure")] = None
+    evidence: Annotated[
+        Evidence | None, Column("strength of the evidence for this limit; null: there is no figure")
+    ] = None
     evidence_reasons: Annotated[
         tuple[str, ...],
         Column("one_specimen, short_log, wide_interval, few_axes, or codes of the table doubts"),
     ] = ()
     corrected_units: Annotated[
-        tuple[UnitFactor, ...], Column("factors that correct units in doubt")
+        tuple[UnitFactor, ...], Column("factors that correct doubtful units")
     ] = ()
     corrected_verdict: Annotated[Verdict | None, Column("with these factors")] = None
     corrected_margin: Annotated[float | None, Column("with these factors")] = None
@@ -312,7 +329,9 @@ class RankingRow(TableRow):
         float | None, Column("lower end of where it lies in 95 % of logs")
     ] = None
     backtest_ratio_upper: Annotated[float | None, Column("upper end")] = None
-    backtest_windows: Annotated[int | None, Column("of the log, overlapping")] = None
+    backtest_windows: Annotated[int | None, Column("number of overlapping windows of the log")] = (
+        None
+    )
 
 
 @table("next_steps")
@@ -320,7 +339,9 @@ class NextStepRow(SensorRow):
     """A row of the table ``next_steps``."""
 
     recording: Annotated[str | None, Column("name of the recording; null: a new one")] = None
-    requirements: Annotated[tuple[str, ...], Column("whose verdicts it can change")]
+    requirements: Annotated[
+        tuple[str, ...], Column("requirements with verdicts that it can change")
+    ]
     action: Annotated[Action, Column("what to do")]
     quantities: Annotated[tuple[str, ...], Column("whose unit or axes it is about")] = ()
     figures: Annotated[tuple[Condition, ...], Column("to find in data sheets")] = ()
@@ -329,7 +350,7 @@ class NextStepRow(SensorRow):
     verdicts_strengthened: Annotated[int, Column("verdicts whose evidence it makes stronger")]
     duration: Annotated[float | None, Column("length of the log that it takes", "s")] = None
     logged: Annotated[float | None, Column("length of the present log", "s")] = None
-    specimens: Annotated[int | None, Column("number of further units that it takes")] = None
+    specimens: Annotated[int | None, Column("required number of further units")] = None
     text: Annotated[str, Column("in words")] = ""
 
 
@@ -337,7 +358,7 @@ class NextStepRow(SensorRow):
 class ShortlistRow(TableRow):
     """A row of the table ``shortlist``."""
 
-    requirement: Annotated[str, Column("file under config/requirements, without .yaml")]
+    requirement: Annotated[str, Column("requirement: file in config/requirements, without .yaml")]
     sensor: Annotated[str, Column("of the catalogue")]
     price_class: Annotated[str | None, Column("as stated")] = None
     best_margin: Annotated[
@@ -346,18 +367,20 @@ class ShortlistRow(TableRow):
     worst_margin: Annotated[
         float | None, Column("of the worst that it allows; null: not known")
     ] = None
-    decides: Annotated[str | None, Column("the limit with the least margin at the best")] = None
-    verdict: Annotated[ShortlistVerdict, Column("by the data sheet alone")]
+    decides: Annotated[
+        str | None, Column("the limit with the smallest margin in the best case")
+    ] = None
+    verdict: Annotated[ShortlistVerdict, Column("verdict from the data sheet alone")]
     measured_margin_of: Annotated[
         str | None, Column("logs or simulated logs; null: not measured")
     ] = None
     measured_margin: Annotated[
         float | None, Column("limit over error by its logs: see the table ranking")
     ] = None
-    measured_verdict: Annotated[Verdict | None, Column("as in the table ranking")] = None
+    measured_verdict: Annotated[Verdict | None, Column("verdict, as in the table ranking")] = None
     assumed: Annotated[tuple[str, ...], Column("unprinted figures, and the values assumed")] = ()
     shortfalls: Annotated[
-        tuple[Shortfall, ...], Column("demanded properties that it lacks; has: its own, SI")
+        tuple[Shortfall, ...], Column("required properties that it lacks; has: its own value, SI")
     ] = ()
     reasons: Annotated[tuple[str, ...], Column("why the sensor is not judged")] = ()
 
@@ -383,8 +406,8 @@ class VendorCoverageRow(TableRow):
     vendor: Annotated[str, Column("of the sensors")]
     quantity: Annotated[str, Column("gyro or accel")]
     figure: Annotated[str, Column("N, B, K, T_B, temperature_coefficient or offset")]
-    sensors: Annotated[int, Column("of the vendor in the catalogue")]
-    yes: Annotated[int, Column("that have it published")]
-    other_convention: Annotated[int, Column("that have something akin")]
+    sensors: Annotated[int, Column("number of sensors of the vendor in the catalogue")]
+    yes: Annotated[int, Column("number with a published figure")]
+    other_convention: Annotated[int, Column("number with a figure in another convention")]
     no: Annotated[int, Column("that do not")]
-    not_looked_up: Annotated[int, Column("that nobody looked it up for")]
+    not_looked_up: Annotated[int, Column("number that were not looked up")]

@@ -111,7 +111,7 @@ class ModelRow(ChannelRow):
     )
     bins: Annotated[int, Column("bins of the spectrum used")]
     band: Annotated[float | None, Column("highest frequency used", "Hz")] = None
-    band_source: Annotated[str | None, Column("how it was found")] = None
+    band_source: Annotated[str | None, Column("method of detection")] = None
 
 
 @table("lines")
@@ -129,14 +129,14 @@ class LineRow(ChannelRow):
     false_alarm: Annotated[
         float | None, Column("chance of one like it in a channel without lines")
     ] = None
-    width: Annotated[float | None, Column("how wide it is", "Hz")] = None
+    width: Annotated[float | None, Column("width of the line", "Hz")] = None
 
 
 @table("envelope")
 class EnvelopeRow(ChannelRow):
     """A row of the table ``envelope``."""
 
-    start: Annotated[float, Column("begin of a part of the log, from the first sample", "s")]
+    start: Annotated[float, Column("start of a part of the log, from the first sample", "s")]
     end: Annotated[float, Column("its end", "s")]
     low: Annotated[float | None, Column("least sample; degC for temperature", "SI")] = None
     high: Annotated[float | None, Column("largest sample", "SI")] = None
@@ -184,7 +184,7 @@ class SpectrumRow(ChannelRow):
     fitted: Annotated[
         float | None, Column("of the chosen model", "(rad/s)^2/Hz or (m/s^2)^2/Hz")
     ] = None
-    used: Annotated[bool, Column("inside the band, and clear of lines")]
+    used: Annotated[bool, Column("whether the bin is in the fitted band and without lines")]
 
 
 @table("fixed_bias")
@@ -199,7 +199,9 @@ class FixedBiasRow(ChannelRow):
 class TemperatureRow(ChannelRow):
     """A row of the table ``temperature``."""
 
-    compensated: Annotated[bool, Column("taken out of the noise: method compensated")]
+    compensated: Annotated[
+        bool, Column("whether the effect is removed from the noise (method compensated)")
+    ]
     parameter: Annotated[
         str, Column("T_0 (mean temperature), sensitivity, quadratic, lag, bias (at T_0)")
     ]
@@ -234,7 +236,9 @@ class CompensatedAllanRow(ChannelRow):
 class LowPassRow(ChannelRow):
     """A row of the table ``low_pass``."""
 
-    kind: Annotated[str | None, Column("analogue, bilinear or boxcar; null: none shows")] = None
+    kind: Annotated[str | None, Column("analogue, bilinear or boxcar; null: none is visible")] = (
+        None
+    )
     order: Annotated[
         int | None, Column("order of the filter: 1, or of a Butterworth; null: no filter found")
     ] = None
@@ -272,8 +276,8 @@ class ScoreRow(ChannelRow):
     rms: Annotated[
         float | None,
         Column(
-            "RMS over tau of the model's less the measured Allan deviation; each tau counts by "
-            "how sure the measured one is",
+            "RMS over tau of model minus measured Allan deviation, weighted by the precision at "
+            "each tau",
             "rad/s or m/s^2",
         ),
     ] = None
@@ -282,7 +286,7 @@ class ScoreRow(ChannelRow):
     )
     drawn: Annotated[
         float | None,
-        Column("rms of one simulated log in the model's place: median of many", "rad/s or m/s^2"),
+        Column("rms of one simulated log instead of the model: median of many", "rad/s or m/s^2"),
     ] = None
     drawn_lower: Annotated[
         float | None, Column("lower end of the range of 90 % of them", "rad/s or m/s^2")
@@ -297,7 +301,7 @@ class ScoreRow(ChannelRow):
     drawn_log10_upper: Annotated[float | None, Column("upper end", "decades")] = None
     whole: Annotated[
         float | None,
-        Column("RMS of one simulated log, every tau alike: median of many", "rad/s or m/s^2"),
+        Column("RMS of one simulated log with equal weights: median of many", "rad/s or m/s^2"),
     ] = None
     whole_lower: Annotated[
         float | None, Column("lower end of the range of 90 % of them", "rad/s or m/s^2")
@@ -313,7 +317,7 @@ class ScoreRow(ChannelRow):
     inside_band: Annotated[
         float | None, Column("share of the measured curve inside the 95 % band")
     ] = None
-    reason: Annotated[str | None, Column("why there is no score")] = None
+    reason: Annotated[str | None, Column("reason for a missing score")] = None
 
 
 @table("simulated_truth")
@@ -324,7 +328,7 @@ class SimulatedTruthRow(ChannelRow):
     component: Annotated[int, Column("number of a repeated term, from 1")]
     value: Annotated[float, Column("true value of the simulation", "as in unit")]
     unit: Annotated[str, Column("SI unit of value")]
-    assumed: Annotated[bool, Column("not published by the source: chosen")]
+    assumed: Annotated[bool, Column("assumed, not published by the source")]
     source: Annotated[str, Column("where the parameters are published")]
 
 
@@ -332,7 +336,7 @@ class SimulatedTruthRow(ChannelRow):
 class BacktestRow(ChannelRow):
     """A row of the table ``backtest``."""
 
-    requirement: Annotated[str, Column("that has the limit")]
+    requirement: Annotated[str, Column("requirement with this limit")]
     error: Annotated[
         str, Column("attitude, heading, velocity, position: the part of it of this channel")
     ]
@@ -364,10 +368,12 @@ class BacktestRow(ChannelRow):
     chance: Annotated[
         float | None, Column("of such a ratio or a larger one, if the model is right")
     ] = None
-    verdict: Annotated[BacktestVerdict | None, Column("null: it cannot be done")] = None
+    verdict: Annotated[BacktestVerdict | None, Column("verdict; null: not tested")] = None
     contradicted: Annotated[
         bool | None,
-        Column("1.1 times the prediction or more, sure at 1 % for all rows of the recording"),
+        Column(
+            "at least 1.1 times the prediction, significant at 1 % over all rows of the recording"
+        ),
     ] = None
     unit: Unit
     taken_out: Annotated[
@@ -376,7 +382,7 @@ class BacktestRow(ChannelRow):
     duration_needed: Annotated[
         float | None, Column("length of a log that can be tested so", "s")
     ] = None
-    reason: Annotated[str | None, Column("why it cannot be done")] = None
+    reason: Annotated[str | None, Column("reason without a test")] = None
 
 
 @table("drawn_deviations")
@@ -386,7 +392,7 @@ class DrawnDeviationRow(ChannelRow):
     tau: Annotated[float, Column("averaging time", "s")]
     draw: Annotated[
         int | None,
-        Column("place of a noise model drawn, the lowest first; null: the estimate itself"),
+        Column("rank of a drawn noise model, the lowest first; null: the estimate itself"),
     ] = None
     adev: Annotated[float, Column("Allan deviation of the noise model", "rad/s or m/s^2")]
     unknown: Annotated[
@@ -401,9 +407,6 @@ class DeterministicRow(ChannelRow):
     kind: Annotated[
         str, Column("bias_step, warm_up_drift or periodic_drift: taken out of the noise")
     ]
-    start: Annotated[float, Column("of the part that has it, from the first sample", "s")]
-    end: Annotated[float, Column("its end; of a step both are its place", "s")]
-    size: Annotated[float, Column("of a step; of a warm-up at its start; amplitude", "as in unit")]
     size_lower: LowerLimit = None
     size_upper: UpperLimit = None
     unit: Annotated[str, Column("SI unit of the sizes")]
@@ -415,7 +418,7 @@ class DeterministicRow(ChannelRow):
     place_error: Annotated[
         float | None, Column("half width of the 95 % interval of a step's place", "s")
     ] = None
-    gain: Annotated[float | None, Column("twice the log likelihood that is lost without it")] = None
+    gain: Annotated[float | None, Column("twice the loss of log likelihood without it")] = None
 
 
 @table("draws")
@@ -452,7 +455,7 @@ class DrawRow(ChannelRow):
 class ErrorGrowthRow(OfRecordingRow):
     """A row of the table ``error_growth``."""
 
-    axis: Annotated[str, Column("worst: of all axes; or x, y or z alone, where there are several")]
+    axis: Annotated[str, Column("worst of all axes, or x, y or z alone if there are several")]
     gyro: Annotated[str, Column("channel that answers")]
     accel: Annotated[str | None, Column("channel that answers")] = None
     window: Annotated[

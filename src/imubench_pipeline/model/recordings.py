@@ -24,22 +24,30 @@ class RecordingRow(SensorRow):
     device: Annotated[str, Column("specimen of the sensor; by default the recording's name")]
     recording: Annotated[str, Column("name of the recording")]
     kind: Annotated[str, Column("static, two_position, rate_table or positions")]
-    started: Annotated[str | None, Column("date and time of the first sample, where known")] = None
-    power_cycled: Annotated[bool | None, Column("without power before it; null: not known")] = None
-    simulated: Annotated[bool, Column("made from known parameters, not measured")]
+    started: Annotated[str | None, Column("date and time of the first sample, if known")] = None
+    power_cycled: Annotated[
+        bool | None, Column("whether the power was off before it; null: not known")
+    ] = None
+    simulated: Annotated[bool, Column("simulated from known parameters, not measured")]
     status: Annotated[RecordingStatus, Column("failed: a step of its analysis failed")]
     reason: Annotated[str | None, Column("why a recording is rejected or failed")] = None
     rate: Annotated[float | None, Column("sampling rate used", "Hz")] = None
-    rate_from: Annotated[str | None, Column("where it is from: stamps, or stated")] = None
+    rate_from: Annotated[str | None, Column("source of the rate: stamps, or stated")] = None
     rate_error: Annotated[
         float | None, Column("its standard deviation, as the stamps' scatter tells", "Hz")
     ] = None
-    samples: Annotated[int | None, Column("samples present in the longest channel")] = None
-    duration: Annotated[float | None, Column("from the first to the last sample", "s")] = None
+    samples: Annotated[int | None, Column("number of samples present in the longest channel")] = (
+        None
+    )
+    duration: Annotated[float | None, Column("duration from the first to the last sample", "s")] = (
+        None
+    )
     temperature_min: Annotated[float | None, Column("lowest temperature", "degC")] = None
     temperature_max: Annotated[float | None, Column("highest temperature", "degC")] = None
     fitness: Annotated[Fitness | None, Column("null: not analysed")] = None
-    decides: Annotated[bool | None, Column("enters rankings, pools and exports")] = None
+    decides: Annotated[bool | None, Column("whether it is used in rankings, pools and exports")] = (
+        None
+    )
     doubts: Annotated[tuple[DoubtMark, ...], Column("codes and channels of doubts")] = ()
 
 
@@ -47,11 +55,13 @@ class RecordingRow(SensorRow):
 class FileRow(TableRow):
     """A row of the table ``files``."""
 
-    file: Annotated[str, Column("its place in the drop zone")]
-    sensor: Annotated[str | None, Column("null: the file is skipped")] = None
-    recording: Annotated[str | None, Column("that it belongs to; null: it is skipped")] = None
-    status: Annotated[FileStatus, Column("what became of it")]
-    reason: Annotated[str | None, Column("why it is not analysed")] = None
+    file: Annotated[str, Column("path in the drop zone")]
+    sensor: Annotated[str | None, Column("sensor; null: the file is skipped")] = None
+    recording: Annotated[str | None, Column("recording of the file; null: the file is skipped")] = (
+        None
+    )
+    status: Annotated[FileStatus, Column("outcome of the file")]
+    reason: Annotated[str | None, Column("reason why it is not analysed")] = None
 
 
 @table("doubts")
@@ -79,9 +89,9 @@ class FindingRow(OfRecordingRow):
     channel: _Channel = None
     finding: Annotated[str, Column("what was found")]
     severity: Annotated[Severity, Column("fatal: not analysed")]
-    affects: Annotated[tuple[str, ...], Column("parameters whose estimates it puts in doubt")] = ()
-    detail: Annotated[str, Column("in words, with what to do")]
-    value: Annotated[float | None, Column("its size", "as the finding says")] = None
+    affects: Annotated[tuple[str, ...], Column("parameters with doubtful estimates")] = ()
+    detail: Annotated[str, Column("description with advice")]
+    value: Annotated[float | None, Column("its size", "value of the finding")] = None
     data: Annotated[str | None, Column("its data, JSON")] = None
     start: Annotated[
         float | None, Column("begin of the part concerned, from the first sample", "s")
@@ -96,6 +106,6 @@ class FailureRow(SensorRow):
     recording: Annotated[
         str | None, Column("that is left out; null: a step of the whole sensor")
     ] = None
-    step: Annotated[str, Column("of the workflow, which failed")]
-    cause: Annotated[FailureCause, Column("time: it ran past its time limit")]
-    reason: Annotated[str, Column("in one line; the log of the step has the rest")]
+    step: Annotated[str, Column("step of the workflow that failed")]
+    cause: Annotated[FailureCause, Column("time: it exceeded its time limit")]
+    reason: Annotated[str, Column("reason in one line; see the log of the step")]

@@ -63,12 +63,12 @@ class Column:
 # Columns that several tables have.
 LowerLimit = Annotated[float | None, Column("lower 95 % limit", "as in unit")]
 UpperLimit = Annotated[float | None, Column("upper 95 % limit", "as in unit")]
-Estimate = Annotated[float | None, Column("estimate; null where status says why", "as in unit")]
+Estimate = Annotated[float | None, Column("estimate; null: see status", "as in unit")]
 Unit = Annotated[str, Column("SI unit")]
 EstimateUnit = Annotated[str, Column("SI unit of value, lower and upper; degC for T_0")]
-EstimateReason = Annotated[str | None, Column("why there is no plain value")]
+EstimateReason = Annotated[str | None, Column("reason for a missing or doubtful value")]
 FittedValue = Annotated[
-    float | None, Column("what the model has where there is no value; no estimate", "as in unit")
+    float | None, Column("value in the fitted model if there is no estimate", "as in unit")
 ]
 SourceColumn = Annotated[SourceCode, Column("total, or the source of the error")]
 SourceQuantity = Annotated[Measured | None, Column("sensor of the source")]
@@ -263,4 +263,4 @@ class OfRecordingRow(SensorRow):
 class ChannelRow(OfRecordingRow):
     """Key columns of a channel in a table."""
 
-    channel: Annotated[str, Column("axis and quantity, gyro_x to accel_z")]
+    channel: Annotated[str, Column("channel, gyro_x to accel_z")]
