@@ -41,7 +41,8 @@ class AllanSettings(Strict):
 
     overlap: Literal["full", "octave"] = Field(
         "octave",
-        description="octave: clusters that start 1/48 of their length apart, fast and as sure; "
+        description="octave: clusters that start 1/48 of their length apart, fast and equally "
+        "precise; "
         "full: every cluster",
     )
     per_decade: int = Field(10, ge=1, le=100, description="cluster sizes per decade of tau")
@@ -65,11 +66,11 @@ class EstimateSettings(Strict):
     )
     band: Frequency | None = Field(
         None,
-        description="highest frequency in the likelihood; null: all, behind the low-pass that the "
-        "spectrum shows",
+        description="highest frequency in the likelihood; null: all, with the low-pass found in "
+        "the spectrum",
     )
     seed: int = Field(
-        20260101, ge=0, description="of the draws that give the intervals, and fill holes"
+        20260101, ge=0, description="seed of the draws for intervals and missing samples"
     )
 
     @field_validator("methods")
@@ -78,7 +79,7 @@ class EstimateSettings(Strict):
         if len(set(methods)) < len(methods):
             raise ValueError(f"{', '.join(methods)}: a method stands twice")
         if methods == ("compensated",):
-            raise ValueError("compensated stands beside another method, such as likelihood")
+            raise ValueError("compensated requires another method, such as likelihood")
         return methods
 
 
@@ -106,11 +107,13 @@ class ErrorBudgetSettings(Strict):
         ("1 s", "10 s", "60 s", "600 s"), min_length=1, description="of dead reckoning, and of rest"
     )
     static_window: Time = Field(
-        "60 s", description="at rest right before, from which biases and tilt are taken"
+        "60 s", description="window at rest before it, for the estimation of biases and tilt"
     )
-    latitude: Latitude = Field("45 deg", description="where gyros look for north")
+    latitude: Latitude = Field("45 deg", description="latitude for north-finding")
     axes: tuple[Axis, ...] = Field(("worst", "median"), min_length=1)
-    draws: int = Field(200, ge=20, description="noise models that give the interval of an error")
+    draws: int = Field(
+        200, ge=20, description="number of noise models for the interval of an error"
+    )
     seed: int = Field(20260101, ge=0)
 
 
@@ -130,7 +133,8 @@ class ExportSettings(Strict):
     )
     axis: Text = Field("worst", description="worst or median axis, a device or a recording")
     horizon: Time = Field(
-        "60 s", description="of coasting, for which terms that a program lacks are mapped"
+        "60 s",
+        description="time of coasting, for the replacement of unsupported terms",
     )
     inflation: float = Field(1.0, ge=1, description="multiplies every deviation")
     because: Text | None = Field(
@@ -141,7 +145,9 @@ class ExportSettings(Strict):
         False, description="the smallest model above the upper limit of the curve instead"
     )
     most_excess: float = Field(
-        3.0, gt=1, description="an overbound so many times its limit (Allan deviation) is refused"
+        3.0,
+        gt=1,
+        description="largest permitted ratio of the Allan deviation of an overbound to its limit",
     )
 
 
@@ -158,15 +164,18 @@ class FusionSettings(Strict):
     """Settings of the number of cheap sensors that match a good one."""
 
     tau: tuple[Time, ...] = Field(
-        ("1 s", "10 s", "100 s", "1000 s"), min_length=1, description="where they are compared"
+        ("1 s", "10 s", "100 s", "1000 s"),
+        min_length=1,
+        description="averaging times of the comparison",
     )
     common: CommonSettings = Field(
-        CommonSettings(), description="part of the variance that specimens share: not averaged away"
+        CommonSettings(),
+        description="common share of the variance of units, which averaging does not reduce",
     )
-    longest: FractionOfLog = Field(
-        1 / 9, description="longest tau that a log tells, as a part of it"
+    longest: FractionOfLog = Field(1 / 9, description="longest tau, as a fraction of the log")
+    draws: int = Field(
+        200, ge=100, description="number of noise models for the interval of a number"
     )
-    draws: int = Field(200, ge=100, description="noise models that give the interval of a number")
     seed: int = Field(20260101, ge=0)
 
 
@@ -213,11 +222,11 @@ class Run(WithBlocks):
     """One run: the folders of logs and results, and the settings of each step."""
 
     logs: NamedPath = Field(Path("logs"), description="the drop zone: logs/<sensor>/<recording>")
-    results: NamedPath = Field(Path("results"), description="where a run leaves its results")
+    results: NamedPath = Field(Path("results"), description="folder of the results of a run")
     sensors: Folders = Field(
         (CATALOGUE, Path("config/sensors")),
-        description="folder of the sensor files, or several: what is in a later one counts; "
-        "catalogue: those that come with the package",
+        description="folder of the sensor files, or several: later ones have precedence; "
+        "catalogue: the files of the package",
     )
     simulated: Annotated[
         NamedPath | None, BeforeValidator(_path_or_none, json_schema_input_type=str | bool | None)
@@ -230,10 +239,11 @@ class Run(WithBlocks):
         BeforeValidator(_path_or_none, json_schema_input_type=str | list[str] | bool | None),
     ] = Field(
         (CATALOGUE, Path("config/requirements")),
-        description="folders of what applications need, a file each, as of sensors; false: none",
+        description="folders of the requirements of applications, one file each, like sensors; "
+        "false: none",
     )
     held_back: tuple[HeldBack, ...] = Field(
-        (), description="recordings whose logs are not read; results that are there stay"
+        (), description="recordings that are not read; existing results remain"
     )
     allan: AllanSettings = AllanSettings()
     estimate: EstimateSettings = EstimateSettings()

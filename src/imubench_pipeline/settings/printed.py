@@ -136,13 +136,13 @@ class PrintedFigure(Strict):
     tau: Duration | None = Field(None, description="of an Allan deviation: its averaging time")
     option: Text | None = Field(
         None,
-        description="grade, range or mode of the sensor that alone has this figure; which of "
-        "them the logged ones have, 'options' of the datasheet says",
+        description="grade, range or mode of the sensor with this figure; 'options' of the "
+        "datasheet lists the options of the logged sensors",
     )
     condition: Text | None = Field(None, description="temperature, supply and the like, as printed")
-    evidence: Text | None = Field(None, description="where the figure or its sidedness is from")
+    evidence: Text | None = Field(None, description="source of the figure or its sidedness")
     source: Literal["primary", "secondary"] | None = Field(
-        None, description="null: that of the datasheet"
+        None, description="null: from the datasheet"
     )
 
     @model_validator(mode="after")
@@ -226,7 +226,7 @@ class QuantityDatasheet(Strict):
     bias_repeatability: Figures = Field(None, description="offset from one run to another")
     temperature_coefficient: Figures = Field(None, description="offset per kelvin")
     temperature_total: Figures = Field(
-        None, description="change of the offset over the range of temperature of 'condition'"
+        None, description="change of the offset over the temperature range of 'condition'"
     )
     temperature_rms: Figures = Field(
         None, description="rms of the offset while the temperature changes slowly"
@@ -243,7 +243,7 @@ class QuantityDatasheet(Strict):
     )
     full_scale: Figures = Field(None, description="±, of the sensor or to choose from")
     sensitivity: Figures = Field(None, description="unit per LSB, or LSB per unit")
-    resolution: Figures = Field(None, description="least change that shows, such as deg/h")
+    resolution: Figures = Field(None, description="smallest detectable change, such as deg/h")
     bandwidth: Figures = Field(None, description="-3 dB, of the sensor")
 
     @model_serializer(mode="wrap")

@@ -89,7 +89,7 @@ class FileForm(Strict):
 
     form: Literal["file"]
     file: Path
-    column: str | None = Field(None, description="null: what it is a profile of")
+    column: str | None = Field(None, description="null: the unit of its quantity")
 
 
 Part = Annotated[ConstantForm | StepsForm | DayCycleForm | WarmUpForm, Field(discriminator="form")]

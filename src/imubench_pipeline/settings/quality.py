@@ -26,7 +26,7 @@ class QualitySettings(Strict):
         3600.0, gt=0, description="s; a longer gap begins a new segment instead of a hole"
     )
     jitter: float = Field(
-        0.01, gt=0, lt=1, description="share of stamps off the grid beyond which it is given up"
+        0.01, gt=0, lt=1, description="fraction of stamps off the grid above which no grid is used"
     )
     rate_tolerance: float = Field(
         0.01, gt=0, description="relative difference of stated rate and stamps that is a finding"
@@ -37,7 +37,7 @@ class QualitySettings(Strict):
     knock: float = Field(
         10.0, ge=5, description="standard deviations from which a sample is an outlier"
     )
-    longest_knock: float = Field(0.5, gt=0, description="s; what shakes for longer is motion")
+    longest_knock: float = Field(0.5, gt=0, description="s; a longer vibration is motion")
     motion: float = Field(
         4.0, gt=1, description="times its usual spread from which a sensor is in motion"
     )

@@ -72,7 +72,7 @@ class Limit(Strict):
     error: Error
     after: Time | None = Field(None, description="of dead reckoning; of rest, for north")
     outage: Outage | None = Field(
-        None, description="instead: of GNSS, on a simulated drive, of a filter that is tuned"
+        None, description="instead of a time: GNSS outage of a tuned filter on a simulated drive"
     )
     trajectory: Trajectory | None = Field(None, description="of that drive")
     at_most: Text = Field(description="with its unit, such as 1 deg or 5 m")
@@ -136,10 +136,10 @@ class TurnOn(Strict):
     """Standard deviations of the biases with which dead reckoning begins."""
 
     gyro: Text | None = Field(
-        None, description="with its unit, such as 0.2 deg/s; null: that of the datasheet"
+        None, description="with its unit, such as 0.2 deg/s; null: from the datasheet"
     )
     accel: Text | None = Field(
-        None, description="with its unit, such as 20 mg; null: that of the datasheet"
+        None, description="with its unit, such as 20 mg; null: from the datasheet"
     )
     on_time: Time = Field("60 s", description="since the sensor was switched on")
 
@@ -198,24 +198,24 @@ class Requirement(Strict):
     """Requirements of one application."""
 
     title: Text
-    example: bool = Field(False, description="made up, to show how a requirement is written")
+    example: bool = Field(False, description="invented as an example")
     note: Text | None = None
     limits: tuple[Limit, ...] = Field(min_length=1)
     static_window: Time | None = Field(
-        None, description="at rest right before, from which biases and tilt are taken"
+        None, description="window at rest before it, for the estimation of biases and tilt"
     )
-    turn_on: TurnOn | None = Field(None, description="instead: biases that nothing has taken off")
+    turn_on: TurnOn | None = Field(None, description="instead: turn-on biases without calibration")
     latitude: Latitude | None = Field(None, description="for limits of north")
     environment: Environment = Field(
-        Environment(), description="what happens in use; datasheets say what errors it causes"
+        Environment(), description="conditions of use; datasheets give the resulting errors"
     )
     must: Must = Field(Must(), description="without it a sensor is excluded")
     confidence: float = Field(
-        0.95, gt=0, lt=1, description="chance of an error within its limit, on one axis"
+        0.95, gt=0, lt=1, description="probability of an error within its limit, on one axis"
     )
     axis: Axis = Field("worst", description="the axis of a sensor that must fulfil it")
     price_class: tuple[Text, ...] | None = Field(
-        None, description="words of which the price class of a sensor must have one; null: any"
+        None, description="permitted words in the price class of a sensor; null: any"
     )
 
     @model_validator(mode="after")

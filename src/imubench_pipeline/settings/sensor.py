@@ -87,9 +87,7 @@ class ColumnSource(Strict):
 class PositionSource(ColumnSource):
     """Location of the column with the position of a turned sensor."""
 
-    unit: str = Field(
-        "1", description="of no importance: two positions are told apart by any two numbers"
-    )
+    unit: str = Field("1", description="not relevant: any two numbers distinguish two positions")
 
 
 class TimeSource(Strict):
@@ -98,8 +96,8 @@ class TimeSource(Strict):
     column: str | int = Field(description="name in the header, or position counted from 1")
     unit: Literal["s", "ms", "us", "ns", "samples"] | None = Field(
         None,
-        description="unit of numeric stamps; samples: the column counts samples, and 'rate' "
-        "says how long one lasts",
+        description="unit of numeric stamps; samples: the column counts samples, and 'rate' gives "
+        "the interval",
     )
     date: str | int | None = Field(
         None, description="column of the date, where 'column' holds the time of day alone"
@@ -252,22 +250,20 @@ class Sensor(Strict):
     price_class: Text | None = None
     sold: bool = Field(
         True,
-        description="false: no such sensor can be bought, as a board of several that is simulated; "
-        "its recordings decide nothing, and it is on no shortlist",
+        description="false: the sensor is not for sale, such as a simulated board of several; it "
+        "is in no comparison and on no shortlist",
     )
     price: Text | None = Field(None, description="with its currency and number, such as 12 EUR")
     mass: Annotated[Text, make_size_validator("mass")] | None = Field(
         None, examples=["15 g"], description="null: not known"
     )
     power: Annotated[Text, make_size_validator("power")] | None = Field(
-        None, examples=["0.2 W"], description="that it takes; null: not known"
+        None, examples=["0.2 W"], description="supply that it requires; null: not known"
     )
     temperature_range: Between | None = Field(
         None, description="of operation, such as [-40 degC, 85 degC]; null: not known"
     )
-    rate: Frequency | None = Field(
-        None, description="the highest that it gives samples at; null: not known"
-    )
+    rate: Frequency | None = Field(None, description="highest sampling rate; null: not known")
     interface: Text | None = Field(None, description="such as SPI, I2C, UART or CAN")
     log: LogFormat
     datasheet: Datasheet = Datasheet()
@@ -294,8 +290,9 @@ class RecordingNotes(WithBlocks):
     started: Text | None = Field(None, description="date and time of the first sample")
     simulated: bool | None = Field(
         None,
-        description="true: the log is simulated, and decides nothing beside measured ones; false "
-        "does not overrule the mark in a log of `imubench simulate`; null: the log says it",
+        description="true: the log is simulated, and is not compared with measured ones; false "
+        "does not overrule the mark in a log of `imubench simulate`; null: by the mark "
+        "in the log",
     )
     power_cycled: bool | None = Field(
         None,

@@ -55,12 +55,12 @@ class PublishedFigure(Strict):
 
     where: Text = Field(description="such as Table 5")
     figure: Text = Field(description="its name there")
-    printed: Text = Field(description="with its unit, as printed")
-    of: Literal["log", "datasheet"] = Field("log", description="what it says something of")
+    printed: Text = Field(description="printed value, with its unit")
+    of: Literal["log", "datasheet"] = Field("log", description="subject of the value")
     kind: FigureKind | None = Field(None, description="of a datasheet: max, typ ...; left out: any")
     parameter: Literal["N", "B", "bias", "sensitivity"]
     means: Text = Field(description="the same as that parameter: N two-sided, B the floor / 0.664")
-    why: Text | None = Field(None, description="why it differs from what an estimate gives")
+    why: Text | None = Field(None, description="reason for the difference from an estimate")
 
     def si(self, quantity: str) -> float:
         """Return its meaning in SI."""
@@ -87,10 +87,10 @@ class ReadByAuthors(Strict):
 class SimulatedChannel(AxisSettings):
     """The truth of one simulated channel, with units as published."""
 
-    assumed: tuple[Text, ...] = Field((), description="figures that no source publishes")
+    assumed: tuple[Text, ...] = Field((), description="values that no source publishes")
     published: tuple[PublishedFigure, ...] = ()
     read: ReadByAuthors | None = Field(
-        None, description="what the source reads from its own curve: method `authors`"
+        None, description="values that the source read from its own curve: method `authors`"
     )
     figures: Text | None = Field(None, description="figures of the source that show this channel")
 
@@ -122,8 +122,8 @@ class OfASensor(ImuSettings):
     channels: dict[Channel, SimulatedChannel] = Field(min_length=1)
     shows: dict[Text, Text] = Field(
         default_factory=dict,
-        description="findings that it is to have, each with what it shows by them: on pages they "
-        "are told from those that nobody expects",
+        description="intended findings, each with the reason: pages distinguish them from "
+        "unexpected ones",
     )
 
     @model_validator(mode="after")
@@ -175,8 +175,8 @@ class SimulatedRecording(OfASensor, Surroundings, WithBlocks):
                 raise ValueError(f"{key}.{error}") from error
             if gyro in self.motion or (gyro is None and self.motion):
                 raise ValueError(
-                    f"motion.{gyro or min(self.motion)}: {key} says how it moves; expected one of "
-                    "the two"
+                    f"motion.{gyro or min(self.motion)}: {key} also states its motion; expected "
+                    "one of the two"
                 )
         return self
 
@@ -214,7 +214,7 @@ class Board(Surroundings):
     seed: int
     why: dict[str, Text] = Field(
         default_factory=dict,
-        description="by the name of a published figure: why it differs from what an estimate gives",
+        description="by the name of a published figure: reason for the difference from an estimate",
     )
     sensors: tuple[OfASensor, ...] = Field(min_length=1)
 
