@@ -158,7 +158,7 @@ HDF5 = [
         "hdf5 that is kept elsewhere",
         hdf5(elsewhere),
         MATRIX,
-        Rejected(r"log\.h5: m is kept in other files"),
+        Rejected(r"log\.h5: m is stored in other files"),
     ),
     Entry("hdf5 of a header", file(b"\x89HDF\r\n\x1a\n", "log.h5"), STAMPED, Rejected(r"log\.h5")),
     Entry(

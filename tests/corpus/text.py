@@ -96,7 +96,7 @@ LAYOUTS = [
         "csv in UTF-16 without a mark",
         file(WHOLE.encode("utf-16-le")),
         STAMPED,
-        Rejected("log.csv, line 1: looks like UTF-16 without the mark that says so"),
+        Rejected("log.csv, line 1: looks like UTF-16 without a byte order mark"),
     ),
     Entry(
         "csv in Latin-1",

@@ -101,7 +101,7 @@ def test_zeros_may_follow_compressed_data_and_nothing_else(
     found, _, file = columns(written(tmp_path, packed + bytes(100_000)), log_format())
     assert len(found["gyro_x"]) == ROWS
     assert file.findings == []
-    with pytest.raises(RecordingError, match="what follows the compressed data is not compressed"):
+    with pytest.raises(RecordingError, match="the compressed data are followed by other data"):
         columns(written(tmp_path, packed + text), log_format())
 
 

@@ -189,7 +189,7 @@ def test_what_is_elsewhere_is_not_followed(tmp_path: Path) -> None:
         refused(
             path,
             log({"gyro_x": {"column": 1, "variable": name}}),
-            f"{name}( for gyro_x)? is kept in other files; expected one file",
+            f"{name}( for gyro_x)? is stored in other files; expected one file",
         )
     refused(path, log({"gyro_x": {"column": 1, "variable": "link"}}), "no variable 'link'")
 
@@ -202,7 +202,9 @@ def test_a_compression_that_is_not_here(tmp_path: Path) -> None:
     data = path.read_bytes()
     place = data.index(b"deflate") - 8
     path.write_bytes(data[:place] + (32001).to_bytes(2, "little") + data[place + 2 :])
-    message = r"m is compressed with filter 32001 \(deflate\), which is not here; expected gzip"
+    message = (
+        r"m is compressed with filter 32001 \(deflate\), which is not installed; expected gzip"
+    )
     refused(path, log({"gyro_x": {"column": 1}}), message)
 
 

@@ -69,7 +69,7 @@ class _CompressedParts:
             try:
                 block: bytes = self._part.decompress(packed, size)
             except (OSError, EOFError, lzma.LZMAError, zlib.error, zstd.ZstdError) as error:
-                why = "what follows the compressed data is not compressed" if begins else error
+                why = "the compressed data are followed by other data" if begins else error
                 raise OSError(str(why)) from None
             if block:
                 self._size += len(block)
@@ -231,7 +231,7 @@ class _DeflatedMember:
                 self._crc = zlib.crc32(block, self._crc)
                 self._size -= len(block)
                 if self._size < 0:
-                    raise zipfile.BadZipFile("more data than the directory says")
+                    raise zipfile.BadZipFile("more data than stated in the directory")
                 return block
             if not packed and not self._inflate.eof:
                 raise EOFError
@@ -248,7 +248,7 @@ _UNSUPPORTED_COMPRESSIONS: Mapping[bytes, str] = {
     b"Rar!\x1a\x07": "rar",
     b"\x04\x22\x4d\x18": "lz4",
     b"\x1f\x9d\x90": "compress",
-    _ZIP_LOCAL: "zip in another way",
+    _ZIP_LOCAL: "zip with another compression method",
 }
 
 _CORRUPT_DATA_ERRORS = (OSError, ValueError, zlib.error, lzma.LZMAError, zipfile.BadZipFile,
@@ -361,7 +361,7 @@ def _read_directory(archive: Path, _size: int, _written: int) -> Mapping[str, zi
         if other is not info and is_visible(Path(name)):
             raise RecordingError(
                 f"{archive.name}: {_describe_member(other)} and {_describe_member(info)} have one "
-                "name; expected each name once: pack it again without the copy"
+                "name; expected each name once: pack it again with unique names"
             )
     return by_name
 
@@ -456,7 +456,7 @@ def _open_member(archive: Path, name: str, file: IO[bytes]) -> Bytes:
     if info.flag_bits & _FLAG_ENCRYPTED:
         raise RecordingError(f"{shown}: is encrypted; unpack the archive with its password")
     if stat.S_ISLNK(info.external_attr >> 16):
-        raise RecordingError(f"{shown}: is a link; expected the log itself: pack it anew")
+        raise RecordingError(f"{shown}: is a link; expected the log itself: pack it again")
     if info.compress_type not in _ZIP_METHODS:
         method = _OTHER_METHODS.get(info.compress_type, "unknown")
         raise RecordingError(
@@ -467,7 +467,7 @@ def _open_member(archive: Path, name: str, file: IO[bytes]) -> Bytes:
         file.seek(info.header_offset)
         header = _ZIP_HEADER.unpack(file.read(_ZIP_HEADER.size))
         if header[0] != _ZIP_LOCAL:
-            raise zipfile.BadZipFile("no header where the directory says")
+            raise zipfile.BadZipFile("no header at the position that the directory states")
         file.seek(header[9] + header[10], io.SEEK_CUR)
         deflated = info.compress_type == zipfile.ZIP_DEFLATED
         stream = _DeflatedMember(file, info) if deflated else zipfile.ZipExtFile(file, "r", info)

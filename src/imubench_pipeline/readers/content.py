@@ -87,7 +87,7 @@ def recognise_content(path: Path) -> tuple[FileFormat, str]:
     if packed and not file_format.streamed:
         raise RecordingError(
             f"{path.name}: holds a file of the reader {file_format.name!r}, compressed by "
-            f"{packed}; expected it as it is: unpack it"
+            f"{packed}; expected it uncompressed: unpack it"
         )
     return file_format, packed
 

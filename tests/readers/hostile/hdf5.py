@@ -134,6 +134,6 @@ HDF5 = {
         "corrupt data, or cut short",
         channels=FIRST,
     ),
-    "a virtual data set of a pipe": Attack(virtual, "wx .*is kept in other files", "^listed: "),
+    "a virtual data set of a pipe": Attack(virtual, "wx .*is stored in other files", "^listed: "),
     "an external link to a pipe": Attack(external, "no variable or column 'wx'", "^listed: "),
 }

@@ -112,7 +112,7 @@ PACKED = {
         file("log.zip", lambda: local_headers(100_000)), "without its directory, with more than"
     ),
     "a member that is longer than is said": Attack(
-        lying_archive, "more data than the directory says"
+        lying_archive, "more data than stated in the directory"
     ),
     "an archive in an archive in an archive": Attack(nested_archives, "is compressed twice"),
 }

@@ -198,8 +198,8 @@ def count_block_rows(row_bytes: int, most: int) -> int:
     """Return the records of a block of ``most`` bytes; `UnusableError` if one is larger."""
     if row_bytes > most:
         raise UnusableError(
-            f"one record takes {row_bytes} bytes; expected at most {most}: store the log's columns "
-            "in an array of their own"
+            f"one record takes {row_bytes} bytes; expected at most {most}: store the columns of "
+            "the log in a separate array"
         )
     return min(_MAX_BLOCK_ROWS, most // max(row_bytes, 1))
 

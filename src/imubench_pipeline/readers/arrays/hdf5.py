@@ -31,7 +31,7 @@ from imubench_pipeline.readers.bounds import (
 _CACHE_SLOTS, _CACHE_PREEMPTION, _MIN_CACHE = 521, 0.75, 1 << 20
 """Defaults of the library: slots, preemption weight (w0) and bytes of the chunk cache."""
 
-_EXTERNAL_FAULT = "is kept in other files; expected one file: repack it with h5repack"
+_EXTERNAL_FAULT = "is stored in other files; expected one file: repack it with h5repack"
 
 
 class Hdf5File(ArrayFile):
@@ -62,7 +62,7 @@ def list_data_sets(file: h5py.File, time_axis: int = 0, passed_over: str = "\0")
         if depth > MAX_GROUP_DEPTH:
             raise UnusableError(
                 f"groups lie more than {MAX_GROUP_DEPTH} deep; expected the log of one sensor: "
-                "copy its data sets into a file of their own"
+                "copy its data sets into a separate file"
             )
         if objects + len(group) > MAX_OBJECTS:
             raise UnusableError(
@@ -201,7 +201,7 @@ def _check_written(data: h5py.Dataset, name: str, unpacked: int) -> None:
         if not h5py.h5z.filter_avail(code):
             raise UnusableError(
                 f"{name} is compressed with filter {code} ({title.decode('ascii', 'replace')}), "
-                "which is not here; expected gzip: repack it with h5repack -f GZIP=4"
+                "which is not installed; expected gzip: repack it with h5repack -f GZIP=4"
             )
     if unpacked > MAX_CHUNK_BYTES:
         raise UnusableError(
@@ -215,7 +215,7 @@ def _check_written(data: h5py.Dataset, name: str, unpacked: int) -> None:
     if written < chunks:
         raise UnusableError(
             f"{written} of {chunks} chunks of {name} were written, the others would read as "
-            "zeros; cut it to what was recorded, or copy the file again"
+            "zeros; cut it to the recorded samples, or copy the file again"
         )
     if chunks > MAX_CHUNKS:
         raise UnusableError(

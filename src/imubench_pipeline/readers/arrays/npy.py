@@ -46,8 +46,8 @@ class NumpyFile(ArrayFile):
             return [_read_array_header("", lambda: self.path.open("rb"), size, checked=False)]
         if not begin.startswith(b"PK"):
             raise UnusableError(
-                "not a NumPy file, or its beginning is damaged; expected what numpy.save or "
-                "numpy.savez writes: mend 'reader' in the sensor file, or copy the file again"
+                "not a NumPy file, or its beginning is damaged; expected the output of numpy.save "
+                "or numpy.savez: mend 'reader' in the sensor file, or copy the file again"
             )
         archive = stack.enter_context(open_archive(self.path))
         size = self.path.stat().st_size

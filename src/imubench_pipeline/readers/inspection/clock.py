@@ -47,7 +47,7 @@ share of pauses, for steps that count as equal."""
 
 _RATE_TOLERANCE = 0.1  # largest relative difference of a guessed rate and the stated one
 _SECONDS_PER_UNIT = {"min": 60, "h": 3600}
-_UNIT_HINT = "the file does not say: s, ms, us or ns?"
+_UNIT_HINT = "not stated in the file: s, ms, us or ns?"
 
 
 @dataclass(frozen=True, eq=False)

@@ -285,11 +285,11 @@ def choose_columns(contents: Contents) -> Choice:
 def _explain_rejection(group: Group) -> str:
     """Return the reason why a group is never used; empty if it can be used."""
     if group.rank == DERIVED:
-        return "of a filter or about the measurement, not what the sensor measures"
+        return "filter output or metadata, not a measurement of the sensor"
     if group.rank == WITHOUT_GRAVITY and group.gravity_unit is None:
-        return "without gravity: not what the accelerometer measures"
+        return "without gravity: not a raw accelerometer measurement"
     if group.quantity != "temperature" and len(group.columns) > 1 and group.constant:
-        return "the same in all of the first records: nothing was measured here"
+        return "constant in the first records: no measurement"
     return ""
 
 
@@ -339,7 +339,7 @@ def _collect_tables(groups: Sequence[Group], anchor: LogTable | None) -> list[Lo
     return list({id(table): table for table in tables}.values())
 
 
-_GYRO_HINT = "the file does not say: deg/s or rad/s? see the logger's manual"
+_GYRO_HINT = "not stated in the file: deg/s or rad/s? see the logger's manual"
 _MAX_LISTED_NAMES = 20
 _FILE_SUFFIXES = re.compile(r"(?:\.[A-Za-z]\w{0,7})+$")
 _COUNTS_PER_G = tuple(1 << bits for bits in range(8, 20))
@@ -352,11 +352,13 @@ def draft_sensor_file(contents: Contents, model: str | None = None) -> Draft:
     usable = (table.file_format for table in contents.tables if table.fault is None)
     vendor = next((made.vendor for made in usable if made.vendor), "unknown")
     drafted = Draft(
-        Entry(vendor, "who makes the sensor, for the report"),
-        Entry(model or _FILE_SUFFIXES.sub("", contents.path.name) or "sensor", "what it is called"),
+        Entry(vendor, "vendor of the sensor, for the report"),
+        Entry(model or _FILE_SUFFIXES.sub("", contents.path.name) or "sensor", "model name"),
     )
     if contents.stated is not None:
-        drafted.reader = Entry(contents.stated.name, "the file does not tell it by its first bytes")
+        drafted.reader = Entry(
+            contents.stated.name, "not detected from the first bytes of the file"
+        )
     if choice.clock is not None:
         value = dict(choice.clock.entry.value)
         if choice.local:
@@ -364,7 +366,7 @@ def draft_sensor_file(contents: Contents, model: str | None = None) -> Draft:
         drafted.time = Entry(value, choice.clock.entry.comment)
     if choice.clock is None or choice.clock.counts:
         stating = (table for table in contents.tables if table.rate is not None)
-        drafted.rate = Entry(UNKNOWN, "the file does not say: such as 100 Hz")
+        drafted.rate = Entry(UNKNOWN, "not stated in the file: such as 100 Hz")
         table = choice.anchor or next(stating, None)
         if table is not None and table.rate is not None:
             drafted.rate = Entry(f"{table.rate:.10g} Hz", "stated in the file")
@@ -377,7 +379,7 @@ def draft_sensor_file(contents: Contents, model: str | None = None) -> Draft:
         _add_temperature(drafted, choice.temperature, alone)
     if not drafted.channels:
         entry = Entry(
-            {"column": UNKNOWN, "unit": UNKNOWN}, "no name of a column tells: fill in, or remove"
+            {"column": UNKNOWN, "unit": UNKNOWN}, "no column name identifies it: fill in, or remove"
         )
         drafted.channels = dict.fromkeys(CHANNELS, entry)
     drafted.left_over += [f"not taken: {_name_group(g)} ({why})" for g, why in choice.left]
@@ -425,7 +427,7 @@ def _guess_acceleration_unit(group: Group) -> tuple[str, str]:
     """Return the unit in which the mean has the length of gravity, and a comment."""
     length, unit = group.mean_length, group.gravity_unit
     if length is None:
-        return UNKNOWN, "the file does not say: m/s^2, g or mg?"
+        return UNKNOWN, "not stated in the file: m/s^2, g or mg?"
     if unit is not None:
         return unit, f"guessed: the mean is {length:.4g} long, as gravity in {unit}"
     counts = [count for count in _COUNTS_PER_G if abs(length / count - 1) < _COUNT_TOLERANCE]
@@ -447,7 +449,7 @@ def _add_temperature(drafted: Draft, group: Group, alone: bool) -> None:
         comment = f"guessed: {level:.4g} is one in {unit}"
     if unit is None:
         drafted.left_over.append(
-            f"not taken: {_name_group(group)}, a temperature in a unit that the file does not say"
+            f"not taken: {_name_group(group)}, a temperature in a unit that the file does not state"
         )
         return
     drafted.temperature = Entry(_describe_source(group.table, column, unit, alone), comment)

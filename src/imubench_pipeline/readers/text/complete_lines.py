@@ -191,9 +191,9 @@ def describe_missing_text(path: Path) -> str:
             "the compressed data end before any text" if file.ended_early else "the file is empty"
         )
     if not begin.strip(b"\0"):
-        return "the file begins with zero bytes and no text: the logger wrote nothing, or lost it"
+        return "the file has zero bytes and no text: the logger wrote nothing, or data were lost"
     if not begin.strip(b"\0 \t\r\n"):
-        return "the file holds blank lines alone"
+        return "the file has only blank lines"
     return "the file has no more lines"
 
 
@@ -299,7 +299,7 @@ class Records:
         if self._blank > _MAX_BLANK_LINES:
             raise RecordingError(
                 f"{self._blank} blank lines follow each other among the records; expected a log "
-                "without: cut the file there"
+                "without blank lines: cut the file there"
             )
         before = _MISSING_CELL * self._blank
         self._blank = after - 1

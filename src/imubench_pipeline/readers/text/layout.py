@@ -416,8 +416,8 @@ def refuse_binary(file: str, number: int, line: bytes) -> None:
         < (1 - _MIN_ZERO_SHARE_UTF_16) * len(line) + 2
     ):
         raise RecordingError(
-            f"{file}, line {number}: looks like UTF-16 without the mark that says so; expected "
-            "UTF-8, or UTF-16 with its mark: save the text so"
+            f"{file}, line {number}: looks like UTF-16 without a byte order mark; expected UTF-8, "
+            "or UTF-16 with its mark: save the text in one of these"
         )
     raise RecordingError(
         f"{file}, line {number}: holds {zeros} zero byte{'s' if zeros > 1 else ''}, as binary data "
