@@ -71,7 +71,7 @@ def test_the_page_of_a_rate_table(read: dict[str, Read]) -> None:
 def test_the_page_of_a_gyro_at_rest_says_what_it_cannot_tell(read: dict[str, Read]) -> None:
     page = read["recordings/s/still.html"]
     assert "Bias without the Earth’s rate, gyro x" in page.text
-    assert "the Earth's rate: In one position the Earth's rate and the bias" in page.text
+    assert "the Earth's rate: In one position, only the sum of Earth's rate and bias" in page.text
     assert "heading: The heading is not known" in page.text and "no heading)" in page.text
     assert page.naming("bias at the end", "tr")
     assert "Bias without the Earth’s rate" not in read["recordings/s/night.html"].text
@@ -92,7 +92,7 @@ def test_each_sensor_has_its_alignment_and_its_needs(read: dict[str, Read]) -> N
     assert "20 mg (earth_rate.accelerometer_bias), assumed" in page.text
     assert "no gyro y and z, accelerometer x and y; the other axes replace them" in page.text
     assert "Check: 400 simulated triads" in page.text
-    assert "No heading: What is not known of the gyros" in page.text
+    assert "No heading: The uncertainty of the gyro" in page.text
     (line,) = [one for one in page.naming("two opposite positions", "tr") if "60 min" in one.text
                and "fine" in one.text]  # fmt: skip
     assert "not determined" not in line.text

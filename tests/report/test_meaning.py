@@ -86,7 +86,7 @@ def test_a_budget_names_its_sources_and_what_is_missing() -> None:
     assert lines["heading"]["lines"][0] == f"{math.degrees(1e-3 * math.sqrt(120)):.2g} °"
     assert "gyro N 50 %" in lines["heading"]["lines"]
     north = lines["north, found at rest"]["lines"]  # 1e-3 rad/s against the Earth's rate
-    assert north[0] == "not to be found"
+    assert north[0] == "not determined"
     assert [line["error"] for line in tables[2]["lines"]] == [
         "heading", "north, found at rest",
     ]  # fmt: skip
@@ -151,7 +151,7 @@ def test_an_error_of_more_than_a_right_angle_is_no_number() -> None:
     (line,) = shown(budget(sigma=2.0))["lines"]
     assert line["cells"][0]["lines"][0] == "over 90 °"
     (line,) = shown(budget(sigma=2.0, error="north"))["lines"]
-    assert line["cells"][0]["lines"][0] == "not to be found"
+    assert line["cells"][0]["lines"][0] == "not determined"
     assert not any(" to " in one for one in line["cells"][0]["lines"][1:])
     _, limit = ranked(sigma=2.0, upper=9.0)
     assert (limit.sigma, limit.interval) == ("over 90 °", "–")

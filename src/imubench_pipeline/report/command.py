@@ -30,7 +30,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--output",
         partial(OutputFolder, is_earlier=is_report),
         metavar="FOLDER",
-        help="where the pages go, a new folder or an earlier report; default: RESULTS/report",
+        help="folder of the pages: a new one, or an earlier report; default: RESULTS/report",
     )
 
 

@@ -374,7 +374,7 @@ def _format_error(row: ErrorRow, sigma: float, unit: Unit) -> str:
     """Return the error of a row with its unit, and as many digits as its limits allow."""
     if not _is_sensible(row, sigma):
         north = row.error == "north"
-        return "not to be found" if north else f"over {unit.text(_QUARTER_TURN, 3)} {unit.sign}"
+        return "not determined" if north else f"over {unit.text(_QUARTER_TURN, 3)} {unit.sign}"
     digits = unit.digits(sigma, row.lower, row.upper)
     return f"{unit.text(sigma, digits)} {unit.sign}"
 

@@ -82,13 +82,13 @@ def describe_failure(logs: Sequence[str], results: Path) -> str:
     """Return the summary of a run that failed or was stopped, from the logs of Snakemake."""
     texts = [Path(log).read_text(encoding="utf-8", errors="replace") for log in logs]
     steps = dict.fromkeys(step for text in texts for step in _failed_steps(text, results))
-    again = "run the same command again: it goes on where this run stopped"
+    again = "run the same command again: it continues where this run stopped"
     if any(_INTERRUPTED in text for text in texts):
-        lines = [f"stopped before its end; to go on, {again}"]
+        lines = [f"stopped before its end; to continue, {again}"]
     else:
         lines = [f"{counted(len(steps), 'step') if steps else 'a step'} failed; why stands above"]
         lines += _bounded(f"  {step}" for step in steps)
-        lines.append(f"all that does not need them is done; to go on, mend it and {again}")
+        lines.append(f"all independent steps are done; to continue, correct the cause and {again}")
     lines += [f"log: {log}" for log in logs]
     return "\n".join(lines)
 
@@ -119,7 +119,7 @@ def list_rejections(recordings: Iterable[RecordingRow]) -> Iterator[str]:
     """Yield a line for each rejected recording: its name and the reason."""
     for row in recordings:
         if row.status == "rejected":
-            reason = row.reason or "no reason is kept"
+            reason = row.reason or "no reason is recorded"
             yield fold_text(f"{row.sensor}/{row.recording}: {reason}")
 
 

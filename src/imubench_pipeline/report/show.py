@@ -23,10 +23,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of the command to its parser."""
     parser.add_argument("results", type=Path, help="folder of the results of a run")
     parser.add_argument(
-        "--requirement", metavar="NAME", help="the ranking for this one alone, with every limit"
+        "--requirement",
+        metavar="NAME",
+        help="the ranking for only this requirement, with every limit",
     )
-    parser.add_argument("--channel", help="parameters of this one alone, such as gyro_x")
-    parser.add_argument("--method", help="of the parameters; default: the recommended one")
+    parser.add_argument("--channel", help="parameters of only this channel, such as gyro_x")
+    parser.add_argument("--method", help="method of the parameters; default: the recommended one")
     parser.add_argument(
         "--units",
         choices=("practical", "si"),

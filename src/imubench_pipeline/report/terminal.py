@@ -142,7 +142,7 @@ def render_logs(
         recommended = [line for line in parameters if line.recommended]
         yield from _parameter_tables(recommended, "95 % intervals below", about, system, width)
         if not parameters:
-            why = "no noise is estimated of a turned sensor"
+            why = "noise is not estimated for a turned sensor"
             why = "no channel can be analysed" if row.kind == "static" else why
             yield Text(f"  {row.kind.replace('_', ' ')}: {why}\n")
 

@@ -126,7 +126,7 @@ def _add_schema(parser: argparse.ArgumentParser) -> None:
 
 
 def _add_check(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("logs", type=Path, help="folder that holds <sensor>/<recording>")
+    parser.add_argument("logs", type=Path, help="folder that contains <sensor>/<recording>")
     parser.add_argument("--sensors", type=Path, help="folder of the sensor files")
     parser.add_argument(
         "--config", type=Path, default=Path("config/config.yaml"), help="settings of the findings"
@@ -136,7 +136,7 @@ def _add_check(parser: argparse.ArgumentParser) -> None:
 def _add_inspect(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("log", type=Path, help="log file, or folder or archive of a recording")
     parser.add_argument(
-        "--block", action="store_true", help="print the sensor file alone, and no listing"
+        "--block", action="store_true", help="print only the sensor file, without a listing"
     )
     outputs.add_output(
         parser,
@@ -160,7 +160,8 @@ def _add_export(parser: argparse.ArgumentParser) -> None:
         type=make_number_type(1e-9, LONGEST, "a time above 0, such as 60 s", parse_seconds),
         default="60 s",
         metavar="TIME",
-        help="of coasting, for which terms that the program lacks are mapped; default: 60 s",
+        help="time of coasting, for the replacement of terms that the program does not support; "
+        "default: 60 s",
     )
     parser.add_argument(
         "--inflate",
@@ -182,7 +183,7 @@ def _add_export(parser: argparse.ArgumentParser) -> None:
         type=make_number_type(1.0, 1e6, "a factor of 1 to 1e6"),
         default=3.0,
         metavar="FACTOR",
-        help="an overbound whose Allan deviation must be more times its limit is refused; "
+        help="largest permitted ratio of the Allan deviation of an overbound to its limit; "
         "default: 3",
     )
     parser.add_argument("--method", help="of the estimates; default: the recommended one")
@@ -400,7 +401,7 @@ COMMANDS = {
         (
             "analysed",
             "a log was rejected, or a step failed",
-            "a log or the sensor file is not there, or does not say what is needed",
+            "a log or the sensor file is missing, or incomplete",
         ),
     ),
     "init": Command(
@@ -414,9 +415,9 @@ COMMANDS = {
         project.add_run_arguments,
         project.run,
         (
-            "done, as snakemake says it",
-            "a step failed, a recording was left out, or a setting is wrong, likewise",
-            "the folder is none of logs, or snakemake does not know a flag",
+            "done (exit status of snakemake)",
+            "a step failed, a recording was omitted, or a setting is wrong",
+            "the folder has no logs, or snakemake does not know a flag",
         ),
         passes_on=True,
     ),
@@ -427,13 +428,13 @@ COMMANDS = {
         ("written", "", "cannot be written"),
     ),
     "check": Command(
-        "say what is wrong with logs, without analysing them",
+        "check logs without analysing them",
         _add_check,
         _check,
         ("all good", "warnings, or rejected logs", "a setting is wrong, or there are no logs"),
     ),
     "inspect": Command(
-        "show what a log holds, and draft a sensor file for it",
+        "show the contents of a log, and draft a sensor file for it",
         _add_inspect,
         _inspect,
         (
@@ -446,7 +447,7 @@ COMMANDS = {
         "list the logs that are read, and the exports", lambda _: None, formats.run, ("listed",)
     ),
     "export": Command(
-        "write what a filter or simulator loads",
+        "write the input file of a filter or simulator",
         _add_export,
         _export,
         ("written", "", "the program cannot hold it, or " + NO_RESULTS),
@@ -482,14 +483,14 @@ COMMANDS = {
         ("written", "", NO_RESULTS),
     ),
     "verify": Command(
-        "say whether all results are as runs left them",
+        "verify that all results are unchanged",
         verification.add_arguments,
         verification.run,
-        ("all is as it was left", "something is not", "there are no results"),
+        ("all results are unchanged", "something is not", "there are no results"),
     ),
     **_ADDED.by_key(),
     "completion": Command(
-        "print what a shell needs to complete all this",
+        "print a completion script for the shell",
         _add_completion,
         _completion,
         ("printed",),

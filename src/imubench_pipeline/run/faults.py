@@ -90,7 +90,10 @@ class Faults:
 
     def left_out(self) -> str:
         """Return the message about failures of a run; empty if its caller reports them (`TOLD`)."""
-        lines = ["what failed is left out, and tried again by the next run; the report is there"]
+        lines = [
+            "failed parts are omitted, and tried again by the next run; the report is complete "
+            "otherwise"
+        ]
         for failure, log in self.now():
             lines.append(f"  {fold_text(f'{failure.name}: {failure.reason}')}\n    log: {log}")
         return "" if len(lines) == 1 or TOLD in os.environ else "\n".join(lines)

@@ -133,7 +133,7 @@ def read_note(path: Path) -> Mapping[str, Any]:
 def _describe_holder(note: Mapping[str, Any]) -> str:
     """Describe the holder of a lock."""
     if not isinstance(process := note.get("process"), int):
-        return "who holds it is not known"
+        return "its owner is not known"
     since = f"since {note.get('since')}"
     command = note.get("command")
     named = f"process {process}" + (f" ({command})" if isinstance(command, str) else "")

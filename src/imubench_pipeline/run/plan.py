@@ -470,8 +470,8 @@ def _check_places(run: Run) -> None:
     declared = (run.sensors,) if isinstance(run.sensors, Path) else run.sensors
     if results in [folder.resolve() for folder in declared]:
         raise ConfigError(
-            f"results: found {str(run.results)!r}, the folder of the sensor files; expected one of "
-            "its own"
+            f"results: found {str(run.results)!r}, the folder of the sensor files; expected a "
+            "separate folder"
         )
     if logs.is_relative_to(results) or results.is_relative_to(logs):
         raise ConfigError(

@@ -110,7 +110,9 @@ class Processes:
                     self._server = None
                     requests.close()
                     process.wait()
-        raise StepError("the process that starts the steps ends at once; what it says stands above")
+        raise StepError(
+            "the process that starts the steps ended immediately; see its message above"
+        )
 
 
 def _request(

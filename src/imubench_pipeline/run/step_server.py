@@ -85,7 +85,9 @@ def _reap(signal_number: int, frame: FrameType | None) -> None:
                 if number not in _STOP_SIGNALS:
                     reason = signal.Signals(number).name
                     error.cause = "killed"
-                    error.reason = reason + ", perhaps for want of memory" * (reason == "SIGKILL")
+                    error.reason = reason + ", perhaps because memory was exhausted" * (
+                        reason == "SIGKILL"
+                    )
                 connection.send(error)
 
 

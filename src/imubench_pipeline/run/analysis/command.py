@@ -32,8 +32,8 @@ _MAX_DRAWING_TIME, _MAX_DRAWING_MEMORY = 600.0, 4 << 30  # of a process, s and b
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of the command."""
     parser.description = (
-        "Read static logs, say what is wrong with them, and estimate the noise parameters of each "
-        "axis, as a run of the workflow does."
+        "Read static logs, report their faults, and estimate the noise parameters of each axis, "
+        "like a run of the workflow."
     )
     parser.add_argument(
         "logs", type=Path, nargs="+", metavar="LOG", help="log file, or folder of a recording"
@@ -42,11 +42,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--sensor",
         type=Path,
         metavar="FILE",
-        help="sensor file, or a name in config/sensors or the catalogue; default: as the log says",
+        help="sensor file, or a name in config/sensors or the catalogue; default: as stated in the "
+        "log",
     )
     parser.add_argument("--rate", metavar="FREQUENCY", help="of a log without stamps, as '100 Hz'")
-    parser.add_argument("--gyro-unit", metavar="UNIT", help="where the log does not say it")
-    parser.add_argument("--accel-unit", metavar="UNIT", help="where the log does not say it")
+    parser.add_argument("--gyro-unit", metavar="UNIT", help="unit, if the log does not state it")
+    parser.add_argument("--accel-unit", metavar="UNIT", help="unit, if the log does not state it")
     add_output(
         parser,
         "--output",

@@ -64,8 +64,8 @@ def lay_out(
     declared = None if sensor is None else _find_sensor_file(sensor, catalogue)
     if declared is not None and stated:
         raise ConfigError(
-            "--rate, --gyro-unit and --accel-unit fill in what a log does not say; with --sensor "
-            "they have no place: state them in the sensor file"
+            "--rate, --gyro-unit and --accel-unit complete the statements of a log; they cannot be "
+            "used with --sensor: state them in the sensor file"
         )
     (folder / "sensors").mkdir()
     for log, name in zip(logs, _name_recordings(logs), strict=True):
@@ -169,7 +169,7 @@ def _describe_missing_keys(log: Path, keys: Sequence[str]) -> str:
         lines += [f"  add {options[key]}" for key in keys]
         lines.append("or write a sensor file once, for all logs of this sensor:")
     else:
-        lines.append("its columns have no names that tell; write a sensor file:")
+        lines.append("its column names do not identify the channels; write a sensor file:")
     command = shlex.join(["imubench", "inspect", str(log), "--output", "mine.yaml"])
     lines.append(f"  {command}, fill it in, then --sensor mine.yaml")
     return "\n".join(lines)

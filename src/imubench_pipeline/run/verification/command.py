@@ -15,8 +15,8 @@ _PATIENCE = 3.0  # s, until progress is shown, and between its lines in a file
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of the command."""
     parser.description = (
-        "Read all that runs have left, and hold it against the digests that they left, too. Each "
-        "line says what is wrong with a file, and the command that has it made again."
+        "Read all outputs of runs, and compare them with their stored digests. Each line states "
+        "the fault of a file, and the command that makes it again."
     )
     parser.add_argument("results", type=Path, help="folder of the results of runs")
 

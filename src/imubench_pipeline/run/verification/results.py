@@ -26,7 +26,7 @@ _SEALED_FOLDERS = ("recordings", "sensors", "tables", "simulated", "report", "ex
 """Folders in which every file has a seal, except files with their own digest."""
 
 _SAMPLE_FILES = "log*.parquet"
-_NO_SEAL = "expected a seal of the step that left it, found none"
+_NO_SEAL = "expected the seal of its step, found none"
 
 
 @dataclass(frozen=True)
@@ -132,7 +132,7 @@ class Results:
         yield from self._strange_rows()
         for path in find_unfinished(self.folder):
             place = path.relative_to(self.folder).as_posix()
-            words = "expected nothing, found what a run had not completed that was killed"
+            words = "expected nothing, found an incomplete output of a killed run"
             yield Fault(place, words, f"where no run goes on: rm -r {self._quoted(place)}")
 
     def _changed(self, place: str, seal: sealing.Seal) -> Iterator[Fault]:
@@ -153,7 +153,7 @@ class Results:
         try:
             quality = Quality.read(path)
         except (RecordingError, OSError) as error:
-            yield Fault(name, f"expected what the ingest wrote, {_of(error)}",
+            yield Fault(name, f"expected the output of the ingest, {_of(error)}",
                         self._mended(name, step))  # fmt: skip
             return
         of = f"{quality.recording.get('sensor')}/{quality.recording.get('recording')}"
@@ -171,7 +171,7 @@ class Results:
                 yield self._stray(f"{place}/{other.name}")
         known_log = path.with_name(KNOWN)
         if samples and not quality.row.simulated and not known_log.exists():
-            words = "expected what is known of the log, found no such file"
+            words = "expected the file identities of the log, found no such file"
             yield Fault(f"{place}/{KNOWN}", words, self.run_again)
 
     def _others_now(self, seal: sealing.Seal) -> list[tuple[str, bool]]:
