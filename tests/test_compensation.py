@@ -249,7 +249,7 @@ def test_compensated_beside_the_curve_alone_is_never_recommended(brief: Brief) -
 
 
 def test_compensated_does_not_stand_alone() -> None:
-    with pytest.raises(ConfigError, match=r"methods: .*compensated stands beside another method"):
+    with pytest.raises(ConfigError, match=r"methods: .*compensated requires another method"):
         read_run({"estimate": {"methods": ["compensated"]}})
     assert "compensated" in Run().estimate.methods
 

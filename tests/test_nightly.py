@@ -210,7 +210,7 @@ def test_what_moves_between_two_looks_is_held_back(tmp_path: Path) -> None:
     os.utime(grows, (OLD, OLD))
     gone.unlink()
     found = list(find_unsettled_logs(first, scan_drop_zone(tmp_path), 10.0, time.time(), {}))
-    said = "it changed while it was looked at"
+    said = "it changed during the check"
     assert found == [Skip("s/gone", said), Skip("s/grows", said)]
     assert find_changed_logs(first, scan_drop_zone(tmp_path)) == {"s/grows"}
 

@@ -310,7 +310,7 @@ def test_an_output_is_not_what_the_command_reads(
     with kept(lab):
         for target in ("run.csv", "./run.csv", "same.csv"):
             assert call(("inspect", "output"), target, "--force") == 2
-            assert "is what the command reads" in capsys.readouterr().err
+            assert "is an input of the command" in capsys.readouterr().err
 
 
 def test_links_to_nothing_and_long_names_are_written(lab: Path) -> None:

@@ -117,11 +117,11 @@ def test_what_a_failing_step_says_is_not_drawn_over(folder: Path) -> None:
     assert "Traceback (most recent call last):\n" in left
     assert "ValueError: upside down\nturn it over\n" in left
     assert "Error in rule ingest:" in left and "output: s/bad.done" in left
-    assert left.index("turn it over") < left.index("what failed")
+    assert left.index("turn it over") < left.index("failed parts")
     # What a run says of its failures, by the log that it wrote.
-    said = [line.strip() for line in left.partition("what failed")[2].splitlines() if line.strip()]
+    said = [line.strip() for line in left.partition("failed parts")[2].splitlines() if line.strip()]
     assert said[:2] == ["1 step failed; why stands above", "ingest"]
-    assert said[2].endswith("run the same command again: it goes on where this run stopped")
+    assert said[2].endswith("run the same command again: it continues where this run stopped")
 
 
 @pytest.mark.parametrize("flags", few([], [(("--quiet",),), (("--verbose",),)]))

@@ -167,7 +167,7 @@ def test_a_failed_run_says_what_failed_and_how_to_go_on(tmp_path: Path) -> None:
     lines = snakemake(tmp_path, "exit 3")
     assert lines[0] == "2 steps failed; why stands above"
     assert set(lines[1:3]) == {"  allan of s/r", "  ranking"}
-    assert lines[3].endswith("run the same command again: it goes on where this run stopped")
+    assert lines[3].endswith("run the same command again: it continues where this run stopped")
     assert Path(lines[4].removeprefix("log: ")).is_file()
 
 
@@ -185,7 +185,7 @@ def test_an_interrupted_run_says_how_to_go_on(tmp_path: Path) -> None:
         f"for try in 1 2 3 4 5 6 7 8; do sleep 1; kill -INT $PPID; sleep 2; {heard} && break; done"
     )
     lines = snakemake(tmp_path, f"{send}; exit 3")
-    assert lines[0].startswith("stopped before its end; to go on, run the same command again")
+    assert lines[0].startswith("stopped before its end; to continue, run the same command again")
     assert len(lines) == 2
 
 
@@ -196,7 +196,7 @@ def test_a_log_of_a_run_that_was_interrupted_is_understood(tmp_path: Path) -> No
         "Error in rule allan:\n    jobid: 4\n    output: out/recordings/a/r/allan.parquet\n"
     )
     first, last = describe_failure([str(log)], Path("out")).splitlines()
-    assert first.startswith("stopped before its end; to go on, run the same command again")
+    assert first.startswith("stopped before its end; to continue, run the same command again")
     assert last == f"log: {log}"
 
 

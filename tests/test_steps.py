@@ -244,7 +244,11 @@ def test_a_script_that_runs_past_its_time_is_ended(steps: Processes, tmp_path: P
 
 BLAMED = (
     ("raise ValueError('upside\\ndown')", "error", "ValueError: upside down"),
-    ("import os; os.kill(os.getpid(), 9)", "killed", "SIGKILL, perhaps for want of memory"),
+    (
+        "import os; os.kill(os.getpid(), 9)",
+        "killed",
+        "SIGKILL, perhaps because memory was exhausted",
+    ),
     ("import os; os.kill(os.getpid(), 11)", "killed", "SIGSEGV"),
     ("import os; os.kill(os.getpid(), 2)", None, "bad.py was killed"),
     ("raise OSError(28, 'No space left on device')", None, "OSError: [Errno 28]"),

@@ -236,8 +236,8 @@ def test_both_dimensions_are_named(unit: str, dimension: str, said: str) -> None
         ("mdps/ Hz", "gyro_density", "sign of a root lost, and 'mdps/sqrt(Hz)' meant?"),
         ("deg/h", "gyro_density", "sign of a root lost, and 'deg/sqrt(h)' meant?"),
         ("m/s/h", "accel_density", "sign of a root lost, and 'm/s/sqrt(h)' meant?"),
-        ("mdps/ Hz (lost root)", "gyro_density", "says that a sign was lost"),
-        ("g/√Hz (micro lost)", "accel_density", "says that a sign was lost"),
+        ("mdps/ Hz (lost root)", "gyro_density", "shows that a sign was lost"),
+        ("g/√Hz (micro lost)", "accel_density", "shows that a sign was lost"),
         ("dB re 1 g/√Hz", "accel_density", "10^(level/20) times the reference"),
     ],
 )

@@ -187,7 +187,7 @@ def _parsed(unit: str) -> tuple[float, pint.Unit]:
             "reference"
         )
     if _LOST_SIGN.search(unit):
-        raise UnitError(f"{unit!r} says that a sign was lost; state the unit that was meant")
+        raise UnitError(f"{unit!r} shows that a sign was lost; state the intended unit")
     if len(unit) > _LONGEST:
         raise UnitError(f"{unit[:_LONGEST]!r}... is longer than a unit")
     power = _POWER_OF_TWO.search(unit)
@@ -278,7 +278,7 @@ def _exponent(tokens: list[str], place: int) -> tuple[float, int]:
             raise UnitError("a power is divided by 0")
         exponent /= divisor
     if bracket and tokens[place : place + 1] != [")"]:
-        raise UnitError("what stands behind ^ is no power")
+        raise UnitError("the text after ^ is not a power")
     return exponent, place + bracket
 
 
@@ -286,7 +286,7 @@ def _number(tokens: list[str], place: int) -> tuple[float, int]:
     sign = tokens[place : place + 1] == ["-"]
     digits = "".join(tokens[place + sign : place + sign + 1])
     if not digits[:1].isdigit():
-        raise UnitError("what stands behind ^ is no power")
+        raise UnitError("the text after ^ is not a power")
     return (-1.0 if sign else 1.0) * float(digits), place + sign + 1
 
 

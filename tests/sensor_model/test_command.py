@@ -233,7 +233,7 @@ def test_other_formats_and_other_notes_are_left_alone(tmp_path: Path, capsys) ->
     assert ".parquet or .csv" in capsys.readouterr().err
     (tmp_path / "log.yaml").write_text("device: mine\n")
     assert simulate("bno055", "--hours", "1", "--out", tmp_path / "log.csv") == 2
-    assert "not of a simulation" in capsys.readouterr().err
+    assert "not belong to a simulation" in capsys.readouterr().err
     assert (tmp_path / "log.yaml").read_text() == "device: mine\n"
 
 

@@ -95,7 +95,7 @@ def faulty(project: Project, tmp_path_factory: pytest.TempPathFactory) -> dict[s
 REASONS = {
     "raises": "the step estimate failed: ValueError: need at least one array",
     "sleeps": "the step estimate ran for longer than 12.52 s (limits.recording, ",
-    "dies": "the step estimate was killed twice: SIGKILL, perhaps for want of memory",
+    "dies": "the step estimate was killed twice: SIGKILL, perhaps because memory was exhausted",
     "unread": "the step ingest failed: IndexError: list index out of range",
 }
 NO_REST = "the step outlook failed: ZeroDivisionError: no rest"

@@ -157,7 +157,9 @@ class Figures:
     def models(self, end: End) -> list[NoiseModel]:
         """Return the models of one case, one for each correlation time; the case must be known."""
         if end == "worst" and not self.bounded:
-            raise ValueError("the worst is not known: a figure is measured of no sensor")
+            raise ValueError(
+                "the worst case is not known: one figure is not measured for any sensor"
+            )
         N, B, K = (
             0.0 if span is None else span.low if end == "best" else span.high
             for span in (self.N, self.B, self.K)

@@ -75,7 +75,7 @@ class NoiseModel:
             PARAMETERS["T_B"].check(self.T_B)
         for term in self.further:
             if isinstance(term, _KINDS_WITH_PARAMETER):
-                raise ValueError(f"{term} is no further term, expected it in its own parameter")
+                raise ValueError(f"{term} is no further term, state it in its own parameter")
         for term in (*self.further, *self.sinusoids):
             for parameter in term.parameters:
                 parameter.check(getattr(term, parameter.symbol))

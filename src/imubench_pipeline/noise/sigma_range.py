@@ -53,7 +53,7 @@ def sigma_range(
     if not drawn:
         raise ValueError("expected noise models, and there is none")
     if not 0 < level < 1:
-        raise ValueError(f"level is {level}, expected one between 0 and 1")
+        raise ValueError(f"level is {level}, expected a number between 0 and 1")
     values = np.array([np.asarray(sigma(drawn_model), dtype=np.float64) for drawn_model in drawn])
     tail = (1.0 - level) / 2.0
     lower, upper = np.quantile(values, [tail, 1.0 - tail], axis=0)

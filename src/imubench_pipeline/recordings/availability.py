@@ -64,7 +64,7 @@ def watch_log(source: Path, planned: Collection[str] = ()) -> Iterator[Callable[
                     raise _unavailable(source, cause) from None
             cause = cause.__cause__ or cause.__context__
         if isinstance(raised, RecordingError) and _identity(source) != before:
-            reason = f"{source.name}: changed while it was read, was replaced, or was away"
+            reason = f"{source.name}: changed while it was read, was replaced, or was not available"
             raise UnavailableError(reason) from None
         raise
 

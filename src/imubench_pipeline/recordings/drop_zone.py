@@ -66,7 +66,7 @@ class Recording:
 class FoundFile:
     """A file in the drop zone: it belongs to a recording, or is skipped."""
 
-    file: str  # its place in the drop zone
+    file: str  # path in the drop zone
     sensor: str | None = None
     recording: str | None = None
     reason: str | None = None  # why it is skipped
@@ -255,7 +255,7 @@ def _fault(path: Path, name: str) -> str | None:
             )
     try:
         if _holds_itself(path):
-            return f"{shown} links to a folder that it lies in; expected a log: remove the link"
+            return f"{shown} links to one of its parent folders; expected a log: remove the link"
         if is_endless(path):
             return f"{shown} is neither a file nor a folder; expected a log"
         files = log_files(path)

@@ -53,7 +53,7 @@ class Quality:
             content["findings"] = [FindingRow.from_json(row) for row in content.get("findings", ())]
             return cls(**content)
         except (ValueError, TypeError) as error:  # other letters, or other keys
-            raise RecordingError(f"{path}: is not as the ingest wrote it: {MEND}") from error
+            raise RecordingError(f"{path}: was changed after the ingest: {MEND}") from error
 
     def write(self, path: Path) -> None:
         """Write the file, atomically."""
@@ -73,7 +73,7 @@ class Quality:
                 elif _footer(path) != stated["footer"] or (
                     whole and compute_digest(path) != stated["sha256"]
                 ):
-                    wrong = "is not as the ingest wrote it"
+                    wrong = "was changed after the ingest"
                 else:
                     continue
             except FileNotFoundError:
@@ -130,7 +130,7 @@ def load_logs(folder: Path) -> dict[str, ChannelLog]:
     if quality.kept is not None:
         for path in list_log_files(folder):
             if path.name not in quality.kept:
-                raise RecordingError(f"{path}: is none that the ingest wrote: {MEND}")
+                raise RecordingError(f"{path}: was not written by the ingest: {MEND}")
     return open_channel_logs(folder)
 
 

@@ -88,7 +88,7 @@ def fit_time_base(
     """
     typical = tracking.estimate_interval(stamps) if known is None else tracking.Interval(known)
     if typical is None:
-        raise RecordingError("the time stamps do not advance; is the right column named?")
+        raise RecordingError("the time stamps do not advance; is the column name correct?")
     interval = typical.mean
     if not _MIN_INTERVAL <= interval <= _MAX_INTERVAL:
         raise RecordingError(
@@ -324,7 +324,7 @@ def _assume_consecutive(
         rows += len(block)
         last = latest[-1]
     if groups.elapsed <= 0:
-        raise RecordingError("the time stamps do not advance; is the right column named?")
+        raise RecordingError("the time stamps do not advance; is the column name correct?")
     _check_segments(len(starts))
     rate, others = groups.rate()
     at_worst = worst_at / rate

@@ -102,7 +102,9 @@ def check_notes(notes: Path, path: Path) -> None:
         return
     mark = notes.read_text("utf-8", "replace").partition("\n")[0].partition(": ")[0]
     if not is_simulated([mark]):
-        raise ConfigError(f"{notes}: exists, and is not of a simulation; name another --out")
+        raise ConfigError(
+            f"{notes}: exists, and does not belong to a simulation; name another --out"
+        )
 
 
 def layout(path: Path, columns: Iterable[str], rate: float, sensor: LogFormat | None) -> LogFormat:

@@ -34,7 +34,7 @@ def read_sealed_json(path: Path) -> dict[str, Any]:
     try:
         data: dict[str, Any] = json.loads(rest)
     except RecursionError:
-        raise ValueError(f"{path}: is deeper than what is written") from None
+        raise ValueError(f"{path}: is nested deeper than permitted") from None
     return data
 
 

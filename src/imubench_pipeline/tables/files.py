@@ -220,7 +220,7 @@ def read_part(table: str, path: Path) -> pa.Table:
         if path.exists() and not path.is_file():  # a pipe never answers
             raise pa.ArrowInvalid("it is no file")
         if is_seal_broken(path):
-            raise pa.ArrowInvalid("its metadata are not those that were written")
+            raise pa.ArrowInvalid("its metadata were changed")
         with open_parquet(path) as file:
             part = file.read(use_threads=False)
         metadata = {key: text for key, text in (part.schema.metadata or {}).items() if key != SEAL}

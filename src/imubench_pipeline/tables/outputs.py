@@ -124,7 +124,7 @@ class OutputFile(Output):
         if status is None:
             return real
         if any(_is_at(path, status) for path in self.inputs):
-            raise OutputError(f"{self}: is what the command reads; name another file")
+            raise OutputError(f"{self}: is an input of the command; name another file")
         if not self.force:
             raise OutputError(f"{self}: exists already; name another file, or add --force")
         return real

@@ -49,7 +49,7 @@ def write_sealed(table: pa.Table, path: Path, compression: str) -> None:
     footer = read_footer(path)
     place = _PLACE.search(footer)
     if place is None:
-        raise RuntimeError(f"{path}: its metadata are not laid out as expected")
+        raise RuntimeError(f"{path}: its metadata do not have the expected layout")
     with path.open("r+b") as file:
         file.seek(place.start(1) - len(footer), 2)
         file.write(hashlib.sha256(footer).hexdigest().encode())

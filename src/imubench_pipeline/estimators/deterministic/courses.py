@@ -56,8 +56,8 @@ class DeterministicSignal:
     time_lower: float | None
     time_upper: float | None
     """Time constant of a warm-up, or period, s, with 95 % limits."""
-    place_error: float | None  # half width of the 95 % interval of a step's place, s
-    gain: float  # twice the log likelihood that is lost without it
+    place_error: float | None  # half width of the 95 % interval of the position of a step, s
+    gain: float  # twice the loss of log likelihood without it
     regressor: Regressor
     amplitudes: Array  # (1,) or (2,): of the regressor, SI
 

@@ -24,7 +24,7 @@ def compute_interval(budgets: Sequence[Budget], level: float = 0.95) -> tuple[fl
     if len({(budget.quantity, budget.time) for budget in budgets}) != 1:
         raise ValueError("expected budgets of one quantity at one time")
     if not 0 < level < 1:
-        raise ValueError(f"level is {level}, expected one between 0 and 1")
+        raise ValueError(f"level is {level}, expected a number between 0 and 1")
     tail = (1.0 - level) / 2.0
     lower, upper = np.quantile([budget.total for budget in budgets], [tail, 1.0 - tail])
     return float(lower), float(upper)
