@@ -105,5 +105,5 @@ def test_what_gives_no_attitude_is_refused():
     with pytest.raises(ValueError, match="shape"):
         Positions(ONE.blocks, TWO.turned)
     for wrong in (np.eye(3) * 2.0, np.diag([1.0, 1.0, -1.0])):
-        with pytest.raises(ValueError, match="no rotation"):
+        with pytest.raises(ValueError, match="not a rotation"):
             Positions(ONE.blocks, wrong[None])

@@ -33,7 +33,7 @@ def test_what_is_declared_in_si() -> None:
 @pytest.mark.parametrize(
     ("changes", "said"),
     [
-        ({"latitude": None}, "latitude is missing; expected where the log was recorded, such as"),
+        ({"latitude": None}, "latitude is missing; expected the latitude of the place, such as"),
         ({"dwell": None}, "dwell is missing; expected the time from one turn to the next"),
         ({"latitude": "90 deg"}, "latitude: found '90 deg'; expected a latitude between the poles"),
         ({"latitude": "89.5 deg"}, "at a pole a horizontal axis does not sense"),

@@ -86,8 +86,8 @@ def test_a_figure_entered_as_power_is_larger_and_makes_no_floor() -> None:
 
 
 def test_what_he_says_of_axes_and_datasheets() -> None:
-    assert "y 0.93 and of z 2.97" in of_figure(31)["found_words"]  # 80/86, 255/86
-    assert "y 1.09 and of z 0.52" in of_figure(32)["found_words"]  # 35/32, 16.5/32
+    assert "y is 0.93 and N of z is 2.97" in of_figure(31)["found_words"]  # 80/86, 255/86
+    assert "y is 1.09 and N of z is 0.52" in of_figure(32)["found_words"]  # 35/32, 16.5/32
     # (0.005/0.00041)^2, half of it, and (0.0045/0.00041)^2
     for text in ("at 149 s", "at 74 s", "the log at 120 s"):
         assert text in of_figure(42)["found_words"]
@@ -161,7 +161,7 @@ def test_figure_38_is_not_alike_as_he_saw_it_smaller() -> None:
     line = found_in({"samples_of_models": rows}, "Figure 38", "")
     assert line["verdict"] == "differs"
     assert line["printed_as"] == "the simulation is slightly smaller"
-    assert "1.001 times" in line["found_words"]
+    assert "simulated log: 1.001" in line["found_words"]
 
 
 def test_ratios_are_those_of_the_cells() -> None:

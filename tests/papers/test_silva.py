@@ -60,7 +60,7 @@ def test_a_filter_improves_the_pairs_by_a_per_cent() -> None:
     gains = silva.compute_filter_gain(Evidence()).fields
     assert 0.3 < gains["least"] and gains["most"] < 1.35
     assert ROWS["Section 8", "improvement by a Kalman filter"]["found_words"] == (
-        "σ is 0.4 to 1.2 % less than that of the mean over pairs"
+        "σ is 0.4 to 1.2 % less than for the mean over pairs"
     )
 
 
@@ -85,7 +85,7 @@ def test_what_each_cause_asks_for() -> None:
     )
     # (1 - v / w) / 2
     assert (
-        "44 % of the time (run 2), 20 % of the time (run 3), 52 % of the time (run 4)"
+        "44 % of the time (run 2), 20 % (run 3), 52 % (run 4)"
         in (ROWS["Section 6", "hypothesis: turns miscounted"]["found_words"])
     )
     assert (

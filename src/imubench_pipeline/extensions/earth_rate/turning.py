@@ -1,9 +1,9 @@
 """Dwells and turning points of a gyro that is turned end for end, from its log.
 
 Turning a sensitive axis end for end is a rotation about an axis perpendicular to it: the gyro
-senses cross-axis coupling and handling, which may be strong or absent. A column with the position
-decides if there is one, else the events in the log, and without these the schedule. `find_stays`
-reads turns from such a column.
+senses cross-axis coupling and handling, which may be strong or absent. Turns are taken from a
+column with the position, else from events in the log, else from the schedule. `find_stays` reads
+turns from such a column.
 """
 
 from __future__ import annotations
