@@ -120,7 +120,7 @@ def test_what_a_failing_step_says_is_not_drawn_over(folder: Path) -> None:
     assert left.index("turn it over") < left.index("failed parts")
     # What a run says of its failures, by the log that it wrote.
     said = [line.strip() for line in left.partition("failed parts")[2].splitlines() if line.strip()]
-    assert said[:2] == ["1 step failed; why stands above", "ingest"]
+    assert said[:2] == ["1 step failed; see above", "ingest"]
     assert said[2].endswith("run the same command again: it continues where this run stopped")
 
 

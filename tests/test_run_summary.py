@@ -165,7 +165,7 @@ def snakemake(folder: Path, command: str, *flags: str) -> list[str]:
 @pytest.mark.release
 def test_a_failed_run_says_what_failed_and_how_to_go_on(tmp_path: Path) -> None:
     lines = snakemake(tmp_path, "exit 3")
-    assert lines[0] == "2 steps failed; why stands above"
+    assert lines[0] == "2 steps failed; see above"
     assert set(lines[1:3]) == {"  allan of s/r", "  ranking"}
     assert lines[3].endswith("run the same command again: it continues where this run stopped")
     assert Path(lines[4].removeprefix("log: ")).is_file()
@@ -173,7 +173,7 @@ def test_a_failed_run_says_what_failed_and_how_to_go_on(tmp_path: Path) -> None:
 
 @pytest.mark.release
 def test_a_quiet_run_says_that_a_step_failed(tmp_path: Path) -> None:
-    assert snakemake(tmp_path, "exit 3", "--quiet", "all")[0] == "a step failed; why stands above"
+    assert snakemake(tmp_path, "exit 3", "--quiet", "all")[0] == "a step failed; see above"
 
 
 # Every day: that a log of Snakemake which says so is understood, below.
@@ -207,10 +207,10 @@ def test_a_step_that_was_tried_again_is_named_once(tmp_path: Path) -> None:
         "    output: out/recordings/a, b/r (1)/allan.parquet, x\n" * 2
     )
     lines = describe_failure([str(log)], Path("out")).splitlines()
-    assert lines[:2] == ["1 step failed; why stands above", "  allan of a, b/r (1)"]
+    assert lines[:2] == ["1 step failed; see above", "  allan of a, b/r (1)"]
     with log.open("a") as file:
         file.write("Finished jobid: 4 (Rule: allan)\n")
-    assert describe_failure([str(log)], Path("out")).startswith("a step failed; why stands above\n")
+    assert describe_failure([str(log)], Path("out")).startswith("a step failed; see above\n")
 
 
 def test_a_job_of_several_steps_is_named_with_its_last_log(tmp_path: Path) -> None:
@@ -226,4 +226,4 @@ def test_a_job_of_several_steps_is_named_with_its_last_log(tmp_path: Path) -> No
         )
     )
     lines = describe_failure([str(log)], Path("out")).splitlines()
-    assert lines[:2] == ["1 step failed; why stands above", "  ranking or report (2.log)"]
+    assert lines[:2] == ["1 step failed; see above", "  ranking or report (2.log)"]

@@ -339,7 +339,7 @@ def find_conversion(unit: str, dimension: str) -> tuple[float, float]:
 def find_dimension(unit: str, expected: tuple[str, ...]) -> str:
     """Return the dimension of a unit among some keys of `SI_UNITS`, the usual one first.
 
-    Raises a `UnitError` about the first one if it has none of them.
+    Raises a `UnitError` about the first dimension if the unit has none of them.
     """
     for dimension in expected[1:]:
         try:

@@ -326,8 +326,8 @@ def _sum_end(
 ) -> tuple[float, bool]:
     """Sum the clusters that begin in a section at the end of the log, and decimate its phase.
 
-    Returns the sum of its samples less the bias, and whether no sample is missing; otherwise
-    nothing is set.
+    Returns the sum of its samples less the bias, and whether no sample is missing; sets nothing if
+    samples are missing.
     """
     sizes, steps, _, begins = grid
     own, points = min(SECTION_SAMPLES, samples.size), samples.size + 1

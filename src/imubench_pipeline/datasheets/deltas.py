@@ -111,8 +111,8 @@ def bias_deltas(
 def compare(entry: Comparable, parameter: Parameter, tolerance: float) -> Delta:
     """Compare a printed figure with its measured value, SI.
 
-    Without limits, the value alone decides. ``delta`` is measured / comparable - 1, with its least
-    and largest value within both intervals. The tolerance is as in `deltas`.
+    Without limits, the verdict follows from the value alone. ``delta`` is measured / comparable -
+    1, with its least and largest value within both intervals. The tolerance is as in `deltas`.
     """
     figure = entry.figure
     value, lower, upper = parameter.value, parameter.lower, parameter.upper

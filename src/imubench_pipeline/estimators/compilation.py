@@ -22,8 +22,8 @@ from imubench_pipeline.estimators.whittle_kernels import (
 def compile_kernels() -> None:
     """Compile the kernels, or load them from numba's cache.
 
-    Only numba is imported, so that a separate process can begin while others import everything
-    else. The calls have the types of an estimate (see `tests/estimators/test_compilation`).
+    Only numba is imported, so that a separate process can begin during the other imports. The calls
+    have the types of an estimate (see `tests/estimators/test_compilation`).
     """
     bins = Bins(*np.ones((4, 8)))
     problem = Problem(np.ones((8, 1)), bins, False, ShapeTable(0.0, 1.0, np.zeros((2, 8))))

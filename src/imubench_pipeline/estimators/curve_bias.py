@@ -119,9 +119,9 @@ def compute_allan_variances(models: Models, tau: Array) -> Array:
 def find_lowest_point(models: Models, tau: Array) -> tuple[Array, Array, NDArray[np.bool_]]:
     """Return the lowest point of the Allan deviation of models.
 
-    ``tau``, shape (m,), rises evenly in the logarithm, s; between them a parabola is taken.
-    Returned are, each of shape (d,), the deviation, rad/s or m/s², its averaging time, s, and
-    whether it is a minimum, and not an end of ``tau``.
+    ``tau``, shape (m,), is evenly spaced in the logarithm, s; a parabola interpolates between its
+    points. Returned are, each of shape (d,), the deviation, rad/s or m/s², its averaging time, s,
+    and whether it is a minimum, and not an end of ``tau``.
     """
     level = np.log(compute_allan_variances(models, tau))
     rows = np.arange(len(level))

@@ -1,10 +1,10 @@
 """The limits of an Allan curve from the spectrum that was fitted to the same log.
 
-The power law identified at each tau ignores the noise a decade away: near the hump of a
-Gauss-Markov process its degrees of freedom are too many. The fitted model does, where it explains
-the log. A log that happens to show little random walk has too low a curve at its end: the upper
-limit there allows for a walk one standard error above the fitted one. (Without this, limits of 100
-logs of the MTi-7's gyro contained the truth in 90 to 93 % from a third of the log on.)
+The power law identified at each tau ignores noise a decade away: near the hump of a
+Gauss-Markov process its degrees of freedom are too many. The fitted model includes it, where it
+explains the log. A log that happens to show little random walk has too low a curve at its end: the
+upper limit there allows for a walk one standard error above the fitted one. (Without this, limits
+of 100 logs of the MTi-7's gyro contained the truth in 90 to 93 % from a third of the log on.)
 """
 
 from __future__ import annotations
@@ -33,10 +33,10 @@ def add_fitted_limits(
 ) -> AllanCurve:
     """Return a curve with the degrees of freedom that the fitted spectrum implies.
 
-    The smaller of these and those of the identified power law apply where the model does not
-    explain the log, and at tau so short that the curve shows frequencies that were not fitted.
-    Without a fit the curve is unchanged. ``segments`` are first and one-past-last sample of each;
-    ``presence`` is needed where samples are missing.
+    The smaller of these degrees of freedom and the values of the identified power law apply where
+    the model does not explain the log, and at tau so short that the curve shows frequencies that
+    were not fitted. Without a fit the curve is unchanged. ``segments`` are first and one-past-last
+    sample of each; ``presence`` is needed where samples are missing.
     """
     if not likelihood.candidates or likelihood.band is None:
         return curve

@@ -184,8 +184,8 @@ def _draw_state_sum(
 ) -> Array:
     """Draw the sum of scalar states given measurements of it (Durbin and Koopman's smoother).
 
-    A path is simulated; the smoothed difference between the measurements and those of the
-    simulated path is added to it. It goes through the log in windows, each with a look ahead.
+    A path is simulated; the smoothed difference between the real and the simulated measurements is
+    added to it. It goes through the log in windows, each with a look ahead.
     """
     # Plain loops: expressions of arrays take four times as long to compile.
     n, s = len(mean), len(decay)

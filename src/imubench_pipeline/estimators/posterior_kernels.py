@@ -84,7 +84,7 @@ def compute_log_posteriors(points: Array, problem: Problem) -> tuple[Array, Arra
 def find_mode(start: Array, times: Array, problem: Problem) -> tuple[Array, Array, Array]:
     """Return the mode of the log amplitudes for given log T_B, the curvature and D there.
 
-    ``start`` holds log amplitudes; D_j, shape (b, p), is the density of a term over the density of
+    ``start``: log amplitudes; D_j, shape (b, p), is the density of a term over the density of
     the model, times 2. The curvature of the posterior is sum nu D_j D_k / 2, and 2 from a flat
     amplitude, which bounds an absent term away from 0.
 

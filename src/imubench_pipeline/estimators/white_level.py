@@ -5,8 +5,8 @@ Gauss-Markov process faster than a second has the level N_0 at tau far below T_B
 
     N^2 = N_0^2 + S_B T_B^2
 
-at tau far above it. N is the level of the first stretch of the curve that lasts. A process that
-counts into N leaves the model, so that nothing counts twice.
+at tau far above it. N is the level of the first stretch of the curve that lasts. A process that is
+part of N is removed from the model, so that it is not counted twice.
 """
 
 from __future__ import annotations

@@ -145,7 +145,7 @@ class Whittle:
         return other
 
     def standing(self, behind: Behind) -> Whittle:
-        """Return the likelihood of the same data behind a low-pass; here there is none."""
+        """Return the likelihood of the same data without a low-pass."""
         other = copy.copy(self)
         other.columns, other.behind = {}, behind
         vars(other)["table"] = self.table + np.log(behind.slow)
@@ -277,8 +277,8 @@ def make_whittle(
     """Return the likelihood of a spectrum, with the correlation times that it can show.
 
     ``highest`` is the frequency up to which its bins reach, Hz; ``shortest`` the shortest
-    correlation time, s, by default twenty sampling intervals; ``shapes`` and ``behind`` are those
-    of `Whittle`.
+    correlation time, s, by default twenty sampling intervals; ``shapes`` and ``behind``: from
+    `Whittle`.
     """
     longest = CORRELATION_TIMES.of_log * float(spectrum.length.max())
     least = CORRELATION_TIMES.samples / spectrum.rate if shortest is None else shortest

@@ -91,7 +91,7 @@ class FindingRow(OfRecordingRow):
     severity: Annotated[Severity, Column("fatal: not analysed")]
     affects: Annotated[tuple[str, ...], Column("parameters with doubtful estimates")] = ()
     detail: Annotated[str, Column("description with advice")]
-    value: Annotated[float | None, Column("its size", "value of the finding")] = None
+    value: Annotated[float | None, Column("its size", "as the finding says")] = None
     data: Annotated[str | None, Column("its data, JSON")] = None
     start: Annotated[
         float | None, Column("begin of the part concerned, from the first sample", "s")

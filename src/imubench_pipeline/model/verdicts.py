@@ -47,7 +47,7 @@ class Shortfall:
     """A required property that a sensor does not have.
 
     ``subject`` is the quantity or axis, or the price class of the sensor; ``asked`` is as in the
-    requirement; ``has`` are the figures of the sensor, SI (empty: it has none).
+    requirement; ``has``: values of the sensor, SI (empty if there are none).
     """
 
     property: Property

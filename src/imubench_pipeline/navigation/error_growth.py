@@ -52,7 +52,7 @@ def list_growth_rows(
     """Yield the rows of the table ``error_growth`` of a recording.
 
     They are for its worst axes, and if it has several, for each letter alone. ``times`` and
-    ``window``, s, are in addition to those that every table has; the others are as in
+    ``window``, s, are used in addition to the default times; the others are as in
     `expected_errors.error_rows`.
     """
     axes = collect_axis_errors(estimates, figures)

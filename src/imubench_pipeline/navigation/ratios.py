@@ -58,7 +58,7 @@ class Ratio:
 def compare_parameters(first: Parameter, second: Parameter) -> Ratio:
     """Return the ratio of one noise parameter of two logs (Zou and Donner 2008, eq. 2 and 3).
 
-    If one has limits but no value, the interval is that of all quotients within the limits.
+    If one has limits but no value, the interval contains all quotients within the limits.
     """
     reasons = tuple(
         texts.operand_status(which, parameter.status)

@@ -23,9 +23,9 @@ def repeatability_rows(
 ) -> Iterator[RepeatabilityRow]:
     """Yield the rows of the table ``repeatability``: bias spread and printed repeatability.
 
-    A recording is left out if it does not decide, or if the power stayed on before it, since it
-    belongs to the previous turn-on. The tolerance is the relative difference that still counts as
-    printed.
+    A recording is omitted if it is not used in comparisons, or if the power stayed on before it,
+    since it belongs to the previous turn-on. The tolerance is the relative difference that still
+    counts as printed.
     """
     about = {(row.sensor, row.recording): row for row in recordings if row.decides}
     by_channel: dict[tuple[str, str, str], list[tuple[RecordingRow, float]]] = {}

@@ -295,7 +295,7 @@ class VectorNavFile(LogFile):
             expected = "; ".join(f"{kind}: {' '.join(FIELDS[kind])}" for kind in FIELDS)
             raise RecordingError(
                 f"{self.path.name}: no VectorNav sentence has the columns {named} together; mend "
-                f"'column' in the sensor file, expected those of one sentence of {expected}"
+                f"'column' in the sensor file, expected the columns of one sentence of {expected}"
             )
         if len(able) == 1:
             return able[0]

@@ -1,7 +1,7 @@
 """Distinguish errors of a log from errors of the system: mounts, disks, permissions.
 
-An error of a log rejects it until it changes. The surroundings may be different an hour later: the
-ingest fails, nothing is concluded, and the next run tries again.
+An error of a log rejects it until it changes. The state of the system may change within an hour:
+the ingest fails without a verdict, and the next run tries again.
 """
 
 from __future__ import annotations

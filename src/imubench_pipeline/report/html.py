@@ -41,7 +41,7 @@ def make_templates(system: System) -> jinja2.Environment:
     def si(value: float | None, unit: str, digits: int = 4, *, inside: bool = False) -> Markup:
         """Return an SI number that the reader can switch to another unit.
 
-        ``inside``: an element around it has the unit, and the digits where they are not 4.
+        ``inside``: the surrounding element states the unit, and the digits unless they are 4.
         """
         if value is None or not math.isfinite(value):
             return Markup(number_text(value))

@@ -53,8 +53,8 @@ def make_methods_table(
 def describe_model(channel: ChannelView, method: str) -> str:
     """Return the model of a method, and how many other models its intervals include.
 
-    The intervals of the likelihood include all models that fit nearly as well as the best; those of
-    the papers' model are for this model alone.
+    The intervals of the likelihood include all models that fit nearly as well as the best; the
+    intervals of the papers' model are for this model only.
     """
     text = model_text(channel.parameters[method][0].model)
     if method != "likelihood" or not channel.models:

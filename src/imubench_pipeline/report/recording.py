@@ -257,7 +257,7 @@ def _compare_deviations(rows: Sequence[ModelSampleRow], channel: str) -> str:
     if log is None or not log.mean:
         return ""
     ratios = [f"{number_text(w / log.mean, 4)} {of} the fit" for of, w in widths if w is not None]
-    length = f"Standard deviation relative to that of the log ({duration_text(log.end)})"
+    length = f"Standard deviation relative to the log ({duration_text(log.end)})"
     return f"{length}: {', '.join(ratios)}." if ratios else ""
 
 

@@ -86,7 +86,7 @@ def describe_failure(logs: Sequence[str], results: Path) -> str:
     if any(_INTERRUPTED in text for text in texts):
         lines = [f"stopped before its end; to continue, {again}"]
     else:
-        lines = [f"{counted(len(steps), 'step') if steps else 'a step'} failed; why stands above"]
+        lines = [f"{counted(len(steps), 'step') if steps else 'a step'} failed; see above"]
         lines += _bounded(f"  {step}" for step in steps)
         lines.append(f"all independent steps are done; to continue, correct the cause and {again}")
     lines += [f"log: {log}" for log in logs]

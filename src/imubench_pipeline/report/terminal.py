@@ -70,9 +70,9 @@ def render_comparison(
 ) -> Iterator[RenderableType]:
     """Yield the parts of the comparison, from top to bottom.
 
-    The ranking is for one requirement alone, with every limit, or for all, with the limit that
-    decides; parameters are of one channel or all, by one method or the recommended one. The width
-    is in columns of the terminal.
+    The ranking is for one requirement with every limit, or for all requirements with the deciding
+    limit. Parameters are of one channel or all, by one method or the recommended one. The width is
+    in columns of the terminal.
     """
     recordings = RecordingRow.rows_of(tables["recordings"])
     about = {(row.sensor, row.recording): row for row in recordings}

@@ -24,7 +24,7 @@ def fit_table(
 ) -> Table:
     """Return a table that breaks no word or number, except for names.
 
-    Columns for which there is no room in the width are left out from the right. The head of a
+    Columns that do not fit into the width are omitted from the right. The head of a
     column of numbers has their unit on a second line; ``names`` is the column that may be broken
     anywhere.
     """

@@ -50,7 +50,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     length = parser.add_mutually_exclusive_group(required=True)
     length.add_argument("--hours", type=float, help="length of the log")
     length.add_argument("--duration", metavar="TIME", help="length with its unit, such as 90 s")
-    parser.add_argument("--rate", metavar="FREQUENCY", help="default: that of the sensor file")
+    parser.add_argument("--rate", metavar="FREQUENCY", help="default: rate of the sensor file")
     parser.add_argument(
         "--temperature",
         metavar="PROFILE",

@@ -73,8 +73,8 @@ NO_RESULTS = "the requested data are missing, or cannot be used"
 class Command(NamedTuple):
     """A command.
 
-    ``statuses``: what its exit statuses mean, from 0; an empty text is one that it never has.
-    ``passes_on``: all that stands after ``--`` is for Snakemake.
+    ``statuses``: meanings of its exit statuses, from 0; an empty text marks an unused status.
+    ``passes_on``: all arguments after ``--`` are for Snakemake.
     """
 
     help: str

@@ -37,7 +37,7 @@ class WithBlocks(Strict):
 def with_blocks(place: Place) -> Callable[[type[_Model]], type[_Model]]:
     """Return a decorator that adds the blocks of all extensions to a model, as fields.
 
-    A block of a run has its defaults where it is left out; any other is null then.
+    An omitted block of a run has its defaults; any other omitted block is null.
     """
 
     def extend(model: type[_Model]) -> type[_Model]:

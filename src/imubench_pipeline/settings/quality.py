@@ -49,7 +49,9 @@ class QualitySettings(Strict):
     )
     trim_warm_up: bool = Field(False, description="leave the warm-up out of the analysis")
     variance_ratio: float = Field(
-        1.5, gt=1, description="spread over that of the calmest part that is not stationary"
+        1.5,
+        gt=1,
+        description="ratio of the spread to the calmest part above which a log is not stationary",
     )
     saturated: float = Field(
         1e-3, gt=0, lt=1, description="share of the samples at an extreme value"

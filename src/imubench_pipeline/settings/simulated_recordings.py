@@ -1,6 +1,6 @@
 """Simulated recordings of a run: single sensors, boards of several sensors, experiments.
 
-An experiment has what its notes would say, and what is true of it.
+An experiment has the settings of its notes, and the true values.
 """
 
 from __future__ import annotations

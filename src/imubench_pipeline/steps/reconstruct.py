@@ -45,8 +45,8 @@ def reconstruct(
 ) -> Reconstruction:
     """Simulate full-length logs and an ensemble from an estimate, and score them.
 
-    The reconstruction has the length and the tau of `measured`; `rate` in Hz; `series` is where
-    the first full-length log goes, if it is to be kept.
+    The reconstruction has the length and the tau of `measured`; `rate` in Hz; `series`: file for
+    the first full-length log, if it is stored.
     """
     names = asdict(key) | {"method": estimate.method}
     model = estimate.model

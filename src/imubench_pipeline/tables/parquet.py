@@ -1,6 +1,6 @@
 """Parquet files with checksums of their pages, and a digest of the metadata in the footer.
 
-Parquet has checksums of pages only, and none of the footer.
+Parquet has checksums of pages only, not of the footer.
 """
 
 from __future__ import annotations

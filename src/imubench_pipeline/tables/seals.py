@@ -1,6 +1,6 @@
 """Seals: digests of the inputs and outputs of each step, kept apart from its outputs.
 
-An intact file may still be the wrong one, such as that of another recording or a backup.
+An intact file may still be the wrong one, for example from another recording or a backup.
 """
 
 from __future__ import annotations
@@ -158,7 +158,7 @@ def read_seal(results: Path, place: str) -> Seal:
     except (ValueError, TypeError, KeyError, AttributeError) as error:
         raise SealError("is not as it was written") from error
     if seal.place != place:
-        raise SealError(f"is that of {seal.place}")
+        raise SealError(f"belongs to {seal.place}")
     return seal
 
 

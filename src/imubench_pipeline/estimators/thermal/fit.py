@@ -246,7 +246,7 @@ class _Fit:
         return True
 
     def settle(self, quadratic: bool | None) -> _Settled:
-        """Return the joint fit, with the square and another sensitivity at the beginning if needed.
+        """Return the joint fit; add a quadratic term, or a separate initial sensitivity, if needed.
 
         The square is tried if ``quadratic`` is None.
         """

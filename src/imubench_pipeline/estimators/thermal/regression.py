@@ -153,7 +153,7 @@ class Regression:
     ramp. SI per K, K², K and s."""
     information: Array  # (p, p): inverse of their covariance
     lag: float  # s
-    log_likelihood_gain: float  # log likelihood over that of beta = 0
+    log_likelihood_gain: float  # log likelihood minus the value for beta = 0
 
     @property
     def covariance(self) -> Array:

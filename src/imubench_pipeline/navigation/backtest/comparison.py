@@ -4,8 +4,8 @@ The results are rows of the table ``backtest``, and findings.
 
 The ratio of measured to predicted error comes with its 95 % range if the noise model is right. The
 errors of a log have a random scatter, and the model is uncertain, since it was estimated from the
-same log. Let S be the mean square of the errors of the log, and P that of the model: both estimate
-the same number. If P is an efficient estimate,
+same log. Let S be the mean square of the errors of the log, and P the mean square by the model:
+both estimate the same number. If P is an efficient estimate,
 
     var(S - P) = var(S) - var(P),
 

@@ -48,12 +48,12 @@ class Window:
 
     @property
     def rest(self) -> float:
-        """W, s."""
+        """Time at rest, W, s."""
         return self.resting * self.block
 
     @property
     def time(self) -> float:
-        """t, s."""
+        """Time in motion, t, s."""
         return self.moving * self.block
 
     def weights(self, order: int) -> Array:

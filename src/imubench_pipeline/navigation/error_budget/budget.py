@@ -164,10 +164,10 @@ def budget(
     """Return the error after a time of dead reckoning, by source.
 
     The noise of the gyro is integrated once to the attitude and the heading, twice and three times
-    with g to velocity and position; that of the accelerometer once and twice; an initial tilt adds
-    g t and g t^2 / 2 times itself (see `Term.growth`). White noise alone gives, after t, N sqrt(t),
-    g N sqrt(t^3/3) and g N sqrt(t^5/20) from the gyro, N sqrt(t) and N sqrt(t^3/3) from the
-    accelerometer. White noise in the window is independent of the noise in motion and has a
+    with g to velocity and position; the noise of the accelerometer once and twice; an initial tilt
+    adds g t and g t^2 / 2 times itself (see `Term.growth`). White noise alone gives, after t, N
+    sqrt(t), g N sqrt(t^3/3) and g N sqrt(t^5/20) from the gyro, N sqrt(t) and N sqrt(t^3/3) from
+    the accelerometer. White noise in the window is independent of the noise in motion and has a
     separate contribution; every other term has one, since window and motion are correlated.
 
     Parameters

@@ -183,7 +183,8 @@ def judge_sensors(
     """Yield the judgement of each sensor by each requirement.
 
     ``errors`` belong to all recordings; ``sensors`` have ``price_class`` and, if known,
-    ``abilities``; ``basis`` has the recordings. Recordings that do not decide are left out.
+    ``abilities``; ``basis`` has the recordings. Recordings that are not used in comparisons are
+    omitted.
     """
     by_requirement: dict[str | None, dict[str, list[ErrorBudgetRow]]] = {}
     for row in errors:

@@ -216,7 +216,7 @@ class RosbagFile(LogFile):
         if len(stated) > 1:
             raise RecordingError(
                 f"{self.path.name}: columns of the topics {_join_names(sorted(stated))} cannot be "
-                "read together, for each topic has a clock of its own; expected one topic a file"
+                "read together, because each topic has its own clock; expected one topic per file"
             )
         able = {
             topic: kind

@@ -139,7 +139,8 @@ def check_folder(path: Path) -> None:
     for file in sorted(path.iterdir()):
         if not file.is_file() and not file.is_dir():
             raise RecordingError(
-                f"{path.name}: {cut(file.name)} is no file; expected those of a ROS 2 bag: copy "
+                f"{path.name}: {cut(file.name)} is no file; expected the files of a ROS 2 bag: "
+                "copy "
                 "the bag again"
             )
     size = (path / "metadata.yaml").stat().st_size

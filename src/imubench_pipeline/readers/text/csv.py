@@ -240,7 +240,7 @@ class _WrongWidth:
         self._blank = 0
 
     def keep(self, row: pacsv.InvalidRow) -> str:
-        """Let pyarrow continue after the first such record, and stop at the second."""
+        """Continue after the first record with a wrong number of columns; stop at the second."""
         if not row.text.strip():
             self._blank += 1
             return "skip"

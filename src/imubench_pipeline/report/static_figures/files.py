@@ -63,7 +63,7 @@ def list_cross_figures(
 ) -> Iterator[tuple[str, Callable[[], Figure]]]:
     """Yield the name of each figure of all sensors, and its maker.
 
-    The looks follow from all sensors of the run, or else from the sensors of the views.
+    Colours and markers depend on all sensors of the run, by default on the sensors of the views.
     """
     every = sorted({view.sensor for view in views}) if sensors is None else list(sensors)
     for channel in dict.fromkeys(view.channel for view in views):

@@ -176,7 +176,7 @@ class Analysis:
     def _submit(
         self, beside: ThreadPoolExecutor, step: str, keys: Iterable[K], function: Callable[..., T]
     ) -> dict[K, Future[T | None]]:
-        """Begin a step for each key, of a recording that is not left out."""
+        """Start a step for each key, except for omitted recordings."""
         return {key: beside.submit(self._run_bounded, step, function, key) for key in keys}
 
     def _run_bounded(self, step: str, function: Callable[..., T], key: tuple[str, ...]) -> T | None:

@@ -158,7 +158,7 @@ class Results:
             return
         of = f"{quality.recording.get('sensor')}/{quality.recording.get('recording')}"
         if f"recordings/{of}" != place:
-            yield Fault(name, f"expected that of {place}, found that of {of}",
+            yield Fault(name, f"expected the file of {place}, found the file of {of}",
                         self._mended(name, step))  # fmt: skip
         samples = quality.kept or {}
         for file, stated in samples.items():

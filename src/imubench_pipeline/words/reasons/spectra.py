@@ -90,7 +90,8 @@ def fast_process_or_filter(time: float) -> str:
 def unfiltered_noise(share: float, low_pass: str, factor: float) -> str:
     """Return the part of N_sensor that bypasses a filter.
 
-    ``share``: power of the noise that bypasses it over that of the other; ``factor``: of N_sensor.
+    ``share``: power of the noise that bypasses the filter over the filtered power; ``factor``: of
+    N_sensor.
     """
     return (
         f"white noise with {percent_text(share, 2)} of the filtered power bypasses the {low_pass}, "
