@@ -59,7 +59,9 @@ class Experiment:
         if not (math.isfinite(self.rate) and self.rate > 0):
             raise ValueError(f"the rate is {self.rate} Hz, expected a frequency above 0")
         if not abs(self.latitude) < math.pi / 2.0:
-            raise ValueError(f"latitude is {self.latitude}, expected one between the poles, in rad")
+            raise ValueError(
+                f"latitude is {self.latitude}, expected an angle between the poles, in rad"
+            )
 
     @classmethod
     def regular(

@@ -197,7 +197,7 @@ class _Elements:
         begin = self.at
         length = self.tag(*kinds)
         if length > _MAX_ELEMENT_HEADER:
-            raise _make_damaged_error(f"{length} bytes of sides or names", self.at)
+            raise _make_damaged_error(f"{length} bytes of dimensions or names", self.at)
         read = self._read(length)
         self.skip(-(self.at - begin) % 8)  # the next element begins at a multiple of eight bytes
         return read

@@ -248,7 +248,7 @@ def _find_bad_values(
     rate: float,
     settings: QualitySettings,
 ) -> Iterator[Finding]:
-    """Yield findings about steps, stuck, saturated and piled-up values."""
+    """Yield findings about quantisation, and about stuck, saturated or too frequent values."""
     if steps is not None and _has_few_levels(steps, settings):
         coarse = samples.Coarse(steps.levels, steps.step, settings.fewest_levels, steps.hidden)
         yield find(coarse, "warning", steps.levels, channel)

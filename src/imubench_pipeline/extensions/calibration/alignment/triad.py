@@ -26,7 +26,9 @@ class Site:
 
     def __post_init__(self) -> None:
         if not (abs(self.latitude) < math.pi and math.cos(self.latitude) > _NEAREST_POLE):
-            raise ValueError(f"latitude is {self.latitude}, expected one between the poles, in rad")
+            raise ValueError(
+                f"latitude is {self.latitude}, expected an angle between the poles, in rad"
+            )
         if not (math.isfinite(self.gravity) and self.gravity > 0):
             raise ValueError(f"gravity is {self.gravity}, expected a number above 0")
 
