@@ -55,7 +55,7 @@ class DriftRow(SensorRow):
     upper: UpperLimit = None
     unit: Unit
     expected: Annotated[
-        float | None, Column("what the earlier recordings let one expect", "as in unit")
+        float | None, Column("value expected from the earlier recordings", "as in unit")
     ] = None
     expected_lower: Annotated[
         float | None, Column("lower 95 % limit of the estimate expected", "as in unit")
@@ -65,7 +65,7 @@ class DriftRow(SensorRow):
     ] = None
     change: Annotated[float | None, Column("value / expected - 1; null for a bias")] = None
     p_value: Annotated[
-        float | None, Column("chance of such a difference, if the device has not changed")
+        float | None, Column("probability of such a difference for an unchanged device")
     ] = None
     verdict: Annotated[DriftVerdict | None, Column("null: cannot be judged")] = None
     reasons: Annotated[tuple[str, ...], Column("in words")] = ()
@@ -99,7 +99,7 @@ class PooledRow(SensorRow):
         float | None, Column("upper 95 % limit of the spread", "as in unit")
     ] = None
     p_value: Annotated[
-        float | None, Column("chance of such differences, if the recordings agree")
+        float | None, Column("probability of such differences if the recordings agree")
     ] = None
     verdict: Annotated[PoolVerdict | None, Column("at a level of 1 %")] = None
     reasons: Annotated[tuple[str, ...], Column("in words")] = ()
@@ -111,7 +111,7 @@ class DatasheetRow(ChannelRow):
     """A row of the table ``datasheet``."""
 
     method: Annotated[
-        str, Column("of the estimate; mean: of the log; temperature: the thermal fit")
+        str, Column("method of the estimate; mean: of the log; temperature: of the thermal fit")
     ]
     quantity: Annotated[str, Column("N, bias_instability, K, T_B, allan_deviation, offset, ...")]
     statistic: Annotated[
@@ -119,7 +119,7 @@ class DatasheetRow(ChannelRow):
         Column("compared quantity: N, adev_minimum, plateau (0.664 B), K, T_B, mean, sensitivity"),
     ]
     printed: Annotated[
-        float | None, Column("figure as printed; null: the verdict says why", "as in unit")
+        float | None, Column("printed value; null: see the verdict", "as in unit")
     ] = None
     unit: Annotated[str | None, Column("unit as printed")] = None
     kind: Annotated[str | None, Column("typ, max, min, range, 1sigma or derived")] = None
@@ -128,13 +128,13 @@ class DatasheetRow(ChannelRow):
         str | None, Column("sidedness of a noise density, as assumed in this row")
     ] = None
     comparable: Annotated[
-        float | None, Column("the printed figure in the convention of measured", "SI")
+        float | None, Column("printed value in the convention of measured", "SI")
     ] = None
     comparable_lower: Annotated[
-        float | None, Column("least figure that is printed of it, such as typ", "SI")
+        float | None, Column("smallest printed value, such as typ", "SI")
     ] = None
     comparable_upper: Annotated[
-        float | None, Column("largest figure that is printed of it, such as max", "SI")
+        float | None, Column("largest printed value, such as max", "SI")
     ] = None
     measured: Annotated[float | None, Column("estimate of the same quantity", "SI")] = None
     lower: Annotated[float | None, Column("lower 95 % limit of measured", "SI")] = None
@@ -201,7 +201,7 @@ class ErrorBudgetRow(OfRecordingRow):
     gyro: Annotated[str | None, Column("channel that answers")] = None
     accel: Annotated[str | None, Column("channel that answers")] = None
     error: Annotated[
-        str, Column("attitude, heading, velocity, position; north: heading found at rest")
+        str, Column("error: attitude, heading, velocity, position; north: heading found at rest")
     ]
     time: Annotated[float, Column("of dead reckoning; of rest for north", "s")]
     source: SourceColumn
@@ -218,10 +218,6 @@ class ErrorBudgetRow(OfRecordingRow):
     drawn: Annotated[str | None, Column("parameters behind the limits: jointly, or one by one")] = (
         None
     )
-    within: Annotated[float | None, Column("chance that the total is within limit")] = None
-    limit: Annotated[
-        float | None, Column("largest standard deviation that is allowed", "as in unit")
-    ] = None
     unit: Unit
     reached_after: Annotated[
         float | None, Column("time after which the limit is reached; null: never", "s")
@@ -230,7 +226,7 @@ class ErrorBudgetRow(OfRecordingRow):
     kind: Annotated[str | None, Column("of a printed figure: typ, max, 1sigma, ...")] = None
     convention: Annotated[str | None, Column("how a figure became a standard deviation")] = None
     largest: Annotated[
-        float | None, Column("1 sigma with which the limit is kept", "as in largest_unit")
+        float | None, Column("largest 1 sigma of the figure within the limit", "as in largest_unit")
     ] = None
     largest_unit: Annotated[str | None, Column("SI unit of the figure")] = None
     reasons: Annotated[tuple[str, ...], Column("unknown figures")] = ()
@@ -259,20 +255,18 @@ class RankingRow(TableRow):
         float | None, Column("the limit as stated in the requirement", "as in unit")
     ] = None
     confidence: Annotated[
-        float | None, Column("chance of an error within it that was asked for")
+        float | None, Column("required probability of an error within the limit")
     ] = None
-    limit: Annotated[
-        float | None, Column("the same as a standard deviation: the largest allowed", "as in unit")
-    ] = None
+    limit: Annotated[float | None, Column("the limit as a standard deviation", "as in unit")] = None
     sigma: Annotated[
-        float | None, Column("standard deviation of the error, of the next specimen", "as in unit")
+        float | None, Column("standard deviation of the error of the next unit", "as in unit")
     ] = None
     lower: LowerLimit = None
     upper: UpperLimit = None
     unit: Unit
     margin: Annotated[float | None, Column("limit over sigma")] = None
     chance: Annotated[
-        float | None, Column("that sigma is within limit, as far as logs and specimens tell")
+        float | None, Column("probability that sigma is within the limit, given logs and units")
     ] = None
     limit_verdict: Annotated[Verdict, Column("of this limit alone")]
     source: Annotated[SourceCode | None, Column("the largest contribution: see parts")] = None
@@ -320,13 +314,13 @@ class RankingRow(TableRow):
     logged_verdict: Annotated[Verdict | None, Column("with unused recordings, as logged")] = None
     logged_margin: Annotated[float | None, Column("with unused recordings, as logged")] = None
     backtest_channel: Annotated[
-        str | None, Column("that the error mostly comes of; null: not tested")
+        str | None, Column("channel with the largest part of the error; null: not tested")
     ] = None
     backtest_ratio: Annotated[
-        float | None, Column("error that its log shows of its part, over the predicted one")
+        float | None, Column("observed over predicted error of this channel")
     ] = None
     backtest_ratio_lower: Annotated[
-        float | None, Column("lower end of where it lies in 95 % of logs")
+        float | None, Column("lower end of the range for 95 % of logs")
     ] = None
     backtest_ratio_upper: Annotated[float | None, Column("upper end")] = None
     backtest_windows: Annotated[int | None, Column("number of overlapping windows of the log")] = (
@@ -362,20 +356,20 @@ class ShortlistRow(TableRow):
     sensor: Annotated[str, Column("of the catalogue")]
     price_class: Annotated[str | None, Column("as stated")] = None
     best_margin: Annotated[
-        float | None, Column("limit over error, of the best that the datasheet allows")
+        float | None, Column("limit over error in the best case of the datasheet")
     ] = None
     worst_margin: Annotated[
-        float | None, Column("of the worst that it allows; null: not known")
+        float | None, Column("limit over error in the worst case; null: not known")
     ] = None
     decides: Annotated[
         str | None, Column("the limit with the smallest margin in the best case")
     ] = None
     verdict: Annotated[ShortlistVerdict, Column("verdict from the data sheet alone")]
     measured_margin_of: Annotated[
-        str | None, Column("logs or simulated logs; null: not measured")
+        str | None, Column("source: logs or simulated logs; null: not measured")
     ] = None
     measured_margin: Annotated[
-        float | None, Column("limit over error by its logs: see the table ranking")
+        float | None, Column("limit over error by its logs (see the table ranking)")
     ] = None
     measured_verdict: Annotated[Verdict | None, Column("verdict, as in the table ranking")] = None
     assumed: Annotated[tuple[str, ...], Column("unprinted figures, and the values assumed")] = ()

@@ -31,7 +31,7 @@ _UpperDegrees = Annotated[
     Column("degrees of freedom of the upper 95 % limit: more where few clusters remain"),
 ]
 _DegreesSource = Annotated[
-    str, Column("what they follow from: fitted spectrum, or power law at this tau")
+    str, Column("basis of the degrees of freedom: fitted spectrum, or power law at this tau")
 ]
 
 
@@ -50,15 +50,15 @@ class AllanRow(ChannelRow):
     averaged: Annotated[
         float | None,
         Column(
-            "samples that a cluster really averages: fewer than its size where samples are missing"
+            "average number of samples present in a cluster, below its size if samples are missing"
         ),
     ] = None
     exponent: Annotated[
         int | None, Column("noise type: 0 white, -1 flicker, -2 random walk, 1 and 2 phase noise")
     ] = None
-    share: Annotated[float | None, Column("part of the differences that missing samples leave")] = (
-        None
-    )
+    share: Annotated[
+        float | None, Column("fraction of the differences that is left by missing samples")
+    ] = None
 
 
 @table("parameters")
@@ -85,7 +85,7 @@ class ParameterRow(ChannelRow):
     status: EstimateStatus
     reason: EstimateReason = None
     duration_needed: Annotated[
-        float | None, Column("length of a log that gives the value to 10 %", "s")
+        float | None, Column("length of a log that determines the value to 10 %", "s")
     ] = None
     fitted: FittedValue = None
 
@@ -100,15 +100,15 @@ class ModelRow(ChannelRow):
     log_likelihood: Annotated[float, Column("up to a constant of the channel")]
     bic: Annotated[float, Column("-2 log likelihood + free log(bins); + 4: GM for K, + 6: Q, R")]
     aic: Annotated[float, Column("-2 log likelihood + 2 free")]
-    weight: Annotated[float, Column("of the model among the candidates, by BIC")]
-    deviance: Annotated[float | None, Column("mean of a bin; about 1 where the model is right")] = (
+    weight: Annotated[float, Column("weight of the model among the candidates, by BIC")]
+    deviance: Annotated[
+        float | None, Column("mean deviance of a bin; about 1 for a correct model")
+    ] = None
+    chance: Annotated[float | None, Column("probability of so poor a fit for a correct model")] = (
         None
     )
-    chance: Annotated[float | None, Column("of so poor a fit, if the model is right")] = None
     verdict: Annotated[GoodnessVerdict, Column("whether the model explains the spectrum")]
-    note: Annotated[str | None, Column("where it is furthest from the spectrum; what AIC says")] = (
-        None
-    )
+    note: Annotated[str | None, Column("frequency of the largest deviation; note on AIC")] = None
     bins: Annotated[int, Column("bins of the spectrum used")]
     band: Annotated[float | None, Column("highest frequency used", "Hz")] = None
     band_source: Annotated[str | None, Column("method of detection")] = None
@@ -127,7 +127,7 @@ class LineRow(ChannelRow):
     amplitude_upper: Annotated[float | None, Column("upper 95 % limit", "rad/s or m/s^2")] = None
     ratio: Annotated[float | None, Column("ratio of the highest density to the noise")] = None
     false_alarm: Annotated[
-        float | None, Column("chance of one like it in a channel without lines")
+        float | None, Column("probability of such a line in a channel without lines")
     ] = None
     width: Annotated[float | None, Column("width of the line", "Hz")] = None
 
@@ -149,7 +149,7 @@ class ModelSampleRow(ChannelRow):
     """A row of the table ``samples_of_models``."""
 
     of: Annotated[
-        str, Column("log; before: of the model that the curve reads; after: of the estimate")
+        str, Column("log; before: model read from the curve; after: model of the estimate")
     ]
     what: Annotated[
         str, Column("deviation of all samples; stretch: each sample; envelope: over time")
@@ -220,7 +220,7 @@ class CompensatedAllanRow(ChannelRow):
 
     tau: Annotated[float, Column("cluster length", "s")]
     adev: Annotated[
-        float, Column("Allan deviation of the log less what temperature adds", "rad/s or m/s^2")
+        float, Column("Allan deviation of the log without the temperature effect", "rad/s or m/s^2")
     ]
     lower: Annotated[float | None, Column("lower 95 % limit", "rad/s or m/s^2")] = None
     upper: Annotated[float | None, Column("upper 95 % limit", "rad/s or m/s^2")] = None
@@ -228,7 +228,7 @@ class CompensatedAllanRow(ChannelRow):
     edf_upper: _UpperDegrees = None
     edf_source: _DegreesSource
     temperature: Annotated[
-        float, Column("Allan deviation of what temperature adds", "rad/s or m/s^2")
+        float, Column("Allan deviation of the temperature effect", "rad/s or m/s^2")
     ]
 
 
@@ -281,9 +281,9 @@ class ScoreRow(ChannelRow):
             "rad/s or m/s^2",
         ),
     ] = None
-    rms_log10: Annotated[float | None, Column("the same of the difference of log10", "decades")] = (
-        None
-    )
+    rms_log10: Annotated[
+        float | None, Column("the same for the difference of log10", "decades")
+    ] = None
     drawn: Annotated[
         float | None,
         Column("rms of one simulated log instead of the model: median of many", "rad/s or m/s^2"),
@@ -310,8 +310,8 @@ class ScoreRow(ChannelRow):
     beats: Annotated[
         float | None,
         Column(
-            "chance that a log simulated of it has a lower whole than one of the recommended "
-            "method: 0.5 for the same model"
+            "probability that a log simulated from it has a lower RMS with equal weights than a "
+            "log of the recommended method: 0.5 for the same model"
         ),
     ] = None
     inside_band: Annotated[
@@ -338,35 +338,33 @@ class BacktestRow(ChannelRow):
 
     requirement: Annotated[str, Column("requirement with this limit")]
     error: Annotated[
-        str, Column("attitude, heading, velocity, position: the part of it of this channel")
+        str, Column("attitude, heading, velocity or position: the part from this channel")
     ]
     time: Annotated[float, Column("of dead reckoning", "s")]
     window: Annotated[
-        float | None, Column("at rest right before, over which the bias is the mean", "s")
+        float | None, Column("window at rest before it, whose mean is the bias", "s")
     ] = None
     windows: Annotated[
-        int | None, Column("of the log, overlapping; those with gaps are left out")
+        int | None, Column("number of overlapping windows of the log without gaps")
     ] = None
-    independent: Annotated[
-        float | None, Column("windows that would scatter as little, if independent")
-    ] = None
+    independent: Annotated[float | None, Column("equivalent number of independent windows")] = None
     measured: Annotated[
-        float | None, Column("rms of the error over the windows of the log as it is", "as in unit")
+        float | None, Column("rms error over the windows of the log as recorded", "as in unit")
     ] = None
     predicted: Annotated[
         float | None, Column("standard deviation by the noise model of the channel", "as in unit")
     ] = None
     predicted_lower: Annotated[
-        float | None, Column("lower 95 % limit, by the models drawn", "as in unit")
+        float | None, Column("lower 95 % limit from drawn models", "as in unit")
     ] = None
     predicted_upper: UpperLimit = None
     ratio: Annotated[float | None, Column("measured over predicted")] = None
     ratio_lower: Annotated[
-        float | None, Column("lower end of where it lies in 95 % of logs, the model right")
+        float | None, Column("lower end of the range for 95 % of logs, the model right")
     ] = None
     ratio_upper: Annotated[float | None, Column("upper end")] = None
     chance: Annotated[
-        float | None, Column("of such a ratio or a larger one, if the model is right")
+        float | None, Column("probability of at least this ratio for a correct model")
     ] = None
     verdict: Annotated[BacktestVerdict | None, Column("verdict; null: not tested")] = None
     contradicted: Annotated[
@@ -380,7 +378,7 @@ class BacktestRow(ChannelRow):
         tuple[str, ...], Column("in the log, not in the model: kinds of deterministic")
     ] = ()
     duration_needed: Annotated[
-        float | None, Column("length of a log that can be tested so", "s")
+        float | None, Column("length of a log that this test requires", "s")
     ] = None
     reason: Annotated[str | None, Column("reason without a test")] = None
 
@@ -405,7 +403,12 @@ class DeterministicRow(ChannelRow):
     """A row of the table ``deterministic``."""
 
     kind: Annotated[
-        str, Column("bias_step, warm_up_drift or periodic_drift: taken out of the noise")
+        str, Column("bias_step, warm_up_drift or periodic_drift: removed from the noise")
+    ]
+    start: Annotated[float, Column("start of the part with the signal, from the first sample", "s")]
+    end: Annotated[float, Column("end of this part; for a step both are its position", "s")]
+    size: Annotated[
+        float, Column("size of a step, of a warm-up at its start, or amplitude", "as in unit")
     ]
     size_lower: LowerLimit = None
     size_upper: UpperLimit = None
@@ -416,7 +419,7 @@ class DeterministicRow(ChannelRow):
     time_lower: Annotated[float | None, Column("lower 95 % limit", "s")] = None
     time_upper: Annotated[float | None, Column("upper 95 % limit", "s")] = None
     place_error: Annotated[
-        float | None, Column("half width of the 95 % interval of a step's place", "s")
+        float | None, Column("half width of the 95 % interval of the position of a step", "s")
     ] = None
     gain: Annotated[float | None, Column("twice the loss of log likelihood without it")] = None
 
@@ -459,7 +462,7 @@ class ErrorGrowthRow(OfRecordingRow):
     gyro: Annotated[str, Column("channel that answers")]
     accel: Annotated[str | None, Column("channel that answers")] = None
     window: Annotated[
-        float, Column("at rest right before, from which biases and tilt are taken", "s")
+        float, Column("window at rest before it, for the estimation of biases and tilt", "s")
     ]
     error: Annotated[str, Column("attitude, heading, velocity or position")]
     time: Annotated[float, Column("of dead reckoning", "s")]

@@ -34,14 +34,14 @@ class RecordingRow(SensorRow):
     rate: Annotated[float | None, Column("sampling rate used", "Hz")] = None
     rate_from: Annotated[str | None, Column("source of the rate: stamps, or stated")] = None
     rate_error: Annotated[
-        float | None, Column("its standard deviation, as the stamps' scatter tells", "Hz")
+        float | None, Column("standard deviation of the rate, from the scatter of the stamps", "Hz")
     ] = None
-    samples: Annotated[int | None, Column("number of samples present in the longest channel")] = (
-        None
-    )
-    duration: Annotated[float | None, Column("duration from the first to the last sample", "s")] = (
-        None
-    )
+    samples: Annotated[
+        int | None, Column("number of number of samples present in the longest channel")
+    ] = None
+    duration: Annotated[
+        float | None, Column("duration duration from the first to the last sample", "s")
+    ] = None
     temperature_min: Annotated[float | None, Column("lowest temperature", "degC")] = None
     temperature_max: Annotated[float | None, Column("highest temperature", "degC")] = None
     fitness: Annotated[Fitness | None, Column("null: not analysed")] = None
@@ -72,11 +72,11 @@ class DoubtRow(OfRecordingRow):
     code: Annotated[
         str, Column("a finding; not_explained: the spectrum; doubtful: a parameter's status")
     ]
-    fitness: Annotated[Fitness, Column("unfit: the figures may not be those of a sensor at rest")]
+    fitness: Annotated[Fitness, Column("unfit: the values may not belong to a sensor at rest")]
     parameters: Annotated[tuple[str, ...], Column("affected; empty: all")] = ()
-    factor: Annotated[float | None, Column("possible change of a value, where known")] = None
+    factor: Annotated[float | None, Column("possible change of a value, if known")] = None
     start: Annotated[
-        float | None, Column("begin of the part concerned, from the first sample", "s")
+        float | None, Column("start of the part concerned, from the first sample", "s")
     ] = None
     end: Annotated[float | None, Column("its end", "s")] = None
     reason: Annotated[str, Column("in words")]
@@ -94,7 +94,7 @@ class FindingRow(OfRecordingRow):
     value: Annotated[float | None, Column("its size", "as the finding says")] = None
     data: Annotated[str | None, Column("its data, JSON")] = None
     start: Annotated[
-        float | None, Column("begin of the part concerned, from the first sample", "s")
+        float | None, Column("start of the part concerned, from the first sample", "s")
     ] = None
     end: Annotated[float | None, Column("its end", "s")] = None
 
@@ -104,7 +104,7 @@ class FailureRow(SensorRow):
     """A row of the table ``failures``."""
 
     recording: Annotated[
-        str | None, Column("that is left out; null: a step of the whole sensor")
+        str | None, Column("omitted recording; null: a step of the whole sensor")
     ] = None
     step: Annotated[str, Column("step of the workflow that failed")]
     cause: Annotated[FailureCause, Column("time: it exceeded its time limit")]
