@@ -39,9 +39,9 @@ class RecordingRow(SensorRow):
     samples: Annotated[
         int | None, Column("number of number of samples present in the longest channel")
     ] = None
-    duration: Annotated[
-        float | None, Column("duration duration from the first to the last sample", "s")
-    ] = None
+    duration: Annotated[float | None, Column("duration from the first to the last sample", "s")] = (
+        None
+    )
     temperature_min: Annotated[float | None, Column("lowest temperature", "degC")] = None
     temperature_max: Annotated[float | None, Column("highest temperature", "degC")] = None
     fitness: Annotated[Fitness | None, Column("null: not analysed")] = None
