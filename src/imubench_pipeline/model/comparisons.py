@@ -125,7 +125,7 @@ class DatasheetRow(ChannelRow):
     kind: Annotated[str | None, Column("typ, max, min, range, 1sigma or derived")] = None
     condition: Annotated[str | None, Column("as printed")] = None
     sidedness: Annotated[
-        str | None, Column("sidedness of a noise density, as assumed in this row")
+        str | None, Column("sidedness sidedness of a noise density, as assumed in this row")
     ] = None
     comparable: Annotated[
         float | None, Column("printed value in the convention of measured", "SI")
@@ -154,7 +154,9 @@ class RepeatabilityRow(SensorRow):
     device: Annotated[str, Column("device with the compared recordings")]
     channel: Annotated[str, Column("channel, gyro_x to accel_z")]
     recordings: Annotated[int, Column("number of turn-ons")]
-    power_cycled: Annotated[str, Column("power cycle between all of them: yes or unknown")]
+    power_cycled: Annotated[
+        str, Column("power cycle power cycle between all of them: yes or unknown")
+    ]
     printed: Annotated[float | None, Column("bias repeatability as printed", "as in unit")] = None
     unit: Annotated[str | None, Column("unit as printed")] = None
     kind: Annotated[str | None, Column("typ, max, min, range, 1sigma or derived")] = None
@@ -201,7 +203,8 @@ class ErrorBudgetRow(OfRecordingRow):
     gyro: Annotated[str | None, Column("channel that answers")] = None
     accel: Annotated[str | None, Column("channel that answers")] = None
     error: Annotated[
-        str, Column("error: attitude, heading, velocity, position; north: heading found at rest")
+        str,
+        Column("error: error: attitude, heading, velocity, position; north: heading found at rest"),
     ]
     time: Annotated[float, Column("of dead reckoning; of rest for north", "s")]
     source: SourceColumn
@@ -297,7 +300,11 @@ class RankingRow(TableRow):
     ] = None
     spread_of: Annotated[SpreadOf | None, Column("compared units or recordings")] = None
     evidence: Annotated[
-        Evidence | None, Column("strength of the evidence for this limit; null: there is no figure")
+        Evidence | None,
+        Column(
+            "strength of the evidence strength of the evidence for this limit; null: there is no "
+            "figure"
+        ),
     ] = None
     evidence_reasons: Annotated[
         tuple[str, ...],
@@ -366,7 +373,7 @@ class ShortlistRow(TableRow):
     ] = None
     verdict: Annotated[ShortlistVerdict, Column("verdict from the data sheet alone")]
     measured_margin_of: Annotated[
-        str | None, Column("source: logs or simulated logs; null: not measured")
+        str | None, Column("source: source: logs or simulated logs; null: not measured")
     ] = None
     measured_margin: Annotated[
         float | None, Column("limit over error by its logs (see the table ranking)")
@@ -400,7 +407,9 @@ class VendorCoverageRow(TableRow):
     vendor: Annotated[str, Column("of the sensors")]
     quantity: Annotated[str, Column("gyro or accel")]
     figure: Annotated[str, Column("N, B, K, T_B, temperature_coefficient or offset")]
-    sensors: Annotated[int, Column("number of sensors of the vendor in the catalogue")]
+    sensors: Annotated[
+        int, Column("number of sensors number of sensors of the vendor in the catalogue")
+    ]
     yes: Annotated[int, Column("number with a published figure")]
     other_convention: Annotated[int, Column("number with a figure in another convention")]
     no: Annotated[int, Column("that do not")]

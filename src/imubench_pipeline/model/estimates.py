@@ -100,7 +100,7 @@ class ModelRow(ChannelRow):
     log_likelihood: Annotated[float, Column("up to a constant of the channel")]
     bic: Annotated[float, Column("-2 log likelihood + free log(bins); + 4: GM for K, + 6: Q, R")]
     aic: Annotated[float, Column("-2 log likelihood + 2 free")]
-    weight: Annotated[float, Column("weight of the model among the candidates, by BIC")]
+    weight: Annotated[float, Column("weight weight of the model among the candidates, by BIC")]
     deviance: Annotated[
         float | None, Column("mean deviance of a bin; about 1 for a correct model")
     ] = None

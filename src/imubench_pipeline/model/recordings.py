@@ -37,7 +37,7 @@ class RecordingRow(SensorRow):
         float | None, Column("standard deviation of the rate, from the scatter of the stamps", "Hz")
     ] = None
     samples: Annotated[
-        int | None, Column("number of number of samples present in the longest channel")
+        int | None, Column("number of number of number of samples present in the longest channel")
     ] = None
     duration: Annotated[float | None, Column("duration from the first to the last sample", "s")] = (
         None

@@ -81,7 +81,7 @@ def _make_row(
         return replace(unknown, reasons=(f"the runs do not tell the error of the {limit.error}",))
     sigma, lower, upper = sizes
     spread = math.log(upper / lower) / (2.0 * NORMAL_QUANTILE)
-    reason = "simulated drives; the limits are those of the runs, not of the estimate"
+    reason = "simulated drives; the limits are from the scatter of the runs, not from the estimate"
     return replace(
         unknown,
         sigma=sigma,

@@ -138,7 +138,7 @@ def collect_tunings(
         own = {c: m for c, m in models.items() if quantity_of(c) not in replaced}
         whole = complete_noise_models(own | stand_in)
         if whole is None:
-            lacking[name] = "it tells no white noise of a gyro or of an accelerometer"
+            lacking[name] = "no white noise of a gyro or an accelerometer is estimated"
         else:
             found[name] = whole
     return found, lacking
@@ -157,7 +157,7 @@ def scale_model(model: NoiseModel, factor: float) -> NoiseModel:
 
 
 def _select_method(every: Mapping[str, Sequence[Estimate]], method: str) -> Models:
-    """Return the models of a method without a ramp and lines: no filter expects them to go on."""
+    """Return the models of a method without ramp and lines, which a filter cannot extrapolate."""
     return {
         channel: scale_model(estimate.model, 1.0)
         for channel, own in every.items()
@@ -167,7 +167,7 @@ def _select_method(every: Mapping[str, Sequence[Estimate]], method: str) -> Mode
 
 
 def _make_printed_models(sensor: str, declared: Sensor | None) -> dict[str, Models]:
-    """Return what the datasheet says, read right, and as Maia et al. read it."""
+    """Return the models of the datasheet, read correctly and as Maia et al. read it."""
     if declared is None:
         return {}
     try:
@@ -226,7 +226,7 @@ def navigate(folders: Sequence[Path], sensor: str, settings: str) -> Iterator[Na
         if rate < _MIN_RATE:
             lacking = f"samples of {rate:.3g} Hz; expected {_MIN_RATE:g} Hz or more"
         elif complete_noise_models(fitted) is None:
-            lacking = "the recording tells no white noise of a gyro"
+            lacking = "the recording has no estimate of gyro white noise"
         names: dict[str, Any] = {"sensor": sensor, "recording": about.recording}
         if lacking is not None:
             for course in how.trajectories:

@@ -45,7 +45,7 @@ class NavigateSettings(Strict):
     outages: tuple[Outage, ...] = Field(
         ("10 s", "30 s", "60 s"),
         min_length=1,
-        description="durations without GNSS, one after the other",
+        description="durations durations without GNSS, one after the other",
     )
     duration: Annotated[Duration, AfterValidator(_of_drive)] = Field(
         "310 s",

@@ -101,7 +101,7 @@ def make_calibration_tables(
         key = Key(sensor, recording, channel)
         if channel not in logs:
             run = "rate_table" if isinstance(declared, OnRateTable) else "at_rest"
-            reason = f"{channel} cannot be used; the findings of the recording say why"
+            reason = f"{channel} cannot be used; see the findings of the recording"
             rows = _without(asdict(key) | {"run": run}, "not_shown", reason)
         else:
             source = find_noise_source(folder, static, key, stated)

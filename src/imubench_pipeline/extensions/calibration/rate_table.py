@@ -212,8 +212,7 @@ class RateTable:
             scale = fit.value[:, 1]
             if np.any(np.abs(scale) <= compute_half_width() * fit.sigma[1]):
                 reason = (
-                    "the gyro does not follow the table: there is no scale factor to be a fraction "
-                    "of"
+                    "the gyro does not follow the table, so there is no scale factor as a reference"
                 )
                 not_observable.append(NotObservable("asymmetry", reason))
             else:  # the error of the scale factor is of second order

@@ -44,8 +44,8 @@ class Direction(Strict):
     def _require_latitude(cls, data: Any) -> Any:
         if isinstance(data, dict) and data.get("latitude") is None:
             raise ValueError(
-                "latitude is missing; expected where the log was recorded, such as "
-                "latitude: 45.1 deg (south: negative)"
+                "latitude is missing; expected the latitude of the place, such as latitude: 45.1 "
+                "deg (south: negative)"
             )
         return data
 
@@ -100,7 +100,9 @@ class OnRateTable(Experiment):
 
     steps: tuple[Step, ...] = Field((), description="steady rates; none: column log.table_rate")
     channel: Gyro | None = Field(None, description="along the axis; null: the only gyro of the log")
-    settling: TimeFromZero = Field("2 s", description="left out at the start of each steady rate")
+    settling: TimeFromZero = Field(
+        "2 s", description="time omitted at the start of each steady rate"
+    )
     tolerance: RateFromZero = Field(
         "0.05 deg/s", description="range of the column at a steady rate"
     )
@@ -164,7 +166,7 @@ class OnRateTable(Experiment):
 
 
 class InPositions(Experiment):
-    """A triad that is turned about its z axis, by the clock, and stands still between the turns."""
+    """A triad that is turned about its z axis by a schedule, and is at rest between the turns."""
 
     latitude: Latitude = Field(
         description="latitude of the place, with its unit; south is negative"

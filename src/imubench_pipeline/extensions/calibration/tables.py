@@ -60,7 +60,7 @@ class CalibrationPointRow(OfRecordingRow):
     """A row of the table ``calibration_points``."""
 
     channel: Annotated[str, Column("the gyro that was calibrated")]
-    number: Annotated[int, Column("of the steady rate, in order, from 1")]
+    number: Annotated[int, Column("number of the steady rate, in order, from 1")]
     start: Annotated[float, Column("from the first sample of the recording, without settling", "s")]
     stop: Annotated[float, Column("its end", "s")]
     table_rate: Annotated[float, Column("of the table", "rad/s")]

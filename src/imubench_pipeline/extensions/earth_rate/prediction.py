@@ -296,7 +296,7 @@ def make_outlook_tables(
     """Return the rows of ``alignment`` and ``earth_rate_prediction`` of a sensor at rest.
 
     `folders`: of its static recordings; `settings`: of `plan.select_outlook_settings`. There are no
-    rows without the noise of a gyro, and none of ``alignment`` without an accelerometer.
+    rows without gyro noise, and no rows of ``alignment`` without an accelerometer.
     """
     rows: dict[str, Sequence[TableRow]] = {"alignment": [], "earth_rate_prediction": []}
     sections = json.loads(settings)

@@ -60,7 +60,7 @@ class Course:
     time: Array  # shape (k,); s from the first sample of the log
     rate: Array  # shape (k,); estimate from the data up to then, or all of it, rad/s
     sigma: Array | None  # shape (k,); its standard deviation, rad/s; None where the method has none
-    reason: str | None = None  # why there is no estimate: the arrays are empty then
+    reason: str | None = None  # reason without an estimate; the arrays are then empty
     settled: float | None = None  # s of data to within a tenth of the known rate
 
 
@@ -96,7 +96,7 @@ def estimate_courses(
     empty.
     """
     if len({dwell.sense for dwell in experiment.dwells}) < 2:
-        raise ValueError("all dwells are of one position: the rate cannot be told from the bias")
+        raise ValueError("all dwells have one position: rate and bias cannot be separated")
     longest = choose_block_length(experiment, model)
     measured = block_means([log], experiment, longest)
     blocks, means = measured.blocks, measured.means

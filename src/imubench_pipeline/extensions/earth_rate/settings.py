@@ -33,15 +33,17 @@ _REQUIRED_KEYS = {
 
 
 class TwoPosition(Experiment):
-    """A log in which one gyro was turned end for end, between north and south, again and again."""
+    """A log of a gyro that was repeatedly turned end for end, between north and south."""
 
     latitude: Latitude = Field(description="of the place, with its unit; south is negative")
-    dwell: Time = Field(description="nominal, from the start of one turn to the start of the next")
+    dwell: Time = Field(
+        description="nominal time from the start of one turn to the start of the next"
+    )
     channel: Gyro | None = Field(None, description="the turned gyro; null: the only one of the log")
-    turning: TimeFromZero = Field("2 s", description="that a turn takes, where it is not seen")
+    turning: TimeFromZero = Field("2 s", description="duration of a turn that is not visible")
     start: TimeFromZero = Field("0 s", description="of the first dwell, from the first sample used")
     first: Literal["north", "south"] | None = Field(
-        None, description="where the axis points in the first dwell; null: not known"
+        None, description="direction of the axis in the first dwell; null: not known"
     )
     trust_schedule: bool = Field(False, description="accept the schedule if no turn is detected")
     turn_on_bias: Annotated[Text, _from_zero("angular_rate")] | None = Field(
@@ -113,7 +115,7 @@ class PublishedRate(Strict):
 
     where: Text = Field(description="such as section 6")
     printed: _Rate = Field(description="printed value, with its unit")
-    part: Text = Field("whole", description="part of the run: whole, or such as 'last 13 min'")
+    part: Text = Field("whole", description="part part of the run: whole, or such as 'last 13 min'")
 
 
 class SimulatedTurns(TwoPosition):

@@ -15,7 +15,7 @@ from imubench_pipeline.model.table import (
 )
 
 TurnedGyro = Annotated[str, Column("the gyro that was turned")]
-Part = Annotated[str, Column("part: whole, or the last minutes of the recording")]
+Part = Annotated[str, Column("part: part: whole, or the last minutes of the recording")]
 Method = Annotated[
     str,
     Column(
@@ -55,7 +55,7 @@ class EarthRateRow(OfRecordingRow):
         None
     )
     duration: Annotated[float | None, Column("of all dwells and the turns between", "s")] = None
-    latitude: Annotated[float, Column("as stated with the log", "rad")]
+    latitude: Annotated[float, Column("latitude, as stated with the log", "rad")]
     block: Annotated[float | None, Column("largest length of an averaged block", "s")] = None
     model: Annotated[str | None, Column("terms of the noise model")] = None
     model_from: Annotated[str | None, Column("source of the noise model")] = None
@@ -79,15 +79,19 @@ class TurningRow(OfRecordingRow):
     """A row of the table ``turning``."""
 
     channel: TurnedGyro
-    what: Annotated[str, Column("dwell, turn, knock, or a doubt about the whole log")]
+    what: Annotated[str, Column("dwell, turn, knock, or a doubt about the whole log log")]
     number: Annotated[int | None, Column("in order, from 1")] = None
     start: Annotated[float | None, Column("from the first sample of the recording", "s")] = None
     stop: Annotated[float | None, Column("its end; of a turn: end of the time left out", "s")] = (
         None
     )
-    time: Annotated[float | None, Column("of a turn: its middle", "s")] = None
-    sense: Annotated[int | None, Column("of a dwell: 1 the axis points north, -1 south")] = None
-    found_by: Annotated[str | None, Column("column, transient, step or schedule")] = None
+    time: Annotated[float | None, Column("for a turn: its middle", "s")] = None
+    sense: Annotated[int | None, Column("for a dwell: 1 if the axis points north, -1 if south")] = (
+        None
+    )
+    found_by: Annotated[
+        str | None, Column("source of a turn: column, transient, step or schedule")
+    ] = None
     peak: Annotated[float | None, Column("of a turn: largest rate or step", "rad/s")] = None
     mean: Annotated[float | None, Column("of a dwell", "rad/s")] = None
     doubts: Annotated[tuple[str, ...], Column("in words")] = ()
@@ -104,11 +108,13 @@ class EarthRatePredictionRow(OfRecordingRow):
     turns: Annotated[int, Column("of the run")]
     time: Annotated[float, Column("length of the run", "s")]
     sigma: Annotated[float | None, Column("least standard deviation of the rate", "rad/s")] = None
-    relative: Annotated[float | None, Column("the same over the Earth's rate")] = None
+    relative: Annotated[float | None, Column("the same as a fraction of the Earth's rate")] = None
     heading: Annotated[float | None, Column("standard deviation, east-west axis", "rad")] = None
-    goal: Annotated[float | None, Column("relative standard deviation that is wanted")] = None
-    best: Annotated[bool | None, Column("of dwell: the best of these")] = None
-    nearly_best: Annotated[bool | None, Column("of dwell: less than 1 % worse")] = None
+    goal: Annotated[float | None, Column("required relative standard deviation")] = None
+    best: Annotated[bool | None, Column("for dwell: the best one")] = None
+    nearly_best: Annotated[bool | None, Column("for dwell: less than 1 % worse than the best")] = (
+        None
+    )
 
 
 @table("earth_rate_published")
@@ -121,10 +127,10 @@ class EarthRatePublishedRow(OfRecordingRow):
     printed: Annotated[str, Column("as printed, with its unit")]
     published: Annotated[float, Column("the same", "rad/s")]
     truth: Annotated[float, Column("the Earth's rate", "rad/s")]
-    duration: Annotated[float, Column("of the run, or of the part", "s")]
+    duration: Annotated[float, Column("duration of the run or its part", "s")]
     white: Annotated[float | None, Column("sigma by white noise alone", "rad/s")] = None
     sigma: Annotated[float | None, Column("of the mean over pairs, printed noise", "rad/s")] = None
-    sigma_filter: Annotated[float | None, Column("of the filter, likewise", "rad/s")] = None
+    sigma_filter: Annotated[float | None, Column("the same for the filter", "rad/s")] = None
     off_sigma: Annotated[float | None, Column("published less truth, in sigma")] = None
     verdict: Annotated[str, Column("within the noise or beyond the noise")]
     simulated: Annotated[float | None, Column("from pairs, in a simulated log", "rad/s")] = None
@@ -139,16 +145,16 @@ class AlignmentRow(OfRecordingRow):
     recording: Annotated[str, Column("static recording with its noise")]
     positions: Annotated[int, Column("number of positions: 1, or 2 (opposite about the vertical)")]
     method: Annotated[str, Column("coarse or fine")]
-    time: Annotated[float, Column("of rest, the turn between two positions included", "s")]
+    time: Annotated[float, Column("time at rest, including the turn between two positions", "s")]
     roll: Annotated[float | None, Column("standard deviation, level, facing north", "rad")] = None
     pitch: Annotated[float | None, Column("likewise", "rad")] = None
     heading: Annotated[float | None, Column("likewise; null: see reason", "rad")] = None
-    reason: Annotated[str | None, Column("why an angle is missing")] = None
+    reason: Annotated[str | None, Column("reason for a missing angle")] = None
     error_roll: Annotated[float | None, Column("rms error of simulated triads over roll")] = None
     error_pitch: Annotated[float | None, Column("likewise, over pitch")] = None
     error_heading: Annotated[float | None, Column("likewise, over heading")] = None
     simulated: Annotated[int | None, Column("number of triads of this check; null: none")] = None
-    latitude: Annotated[float, Column("latitude, as set (earth_rate: latitude)", "rad")]
+    latitude: Annotated[float, Column("latitude, latitude, as set (earth_rate: latitude)", "rad")]
     gyro_bias: Annotated[float, Column("standard deviation of the fixed biases", "rad/s")]
     gyro_bias_from: Annotated[str, Column("source of this figure")]
     accelerometer_bias: Annotated[float, Column("standard deviation of the fixed biases", "m/s^2")]

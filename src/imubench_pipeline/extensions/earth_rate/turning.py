@@ -115,7 +115,7 @@ def find_turning(
 ) -> Turning:
     """Find the dwells and the turning points of a log.
 
-    A column with the position decides if there is one. Else the transients and steps that fit the
+    A column with the position is used if there is one. Else the transients and steps that fit the
     schedule best are chosen (`extensions.earth_rate.choice_of_turns.choose_turns`), and weak turns
     are inserted from the schedule; it gives all turns if fewer than 40 % are detected. A transient
     within a fifth of a dwell of an end of the log is handling. ``benchmarks/dwell_detection.py``

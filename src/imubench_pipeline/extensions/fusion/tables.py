@@ -33,7 +33,7 @@ class PublishedFigureRow(ChannelRow):
     upper: UpperLimit = None
     datasheet: Annotated[float | None, Column("of the sensor file, as N or B", "as in unit")] = None
     datasheet_upper: Annotated[float | None, Column("largest of several", "as in unit")] = None
-    reason: Annotated[str | None, Column("why the printed figure differs")] = None
+    reason: Annotated[str | None, Column("reason for the difference from the printed value")] = None
 
 
 @table("fusion")
@@ -50,7 +50,7 @@ class FusionRow(TableRow):
     simulated: Annotated[bool | None, Column("that recording is simulated")] = None
     adev: Annotated[float | None, Column("of one of them, by its model", "rad/s or m/s^2")] = None
     floor: Annotated[float | None, Column("common part: not reduced by n", "rad/s or m/s^2")] = None
-    common_share: Annotated[float | None, Column("the same as a part of the variance")] = None
+    common_share: Annotated[float | None, Column("the same as a fraction of the variance")] = None
     temperature_share: Annotated[float | None, Column("part of the variance by temperature")] = None
     other: Annotated[str, Column("sensor to be matched")]
     other_recording: Annotated[str | None, Column("recording that represents it")] = None
@@ -81,11 +81,13 @@ class GradeRow(TableRow):
     value: Annotated[float | None, Column("value of one sensor", "SI")] = None
     lower: Annotated[float | None, Column("lower 95 % limit", "SI")] = None
     upper: Annotated[float | None, Column("upper 95 % limit", "SI")] = None
-    printed: Annotated[float | None, Column("of the grade, in the same convention", "SI")] = None
+    printed: Annotated[
+        float | None, Column("value of the target sensor, in the same convention", "SI")
+    ] = None
     n: Annotated[float | None, Column("number that equals it, if independent")] = None
-    n_lower: Annotated[float | None, Column("by the lower limit")] = None
-    n_upper: Annotated[float | None, Column("by the upper limit")] = None
-    reason: Annotated[str | None, Column("why there is no n")] = None
+    n_lower: Annotated[float | None, Column("number for the lower limit")] = None
+    n_upper: Annotated[float | None, Column("number for the upper limit")] = None
+    reason: Annotated[str | None, Column("reason for a missing n")] = None
 
 
 RECORDINGS_OF_A_PAIR = (("sensor", "recording"), ("other", "other_recording"))

@@ -23,7 +23,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.usage = "%(prog)s [options] [folder] [-- FLAG ...]"
     parser.description = "Arguments after -- go to snakemake, such as --workflow-profile DIR."
     parser.add_argument(
-        "folder", type=Path, nargs="?", help="folder of logs, or a checkout; default: this one"
+        "folder",
+        type=Path,
+        nargs="?",
+        help="folder folder of logs, or a checkout; default: this one",
     )
     parser.add_argument("--project", type=Path, metavar="DIR", help="the folder, as an option")
     parser.add_argument(

@@ -126,9 +126,9 @@ class _Terminal:
                 return
 
     def _keep(self, line: bytes) -> None:
-        """Write a line to the file once the next line does not erase it."""
+        """Write a line to the file unless the next line overwrites it."""
         if self._last is not None and _ERASE_SEQUENCE not in line:
-            with contextlib.suppress(OSError):  # a full disk: the steps say so themselves
+            with contextlib.suppress(OSError):  # a full disk: the steps report it themselves
                 self._file.write(self._last + b"\n")
         text = _CONTROL_SEQUENCE.sub(b"", _ERASED_LINE.sub(b"", line)).rstrip()
         self._last = text if text or not _ERASED_LINE.match(line) else None

@@ -103,15 +103,14 @@ class State(BaseModel):
 
 
 def read_state(path: Path) -> State | None:
-    """Return the state that a run has written; None without one; StateError if unreadable."""
+    """Return the state that a run wrote; None if there is none; StateError if unreadable."""
     try:
         return State.model_validate(read_sealed_json(path))
     except FileNotFoundError:
         return None
     except (OSError, ValueError) as error:
         raise StateError(
-            f"{path.name} is damaged, or of another version: what is new is not known, and "
-            "everything is told"
+            f"{path.name} is damaged, or of another version: everything is reported as new"
         ) from error
 
 
@@ -153,7 +152,7 @@ def make_state(
 ) -> State:
     """Return the state after a run, of tables as of `load_tables` and the logs that were read."""
     rejected = {
-        get_recording_name(row): row.reason or "no reason is kept"
+        get_recording_name(row): row.reason or "no reason is recorded"
         for row in tables.recordings
         if row.status == "rejected"
     }

@@ -100,7 +100,7 @@ class Lottery:
     ranges: tuple[Range, Range]  # reconstructed by Table 1, and by Table 2 itself
     beats: float  # chance that a reconstruction by Table 1 has the lower RMS of two
     beyond: tuple[float, float]  # shares of them at least as large as the printed figures
-    slow: float  # share of the mean square that comes of tau beyond 300 s, by Table 2
+    slow: float  # share of the mean square from tau beyond 300 s, by Table 2
 
 
 def choose_cluster_sizes(channel: Channel, grid: str) -> NDArray[np.int64]:
@@ -153,7 +153,7 @@ def simulate_readings(channel: Channel) -> dict[str, Range]:
 
 @cache
 def _simulate_deviations(channel: Channel) -> tuple[dict[str, Array], ...]:
-    """Return Allan deviations: of logs of Table 2, of draws by Table 1, of others by Table 2."""
+    """Return Allan deviations of logs of Table 2, and of reconstructions by Tables 1 and 2."""
     grids = {grid: choose_cluster_sizes(channel, grid) for grid in (*GRIDS, "read")}
     together = np.unique(np.concatenate(list(grids.values())))
     samples = round(DURATION * channel.rate)
@@ -451,7 +451,7 @@ def compute_weight_ratios(tau: float) -> tuple[float, float]:
 
 
 def evaluate_equation(_: Evidence, number: str) -> Result:
-    """Return the result of an equation, with the printed one where it follows from Table 2."""
+    """Return the result of an equation, and the printed result if it follows from Table 2."""
     N, B, K, T_B, T = _MODEL.N, _MODEL.B, _MODEL.K, _PROCESS.T_B, 1.0 / _RATE
     f, omega = np.array(1e-3), 2.0 * math.pi * 1e-3
     space, driven = _MODEL.state_space(_RATE), compute_driving_density(B, T_B)

@@ -189,7 +189,7 @@ class Evidence:
         return of.rows_of(table)
 
     def has(self, sensor: str, recording: str) -> bool:
-        """Return whether the run has this recording, and it was usable."""
+        """Return whether the run has a usable recording of this name."""
         return bool(self.rows(RecordingRow, sensor=sensor, recording=recording, status="ok"))
 
     def of_log(self, of: type[R], log: Log, **where: object) -> list[R]:

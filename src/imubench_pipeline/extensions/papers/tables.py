@@ -13,13 +13,17 @@ class PublishedRow(TableRow):
 
     paper: Annotated[str, Column("its authors")]
     place: Annotated[str, Column("table, figure, equation or section, with its number there")]
-    quantity: Annotated[str, Column("of what, in words")]
+    quantity: Annotated[str, Column("quantity, in words")]
     printed_as: Annotated[str, Column("as printed, with unit; derived: follows from it alone")]
-    printed: Annotated[float | None, Column("the same; null: it is no number", "as in unit")] = None
+    printed: Annotated[
+        float | None, Column("the same as a number; null: not a number", "as in unit")
+    ] = None
     found: Annotated[float | None, Column("result of this project", "as in unit")] = None
     lower: Annotated[float | None, Column("lower limit, 95 % by default", "as in unit")] = None
     upper: Annotated[float | None, Column("upper limit", "as in unit")] = None
-    found_words: Annotated[str | None, Column("beside the number, or in its place")] = None
+    found_words: Annotated[
+        str | None, Column("result in words, in addition to the number or instead of it")
+    ] = None
     ratio: Annotated[float | None, Column("found over printed")] = None
     tolerance: Annotated[float | None, Column("of the ratio from 1; null: no ratio")] = None
     unit: Annotated[str, Column("SI unit of the numbers")]
@@ -41,9 +45,9 @@ class AccuracyRow(TableRow):
     method: Annotated[str, Column("estimation method; likelihood_gm with the papers' model alone")]
     parameter: Annotated[str, Column("N, B, T_B or K")]
     logs: Annotated[int, Column("simulated")]
-    given: Annotated[int, Column("of them that the method gives a value for")]
+    given: Annotated[int, Column("number of logs for which the method gives a value")]
     rmse: Annotated[float | None, Column("root mean square error over the truth")] = None
-    bias: Annotated[float | None, Column("their mean error over the truth")] = None
+    bias: Annotated[float | None, Column("mean error of these values over the truth")] = None
     bound: Annotated[float, Column("Cramér-Rao bound of the standard deviation over the truth")]
     ratio: Annotated[float | None, Column("rmse over bound")] = None
     ratio_lower: Annotated[float | None, Column("lower 95 % limit for this number of logs")] = None
