@@ -32,7 +32,7 @@ def test_what_is_declared_in_si() -> None:
 @pytest.mark.parametrize(
     ("changes", "said"),
     [
-        ({"axis": {"elevation": "90 deg"}}, "axis: latitude is missing; expected where the log"),
+        ({"axis": {"elevation": "90 deg"}}, "axis: latitude is missing; expected the latitude"),
         ({"axis": {"latitude": "45 deg"}}, "axis.heading is missing; expected where the axis of"),
         ({"settling": "60 s"}, "step 1 lasts from 0 s to 60 s; expected more than the settling"),
         ({"settling": "-1 s"}, "settling: found '-1 s'; expected a figure from 0"),
@@ -76,7 +76,7 @@ COLUMN = {"column": 4, "unit": "deg/s"}
             {"pointing": {"latitude": "45 deg", "channel": "gyro_z"}},
             "pointing.channel: found 'gyro_z'; the log has gyro_x",
         ),
-        ({"pointing": {"heading": "3 deg"}}, "pointing: latitude is missing; expected where"),
+        ({"pointing": {"heading": "3 deg"}}, "pointing: latitude is missing; expected the latitude"),
         (
             {"pointing": UP, "rate_table": {"steps": STEPS}},
             "found rate_table and pointing; expected one of them",

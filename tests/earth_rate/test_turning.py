@@ -209,7 +209,7 @@ def test_turns_among_sensed_ones_that_are_not_seen_are_filled_in() -> None:
     assert times(found) == pytest.approx(EVERY_30, abs=1.0)
     assert found.turns[5].found_by == "schedule"
     assert found.dwells[5].found_by == found.dwells[6].found_by == "schedule"
-    assert any("rest on the schedule" in doubt for doubt in found.doubts)
+    assert any("are from the schedule" in doubt for doubt in found.doubts)
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
