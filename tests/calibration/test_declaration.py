@@ -76,7 +76,10 @@ COLUMN = {"column": 4, "unit": "deg/s"}
             {"pointing": {"latitude": "45 deg", "channel": "gyro_z"}},
             "pointing.channel: found 'gyro_z'; the log has gyro_x",
         ),
-        ({"pointing": {"heading": "3 deg"}}, "pointing: latitude is missing; expected the latitude"),
+        (
+            {"pointing": {"heading": "3 deg"}},
+            "pointing: latitude is missing; expected the latitude",
+        ),
         (
             {"pointing": UP, "rate_table": {"steps": STEPS}},
             "found rate_table and pointing; expected one of them",
