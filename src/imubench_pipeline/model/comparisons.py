@@ -1,4 +1,4 @@
-"""Rows of comparisons: with data sheets, over time, with other sensors and with requirements."""
+"""Sensors compared: with their data sheets, over time, with each other and with requirements."""
 
 from __future__ import annotations
 
@@ -103,7 +103,7 @@ class PooledRow(SensorRow):
     ] = None
     verdict: Annotated[PoolVerdict | None, Column("at a level of 1 %")] = None
     reasons: Annotated[tuple[str, ...], Column("in words")] = ()
-    doubts: Annotated[tuple[DoubtMark, ...], Column("of the pooled recordings")] = ()
+    doubts: Annotated[tuple[DoubtMark, ...], Column("methods of the pooled recordings")] = ()
 
 
 @table("datasheet")
@@ -125,7 +125,7 @@ class DatasheetRow(ChannelRow):
     kind: Annotated[str | None, Column("typ, max, min, range, 1sigma or derived")] = None
     condition: Annotated[str | None, Column("as printed")] = None
     sidedness: Annotated[
-        str | None, Column("sidedness sidedness of a noise density, as assumed in this row")
+        str | None, Column("sidedness of a noise density, as assumed in this row")
     ] = None
     comparable: Annotated[
         float | None, Column("printed value in the convention of measured", "SI")
@@ -154,9 +154,7 @@ class RepeatabilityRow(SensorRow):
     device: Annotated[str, Column("device with the compared recordings")]
     channel: Annotated[str, Column("channel, gyro_x to accel_z")]
     recordings: Annotated[int, Column("number of turn-ons")]
-    power_cycled: Annotated[
-        str, Column("power cycle power cycle between all of them: yes or unknown")
-    ]
+    power_cycled: Annotated[str, Column("power cycle between all of them: yes or unknown")]
     printed: Annotated[float | None, Column("bias repeatability as printed", "as in unit")] = None
     unit: Annotated[str | None, Column("unit as printed")] = None
     kind: Annotated[str | None, Column("typ, max, min, range, 1sigma or derived")] = None
@@ -168,8 +166,8 @@ class RepeatabilityRow(SensorRow):
     lower: Annotated[float | None, Column("lower 95 % limit of measured", "SI")] = None
     upper: Annotated[float | None, Column("upper 95 % limit of measured", "SI")] = None
     delta: Annotated[float | None, Column("measured / comparable - 1")] = None
-    verdict: Annotated[str, Column("as of the table datasheet")]
-    reasons: Annotated[tuple[str, ...], Column("in words, with the conditions")] = ()
+    verdict: Annotated[str, Column("verdict, as in the table datasheet")]
+    reasons: Annotated[tuple[str, ...], Column("explanation with the conditions")] = ()
 
 
 @table("datasheet_curve")
@@ -203,10 +201,9 @@ class ErrorBudgetRow(OfRecordingRow):
     gyro: Annotated[str | None, Column("channel that answers")] = None
     accel: Annotated[str | None, Column("channel that answers")] = None
     error: Annotated[
-        str,
-        Column("error: error: attitude, heading, velocity, position; north: heading found at rest"),
+        str, Column("error: attitude, heading, velocity, position; north: heading found at rest")
     ]
-    time: Annotated[float, Column("of dead reckoning; of rest for north", "s")]
+    time: Annotated[float, Column("time of dead reckoning; for north: time at rest", "s")]
     source: SourceColumn
     quantity: SourceQuantity = None
     through: SourceThrough = None
@@ -218,16 +215,22 @@ class ErrorBudgetRow(OfRecordingRow):
     ] = None
     lower: Annotated[float | None, Column("lower 95 % limit of a total", "as in unit")] = None
     upper: Annotated[float | None, Column("upper 95 % limit of a total", "as in unit")] = None
-    drawn: Annotated[str | None, Column("parameters behind the limits: jointly, or one by one")] = (
+    drawn: Annotated[str | None, Column("whether the limits use joint draws of the parameters")] = (
+        None
+    )
+    within: Annotated[float | None, Column("probability that the total is within the limit")] = None
+    limit: Annotated[float | None, Column("largest permitted standard deviation", "as in unit")] = (
         None
     )
     unit: Unit
     reached_after: Annotated[
         float | None, Column("time after which the limit is reached; null: never", "s")
     ] = None
-    origin: Annotated[Origin | None, Column("of the figure of a source")] = None
-    kind: Annotated[str | None, Column("of a printed figure: typ, max, 1sigma, ...")] = None
-    convention: Annotated[str | None, Column("how a figure became a standard deviation")] = None
+    origin: Annotated[Origin | None, Column("origin of the figure of a source")] = None
+    kind: Annotated[str | None, Column("kind of a printed figure: typ, max, 1sigma, ...")] = None
+    convention: Annotated[
+        str | None, Column("conversion of the figure to a standard deviation")
+    ] = None
     largest: Annotated[
         float | None, Column("largest 1 sigma of the figure within the limit", "as in largest_unit")
     ] = None
@@ -271,9 +274,9 @@ class RankingRow(TableRow):
     chance: Annotated[
         float | None, Column("probability that sigma is within the limit, given logs and units")
     ] = None
-    limit_verdict: Annotated[Verdict, Column("of this limit alone")]
+    limit_verdict: Annotated[Verdict, Column("verdict on this limit alone")]
     source: Annotated[SourceCode | None, Column("the largest contribution: see parts")] = None
-    share: Annotated[float | None, Column("its part of the variance")] = None
+    share: Annotated[float | None, Column("share of this source in the variance")] = None
     reached_after: Annotated[float | None, Column("time after which the limit is reached", "s")] = (
         None
     )
@@ -286,7 +289,7 @@ class RankingRow(TableRow):
     ] = ()
     parts: Annotated[tuple[Share, ...], Column("every source of 1 % of the variance or more")] = ()
     reasons: Annotated[tuple[str, ...], Column("unknown figures")] = ()
-    doubts: Annotated[tuple[DoubtMark, ...], Column("of the recordings that are used")] = ()
+    doubts: Annotated[tuple[DoubtMark, ...], Column("doubts about the used recordings")] = ()
     left_out: Annotated[
         tuple[DoubtMark, ...], Column("recordings of the sensor that are not used, with reasons")
     ] = ()
@@ -300,11 +303,7 @@ class RankingRow(TableRow):
     ] = None
     spread_of: Annotated[SpreadOf | None, Column("compared units or recordings")] = None
     evidence: Annotated[
-        Evidence | None,
-        Column(
-            "strength of the evidence strength of the evidence for this limit; null: there is no "
-            "figure"
-        ),
+        Evidence | None, Column("strength of the evidence for this limit; null: there is no figure")
     ] = None
     evidence_reasons: Annotated[
         tuple[str, ...],
@@ -316,10 +315,14 @@ class RankingRow(TableRow):
     corrected_verdict: Annotated[Verdict | None, Column("with these factors")] = None
     corrected_margin: Annotated[float | None, Column("with these factors")] = None
     corrected_reasons: Annotated[
-        tuple[str, ...], Column("why it cannot be judged with these factors")
+        tuple[str, ...], Column("reason without a verdict for these factors")
     ] = ()
-    logged_verdict: Annotated[Verdict | None, Column("with unused recordings, as logged")] = None
-    logged_margin: Annotated[float | None, Column("with unused recordings, as logged")] = None
+    logged_verdict: Annotated[
+        Verdict | None, Column("verdict with unused recordings, as logged")
+    ] = None
+    logged_margin: Annotated[float | None, Column("verdict with unused recordings, as logged")] = (
+        None
+    )
     backtest_channel: Annotated[
         str | None, Column("channel with the largest part of the error; null: not tested")
     ] = None
@@ -344,12 +347,14 @@ class NextStepRow(SensorRow):
         tuple[str, ...], Column("requirements with verdicts that it can change")
     ]
     action: Annotated[Action, Column("what to do")]
-    quantities: Annotated[tuple[str, ...], Column("whose unit or axes it is about")] = ()
-    figures: Annotated[tuple[Condition, ...], Column("to find in data sheets")] = ()
+    quantities: Annotated[
+        tuple[str, ...], Column("quantities with the unit or axes concerned")
+    ] = ()
+    figures: Annotated[tuple[Condition, ...], Column("figures to look up in data sheets")] = ()
     doubts: Annotated[tuple[DoubtMark, ...], Column("doubts that it removes")] = ()
-    verdicts_turned: Annotated[int, Column("verdicts that it can change, or settle")]
-    verdicts_strengthened: Annotated[int, Column("verdicts whose evidence it makes stronger")]
-    duration: Annotated[float | None, Column("length of the log that it takes", "s")] = None
+    verdicts_turned: Annotated[int, Column("number of verdicts that it can change or settle")]
+    verdicts_strengthened: Annotated[int, Column("number of verdicts with stronger evidence")]
+    duration: Annotated[float | None, Column("required length of the log", "s")] = None
     logged: Annotated[float | None, Column("length of the present log", "s")] = None
     specimens: Annotated[int | None, Column("required number of further units")] = None
     text: Annotated[str, Column("in words")] = ""
@@ -373,7 +378,7 @@ class ShortlistRow(TableRow):
     ] = None
     verdict: Annotated[ShortlistVerdict, Column("verdict from the data sheet alone")]
     measured_margin_of: Annotated[
-        str | None, Column("source: source: logs or simulated logs; null: not measured")
+        str | None, Column("source: logs or simulated logs; null: not measured")
     ] = None
     measured_margin: Annotated[
         float | None, Column("limit over error by its logs (see the table ranking)")
@@ -395,7 +400,7 @@ class CoverageRow(SensorRow):
     quantity: Annotated[str, Column("gyro or accel")]
     figure: Annotated[str, Column("N, B, K, T_B, temperature_coefficient or offset")]
     published: Annotated[str, Column("yes, no, other convention, not looked up")]
-    as_printed: Annotated[tuple[str, ...], Column("every figure of it")] = ()
+    as_printed: Annotated[tuple[str, ...], Column("all printed figures")] = ()
     document: Annotated[str | None, Column("with its revision")] = None
     source: Annotated[str | None, Column("primary or secondary")] = None
 
@@ -407,9 +412,7 @@ class VendorCoverageRow(TableRow):
     vendor: Annotated[str, Column("of the sensors")]
     quantity: Annotated[str, Column("gyro or accel")]
     figure: Annotated[str, Column("N, B, K, T_B, temperature_coefficient or offset")]
-    sensors: Annotated[
-        int, Column("number of sensors number of sensors of the vendor in the catalogue")
-    ]
+    sensors: Annotated[int, Column("number of sensors of the vendor in the catalogue")]
     yes: Annotated[int, Column("number with a published figure")]
     other_convention: Annotated[int, Column("number with a figure in another convention")]
     no: Annotated[int, Column("that do not")]
