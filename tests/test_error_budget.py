@@ -2,7 +2,7 @@ import math
 from collections.abc import Sequence
 from functools import partial
 from itertools import pairwise
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import pytest
@@ -282,6 +282,9 @@ def test_heading_from_white_noise() -> None:
     expected = 1e-6 / math.sqrt(400.0) / (EARTH_RATE / 2.0)
     assert compass.heading(400.0).total == pytest.approx(expected)
     assert compass.time_needed(expected) == pytest.approx(400.0)
+    # Two positions share the time; half the difference is as good as the mean.
+    turned = Gyrocompass(gyro=NoiseModel(N=1e-6), latitude=math.radians(60.0), positions=2)
+    assert turned.heading(400.0).total == pytest.approx(expected)
 
 
 def test_a_floor_makes_a_heading_impossible() -> None:
@@ -293,6 +296,10 @@ def test_a_floor_makes_a_heading_impossible() -> None:
     floor = math.sqrt(2.0 / math.pi) * 1e-6 / EARTH_RATE
     assert flicker.time_needed(1.01 * floor) is not None
     assert flicker.time_needed(0.99 * floor) is None
+    two = Gyrocompass(gyro=NoiseModel(N=1e-6, B=1e-6), latitude=0.0, positions=2)
+    floor = math.sqrt(math.log(2.0) / math.pi) * 1e-6 / EARTH_RATE
+    assert two.time_needed(1.01 * floor) is not None
+    assert two.time_needed(0.99 * floor) is None
 
 
 def test_the_best_window_of_a_walk_is_found() -> None:
@@ -304,9 +311,10 @@ def test_the_best_window_of_a_walk_is_found() -> None:
     assert compass.time_needed(best * (1.0 - 1e-6)) is None
 
 
-def test_a_line_counts_by_its_envelope_in_the_search() -> None:
+@pytest.mark.parametrize("positions", [1, 2])
+def test_a_line_counts_by_its_envelope_in_the_search(positions: Literal[1, 2]) -> None:
     gyro = NoiseModel(N=1e-6, sinusoids=(Sinusoid(1e-5, 2.0),))
-    compass = Gyrocompass(gyro=gyro, latitude=0.5, bias=0.0)
+    compass = Gyrocompass(gyro=gyro, latitude=0.5, bias=0.0, positions=positions)
     needed = compass.time_needed(0.01)
     assert needed is not None
     later = needed * np.linspace(1.0, 1.5, 400)
@@ -319,6 +327,7 @@ def test_an_unknown_turn_on_bias_is_a_stated_assumption() -> None:
     assert unknown.quantity == "heading"
     known = Gyrocompass(gyro=MTI_7_GYRO, latitude=0.5, bias=1e-3).heading(60.0)
     assert not known.assumptions
+    assert not Gyrocompass(gyro=MTI_7_GYRO, latitude=0.5, positions=2).heading(60.0).assumptions
     assert known.total == pytest.approx(
         math.hypot(unknown.total, 1e-3 / (EARTH_RATE * math.cos(0.5)))
     )
@@ -329,6 +338,8 @@ def test_bad_gyrocompasses_are_refused() -> None:
         Gyrocompass(gyro=NOTHING, latitude=math.pi / 2.0)
     with pytest.raises(ValueError, match="bias"):
         Gyrocompass(gyro=NOTHING, latitude=0.0, bias=-1.0)
+    with pytest.raises(ValueError, match="positions"):
+        Gyrocompass(gyro=NOTHING, latitude=0.0, positions=3)  # type: ignore[arg-type]  # wrong on purpose
     with pytest.raises(ValueError, match="accuracy"):
         Gyrocompass(gyro=NOTHING, latitude=0.0).time_needed(0.0)
 

@@ -144,3 +144,7 @@ def test_gyrocompassing_on_simulated_windows(rng: np.random.Generator) -> None:
     found, error = spread(log.mean(axis=1) / EARTH_RATE)
     compass = Gyrocompass(gyro=gyro, latitude=0.0, bias=0.0)
     assert abs(found - compass.heading(time).total) < 4.0 * error
+    first, second = np.split(log, 2, axis=1)
+    found, error = spread((first.mean(axis=1) - second.mean(axis=1)) / 2.0 / EARTH_RATE)
+    compass = Gyrocompass(gyro=gyro, latitude=0.0, positions=2)
+    assert abs(found - compass.heading(time).total) < 4.0 * error

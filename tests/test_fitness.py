@@ -148,7 +148,7 @@ def test_pools_are_those_without_the_unfit_recording_and_count_it() -> None:
     (without,) = list_pooled_rows(rows[:2], [], {})
     assert pooled["value"] == without["value"]
     assert (pooled["recordings"], pooled["left_out"]) == (2, 1)
-    assert "1 recording not used (the recording is in doubt)" in pooled["reason"]
+    assert "1 recording not used (the recording is in doubt)" in pooled["reasons"]
 
 
 def test_rows_carry_the_doubts_of_what_they_stand_on() -> None:
@@ -199,6 +199,6 @@ def test_a_ranking_stands_on_the_recordings_that_decide() -> None:
     only = both[len(fine) :]
     (none,) = build("ranking", ranking_rows(only, requirement, prices, about)).to_pylist()
     assert none["verdict"] == "not_enough_data"
-    assert none["reason"] == "moved is not used: the sensor was moved"
+    assert none["reasons"] == ["moved is not used: the sensor was moved"]
     assert none["rank"] is None
     assert none["logged_verdict"] == "fails" and none["corrected_verdict"] is None

@@ -14,7 +14,7 @@ from imubench_pipeline.estimators.rows import make_parameter_rows
 from imubench_pipeline.extensions.calibration.alignment.accuracy import accuracies
 from imubench_pipeline.extensions.calibration.alignment.fine import UNIFORM_HEADING_SIGMA
 from imubench_pipeline.extensions.calibration.alignment.triad import Site, Triad
-from imubench_pipeline.extensions.earth_rate.prediction import (
+from imubench_pipeline.extensions.earth_rate.outlook import (
     TIMES,
     load_noise_at_rest,
     make_outlook_tables,

@@ -13,8 +13,8 @@ from imubench_pipeline.extensions.earth_rate.bound import (
     choose_block_length,
     compute_cramer_rao_bounds,
 )
+from imubench_pipeline.extensions.earth_rate.outlook import Outlook
 from imubench_pipeline.extensions.earth_rate.pairs import by_pairs, by_triples
-from imubench_pipeline.extensions.earth_rate.prediction import Outlook
 from imubench_pipeline.extensions.earth_rate.simulation import (
     ASSUMED_LATITUDE,
     PAPER_MODEL,

@@ -13,8 +13,8 @@ from imubench_pipeline.extensions.earth_rate.bound import (
     compute_cramer_rao_bounds,
     compute_information,
 )
+from imubench_pipeline.extensions.earth_rate.outlook import Outlook, prediction_rows
 from imubench_pipeline.extensions.earth_rate.pairs import by_pairs
-from imubench_pipeline.extensions.earth_rate.prediction import Outlook, prediction_rows
 from imubench_pipeline.extensions.earth_rate.simulation import PAPER_MODEL, design_paper_run
 from imubench_pipeline.navigation.error_budget import Gyrocompass
 from imubench_pipeline.noise import NoiseModel

@@ -93,7 +93,7 @@ def test_the_command_prints_the_table(tmp_path: Path, capsys: Any) -> None:
     printed = " ".join(capsys.readouterr().out.split())
     for text in ("Maia et al.", "Table 3", "2,0 °/s", "misprint", "[1] one draw ranks nothing",
                  "2 ±5 %", "± the tolerance",
-                 "misprint: as printed it cannot be right"):  # fmt: skip
+                 "misprint: as printed it is wrong"):  # fmt: skip
         assert text in printed
     assert main(["papers", str(tmp_path), "--place", "Table 3"]) == 0
     assert "Equation" not in capsys.readouterr().out

@@ -79,7 +79,7 @@ def faulty(project: Project, tmp_path_factory: pytest.TempPathFactory) -> dict[s
     )
     put_fault(copy / "recordings/ingest.py", names, IN_INGEST)
     rows = 'rows: dict[str, Sequence[TableRow]] = {"alignment": [], "earth_rate_prediction": []}'
-    put_fault(copy / "extensions/earth_rate/prediction.py", rows, IN_OUTLOOK)
+    put_fault(copy / "extensions/earth_rate/outlook.py", rows, IN_OUTLOOK)
     project.environment = os.environ | {"PYTHONPATH": str(place)}
     kernels = ("whittle_kernels", "posterior_kernels")
     if not all(any(copy.glob(f"estimators/__pycache__/{name}.*.nbc")) for name in kernels):

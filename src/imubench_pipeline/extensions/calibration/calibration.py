@@ -38,7 +38,7 @@ from imubench_pipeline.extensions.calibration.tables import (
     CalibrationPointRow,
     CalibrationRow,
 )
-from imubench_pipeline.extensions.earth_rate.prediction import load_noise_at_rest
+from imubench_pipeline.extensions.earth_rate.outlook import load_noise_at_rest
 from imubench_pipeline.model.table import TableRow
 from imubench_pipeline.recordings.kept import load_logs
 from imubench_pipeline.recordings.recording import ChannelLog, place_on_grid, read_metadata

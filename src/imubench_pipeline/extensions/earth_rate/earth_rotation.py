@@ -14,7 +14,7 @@ from numpy.linalg import LinAlgError
 
 from imubench_pipeline.earth import EARTH_RATE
 from imubench_pipeline.extensions.calibration.experiment import Dwell, Experiment
-from imubench_pipeline.extensions.earth_rate.prediction import Outlook, prediction_rows
+from imubench_pipeline.extensions.earth_rate.outlook import Outlook, prediction_rows
 from imubench_pipeline.extensions.earth_rate.published import (
     METHODS,
     Course,

@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -47,18 +48,24 @@ class Gyrocompass:
     latitude: float  # rad, between the poles
     # turn-on bias, 1 sigma, rad/s; None: from ``figures``, else left out with a note
     bias: float | None = None
+    # 2: the gyro is turned by 180 degrees after half the time; half the difference of the two means
+    # has no turn-on bias
+    positions: Literal[1, 2] = 1
     figures: Figures = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         if not abs(self.latitude) < math.pi / 2.0:
             raise ValueError(f"latitude is {self.latitude}, expected one between the poles, in rad")
         check_not_negative(bias=self.bias or 0.0)
+        if self.positions not in (1, 2):
+            raise ValueError(f"positions is {self.positions}, expected 1 or 2")
 
     def heading(self, time: float) -> Budget:
         """Return the heading error after a static window, s, by source, rad.
 
-        The error of the mean has, by term, the variance `Term.mean_variance`. Raises a ValueError
-        if the time is not above 0.
+        At one position the error of the mean has, by term, the variance `Term.mean_variance`; at
+        two positions sigma^2(t/2) / 2, with sigma^2 the Allan variance (Britting, "Inertial
+        Navigation Systems Analysis", Wiley 1971). Raises a ValueError if the time is not above 0.
         """
         if not (math.isfinite(time) and time > 0):
             raise ValueError(f"time is {time}, expected a time above 0")
@@ -121,6 +128,8 @@ class Gyrocompass:
 
     def _list_bias_errors(self) -> list[Contribution | Missing]:
         """Return the contributions of the gyro bias, which do not decrease with time."""
+        if self.positions == 2:
+            return []
         if self.bias is not None:
             sigma = self.bias / self._north_rate
             return [Contribution(ErrorSource("turn_on_bias", "gyro"), sigma, STATED_FIGURE)]
@@ -133,9 +142,13 @@ class Gyrocompass:
     def _list_noise_errors(self, time: float, *, swings: bool) -> Iterator[Contribution]:
         for term in self.gyro.terms:
             if isinstance(term, Sinusoid) and not swings:
-                # The mean of a line is 0 after each whole period: use the envelope of |sin x / x|.
-                most = min(1.0, 1.0 / (math.pi * term.frequency * time))
+                # The mean of a line is 0 after each whole period: use its envelope, of
+                # |sin(x) / x| at one position, of sin^2(x/2) / (x/2) at two.
+                x = math.pi * term.frequency * time / self.positions
+                most = min(1.0, 1.0 / x) if self.positions == 1 else min(x, 1.0 / x)
                 sigma = term.amplitude * most / math.sqrt(2.0)
-            else:
+            elif self.positions == 1:
                 sigma = math.sqrt(term.mean_variance(time, 0.0))
+            else:
+                sigma = math.sqrt(float(term.allan_variance(np.array([time / 2.0]))[0]) / 2.0)
             yield Contribution(describe_term("gyro", term), sigma / self._north_rate)

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from imubench_pipeline.extensions.earth_rate.prediction import make_outlook_tables
+from imubench_pipeline.extensions.earth_rate.outlook import make_outlook_tables
 from imubench_pipeline.tables import write
 
 if __name__ == "__main__":
