@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from imubench_pipeline.extensions.fusion.page import BOARDS, make_published_lines
+from imubench_pipeline.extensions.fusion.page import BOARDS, PublishedLine, make_published_line
 from imubench_pipeline.extensions.fusion.tables import PublishedFigureRow
 from imubench_pipeline.report.pages import list_pages
 from imubench_pipeline.report.publish import publish
@@ -330,30 +330,28 @@ def test_the_page_is_written_again_only_if_its_recordings_or_words_change() -> N
 # A line of the table.
 
 
-def line(**changes: Any) -> dict[str, Any]:
+def line(**changes: Any) -> PublishedLine:
     names = {"sensor": "imu", "recording": "sim_pair", "channel": "gyro_x"}
-    (found,) = make_published_lines(
-        PublishedFigureRow.rows_of(build("published_figures", [names | PRINTED | changes]))
-    )
-    return found
+    table = build("published_figures", [names | PRINTED | changes])
+    return make_published_line(*PublishedFigureRow.rows_of(table))
 
 
 def test_found_over_printed() -> None:
-    assert line()["ratio"] == "0.95"
-    assert line(value=None)["ratio"] == "–"
-    assert line(of="datasheet")["ratio"] == "0.583"
-    assert line(of="datasheet", datasheet=None)["ratio"] == "–"
-    assert line(means=0.0)["ratio"] == "–"
-    assert line(means=-0.006 * DEGREE)["ratio"] == "−0.95"
+    assert line().ratio == "0.95"
+    assert line(value=None).ratio == "–"
+    assert line(of="datasheet").ratio == "0.583"
+    assert line(of="datasheet", datasheet=None).ratio == "–"
+    assert line(means=0.0).ratio == "–"
+    assert line(means=-0.006 * DEGREE).ratio == "−0.95"
 
 
 def test_limits_that_are_close_have_the_digits_to_differ() -> None:
     n = 0.006 * DEGREE
-    assert line()["digits"] == 4
-    assert line(value=n, lower=n * (1 - 1e-5), upper=n * (1 + 1e-5))["digits"] > 4
-    assert line(lower=None, upper=None)["digits"] == 4
+    assert line().digits == 4
+    assert line(value=n, lower=n * (1 - 1e-5), upper=n * (1 + 1e-5)).digits > 4
+    assert line(lower=None, upper=None).digits == 4
 
 
 def test_an_accelerometer_has_its_own_units() -> None:
-    assert line(channel="accel_z")["unit"] == "accel.N"
-    assert line(channel="accel_z", parameter="bias")["unit"] == "accel.signal"
+    assert line(channel="accel_z").unit == "accel.N"
+    assert line(channel="accel_z", parameter="bias").unit == "accel.signal"

@@ -196,7 +196,7 @@ def _best_of(tried: list[float], nearly: list[float], best: float) -> str:
     ]  # fmt: skip
     found = summarise_needs(rows)
     assert found is not None
-    return str(found["best"])
+    return found.best
 
 
 def test_sentences() -> None:

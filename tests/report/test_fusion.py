@@ -3,6 +3,7 @@ from typing import Any
 
 from imubench_pipeline.extensions.fusion.page import (
     FUSION,
+    PairLine,
     describe_common_errors,
     find_unprinted_grades,
     make_grade_lines,
@@ -21,26 +22,26 @@ ROW = {"quantity": "gyro", "tau": 10.0, "sensor": "a", "recording": "r", "channe
        "reachable": True}  # fmt: skip
 
 
-def line(**changes: Any) -> dict[str, Any]:
+def line(**changes: Any) -> PairLine:
     (found,) = make_pair_lines(FusionRow.rows_of(build("fusion", [ROW | changes])))
     return found
 
 
 def test_numbers_are_rounded_up() -> None:
     found = line()
-    assert (found["number"], found["limits"]) == ("11", "8 to 13")
-    assert (found["tau"], found["common"], found["quantity"]) == ("10 s", "12.5 %", "Gyroscope")
-    assert (found["simulated"], found["other_simulated"]) == (True, False)
-    assert line(n=9.000000000001)["number"] == "9"
-    assert line(n=1.2, lower=0.4, upper=2.0)["limits"] == "1 to 2"
-    assert line(n=9.5, lower=9.1, upper=9.9)["limits"] == "10"
+    assert (found.number, found.limits) == ("11", "8 to 13")
+    assert (found.tau, found.common, found.quantity) == ("10 s", "12.5 %", "Gyroscope")
+    assert (found.row.simulated, found.row.other_simulated) == (True, False)
+    assert line(n=9.000000000001).number == "9"
+    assert line(n=1.2, lower=0.4, upper=2.0).limits == "1 to 2"
+    assert line(n=9.5, lower=9.1, upper=9.9).limits == "10"
 
 
 def test_what_no_number_reaches_is_said() -> None:
     found = line(n=None, lower=None, upper=None, reachable=False, reasons=["a floor"])
-    assert (found["number"], found["limits"], found["reason"]) == ("not possible", "", "a floor")
-    assert line(upper=None)["limits"] == "8 or more"
-    assert line(n=None)["number"] == "–"
+    assert (found.number, found.limits, found.row.reasons) == ("not possible", "", ("a floor",))
+    assert line(upper=None).limits == "8 or more"
+    assert line(n=None).number == "–"
 
 
 def test_only_the_worse_of_two_is_multiplied() -> None:
@@ -53,7 +54,7 @@ def test_what_is_not_known_of_a_pair_is_said_once() -> None:
     one = ROW | nothing | {"reasons": ["too short"]}
     two = one | {"sensor": "b", "other": "a", "adev": 1e-5, "other_adev": None}
     (found,) = make_pair_lines(FusionRow.rows_of(build("fusion", [one, two])))
-    assert (found["sensor"], found["number"], found["common"]) == ("a", "–", "–")
+    assert (found.row.sensor, found.number, found.common) == ("a", "–", "–")
 
 
 def test_the_page_says_what_it_assumes() -> None:
@@ -65,8 +66,8 @@ def test_the_page_says_what_it_assumes() -> None:
 
 
 def test_what_temperature_adds_is_told_apart_of_what_is_common() -> None:
-    assert line(temperature_share=0.1)["common"] == "12.5 % (temperature 10 %)"
-    assert line(temperature_share=0.0)["common"] == "12.5 %"
+    assert line(temperature_share=0.1).common == "12.5 % (temperature 10 %)"
+    assert line(temperature_share=0.0).common == "12.5 %"
 
 
 def test_sensors_that_are_alike_have_no_line_and_one_where_nothing_is_known(
@@ -74,8 +75,8 @@ def test_sensors_that_are_alike_have_no_line_and_one_where_nothing_is_known(
 ) -> None:
     made = site(joined(*(recording_rows(name) for name in ("one", "two"))), tmp_path)
     (found,) = FUSION.page(made).context()["lines"]
-    assert (found["tau"], found["number"]) == ("1000 s", "–")
-    assert found["reason"].startswith("the logs of one tell tau up to 800 s alone")
+    assert (found.tau, found.number) == ("1000 s", "–")
+    assert found.row.reasons[0].startswith("the logs of one tell tau up to 800 s alone")
 
 
 def test_a_single_sensor_is_not_compared(tmp_path: Path) -> None:
@@ -94,11 +95,11 @@ def test_how_many_reach_a_class_stands_in_a_line_of_both_figures() -> None:
     floor = GRADE | {"statistic": "sigma_min", "value": None, "n": None, "n_lower": 0.0,
                      "n_upper": 4.2, "reason": "it still falls"}  # fmt: skip
     (found,) = make_grade_lines(GradeRow.rows_of(build("grades", [GRADE, floor])))
-    assert (found["grade"], found["option"]) == ("V B", "C")
-    noise, lowest = found["cells"]
-    assert (noise["number"], noise["limits"]) == ("9", "9 to 10")
-    assert (lowest["number"], lowest["limits"]) == ("–", "at most 5")
-    assert lowest["reason"] == "it still falls"
+    assert (found.row.grade_name, found.row.option) == ("V B", "C")
+    noise, lowest = found.cells
+    assert noise[2:] == ("9", "9 to 10")
+    assert lowest[2:] == ("–", "at most 5")
+    assert lowest[1].reason == "it still falls"
 
 
 def test_a_class_of_which_nothing_is_printed_has_no_line() -> None:
@@ -108,7 +109,7 @@ def test_a_class_of_which_nothing_is_printed_has_no_line() -> None:
     )
     rows = GradeRow.rows_of(table)
     (found,) = make_grade_lines(rows)
-    assert found["grade"] == "V B"
+    assert found.row.grade_name == "V B"
     assert find_unprinted_grades(rows) == {"V D, gyroscope": "it prints none"}
 
 
@@ -130,9 +131,9 @@ def test_a_matrix_has_the_quietest_first_and_a_number_where_one_is_not_enough() 
         ROW | {"sensor": "c", "adev": 2e-5, "n": 4.0, "lower": 3.1, "upper": 5.0},
     ]
     (matrix,) = make_matrices(list(make_pair_lines(FusionRow.rows_of(build("fusion", rows)))))
-    assert (matrix["name"], matrix["sensors"]) == ("Gyroscope, 10 s", ["b", "c", "a"])
-    assert matrix["levels"] == [1e-5, 2e-5, 3e-5]
-    numbers = [[cell and cell["number"] for cell in row] for row in matrix["cells"]]
+    assert (matrix.name, matrix.sensors) == ("Gyroscope, 10 s", ["b", "c", "a"])
+    assert matrix.levels == [1e-5, 2e-5, 3e-5]
+    numbers = [[cell and cell.number for cell in row] for row in matrix.cells]
     assert numbers == [[None, None, None], ["4", None, None], ["11", "3", None]]
 
 

@@ -68,12 +68,12 @@ def test_a_tuning_matters_where_it_surely_costs_a_tenth() -> None:
             {"tuning": "curve", "recommended": False, **ratio(1.2, 0.9, 1.5)},
         )
     )
-    assert answer["matters"] == (
+    assert answer.effect == (
         "The tuning matters: ten times the estimate 1.8 times the error of the true model; "
         "within 10 %: likelihood; inconclusive: read from the curve."
     )
-    assert answer["smallest"] == "likelihood, 15 states"
-    assert answer["dishonest"] is None
+    assert answer.smallest == "likelihood, 15 states"
+    assert answer.inconsistent is None
 
 
 def test_the_longest_outage_answers_and_a_filter_that_is_wrong_of_itself_is_named() -> None:
@@ -83,9 +83,9 @@ def test_the_longest_outage_answers_and_a_filter_that_is_wrong_of_itself_is_name
             {"outage": 60.0, "consistent": False, **ratio(1.0, 0.98, 1.05)},
         )
     )
-    assert answer["outage"] == "60 s"
-    assert answer["matters"] == "Within 10 %: likelihood."
-    assert answer["dishonest"] == "likelihood"
+    assert answer.outage == "60 s"
+    assert answer.effect == "Within 10 %: likelihood."
+    assert answer.inconsistent == "likelihood"
 
 
 def test_sensors_are_ranked_by_the_recommended_tuning_and_overlaps_are_said() -> None:
@@ -103,7 +103,7 @@ def test_sensors_are_ranked_by_the_recommended_tuning_and_overlaps_are_said() ->
             )
         )
     )
-    assert [(one["place"], one["sensor"], one["ties"]) for one in places] == [
+    assert [(place, line.row.sensor, ties) for place, line, ties in places] == [
         (1, "b", ["c"]),
         (2, "c", ["b"]),
         (3, "a", []),
@@ -117,7 +117,7 @@ def test_what_decides_nothing_has_no_place_and_says_why() -> None:
     )
     run = {"navigation": [navigation_row("sold"), navigation_row("fused")]}
     context = NAVIGATION.page(site(joined(sold, apart, run))).context()
-    assert [line["sensor"] for line in context["ranking"]] == ["sold"]
+    assert [line.row.sensor for _, line, _ in context["ranking"]] == ["sold"]
     assert context["apart"] == {"fused": "day1 is not used: this sensor is not sold"}
 
 
@@ -133,8 +133,8 @@ def test_the_page_is_there_where_something_was_run(tmp_path: Path) -> None:
     )
     made = site(joined(recording_rows("imu"), {"navigation": [navigation_row("imu"), lacking]}))
     context = NAVIGATION.page(made).context()
-    assert [line["tuning"] for line in context["lines"]] == ["likelihood"]
-    assert [line["reason"] for line in context["lacking"]] == ["no model lies above the curve"]
+    assert [line.tuning for line in context["lines"]] == ["likelihood"]
+    assert [line.row.reason for line in context["lacking"]] == ["no model lies above the curve"]
 
 
 @pytest.fixture(scope="module")

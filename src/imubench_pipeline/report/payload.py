@@ -187,6 +187,16 @@ def pack_channel(view: ChannelView, arrays: Arrays) -> Json:
     }
 
 
+def pack_page(channels: Sequence[ChannelView], looks: Mapping[str, Appearance]) -> Json:
+    """Return the data of a page with figures of channels, by the looks of all sensors."""
+    arrays = Arrays()
+    return {
+        "looks": pack_styles({channel.sensor: looks[channel.sensor] for channel in channels}),
+        "channels": [pack_channel(channel, arrays) for channel in channels],
+        "arrays": arrays.texts,
+    }
+
+
 def _compute_curve(model: NoiseModel | Term, tau: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.sqrt(model.allan_variance(tau))
 

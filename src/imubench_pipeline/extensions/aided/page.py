@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Any
+from dataclasses import dataclass
 
 from imubench_pipeline.extensions.aided.tables import NavigationRow
 from imubench_pipeline.recordings.fitness import list_excluded
@@ -38,18 +38,44 @@ _CONSISTENT_TEXTS = {True: "yes", False: "no", None: "not determined"}
 _MIN_RELEVANT_RATIO = 1.1  # error over the error of the true model from which a tuning matters
 
 
-def _make_context(site: Site) -> dict[str, Any]:
+@dataclass(frozen=True)
+class TuningAnswer:
+    """Whether the tuning matters; ``row`` is any one of the sensor, trajectory and signals."""
+
+    row: NavigationRow
+    signals: str
+    outage: str
+    effect: str
+    smallest: str | None
+    inconsistent: str | None
+
+
+@dataclass(frozen=True)
+class NavigationLine:
+    """A row as the page shows it."""
+
+    row: NavigationRow
+    outage: str
+    signals: str
+    tuning: str
+    position: str
+    ratio: str
+    velocity: str
+    heading: str
+    inside: str
+    consistent: str
+    outages: str
+
+
+def _make_context(site: Site) -> Mapping[str, object]:
     rows = site.rows(NavigationRow)
     shown = [row for row in rows if row.position is not None]
     recordings = [view.row for view in site.views]
     apart = list_excluded(recordings)
-    doubts = {(row.sensor, row.recording): doubts_text(row.doubts) for row in recordings}
     deciding = [row for row in shown if (row.sensor, row.recording) not in apart]
     return {
-        "answers": [
-            answer | {"doubts": doubts.get((answer["sensor"], answer["recording"]))}
-            for answer in describe_tunings(shown)
-        ],
+        "answers": list(describe_tunings(shown)),
+        "doubts": {(row.sensor, row.recording): doubts_text(row.doubts) for row in recordings},
         "ranking": list(rank_sensors(deciding)),
         "apart": {
             row.sensor: f"{row.recording} is not used: {doubts_text(apart[key])}"
@@ -57,7 +83,7 @@ def _make_context(site: Site) -> dict[str, Any]:
             if (key := (row.sensor, row.recording)) in apart
         },
         "lines": [describe_row(row) for row in shown],
-        "lacking": [row.columns() | {"tuning": TUNINGS[row.tuning]} for row in rows if row.reason],
+        "lacking": [describe_row(row) for row in rows if row.reason],
         "filters": {
             "trajectory": list(dict.fromkeys(row.trajectory for row in shown)),
             "outage": list(dict.fromkeys(_format_outage(row) for row in shown)),
@@ -77,33 +103,29 @@ NAVIGATION = Entry(
 )
 
 
-def describe_tunings(rows: Sequence[NavigationRow]) -> Iterator[dict[str, Any]]:
+def describe_tunings(rows: Sequence[NavigationRow]) -> Iterator[TuningAnswer]:
     """Yield whether the tuning matters to the position after the longest outage, by sensor."""
     groups: dict[tuple[str, str | None, str | None], list[NavigationRow]] = {}
     for row in rows:
         groups.setdefault((row.sensor, row.trajectory, row.signals), []).append(row)
-    for (sensor, trajectory, signals), own in groups.items():
+    for own in groups.values():
         longest = max(row.outage or 0.0 for row in own)
         last = [row for row in own if row.outage == longest and row.tuning != "true"]
         known = [row for row in last if row.position_ratio is not None]
         if not known:
             continue
         smallest = next((row for row in own if row.smallest), None)
-        yield {
-            "sensor": sensor,
-            "trajectory": trajectory,
-            "signals": signals,
-            "recording": own[0].recording,
-            "runs": own[0].runs,
-            "words": _SIGNAL_TEXTS[signals],
-            "outage": f"{number_text(longest)} s",
-            "matters": _describe_effect(known),
-            "smallest": smallest and f"{TUNINGS[smallest.tuning]}, {smallest.states} states",
-            "dishonest": ", ".join(
-                dict.fromkeys(TUNINGS[row.tuning] for row in own if row.consistent is False)
-            )
-            or None,
-        }
+        inconsistent = dict.fromkeys(TUNINGS[row.tuning] for row in own if row.consistent is False)
+        yield TuningAnswer(
+            row=own[0],
+            signals=_SIGNAL_TEXTS[own[0].signals],
+            outage=f"{number_text(longest)} s",
+            effect=_describe_effect(known),
+            smallest=None
+            if smallest is None
+            else f"{TUNINGS[smallest.tuning]}, {smallest.states} states",
+            inconsistent=", ".join(inconsistent) or None,
+        )
 
 
 def _fill_limits(lower: float | None, upper: float | None) -> tuple[float, float]:
@@ -133,8 +155,10 @@ def _describe_effect(rows: Sequence[NavigationRow]) -> str:
     return f"{text[0].upper()}{text[1:]}."
 
 
-def rank_sensors(rows: Sequence[NavigationRow]) -> Iterator[dict[str, Any]]:
-    """Yield the sensors by the position error after the longest outage, recommended tuning."""
+def rank_sensors(
+    rows: Sequence[NavigationRow],
+) -> Iterator[tuple[int, NavigationLine, list[str]]]:
+    """Yield place, line and overlapping sensors by the error after the longest outage."""
     for trajectory in dict.fromkeys(row.trajectory for row in rows):
         chosen = [
             row
@@ -152,35 +176,28 @@ def rank_sensors(rows: Sequence[NavigationRow]) -> Iterator[dict[str, Any]]:
                 for other, (low, high) in zip(last, limits, strict=True)
                 if other is not row and low <= upper and lower <= high
             ]
-            yield describe_row(row) | {"place": place, "ties": ties, "trajectory": trajectory}
+            yield place, describe_row(row), ties
 
 
-def describe_row(row: NavigationRow) -> dict[str, Any]:
+def describe_row(row: NavigationRow) -> NavigationLine:
     """Return a row as the page shows it."""
     inside, error = row.nees_inside, row.nees_error
-    return {
-        **row.columns(),
-        "outage": _format_outage(row),
-        "seconds": row.outage or 0.0,
-        "signals": _SIGNAL_TEXTS[row.signals],
-        "tuning": TUNINGS[row.tuning],
-        "position_text": _format_figure(row.position, row.position_lower, row.position_upper),
-        "ratio": row.position_ratio,
-        "ratio_text": _format_figure(
-            row.position_ratio, row.position_ratio_lower, row.position_ratio_upper
-        ),
-        "velocity_text": _format_figure(row.velocity, row.velocity_lower, row.velocity_upper),
-        "heading_text": _format_figure(
-            row.heading, row.heading_lower, row.heading_upper, 180.0 / math.pi
-        ),
-        "expected": number_text(row.position_predicted, 3),
-        "inside": None if inside is None else 100.0 * inside,
-        "inside_text": ""
+    position_ratio = (row.position_ratio, row.position_ratio_lower, row.position_ratio_upper)
+    return NavigationLine(
+        row=row,
+        outage=_format_outage(row),
+        signals=_SIGNAL_TEXTS[row.signals],
+        tuning=TUNINGS[row.tuning],
+        position=_format_figure(row.position, row.position_lower, row.position_upper),
+        ratio=_format_figure(*position_ratio),
+        velocity=_format_figure(row.velocity, row.velocity_lower, row.velocity_upper),
+        heading=_format_figure(row.heading, row.heading_lower, row.heading_upper, 180.0 / math.pi),
+        inside=""
         if inside is None or error is None
         else f"{number_text(100.0 * inside, 3)} ± {percent_text(error, 2)}",
-        "as_sure": _CONSISTENT_TEXTS[row.consistent],
-        "of": counted(row.outages, "outage") if row.outage and row.outages else "",
-    }
+        consistent=_CONSISTENT_TEXTS[row.consistent],
+        outages=counted(row.outages, "outage") if row.outage and row.outages else "",
+    )
 
 
 def _format_outage(row: NavigationRow) -> str:

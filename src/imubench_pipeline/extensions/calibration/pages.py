@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 from imubench_pipeline.extensions.calibration.tables import CalibrationPointRow, CalibrationRow
 from imubench_pipeline.extensions.earth_rate.tables import EarthRateRow
@@ -85,40 +85,54 @@ def _format_half_width(
     return f"{as_text(value, limit_digits(lower, upper, 3))} ± {as_text(half, 2)}"
 
 
-def format_estimates(rows: Sequence[CalibrationRow]) -> Iterator[dict[str, Any]]:
-    """Yield the lines of the table of results; dimensionless quantities as text."""
+@dataclass(frozen=True)
+class CalibrationLine:
+    """A line of the tables of results and attitudes; dimensionless quantities as text."""
+
+    row: CalibrationRow
+    words: str
+    why: str
+    digits: int
+    percent: str = "–"
+    text: str = "–"
+    limits: str = "–"
+    sigma: str = "–"
+    truth: str = "–"
+    off: str = "–"
+
+
+def format_estimates(rows: Sequence[CalibrationRow]) -> Iterator[CalibrationLine]:
+    """Yield the lines of the table of results."""
     for row in rows:
         if row.status == "not_observable" and row.parameter in ("earth_rate", "heading"):
             continue
-        line: dict[str, Any] = {
-            **row.columns(),
-            "words": WORDS[row.parameter],
-            "digits": limit_digits(row.lower, row.upper, 4),
-            "is_rate": row.unit == "rad/s",
-            "percent": None if row.chance is None else percent_text(row.chance, 2),
-            "why": sentence(row.reason),
-        }
+        line = CalibrationLine(
+            row=row,
+            words=WORDS[row.parameter],
+            why=sentence(row.reason),
+            digits=limit_digits(row.lower, row.upper, 4),
+            percent="–" if row.chance is None else percent_text(row.chance, 2),
+        )
         name, shown = row.parameter, (row.value, row.lower, row.upper, row.truth)
         if row.value is None or name not in _RATIO_UNITS:
-            yield line | dict.fromkeys(("text", "limits", "sigma_text", "truth_text"), "–")
+            yield line
             continue
         if name == "scale_factor":
-            value, low, high, true = (number_text(size, line["digits"]) for size in shown)
+            value, low, high, true = (number_text(size, line.digits) for size in shown)
             sigma = "–" if row.sigma is None else f"{number_text(_PPM_PER_UNIT * row.sigma, 3)} ppm"
         else:
             value, low, high, true, sigma = (
                 number_text(None if size is None else _RATIO_UNITS[name][1] * size, 3)
                 for size in (*shown, row.sigma)
             )
-        text = value + _RATIO_UNITS[name][0]
-        texts = {"text": text, "limits": f"{low} to {high}"}
-        yield line | texts | {"sigma_text": sigma, "truth_text": true}
+        text, limits = value + _RATIO_UNITS[name][0], f"{low} to {high}"
+        yield replace(line, text=text, limits=limits, sigma=sigma, truth=true)
 
 
-def list_not_observable(rows: Sequence[CalibrationRow]) -> list[dict[str, Any]]:
-    """Return the quantities that a recording cannot determine, each with the reason."""
+def list_not_observable(rows: Sequence[CalibrationRow]) -> list[tuple[str, str, float | None]]:
+    """Return the names of unobservable quantities, with reasons and possible half-widths."""
     return [
-        {"words": WORDS[row.parameter], "why": sentence(row.reason), **row.columns()}
+        (WORDS[row.parameter], sentence(row.reason), row.half_width)
         for row in rows
         if row.status == "not_observable"
     ]
@@ -174,14 +188,14 @@ def select_calibrated(site: Site) -> list[RecordingView]:
 
 def list_without_result(
     views: Sequence[RecordingView], rows_of: Callable[[RecordingView], Sequence[Estimated]]
-) -> Iterator[dict[str, Any]]:
+) -> Iterator[tuple[RecordingView, str]]:
     """Yield the recordings of an experiment without an estimate, with the reasons."""
     for view in views:
         rows = rows_of(view)
         if rows and all(row.value is None for row in rows):
             row = rows[0]
             reason = row.reason if isinstance(row, CalibrationRow) else "; ".join(row.reasons)
-            yield {"view": view, "reason": sentence(reason)}
+            yield view, sentence(reason)
 
 
 NOT_CALIBRATED = Section(
@@ -194,14 +208,14 @@ NOT_CALIBRATED = Section(
 )
 
 
-def make_rest_section(site: Site, view: RecordingView) -> tuple[str, dict[str, Any]] | None:
+def make_rest_section(site: Site, view: RecordingView) -> tuple[str, Mapping[str, object]] | None:
     """Return the bias of a static recording for its page; None without a known direction."""
     rows = [row for row in view.rows(CalibrationRow) if row.run == "at_rest"]
     if not rows:
         return None
     return "at_rest.html.jinja", {
         "channel": rows[0].channel,
-        "lines": [line for line in format_estimates(rows) if line["status"] != "not_observable"],
+        "lines": [line for line in format_estimates(rows) if line.row.status != "not_observable"],
         "open": list_not_observable(rows),
         "noise": describe_noise_model(rows),
         "scatter": describe_scatter(rows),
@@ -209,25 +223,34 @@ def make_rest_section(site: Site, view: RecordingView) -> tuple[str, dict[str, A
     }
 
 
-def group_by_run(site: Site) -> dict[str, list[dict[str, Any]]]:
-    """Return the lines of all calibrated recordings, by kind of run."""
-    by_run: dict[str, list[dict[str, Any]]] = {"rate_table": [], "at_rest": [], "positions": []}
+@dataclass(frozen=True)
+class CalibratedRun:
+    """A calibrated recording: its lines by parameter, its result and the correction in words."""
+
+    view: RecordingView
+    lines: Mapping[str, CalibrationLine]
+    answer: str
+    earth: str
+
+
+def group_by_run(site: Site) -> dict[str, list[CalibratedRun]]:
+    """Return all calibrated recordings, by kind of run."""
+    by_run: dict[str, list[CalibratedRun]] = {"rate_table": [], "at_rest": [], "positions": []}
     for view in select_calibrated(site):
         rows = view.rows(CalibrationRow)
-        if rows and rows[0].run == "positions":
-            by_run["positions"].append({"view": view, "lines": list(format_attitude(rows))})
-        elif rows:
-            line = {
-                "view": view,
-                "lines": {line["parameter"]: line for line in format_estimates(rows)},
-                "answer": summarise_calibration(rows, site.system),
-                "earth": describe_earth_rate(rows, site.system),
-            }
-            by_run[rows[0].run].append(line)
+        if rows:
+            lines = format_attitude if rows[0].run == "positions" else format_estimates
+            run = CalibratedRun(
+                view,
+                lines={line.row.parameter: line for line in lines(rows)},
+                answer=summarise_calibration(rows, site.system),
+                earth=describe_earth_rate(rows, site.system),
+            )
+            by_run[rows[0].run].append(run)
     return by_run
 
 
-def format_attitude(rows: Sequence[CalibrationRow]) -> Iterator[dict[str, Any]]:
+def format_attitude(rows: Sequence[CalibrationRow]) -> Iterator[CalibrationLine]:
     """Yield roll, pitch and heading in degrees, of rows of ``calibration`` of one recording."""
     for row in rows:
         value, lower, upper, truth = (
@@ -238,16 +261,18 @@ def format_attitude(rows: Sequence[CalibrationRow]) -> Iterator[dict[str, Any]]:
         off = None
         if value is not None and truth is not None and row.sigma is not None:
             off = math.remainder(value - truth, 360.0) / math.degrees(row.sigma)
-        yield {
-            "words": row.parameter,
-            "value": "–" if value is None else f"{number_text(value, digits)}°",
-            "limits": ""
+        yield CalibrationLine(
+            row=row,
+            words=row.parameter,
+            why=sentence(row.reason),
+            digits=digits,
+            text="–" if value is None else f"{number_text(value, digits)}°",
+            limits=""
             if lower is None or upper is None
             else f"{number_text(lower, digits)}° to {number_text(upper, digits)}°",
-            "truth": "–" if truth is None else f"{number_text(truth, digits)}°",
-            "off": "–" if off is None else f"{number_text(off, 2)} σ",
-            "why": sentence(row.reason),
-        }
+            truth="–" if truth is None else f"{number_text(truth, digits)}°",
+            off="–" if off is None else f"{number_text(off, 2)} σ",
+        )
 
 
 def describe_noise_model(rows: Sequence[Estimated]) -> str:
@@ -259,7 +284,7 @@ def describe_noise_model(rows: Sequence[Estimated]) -> str:
     return f"Noise model: {fitted.model}{origin}."
 
 
-def _rate_table(site: Site, view: RecordingView, folder: Path) -> dict[str, Any]:
+def _rate_table(site: Site, view: RecordingView, folder: Path) -> Mapping[str, object]:
     """Return the context of the template; ``folder`` is the recording's."""
     rows = view.rows(CalibrationRow)
     points = view.rows(CalibrationPointRow)
@@ -299,7 +324,7 @@ def _rate_table(site: Site, view: RecordingView, folder: Path) -> dict[str, Any]
 RATE_TABLE = RecordingPage("rate_table.html.jinja", _rate_table, "rate table")
 
 
-def _positions(site: Site, view: RecordingView, folder: Path) -> dict[str, Any]:
+def _positions(site: Site, view: RecordingView, folder: Path) -> Mapping[str, object]:
     """Return the context of the template; ``folder`` is the recording's."""
     rows = view.rows(CalibrationRow)
     number = rows[0].rates if rows else None

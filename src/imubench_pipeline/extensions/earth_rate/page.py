@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from operator import attrgetter
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -25,7 +25,7 @@ from imubench_pipeline.extensions.earth_rate.tables import (
     TurningRow,
 )
 from imubench_pipeline.model.estimates import EnvelopeRow
-from imubench_pipeline.report.payload import Arrays, fill_missing, pack_samples
+from imubench_pipeline.report.payload import Arrays, Json, fill_missing, pack_samples
 from imubench_pipeline.report.practical import System, choose_page_unit
 from imubench_pipeline.report.recording import (
     describe_recording,
@@ -55,7 +55,55 @@ _METHODS = {  # term of the glossary, and words
 ESTIMATES = ("filter", "pairs", "triples")
 
 
-def make_turned_context(site: Site, view: RecordingView, folder: Path) -> dict[str, Any]:
+@dataclass(frozen=True)
+class EarthRateLine:
+    """A line of the table of estimates."""
+
+    row: EarthRateRow
+    term: str
+    words: str
+    digits: int
+    off: str
+    why: str
+    use: bool
+
+
+@dataclass(frozen=True)
+class Goal:
+    """The requirement for a standard deviation of the Earth's rate."""
+
+    goal: str
+    turns: str
+    time: str
+    sigma: float | None
+    heading: str
+
+
+@dataclass(frozen=True)
+class Needs:
+    """The recordings required to find the Earth's rate."""
+
+    latitude: str
+    dwell: str
+    goals: list[Goal]
+    best: str
+
+
+@dataclass(frozen=True)
+class Alignment:
+    """The predicted alignment of a sensor at rest; the lines end with roll, pitch and heading."""
+
+    view: RecordingView
+    latitude: str
+    biases: str
+    axes: str
+    lines: list[tuple[str, str, str, list[str]]]
+    none: list[str]
+    check: str
+    drawn: list[Json]
+
+
+def make_turned_context(site: Site, view: RecordingView, folder: Path) -> Mapping[str, object]:
     """Return the context of the template; ``folder`` is the recording's."""
     arrays = Arrays()
     rows = view.rows(EarthRateRow)
@@ -67,11 +115,9 @@ def make_turned_context(site: Site, view: RecordingView, folder: Path) -> dict[s
     prediction = view.rows(EarthRatePredictionRow)
     latitude = degrees_text(rows[0].latitude) if rows else ""
     # Dwells, turns and knocks in the order of time.
-    listed = sorted(
+    stretches = sorted(
         (row for row in turning if row.start is not None), key=lambda row: (row.start, row.what)
     )
-    positions = {1: "north", -1: "south"}
-    stretches = [{**row.columns(), "position": positions.get(row.sense or 0, "")} for row in listed]
     turns = counted(sum(event.what == "turn" for event in turning), "turn")
     summary = [f"{turns} between north and south", *[f"at latitude {latitude}"] * bool(rows)]
     return {
@@ -89,9 +135,8 @@ def make_turned_context(site: Site, view: RecordingView, folder: Path) -> dict[s
         "parts": parts,
         "has_samples": any(row.channel == channel for row in envelope),
         "has_drift": any(row.quantity == "drift" for row in view.rows(EarthRateSeriesRow)),
-        "published": list(format_published(view.rows(EarthRatePublishedRow))),
+        "published": [(view, row) for row in view.rows(EarthRatePublishedRow)],
         "needs": summarise_needs(prediction),
-        "has_prediction": bool(prediction),
         "stretches": stretches,
         "command": site.again(view, "earth_rate"),
         "page": {
@@ -159,30 +204,21 @@ def describe_settling(rows: Sequence[EarthRateRow]) -> str:
 _MAX_NOISE_ERROR = 4.0  # standard deviations beyond which noise does not explain an error
 
 
-def format_estimate(row: EarthRateRow) -> dict[str, Any]:
+def format_estimate(row: EarthRateRow) -> EarthRateLine:
     """Return a line of the table of estimates, from a row of ``earth_rate``."""
-    return {
-        **row.columns(),
-        "term": _METHODS[row.method][0],
-        "words": _METHODS[row.method][1],
-        "digits": limit_digits(row.lower, row.upper, 4),
-        "off": "–" if row.off_sigma is None else f"{number_text(row.off_sigma, 2)} σ",
-        "why": sentence("; ".join(row.reasons)),
-        "use": row.method == "filter" and row.status == "ok",
-    }
+    term, words = _METHODS[row.method]
+    return EarthRateLine(
+        row=row,
+        term=term,
+        words=words,
+        digits=limit_digits(row.lower, row.upper, 4),
+        off="–" if row.off_sigma is None else f"{number_text(row.off_sigma, 2)} σ",
+        why=sentence("; ".join(row.reasons)),
+        use=row.method == "filter" and row.status == "ok",
+    )
 
 
-def format_published(rows: Sequence[EarthRatePublishedRow]) -> Iterator[dict[str, Any]]:
-    """Yield the lines of the table of published estimates."""
-    for row in rows:
-        yield {
-            **row.columns(),
-            "length": duration_text(row.duration),
-            "off": f"{number_text(row.off_sigma, 3)} σ",
-        }
-
-
-def summarise_needs(rows: Sequence[EarthRatePredictionRow]) -> dict[str, Any] | None:
+def summarise_needs(rows: Sequence[EarthRatePredictionRow]) -> Needs | None:
     """Return the recordings required to find the Earth's rate, by the rows of one recording."""
     goals = [row for row in rows if row.of == "goal"]
     if not goals:
@@ -198,23 +234,23 @@ def summarise_needs(rows: Sequence[EarthRatePredictionRow]) -> dict[str, Any] | 
             f"the Earth's rate to {percent_text(best.relative)} (1σ). "
             + _describe_near_best(best.dwell, [row.dwell for row in curve], nearly)
         )
-    return {
-        "dwell": duration_text(goals[0].dwell),
-        "goals": [
-            {
-                "goal": percent_text(row.goal),
-                "turns": f"{row.turns:,}".replace(",", " "),
-                "time": duration_text(row.time),
-                "seconds": row.time,
-                "sigma": row.sigma,
-                "heading": f"above {degrees_text(_MAX_SMALL_HEADING, 2)}"
+    return Needs(
+        latitude=degrees_text(goals[0].latitude),
+        dwell=duration_text(goals[0].dwell),
+        goals=[
+            Goal(
+                goal=percent_text(row.goal),
+                turns=f"{row.turns:,}".replace(",", " "),
+                time=duration_text(row.time),
+                sigma=row.sigma,
+                heading=f"above {degrees_text(_MAX_SMALL_HEADING, 2)}"
                 if row.heading is not None and row.heading > _MAX_SMALL_HEADING
                 else degrees_text(row.heading, 3),
-            }
+            )
             for row in goals
         ],
-        "best": best_words,
-    }
+        best=best_words,
+    )
 
 
 def _describe_near_best(best: float, tried: Sequence[float], nearly: Sequence[float]) -> str:
@@ -238,14 +274,14 @@ _MAX_SMALL_HEADING = 0.5  # rad; largest sigma of a heading for which the small-
 
 def _pack_figures(
     view: RecordingView, rows: Sequence[EarthRateRow], turning: Sequence[TurningRow], arrays: Arrays
-) -> dict[str, Any]:
+) -> Json:
     """Return the data of the figures of dwells and estimates."""
     dwells, turns = ([row for row in turning if row.what == what] for what in ("dwell", "turn"))
     series = view.rows(EarthRateSeriesRow)
-    parts: dict[str, Any] = {}
+    parts: Json = {}
     for part in dict.fromkeys(row.part for row in series):
         in_part = [row for row in series if row.part == part]
-        courses: dict[str, Any] = {}
+        courses: Json = {}
         for quantity, method in dict.fromkeys((row.quantity, row.method) for row in in_part):
             own = [row for row in in_part if (row.quantity, row.method) == (quantity, method)]
             courses["drift" if quantity == "drift" else method] = {
@@ -283,10 +319,10 @@ def _find_range(series: Sequence[EarthRateSeriesRow], truth: float) -> list[floa
     return [truth - 1.1 * high, truth + 1.1 * high]
 
 
-def pack_prediction(rows: Sequence[EarthRatePredictionRow], arrays: Arrays) -> dict[str, Any]:
+def pack_prediction(rows: Sequence[EarthRatePredictionRow], arrays: Arrays) -> Json:
     """Return the data of the figures of the prediction of a recording."""
     goals = [row.goal for row in rows if row.of == "goal"]
-    payload: dict[str, Any] = {"goals": goals, "truth": EARTH_RATE}
+    payload: Json = {"goals": goals, "truth": EARTH_RATE}
     for of, x in (("time", attrgetter("time")), ("dwell", attrgetter("dwell"))):
         own = sorted((row for row in rows if row.of == of and row.sigma is not None), key=x)
         payload[of] = {
@@ -312,25 +348,21 @@ def select_predicted(site: Site) -> list[RecordingView]:
     return [view for view in site.views if view.static and view.full_name in named]
 
 
-def _make_context(site: Site) -> dict[str, Any]:
+def _make_context(site: Site) -> Mapping[str, object]:
     arrays = Arrays()
     turned_gyros = select_turned(site)
-    published = [row for view in turned_gyros for row in view.rows(EarthRatePublishedRow)]
+    published = [(view, row) for view in turned_gyros for row in view.rows(EarthRatePublishedRow)]
     predicted = list(_list_predictions(site))
     aligned = summarise_alignments(site, arrays)
     return {
         "truth": EARTH_RATE,
-        "runs": [_describe_run(site, view) for view in turned_gyros],
+        "runs": [(view, lines) for view in turned_gyros for lines in _format_parts(view)],
         "given": describe_settling(
             [row for view in turned_gyros for row in view.rows(EarthRateRow)]
         ),
         "rejected": [view for view in turned_gyros if view.left_out],
-        "published": [
-            {**line, "view": view}
-            for view in turned_gyros
-            for line in format_published(view.rows(EarthRatePublishedRow))
-        ],
-        "verdict": describe_published(published),
+        "published": published,
+        "verdict": describe_published([row for _, row in published]),
         "needs": predicted,
         "alignments": aligned,
         "calibrations": group_by_run(site),
@@ -346,12 +378,15 @@ def _make_context(site: Site) -> dict[str, Any]:
                     "sigma": row.sigma,
                     "simulated": row.simulated,
                 }
-                for row in published
+                for _, row in published
             ],
             "predictions": {
-                line["place"]: pack_prediction(line["rows"], arrays) for line in predicted
+                f"{view.sensor}-{view.name}": pack_prediction(
+                    view.rows(EarthRatePredictionRow), arrays
+                )
+                for view, _ in predicted
             },
-            "alignments": {line["view"].sensor: line["drawn"] for line in aligned},
+            "alignments": {one.view.sensor: one.drawn for one in aligned},
             "arrays": arrays.texts,
         },
     }
@@ -378,35 +413,22 @@ NOT_FOUND = Section(
 )
 
 
-def _describe_run(site: Site, view: RecordingView) -> dict[str, Any]:
-    rows = view.rows(EarthRateRow)
-    whole = [row for row in rows if row.part == "whole"]
-    shown = [row for row in rows if row.method in ESTIMATES]
-    return {
-        "view": view,
-        "answer": view.row.reason if view.left_out else summarise_earth_rate(whole, site.system),
-        "parts": [
-            {
-                "part": part,
-                "duration": next(row.duration for row in shown if row.part == part),
-                "lines": {row.method: format_estimate(row) for row in shown if row.part == part},
-            }
-            for part in dict.fromkeys(row.part for row in shown)
-        ],
-    }
+def _format_parts(view: RecordingView) -> Iterator[dict[str, EarthRateLine]]:
+    """Yield the estimates from each part of a recording, by method."""
+    shown = [row for row in view.rows(EarthRateRow) if row.method in ESTIMATES]
+    for part in dict.fromkeys(row.part for row in shown):
+        yield {row.method: format_estimate(row) for row in shown if row.part == part}
 
 
-def _list_predictions(site: Site) -> Iterator[dict[str, Any]]:
+def _list_predictions(site: Site) -> Iterator[tuple[RecordingView, Needs]]:
     """Yield the recordings that each sensor would need, without duplicates."""
-    yielded: list[tuple[str, Any]] = []
+    yielded: list[tuple[str, Needs]] = []
     for view in [*select_turned(site), *select_predicted(site)]:
-        rows = view.rows(EarthRatePredictionRow)
-        needed = summarise_needs(rows)
+        needed = summarise_needs(view.rows(EarthRatePredictionRow))
         if needed is None or (view.sensor, needed) in yielded:
             continue
         yielded.append((view.sensor, needed))
-        place, latitude = f"{view.sensor}-{view.name}", degrees_text(rows[0].latitude)
-        yield needed | {"view": view, "place": place, "rows": rows, "latitude": latitude}
+        yield view, needed
 
 
 def describe_published(rows: Sequence[EarthRatePublishedRow]) -> str:
@@ -456,7 +478,7 @@ _TABLE_TIMES = (60.0, 600.0, 3600.0)  # times at rest that the table shows, s; t
 _POSITION_TEXTS = {1: "one position", 2: "two opposite positions"}
 
 
-def summarise_alignments(site: Site, arrays: Arrays) -> list[dict[str, Any]]:
+def summarise_alignments(site: Site, arrays: Arrays) -> list[Alignment]:
     """Return the section of each sensor with gyros and accelerometers; ``arrays`` gets its data."""
     entries = []
     unit = choose_page_unit("gyro", "adev", site.system)
@@ -469,29 +491,27 @@ def summarise_alignments(site: Site, arrays: Arrays) -> list[dict[str, Any]]:
         gyro_bias = f"{unit.text(about.gyro_bias, 3)} {unit.sign} ({about.gyro_bias_from})"
         accel_bias = f"{fine.text(about.accelerometer_bias, 3)} {fine.sign}"
         lines = [
-            {
-                "position": _POSITION_TEXTS[row.positions],
-                "method": row.method,
-                "time": duration_text(row.time),
-                "roll": _format_angle(row.roll),
-                "pitch": _format_angle(row.pitch),
-                "heading": _format_angle(row.heading),
-            }
+            (
+                _POSITION_TEXTS[row.positions],
+                row.method,
+                duration_text(row.time),
+                [_format_angle(angle) for angle in (row.roll, row.pitch, row.heading)],
+            )
             for row in rows
             if row.time in _TABLE_TIMES
         ]
         entries.append(
-            {
-                "view": view,
-                "latitude": degrees_text(about.latitude),
-                "biases": f"Fixed biases of {gyro_bias} and {accel_bias} "
+            Alignment(
+                view=view,
+                latitude=degrees_text(about.latitude),
+                biases=f"Fixed biases of {gyro_bias} and {accel_bias} "
                 f"({about.accelerometer_bias_from}).",
-                "axes": _describe_missing_axes(about),
-                "lines": lines,
-                "none": list(dict.fromkeys(sentence(row.reason) for row in rows if row.reason)),
-                "check": _describe_check(rows),
-                "drawn": _pack_curves(rows, arrays),
-            }
+                axes=_describe_missing_axes(about),
+                lines=lines,
+                none=list(dict.fromkeys(sentence(row.reason) for row in rows if row.reason)),
+                check=_describe_check(rows),
+                drawn=_pack_curves(rows, arrays),
+            )
         )
     return entries
 
@@ -534,7 +554,7 @@ def _describe_check(rows: Sequence[AlignmentRow]) -> str:
     )
 
 
-def _pack_curves(rows: Sequence[AlignmentRow], arrays: Arrays) -> list[dict[str, Any]]:
+def _pack_curves(rows: Sequence[AlignmentRow], arrays: Arrays) -> list[Json]:
     """Return the curves of the figure; ``level`` is the larger of roll and pitch."""
     courses = []
     for positions in _POSITION_TEXTS:

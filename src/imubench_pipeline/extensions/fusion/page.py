@@ -3,20 +3,53 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from typing import Any
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 
 from imubench_pipeline.extensions.fusion.tables import FusionRow, GradeRow, PublishedFigureRow
 from imubench_pipeline.report import thermal
-from imubench_pipeline.report.payload import Arrays, pack_channel, pack_styles
+from imubench_pipeline.report.payload import pack_page
 from imubench_pipeline.report.site import Entry, Site
-from imubench_pipeline.report.view import QUANTITY_NAMES, RecordingView
+from imubench_pipeline.report.view import QUANTITY_NAMES, ChannelView, RecordingView
 from imubench_pipeline.words.numbers import limit_digits, number_text, percent_text
 
 _PARAMETER_TEXTS = {"N": "white noise", "B": "bias instability", "K": "random walk", "R": "ramp"}
 
 
-def _make_context(site: Site) -> dict[str, Any]:
+@dataclass(frozen=True)
+class PairLine:
+    """A line of the table of pairs."""
+
+    row: FusionRow
+    quantity: str
+    tau: str
+    number: str
+    limits: str
+    common: str
+
+
+@dataclass(frozen=True)
+class PairMatrix:
+    """The pairs of a quantity and an averaging time; cells by row sensor and column sensor."""
+
+    name: str
+    symbol: str
+    sensors: list[str]
+    levels: list[float]
+    cells: list[list[PairLine | None]]
+
+
+@dataclass(frozen=True)
+class GradeLine:
+    """A line of the table of classes; its cells have figure, row, number and limits."""
+
+    row: GradeRow  # any one of its rows
+    quantity: str
+    simulated: bool
+    cells: list[tuple[str, GradeRow | None, str, str]]
+
+
+def _make_context(site: Site) -> Mapping[str, object]:
     lines = list(make_pair_lines(site.rows(FusionRow)))
     sensors = site.settings["sensors"]
     return {
@@ -25,10 +58,10 @@ def _make_context(site: Site) -> dict[str, Any]:
         "grades": list(make_grade_lines(site.rows(GradeRow))),
         "unprinted": find_unprinted_grades(site.rows(GradeRow)),
         "filters": {
-            "tau": list(dict.fromkeys(line["tau"] for line in lines)),
-            "quantity": list(dict.fromkeys(line["quantity"] for line in lines)),
-            "wanted": list(dict.fromkeys(site.names[line["other"]] for line in lines)),
-            "sensor": list(dict.fromkeys(site.names[line["sensor"]] for line in lines)),
+            "tau": list(dict.fromkeys(line.tau for line in lines)),
+            "quantity": list(dict.fromkeys(line.quantity for line in lines)),
+            "wanted": list(dict.fromkeys(site.names[line.row.other] for line in lines)),
+            "sensor": list(dict.fromkeys(site.names[line.row.sensor] for line in lines)),
         },
         "shared": describe_common_errors(site.settings["settings"]["fusion"]["common"]),
         "price_classes": {name: sensors.get(name, {}).get("price_class") for name in site.sensors},
@@ -56,7 +89,7 @@ def describe_common_errors(common: Mapping[str, float]) -> str:
     )
 
 
-def make_pair_lines(rows: Sequence[FusionRow]) -> Iterator[dict[str, Any]]:
+def make_pair_lines(rows: Sequence[FusionRow]) -> Iterator[PairLine]:
     """Yield the lines of the table: pairs whose first sensor is the noisier one, or unknown."""
     for row in rows:
         if row.adev is not None and row.other_adev is not None:
@@ -68,74 +101,54 @@ def make_pair_lines(rows: Sequence[FusionRow]) -> Iterator[dict[str, Any]]:
         common = percent_text(row.common_share) if row.common_share is not None else "–"
         if row.common_share is not None and row.temperature_share:
             common += f" (temperature {percent_text(row.temperature_share)})"
-        yield {
-            **row.columns(),
-            "reason": "; ".join(row.reasons),
-            "quantity": QUANTITY_NAMES[row.quantity],
-            "symbol": f"{row.quantity}.adev",
-            "tau": f"{number_text(row.tau)} s",
-            "seconds": row.tau,
-            "number": "not possible" if row.reachable is False else number,
-            "limits": _format_limits(row),
-            "common": common,
-        }
+        yield PairLine(
+            row=row,
+            quantity=QUANTITY_NAMES[row.quantity],
+            tau=f"{number_text(row.tau)} s",
+            number="not possible" if row.reachable is False else number,
+            limits=_format_limits(row),
+            common=common,
+        )
 
 
-def make_matrices(lines: Sequence[Mapping[str, Any]]) -> Iterator[dict[str, Any]]:
+def make_matrices(lines: Sequence[PairLine]) -> Iterator[PairMatrix]:
     """Yield a matrix of pair lines for each quantity and averaging time, the quietest first."""
-    groups: dict[tuple[str, str], list[Mapping[str, Any]]] = {}
+    groups: dict[tuple[str, str], list[PairLine]] = {}
     for line in lines:
-        groups.setdefault((line["quantity"], line["tau"]), []).append(line)
+        groups.setdefault((line.quantity, line.tau), []).append(line)
     for (quantity, tau), own in groups.items():
-        by_pair = {(line["sensor"], line["other"]): line for line in own}
-        levels = {line[of]: line[adev] for line in own for of, adev in _PAIR_COLUMNS if line[adev]}
+        by_pair = {(line.row.sensor, line.row.other): line for line in own}
+        known = [(line.row.sensor, line.row.adev) for line in own]
+        known += [(line.row.other, line.row.other_adev) for line in own]
+        levels = {sensor: level for sensor, level in known if level}
         sensors = sorted(levels, key=lambda sensor: (levels[sensor], sensor))
         if 1 < len(sensors) <= _MAX_MATRIX_SENSORS:
-            cells = [[by_pair.get((row, column)) for column in sensors] for row in sensors]
-            yield {
-                "name": f"{quantity}, {tau}",
-                "symbol": own[0]["symbol"],
-                "sensors": sensors,
-                "levels": [levels[sensor] for sensor in sensors],
-                "cells": cells,
-            }
+            cells = [[by_pair.get((one, other)) for other in sensors] for one in sensors]
+            symbol = f"{own[0].row.quantity}.adev"
+            sorted_levels = [levels[sensor] for sensor in sensors]
+            yield PairMatrix(f"{quantity}, {tau}", symbol, sensors, sorted_levels, cells)
 
 
-_PAIR_COLUMNS = (("sensor", "adev"), ("other", "other_adev"))
 _MAX_MATRIX_SENSORS = 40  # for which a matrix is readable
 
 
-def make_grade_lines(rows: Sequence[GradeRow]) -> Iterator[dict[str, Any]]:
+def make_grade_lines(rows: Sequence[GradeRow]) -> Iterator[GradeLine]:
     """Yield the lines of the table of classes: one per sensor and option with printed figures."""
     groups: dict[tuple[str, ...], dict[str, GradeRow]] = {}
     for row in rows:
         key = (row.quantity, row.sensor, row.grade, row.option or "")
         # A density of unknown sidedness has two rows: the first reading is shown.
         groups.setdefault(key, {}).setdefault(row.statistic, row)
-    for (quantity, sensor, _, option), by in groups.items():
+    for (quantity, *_), by in groups.items():
         if not any(row.printed for row in by.values()):
             continue
-        yield {
-            "quantity": QUANTITY_NAMES[quantity],
-            "sensor": sensor,
-            "simulated": any(row.simulated for row in by.values()),
-            "grade": next(row.grade_name for row in by.values()),
-            "option": option,
-            "symbol": quantity,
-            "cells": [
-                {
-                    "name": name,
-                    "value": row.value if row else None,
-                    "printed": row.printed if row else None,
-                    "n": row.n if row else None,
-                    "number": "–" if row is None or row.n is None else _round_up(row.n),
-                    "limits": "" if row is None else _format_grade_limits(row),
-                    "reason": (row.reason or "") if row else "",
-                }
-                for name in ("N", "sigma_min")
-                for row in (by.get(name),)
-            ],
-        }
+        cells = []
+        for name in ("N", "sigma_min"):
+            one = by.get(name)
+            number = "–" if one is None or one.n is None else _round_up(one.n)
+            cells.append((name, one, number, _format_grade_limits(one) if one else ""))
+        simulated = any(row.simulated for row in by.values())
+        yield GradeLine(next(iter(by.values())), QUANTITY_NAMES[quantity], simulated, cells)
 
 
 def find_unprinted_grades(rows: Sequence[GradeRow]) -> dict[str, str]:
@@ -178,10 +191,9 @@ _MAX_AGREEING_DIFFERENCE = 0.05  # relative, up to which result and printed figu
 _UNIT_SYMBOLS = {"bias": "signal"}  # of a parameter, where it is not its own
 
 
-def _make_boards_context(site: Site) -> dict[str, Any]:
-    arrays = Arrays()
+def _make_boards_context(site: Site) -> Mapping[str, object]:
     boards = []
-    payloads: list[dict[str, Any]] = []
+    drawn: list[ChannelView] = []
     for name, board in site.settings["boards"].items():
         views = _select_recordings(site, name)
         sensors = []
@@ -189,14 +201,14 @@ def _make_boards_context(site: Site) -> dict[str, Any]:
             rows = view.rows(PublishedFigureRow)
             channels = []
             for channel in view.channels():
-                payloads.append(pack_channel(channel, arrays))
+                drawn.append(channel)
                 own = (row for row in rows if row.channel == channel.channel)
                 channels.append(
                     {
                         "view": channel,
                         "figures": board["sensors"][view.sensor].get(channel.channel),
                         "answer": thermal.describe_thermal(channel, site.system),
-                        "lines": list(make_published_lines(own)),
+                        "lines": [make_published_line(row) for row in own],
                     }
                 )
             sensors.append({"view": view, "name": site.names[view.sensor], "channels": channels})
@@ -213,9 +225,7 @@ def _make_boards_context(site: Site) -> dict[str, Any]:
                 "lost": sorted(set(board["sensors"]) - {view.sensor for view in views}),
             }
         )
-    used = {channel["sensor"]: site.looks[channel["sensor"]] for channel in payloads}
-    page = {"looks": pack_styles(used), "channels": payloads, "arrays": arrays.texts}
-    return {"boards": boards, "page": page}
+    return {"boards": boards, "page": pack_page(drawn, site.looks)}
 
 
 def _select_recordings(site: Site, board: str) -> list[RecordingView]:
@@ -243,16 +253,26 @@ BOARDS = Entry(
 )
 
 
-def make_published_lines(rows: Iterable[PublishedFigureRow]) -> Iterator[dict[str, Any]]:
-    """Yield the lines of the printed figures of a channel, from rows of ``published_figures``."""
-    for row in rows:
-        quantity = row.channel.split("_")[0]
-        ours = row.datasheet if row.of == "datasheet" else row.value
-        ratio = ours / row.means if ours and row.means else None
-        yield {
-            **row.columns(),
-            "unit": f"{quantity}.{_UNIT_SYMBOLS.get(row.parameter, row.parameter)}",
-            "digits": limit_digits(row.lower, row.upper, 4),
-            "ratio": "–" if ratio is None else number_text(ratio, 3),
-            "differs": ratio is not None and abs(ratio - 1.0) > _MAX_AGREEING_DIFFERENCE,
-        }
+@dataclass(frozen=True)
+class PublishedLine:
+    """A printed figure of a channel."""
+
+    row: PublishedFigureRow
+    unit: str
+    digits: int
+    ratio: str
+    differs: bool
+
+
+def make_published_line(row: PublishedFigureRow) -> PublishedLine:
+    """Return the line of a printed figure."""
+    quantity = row.channel.split("_")[0]
+    ours = row.datasheet if row.of == "datasheet" else row.value
+    ratio = ours / row.means if ours and row.means else None
+    return PublishedLine(
+        row=row,
+        unit=f"{quantity}.{_UNIT_SYMBOLS.get(row.parameter, row.parameter)}",
+        digits=limit_digits(row.lower, row.upper, 4),
+        ratio="–" if ratio is None else number_text(ratio, 3),
+        differs=ratio is not None and abs(ratio - 1.0) > _MAX_AGREEING_DIFFERENCE,
+    )

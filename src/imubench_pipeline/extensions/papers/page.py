@@ -8,7 +8,7 @@ from typing import Any
 
 from imubench_pipeline.extensions.papers.printed import Drawn, Paper, read_papers, read_terms
 from imubench_pipeline.extensions.papers.tables import AccuracyRow, PublishedRow
-from imubench_pipeline.report.payload import Arrays, pack_channel, pack_styles
+from imubench_pipeline.report.payload import pack_page
 from imubench_pipeline.report.search import Found
 from imubench_pipeline.report.site import Entry, Section, Site
 from imubench_pipeline.report.view import ChannelView, RecordingView
@@ -19,10 +19,7 @@ def _make_context(site: Site) -> dict[str, Any]:
     of_recordings = {view.page for view in site.views if not view.left_out}
     there = of_recordings | {file for file, _ in site.navigation}  # pages to link to
     rows = site.rows(PublishedRow)
-    arrays = Arrays()
     drawn = _select_curves(site)
-    payloads = [pack_channel(channel, arrays) for _, _, channel in drawn]
-    used = {channel["sensor"]: site.looks[channel["sensor"]] for channel in payloads}
     return {
         "bases": read_terms().bases,
         "verdicts": {name: one.meaning for name, one in read_terms().verdicts.items()},
@@ -33,7 +30,7 @@ def _make_context(site: Site) -> dict[str, Any]:
             for paper in read_papers()
             if (own := [row for row in rows if row.paper == paper.name])
         ],
-        "page": {"looks": pack_styles(used), "channels": payloads, "arrays": arrays.texts},
+        "page": pack_page([channel for _, _, channel in drawn], site.looks),
     }
 
 
