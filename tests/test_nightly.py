@@ -24,6 +24,7 @@ from imubench_pipeline.extensions.nightly.settling import (
 )
 from imubench_pipeline.extensions.nightly.summary import (
     STATUS,
+    Changes,
     State,
     StateError,
     Summary,
@@ -432,8 +433,8 @@ def state(
     return make_state(tables, NOW, signatures, {}), tables
 
 
-def summary(found: dict[str, Any]) -> Summary:
-    return Summary(began=NOW, finished=NOW, seconds=61.0, **found)
+def summary(found: Changes) -> Summary:
+    return Summary(began=NOW, finished=NOW, seconds=61.0, **dict(found))
 
 
 def test_at_the_first_run_all_is_new(tmp_path: Path) -> None:

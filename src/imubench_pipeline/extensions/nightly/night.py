@@ -16,7 +16,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from shutil import disk_usage
 from types import FrameType
-from typing import IO, Any
+from typing import IO
 
 import yaml
 
@@ -28,6 +28,7 @@ from imubench_pipeline.extensions.nightly.settling import (
     scan_drop_zone,
 )
 from imubench_pipeline.extensions.nightly.summary import (
+    Changes,
     Skipped,
     State,
     StateError,
@@ -165,7 +166,7 @@ class Night:
         if own := set(flags) & _OWN_FLAGS:
             raise ConfigError(f"{', '.join(own)}: expected --config of imubench nightly instead")
         file = self.project / "config/config.yaml"
-        settings = read_config(file)
+        settings = dict(read_config(file))
         for entry in config:
             key, equals, value = entry.partition("=")
             if not equals:
@@ -253,7 +254,7 @@ class Night:
         failure: Sequence[str],
     ) -> tuple[Summary, State | None]:
         finished = datetime.now(UTC)
-        fields: dict[str, Any] = {"outcome": "failed"}
+        changes, files = Changes(), []
         after, analysed = None, before.recordings if before else {}
         tables = None
         if not failure:
@@ -269,28 +270,29 @@ class Night:
         if tables is not None:
             logs = {name: log.files for name, log in seen.items() if name not in held_back}
             after = make_state(tables, finished, logs, since)
-            fields = compare_states(before, after, tables, late)
-            fields["files"] = describe_drop_zone(self.results)
+            changes = compare_states(before, after, tables, late)
+            files = describe_drop_zone(self.results)
             analysed = after.recordings
             after = after.without(late, before)
-        fields["skipped"] = [
-            Skipped(
-                recording=skip.recording,
-                reason=skip.reason,
-                keeps_results=skip.held_back and skip.recording in analysed,
-                since=since[skip.recording],
-            )
-            for skip in skips
-        ]
         summary = Summary(
             began=self._began,
             finished=finished,
             seconds=(finished - self._began).total_seconds(),
+            files=files,
+            skipped=[
+                Skipped(
+                    recording=skip.recording,
+                    reason=skip.reason,
+                    keeps_results=skip.held_back and skip.recording in analysed,
+                    since=since[skip.recording],
+                )
+                for skip in skips
+            ],
             put_right=self._put_right,
             failure=[*failure, *(self._describe_disk_space() if failure else [])],
             report=str(self.results / "report/index.html"),
             log=str(self._log),
-            **fields,
+            **dict(changes),
         )
         return summary, after
 

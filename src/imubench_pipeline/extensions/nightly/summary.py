@@ -8,7 +8,7 @@ from collections.abc import Collection, Iterable, Mapping
 from dataclasses import asdict, dataclass
 from datetime import datetime
 from pathlib import Path
-from typing import Any, Literal, NamedTuple
+from typing import Literal, NamedTuple
 
 from pydantic import BaseModel, ConfigDict
 
@@ -284,25 +284,30 @@ class First(BaseModel):
     said: str
 
 
-class Summary(BaseModel):
-    """Changes since the last successful nightly run."""
+class Changes(BaseModel):
+    """Changes since the last successful nightly run; without one that was read: failed."""
 
-    outcome: Outcome
-    began: datetime
-    finished: datetime
-    seconds: float
+    outcome: Outcome = "failed"
     since: datetime | None = None  # end of the run that this one is compared with
     recordings: int = 0  # number in the tables
     new: list[str] = []
     changed: list[Changed] = []
     removed: list[str] = []
-    files: list[str] = []  # lines about the drop zone
-    skipped: list[Skipped] = []
     failed: list[Failed] = []
     rejected: list[Rejected] = []
     warnings: list[NewWarning] = []
     drift: list[Drift] = []
     first: list[First] = []
+
+
+class Summary(Changes):
+    """Summary of a nightly run."""
+
+    began: datetime
+    finished: datetime
+    seconds: float
+    files: list[str] = []  # lines about the drop zone
+    skipped: list[Skipped] = []
     put_right: list[str] = []  # repairs after an earlier run
     failure: list[str] = []  # reason, and the last lines of the log
     report: str = ""
@@ -311,7 +316,7 @@ class Summary(BaseModel):
 
 def compare_states(
     before: State | None, after: State, tables: RunRows, without: Iterable[str]
-) -> dict[str, Any]:
+) -> Changes:
     """Return the changes since the last successful run, apart from the recordings `without`."""
     was = before or State(finished=after.finished)
     written_to = set(without)
@@ -330,11 +335,37 @@ def compare_states(
                     said=next(list_best_sensors(of_it, tables.recordings)),
                 )
             )
-    fields: dict[str, Any] = {
-        "since": before and before.finished,
-        "recordings": len(after.recordings),
-        "new": [name for name in now if name not in was.recordings],
-        "changed": [
+    failed = [
+        Failed.model_validate(row, from_attributes=True)
+        for row in tables.failures
+        if row.recording is None or get_recording_name(row) not in written_to
+    ]
+    rejected = [
+        Rejected(
+            recording=name,
+            reason=outcome.rejected,
+            new=was.recordings.get(name, Known("")).rejected != outcome.rejected,
+        )
+        for name, outcome in now.items()
+        if outcome.rejected is not None
+    ]
+    warnings = [
+        NewWarning.model_validate({**row.columns(), "recording": get_recording_name(row)})
+        for row in select_warnings(tables.findings)
+        if get_recording_name(row) not in written_to and make_warning_key(row) not in known_warnings
+    ]
+    drift = [
+        Drift.model_validate(row, from_attributes=True)
+        for key, row in make_drift_keys(tables.drift).items()
+        if key.name not in written_to and key not in known_drift
+    ]
+    flagged = warnings or drift or any(rejection.new for rejection in rejected)
+    return Changes(
+        outcome="failed" if failed else "flagged" if flagged else "fine",
+        since=before and before.finished,
+        recordings=len(after.recordings),
+        new=[name for name in now if name not in was.recordings],
+        changed=[
             Changed(
                 recording=name,
                 because="its log changed"
@@ -344,38 +375,13 @@ def compare_states(
             for name in now
             if name in was.recordings and now[name].digest != was.recordings[name].digest
         ],
-        "removed": [name for name in was.recordings if name not in after.recordings],
-        "failed": [
-            Failed(**row.columns())
-            for row in tables.failures
-            if row.recording is None or get_recording_name(row) not in written_to
-        ],
-        "rejected": [
-            Rejected(
-                recording=name,
-                reason=outcome.rejected,
-                new=was.recordings.get(name, Known("")).rejected != outcome.rejected,
-            )
-            for name, outcome in now.items()
-            if outcome.rejected is not None
-        ],
-        "warnings": [
-            NewWarning.model_validate({**row.columns(), "recording": get_recording_name(row)})
-            for row in select_warnings(tables.findings)
-            if get_recording_name(row) not in written_to
-            and make_warning_key(row) not in known_warnings
-        ],
-        "drift": [
-            Drift.model_validate(row.columns())
-            for key, row in make_drift_keys(tables.drift).items()
-            if key.name not in written_to and key not in known_drift
-        ],
-        "first": first,
-    }
-    rejected = any(rejection.new for rejection in fields["rejected"])
-    flagged = rejected or fields["warnings"] or fields["drift"]
-    outcome = "failed" if fields["failed"] else "flagged" if flagged else "fine"
-    return fields | {"outcome": outcome}
+        removed=[name for name in was.recordings if name not in after.recordings],
+        failed=failed,
+        rejected=rejected,
+        warnings=warnings,
+        drift=drift,
+        first=first,
+    )
 
 
 def format_summary(summary: Summary) -> str:
