@@ -22,7 +22,7 @@ import pyarrow.csv as pacsv
 import pyarrow.parquet as pq
 
 from imubench_pipeline.recordings.ingest import ingest
-from imubench_pipeline.recordings.recording import ROW_GROUP
+from imubench_pipeline.recordings.recording import ROW_GROUP, LogNames
 from imubench_pipeline.settings.quality import QualitySettings
 from imubench_pipeline.settings.sensor import LogFormat, RecordingNotes
 from resident import peak_memory
@@ -55,7 +55,7 @@ def write_log(path: Path, rows: int) -> None:
 def ours(source: Path, folder: Path) -> None:
     """Ingest the log."""
     layout = LogFormat.model_validate(LAYOUT)
-    found = ingest(source, layout, RecordingNotes(), QualitySettings(), folder, {})
+    found = ingest(source, layout, RecordingNotes(), QualitySettings(), folder, LogNames())
     assert not [f for f in found.findings if f.severity != "note"], found.findings
 
 

@@ -85,13 +85,13 @@ def check_accounts(quality: Quality, kept: Path) -> None:
     }
     for name, log in open_channel_logs(kept).items():
         counts = quality.channels[name]
-        present = counts["used"] + counts["knocks"] + counts["repeated"]
-        assert counts["present"] == present > 0, name
+        present = counts.used + counts.knocks + counts.repeated
+        assert counts.present == present > 0, name
         without = sum(int(told.get((kind, name), 0)) for kind in ("empty_cells", "not_finite"))
         file = pq.ParquetFile(log.path)
         rows = file.metadata.num_rows
         values = file.read([name]).column(name)
-        assert len(values) - values.null_count == counts["used"], name
+        assert len(values) - values.null_count == counts.used, name
         # A record left out for its stamp may lack the sample too.
         assert rows <= present + without <= rows + int(told.get(("repeated_stamps", None), 0)), name
 
@@ -179,7 +179,7 @@ def test_entry(name: str, tmp_path: Path) -> None:
 
 
 def check_outcome(entry: Entry, quality: Quality) -> None:
-    status, reason = quality.recording["status"], str(quality.recording.get("reason"))
+    status, reason = quality.recording.status, str(quality.recording.reason)
     match entry.expected:
         case Rejected(reason=expected):
             assert status == "rejected"
@@ -189,7 +189,7 @@ def check_outcome(entry: Entry, quality: Quality) -> None:
         case Kept(samples, findings):
             assert status == "ok", reason
             assert names_of(quality) == findings, quality.findings
-            assert quality.recording["samples"] == samples
+            assert quality.recording.samples == samples
         case Cut():
             if status == "ok":
                 assert "truncated_file" in names_of(quality)

@@ -7,7 +7,12 @@ import pytest
 
 from imubench_pipeline.readers import RecordingError
 from imubench_pipeline.recordings.ingest import Ingested, ingest
-from imubench_pipeline.recordings.recording import list_log_files, open_channel_logs, read_metadata
+from imubench_pipeline.recordings.recording import (
+    LogNames,
+    list_log_files,
+    open_channel_logs,
+    read_metadata,
+)
 from imubench_pipeline.settings.quality import QualitySettings
 from imubench_pipeline.settings.sensor import LogFormat, RecordingNotes
 
@@ -32,7 +37,7 @@ def kept(
     notes = RecordingNotes.model_validate({"use": keys.pop("use", {})})
     rate = {} if "time" in keys else {"rate": "100 Hz"}
     log = LogFormat.model_validate({"channels": channels or XY} | rate | keys)
-    result = ingest(source, log, notes, QualitySettings(short=0), folder, {"simulated": False})
+    result = ingest(source, log, notes, QualitySettings(short=0), folder, LogNames())
     values = {
         name: np.concatenate(list(found.blocks()))
         for name, found in open_channel_logs(folder).items()
@@ -46,14 +51,14 @@ def test_samples_come_back_as_written(tmp_path: Path, rng: np.random.Generator) 
     result, values = kept(source, tmp_path / "out")
     np.testing.assert_array_equal(values["gyro_x"], wx)
     np.testing.assert_array_equal(values["gyro_y"], wy)
-    assert result.summary["samples"] == 3000
-    assert result.summary["duration"] == 30.0
+    assert result.row.samples == 3000
+    assert result.row.duration == 30.0
     assert result.findings == []
     assert pq.read_schema(tmp_path / "out/log.parquet").names == ["gyro_x", "gyro_y"]
     metadata = read_metadata(tmp_path / "out/log.parquet")
-    assert metadata["sources"][0]["name"] == "a.csv"
-    assert metadata["sources"][0]["size"] == source.stat().st_size
-    assert len(metadata["sources"][0]["sha256"]) == 64
+    assert metadata.sources[0].name == "a.csv"
+    assert metadata.sources[0].size == source.stat().st_size
+    assert len(metadata.sources[0].sha256 or "") == 64
     assert [path.name for path in (tmp_path / "out").iterdir()] == ["log.parquet"]
 
 
@@ -69,7 +74,7 @@ def test_empty_lines_of_one_column_keep_their_time(
     alone = {"gyro_x": XY["gyro_x"]}
     results = [kept(source, tmp_path / source.stem, alone) for source in (one, two)]
     for result, values in results:
-        assert result.summary["duration"] == 50.0
+        assert result.row.duration == 50.0
         assert [(one.finding, one.value) for one in result.findings] == [("empty_cells", 2000.0)]
         np.testing.assert_array_equal(values["gyro_x"], wx)
 
@@ -114,7 +119,7 @@ def test_a_hole_beside_a_repeated_record_is_still_a_hole(tmp_path: Path) -> None
     result, values = kept(source, tmp_path / "out", {"gyro_x": XY["gyro_x"]}, time=TIME)
     assert np.isnan(values["gyro_x"]).sum() == 1
     assert open_channel_logs(tmp_path / "out")["gyro_x"].holes
-    assert result.summary["samples"] == 999
+    assert result.row.samples == 999
     found = {finding.finding: finding.value for finding in result.findings}
     assert found == {"missing_samples": 1, "repeated_stamps": 1}
 
@@ -125,7 +130,7 @@ def test_a_uniform_time_is_not_kept(tmp_path: Path, rng: np.random.Generator) ->
     )
     result, _ = kept(source, tmp_path / "out", {"gyro_x": XY["gyro_x"]}, time=TIME)
     assert pq.read_schema(tmp_path / "out/log.parquet").names == ["gyro_x"]
-    assert result.channels["gyro_x"]["rate"] == pytest.approx(50.0)
+    assert result.channels["gyro_x"].rate == pytest.approx(50.0)
 
 
 PER_AXIS = {
@@ -155,8 +160,8 @@ def test_clocks_of_their_own_have_files_of_their_own(
     result, values = kept(tmp_path / "r", tmp_path / "out", channels, time=TIME)
     names = [path.name for path in list_log_files(tmp_path / "out")]
     assert names == ["log.accel.parquet", "log.gyro.parquet"]
-    assert result.channels["accel_x"]["rate"] == pytest.approx(64.0)
-    assert result.channels["gyro_x"]["rate"] == pytest.approx(100.0)
+    assert result.channels["accel_x"].rate == pytest.approx(64.0)
+    assert result.channels["gyro_x"].rate == pytest.approx(100.0)
     assert (len(values["gyro_x"]), len(values["accel_x"])) == (1000, 600)
 
 
@@ -254,8 +259,8 @@ def test_temperature_is_kept_beside_the_channels(tmp_path: Path, rng: np.random.
         temperature={"column": "T", "unit": "K"},
     )
     assert list(values) == ["gyro_x"]
-    assert result.summary["temperature_min"] == pytest.approx(16.85)
-    assert result.summary["temperature_max"] == pytest.approx(26.85)
+    assert result.row.temperature_min == pytest.approx(16.85)
+    assert result.row.temperature_max == pytest.approx(26.85)
     assert "temperature" in pq.read_schema(tmp_path / "out/log.parquet").names
 
 
@@ -265,5 +270,5 @@ def test_a_short_recording_gets_a_note(
 ) -> None:
     log = write_csv(tmp_path / "log.csv", wx=1e-3 * rng.standard_normal(10 * seconds))
     layout = LogFormat.model_validate({"rate": "10 Hz", "channels": {"gyro_x": XY["gyro_x"]}})
-    found = ingest(log, layout, RecordingNotes(), QualitySettings(), tmp_path / "out", {})
+    found = ingest(log, layout, RecordingNotes(), QualitySettings(), tmp_path / "out", LogNames())
     assert [finding.finding for finding in found.findings] == noted

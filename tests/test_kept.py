@@ -11,6 +11,7 @@ import pytest
 
 from imubench_pipeline.recordings.ingest import ingest
 from imubench_pipeline.recordings.kept import Quality, load_logs, load_static_logs
+from imubench_pipeline.recordings.recording import LogNames
 from imubench_pipeline.run.faults import Faults
 from imubench_pipeline.settings.quality import QualitySettings
 from imubench_pipeline.settings.sensor import LogFormat, RecordingNotes
@@ -28,7 +29,7 @@ LOG = LogFormat.model_validate(
         },
     }
 )
-NAMES = {"sensor": "s", "device": "r", "recording": "r", "kind": "static", "simulated": False}
+NAMES = LogNames(sensor="s", device="r", recording="r")
 OF = ("ingest", "s", "r")
 
 
@@ -40,7 +41,7 @@ def ingested(tmp_path_factory: pytest.TempPathFactory) -> Path:
     np.savetxt(folder / "r.csv", rng.standard_normal((2000, 2)) * 1e-3, delimiter=",", fmt="%.9g")
     kept = folder / "results/recordings/s/r"
     found = ingest(folder / "r.csv", LOG, RecordingNotes(), QualitySettings(), kept, NAMES)
-    found.quality(NAMES).write(kept / "quality.json")
+    found.quality().write(kept / "quality.json")
     return folder / "results"
 
 

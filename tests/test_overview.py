@@ -12,7 +12,7 @@ from hypothesis.extra.numpy import arrays
 from imubench_pipeline.recordings import overview as module
 from imubench_pipeline.recordings.ingest import ingest
 from imubench_pipeline.recordings.overview import MOST_BINS, Overview, bin_edges, overview
-from imubench_pipeline.recordings.recording import ROW_GROUP, LogWriter, list_log_files
+from imubench_pipeline.recordings.recording import ROW_GROUP, LogNames, LogWriter, list_log_files
 from imubench_pipeline.settings.quality import QualitySettings
 from imubench_pipeline.settings.sensor import LogFormat, RecordingNotes
 from tests.conftest import few
@@ -411,7 +411,7 @@ def test_a_recording_as_the_ingest_keeps_it(tmp_path: Path, rng: np.random.Gener
         }
     )
     folder = tmp_path / "out"
-    ingest(tmp_path / "a.csv", log, RecordingNotes(), QualitySettings(short=0), folder, {})
+    ingest(tmp_path / "a.csv", log, RecordingNotes(), QualitySettings(short=0), folder, LogNames())
     assert len(list_log_files(folder)) == 1
     found = overview(folder, "sensor", "log_1", 200)
     placed = np.where(present, values, np.nan)

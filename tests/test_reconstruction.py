@@ -10,8 +10,8 @@ from imubench_pipeline.allan import allan_variance
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.simulate import simulate
+from imubench_pipeline.readers.arrays.arrow import METADATA
 from imubench_pipeline.recordings.ingest import ingest_as_planned
-from imubench_pipeline.recordings.recording import read_metadata
 from imubench_pipeline.run.plan import Plan
 from imubench_pipeline.settings.config import AllanSettings, ReconstructionSettings
 from imubench_pipeline.steps.allan import yield_allan_rows
@@ -40,7 +40,8 @@ def test_a_reconstruction_of_the_truth_scores_well(rng, tmp_path: Path) -> None:
         assert low < middle < high
     series = pq.read_table(tmp_path / "s.parquet")["simulated"].to_numpy()
     assert len(series) == 100_000
-    assert read_metadata(tmp_path / "s.parquet")["simulated"] is True
+    metadata = pq.read_metadata(tmp_path / "s.parquet").metadata
+    assert json.loads(metadata[METADATA])["simulated"] is True
 
 
 def test_it_depends_on_the_seed_and_the_channel_only(rng, tmp_path: Path) -> None:

@@ -9,12 +9,14 @@ import pytest
 
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
 from imubench_pipeline.estimators.rows import make_parameter_rows
+from imubench_pipeline.model.recordings import RecordingRow
 from imubench_pipeline.recordings.kept import Quality, identify_files
 from imubench_pipeline.recordings.recording import list_log_files
 from imubench_pipeline.steps.samples_of_models import STRETCH, simulate_samples_of_models
 from imubench_pipeline.tables import build, write
 from imubench_pipeline.tables.keys import Key
 from tests.kept import kept
+from tests.rows import typed
 
 KEY = Key("s", "sim_board", "gyro_x")
 RATE, N = 100.0, 2e-4
@@ -28,8 +30,10 @@ def rows(tmp_path_factory: pytest.TempPathFactory) -> list[dict]:
     log = 0.01 + DEVIATION * np.random.default_rng(1).standard_normal(40_000)
     log[5] = np.nan
     kept(folder, {"gyro_x": log}, RATE, holes=True)
-    about = asdict(KEY) | {"status": "ok"}
-    Quality(about, [], {}, identify_files(list_log_files(folder))).write(folder / "quality.json")
+    about = {"sensor": KEY.sensor, "recording": KEY.recording}
+    Quality(*typed(RecordingRow, [about]), [], {}, identify_files(list_log_files(folder))).write(
+        folder / "quality.json"
+    )
     absent = Parameter(None, "absent", "not asked for")
     parameters = []
     for method, value in (("curve", N / 2.0), ("likelihood", N)):

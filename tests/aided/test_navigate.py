@@ -18,6 +18,7 @@ from imubench_pipeline.extensions.aided.navigate import (
 )
 from imubench_pipeline.extensions.aided.runs import Share
 from imubench_pipeline.extensions.aided.settings import NavigateSettings
+from imubench_pipeline.model.recordings import RecordingRow
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.simulate import simulate
 from imubench_pipeline.recordings.kept import Quality
@@ -25,6 +26,7 @@ from imubench_pipeline.settings.sensor import CHANNELS, Sensor, quantity_of
 from imubench_pipeline.tables import build, write
 from imubench_pipeline.tables.keys import Key
 from tests.kept import kept
+from tests.rows import typed
 
 RATE = 20.0
 MODELS = {
@@ -72,7 +74,7 @@ def put(folder: Path, channels: tuple[str, ...], samples: int = 20_000) -> None:
         "sensor": "imu", "device": "a", "recording": "a", "kind": "static", "simulated": False,
         "status": "ok", "reason": None, "rate": RATE, "duration": samples / RATE,
     }  # fmt: skip
-    Quality(recording=about, findings=[], channels={}).write(folder / "quality.json")
+    Quality(*typed(RecordingRow, [about]), findings=[], channels={}).write(folder / "quality.json")
     rows, curve = [], []
     for channel in channels:
         model = MODELS[quantity_of(channel)]

@@ -13,6 +13,7 @@ from imubench_pipeline.extensions.calibration.alignment.triad import Site
 from imubench_pipeline.extensions.calibration.calibration import make_calibration_tables
 from imubench_pipeline.extensions.calibration.settings import TRIAD, InPositions
 from imubench_pipeline.extensions.calibration.simulated import compute_readings
+from imubench_pipeline.model.recordings import RecordingRow
 from imubench_pipeline.recordings.kept import Quality, identify_files
 from imubench_pipeline.recordings.recording import list_log_files
 from imubench_pipeline.settings.simulated_recordings import SimulatedRecording
@@ -20,6 +21,7 @@ from imubench_pipeline.steps.simulate import _blocks
 from imubench_pipeline.tables import build
 from tests.conftest import catalogue
 from tests.kept import kept
+from tests.rows import typed
 
 DEGREE = math.pi / 180.0
 RATE, DWELL, TURN = 8.0, 40.0, 2.0
@@ -60,7 +62,9 @@ def by_hand(roll: float, pitch: float, heading: float, positions: int) -> dict[s
 def found(folder: Path, columns: dict[str, np.ndarray], **changes: Any) -> dict[str, Any]:
     kept(folder, columns, RATE)
     about = {"sensor": "s", "recording": folder.name, "status": "ok", "kind": "positions"}
-    Quality(about, [], {}, identify_files(list_log_files(folder))).write(folder / "quality.json")
+    Quality(*typed(RecordingRow, [about]), [], {}, identify_files(list_log_files(folder))).write(
+        folder / "quality.json"
+    )
     settings = {
         "sensor": SENSOR.model_dump(mode="json", exclude_unset=True),
         "positions": DECLARED | changes,

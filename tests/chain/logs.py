@@ -178,4 +178,4 @@ def checked(plan: Plan) -> tuple[str, str | None, set[str]]:
     """Return status and reason by `imubench check`, and the names of findings."""
     ((_, _, quality),) = check(plan)
     names = {str(row["finding"]) for row in quality.findings}
-    return quality.recording["status"], quality.recording.get("reason"), names
+    return quality.recording.status, quality.recording.reason, names

@@ -11,12 +11,14 @@ from imubench_pipeline.estimators.estimate import Estimate, Parameter
 from imubench_pipeline.estimators.rows import make_parameter_rows
 from imubench_pipeline.extensions.earth_rate.earth_rotation import make_earth_rate_tables
 from imubench_pipeline.extensions.earth_rate.settings import EarthRateSettings
+from imubench_pipeline.model.recordings import RecordingRow
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.recordings.kept import Quality, identify_files
 from imubench_pipeline.recordings.recording import LogWriter, list_log_files
 from imubench_pipeline.tables import write
 from imubench_pipeline.tables.keys import Key
 from tests.earth_rate.runs import PAPER, RATE, turned
+from tests.rows import typed
 
 SENSOR: dict[str, Any] = {
     "vendor": "V",
@@ -53,7 +55,7 @@ def put(folder: Path, columns: dict[str, np.ndarray], **about: Any) -> Path:
     for name in ("segments", "begins"):
         row.pop(name, None)
     kept = identify_files(list_log_files(folder))
-    Quality(row, [], {}, kept).write(folder / "quality.json")
+    Quality(*typed(RecordingRow, [row]), [], {}, kept).write(folder / "quality.json")
     return folder
 
 

@@ -241,7 +241,7 @@ def test_a_gyro_that_cannot_be_used_is_said_beside_what_can(
 def test_a_rejected_recording_leaves_nothing(tmp_path: Path, rest: Path) -> None:
     (tmp_path / "a").mkdir()
     (rejected,) = typed(RecordingRow, [{"status": "rejected"}])
-    Quality(dict(rejected), [], {}, {}).write(tmp_path / "a/quality.json")
+    Quality(rejected, [], {}, {}).write(tmp_path / "a/quality.json")
     assert set(map(len, briefly(tmp_path / "a", [rest]).values())) == {0}
 
 

@@ -18,10 +18,12 @@ from imubench_pipeline.extensions.earth_rate.pairs import by_pairs
 from imubench_pipeline.extensions.earth_rate.simulation import PAPER_MODEL, design_paper_run
 from imubench_pipeline.navigation.error_budget import Gyrocompass
 from imubench_pipeline.noise import NoiseModel
+from imubench_pipeline.tables.keys import Key
 from tests.earth_rate.brute import MODELS
 from tests.earth_rate.test_experiment import experiments
 
 WHITE = NoiseModel(N=PAPER_MODEL.N)
+KEY = Key("s", "run", "gyro_x")
 LATITUDE = math.radians(-23.3)
 
 
@@ -102,8 +104,8 @@ def test_a_goal_out_of_reach_has_no_row():
     noisy = Outlook(NoiseModel(N=1e28), LATITUDE, 2.0, 32.0)
     assert noisy.turns_needed(28.0, 0.1) is None
     assert noisy.time_needed(28.0, 0.1) == math.inf
-    rows = list(prediction_rows(noisy, 28.0, [0.1], 600.0))
-    assert {row["of"] for row in rows} == {"time", "dwell"}
+    rows = list(prediction_rows(KEY, noisy, 28.0, [0.1], 600.0))
+    assert {row.of for row in rows} == {"time", "dwell"}
 
 
 @pytest.mark.parametrize("turns", [1, 5, 63, 64, 300])
@@ -117,10 +119,10 @@ def test_what_is_reached_is_the_end_of_the_course(turns):
 @pytest.mark.release
 def test_long_dwells_reach_more_than_was_asked_for():
     outlook = Outlook(PAPER_MODEL, LATITUDE, 2.0, 8.0)
-    rows = list(prediction_rows(outlook, 3600.0, [1.0], 1e4))
-    (goal,) = (row for row in rows if row["of"] == "goal")
-    assert goal["turns"] == 1 and goal["sigma"] == pytest.approx(rows[1]["sigma"], rel=0.01)
-    assert goal["sigma"] < 0.5 * EARTH_RATE
+    rows = list(prediction_rows(KEY, outlook, 3600.0, [1.0], 1e4))
+    (goal,) = (row for row in rows if row.of == "goal")
+    assert goal.turns == 1 and goal.sigma == pytest.approx(rows[1].sigma, rel=0.01)
+    assert goal.sigma < 0.5 * EARTH_RATE
 
 
 def test_with_white_noise_one_turn_is_best():

@@ -4,9 +4,10 @@ import math
 
 import pytest
 
+from imubench_pipeline.earth import EARTH_RATE
 from imubench_pipeline.extensions.earth_rate.published import (
     compute_allowed_sigmas,
-    make_published_row,
+    judge_error,
     thin,
 )
 from imubench_pipeline.extensions.earth_rate.simulation import (
@@ -25,17 +26,18 @@ from imubench_pipeline.run.plan import Plan
      (13, 0.001132, -6.0)],
 )  # fmt: skip
 def test_the_runs_of_the_paper(minutes: float, published: float, off: float) -> None:
-    row = make_published_row(math.radians(published), PAPER, 60.0 * minutes, PAPER_MODEL)
-    assert row["off_sigma"] == pytest.approx(off, abs=0.06)
-    assert row["verdict"] == ("within the noise" if minutes == 120 else "beyond the noise")
+    allowed = compute_allowed_sigmas(PAPER, 60.0 * minutes, PAPER_MODEL)
+    found = (math.radians(published) - EARTH_RATE) / allowed.sigma
+    assert found == pytest.approx(off, abs=0.06)
+    assert judge_error(found) == ("within the noise" if minutes == 120 else "beyond the noise")
 
 
 def test_white_noise_is_the_least() -> None:
     found = compute_allowed_sigmas(PAPER, 720.0, PAPER_MODEL)
     # 24 dwells of 28 s.
     white = math.radians(0.0122) / math.sqrt(24 * 28.0) / math.cos(ASSUMED_LATITUDE)
-    assert found["white"] == pytest.approx(white)
-    assert found["white"] < found["sigma_filter"] < found["sigma"]
+    assert found.white == pytest.approx(white)
+    assert found.white < found.sigma_filter < found.sigma
 
 
 def test_the_demonstration_has_the_runs_of_the_paper() -> None:

@@ -65,8 +65,8 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> tuple[Plan, Path]:
     settings = plan.ingest_settings("s", "sim_run")
     quality = ingest_as_planned(tmp_path / "log", settings, "s", "sim_run", kept)
     quality.write(kept / "quality.json")
-    assert (quality.recording["status"], quality.recording["kind"]) == ("ok", "two_position")
-    assert quality.recording["simulated"] and quality.findings == []
+    assert (quality.recording.status, quality.recording.kind) == ("ok", "two_position")
+    assert quality.recording.simulated and quality.findings == []
     return plan, kept
 
 

@@ -27,8 +27,9 @@ from typing import Any
 import yaml
 
 from imubench_pipeline.extensions.nightly.summary import State, StateError, read_state
+from imubench_pipeline.model.recordings import RecordingRow
 from imubench_pipeline.readers.bounded import limit_memory
-from imubench_pipeline.recordings.kept import Quality
+from imubench_pipeline.recordings.kept import AnalysedChannel, Quality
 from imubench_pipeline.report.publish import _read_keys
 from imubench_pipeline.run.faults import Faults
 from imubench_pipeline.run.lock import _describe_holder, read_note
@@ -46,6 +47,7 @@ from imubench_pipeline.tables.findings import RecordingError
 from imubench_pipeline.units import SI_UNITS, UnitError, find_conversion, parse_quantity
 from tests.conftest import PROJECT
 from tests.fuzz.mutations import mutated
+from tests.rows import typed
 
 SEEDS = Path(__file__).with_name("seeds")
 """Inputs that something failed with once, a folder a subject."""
@@ -244,7 +246,11 @@ def subjects() -> dict[str, Subject]:
     bias = {
         "sensor": "s", "recording": "a", "channel": "gyro_x", "value": 1e-4, "unit": "rad/s"
     }  # fmt: skip
-    quality = Quality({"sensor": "s", "status": "ok"}, [], {"gyro_x": {"rate": 100.0}})
+    channel = AnalysedChannel(
+        mean=0.0, density=(1e-3, None), unit="rad/s", rate=100.0, grid=9, segments=((0, 9),),
+        present=9, used=9, knocks=0, repeated=0,
+    )  # fmt: skip
+    quality = Quality(*typed(RecordingRow, [{"sensor": "s"}]), [], {"gyro_x": channel})
     now = datetime(2026, 1, 1, tzinfo=UTC)
     state = State(finished=now, recordings={"s/a": ("ab12", None)}, skipped={"s/b": now})
     record = {"attempt": 1, "failed": True, "log": "l", **asdict(_FAILURE)}

@@ -142,7 +142,7 @@ def test_every_sentence_of_vectornav(tmp_path: Path) -> None:
         found = inspect(path)
         taken = found.draft.channels | ({"": found.draft.temperature} if found.draft.temperature
                                         else {})  # fmt: skip
-        assert {entry.value["column"] for entry in taken.values()} == {
+        assert {entry.value.column for entry in taken.values()} == {
             name for name in fields if name in CHANNELS or name == "temperature"
         }
         assert found.proof.read and found.draft.unfilled() == ["rate"]

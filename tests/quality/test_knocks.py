@@ -10,7 +10,7 @@ from imubench_pipeline.recordings.ingest import ingest
 from imubench_pipeline.recordings.quality.knocks import find_knocks, find_outlier_blocks
 from imubench_pipeline.recordings.quality.levels import detect_quantisation
 from imubench_pipeline.recordings.quality.summary import ColumnSummary
-from imubench_pipeline.recordings.recording import open_channel_logs
+from imubench_pipeline.recordings.recording import LogNames, open_channel_logs
 from imubench_pipeline.settings.quality import QualitySettings
 from imubench_pipeline.settings.sensor import LogFormat, RecordingNotes
 from tests.quality.real import adis16405
@@ -93,12 +93,14 @@ def kept(tmp_path: Path, log: np.ndarray) -> tuple[list[str], np.ndarray]:
     path.write_text("ax\n" + "\n".join(f"{value:.9g}" for value in log) + "\n")
     channels = {"accel_x": {"column": "ax", "unit": "m/s^2"}}
     layout = LogFormat.model_validate({"rate": "50 Hz", "channels": channels})
-    out = ingest(path, layout, RecordingNotes(), QualitySettings(short=0), tmp_path / "out", {})
+    out = ingest(
+        path, layout, RecordingNotes(), QualitySettings(short=0), tmp_path / "out", LogNames()
+    )
     values = np.concatenate(list(open_channel_logs(tmp_path / "out")["accel_x"].blocks()))
     assert open_channel_logs(tmp_path / "out")["accel_x"].holes
     counts = out.channels["accel_x"]
-    assert counts["present"] == counts["used"] + counts["knocks"]
-    assert counts["knocks"] == np.isnan(values).sum() - np.isnan(log).sum()
+    assert counts.present == counts.used + counts.knocks
+    assert counts.knocks == np.isnan(values).sum() - np.isnan(log).sum()
     return [finding.finding for finding in out.findings], values
 
 

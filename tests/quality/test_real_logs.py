@@ -8,6 +8,7 @@ import yaml
 
 from imubench_pipeline.recordings.fitness import derive_doubts, judge_fitness
 from imubench_pipeline.recordings.ingest import ingest
+from imubench_pipeline.recordings.recording import LogNames
 from imubench_pipeline.settings.quality import QualitySettings
 from imubench_pipeline.settings.sensor import LogFormat, RecordingNotes
 from imubench_pipeline.tables.findings import Finding
@@ -29,7 +30,7 @@ def found(lines: list[str], folder: Path, **channels: dict[str, str]) -> list[Fi
     log["channels"] |= channels
     layout = LogFormat.model_validate(log)
     kept = ingest(
-        folder / "log.csv", layout, RecordingNotes(), QualitySettings(), folder / "kept", {}
+        folder / "log.csv", layout, RecordingNotes(), QualitySettings(), folder / "kept", LogNames()
     )
     return kept.findings
 

@@ -21,12 +21,13 @@ from imubench_pipeline.datasheets.plausibility import implausible_of
 from imubench_pipeline.model.recordings import FindingRow
 from imubench_pipeline.recordings.fitness import derive_doubts, judge_fitness
 from imubench_pipeline.recordings.ingest import ingest
+from imubench_pipeline.recordings.recording import LogNames
 from imubench_pipeline.settings.quality import QualitySettings
 from imubench_pipeline.settings.sensor import CHANNELS, RecordingNotes, Sensor
 from imubench_pipeline.settings.validation import parse
 from tests.conftest import catalogue, few
 
-NAMES = {"sensor": "s", "device": "d", "recording": "r", "kind": "static"}
+NAMES = LogNames(sensor="s", device="d", recording="r")
 CATALOGUE = catalogue()
 ROWS = 30_000
 
@@ -68,7 +69,7 @@ def in_units(gyro: str, accel: str) -> dict[str, Any]:
 def findings(path: Path, of: Sensor, folder: Path) -> Rows:
     """Return what is found of a log, by the ingest and beside the datasheet."""
     kept = ingest(path, of.log, RecordingNotes(), QualitySettings(), folder / "kept", NAMES)
-    quality = kept.quality(NAMES)
+    quality = kept.quality()
     return quality.findings + implausible_of(quality, of)
 
 

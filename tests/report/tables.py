@@ -376,7 +376,7 @@ def put_log(results: Path, sensor: str, recording: str, **about: Any) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     with LogWriter(folder / "log.parquet", {"gyro_x": pa.float64()}) as log:
         log.write({"gyro_x": np.zeros(3)})
-        log.finish(about)
+        log.finish({"rate": 1.0, "grid": 3, "segments": [[0, 3]], "holes": {}} | about)
 
 
 def put_tables(tables: Mapping[str, pa.Table], results: Path) -> None:

@@ -13,8 +13,9 @@ from imubench_pipeline.allan import allan_variance
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
 from imubench_pipeline.estimators.rows import make_parameter_rows
 from imubench_pipeline.readers import read
+from imubench_pipeline.readers.arrays.arrow import METADATA
 from imubench_pipeline.recordings.ingest import ingest
-from imubench_pipeline.recordings.recording import open_channel_logs, read_metadata
+from imubench_pipeline.recordings.recording import LogNames, open_channel_logs, read_metadata
 from imubench_pipeline.run.cli import main
 from imubench_pipeline.settings.quality import QualitySettings
 from imubench_pipeline.settings.sensor import RecordingNotes, merged_log
@@ -37,13 +38,13 @@ def ingested(path: Path, sensor: str, folder: Path) -> dict[str, np.ndarray]:
     """Read a log as a run does, with its sensor file and the notes beside it."""
     notes = parse(RecordingNotes, read_yaml(path.with_suffix(".yaml")), "notes")
     log = merged_log(catalogue()[sensor], notes, "notes")
-    kept = ingest(path, log, notes, QualitySettings(), folder, {})
-    assert kept.summary["rate"] == 100.0
+    kept = ingest(path, log, notes, QualitySettings(), folder, LogNames())
+    assert kept.row.rate == 100.0
     found = {
         name: np.concatenate([*one.blocks()]) for name, one in open_channel_logs(folder).items()
     }
     found["temperature_range"] = np.array(
-        [kept.summary["temperature_min"], kept.summary["temperature_max"]], dtype=float
+        [kept.row.temperature_min, kept.row.temperature_max], dtype=float
     )
     return found
 
@@ -71,7 +72,7 @@ def test_a_text_log_of_a_sensor_with_names_needs_no_notes(tmp_path: Path) -> Non
     path = tmp_path / "log.csv"
     assert simulate("bno055", "--duration", "40 s", "--out", path) == 0
     log = catalogue()["bno055"].log
-    ingest(path, log, RecordingNotes(), QualitySettings(), tmp_path / "kept", {})
+    ingest(path, log, RecordingNotes(), QualitySettings(), tmp_path / "kept", LogNames())
     (block,) = open_channel_logs(tmp_path / "kept")["gyro_x"].blocks()
     steps = np.degrees(block) * 16  # 16 LSB/(deg/s)
     np.testing.assert_allclose(steps, np.rint(steps), atol=1e-6)
@@ -84,8 +85,9 @@ def test_parquet_is_a_kept_recording(tmp_path: Path) -> None:
     path = tmp_path / "log.parquet"
     given = ["--duration", "60 s", "--temperature", "30 degC", "--seed", 7]
     assert simulate("bno055", *given, "--out", path) == 0
-    about = read_metadata(path)
-    assert about["simulated"] is True and about["simulation"]["seed"] == 7
+    assert read_metadata(path).simulated
+    about = json.loads(pq.read_metadata(path).metadata[METADATA])
+    assert about["simulation"]["seed"] == 7
     assert "rms" in json.dumps(about["simulation"]["figures"])
     assert pq.read_schema(path).names == ["gyro_x", "gyro_y", "gyro_z", "temperature"]
     kept = open_channel_logs(tmp_path)

@@ -12,7 +12,6 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -21,6 +20,7 @@ from imubench_pipeline.datasheets.suspicion import MAX_FACTOR_FROM_PRINTED, prin
 from imubench_pipeline.earth import STANDARD_GRAVITY
 from imubench_pipeline.model.recordings import FindingRow
 from imubench_pipeline.recordings.kept import Quality
+from imubench_pipeline.recordings.quality.levels import Level
 from imubench_pipeline.recordings.quality.rotation import GravityTurn
 from imubench_pipeline.settings.sensor import QUANTITIES, Sensor, quantity_of
 from imubench_pipeline.tables.findings import Finding, find
@@ -65,9 +65,6 @@ _USUAL_RATE = 100.0
 _TIME_UNIT_PENALTIES: Mapping[float, float] = {60.0: 1.0, 1e3: 0.0, 1e6: 0.0, 1e9: 0.0}
 """Usual rate, Hz; and ratios of two units of time, each with a penalty in decades from the usual
 rate. Minutes have a penalty, since a sensor file cannot state them."""
-
-Level = Mapping[str, Any]
-"""Level of a channel, from `imubench_pipeline.recordings.quality.levels.summarise_level`."""
 
 _GRAVITY_TOLERANCE = 0.15
 """Maximum error of the mean acceleration, as a fraction of gravity."""
@@ -246,7 +243,7 @@ def implausible(
     and on the sensor file. ``static``: the sensor should be at rest.
     """
     of = {quantity: expected(sensor, quantity) for quantity in QUANTITIES}
-    rates = {name: level["rate"] for name, level in channels.items()}
+    rates = {name: level.rate for name, level in channels.items()}
     findings = implausible_rates(
         rates,
         {name: of[quantity_of(name)].bandwidth for name in channels},
@@ -260,7 +257,7 @@ def implausible(
     if static:
         mending = {f.channel: f.value for f in findings if f.finding == "suspicious_unit"}
         means = {
-            name: level["mean"] * mending.get(name, 1.0)
+            name: level.mean * mending.get(name, 1.0)
             for name, level in channels.items()
             if quantity_of(name) == "gyro"
         }
@@ -272,9 +269,8 @@ def implausible(
 
 def implausible_of(quality: Quality, sensor: Sensor | None) -> list[FindingRow]:
     """Return the finding rows about data that are implausible for a static sensor."""
-    about = quality.row
-    turn = GravityTurn(**quality.gravity) if quality.gravity else None
-    findings = implausible(quality.channels, turn, sensor, static=about.kind == "static")
+    about, static = quality.recording, quality.recording.kind == "static"
+    findings = implausible(quality.channels, quality.gravity, sensor, static=static)
     return [finding.row(about.sensor, about.recording) for finding in findings]
 
 
@@ -293,10 +289,10 @@ def _check_gravity(channels: Mapping[str, Level]) -> Iterator[Finding]:
     axes = [f"accel_{axis}" for axis in "xyz"]
     if not set(axes) <= channels.keys():
         return
-    norm = math.hypot(*(channels[name]["mean"] for name in axes))
+    norm = math.hypot(*(channels[name].mean for name in axes))
     if abs(norm / STANDARD_GRAVITY - 1.0) <= _GRAVITY_TOLERANCE:
         return
-    units = {channels[name]["unit"] for name in axes}
+    units = {channels[name].unit for name in axes}
     unit = units.pop()
     for other, factor in mistakes(unit, "accel") if not units else ():
         if abs(norm * factor / STANDARD_GRAVITY - 1.0) <= _GRAVITY_TOLERANCE:
@@ -315,7 +311,7 @@ def _check_noise(channels: Mapping[str, Level], of: Mapping[str, Expected]) -> I
         usual = of[quantity].noise
         if usual is None or (quantity == "accel" and weighed):
             continue  # gravity is the better test
-        low, high = level["density"]
+        low, high = level.density
         if low > _SUSPICIOUS_NOISE_FACTOR * usual[1]:
             shown = low
         elif high is not None and high < usual[0] / _SUSPICIOUS_NOISE_FACTOR:
@@ -323,13 +319,13 @@ def _check_noise(channels: Mapping[str, Level], of: Mapping[str, Expected]) -> I
         else:
             continue
         high = math.inf if high is None else high
-        for unit, factor in mistakes(level["unit"], quantity):
+        for unit, factor in mistakes(level.unit, quantity):
             if (
                 low * factor <= _MAX_EXPLAINED_FACTOR * usual[1]
                 and high * factor >= usual[0] / _MAX_EXPLAINED_FACTOR
             ):
                 data = SuspiciousUnit(
-                    level["unit"],
+                    level.unit,
                     unit,
                     factor,
                     noise=shown,
@@ -353,14 +349,14 @@ def _compare_noise(
         if name in doubted:
             continue
         quantity = quantity_of(name)
-        low, high = level["density"]
+        low, high = level.density
         high = math.inf if high is None else high
         printed = of[quantity].printed
-        timed = level.get("timed", True)
+        timed = level.timed
         near = MAX_FACTOR_FROM_PRINTED if timed else _MAX_FACTOR_WITHOUT_STAMPS
         if printed is not None and (low > near * printed or near * high < printed):
             shown = low if low > printed else high
-            stated_rate = None if timed else level["rate"]
+            stated_rate = None if timed else level.rate
             far = (
                 low > MAX_FACTOR_FROM_PRINTED * printed or MAX_FACTOR_FROM_PRINTED * high < printed
             )
@@ -376,26 +372,27 @@ def _compare_noise(
             shown = low if ratio > 1.0 else high
             explained = (
                 unit
-                for unit, factor in mistakes(level["unit"], quantity)
+                for unit, factor in mistakes(level.unit, quantity)
                 if 1.0 / _MAX_EXPLAINED_AXIS_RATIO < ratio * factor < _MAX_EXPLAINED_AXIS_RATIO
             )
-            data = AxisUnlike(tuple(others), ratio, shown, level["unit"], next(explained, None))
+            data = AxisUnlike(tuple(others), ratio, shown, level.unit, next(explained, None))
             yield find(data, "warning", ratio, name)
 
 
 def _compute_axis_ratio(level: Level, others: Sequence[Level]) -> float | None:
     """Return the ratio of the noise of an axis to two similar ones; None if not suspicious."""
-    if len(others) < 2 or any(axis["density"][1] is None for axis in (level, *others)):
+    low, high = level.density
+    lows = [axis.density[0] for axis in others]
+    highs = [axis.density[1] for axis in others if axis.density[1] is not None]
+    if high is None or not len(others) == len(highs) >= 2:
         return None
-    least = min(axis["density"][0] for axis in others)
-    most = max(axis["density"][1] for axis in others)
-    low, high = level["density"]
+    least, most = min(lows), max(highs)
     if not (least > 0.0 and high > 0.0) or most > _MAX_RATIO_OF_OTHER_AXES * least:
         return None
     if low > _MIN_SUSPICIOUS_AXIS_RATIO * most:
-        return float(low / max(axis["density"][0] for axis in others))
+        return low / max(lows)
     if _MIN_SUSPICIOUS_AXIS_RATIO * high < least:
-        return float(high / min(axis["density"][1] for axis in others))
+        return high / min(highs)
     return None
 
 

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from dataclasses import asdict, fields, replace
+from dataclasses import asdict, dataclass, fields, replace
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pyarrow as pa
@@ -28,10 +27,10 @@ from imubench_pipeline.tables.keys import Key, split_table
 
 def make_allan_rows(key: Key, curve: AllanCurve) -> Iterator[AllanRow]:
     """Yield the rows of the table ``allan``."""
-    for i, limits in enumerate(make_limit_rows(curve)):
+    for i, point in enumerate(make_curve_points(curve)):
         yield AllanRow(
             **asdict(key),
-            **limits,
+            **vars(point),
             cluster_size=int(curve.cluster_size[i]),
             averaged=float(curve.averaged[i]),
             exponent=int(curve.exponent[i]),
@@ -39,19 +38,32 @@ def make_allan_rows(key: Key, curve: AllanCurve) -> Iterator[AllanRow]:
         )
 
 
-def make_limit_rows(curve: AllanCurve) -> Iterator[dict[str, Any]]:
-    """Yield the columns at each tau that all tables of a measured curve share."""
+@dataclass(frozen=True)
+class CurvePoint:
+    """A point of a measured curve: the columns that its tables share."""
+
+    tau: float
+    adev: float
+    lower: float
+    upper: float
+    edf: float
+    edf_upper: float
+    edf_source: str
+
+
+def make_curve_points(curve: AllanCurve) -> Iterator[CurvePoint]:
+    """Yield the points of a measured curve, with 95 % limits."""
     lower, upper = curve.limits(0.95)
     for i, tau in enumerate(curve.tau):
-        yield {
-            "tau": float(tau),
-            "adev": float(curve.deviation[i]),
-            "lower": float(lower[i]),
-            "upper": float(upper[i]),
-            "edf": float(curve.edf[i]),
-            "edf_upper": float(curve.edf_upper[i]),
-            "edf_source": curve.edf_source[i],
-        }
+        yield CurvePoint(
+            tau=float(tau),
+            adev=float(curve.deviation[i]),
+            lower=float(lower[i]),
+            upper=float(upper[i]),
+            edf=float(curve.edf[i]),
+            edf_upper=float(curve.edf_upper[i]),
+            edf_source=curve.edf_source[i],
+        )
 
 
 def make_parameter_rows(

@@ -8,8 +8,7 @@ import tempfile
 import weakref
 from collections.abc import Iterator, Mapping
 from difflib import get_close_matches
-from functools import cached_property, reduce
-from operator import getitem
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -19,7 +18,7 @@ from imubench_pipeline.datasheets.plausibility import implausible_of
 from imubench_pipeline.library.given import Channels, Column, Units, expand_channels, get_dimension
 from imubench_pipeline.library.shown import Shown, Summary, cut
 from imubench_pipeline.readers.inspection import inspect
-from imubench_pipeline.readers.inspection.draft import UNKNOWN
+from imubench_pipeline.readers.inspection.draft import Entry
 from imubench_pipeline.recordings.drop_zone import get_recording_name, get_sensor_name
 from imubench_pipeline.recordings.ingest import ingest_as_planned
 from imubench_pipeline.recordings.kept import Quality
@@ -33,11 +32,11 @@ from imubench_pipeline.settings.quality import QualitySettings
 from imubench_pipeline.settings.sensor import (
     CHANNELS,
     TEMPERATURE,
+    IngestPlan,
     LogFormat,
     RecordingNotes,
     Sensor,
     merged_log,
-    of_ingest,
     quantity_of,
 )
 from imubench_pipeline.settings.validation import ConfigError, parse
@@ -83,7 +82,7 @@ class Log(Shown):
     ) -> None:
         weakref.finalize(self, shutil.rmtree, folder, ignore_errors=True)
         self._logs = open_channel_logs(folder)
-        self._about = quality.row
+        self._about = quality.recording
         self.quality, self.declared = quality, sensor
         self.sensor = self._about.sensor
         self.recording = self._about.recording
@@ -333,15 +332,12 @@ def _ingest(
 ) -> tuple[Path, Quality]:
     """Ingest a log; return the folder of its samples, and its quality."""
     limits = parse(QualitySettings, quality, "quality")
-    settings = of_ingest(log, notes, notes.kind) | {
-        "simulated": False,
-        "quality": limits.model_dump(mode="json"),
-    }
+    settings = IngestPlan(kind=notes.kind, notes=notes, log=log, quality=limits).to_json()
     folder = Path(tempfile.mkdtemp(prefix="imubench."))
     try:
         found = ingest_as_planned(source, json.dumps(settings), *names, folder, guarded=guarded)
-        if found.row.status != "ok":
-            raise RecordingError(str(found.row.reason))
+        if found.recording.status != "ok":
+            raise RecordingError(str(found.recording.reason))
     except BaseException:
         shutil.rmtree(folder, ignore_errors=True)
         raise
@@ -382,25 +378,18 @@ def _load_sensor(
 def _draft_sensor(source: Path, rate: float | str | None, units: Units | None) -> Sensor:
     """Return a sensor file drafted from a log, completed by the rate and units of the user."""
     inspection = inspect(source)
-    sensor = inspection.draft.sensor()
-    log = sensor["log"]
+    stated = units or {}
+    draft = inspection.draft.with_units(
+        lambda channel, _: stated.get(channel) or stated.get(quantity_of(channel))
+    )
     if rate is not None:
-        log["rate"] = f"{parse_setting(rate, 'frequency', 'rate')!r} Hz"
-    for channel, column in log["channels"].items():
-        stated = (units or {}).get(channel) or (units or {}).get(quantity_of(channel))
-        if stated is not None:
-            column["unit"] = stated
+        draft.rate = Entry(f"{parse_setting(rate, 'frequency', 'rate')!r} Hz")
     if unknown := [key for key in units or () if key not in (*CHANNELS, "gyro", "accel")]:
         raise ValueError(f"units name {unknown[0]!r}; expected gyro, accel, or a channel")
-    left = [
-        key
-        for key in inspection.draft.unfilled()
-        if reduce(getitem, key.split("."), log) == UNKNOWN
-    ]
-    if left:
+    if left := draft.unfilled():
         raise ValueError(
             f"{source.name}: the log does not say {', '.join(left)}; expected units= or rate= that "
             "do, such as units={'gyro': 'deg/s'}, or sensor= with this, where ? is filled in:\n\n"
             f"{inspection.block}"
         )
-    return parse(Sensor, sensor, f"the sensor file drafted from {source.name}")
+    return parse(Sensor, draft.sensor(), f"the sensor file drafted from {source.name}")

@@ -121,7 +121,7 @@ class TableRow(_Attributes):
     __slots__ = ()
     table: ClassVar[str]
 
-    def columns(self) -> dict[str, Any]:
+    def columns(self) -> dict[str, object]:
         """Return the values by the names of the columns."""
         return {name: getattr(self, name) for name in names_of(type(self))}
 

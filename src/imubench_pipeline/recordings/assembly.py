@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +14,7 @@ from numpy.typing import NDArray
 
 from imubench_pipeline.recordings import timebase
 from imubench_pipeline.recordings.parts import Part
-from imubench_pipeline.recordings.recording import BESIDE, LogWriter
+from imubench_pipeline.recordings.recording import BESIDE, LogMetadata, LogWriter, SampleCounts
 from imubench_pipeline.settings.quality import QualitySettings
 from imubench_pipeline.settings.sensor import quantity_of
 from imubench_pipeline.tables import open_parquet, read_row_group
@@ -39,7 +40,7 @@ def assemble(
     parts: list[Part],
     base: timebase.TimeBase,
     settings: QualitySettings,
-    metadata: dict[str, Any],
+    metadata: LogMetadata,
     path: Path,
 ) -> tuple[Path, dict[str, int]]:
     """Write the columns of files that share a clock to ``path``, unless one can be used unchanged.
@@ -47,7 +48,7 @@ def assemble(
     Return the path, and the samples of each column that are left out because they repeat a stamp.
     """
     for part in parts:
-        part.writer.finish(metadata)
+        part.writer.finish(asdict(metadata))
     if len(parts) == 1 and base.uniform:
         return parts[0].data, {}
     repeated: dict[str, int] = {}
@@ -74,7 +75,7 @@ def assemble(
                     left = int(np.isfinite(block[name][~keep]).sum())
                     repeated[name] = repeated.get(name, 0) + left
                 writer.write({name: values[keep] for name, values in block.items()})
-        writer.finish(metadata)
+        writer.finish(asdict(metadata))
     return path, repeated
 
 
@@ -95,7 +96,7 @@ def _read_columns(parts: list[Part]) -> Iterator[dict[str, NDArray[Any]]]:
 
 def count_samples(
     path: Path, parts: list[Part], repeated: Mapping[str, int]
-) -> dict[str, dict[str, int]]:
+) -> dict[str, SampleCounts]:
     """Return how many samples of each column are used and left out, by reason (see `assemble`).
 
     Raises RuntimeError if the numbers do not add up, which is an error of this program.
@@ -109,13 +110,13 @@ def count_samples(
     counts = {}
     for part in parts:
         for name, column in part.columns.items():
-            counts[name] = {
-                "present": column.present,
-                "used": used[name],
-                "knocks": part.knocks.get(name, 0),
-                "repeated": repeated.get(name, 0),
-            }
-            present, *elsewhere = counts[name].values()
-            if present != sum(elsewhere):
-                raise RuntimeError(f"samples were lost or invented: {name} {counts[name]}")
+            count = SampleCounts(
+                present=column.present,
+                used=used[name],
+                knocks=part.knocks.get(name, 0),
+                repeated=repeated.get(name, 0),
+            )
+            if count.present != count.used + count.knocks + count.repeated:
+                raise RuntimeError(f"samples were lost or invented: {name} {count}")
+            counts[name] = count
     return counts

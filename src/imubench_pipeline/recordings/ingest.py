@@ -2,33 +2,46 @@
 
 from __future__ import annotations
 
-import json
 import shutil
 import tempfile
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import suppress
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 from threading import Event
-from typing import Any
 
+from imubench_pipeline.model.recordings import RecordingRow
 from imubench_pipeline.readers import log_files, read
 from imubench_pipeline.readers.content import recognise_folder
-from imubench_pipeline.recordings import timebase
-from imubench_pipeline.recordings.assembly import assemble, count_samples, name_parquet_files
+from imubench_pipeline.recordings import assembly, timebase
 from imubench_pipeline.recordings.availability import check_opening, watch_log
-from imubench_pipeline.recordings.kept import Quality, identify_files
+from imubench_pipeline.recordings.kept import AnalysedChannel, KeptFile, Quality, identify_files
 from imubench_pipeline.recordings.known_logs import KnownFile, identify_log_files, write_known
 from imubench_pipeline.recordings.parts import Part, leave_out_knocks, read_part
 from imubench_pipeline.recordings.quality.columns import check_columns
 from imubench_pipeline.recordings.quality.copies import find_copied_channels
 from imubench_pipeline.recordings.quality.levels import summarise_level
 from imubench_pipeline.recordings.quality.rotation import GravityTurn, detect_gravity_turn
-from imubench_pipeline.recordings.recording import BESIDE, list_log_files, open_channel_logs
+from imubench_pipeline.recordings.recording import (
+    BESIDE,
+    LogMetadata,
+    LogNames,
+    SampleCounts,
+    SourceFile,
+    list_log_files,
+    open_channel_logs,
+)
 from imubench_pipeline.recordings.separation import separate_clocks
+from imubench_pipeline.settings.experiments import AT_REST
 from imubench_pipeline.settings.quality import QualitySettings
-from imubench_pipeline.settings.sensor import TEMPERATURE, LogFormat, RecordingNotes, UsedPart
+from imubench_pipeline.settings.sensor import (
+    TEMPERATURE,
+    IngestPlan,
+    LogFormat,
+    RecordingNotes,
+    UsedPart,
+)
 from imubench_pipeline.tables.failures import Failure
 from imubench_pipeline.tables.findings import Finding, RecordingError, UnavailableError, find
 from imubench_pipeline.words.findings import files
@@ -41,24 +54,18 @@ _MAX_TIMES = 5  # of knocks that are listed
 class Ingested:
     """The stored data of a recording."""
 
-    summary: dict[str, Any]  # a row of the table `recordings` without the names
+    row: RecordingRow
     findings: list[Finding]
-    channels: dict[str, dict[str, Any]] = field(default_factory=dict)  # rate, grid, segments, level
-    kept: dict[str, dict[str, Any]] = field(default_factory=dict)  # as of `kept.identify_files`
+    channels: dict[str, AnalysedChannel] = field(default_factory=dict)
+    kept: dict[str, KeptFile] = field(default_factory=dict)
     gravity: GravityTurn | None = None  # how gravity turns against the sensor
     sources: dict[str, KnownFile] | None = None  # of the log, by place; None: not read to the end
 
-    def quality(self, names: dict[str, Any]) -> Quality:
-        """Return the content of ``quality.json``, with the names of the recording."""
-        status = "ok" if self.channels else "rejected"
-        sensor, recording = names["sensor"], names["recording"]
-        return Quality(
-            names | {"status": status} | self.summary,
-            [finding.row(sensor, recording) for finding in self.findings],
-            self.channels,
-            self.kept,
-            gravity=asdict(self.gravity) if self.gravity else None,
-        )
+    def quality(self) -> Quality:
+        """Return the content of ``quality.json``."""
+        row = self.row
+        findings = [finding.row(row.sensor, row.recording) for finding in self.findings]
+        return Quality(row, findings, self.channels, self.kept, gravity=self.gravity)
 
 
 def ingest(
@@ -67,7 +74,7 @@ def ingest(
     notes: RecordingNotes,
     settings: QualitySettings,
     folder: Path,
-    provenance: dict[str, Any],
+    names: LogNames,
 ) -> Ingested:
     """Read a recording and store it as Parquet in ``folder``.
 
@@ -79,10 +86,11 @@ def ingest(
     notes : RecordingNotes
         The part to use, and when it started.
     settings : QualitySettings
-    folder : Path Folder of the Parquet files; files of an earlier run are replaced.
-    provenance : dict
-        Stored unchanged in the metadata of every file. Its ``kind`` says whether the sensor was at
-        rest: knocks and changes are looked for then alone.
+    folder : Path
+        Folder of the Parquet files; files of an earlier run are replaced.
+    names : LogNames
+        Stored in the metadata of every file. The kind says whether the sensor was at rest: knocks
+        and changes are looked for then alone.
 
     Raises
     ------
@@ -96,12 +104,12 @@ def ingest(
     beside, rejected = ThreadPoolExecutor(1), Event()
     sources = beside.submit(identify_log_files, source, rejected.is_set)
     try:
-        whole = _ingest(source, log, notes, settings, folder, scratch, provenance, sources)
+        whole = _ingest(source, log, notes, settings, folder, scratch, names, sources)
         end = max((f.end or 0.0 for f in whole.findings if f.finding == "warm_up"), default=0.0)
         if not (settings.trim_warm_up and end):
             return whole
         later = notes.model_copy(update={"use": UsedPart(start=end, end=notes.use.end)})
-        trimmed = _ingest(source, log, later, settings, folder, scratch, provenance, sources)
+        trimmed = _ingest(source, log, later, settings, folder, scratch, names, sources)
         note = find(files.WarmUpTrimmed(end), "note", end, start=0.0, end=end)
         return replace(trimmed, findings=[note, *trimmed.findings])
     except BaseException:
@@ -127,7 +135,7 @@ def _ingest(
     settings: QualitySettings,
     folder: Path,
     scratch: Path,
-    provenance: dict[str, Any],
+    names: LogNames,
     sources: Future[dict[str, KnownFile]],
 ) -> Ingested:
     parts: list[Part] = []
@@ -142,36 +150,48 @@ def _ingest(
         stamps = part.digest() if len(parts) > 1 else ""
         by_clock.setdefault((stamps, part.rows, base.rate), []).append(index)
     groups = list(by_clock.values())
-    static = provenance.get("kind", "static") == "static"
+    static = names.kind == AT_REST
     findings = _findings(parts, bases, groups, settings, scratch, static=static)
     marked = [part.source.path.name for part in parts if part.source.simulated]
     if marked and notes.simulated is False:
         findings.append(find(files.SimulatedByMark(marked[0]), "warning", len(marked)))
     findings += _unused_files(source, parts)
     unusable = {finding.channel for finding in findings if finding.severity == "fatal"}
-    names = name_parquet_files(parts, groups)
-    simulated = bool(marked or notes.simulated or provenance.get("simulated"))
-    metadata = provenance | {
-        "simulated": simulated,
-        "sources": [
-            {"name": (source / place).name, "size": file.size, "sha256": file.sha256}
+    simulated = bool(marked or notes.simulated or names.simulated)
+    names = replace(names, simulated=simulated)
+    started = notes.started or next((p.source.started for p in parts if p.source.started), None)
+    describe = partial(
+        LogMetadata,
+        **vars(names),
+        sources=tuple(
+            SourceFile((source / place).name, file.size, file.sha256)
             for place, file in sources.result().items()
-        ],
-        "reader": log.reader,
-        "begins": notes.use.start,
-        "started": notes.started
-        or next((p.source.started for p in parts if p.source.started), None),
-    }
-    left_out = {"unusable": sorted(channel for channel in unusable if channel)}
+        ),
+        reader=log.reader,
+        begins=notes.use.start,
+        started=started,
+        unusable=tuple(sorted(channel for channel in unusable if channel)),
+    )
     written: list[tuple[Path, Path]] = []
-    counts: dict[str, dict[str, int]] = {}
-    for name, group in zip(names, groups, strict=True):
+    counts: dict[str, SampleCounts] = {}
+    for name, group in zip(assembly.name_parquet_files(parts, groups), groups, strict=True):
         chosen, base = [parts[index] for index in group], bases[group[0]]
-        about = metadata | _of_clock(chosen, base) | left_out
-        assembled, repeated = assemble(chosen, base, settings, about, scratch / name)
-        counts |= count_samples(assembled, chosen, repeated)
+        holes, empty = _find_holes(chosen, base)
+        about = describe(
+            rate=base.rate,
+            rate_from=base.source,
+            rows=base.rows,
+            grid=base.grid,
+            segments=base.segments,
+            uniform=base.uniform,
+            holes=holes,
+            empty=tuple(empty),
+        )
+        assembled, repeated = assembly.assemble(chosen, base, settings, about, scratch / name)
+        counts |= assembly.count_samples(assembled, chosen, repeated)
         written.append((assembled, folder / name))
-    summary = _summary(parts, bases, metadata["started"]) | {"simulated": simulated}
+    about_log = partial(RecordingRow, started=started, power_cycled=notes.power_cycled)
+    row = _complete_row(partial(about_log, **vars(names)), parts, bases)
     if all(channel in unusable for channel in log.channels):
         reasons = ". ".join(f.detail for f in findings if f.severity == "fatal")
         raise RecordingError(f"no channel can be used: {reasons}")
@@ -181,9 +201,12 @@ def _ingest(
     timed = {name for part in parts if part.stamped for name in part.columns}
     units = {str(name): source.unit for name, source in log.channels.items()}
     channels = {
-        name: {"grid": channel.grid, "segments": channel.segments}
-        | counts[name]
-        | summarise_level(column[name], channel.rate, units[name], timed=name in timed)
+        name: AnalysedChannel(
+            grid=channel.grid,
+            segments=channel.segments,
+            **vars(counts[name]),
+            **vars(summarise_level(column[name], channel.rate, units[name], timed=name in timed)),
+        )
         for name, channel in open_channel_logs(folder).items()
     }
     begin = notes.use.start
@@ -192,7 +215,7 @@ def _ingest(
         for f in findings
     ]
     kept = identify_files(list_log_files(folder))
-    return Ingested(summary, findings, channels, kept, _gravity(parts, bases), sources.result())
+    return Ingested(row, findings, channels, kept, _gravity(parts, bases), sources.result())
 
 
 def _unused_files(source: Path, parts: list[Part]) -> list[Finding]:
@@ -242,8 +265,8 @@ def _findings(
     return findings
 
 
-def _of_clock(parts: list[Part], base: timebase.TimeBase) -> dict[str, Any]:
-    """Return the metadata of a file of samples about its time base and holes."""
+def _find_holes(parts: list[Part], base: timebase.TimeBase) -> tuple[dict[str, bool], list[str]]:
+    """Return which columns lack samples, and the columns beside the channels without any."""
     holes, empty = {}, []
     for part in parts:
         for name, column in part.columns.items():
@@ -251,16 +274,7 @@ def _of_clock(parts: list[Part], base: timebase.TimeBase) -> dict[str, Any]:
             holes[name] = any(lacks)
             if name in BESIDE and not column.present:
                 empty.append(name)
-    return {
-        "rate": base.rate,
-        "rate_from": base.source,
-        "rows": base.rows,
-        "grid": base.grid,
-        "segments": [list(segment) for segment in base.segments],
-        "uniform": base.uniform,
-        "holes": holes,
-        "empty": empty,
-    }
+    return holes, empty
 
 
 def _gravity(parts: list[Part], bases: list[timebase.TimeBase]) -> GravityTurn | None:
@@ -300,24 +314,24 @@ def _base(part: Part, log: LogFormat, settings: QualitySettings) -> timebase.Tim
         raise RecordingError(f"{part.source.path.name}: {error}") from None
 
 
-def _summary(
-    parts: list[Part], bases: list[timebase.TimeBase], started: str | None
-) -> dict[str, Any]:
+def _complete_row(
+    row: partial[RecordingRow], parts: list[Part], bases: list[timebase.TimeBase]
+) -> RecordingRow:
     measured = [i for i, part in enumerate(parts) if set(part.columns) - BESIDE]
     longest = max(measured, key=lambda index: bases[index].rows)
     base = bases[longest]
     readings = [part.columns[TEMPERATURE] for part in parts if TEMPERATURE in part.columns][:1]
     temperature = next((column for column in readings if column.present), None)
-    return {
-        "started": started,
-        "rate": base.rate,
-        "rate_from": base.source,
-        "rate_error": base.rate_error,
-        "samples": base.samples,
-        "duration": base.grid / base.rate,
-        "temperature_min": temperature.low if temperature else None,
-        "temperature_max": temperature.high if temperature else None,
-    }
+    return row(
+        status="ok",
+        rate=base.rate,
+        rate_from=base.source,
+        rate_error=base.rate_error,
+        samples=base.samples,
+        duration=base.grid / base.rate,
+        temperature_min=temperature.low if temperature else None,
+        temperature_max=temperature.high if temperature else None,
+    )
 
 
 def ingest_as_planned(
@@ -343,35 +357,38 @@ def ingest_as_planned(
     UnavailableError
         If the log cannot be read now, for a reason outside of it.
     """
-    plan = json.loads(settings)
-    notes = RecordingNotes.model_validate(plan.get("notes", {}))
-    names = {"sensor": sensor, "device": notes.device or recording, "recording": recording}
-    names |= {"kind": plan.get("kind", "static")}
-    provenance = names | {"simulated": _stated_simulated(plan)}
-    if "unavailable" in plan:
-        raise UnavailableError(plan["unavailable"])
+    plan = IngestPlan.model_validate_json(settings)
+    notes = plan.notes or RecordingNotes()
+    names = _name_recording(plan, sensor, recording)
+    if plan.unavailable is not None:
+        raise UnavailableError(plan.unavailable)
     sources: dict[str, KnownFile] = {}
     try:
-        if "error" in plan:
-            raise RecordingError(plan["error"])
-        log = LogFormat.model_validate(plan["log"])
-        limits = QualitySettings.model_validate(plan["quality"])
-        with watch_log(source, plan.get("files", ())) as is_same:
+        if plan.log is None:
+            raise RecordingError(plan.error or "")
+        with watch_log(source, plan.files or ()) as is_same:
             if guarded:
-                check_opening(source, log, limits.opening)
-            ingested = ingest(source, log, notes, limits, folder, provenance)
+                check_opening(source, plan.log, plan.quality.opening)
+            ingested = ingest(source, plan.log, notes, plan.quality, folder, names)
         sources = ingested.sources or {}
         if not is_same():  # the samples and the digest may be from two logs
             sources = {name: file.distrusted() for name, file in sources.items()}
     except RecordingError as error:
         remove_kept(folder)
-        ingested = rejected(error, notes)
-        if "files" in plan:
+        row = RecordingRow(
+            **vars(names),
+            started=notes.started,
+            power_cycled=notes.power_cycled,
+            status="rejected",
+            reason=str(error),
+        )
+        ingested = Ingested(row, [find(files.Rejected(str(error)), "fatal", 1)])
+        if plan.files is not None:
             with suppress(OSError):  # a path that cannot be listed at all
                 sources = identify_log_files(source, lambda: True)  # no digests of large files
-    if versions := plan.get("files"):
-        write_known(sources, folder, versions)
-    return ingested.quality(provenance | {"power_cycled": notes.power_cycled})
+    if plan.files:
+        write_known(sources, folder, plan.files)
+    return ingested.quality()
 
 
 def write_failed(settings: str, failure: Failure, path: Path) -> None:
@@ -379,29 +396,21 @@ def write_failed(settings: str, failure: Failure, path: Path) -> None:
 
     `settings` are as of `ingest_as_planned`, `failure` is the reason, `path` the file.
     """
-    plan = json.loads(settings)
-    notes = plan.get("notes", {})
-    recording = {
-        "sensor": failure.sensor,
-        "device": notes.get("device") or failure.recording,
-        "recording": failure.recording,
-        "kind": plan.get("kind", "static"),
-        "simulated": _stated_simulated(plan),
-        "status": "failed",
-        "started": notes.get("started"),
-        "reason": failure.reason,
-    }
-    finding = failure.finding().row(failure.sensor, str(failure.recording))
+    plan = IngestPlan.model_validate_json(settings)
+    names = _name_recording(plan, failure.sensor, str(failure.recording))
+    started = plan.notes.started if plan.notes else None
+    row = RecordingRow(**vars(names), started=started, status="failed", reason=failure.reason)
+    finding = failure.finding().row(names.sensor, names.recording)
     remove_kept(path.parent)
-    Quality(recording, [finding], {}, {}, asdict(failure)).write(path)
+    Quality(row, [finding], {}, {}, failure).write(path)
 
 
-def _stated_simulated(plan: dict[str, Any]) -> bool:
-    """Return whether the recording is simulated, by the run or by the notes beside its log."""
-    return bool(plan["simulated"] or plan.get("notes", {}).get("simulated"))
-
-
-def rejected(error: RecordingError, notes: RecordingNotes) -> Ingested:
-    """Return the results of a recording that cannot be used."""
-    summary = {"started": notes.started, "reason": str(error)}
-    return Ingested(summary, [find(files.Rejected(str(error)), "fatal", 1)])
+def _name_recording(plan: IngestPlan, sensor: str, recording: str) -> LogNames:
+    notes = plan.notes or RecordingNotes()
+    return LogNames(
+        sensor=sensor,
+        device=notes.device or recording,
+        recording=recording,
+        kind=plan.kind,
+        simulated=plan.simulated or bool(notes.simulated),
+    )

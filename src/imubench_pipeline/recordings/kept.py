@@ -3,22 +3,45 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass
+from functools import cache
 from pathlib import Path
-from typing import Any
+
+from pydantic import TypeAdapter
 
 from imubench_pipeline.model.recordings import FindingRow, RecordingRow
+from imubench_pipeline.recordings.quality.levels import Level
+from imubench_pipeline.recordings.quality.rotation import GravityTurn
 from imubench_pipeline.recordings.recording import (
     MEND,
     ChannelLog,
+    SampleCounts,
     list_log_files,
     open_channel_logs,
     was_at_rest,
 )
 from imubench_pipeline.tables.digests import compute_digest, read_sealed_json, write_sealed_json
+from imubench_pipeline.tables.failures import Failure
 from imubench_pipeline.tables.findings import RecordingError
 from imubench_pipeline.tables.parquet import read_footer
+
+
+@dataclass(frozen=True, kw_only=True)
+class AnalysedChannel(Level, SampleCounts):
+    """Level, grid and segments of a channel, and its numbers of samples."""
+
+    grid: int
+    segments: tuple[tuple[int, int], ...]
+
+
+@dataclass(frozen=True)
+class KeptFile:
+    """A file of samples: size, digest of its metadata, and digest."""
+
+    size: int
+    footer: str
+    sha256: str
 
 
 @dataclass(frozen=True)
@@ -28,31 +51,24 @@ class Quality:
     It has the digests of the samples, so that the results are computed again where these change.
     """
 
-    recording: dict[str, Any]
+    recording: RecordingRow
     findings: list[FindingRow]
-    channels: dict[str, dict[str, Any]]
-    kept: dict[str, dict[str, Any]] | None = None  # samples, as `identify_files` gives them
-    failure: dict[str, Any] | None = None  # why the ingest failed (`tables.failures.Failure`)
-    gravity: dict[str, Any] | None = None  # how gravity turns (`quality.rotation.GravityTurn`)
-
-    @property
-    def row(self) -> RecordingRow:
-        """The row of the table ``recordings``."""
-        return RecordingRow(**self.recording)
+    channels: Mapping[str, AnalysedChannel]
+    kept: Mapping[str, KeptFile] | None = None  # the files of samples; None: not known
+    failure: Failure | None = None  # why the ingest failed
+    gravity: GravityTurn | None = None  # how gravity turns against the sensor
 
     @property
     def grids(self) -> dict[str, int]:
         """Number of samples of each analysed channel, including missing ones."""
-        return {channel: int(about["grid"]) for channel, about in self.channels.items()}
+        return {name: channel.grid for name, channel in self.channels.items()}
 
     @classmethod
     def read(cls, path: Path) -> Quality:
         """Read the file that `write` wrote; raise RecordingError if it is damaged."""
         try:
-            content = read_sealed_json(path)
-            content["findings"] = [FindingRow.from_json(row) for row in content.get("findings", ())]
-            return cls(**content)
-        except (ValueError, TypeError) as error:  # other letters, or other keys
+            return _make_adapter().validate_python(read_sealed_json(path))
+        except ValueError as error:  # other letters, or other keys
             raise RecordingError(f"{path}: was changed after the ingest: {MEND}") from error
 
     def write(self, path: Path) -> None:
@@ -68,10 +84,10 @@ class Quality:
         for name, stated in (self.kept or {}).items():
             path = folder / name
             try:
-                if path.stat().st_size != stated["size"]:
-                    wrong = f"has {path.stat().st_size} bytes instead of {stated['size']}"
-                elif _footer(path) != stated["footer"] or (
-                    whole and compute_digest(path) != stated["sha256"]
+                if path.stat().st_size != stated.size:
+                    wrong = f"has {path.stat().st_size} bytes instead of {stated.size}"
+                elif _footer(path) != stated.footer or (
+                    whole and compute_digest(path) != stated.sha256
                 ):
                     wrong = "was changed after the ingest"
                 else:
@@ -84,6 +100,11 @@ class Quality:
         return None
 
 
+@cache
+def _make_adapter() -> TypeAdapter[Quality]:
+    return TypeAdapter(Quality)
+
+
 def describe_outcome(results: Path, sensor: str, recording: str) -> str:
     """Return the outcome of a recording in one line: used, with doubts, or rejected."""
     name = f"{sensor}/{recording}"
@@ -91,7 +112,7 @@ def describe_outcome(results: Path, sensor: str, recording: str) -> str:
         quality = Quality.read(results / "recordings" / sensor / recording / "quality.json")
     except (OSError, RecordingError) as error:
         return f"{name}: {error}"
-    about = quality.row
+    about = quality.recording
     if about.status != "ok" or about.duration is None:
         return f"{name}: {about.status}: {about.reason}"
     kinds = dict.fromkeys(
@@ -102,14 +123,10 @@ def describe_outcome(results: Path, sensor: str, recording: str) -> str:
     return told + (f"; in doubt: {', '.join(kinds)}" if kinds else "")
 
 
-def identify_files(paths: Iterable[Path]) -> dict[str, dict[str, Any]]:
-    """Return size, digest, and digest of the metadata of Parquet files, by name."""
+def identify_files(paths: Iterable[Path]) -> dict[str, KeptFile]:
+    """Return size and digests of Parquet files, by name."""
     return {
-        path.name: {
-            "size": path.stat().st_size,
-            "footer": _footer(path),
-            "sha256": compute_digest(path),
-        }
+        path.name: KeptFile(path.stat().st_size, _footer(path), compute_digest(path))
         for path in paths
     }
 

@@ -17,6 +17,8 @@ from contextlib import closing
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
+from pydantic import TypeAdapter
+
 from imubench_pipeline.readers import log_files
 from imubench_pipeline.readers.holes import FileWithoutHoles
 from imubench_pipeline.recordings.drop_zone import Recording
@@ -71,10 +73,8 @@ class KnownFile:
 def read_known(folder: Path) -> dict[str, KnownFile] | None:
     """Read the file identities of the last ingest of a recording; None if there are none."""
     with contextlib.suppress(OSError, ValueError, TypeError, KeyError):
-        return {
-            name: KnownFile(**{**file, "stamps": file["stamps"] and tuple(file["stamps"])})
-            for name, file in digests.read_sealed_json(folder / KNOWN)["files"].items()
-        }
+        files = digests.read_sealed_json(folder / KNOWN)["files"]
+        return TypeAdapter(dict[str, KnownFile]).validate_python(files)
     return None
 
 

@@ -7,9 +7,8 @@ of the file on: holes have their length, pauses between segments have none.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pyarrow.parquet as pq
@@ -54,19 +53,17 @@ def overview(folder: Path, sensor: str, recording: str, buckets: int | None = No
     for path in kept.list_log_files(folder):
         if TEMPERATURE in pq.read_schema(path).names:
             about = kept.read_metadata(path)
-            logs.append(
-                kept.ChannelLog(path, TEMPERATURE, about["rate"], about["grid"], (), holes=True)
-            )
+            logs.append(kept.ChannelLog(path, TEMPERATURE, about.rate, about.grid, (), holes=True))
     if buckets is None:
         buckets = BUCKETS if kept.was_at_rest(folder) else BUCKETS_OF_TURNS
     for log in logs:
-        names = asdict(Key(sensor, recording, log.channel))
+        key = Key(sensor, recording, log.channel)
         edges = bucket_edges(log.grid, buckets)
         figures, drawn = _follow(log, edges)
         if len(drawn) == 0:
             continue
-        times = edges / log.rate + kept.read_metadata(log.path).get("begins", 0.0)
-        result.envelope.extend(EnvelopeRow(**names, **row) for row in envelope_rows(times, figures))
+        times = edges / log.rate + kept.read_metadata(log.path).begins
+        result.envelope.extend(envelope_rows(key, times, figures))
         if log.channel != TEMPERATURE:
             low, high = float(figures[:, _LOW].min()), float(figures[:, _HIGH].max())
             limits = bin_edges(drawn, low, high)
@@ -75,7 +72,7 @@ def overview(folder: Path, sensor: str, recording: str, buckets: int | None = No
                 _count(values, limits, counts)
             bins = zip(limits[:-1].tolist(), limits[1:].tolist(), counts.tolist(), strict=True)
             result.histogram.extend(
-                HistogramRow(**names, lower=a, upper=b, count=n) for a, b, n in bins
+                HistogramRow(**asdict(key), lower=a, upper=b, count=n) for a, b, n in bins
             )
     return result
 
@@ -108,15 +105,14 @@ def _follow(log: kept.ChannelLog, edges: NDArray[np.int64]) -> tuple[Array, Arra
     return figures, np.concatenate(drawn)
 
 
-def envelope_rows(times: Array, figures: Array) -> Iterator[dict[str, Any]]:
+def envelope_rows(key: Key, times: Array, figures: Array) -> Iterator[EnvelopeRow]:
     """Yield rows of ``envelope``: times of edges, s, shape (b + 1,), figures as in `no_figures`."""
     spans = zip(times[:-1].tolist(), times[1:].tolist(), figures.tolist(), strict=True)
     for start, end, (low, high, total, present) in spans:
-        row = {"start": start, "end": end, "samples": int(present)}
+        row = EnvelopeRow(**asdict(key), start=start, end=end, samples=int(present))
         # Rounding can put the mean of equal samples beside them.
         mean = min(max(total / present, low), high) if present else None
-        extremes = {"low": low, "high": high} if present else {"low": None, "high": None}
-        yield row | extremes | {"mean": mean}
+        yield replace(row, low=low, high=high, mean=mean) if present else row
 
 
 def bin_edges(drawn: Array, low: float, high: float) -> Array:

@@ -18,8 +18,10 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
+from pydantic import TypeAdapter
 
 from imubench_pipeline.readers.arrays.arrow import METADATA
+from imubench_pipeline.settings.experiments import AT_REST
 from imubench_pipeline.settings.sensor import POSITION, TABLE_RATE, TEMPERATURE
 from imubench_pipeline.tables import open_parquet, read_row_group
 from imubench_pipeline.tables.findings import RecordingError
@@ -30,6 +32,58 @@ MEND = "remove it, and the next run reads the log again"
 
 BESIDE = frozenset({TEMPERATURE, POSITION, TABLE_RATE})  # columns that are no channels
 _NOT_CHANNELS = BESIDE | {"time", "sample"}
+
+
+@dataclass(frozen=True, kw_only=True)
+class LogNames:
+    """The recording of a file of samples."""
+
+    sensor: str = ""
+    device: str = ""
+    recording: str = ""
+    kind: str = AT_REST
+    simulated: bool = False
+
+
+@dataclass(frozen=True)
+class SourceFile:
+    """A file of a log."""
+
+    name: str
+    size: int | None
+    sha256: str | None
+
+
+@dataclass(frozen=True, kw_only=True)
+class LogMetadata(LogNames):
+    """Metadata of a file of samples, on one clock."""
+
+    sources: tuple[SourceFile, ...] = ()
+    reader: str | None = None
+    begins: float = 0.0  # of the part used, s from the first sample
+    started: str | None = None
+    rate: float  # Hz
+    rate_from: str = ""
+    rows: int = 0
+    grid: int
+    segments: tuple[tuple[int, int], ...]
+    uniform: bool = True
+    holes: Mapping[str, bool]
+    empty: tuple[str, ...] = ()
+    unusable: tuple[str, ...] = ()
+
+
+_METADATA_ADAPTER = TypeAdapter(LogMetadata)  # once: it takes milliseconds
+
+
+@dataclass(frozen=True, kw_only=True)
+class SampleCounts:
+    """Samples of a column: present in the log, used, and left out."""
+
+    present: int
+    used: int
+    knocks: int
+    repeated: int
 
 
 class LogWriter(AbstractContextManager["LogWriter"]):
@@ -174,11 +228,10 @@ def average_blocks(blocks: Iterable[Array]) -> float:
     return total / number if number else math.nan
 
 
-def read_metadata(path: Path) -> dict[str, Any]:
+def read_metadata(path: Path) -> LogMetadata:
     """Return the metadata that `LogWriter.finish` wrote."""
     metadata = pq.read_metadata(path).metadata or {}
-    data: dict[str, Any] = json.loads(metadata[METADATA])
-    return data
+    return _METADATA_ADAPTER.validate_json(metadata[METADATA])
 
 
 def list_log_files(folder: Path) -> list[Path]:
@@ -193,9 +246,7 @@ def open_static_logs(folder: Path) -> dict[str, ChannelLog]:
 
 def was_at_rest(folder: Path) -> bool:
     """Return whether the sensor of an ingested recording is stated to be at rest all the time."""
-    return all(
-        read_metadata(path).get("kind", "static") == "static" for path in list_log_files(folder)
-    )
+    return all(read_metadata(path).kind == AT_REST for path in list_log_files(folder))
 
 
 def open_channel_logs(folder: Path) -> dict[str, ChannelLog]:
@@ -204,17 +255,17 @@ def open_channel_logs(folder: Path) -> dict[str, ChannelLog]:
     for path in list_log_files(folder):
         metadata = read_metadata(path)
         columns = pq.read_schema(path).names
-        beside = set(columns) - set(metadata.get("empty", ()))  # without one reading
+        beside = set(columns) - set(metadata.empty)  # without one reading
         for channel in columns:
-            if channel in _NOT_CHANNELS or channel in metadata["unusable"]:
+            if channel in _NOT_CHANNELS or channel in metadata.unusable:
                 continue
             logs[channel] = ChannelLog(
                 path,
                 channel,
-                metadata["rate"],
-                metadata["grid"],
-                tuple((start, stop) for start, stop in metadata["segments"]),
-                bool(metadata["holes"].get(channel, True)),
+                metadata.rate,
+                metadata.grid,
+                metadata.segments,
+                metadata.holes.get(channel, True),
                 TEMPERATURE in beside,
                 POSITION in beside,
                 TABLE_RATE in beside,

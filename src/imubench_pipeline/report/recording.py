@@ -10,7 +10,11 @@ from imubench_pipeline.model.comparisons import CoverageRow
 from imubench_pipeline.model.estimates import BacktestRow, EnvelopeRow, HistogramRow, ModelSampleRow
 from imubench_pipeline.model.table import R
 from imubench_pipeline.recordings.kept import Quality
-from imubench_pipeline.recordings.recording import list_log_files, read_metadata
+from imubench_pipeline.recordings.recording import (
+    LogMetadata,
+    list_log_files,
+    read_metadata,
+)
 from imubench_pipeline.registry import Hook
 from imubench_pipeline.report import thermal
 from imubench_pipeline.report.datasheets import compare_with_datasheet, format_curve_distances
@@ -276,18 +280,19 @@ def describe_recording(
     site: Site, view: RecordingView, channels: Sequence[ChannelView], folder: Path
 ) -> Mapping[str, object]:
     """Return the common context of the pages of recordings; ``folder`` is the recording's."""
+    metadata = load_metadata(folder)
     return {
         "view": view,
         "name": site.names[view.sensor],
         "sensor_page": site.sensor_page(view.sensor),
-        "provenance": list(_list_provenance(view, channels, folder)),
-        "sources": load_metadata(folder).get("sources", []),
+        "provenance": list(_list_provenance(view, channels, metadata)),
+        "sources": metadata.sources if metadata else (),
         "figures_command": None,
     }
 
 
-def load_metadata(folder: Path) -> Mapping[str, Any]:
-    """Return the metadata of the log in a folder of a recording; empty without them.
+def load_metadata(folder: Path) -> LogMetadata | None:
+    """Return the metadata of the log in a folder of a recording; None without samples.
 
     Raises RecordingError if it is not there any more, or not as the ingest left it.
     """
@@ -295,20 +300,20 @@ def load_metadata(folder: Path) -> Mapping[str, Any]:
     if quality.is_file() and (fault := Quality.read(quality).fault(folder)):
         raise RecordingError(fault)
     paths = list_log_files(folder)
-    return read_metadata(paths[0]) if paths else {}
+    return read_metadata(paths[0]) if paths else None
 
 
 def _list_provenance(
-    view: RecordingView, channels: Sequence[ChannelView], folder: Path
+    view: RecordingView, channels: Sequence[ChannelView], metadata: LogMetadata | None
 ) -> Iterator[tuple[str, str]]:
-    """Yield the origin of a recording, as names and texts; ``folder`` is the recording's."""
-    row, metadata = view.row, load_metadata(folder)
+    """Yield the origin of a recording, as names and texts."""
+    row = view.row
     yield "Recording", f"{row.sensor} / {row.recording}"
     yield "Device", str(row.device)
     yield "Kind", row.kind.replace("_", " ") + (", simulated" if row.simulated else "")
     yield "Started", started_text(row.started) or "not stated in the log"
-    if "reader" in metadata:
-        yield "Format", str(metadata["reader"] or "detected from the content")
+    if metadata is not None:
+        yield "Format", metadata.reader or "detected from the content"
     if row.rate is not None:
         error = ""
         if row.rate_error is not None and row.rate_error > _MAX_HIDDEN_RATE_ERROR * row.rate:
@@ -320,7 +325,7 @@ def _list_provenance(
             yield "Rate per channel", ", ".join(f"{name} {rate} Hz" for name, rate in rates.items())
     if row.samples is not None:
         yield "Samples", f"{row.samples:,}".replace(",", " ")
-    if (segments := len(metadata.get("segments", []))) > 1:
-        yield "Segments", str(segments)
+    if metadata is not None and len(metadata.segments) > 1:
+        yield "Segments", str(len(metadata.segments))
     for truth in {parameter.source for channel in channels for parameter in channel.truth.values()}:
         yield "Simulated from", truth

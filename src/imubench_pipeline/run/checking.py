@@ -11,10 +11,11 @@ from imubench_pipeline.estimators.frame import MIN_BINS, select_for_fit
 from imubench_pipeline.estimators.likelihood import fit_models
 from imubench_pipeline.estimators.spectral_findings import spectral_findings
 from imubench_pipeline.estimators.spectrum import compute_spectra
+from imubench_pipeline.model.recordings import RecordingRow
 from imubench_pipeline.recordings.drop_zone import Recording
 from imubench_pipeline.recordings.ingest import ingest_as_planned
 from imubench_pipeline.recordings.kept import Quality
-from imubench_pipeline.recordings.recording import ChannelLog, open_static_logs
+from imubench_pipeline.recordings.recording import ChannelLog, LogNames, open_static_logs
 from imubench_pipeline.report.run_summary import fold_text
 from imubench_pipeline.run.plan import Plan
 from imubench_pipeline.settings.config import AllanSettings
@@ -34,7 +35,9 @@ def check(plan: Plan) -> Iterator[tuple[str, str, Quality]]:
         except Exception as error:  # the others are checked all the same
             reason = fold_text(f"{recording.path.name}: {describe_error(error)}")
             failure = Failure(sensor, name, "check", "error", reason)
-            quality = Quality({"status": "failed"}, [failure.finding().row(sensor, name)], {})
+            names = LogNames(sensor=sensor, device=name, recording=name)
+            row = RecordingRow(**vars(names), status="failed")
+            quality = Quality(row, [failure.finding().row(sensor, name)], {})
         yield sensor, name, quality
 
 

@@ -245,7 +245,7 @@ def _check(options: argparse.Namespace) -> int:
         over: dict[str, object] = {"logs": str(options.logs), "simulated": None}
         if options.sensors:
             over["sensors"] = str(options.sensors)
-        plan = Plan(read_config(options.config) | over)
+        plan = Plan({**read_config(options.config), **over})
         if not plan.recordings:
             raise ConfigError(f"{options.logs}: no log found; expected <sensor>/<recording> in it")
     except ConfigError as error:
@@ -257,10 +257,10 @@ def _check(options: argparse.Namespace) -> int:
     for sensor, recording, quality in check(plan):
         serious = any(finding.severity != "note" for finding in quality.findings)
         worst = max(worst, int(serious))
-        status = quality.recording["status"]
-        status = "warnings" if status == "ok" and serious else status
-        simulated = ", simulated" * bool(quality.recording.get("simulated"))
-        print(f"{sensor}/{recording}: {status}{simulated}")
+        status = quality.recording.status
+        shown = "warnings" if status == "ok" and serious else status
+        simulated = ", simulated" * quality.recording.simulated
+        print(f"{sensor}/{recording}: {shown}{simulated}")
         for finding in quality.findings:
             line = f"  {finding.severity:8} {finding.finding}: {escape_invisible(finding.detail)}"
             if sys.stdout.isatty():  # elsewhere one line each, for programs such as grep

@@ -11,7 +11,7 @@ import os
 import re
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict, replace
-from functools import cached_property
+from functools import cached_property, partial
 from itertools import chain
 from pathlib import Path
 from typing import Any
@@ -157,16 +157,18 @@ class Plan:
     def ingest_settings(self, sensor: str, name: str) -> str:
         """Return the settings of the ingest of a recording, or its error if it cannot be read."""
         if (sensor, name) not in self._of_ingest:
-            self._of_ingest[sensor, name] = to_json(self._ingest(self.recordings[sensor, name]))
+            self._of_ingest[sensor, name] = to_json(
+                self._ingest(self.recordings[sensor, name]).to_json()
+            )
         return self._of_ingest[sensor, name]
 
-    def _ingest(self, recording: Recording) -> dict[str, object]:
-        kind = self.kind(recording.sensor, recording.name)
-        settings: dict[str, object] = {
-            "simulated": recording.simulated,
-            "kind": kind,
-            "quality": self.run.quality,
-        }
+    def _ingest(self, recording: Recording) -> sensor_files.IngestPlan:
+        plan = partial(
+            sensor_files.IngestPlan,
+            simulated=recording.simulated,
+            kind=self.kind(recording.sensor, recording.name),
+            quality=self.run.quality,
+        )
         try:
             log, notes = self._written(recording)
             if recording.simulated:
@@ -177,11 +179,11 @@ class Plan:
                 except ValueError as error:
                     raise ConfigError(f"{recording.notes}: {error}") from None
             files = plan_recording_versions(recording, self.run.results)
-            return settings | sensor_files.of_ingest(log, notes, kind) | {"files": files}
+            return plan(log=log, notes=notes, files=files)
         except UnavailableSettingsError as error:
-            return settings | {"unavailable": self._without_folders(str(error))}
+            return plan(unavailable=self._without_folders(str(error)))
         except ConfigError as error:
-            return settings | {"error": self._without_folders(str(error))}
+            return plan(error=self._without_folders(str(error)))
 
     def _without_folders(self, reason: str) -> str:
         """Return a reason without absolute paths, for tables."""

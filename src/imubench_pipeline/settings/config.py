@@ -6,9 +6,9 @@ import json
 import re
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any, Literal, TypeVar
+from typing import Annotated, Literal, TypeVar
 
-from pydantic import BaseModel, BeforeValidator, Field, field_validator
+from pydantic import BaseModel, BeforeValidator, Field, JsonValue, field_validator
 
 from imubench_pipeline.settings.experiments import WithBlocks, with_blocks
 from imubench_pipeline.settings.quality import QualitySettings
@@ -26,6 +26,7 @@ from imubench_pipeline.settings.validation import (
     parse,
 )
 from imubench_pipeline.settings.yaml_files import read_settings, read_yaml
+from imubench_pipeline.typing import JsonObject
 
 _SIMULATED_RECORDINGS_FILE = Path("config/simulated.yaml")
 _SECTIONS_WITHOUT_RECORDING = {"held_back", "exports", "limits", "report"}
@@ -277,7 +278,7 @@ def read_run(config: Mapping[str, object], file: str = "config/config.yaml or --
     return parse(Run, config, file)
 
 
-def read_config(file: Path) -> dict[str, Any]:
+def read_config(file: Path) -> JsonObject:
     """Return the unchecked settings of a configuration; empty if it does not exist.
 
     Raises ConfigError if it is not YAML, or has no keys.
@@ -305,9 +306,9 @@ def given_beside(run: Run, file: Path) -> list[str]:
     return [f"{key}={_as_given(value)}" for key, value in _differing(in_run, in_file).items()]
 
 
-def _differing(settings: Mapping[str, Any], other_settings: Mapping[str, Any]) -> dict[str, Any]:
+def _differing(settings: JsonObject, other_settings: JsonObject) -> dict[str, JsonValue]:
     """Return the settings that are missing or different in the others."""
-    differing: dict[str, Any] = {}
+    differing: dict[str, JsonValue] = {}
     for key, value in settings.items():
         other = other_settings.get(key)
         if isinstance(value, Mapping) and isinstance(other, Mapping):

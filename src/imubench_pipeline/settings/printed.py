@@ -21,6 +21,7 @@ from pydantic import (
 )
 
 from imubench_pipeline.settings.validation import Duration, Frequency, Strict, Text
+from imubench_pipeline.typing import JsonObject
 from imubench_pipeline.units import UnitError, convert_to_si, find_dimension, parse_quantity
 
 Sidedness = Literal["one-sided", "two-sided"]
@@ -356,7 +357,7 @@ class Datasheet(Strict):
                     _check_unit(f"{quantity}.{name}{place}", quantity, name, figure)
         return self
 
-    def only(self, names: Collection[str]) -> dict[str, Any]:
+    def only(self, names: Collection[str]) -> JsonObject:
         """Return a selection of figures, such as `IN_USE`, and the options, as in the file."""
         written = self.model_dump(mode="json", include={"options", *FIGURE_DIMENSIONS})
         for quantity in FIGURE_DIMENSIONS:

@@ -7,12 +7,13 @@ import re
 from collections.abc import Iterable, Mapping
 from functools import cache
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field, JsonValue, model_validator
 
 from imubench_pipeline.registry import blocks
 from imubench_pipeline.settings.experiments import (
+    AT_REST,
     Kind,
     WithBlocks,
     kind_of,
@@ -20,6 +21,7 @@ from imubench_pipeline.settings.experiments import (
     with_blocks,
 )
 from imubench_pipeline.settings.printed import Datasheet
+from imubench_pipeline.settings.quality import QualitySettings
 from imubench_pipeline.settings.shipped import CATALOGUE, list_folders
 from imubench_pipeline.settings.validation import (
     Between,
@@ -31,6 +33,7 @@ from imubench_pipeline.settings.validation import (
     parse,
 )
 from imubench_pipeline.settings.yaml_files import read_folder, require_valid
+from imubench_pipeline.typing import JsonObject
 from imubench_pipeline.units import UnitError, find_conversion, parse_quantity
 
 QUANTITIES: dict[str, str] = {"gyro": "angular_rate", "accel": "acceleration"}
@@ -300,7 +303,7 @@ class RecordingNotes(WithBlocks):
         "before it of the same device; null: not known",
     )
     use: UsedPart = UsedPart()
-    log: dict[str, Any] = Field(default=dict(), description="merged over the sensor's log")
+    log: dict[str, JsonValue] = Field(default=dict(), description="merged over the sensor's log")
 
     @model_validator(mode="after")
     def _one_kind(self) -> RecordingNotes:
@@ -360,21 +363,34 @@ def merged_log(sensor: Sensor, notes: RecordingNotes, file: str) -> LogFormat:
     return parse(LogFormat, merged, f"{file}: log")
 
 
-def of_ingest(log: LogFormat, notes: RecordingNotes, kind: Kind) -> dict[str, Any]:
-    """Return the parts of log format, notes and experiment that the ingest depends on."""
-    if kind != "rate_table":
-        log = log.model_copy(update={"table_rate": None})
-    return {
-        "kind": kind,
-        "notes": notes.model_dump(mode="json", exclude={"log", *blocks("notes")}),
-        "log": log.model_dump(mode="json", exclude={"bandwidth"}),
-    }
+class IngestPlan(Strict):
+    """Settings of the ingest of a recording; without ``log``, the reason why it cannot be read."""
+
+    kind: Kind = AT_REST
+    simulated: bool = False
+    notes: RecordingNotes | None = None
+    log: LogFormat | None = None
+    quality: QualitySettings = QualitySettings()
+    files: Mapping[str, str] | None = None
+    error: str | None = None
+    unavailable: str | None = None
+
+    def to_json(self) -> JsonObject:
+        """Return the settings without parts that the ingest does not depend on."""
+        log = self.log
+        if log is not None and self.kind != "rate_table":
+            log = log.model_copy(update={"table_rate": None})
+        unused = {"notes": {"log", *blocks("notes")}, "log": {"bandwidth"}}
+        dump = self.model_copy(update={"log": log}).model_dump(mode="json", exclude=unused)
+        return {key: value for key, value in dump.items() if value is not None}
 
 
-def _merge(base: Mapping[str, Any], over: Mapping[str, Any]) -> dict[str, Any]:
+def _merge(base: JsonObject, over: JsonObject) -> dict[str, JsonValue]:
     """Return ``base`` updated with the keys of ``over``; null removes a key."""
     merged = dict(base)
     for key, value in over.items():
-        both = isinstance(value, Mapping) and isinstance(merged.get(key), Mapping)
-        merged[key] = _merge(merged[key], value) if both else value
+        below = merged.get(key)
+        if isinstance(value, Mapping) and isinstance(below, Mapping):
+            value = _merge(below, value)
+        merged[key] = value
     return {key: value for key, value in merged.items() if value is not None}

@@ -26,7 +26,7 @@ def compare_with_datasheet(
     """Return the rows of ``datasheet`` and ``datasheet_curve``; none for a rejected recording."""
     quality = Quality.read(folder / "quality.json")
     measured = read_curves(folder / "allan.parquet", quality.grids)
-    temperatures = [quality.row.temperature_min, quality.row.temperature_max]
+    temperatures = [quality.recording.temperature_min, quality.recording.temperature_max]
     thermal = TemperatureRow.rows_of(read("temperature", [folder / "temperature.parquet"]))
     biases = FixedBiasRow.rows_of(read("fixed_bias", [folder / "fixed_bias.parquet"]))
     means = {row.channel: row.value for row in biases}

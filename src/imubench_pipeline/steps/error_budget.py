@@ -74,11 +74,11 @@ def _deviations(
             sensor=names["sensor"],
             recording=names["recording"],
             channel=name,
-            simulated=quality.row.simulated,
-            duration=quality.row.duration or 0.0,
+            simulated=quality.recording.simulated,
+            duration=quality.recording.duration or 0.0,
             estimate=estimate,
         )
-        rate = quality.channels[name]["rate"]
+        rate = quality.channels[name].rate
         yield from list_deviation_rows(
             channel, rate, longest=how.longest, draws=how.draws, seed=how.seed
         )

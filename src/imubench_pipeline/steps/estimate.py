@@ -24,8 +24,8 @@ from imubench_pipeline.estimators.likelihood import Likelihood
 from imubench_pipeline.estimators.model_choice import describe_disagreement
 from imubench_pipeline.estimators.rows import (
     make_allan_rows,
+    make_curve_points,
     make_draw_rows,
-    make_limit_rows,
     make_parameter_rows,
 )
 from imubench_pipeline.estimators.spectral_findings import (
@@ -195,10 +195,10 @@ class _Channel:
         if warm is not None:
             into.temperature += _temperature_rows(key, warm)
             if warm.compensated:
-                rows = make_limit_rows(limited(left, without))
-                for about, effect in zip(rows, added.deviation, strict=True):
+                points = make_curve_points(limited(left, without))
+                for point, effect in zip(points, added.deviation, strict=True):
                     row = model.CompensatedAllanRow(
-                        **asdict(key), **about, temperature=float(effect)
+                        **asdict(key), **vars(point), temperature=float(effect)
                     )
                     into.allan_compensated.append(row)
         return estimates

@@ -83,7 +83,7 @@ def find_static_recordings(
         row = recording[0]
         return *far(row), -(row.duration or 0.0), row.recording
 
-    every = [(Quality.read(folder / "quality.json").row, folder) for folder in folders]
+    every = [(Quality.read(folder / "quality.json").recording, folder) for folder in folders]
     usable = [kept for kept in every if (kept[0].kind, kept[0].status) == ("static", "ok")]
     return sorted(usable, key=order)
 
@@ -96,7 +96,7 @@ def find_noise_source(
     `folder`: of the turned recording; `static`: of the static recordings of its sensor; `draws`:
     number of models drawn from the uncertainty of a static log.
     """
-    own = Quality.read(folder / "quality.json").row
+    own = Quality.read(folder / "quality.json").recording
     return take_static_noise(static, own, key.channel, draws) or take_printed_noise(
         key.sensor, sensor, key.channel
     )

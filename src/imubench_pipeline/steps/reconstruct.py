@@ -110,8 +110,8 @@ def reconstruct_recording(
     for channel, by_method in read_estimates(parameters).items():
         if channels is not None and channel not in channels:
             continue
-        key = Key(about.row.sensor, about.row.recording, channel)
-        rate = about.channels[channel]["rate"]
+        key = Key(about.recording.sensor, about.recording.recording, channel)
+        rate = about.channels[channel].rate
         results = {}
         for estimate in by_method:
             series = folder / "series" / f"{channel}.{estimate.method}.parquet"

@@ -29,7 +29,6 @@ from imubench_pipeline.typing import Array
 
 STRETCH = 1.0  # length of the section in which every sample is shown, s
 MAX_SAMPLES = 1_500_000  # max. number of compared samples of each; three sensors take 8 s.
-_ENVELOPE_COLUMNS = ("start", "end", "low", "high", "mean")
 
 _TEMPERATURE_AVERAGING_TIME = 100.0  # averaging time of temperature readings, s
 
@@ -132,5 +131,6 @@ def _rows(
     for k, value in enumerate(np.concatenate(parts).tolist()):
         mean = None if math.isnan(value) else value
         yield row(what="stretch", start=k / rate, end=(k + 1) / rate, mean=mean)
-    for seen in overview.envelope_rows(edges / rate, figures):
-        yield row(what="envelope", **{name: seen[name] for name in _ENVELOPE_COLUMNS})
+    for seen in overview.envelope_rows(key, edges / rate, figures):
+        span = partial(row, what="envelope", start=seen.start, end=seen.end)
+        yield span(low=seen.low, high=seen.high, mean=seen.mean)

@@ -25,7 +25,6 @@ from imubench_pipeline.settings.simulated_recordings import SimulatedRecording
 from imubench_pipeline.simulate.models import SIMULATIONS, list_true_figures
 from imubench_pipeline.tables import build
 from imubench_pipeline.tables.failures import (
-    Failure,
     mark_failures,
     read_with_failures,
     remove_recordings,
@@ -53,7 +52,7 @@ def join_tables(
     and usual figures of other sensors, from the plan. `decide`: section of the configuration.
     """
     qualities = [Quality.read(path) for path in parts["quality"]]
-    failed_steps = [Failure(**quality.failure) for quality in qualities if quality.failure]
+    failed_steps = [quality.failure for quality in qualities if quality.failure]
     joined = {}
     for name, paths in parts.items():
         if name != "quality":
@@ -63,7 +62,7 @@ def join_tables(
     joined = remove_recordings(
         joined, {(failure.sensor, failure.recording) for failure in failures}
     )
-    about = [quality.row for quality in qualities]
+    about = [quality.recording for quality in qualities]
     devices = {(row.sensor, row.recording): row.device for row in about}
     recommended = joined["parameters"].filter(joined["parameters"]["recommended"])
     estimated = model.ParameterRow.rows_of(recommended)
@@ -127,7 +126,7 @@ def collect_findings(
 
     `deterministic`, `of_estimates`: of these tables; `estimated`: the recommended parameters.
     """
-    about = [quality.row for quality in qualities]
+    about = [quality.recording for quality in qualities]
     of_logs = drop_duplicate_findings(
         (row for quality in qualities for row in quality.findings),
         deterministic,
@@ -135,7 +134,7 @@ def collect_findings(
     )
     found = list(of_logs)
     for quality in qualities:
-        found += implausible_of(quality, sensors.get(quality.row.sensor))
+        found += implausible_of(quality, sensors.get(quality.recording.sensor))
     return [*found, *of_estimates, *unusual_rows(estimated, sensors, usual)]
 
 

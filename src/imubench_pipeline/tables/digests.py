@@ -8,21 +8,21 @@ import os
 import re
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
 from imubench_pipeline.tables.files import write_content
+from imubench_pipeline.typing import JsonObject
 
 _END = "\n}"
 _LAST_LINE = re.compile(r',\n "digest": "[0-9a-f]{64}"\n\}\n\Z')
 
 
-def write_sealed_json(data: Mapping[str, Any], path: Path) -> None:
+def write_sealed_json(data: Mapping[str, object], path: Path) -> None:
     """Write a mapping of JSON values without NaN, with its digest, atomically."""
     text = json.dumps(dict(data), indent=1, allow_nan=False)
     write_content(text.removesuffix(_END) + _last_line(text), path)
 
 
-def read_sealed_json(path: Path) -> dict[str, Any]:
+def read_sealed_json(path: Path) -> JsonObject:
     """Return the data of `write_sealed_json`; ValueError if any byte has changed, or OSError."""
     # All letters count, and not only what they mean.
     with open(path, "rb", opener=open_without_waiting) as file:
@@ -32,7 +32,7 @@ def read_sealed_json(path: Path) -> dict[str, Any]:
     if seal is None or seal[0] != _last_line(rest):
         raise ValueError(f"{path}: its digest is another one")
     try:
-        data: dict[str, Any] = json.loads(rest)
+        data: JsonObject = json.loads(rest)
     except RecursionError:
         raise ValueError(f"{path}: is nested deeper than permitted") from None
     return data

@@ -11,6 +11,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import asdict, dataclass
 from functools import cache
 from pathlib import Path, PurePosixPath
+from typing import Any
 
 from imubench_pipeline.tables.digests import compute_digest, read_sealed_json, write_sealed_json
 from imubench_pipeline.tables.schemas import PARTS_OF, TABLES
@@ -138,7 +139,7 @@ def compute_digests(results: Path, paths: Iterable[Path]) -> dict[str, str]:
 def read_seal(results: Path, place: str) -> Seal:
     """Return the seal of a place; FileNotFoundError without one, `SealError` if it is damaged."""
     try:
-        data = read_sealed_json(results / name_seal_file(place))
+        data: Mapping[str, Any] = read_sealed_json(results / name_seal_file(place))
         outputs = {name: SealedFile(**file) for name, file in data["outputs"].items()}
         seal = Seal(**{**data, "outputs": outputs})
         texts = [seal.place, seal.form, seal.settings, *seal.inputs.values()]

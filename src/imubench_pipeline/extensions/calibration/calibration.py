@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -96,16 +96,16 @@ def make_calibration_tables(
     else:
         # Of several gyros the notes name one: the ingest has seen to it.
         metadata = read_metadata(next(iter(logs.values())).path)
-        gyros = (name for name in [*logs, *metadata["unusable"]] if name.startswith("gyro_"))
+        gyros = (name for name in [*logs, *metadata.unusable] if name.startswith("gyro_"))
         channel: str = declared.channel or next(gyros)
         key = Key(sensor, recording, channel)
         if channel not in logs:
             run = "rate_table" if isinstance(declared, OnRateTable) else "at_rest"
             reason = f"{channel} cannot be used; see the findings of the recording"
-            rows = _without(asdict(key) | {"run": run}, "not_shown", reason)
+            rows = _without(partial(CalibrationRow, **asdict(key), run=run), "not_shown", reason)
         else:
             source = find_noise_source(folder, static, key, stated)
-            begins, truth = metadata.get("begins", 0.0), _truth(simulated, channel)
+            begins, truth = metadata.begins, _truth(simulated, channel)
             log = GyroLog(key, logs[channel], source, begins, truth)
             if isinstance(declared, OnRateTable):
                 rows = _on_rate_table(log, declared)
@@ -158,14 +158,15 @@ class GyroLog:
     begins: float  # time of the first sample used, s from the first of the recording
     truth: Mapping[str, float]  # true figures of a simulation, SI
 
-    def names(self, run: str, pointing: Pointing | None) -> dict[str, Any]:
+    def start_row(self, run: str, pointing: Pointing | None) -> partial[CalibrationRow]:
         """Return the columns that all rows of the table ``calibration`` share."""
-        row: dict[str, Any] = asdict(self.key) | {"run": run}
+        row = partial(CalibrationRow, **asdict(self.key), run=run)
         if self.source is not None:
-            row |= {"model": self.source.model.name, "model_from": self.source.words}
+            row = partial(row, model=self.source.model.name, model_from=self.source.words)
         if pointing is not None:
-            row |= {name: getattr(pointing, name) for name in ("latitude", "heading", "elevation")}
-            row |= {"earth_rate": pointing.rate, "earth_rate_sigma": pointing.rate_sigma}
+            row = partial(row, earth_rate=pointing.rate, earth_rate_sigma=pointing.rate_sigma)
+            row = partial(row, latitude=pointing.latitude, heading=pointing.heading)
+            row = partial(row, elevation=pointing.elevation)
         return row
 
 
@@ -271,48 +272,48 @@ def _average_positions(
 def _at_rest(gyro: GyroLog, declared: AtRest) -> Iterator[TableRow]:
     """Yield the bias of a gyro with a stated direction, or the reason why there is none."""
     pointing = declared.pointing
-    names = gyro.names("at_rest", pointing)
+    row = gyro.start_row("at_rest", pointing)
     if len(gyro.log.segments) > 1:
-        yield from _without(names, "not_shown", explain_segments(gyro.log))
+        yield from _without(row, "not_shown", explain_segments(gyro.log))
         return
     if gyro.source is None:
-        yield from _without(names, "no_model", NO_MODEL)
+        yield from _without(row, "no_model", NO_MODEL)
         return
     samples = place_on_grid(gyro.log.blocks(), gyro.log.grid)
     try:
         bias = bias_at_rest(samples, gyro.log.rate, gyro.source.model, pointing)
     except ValueError as error:
-        yield from _without(names, "too_short", str(error))
+        yield from _without(row, "too_short", str(error))
         return
-    about = names | {
-        "duration": len(samples) / gyro.log.rate,
-        "samples": int(np.isfinite(samples).sum()),
-        "scatter": _finite(bias.p_value[0]),
-        "half_width": bias.bound,
-    }
+    about = partial(
+        row,
+        duration=len(samples) / gyro.log.rate,
+        samples=int(np.isfinite(samples).sum()),
+        scatter=_finite(bias.p_value[0]),
+        half_width=bias.bound,
+    )
+    figure = partial(_figure, gyro, about)
     limits, noise = bias.fixed_interval(), bias.fixed_noise_sigma
-    fixed = _figure(gyro, "bias", bias.fixed, bias.fixed_sigma, limits, noise)
+    yield figure("bias", bias.fixed, bias.fixed_sigma, limits, noise)
     limits, noise = bias.present_interval(), bias.present_noise_sigma
-    present = _figure(gyro, "present_bias", bias.present, bias.present_sigma, limits, noise)
-    for row in (fixed, present):
-        yield CalibrationRow(**(about | row))
-    yield from _open(names, bias.not_observable)
+    yield figure("present_bias", bias.present, bias.present_sigma, limits, noise)
+    yield from _open(row, bias.not_observable)
 
 
 def _on_rate_table(gyro: GyroLog, declared: OnRateTable) -> Iterator[TableRow]:
     """Yield scale factor and bias of a gyro on a rate table, or the reason without them."""
     pointing = None if declared.axis is None else declared.axis.pointing
-    names = gyro.names("rate_table", pointing)
+    row = gyro.start_row("rate_table", pointing)
     if len(gyro.log.segments) > 1:
-        yield from _without(names, "not_shown", explain_segments(gyro.log))
+        yield from _without(row, "not_shown", explain_segments(gyro.log))
         return
     try:
         schedule = _schedule(gyro, declared)
     except ValueError as error:
-        yield from _without(names, "too_short", str(error))
+        yield from _without(row, "too_short", str(error))
         return
     if gyro.source is None:
-        yield from _without(names, "no_model", NO_MODEL)
+        yield from _without(row, "no_model", NO_MODEL)
         return
     model = gyro.source.model
     setting = declared.si("setting_sigma", "angular_rate")
@@ -321,20 +322,20 @@ def _on_rate_table(gyro: GyroLog, declared: OnRateTable) -> Iterator[TableRow]:
         fit, measured = calibrate(samples, schedule, model, pointing, setting_sigma=setting)
     except ValueError as error:
         status = "not_observable" if isinstance(error, NotObservableError) else "too_short"
-        yield from _without(names, status, str(error))
+        yield from _without(row, status, str(error))
         return
     earth = 0.0 if pointing is None else pointing.rate
     rates = schedule.of_blocks(measured.blocks) + earth
     left = residuals(fit, measured, rates, model, setting)
-    about = names | {
-        "duration": measured.blocks.duration,
-        "samples": int(measured.blocks.count.sum()),
-        "rates": len(left.dwell),
-        "scatter": _finite(fit.line.p_value[0]) if fit.line.freedom else None,
-    }
-    for row in _line(gyro, fit):
-        yield CalibrationRow(**(about | row))
-    yield from _open(names, fit.not_observable)
+    about = partial(
+        row,
+        duration=measured.blocks.duration,
+        samples=int(measured.blocks.count.sum()),
+        rates=len(left.dwell),
+        scatter=_finite(fit.line.p_value[0]) if fit.line.freedom else None,
+    )
+    yield from _line(partial(_figure, gyro, about), fit)
+    yield from _open(row, fit.not_observable)
     for k, dwell in enumerate(left.dwell.tolist()):
         stretch = schedule.stretches[dwell]
         yield CalibrationPointRow(
@@ -388,46 +389,51 @@ def _schedule(gyro: GyroLog, declared: OnRateTable) -> Schedule:
     return Schedule.from_steps(steps, log.rate, settling=settling)
 
 
-def _line(gyro: GyroLog, fit: Calibration) -> Iterator[dict[str, Any]]:
+def _line(figure: Callable[..., CalibrationRow], fit: Calibration) -> Iterator[CalibrationRow]:
     """Yield the estimates of the line, and of its deviations."""
     noise = float(fit.line.sigma[0])
-    yield _figure(gyro, "bias", fit.bias, fit.bias_sigma, fit.bias_interval(), noise)
+    yield figure("bias", fit.bias, fit.bias_sigma, fit.bias_interval(), noise)
     sigma, interval = fit.scale_factor_sigma, fit.scale_factor_interval()
-    yield _figure(gyro, "scale_factor", fit.scale_factor, sigma, interval, sigma)
+    yield figure("scale_factor", fit.scale_factor, sigma, interval, sigma)
     for name, term in (("quadratic", fit.quadratic), ("asymmetry", fit.asymmetry)):
         if term is not None:
-            row = _figure(gyro, name, term.value, term.sigma, term.interval(), term.sigma)
-            yield row | {"chance": float(term.p_value[0])}
+            row = figure(name, term.value, term.sigma, term.interval(), term.sigma)
+            yield replace(row, chance=float(term.p_value[0]))
     if (straight := fit.linearity) is not None:
         sigma = float(straight.sigma[int(np.abs(straight.deviation[0]).argmax())])
-        row = _figure(gyro, "linearity", straight.value, sigma, straight.interval(), sigma)
-        yield row | {"chance": float(straight.p_value[0])}
+        row = figure("linearity", straight.value, sigma, straight.interval(), sigma)
+        yield replace(row, chance=float(straight.p_value[0]))
 
 
 def _figure(
-    gyro: GyroLog, name: str, value: Array, sigma: float, interval: Limits, noise: float
-) -> dict[str, Any]:
+    gyro: GyroLog,
+    about: partial[CalibrationRow],
+    name: str,
+    value: Array,
+    sigma: float,
+    interval: Limits,
+    noise: float,
+) -> CalibrationRow:
     lower, upper = interval
-    return {
-        "parameter": name,
-        "value": float(value[0]),
-        "lower": float(lower[0]),
-        "upper": float(upper[0]),
-        "unit": UNITS[name],
-        "status": "ok",
-        "sigma": float(sigma),
-        "sigma_noise": noise,
-        "truth": gyro.truth.get(name),
-    }
+    return about(
+        parameter=name,
+        value=float(value[0]),
+        lower=float(lower[0]),
+        upper=float(upper[0]),
+        unit=UNITS[name],
+        status="ok",
+        sigma=float(sigma),
+        sigma_noise=noise,
+        truth=gyro.truth.get(name),
+    )
 
 
 def _open(
-    names: Mapping[str, Any], quantities: tuple[NotObservable, ...]
+    row: partial[CalibrationRow], quantities: tuple[NotObservable, ...]
 ) -> Iterator[CalibrationRow]:
     """Yield the quantities that are not observable, each with its reason."""
     for unknown in quantities:
-        yield CalibrationRow(
-            **names,
+        yield row(
             parameter=unknown.quantity,
             unit=UNITS[unknown.quantity],
             status="not_observable",
@@ -436,11 +442,10 @@ def _open(
         )
 
 
-def _without(names: Mapping[str, Any], status: str, reason: str) -> Iterator[CalibrationRow]:
+def _without(row: partial[CalibrationRow], status: str, reason: str) -> Iterator[CalibrationRow]:
     """Yield the rows of a run without estimates."""
-    about = {**names, "status": status, "reason": reason}
-    for name in _RUN_PARAMETERS[names["run"]]:
-        yield CalibrationRow(**about, parameter=name, unit=UNITS[name])
+    for name in _RUN_PARAMETERS[row.keywords["run"]]:
+        yield row(status=status, reason=reason, parameter=name, unit=UNITS[name])
 
 
 def _finite(value: float) -> float | None:

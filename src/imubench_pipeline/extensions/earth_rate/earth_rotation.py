@@ -20,10 +20,11 @@ from imubench_pipeline.extensions.earth_rate.published import (
     Course,
     Courses,
     Range,
+    compute_allowed_sigmas,
     compute_sigma_ranges,
     compute_white_sigma,
     estimate_courses,
-    make_published_row,
+    judge_error,
     thin,
 )
 from imubench_pipeline.extensions.earth_rate.settings import (
@@ -34,7 +35,6 @@ from imubench_pipeline.extensions.earth_rate.settings import (
 from imubench_pipeline.extensions.earth_rate.simulation import RunDesign
 from imubench_pipeline.extensions.earth_rate.tables import (
     TURNED,
-    EarthRatePredictionRow,
     EarthRatePublishedRow,
     EarthRateRow,
     EarthRateSeriesRow,
@@ -82,7 +82,7 @@ def make_earth_rate_tables(
         turns = simulated.block(SimulatedTurns)
     declared = turns.declared if turns else TwoPosition.model_validate(sections["two_position"])
     metadata = read_metadata(next(iter(logs.values())).path)
-    channel = declared.moved_gyro([*logs, *metadata["unusable"]])
+    channel = declared.moved_gyro([*logs, *metadata.unusable])
     key = Key(sensor, recording, channel)
     if channel not in logs:
         reason = f"{channel} cannot be used; see the findings of the recording"
@@ -92,8 +92,7 @@ def make_earth_rate_tables(
     source = find_noise_source(
         folder, static, key, Sensor.model_validate(sections["sensor"]), how.draws
     )
-    begins = metadata.get("begins", 0.0)
-    for row in _earth_rate(key, logs[channel], declared, source, how, begins):
+    for row in _earth_rate(key, logs[channel], declared, source, how, metadata.begins):
         rows[row.table].append(row)
     if simulated is not None and turns is not None:
         published = _published(key, simulated, turns, rows["earth_rate"])
@@ -115,12 +114,20 @@ def _published(
         part = figure.part
         text = simulated.duration if part == WHOLE else part.removeprefix("last ")
         value = parse_quantity(figure.printed, "angular_rate")
+        duration = parse_quantity(text, "time")
+        allowed = compute_allowed_sigmas(schedule, duration, noise)
+        off = (value - EARTH_RATE) / allowed.sigma
         yield EarthRatePublishedRow(
             **asdict(key),
             part=part,
             place=figure.where,
             printed=figure.printed,
-            **make_published_row(value, schedule, parse_quantity(text, "time"), noise),
+            **vars(allowed),
+            duration=duration,
+            published=value,
+            truth=EARTH_RATE,
+            off_sigma=off,
+            verdict=judge_error(off),
             simulated=values.get((part, "pairs")),
             simulated_filter=values.get((part, "filter")),
             assumed=", ".join(turns.assumed) or None,
@@ -165,8 +172,7 @@ def _earth_rate(
         sigma = math.inf if bias is None else bias
         outlook = Outlook(source.model, declared.latitude_si, turn_time, log.rate, sigma)
         run_time = max(parse_quantity(settings.run_time, "time"), 3.0 * dwell + turn_time)
-        for row in prediction_rows(outlook, dwell - turn_time, settings.goals, run_time):
-            yield EarthRatePredictionRow(**asdict(key), **row)
+        yield from prediction_rows(key, outlook, dwell - turn_time, settings.goals, run_time)
     samples = place_on_grid(log.blocks(), log.grid)
     try:
         turning = find_turning(

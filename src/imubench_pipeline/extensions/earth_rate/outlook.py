@@ -10,11 +10,10 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from functools import partial
 from itertools import product
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,6 +38,7 @@ from imubench_pipeline.noise.simulate import channel_rng
 from imubench_pipeline.settings.printed import Datasheet, QuantityDatasheet
 from imubench_pipeline.settings.sensor import QUANTITIES
 from imubench_pipeline.steps.noise_source import find_static_recordings
+from imubench_pipeline.tables.keys import Key
 from imubench_pipeline.typing import Array
 from imubench_pipeline.units import parse_quantity
 
@@ -52,8 +52,6 @@ _REFINEMENT_POINTS = 15  # number of further points about the best one
 MAX_TURNS = 10**12  # of a goal; at one a second they take 30 000 years
 _TIME_CURVE_POINTS = 60  # number of points on the curve over time
 _MAX_CURVE_TURNS = 20_000  # largest number of turns on the curve over time; goals may need more
-
-Row = dict[str, Any]
 
 
 @dataclass(frozen=True)
@@ -203,14 +201,14 @@ def _compute_growth(information: Array) -> float:
 
 
 def prediction_rows(
-    outlook: Outlook, dwell: float, goals: Sequence[float], run_time: float
-) -> Iterator[Row]:
-    """Yield the rows of the table ``earth_rate_prediction``, without the names.
+    key: Key, outlook: Outlook, dwell: float, goals: Sequence[float], run_time: float
+) -> Iterator[EarthRatePredictionRow]:
+    """Yield the rows of the table ``earth_rate_prediction``.
 
     ``dwell`` is the data in each, s; the goals are relative standard deviations. Raises ValueError
     if the run time, s, for the best dwell, does not hold two dwells and a turn.
     """
-    about = {"latitude": outlook.latitude}
+    row = partial(EarthRatePredictionRow, **asdict(key), latitude=outlook.latitude)
     most = 1
     for goal in sorted(goals, reverse=True):
         turns = outlook.turns_needed(dwell, goal)
@@ -220,33 +218,29 @@ def prediction_rows(
         time = (turns + 1) * dwell + turns * outlook.turning
         # The reached value: the last necessary turn may give far more than the goal.
         sigma = outlook.sigma_after(dwell, turns)
-        yield about | {"of": "goal", "goal": goal} | _make_row(dwell, turns, time, sigma)
+        needed = row(of="goal", goal=goal, dwell=dwell, turns=turns, time=time)
+        yield _add_sigma(needed, sigma)
     course = outlook.against_time(dwell, min(max(most, 2), _MAX_CURVE_TURNS))
     shown = np.rint(np.geomspace(1, len(course.turns), _TIME_CURVE_POINTS)).astype(np.int64) - 1
     for k in np.unique(shown).tolist():
-        point = int(course.turns[k]), float(course.time[k]), float(course.sigma[k])
-        yield about | {"of": "time"} | _make_row(dwell, *point)
+        turns, time = int(course.turns[k]), float(course.time[k])
+        reached = row(of="time", dwell=dwell, turns=turns, time=time)
+        yield _add_sigma(reached, float(course.sigma[k]))
     curve = outlook.over_dwell(run_time)
     low, high = curve.nearly_best()
     for k, number in enumerate(curve.dwells.tolist()):
-        length, sigma = float(curve.dwell[k]), float(curve.sigma[k])
-        verdict = {"of": "dwell", "best": k == curve.best, "nearly_best": low <= length <= high}
-        yield about | verdict | _make_row(length, number - 1, run_time, sigma)
+        length, near = float(curve.dwell[k]), low <= curve.dwell[k] <= high
+        tried = row(of="dwell", dwell=length, turns=number - 1, time=run_time)
+        tried = replace(tried, best=k == curve.best, nearly_best=bool(near))
+        yield _add_sigma(tried, float(curve.sigma[k]))
 
 
-def _make_row(dwell: float, turns: int, time: float, sigma: float) -> Row:
-    finite_sigma = sigma if math.isfinite(sigma) else None
-    relative = None if finite_sigma is None else finite_sigma / EARTH_RATE
+def _add_sigma(row: EarthRatePredictionRow, sigma: float) -> EarthRatePredictionRow:
+    if not math.isfinite(sigma):
+        return row
     # Heading error of a gyro perpendicular to north: sigma cos(latitude) over w_ie cos(latitude),
     # see `Outlook.heading`.
-    return {
-        "dwell": dwell,
-        "turns": turns,
-        "time": time,
-        "sigma": finite_sigma,
-        "relative": relative,
-        "heading": relative,
-    }
+    return replace(row, sigma=sigma, relative=sigma / EARTH_RATE, heading=sigma / EARTH_RATE)
 
 
 TIMES = (10.0, 30.0, 60.0, 120.0, 300.0, 600.0, 1200.0, 1800.0, 3600.0)  # durations of rest, s
@@ -314,9 +308,8 @@ def make_outlook_tables(
     latitude = parse_quantity(how.latitude, "angle")
     outlook = Outlook(noise.models[gyro], latitude, TURN_TIME, noise.rate)
     run_time = max(parse_quantity(how.run_time, "time"), 3.0 * DWELL)
-    row = partial(EarthRatePredictionRow, sensor=sensor, recording=noise.recording, channel=gyro)
-    predictions = prediction_rows(outlook, DWELL, how.goals, run_time)
-    rows["earth_rate_prediction"] = [row(**predicted) for predicted in predictions]
+    key = Key(sensor, noise.recording, gyro)
+    rows["earth_rate_prediction"] = list(prediction_rows(key, outlook, DWELL, how.goals, run_time))
     if any(name.startswith("accel_") for name in noise.models):
         printed = Datasheet.model_validate(sections["datasheet"])
         rows["alignment"] = list(_predict_alignment(sensor, noise, printed, how))

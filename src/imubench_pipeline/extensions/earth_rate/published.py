@@ -18,7 +18,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.linalg import LinAlgError
@@ -49,7 +48,6 @@ _TESTED_CLOCK_ERRORS = 20_001
 _Z_95 = 1.96  # half width, in standard deviations, of the interval with 95 % of the estimates
 
 Range = dict[str, float]
-Row = dict[str, Any]
 
 
 @dataclass(frozen=True)
@@ -173,29 +171,30 @@ def compute_sigma_ranges(
     return ranges
 
 
-def compute_allowed_sigmas(run: RunDesign, duration: float, model: NoiseModel) -> Row:
-    """Return sigmas by white noise, over pairs and by the filter, rad/s, of a duration in s."""
+@dataclass(frozen=True)
+class AllowedSigmas:
+    """Standard deviations by noise of the estimates of a run, rad/s."""
+
+    white: float  # by white noise alone
+    sigma: float  # of the mean over pairs
+    sigma_filter: float
+
+
+def compute_allowed_sigmas(run: RunDesign, duration: float, model: NoiseModel) -> AllowedSigmas:
+    """Return the standard deviations by noise of estimates of a run, over a duration in s."""
     design = run.experiment(duration)
     blocks = design.blocks(choose_block_length(design, model))
     zero_means = np.zeros((1, len(blocks)))
-    return {
-        "white": compute_white_sigma(model, blocks),
-        "sigma": float(by_pairs(zero_means, blocks, model).sigma[-1]),
-        "sigma_filter": float(RateFilter(blocks, model).rate_sigma[-1]),
-    }
+    return AllowedSigmas(
+        white=compute_white_sigma(model, blocks),
+        sigma=float(by_pairs(zero_means, blocks, model).sigma[-1]),
+        sigma_filter=float(RateFilter(blocks, model).rate_sigma[-1]),
+    )
 
 
-def make_published_row(value: float, run: RunDesign, duration: float, model: NoiseModel) -> Row:
-    """Return the columns of ``earth_rate_published`` for an estimate, rad/s, over a duration, s."""
-    noise = compute_allowed_sigmas(run, duration, model)
-    off = (value - EARTH_RATE) / noise["sigma"]
-    return noise | {
-        "duration": duration,
-        "published": value,
-        "truth": EARTH_RATE,
-        "off_sigma": off,
-        "verdict": "within the noise" if abs(off) <= _Z_95 else "beyond the noise",
-    }
+def judge_error(off: float) -> str:
+    """Return whether noise explains an error, from its size in standard deviations."""
+    return "within the noise" if abs(off) <= _Z_95 else "beyond the noise"
 
 
 @dataclass(frozen=True)

@@ -100,7 +100,7 @@ def count_turns(evidence: Evidence, run: str) -> float | None:
 def make_printed_run(run: str) -> PrintedRun:
     """Return a printed run, and the sigma of the mean over pairs by the printed noise."""
     duration = 60.0 * PAPER_MINUTES[run]
-    sigma = compute_allowed_sigmas(PAPER_DESIGN, duration, PAPER_MODEL)["sigma"]
+    sigma = compute_allowed_sigmas(PAPER_DESIGN, duration, PAPER_MODEL).sigma
     return PrintedRun(duration, PRINTED[run] * DEGREE, float(sigma))
 
 
@@ -228,7 +228,7 @@ def compute_error_of_mean(_: Evidence) -> Result:
         name: float(mean_sigma(PAPER_MODEL, PAPER_RATE, 1000, start, 0.0)[-1])
         for name, start in STARTS.items()
     }
-    pair = float(compute_allowed_sigmas(PAPER_DESIGN, 2.0 * PAPER_PERIOD, PAPER_MODEL)["sigma"])
+    pair = compute_allowed_sigmas(PAPER_DESIGN, 2.0 * PAPER_PERIOD, PAPER_MODEL).sigma
     errors = {name: one / math.cos(ASSUMED_LATITUDE) / hour for name, one in along_axis.items()}
     return Result(fields=errors | {"rate": EARTH_RATE / hour, "pair": pair / hour})
 
@@ -238,7 +238,7 @@ def compute_filter_gain(_: Evidence) -> Result:
     gains = []
     for run in PRINTED:
         sigmas = compute_allowed_sigmas(PAPER_DESIGN, 60.0 * PAPER_MINUTES[run], PAPER_MODEL)
-        gains.append(100.0 * float(1.0 - sigmas["sigma_filter"] / sigmas["sigma"]))
+        gains.append(100.0 * (1.0 - sigmas.sigma_filter / sigmas.sigma))
     return Result(fields={"least": min(gains), "most": max(gains)})
 
 

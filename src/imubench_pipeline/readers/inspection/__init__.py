@@ -6,7 +6,6 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +15,13 @@ from imubench_pipeline.readers import LogFile, read
 from imubench_pipeline.readers.contents import Contents, list_contents
 from imubench_pipeline.readers.file_format import LogTable
 from imubench_pipeline.readers.inspection.clock import estimate_step
-from imubench_pipeline.readers.inspection.draft import UNKNOWN, Draft, format_draft, make_printable
+from imubench_pipeline.readers.inspection.draft import (
+    UNKNOWN,
+    Draft,
+    Entry,
+    format_draft,
+    make_printable,
+)
 from imubench_pipeline.readers.inspection.drafting import draft_sensor_file
 from imubench_pipeline.readers.inspection.names import interpret_label
 from imubench_pipeline.readers.stated_units import find_bracketed
@@ -148,14 +153,12 @@ def check_draft(path: Path, draft: Draft) -> Proof:
     try:
         if not unfilled:
             parse(Sensor, draft.sensor(), "the sensor file")
-        filled: dict[str, Any] = {
-            key: _STAND_IN_RATE if entry == UNKNOWN else entry for key, entry in draft.log().items()
-        }
-        for holder in (filled, filled["channels"]):
-            for key, entry in holder.items():
-                if isinstance(entry, dict) and entry.get("unit") == UNKNOWN:
-                    holder[key] = entry | {"unit": _STAND_IN_UNITS[key[:4]]}
-        log = parse(LogFormat, filled, "log")
+        filled = draft.with_units(
+            lambda key, unit: _STAND_IN_UNITS[key[:4]] if unit == UNKNOWN else None
+        )
+        if draft.rate is not None and draft.rate.value == UNKNOWN:
+            filled.rate = Entry(_STAND_IN_RATE)
+        log = parse(LogFormat, filled.log(), "log")
         files = [_read_first_records(file) for file in read(path, log)]
     except (RecordingError, ConfigError) as error:
         return Proof(False, make_printable(f"not read so: {error}"))
@@ -197,7 +200,7 @@ def _describe_rate(files: list[_FirstRecords], draft: Draft) -> str:
     if draft.time is None or draft.rate is not None:
         rate = draft.rate.value if draft.rate is not None else UNKNOWN
         return "no rate" if rate == UNKNOWN else f"{rate} as stated"
-    if UNKNOWN in draft.time.value.values():
+    if draft.time.value.unit == UNKNOWN:
         return "no rate without the unit of time"
     rates: dict[str, float | None] = {}
     for file in files:

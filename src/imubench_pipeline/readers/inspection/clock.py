@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from imubench_pipeline.readers.batch import SECONDS
 from imubench_pipeline.readers.file_format import LogColumn, LogTable
-from imubench_pipeline.readers.inspection.draft import UNKNOWN, Entry
+from imubench_pipeline.readers.inspection.draft import UNKNOWN, Entry, Source
 from imubench_pipeline.readers.inspection.names import split_label
 from imubench_pipeline.readers.stamps import format_date
 from imubench_pipeline.readers.stated_units import parse_unit, split_unit
@@ -55,7 +54,7 @@ class Clock:
     """The time of a table, as a sensor file states it."""
 
     column: LogColumn
-    entry: Entry  # `time` of the sensor file
+    entry: Entry[Source]  # `time` of the sensor file
     counts: bool  # the column counts samples, so that `rate` is needed
     order: tuple[int, ...]  # sort key; a lower one is more plausible
 
@@ -82,18 +81,17 @@ def _recognise_date(column: LogColumn, table: LogTable) -> Clock | None:
     form = column.forms[0]
     if not _has_hour(form) or not is_advancing(column.values, DAY):
         return None
-    value: dict[str, Any] = {"column": _get_source(column), "format": form}
+    source = Source(column=_get_source(column), format=form)
     day = column
     if form != "iso8601" and "%d" not in form:
         days = [c for c in table.columns if c.kind == "date" and not _has_hour(c.forms[0])]
         if days:
             day = days[0]
-            form = f"{day.forms[0]} {form}"
-            value = {"column": value["column"], "date": _get_source(day), "format": form}
+            source = replace(source, date=_get_source(day), format=f"{day.forms[0]} {form}")
     # Day and month may be exchanged.
     others = [other for other in day.forms[1:] if sorted(other) == sorted(day.forms[0])]
     comment = f"or {others[0]}? {day.first[0]!r} does not tell" if others else ""
-    return Clock(column, Entry(value, comment), False, (_rank_resolution(column), 1))
+    return Clock(column, Entry(source, comment), False, (_rank_resolution(column), 1))
 
 
 def _has_hour(form: str) -> bool:
@@ -108,64 +106,62 @@ def _recognise_number(column: LogColumn, table: LogTable) -> Clock | None:
     joined = "".join(words)
     if joined.endswith(_XSENS_TICKS):
         return _recognise_xsens_ticks(column)
-    value: dict[str, Any] = {"column": _get_source(column)}
+    source = Source(column=_get_source(column))
     if joined == _XSENS_PACKETS or (
         not _TIME_WORDS.intersection(words) and _COUNTER_WORDS.intersection(words)
     ):
-        return _recognise_counter(column, value, joined == _XSENS_PACKETS)
+        return _recognise_counter(column, joined == _XSENS_PACKETS)
     unit = parse_unit(column.unit or "", "time") or split_unit(column.label, "time")[1]
     if unit is None:
         units = [parse_unit(word, "time") for word in words if len(word) > 1]
         unit = next((word for word in reversed(units) if word), None)
     scale = _SECONDS_PER_UNIT.get(unit or "", 1)
     wrap = _guess_wrap(column.values)
-    again = {} if wrap is None else {"wraps": wrap}
+    source = replace(source, wraps=wrap)
     if unit is not None:
-        value["unit"] = "s" if scale != 1 else unit
+        source = replace(source, unit=unit)
         if scale != 1:
-            value["scale"] = scale
-        comment = "'wraps' is guessed from the stamps" if again else ""
-        return Clock(column, Entry(value | again, comment), False, (_rank_resolution(column), 0))
+            source = replace(source, unit="s", scale=scale)
+        comment = "" if wrap is None else "'wraps' is guessed from the stamps"
+        return Clock(column, Entry(source, comment), False, (_rank_resolution(column), 0))
     named = bool(_TIME_WORDS.intersection(words))
-    value["unit"], comment = _guess_unit(column.values, table.rate)
+    unit, comment = _guess_unit(column.values, table.rate)
     if not named:
         grows = "grows evenly" if _is_regular(column.values) else "" if column.label else "grows"
-        if value["unit"] == UNKNOWN or not grows or (_take_steps(column.values) < 0).any():
+        if unit == UNKNOWN or not grows or (_take_steps(column.values) < 0).any():
             return None
         comment = f"guessed, since it {grows}; {comment.removeprefix('guessed: ')}"
-    order = (_rank_resolution(column) + (0 if named else 2), 0 if value["unit"] != UNKNOWN else 2)
-    return Clock(column, Entry(value | again, comment), False, order)
+    order = (_rank_resolution(column) + (0 if named else 2), 0 if unit != UNKNOWN else 2)
+    return Clock(column, Entry(replace(source, unit=unit), comment), False, order)
 
 
-def _recognise_counter(column: LogColumn, value: dict[str, Any], of_16_bits: bool) -> Clock | None:
+def _recognise_counter(column: LogColumn, of_16_bits: bool) -> Clock | None:
     steps = _take_steps(column.values)
     step = float(np.median(steps[steps > 0]))
     highest = float(np.nanmax(column.values))
     if not step.is_integer() or not step <= _MAX_COUNTER_STEP or not highest < _MAX_COUNT:
         return None
-    value["unit"] = "samples"
-    if step > 1:
-        value["scale"] = 1 / step
+    scale, wraps = 1 / step if step > 1 else None, None
     falls = (steps < 0).any()
     comment = "a count of samples"
     if of_16_bits and highest < 1 << 16:
-        value["wraps"] = 1 << 16
+        wraps = 1 << 16
     elif falls:
-        value["wraps"] = 1 << max(int(highest).bit_length(), 1)
+        wraps = 1 << max(int(highest).bit_length(), 1)
         comment = "a count of samples; 'wraps' is guessed from the highest one"
-    return Clock(column, Entry(value, comment), True, (1, 3))
+    source = Source(column=_get_source(column), unit="samples", scale=scale, wraps=wraps)
+    return Clock(column, Entry(source, comment), True, (1, 3))
 
 
 def _recognise_xsens_ticks(column: LogColumn) -> Clock:
     """Return the tick clock of Xsens: 0.1 ms in motion trackers, 1 us in wearables."""
     step = estimate_step(column.values)
-    value: dict[str, Any] = {"column": _get_source(column)}
     in_microseconds = step is not None and step > 8000
-    value |= {"unit": "us"} if in_microseconds else {"unit": "ms", "scale": 0.1}
-    value["wraps"] = 1 << 32
+    unit, scale = ("us", None) if in_microseconds else ("ms", 0.1)
+    source = Source(column=_get_source(column), unit=unit, scale=scale, wraps=1 << 32)
     rate = "" if step is None else f", {(1e6 if in_microseconds else 1e4) / step:.5g} Hz"
     tick = "1 us" if in_microseconds else "0.1 ms"
-    return Clock(column, Entry(value, f"ticks of {tick}{rate}"), False, (0, 0))
+    return Clock(column, Entry(source, f"ticks of {tick}{rate}"), False, (0, 0))
 
 
 def _guess_unit(values: NDArray[np.float64], rate: float | None) -> tuple[str, str]:

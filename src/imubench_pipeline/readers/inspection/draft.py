@@ -2,53 +2,89 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
-from typing import Any
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Generic, TypeVar
 
 import yaml
+from pydantic import JsonValue
+
+from imubench_pipeline.typing import JsonObject
 
 UNKNOWN = "?"  # placeholder for a missing value; the sensor file is rejected until it is filled in
+V_co = TypeVar("V_co", covariant=True)
 
 
 @dataclass(frozen=True)
-class Entry:
+class Entry(Generic[V_co]):
     """One entry of a sensor file."""
 
-    value: Any
+    value: V_co
     comment: str = ""  # origin of a guessed value; empty if nothing was guessed
+
+
+@dataclass(frozen=True, kw_only=True)
+class Source:
+    """A column of a log, with the keys of a sensor file."""
+
+    file: str | None = None
+    variable: str | None = None
+    column: str | int
+    date: str | int | None = None
+    format: str | None = None
+    unit: str | None = None
+    scale: float | None = None
+    wraps: int | None = None
+
+    def to_json(self) -> dict[str, JsonValue]:
+        """Return the keys that have a value."""
+        return {key: value for key, value in vars(self).items() if value is not None}
 
 
 @dataclass
 class Draft:
     """A sensor file with the values that the log determines."""
 
-    vendor: Entry
-    model: Entry
-    reader: Entry | None = None
-    rate: Entry | None = None
-    time: Entry | None = None
-    channels: dict[str, Entry] = field(default_factory=dict)
-    temperature: Entry | None = None
+    vendor: Entry[str]
+    model: Entry[str]
+    reader: Entry[str] | None = None
+    rate: Entry[str] | None = None
+    time: Entry[Source] | None = None
+    channels: dict[str, Entry[Source]] = field(default_factory=dict)
+    temperature: Entry[Source] | None = None
     left_over: list[str] = field(default_factory=list)  # remarks about columns that are not used
 
     @property
-    def known(self) -> list[tuple[str, Entry]]:
+    def known(self) -> list[tuple[str, Entry[str | Source]]]:
         """The entries under ``log``, except for columns, that the log determines."""
         entries = ("reader", self.reader), ("rate", self.rate), ("time", self.time)
         return [(key, entry) for key, entry in entries if entry is not None]
 
-    def log(self) -> dict[str, Any]:
+    def log(self) -> dict[str, JsonValue]:
         """Return the values under ``log``."""
-        entries = {key: entry.value for key, entry in self.known}
-        entries["channels"] = {name: dict(entry.value) for name, entry in self.channels.items()}
+        entries = {key: _to_json(entry.value) for key, entry in self.known}
+        entries["channels"] = {name: entry.value.to_json() for name, entry in self.channels.items()}
         if self.temperature is not None:
-            entries["temperature"] = dict(self.temperature.value)
+            entries["temperature"] = self.temperature.value.to_json()
         return entries
 
-    def sensor(self) -> dict[str, Any]:
+    def sensor(self) -> JsonObject:
         """Return the complete sensor file as values."""
         return {"vendor": self.vendor.value, "model": self.model.value, "log": self.log()}
+
+    def with_units(self, unit_of: Callable[[str, str | None], str | None]) -> Draft:
+        """Return a draft with the units of ``unit_of(key, unit)``; None leaves a unit."""
+
+        def change(key: str, entry: Entry[Source]) -> Entry[Source]:
+            unit = unit_of(key, entry.value.unit)
+            return replace(entry, value=replace(entry.value, unit=unit)) if unit else entry
+
+        return replace(
+            self,
+            time=self.time and change("time", self.time),
+            channels={name: change(name, entry) for name, entry in self.channels.items()},
+            temperature=self.temperature and change("temperature", self.temperature),
+        )
 
     def unfilled(self) -> list[str]:
         """Return the keys of the missing values."""
@@ -104,7 +140,7 @@ def make_printable(text: str) -> str:
     return shown if len(shown) <= _MAX_TEXT_LENGTH else shown[:_MAX_TEXT_LENGTH] + " ..."
 
 
-def _format_entries(entries: Sequence[tuple[str, Entry]], margin: str) -> list[str]:
+def _format_entries(entries: Sequence[tuple[str, Entry[str | Source]]], margin: str) -> list[str]:
     """Return the lines of entries with aligned comments, or with long comments above them."""
     written = [f"{margin}{key}: {_format_value(entry.value)}" for key, entry in entries]
     comments = [make_printable(entry.comment) for _, entry in entries]
@@ -123,10 +159,14 @@ def _format_entries(entries: Sequence[tuple[str, Entry]], margin: str) -> list[s
     return lines
 
 
-def _format_value(value: Any) -> str:
+def _to_json(value: str | Source) -> JsonValue:
+    return value if isinstance(value, str) else value.to_json()
+
+
+def _format_value(value: str | Source) -> str:
     """Return a value as YAML on one line of printable characters."""
     for as_it_is in (True, False):
-        text = yaml.dump(value, Dumper=_Dumper, default_flow_style=True, sort_keys=False,
+        text = yaml.dump(_to_json(value), Dumper=_Dumper, default_flow_style=True, sort_keys=False,
                          width=_MAX_YAML_WIDTH, allow_unicode=as_it_is)  # fmt: skip
         text = text.removesuffix("...\n").strip()
         if text.isprintable():

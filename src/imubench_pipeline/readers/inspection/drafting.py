@@ -14,7 +14,7 @@ from imubench_pipeline.earth import STANDARD_GRAVITY
 from imubench_pipeline.readers.contents import Contents
 from imubench_pipeline.readers.file_format import LogColumn, LogTable
 from imubench_pipeline.readers.inspection.clock import Clock, find_clocks, is_advancing
-from imubench_pipeline.readers.inspection.draft import UNKNOWN, Draft, Entry
+from imubench_pipeline.readers.inspection.draft import UNKNOWN, Draft, Entry, Source
 from imubench_pipeline.readers.inspection.names import (
     DERIVED,
     DIMENSIONS,
@@ -321,8 +321,10 @@ def _has_equal_entries(clock: Clock, other: Clock) -> bool:
     """Return whether two clocks have the same entries in a sensor file."""
     if clock.column.source != other.column.source:
         return False
-    keys = ("unit", "format", "date", "scale")
-    return all(clock.entry.value.get(key) == other.entry.value.get(key) for key in keys)
+    (own, other_source) = (
+        replace(source, column="", wraps=None) for source in (clock.entry.value, other.entry.value)
+    )
+    return own == other_source
 
 
 def _is_local(groups: Sequence[Group], clock: Clock | None) -> bool:
@@ -360,10 +362,10 @@ def draft_sensor_file(contents: Contents, model: str | None = None) -> Draft:
             contents.stated.name, "not detected from the first bytes of the file"
         )
     if choice.clock is not None:
-        value = dict(choice.clock.entry.value)
+        source = choice.clock.entry.value
         if choice.local:
-            value["column"] = choice.clock.column.source
-        drafted.time = Entry(value, choice.clock.entry.comment)
+            source = replace(source, column=choice.clock.column.source)
+        drafted.time = Entry(source, choice.clock.entry.comment)
     if choice.clock is None or choice.clock.counts:
         stating = (table for table in contents.tables if table.rate is not None)
         drafted.rate = Entry(UNKNOWN, "not stated in the file: such as 100 Hz")
@@ -379,12 +381,12 @@ def draft_sensor_file(contents: Contents, model: str | None = None) -> Draft:
         _add_temperature(drafted, choice.temperature, alone)
     if not drafted.channels:
         entry = Entry(
-            {"column": UNKNOWN, "unit": UNKNOWN}, "no column name identifies it: fill in, or remove"
+            Source(column=UNKNOWN, unit=UNKNOWN), "no column name identifies it: fill in, or remove"
         )
         drafted.channels = dict.fromkeys(CHANNELS, entry)
     drafted.left_over += [f"not taken: {_name_group(g)} ({why})" for g, why in choice.left]
     if choice.other_clocks:
-        names = _join_names(str(clock.entry.value["column"]) for clock in choice.other_clocks)
+        names = _join_names(str(clock.entry.value.column) for clock in choice.other_clocks)
         drafted.left_over.append(f"also a time: {names}")
     if choice.unknown:
         names = _join_names(c.label or f"column {c.source}" for c in choice.unknown)
@@ -394,13 +396,9 @@ def draft_sensor_file(contents: Contents, model: str | None = None) -> Draft:
     return drafted
 
 
-def _describe_source(table: LogTable, column: LogColumn, unit: str, alone: bool) -> dict[str, Any]:
-    source: dict[str, Any] = {}
-    if table.file is not None and not alone:
-        source["file"] = table.file
-    if table.variable is not None:
-        source["variable"] = table.variable
-    return source | {"column": column.source, "unit": unit}
+def _describe_source(table: LogTable, column: LogColumn, unit: str, alone: bool) -> Source:
+    file = None if alone else table.file
+    return Source(file=file, variable=table.variable, column=column.source, unit=unit)
 
 
 def _add_group(drafted: Draft, group: Group, alone: bool) -> None:

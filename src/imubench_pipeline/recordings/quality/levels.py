@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -93,16 +92,21 @@ def _count_values(column: ColumnSummary) -> tuple[Array, NDArray[np.int64]]:
     return np.unique(np.concatenate([np.empty(0), *pieces]), return_counts=True)
 
 
-def summarise_level(
-    column: ColumnSummary, rate: float, unit: str, *, timed: bool = True
-) -> dict[str, Any]:
-    """Return the level and noise of a channel, to be compared with its datasheet.
+@dataclass(frozen=True, kw_only=True)
+class Level:
+    """Level and noise of a channel, to be compared with its datasheet."""
 
-    ``mean`` is the median of the block means, SI, which is robust to knocks. ``unit``: as stated in
-    the sensor file. ``timed``: the log has stamps; otherwise the rate, Hz, is the stated one.
-    """
+    mean: float  # median of the block means, SI, which is robust to knocks
+    density: tuple[float, float | None]  # see `bound_noise_density`
+    unit: str  # as stated in the sensor file
+    rate: float  # Hz
+    timed: bool = True  # the log has stamps; otherwise the rate is the stated one
+
+
+def summarise_level(column: ColumnSummary, rate: float, unit: str, *, timed: bool = True) -> Level:
+    """Return the level and noise of a channel; for the other arguments see `Level`."""
     level, density = compute_finite_median(column.blocks().mean), bound_noise_density(column, rate)
-    return {"mean": level, "density": density, "unit": unit, "rate": rate, "timed": timed}
+    return Level(mean=level, density=density, unit=unit, rate=rate, timed=timed)
 
 
 def bound_noise_density(column: ColumnSummary, rate: float) -> tuple[float, float | None]:

@@ -109,7 +109,7 @@ def _run(arguments: argparse.Namespace, compiling: Compilation) -> int:
             stated = Stated(arguments.rate, arguments.gyro_unit, arguments.accel_unit)
             catalogue = list_folders(Run().sensors, "sensors")
             paths = lay_out(arguments.logs, arguments.sensor, stated, catalogue, Path(folder))
-            plan = Plan(read_config(arguments.config) | paths)
+            plan = Plan({**read_config(arguments.config), **paths})
         except ConfigError as error:
             print(f"imubench analyse: {error}", file=sys.stderr)
             return 2

@@ -5,15 +5,14 @@ from __future__ import annotations
 import shlex
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from copy import deepcopy
 from dataclasses import dataclass
 from pathlib import Path
 
 from imubench_pipeline.readers.bounded import BoundError, run_bounded
 from imubench_pipeline.readers.inspection import Inspection, inspect
-from imubench_pipeline.readers.inspection.draft import UNKNOWN
+from imubench_pipeline.readers.inspection.draft import UNKNOWN, Entry
 from imubench_pipeline.recordings.drop_zone import get_recording_name, get_sensor_name
-from imubench_pipeline.settings.sensor import Sensor, quantity_of
+from imubench_pipeline.settings.sensor import CHANNELS, Sensor, quantity_of
 from imubench_pipeline.settings.validation import ConfigError, parse
 from imubench_pipeline.settings.yaml_files import list_files, read_settings
 from imubench_pipeline.tables import write_json
@@ -137,22 +136,19 @@ def _draft_sensor(log: Path, stated: Stated) -> Mapping[str, object]:
         ) from None
     except (RecordingError, OSError) as error:
         raise ConfigError(str(error)) from None
-    described = deepcopy(inspected.draft.sensor())
-    written = described["log"]
-    if stated.rate and "time" not in written:
-        written["rate"] = stated.rate
-    for channel, source in written["channels"].items():
-        unit = stated.unit_of(channel)
-        if unit and source["unit"] == UNKNOWN:
-            source["unit"] = unit
-    open_keys = ["rate"] * (written.get("rate") == UNKNOWN)
-    for channel, source in written["channels"].items():
-        unknown = [key for key in ("column", "unit") if source.get(key) == UNKNOWN]
-        open_keys += [f"{quantity_of(channel)} {key}" for key in unknown]
+    draft = inspected.draft.with_units(
+        lambda key, unit: stated.unit_of(key) if key in CHANNELS and unit == UNKNOWN else None
+    )
+    if stated.rate and draft.time is None:
+        draft.rate = Entry(stated.rate)
+    open_keys = ["rate"] * (draft.rate is not None and draft.rate.value == UNKNOWN)
+    for channel, entry in draft.channels.items():
+        columns = (("column", entry.value.column), ("unit", entry.value.unit))
+        open_keys += [f"{quantity_of(channel)} {key}" for key, one in columns if one == UNKNOWN]
     if open_keys:
         keys = list(dict.fromkeys(open_keys))
         raise UnfilledError(_describe_missing_keys(log, keys))
-    return parse(Sensor, described, f"drafted from {log}").model_dump(
+    return parse(Sensor, draft.sensor(), f"drafted from {log}").model_dump(
         mode="json", exclude_unset=True
     )
 

@@ -156,13 +156,13 @@ class Results:
             yield Fault(name, f"expected the output of the ingest, {_of(error)}",
                         self._mended(name, step))  # fmt: skip
             return
-        of = f"{quality.recording.get('sensor')}/{quality.recording.get('recording')}"
+        of = f"{quality.recording.sensor}/{quality.recording.recording}"
         if f"recordings/{of}" != place:
             yield Fault(name, f"expected the file of {place}, found the file of {of}",
                         self._mended(name, step))  # fmt: skip
         samples = quality.kept or {}
         for file, stated in samples.items():
-            expected = sealing.SealedFile(stated["size"], stated["sha256"], 0)
+            expected = sealing.SealedFile(stated.size, stated.sha256, 0)
             if words := expected.fault(path.with_name(file), whole=True):
                 yield Fault(f"{place}/{file}", words, self._mended(f"{place}/{file}", step))
             self.read(expected.size)
@@ -170,7 +170,7 @@ class Results:
             if other.name not in samples:
                 yield self._stray(f"{place}/{other.name}")
         known_log = path.with_name(KNOWN)
-        if samples and not quality.row.simulated and not known_log.exists():
+        if samples and not quality.recording.simulated and not known_log.exists():
             words = "expected the file identities of the log, found no such file"
             yield Fault(f"{place}/{KNOWN}", words, self.run_again)
 
