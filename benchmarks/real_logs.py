@@ -44,7 +44,8 @@ import imubench_pipeline as imu
 from imubench_pipeline.allan import allan_variance
 from imubench_pipeline.earth import STANDARD_GRAVITY
 from imubench_pipeline.estimators.white_level import WhiteStretch, find_white_stretch
-from imubench_pipeline.library.estimates import ChannelEstimate, Method
+from imubench_pipeline.library.estimates import ChannelEstimate
+from imubench_pipeline.settings.config import Method
 from imubench_pipeline.typing import Array
 
 CHANNELS = tuple(f"{quantity}_{axis}" for quantity in ("gyro", "accel") for axis in "xyz")

@@ -11,7 +11,7 @@ overlapping Allan variance at n samples a cluster is
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import groupby
 from operator import itemgetter
 from typing import Any, Literal
@@ -121,6 +121,21 @@ class AllanCurve:
     def rate(self) -> float:
         """Sampling rate, Hz."""
         return float(self.cluster_size[0] / self.tau[0])
+
+    def select(self, points: NDArray[np.bool_]) -> AllanCurve:
+        """Return the curve at some of its points."""
+        return replace(
+            self,
+            tau=self.tau[points],
+            cluster_size=self.cluster_size[points],
+            variance=self.variance[points],
+            edf=self.edf[points],
+            exponent=self.exponent[points],
+            averaged=self.averaged[points],
+            edf_upper=self.edf_upper[points],
+            edf_source=[s for s, chosen in zip(self.edf_source, points, strict=True) if chosen],
+            share=self.share[points],
+        )
 
     def up_to(self, part: float) -> Array:
         """Return the tau up to a part of the log, s."""

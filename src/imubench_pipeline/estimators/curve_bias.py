@@ -123,7 +123,14 @@ def find_lowest_point(models: Models, tau: Array) -> tuple[Array, Array, NDArray
     points. Returned are, each of shape (d,), the deviation, rad/s or m/s², its averaging time, s,
     and whether it is a minimum, and not an end of ``tau``.
     """
-    level = np.log(compute_allan_variances(models, tau))
+    return locate_minimum(np.log(compute_allan_variances(models, tau)), tau)
+
+
+def locate_minimum(level: Array, tau: Array) -> tuple[Array, Array, NDArray[np.bool_]]:
+    """Return the lowest points of logarithms of Allan variances, shape (d, m).
+
+    Arguments and results are as in `find_lowest_point`.
+    """
     rows = np.arange(len(level))
     lowest = level.argmin(axis=1)
     inside = (lowest > 0) & (lowest < len(tau) - 1)

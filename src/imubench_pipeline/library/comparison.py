@@ -8,13 +8,13 @@ from itertools import combinations
 from typing import TYPE_CHECKING, Any
 
 from imubench_pipeline.estimators.estimate import COMPARED, SI_UNITS
-from imubench_pipeline.library.estimates import ChannelEstimate, Estimates, Method, estimate
+from imubench_pipeline.library.estimates import ChannelEstimate, Estimates, estimate
 from imubench_pipeline.library.logs import Log
 from imubench_pipeline.library.shown import Shown, Summary, cut
 from imubench_pipeline.navigation.compared import ComparedChannel
 from imubench_pipeline.navigation.ratios import Ratio, compare_deviations, compare_parameters
 from imubench_pipeline.report.practical import choose_page_unit
-from imubench_pipeline.settings.config import FusionSettings
+from imubench_pipeline.settings.config import FusionSettings, Method
 from imubench_pipeline.settings.sensor import quantity_of
 from imubench_pipeline.units import parse_setting
 from imubench_pipeline.words.estimates import symbol_text

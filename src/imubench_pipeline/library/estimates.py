@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields
-from typing import TYPE_CHECKING, Any, Literal, get_args
+from typing import TYPE_CHECKING, Any, get_args
 
 from imubench_pipeline.allan import cluster_sizes
 from imubench_pipeline.allan.threads import count_threads
@@ -18,7 +18,7 @@ from imubench_pipeline.library.shown import Shown, Summary, cut
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.recordings.fitness import Doubt, derive_doubts
 from imubench_pipeline.report.practical import System, choose_page_unit
-from imubench_pipeline.settings.config import AllanSettings, EstimateSettings
+from imubench_pipeline.settings.config import AllanSettings, EstimateSettings, Method
 from imubench_pipeline.settings.sensor import quantity_of, shipped_sensors
 from imubench_pipeline.settings.validation import parse
 from imubench_pipeline.steps.allan import report_too_sparse
@@ -33,7 +33,6 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.axes import Axes
 
-Method = Literal["likelihood", "likelihood_gm", "compensated", "curve", "paper", "weighted"]
 
 _SUMMARY_HEADS = ("channel", "", "value", "95 % interval", "unit", "status")
 
@@ -216,7 +215,8 @@ def estimate(
     rate : float or str, optional
         Sampling rate, Hz, or with its unit: ``"100 Hz"``. A log has its own.
     method : str
-        ``likelihood``, or another of the workflow: ``likelihood_gm`` (the papers' N, B, T_B, K),
+        ``likelihood``, or another of the workflow: ``robust`` (the Allan variance, with limits that
+        hold for sensors that change), ``likelihood_gm`` (the papers' N, B, T_B, K),
         ``compensated`` (without what temperature explains), ``weighted``, ``curve``, ``paper``.
     channels : str or sequence of str, optional
         For an array, the channels of the columns; for a log or table, the selected channels.

@@ -41,6 +41,7 @@ Name = tuple[str, str]
 _ROWS_OF_CHANNELS = (ModelRow, LineRow, DeterministicRow, DatasheetRow, DatasheetCurveRow)
 
 METHOD_NAMES = {
+    "robust": "robust fit",
     "likelihood": "likelihood",
     "likelihood_gm": "likelihood, papers' model",
     "compensated": "likelihood, temperature compensated",

@@ -52,7 +52,9 @@ class AllanSettings(Strict):
 
 HeldBack = Annotated[Text, Field(pattern=r"^[^/]+/[^/]+$", examples=["my_sensor/run_7"])]
 
-Method = Literal["likelihood", "likelihood_gm", "compensated", "curve", "paper", "weighted"]
+Method = Literal[
+    "robust", "likelihood", "likelihood_gm", "compensated", "curve", "paper", "weighted"
+]
 
 
 class EstimateSettings(Strict):

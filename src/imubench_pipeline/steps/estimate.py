@@ -19,9 +19,18 @@ from imubench_pipeline.estimators.agreement import doubt_contradicted, yield_dis
 from imubench_pipeline.estimators.curve_limits import add_fitted_limits
 from imubench_pipeline.estimators.deterministic.courses import find_deterministic_signals
 from imubench_pipeline.estimators.deterministic.verdict import assess_signals, tabulate_signals
-from imubench_pipeline.estimators.estimate import PARAMETERS, SI_UNITS, Estimate, Parameter
+from imubench_pipeline.estimators.estimate import (
+    PARAMETERS,
+    SI_UNITS,
+    Estimate,
+    Parameter,
+    not_shown,
+)
 from imubench_pipeline.estimators.likelihood import Likelihood
+from imubench_pipeline.estimators.lines import select_sinusoids
 from imubench_pipeline.estimators.model_choice import describe_disagreement
+from imubench_pipeline.estimators.robust import fit as robust
+from imubench_pipeline.estimators.robust.parts import compute_part_variances
 from imubench_pipeline.estimators.rows import (
     make_allan_rows,
     make_curve_points,
@@ -168,6 +177,8 @@ class _Channel:
         key, log = self.key, self.log
         self.fitted = fitted = self._fitted(self._blocks)
         estimates = {estimate.method: estimate for estimate in fitted.estimates}
+        if "robust" in self.settings.methods:
+            estimates["robust"] = self._fit_robustly(fitted)
         compensating = log.temperature and "compensated" in self.settings.methods
         warm = self._temperature(fitted, into) if compensating else None
         if warm is not None and warm.compensated:
@@ -202,6 +213,23 @@ class _Channel:
                     )
                     into.allan_compensated.append(row)
         return estimates
+
+    def _fit_robustly(self, fitted: Likelihood) -> Estimate:
+        """Return the estimate from the curve and its parts; the lines are of the spectrum."""
+        log, there = self.log, self._presence
+        parts = compute_part_variances(
+            self._blocks(),
+            self._bare,
+            holes=there is not None,
+            gaps=there.gaps if there else NO_GAPS,
+            segments=log.segments,
+        )
+        lines = [line.term for line in fitted.lines if line.kind != "alias"]
+        try:
+            estimate = robust.fit(self._bare, parts, lines, rng=self._stream("robust"))
+        except least_squares.UnfitCurveError as error:
+            return not_shown("robust", str(error))
+        return replace(estimate, lines=select_sinusoids(fitted.lines))
 
     def _curve_of(self, blocks: Iterator[Array], *, whole: bool = False) -> AllanCurve:
         """Return the Allan variance of the log without deterministic signals, at equal clusters."""
@@ -264,10 +292,10 @@ class _Channel:
 
 
 _MIN_SAMPLES_FOR_STEP = 1 << 16  # samples from which the step of a register is found
-_LIKELIHOOD_METHODS = {"likelihood", "likelihood_gm", "compensated"}
+_LIKELIHOOD_METHODS = {"robust", "likelihood", "likelihood_gm", "compensated"}
 
 _CURVE_METHODS = ("likelihood_gm", "weighted", "paper", "curve")  # of one model, or of the curve
-_METHODS_BY_PREFERENCE = ("likelihood", "likelihood_gm", "weighted", "paper", "curve")
+_METHODS_BY_PREFERENCE = ("likelihood", "robust", "likelihood_gm", "weighted", "paper", "curve")
 """Methods in order of preference: the first requested one is recommended."""
 
 

@@ -72,7 +72,15 @@ DATASHEET, MISREAD, TENFOLD = "datasheet", "datasheet_misread", "times_ten"
 TABLE_1, OVERBOUND, TRUE = "table_1", "overbound", "true"
 """Tunings other than those named after a method."""
 
-_ESTIMATION_METHODS = ("curve", "paper", "weighted", "likelihood", "likelihood_gm", "compensated")
+_ESTIMATION_METHODS = (
+    "curve",
+    "paper",
+    "weighted",
+    "robust",
+    "likelihood",
+    "likelihood_gm",
+    "compensated",
+)
 _TENFOLD_FACTOR = 10.0
 _MIN_PIECES = 4  # least number of runs for which a log must be long enough
 _MIN_RATE = 10.0  # least sampling rate of a log for navigation, Hz

@@ -22,6 +22,7 @@ TUNINGS = {
     "curve": "read from the curve",
     "paper": "printed weights",
     "weighted": "correct weights",
+    "robust": "robust fit",
     "likelihood": "likelihood",
     "likelihood_gm": "likelihood of the papers’ model",
     "compensated": "temperature compensated",

@@ -19,6 +19,7 @@ READ_AT_MINIMUM = "read at the minimum of the whole curve, where N and K add to 
 FIT_WITHOUT_TERM = "the curve is fitted best without this term"
 NO_NOISE = "the model has no noise"
 NO_BIAS_TERMS = "the model has no flicker noise and no Gauss-Markov process"
+MAY_BE_ABSENT = "the lower limit is 0: the term may be absent"
 MINIMUM_BEYOND = "some models that fit the log have no minimum within a ninth of it"
 
 

@@ -1,0 +1,148 @@
+"""Non-negative least squares over all sets of noise terms and correlation times, of many curves.
+
+The Allan variance is linear in N², B², K² and R². For a few terms all sets of them are solved in
+closed form, and the best set whose squares are positive is the non-negative solution. The inverse
+matrices depend on the weights only, so that hundreds of curves drawn around a measured one cost
+little more than one.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from imubench_pipeline.noise import NoiseModel
+from imubench_pipeline.noise.terms import GaussMarkov
+from imubench_pipeline.typing import Array
+
+WHITE, FLICKER, PROCESS, WALK, RAMP = range(5)
+"""Columns: N, B of flicker noise, B of a Gauss-Markov process, K and R."""
+
+TERMS = 5
+
+_GAIN_OF_PROCESS = 4.0  # Decrease of the cost (chi-squared) that a correlation time must bring
+_GAIN_OF_BOTH = 8.0  # The same for flicker noise and a process together
+_GAIN_OF_RAMP = 2.0
+_GAIN_WITHOUT_BIAS = 3.0  # Of a walk or ramp without any bias instability: few sensors have none
+_RIDGE = 1e-12  # Relative, for collinear columns
+
+
+@dataclass(frozen=True)
+class Solutions:
+    """Squares of the parameters of many curves, shape (q, 5), in the order of the columns."""
+
+    squares: Array
+    times: Array  # (q,): T_B, s; NaN without a process
+    cost: Array  # (q,): chi-squared, with the gains that the chosen terms must bring
+
+    def model(self, number: int = 0) -> NoiseModel:
+        """Return the noise model of a curve."""
+        N, F, G, K, R = np.sqrt(self.squares[number]).tolist()
+        T_B = float(self.times[number])
+        if F > 0.0 and G > 0.0:
+            return NoiseModel(N=N, B=F, K=K, R=R, further=[GaussMarkov(G, T_B)])
+        return NoiseModel(N=N, B=F or G, T_B=T_B if G > 0.0 else None, K=K, R=R)
+
+
+class TermSearch:
+    """The Allan variance of each term on a grid of tau, and the search for the best set of terms.
+
+    Parameters
+    ----------
+    tau : ndarray, shape (m,)
+        s.
+    rate : float
+        Hz.
+    averaged : ndarray, shape (m,)
+        Samples present in a cluster.
+    times : ndarray, shape (t,)
+        Correlation times that are tried, s.
+    """
+
+    def __init__(self, tau: Array, rate: float, averaged: Array, times: Array) -> None:
+        self.times = times
+        self._columns = np.empty((len(times), len(tau), TERMS))
+        self._columns[:, :, WHITE] = rate / averaged
+        units = {FLICKER: NoiseModel(B=1.0), WALK: NoiseModel(K=1.0), RAMP: NoiseModel(R=1.0)}
+        for term, unit in units.items():
+            self._columns[:, :, term] = unit.allan_variance(tau, rate)
+        for i, T_B in enumerate(times.tolist()):
+            self._columns[i, :, PROCESS] = NoiseModel(B=1.0, T_B=T_B).allan_variance(tau, rate)
+        sets = [s for size in range(1, TERMS + 1) for s in combinations(range(TERMS), size)]
+        self._sets = [np.array(s) for s in sets]
+        self._masks = np.array([[term in s for term in range(TERMS)] for s in sets])
+        self._gains = np.array([_required_gain(s) for s in sets])
+
+    def design(self, T_B: float) -> Array:
+        """Return the columns, shape (m, 5), with a process of the tried time nearest to T_B."""
+        if not np.isfinite(T_B):
+            return self._columns[0]
+        return self._columns[int(np.argmin(np.abs(np.log(self.times / T_B))))]
+
+    def solve(self, variances: Array, whitening: Array) -> Solutions:
+        """Return the best non-negative solutions.
+
+        ``variances``, shape (q, m), are the curves; ``whitening``, shape (r, m), turns their errors
+        into independent ones of variance 1.
+        """
+        target = variances @ whitening.T
+        columns = whitening @ self._columns
+        size = np.linalg.norm(columns, axis=1)
+        columns /= size[:, None]
+        gram = np.swapaxes(columns, 1, 2) @ columns
+        inverses = np.zeros((len(self.times), len(self._sets), TERMS, TERMS))
+        for i, chosen in enumerate(self._sets):
+            part = gram[:, chosen[:, None], chosen] + _RIDGE * np.eye(len(chosen))
+            inverses[:, i, chosen[:, None], chosen] = np.linalg.inv(part)
+        products = target @ columns
+        squares, index, cost = _solve_all(
+            inverses, products, (target**2).sum(axis=1), self._masks, self._gains
+        )
+        times = np.where(index >= 0, self.times[index], np.nan)
+        return Solutions(squares / size[np.maximum(index, 0)], times, cost)
+
+
+def _required_gain(chosen: tuple[int, ...]) -> float:
+    """Return the decrease of chi-squared that a set of terms must bring beside the simplest."""
+    gain = 0.0
+    if PROCESS in chosen:
+        gain += _GAIN_OF_BOTH if FLICKER in chosen else _GAIN_OF_PROCESS
+    if RAMP in chosen:
+        gain += _GAIN_OF_RAMP
+    if (WALK in chosen or RAMP in chosen) and FLICKER not in chosen and PROCESS not in chosen:
+        gain += _GAIN_WITHOUT_BIAS
+    return gain
+
+
+@njit(cache=True)
+def _solve_all(
+    inverses: Array, products: Array, totals: Array, masks: NDArray[np.bool_], gains: Array
+) -> tuple[Array, NDArray[np.int64], Array]:
+    """Return squares, index of the time (-1: no process) and cost of each curve."""
+    times, curves, terms = products.shape
+    squares, trial = np.zeros((curves, terms)), np.zeros(terms)
+    index, cost = np.full(curves, -1), totals.copy()
+    for q in range(curves):
+        for s in range(len(masks)):
+            mask = masks[s]
+            for t in range(times if mask[PROCESS] else 1):
+                explained, positive = 0.0, True
+                for i in range(terms):
+                    trial[i] = 0.0
+                    if mask[i]:
+                        for j in range(terms):
+                            if mask[j]:
+                                trial[i] += inverses[t, s, i, j] * products[t, q, j]
+                        if trial[i] <= 0.0:
+                            positive = False
+                            break
+                        explained += trial[i] * products[t, q, i]
+                if positive and totals[q] - explained + gains[s] < cost[q]:
+                    cost[q] = totals[q] - explained + gains[s]
+                    index[q] = t if mask[PROCESS] else -1
+                    squares[q] = trial
+    return squares, index, cost

@@ -1,0 +1,426 @@
+"""Noise parameters from the Allan variance, with intervals that hold from one log to the next.
+
+1. The Allan variance of the spectral lines is subtracted.
+2. Terms are fitted by generalised least squares with non-negative squares (`active_sets`).
+   The covariance is the exact one of the fitted model, plus an error of the model: no sum of a few
+   terms is exact, and at short tau the sampling errors are so small that they would rule the fit.
+3. As much of the short end as is bent, by a filter or a coarse register, is left out.
+4. Curves are drawn around the measured one and fitted like it (randomised maximum likelihood), so
+   that the limits contain the choice of terms, and are joint.
+5. The parameters of parts of the log differ by more than a stationary log explains; the draws are
+   spread by that excess (`parts`).
+
+References
+----------
+A. Guerrier, R. Molinari and J. Skaloud, "Wavelet-variance-based estimation for composite stochastic
+processes", JASA 108, 2013, for the fit to a variance by scale; D. Oliver, N. He and A. Reynolds,
+"Conditioning permeability fields to pressure data", ECMOR V, 1996, for the draws; R. DerSimonian
+and N. Laird, "Meta-analysis in clinical trials", Controlled Clinical Trials 7, 1986, for the excess
+of a spread.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cache, partial
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import digamma, polygamma
+
+from imubench_pipeline.allan import AllanCurve
+from imubench_pipeline.estimators.curve_bias import (
+    Models,
+    compute_curve_bias,
+    convert_noise_model,
+    locate_minimum,
+)
+from imubench_pipeline.estimators.estimate import (
+    BROADBAND_TIME,
+    CURVE,
+    MAX_LIMIT_RATIO,
+    Estimate,
+    JointDraws,
+    Parameter,
+)
+from imubench_pipeline.estimators.least_squares import UnfitCurveError
+from imubench_pipeline.estimators.robust.active_sets import (
+    FLICKER,
+    PROCESS,
+    RAMP,
+    TERMS,
+    WALK,
+    WHITE,
+    Solutions,
+    TermSearch,
+)
+from imubench_pipeline.estimators.robust.parts import PartVariances, estimate_excess
+from imubench_pipeline.estimators.whittle import Terms
+from imubench_pipeline.noise import FLOOR, NoiseModel, Sinusoid
+from imubench_pipeline.noise.variance_covariance import compute_variance_covariance
+from imubench_pipeline.typing import Array
+from imubench_pipeline.words.reasons import curves as texts
+from imubench_pipeline.words.reasons import estimates as reasons
+
+LONGEST = 1 / 6
+"""Longest tau of the fit, as a part of the log."""
+
+_MIN_POINTS = 6
+_DRAWS = 400
+_SHORTEST = BROADBAND_TIME
+_CORRELATION_TIMES = 80
+_MAX_MODEL_ERROR = 0.01  # Relative, of a variance
+_DECADES_OF_MODEL_ERROR = 0.4  # Over which errors of the model are correlated
+_LINE_ERROR = 0.3  # Of the variance of a line: lines are neither constant nor single
+_MAX_LINE_SHARE = 0.98  # Of a variance that may be lines
+_MAX_BEND = 2.0  # Largest standardised residual of the first points that are fitted
+_BENT_POINTS = 6
+_MAX_RELATIVE_ERROR = 1.0  # Of a variance
+_MIN_EIGENVALUE = 0.02  # Of the correlation matrix that whitens
+_ROUNDS = 4
+_MIN_FLOOR_SLOPE = -0.25  # Of the deviation at its lowest point, where it has reached its floor
+_TIMES_OF_MINIMUM = 120
+_MAX_DOUBTFUL_RATIO = 10.0  # Of the limits of a bias instability or lowest point with a value
+_MAX_WITHOUT = 0.025  # Share of draws without a floor
+_MIN_DECREASE = 0.5  # of a residual that ends the search for the first point
+
+
+def fit(
+    curve: AllanCurve,
+    parts: PartVariances,
+    lines: Sequence[Sinusoid] = (),
+    *,
+    rng: np.random.Generator,
+) -> Estimate:
+    """Estimate N, B, T_B, K and R of an Allan variance, with limits that hold for the next log.
+
+    Parameters
+    ----------
+    curve : AllanCurve
+        Without what is deterministic in the log.
+    parts : PartVariances
+        The variances of its parts.
+    lines : sequence of Sinusoid
+        The lines of its spectrum.
+    rng : numpy.random.Generator
+        Of the draws.
+
+    Returns
+    -------
+    Estimate
+        SI, with 95 % limits: sampling, choice of terms, error of the model, and changes of the
+        sensor within the log. ``not_identified`` with an upper limit where a term may be absent or
+        its limits are too wide.
+
+    Raises
+    ------
+    UnfitCurveError
+        If fewer than six points lie within a sixth of the log, or the variance is 0 at one.
+    """
+    inside = curve.cluster_size <= LONGEST * curve.samples
+    if inside.sum() < _MIN_POINTS:
+        raise UnfitCurveError(texts.few_points(int(inside.sum()), LONGEST, _MIN_POINTS))
+    if not (curve.variance[inside] > 0).all():
+        raise UnfitCurveError(texts.REPEATED_SAMPLES)
+    points = _Points.of(curve, inside, lines)
+    fitted = _fit_points(points)
+    draws = _draw(points, fitted, parts.select(inside), rng)
+    return _make_estimate(points, fitted, draws, lines)
+
+
+@dataclass(frozen=True)
+class _Points:
+    """The points of a curve up to the longest tau, without lines."""
+
+    curve: AllanCurve
+    variance: Array  # (m,)
+    line_error: Array  # (m,): relative
+    search: TermSearch
+
+    @classmethod
+    def of(cls, curve: AllanCurve, inside: NDArray[np.bool_], lines: Sequence[Sinusoid]) -> _Points:
+        curve = curve.select(inside)
+        of_lines = NoiseModel(sinusoids=lines).allan_variance(curve.tau, curve.rate)
+        rest = np.maximum(curve.variance - of_lines, (1.0 - _MAX_LINE_SHARE) * curve.variance)
+        shortest = min(max(_SHORTEST, 20.0 / curve.rate), curve.tau[-1] / 4.0)
+        times = np.geomspace(shortest, curve.tau[-1] / 2.0, _CORRELATION_TIMES)
+        search = TermSearch(curve.tau, curve.rate, curve.averaged, times)
+        return cls(curve, rest, _LINE_ERROR * of_lines / rest, search)
+
+    def evaluate(self, solutions: Solutions) -> Array:
+        """Return the variance of the first solution, shape (m,)."""
+        return self.search.design(float(solutions.times[0])) @ solutions.squares[0]
+
+    def covariance(self, model: NoiseModel, expected: Array, samples: int) -> Array:
+        """Return the covariance of the relative variances of a log of a model, shape (m, m)."""
+        curve = self.curve
+        stochastic = replace(model, R=0.0)
+        covariance = compute_variance_covariance(
+            stochastic, curve.rate, samples, curve.cluster_size
+        )
+        covariance /= np.outer(expected, expected) * np.sqrt(np.outer(curve.share, curve.share))
+        error = np.sqrt(np.maximum(np.diag(covariance), np.finfo(np.float64).tiny))
+        clipped = np.minimum(error, _MAX_RELATIVE_ERROR) / error
+        return covariance * np.outer(clipped, clipped)
+
+    def model_covariance(self, error: float) -> Array:
+        """Return the covariance of errors of the model and of the lines, shape (m, m)."""
+        place = np.log10(self.curve.tau)
+        near = np.exp(-np.abs(place[:, None] - place) / _DECADES_OF_MODEL_ERROR)
+        return error**2 * near + np.outer(self.line_error, self.line_error)
+
+
+@dataclass(frozen=True)
+class _Fitted:
+    """The best model of a curve."""
+
+    solution: Solutions
+    used: NDArray[np.bool_]
+    expected: Array  # (m,): its variance
+    whitening: Array  # (r, m)
+    sampling: Array  # (m, m): covariance of the relative variances
+    error: float  # relative, of the model
+
+    @property
+    def model(self) -> NoiseModel:
+        return self.solution.model()
+
+
+def _fit_points(points: _Points) -> _Fitted:
+    """Fit the terms; covariance, error of the model and values are found in turns."""
+    curve = points.curve
+    relative = np.sqrt(2.0 / curve.edf)
+    used = _find_used(points, relative)
+    solution, expected = _fit_weighted(points, used, relative, _MAX_MODEL_ERROR)
+    error, whitening = _MAX_MODEL_ERROR, np.empty((0, 0))
+    sampling = np.empty((0, 0))
+    for _ in range(_ROUNDS):
+        sampling = points.covariance(solution.model(), expected, curve.samples)
+        error = _estimate_model_error(points, used, expected, np.diag(sampling))
+        covariance = sampling + points.model_covariance(error)
+        whitening = _whiten(covariance * np.outer(expected, expected), used)
+        solution = points.search.solve(points.variance[None], whitening)
+        expected = points.evaluate(solution)
+    return _Fitted(solution, used, expected, whitening, sampling, error)
+
+
+def _find_used(points: _Points, relative: Array) -> NDArray[np.bool_]:
+    """Return the points that are fitted: as few of the short end left out as are bent."""
+    number = len(relative)
+    first, least = 0, np.inf
+    for start in range(number // 2):
+        used = np.arange(number) >= start
+        _, expected = _fit_weighted(points, used, relative, _MAX_MODEL_ERROR)
+        total = np.sqrt(relative**2 + _MAX_MODEL_ERROR**2 + points.line_error**2)
+        off = np.abs(points.variance / expected - 1.0) / total
+        largest = float(off[start : start + _BENT_POINTS].max())
+        if largest < least - _MIN_DECREASE:
+            first, least = start, largest
+        if least < _MAX_BEND:
+            break
+    return np.arange(number) >= first
+
+
+def _fit_weighted(
+    points: _Points, used: NDArray[np.bool_], relative: Array, error: float
+) -> tuple[Solutions, Array]:
+    """Fit with independent relative errors, of the fit and not of the noisy curve."""
+    total = np.sqrt(relative**2 + error**2 + points.line_error**2)
+    expected = points.variance
+    for _ in range(3):
+        solution = points.search.solve(
+            points.variance[None], np.diag(used / (total * expected))[used]
+        )
+        expected = np.maximum(points.evaluate(solution), np.finfo(np.float64).tiny)
+    return solution, expected
+
+
+def _estimate_model_error(
+    points: _Points, used: NDArray[np.bool_], expected: Array, sampling: Array
+) -> float:
+    """Return the error of the model that explains the residuals beyond sampling and lines."""
+    known = (sampling + points.line_error**2)[used]
+    residuals = (points.variance / expected - 1.0)[used]
+    error = _MAX_MODEL_ERROR**2
+    weight = 1.0 / (known + error) ** 2
+    count = len(residuals) / max(len(residuals) - TERMS + 1, 1)
+    excess = count * float(weight @ (residuals**2 - known)) / float(weight.sum())
+    return float(np.sqrt(np.clip(excess, 0.0, error)))
+
+
+def _whiten(covariance: Array, used: NDArray[np.bool_]) -> Array:
+    """Return the matrix that makes the errors of the used points independent, shape (r, m)."""
+    there = np.flatnonzero(used)
+    part = covariance[np.ix_(there, there)]
+    error = np.sqrt(np.diag(part))
+    values, vectors = np.linalg.eigh(part / np.outer(error, error))
+    whitening = np.zeros((len(there), len(used)))
+    whitening[:, there] = (vectors / np.sqrt(np.maximum(values, _MIN_EIGENVALUE))).T / error
+    return whitening
+
+
+@dataclass(frozen=True)
+class _Draws:
+    """Models drawn around a fitted one, and the part of their spread that is repeatability."""
+
+    solutions: Solutions
+    excess: dict[int, float]  # variance of the logarithm of a parameter, by column
+
+
+def _draw(
+    points: _Points, fitted: _Fitted, parts: PartVariances, rng: np.random.Generator
+) -> _Draws:
+    covariance = fitted.sampling + points.model_covariance(fitted.error)
+    values, vectors = np.linalg.eigh(covariance)
+    root = vectors * np.sqrt(np.maximum(values, 0.0))
+    normal = rng.standard_normal((_DRAWS // 2, len(values)))
+    normal = np.concatenate((normal, -normal))
+    shift, scale = _chi_squared_logarithms(np.diag(covariance))
+    spread = shift + (normal @ root.T) * scale
+    drawn = points.search.solve(points.variance * np.exp(spread), fitted.whitening)
+    excess = _estimate_excesses(points, fitted, parts)
+    spread = rng.standard_normal((_DRAWS // 2, 3))
+    spread = rng.permutation(np.concatenate((spread, -spread)))
+    factors = np.ones((_DRAWS, TERMS))
+    for column, terms in enumerate(((WHITE,), (FLICKER, PROCESS), (WALK, RAMP))):
+        for term in terms:
+            factors[:, term] = np.exp(2.0 * np.sqrt(excess[terms[0]]) * spread[:, column])
+    return _Draws(replace(drawn, squares=drawn.squares * factors), excess)
+
+
+def _chi_squared_logarithms(relative: Array) -> tuple[Array, Array]:
+    """Return mean and scale of the logarithm of a true variance, given its estimate.
+
+    An estimate of relative variance v is chi-squared with 2/v degrees of freedom. Their logarithm
+    has the mean psi(1/v) + ln v and the variance psi'(1/v). The scale is for deviates of variance
+    v.
+    """
+    half = 1.0 / np.maximum(relative, 1e-9)
+    return np.log(half) - digamma(half), np.sqrt(polygamma(1, half) * half)
+
+
+def _estimate_excesses(points: _Points, fitted: _Fitted, parts: PartVariances) -> dict[int, float]:
+    """Return the excess variance of the logarithms of N, B and K between parts of the log."""
+    curve, squares = points.curve, fitted.solution.squares[0]
+    present = np.flatnonzero(squares)
+    columns = points.search.design(float(fitted.solution.times[0]))[:, present]
+    gain = np.zeros((TERMS, len(curve.tau)))
+    gain[present] = np.linalg.pinv(fitted.whitening @ columns) @ fitted.whitening
+    model = fitted.model
+
+    covariance = cache(partial(points.covariance, model, fitted.expected))
+
+    excess = {}
+    for terms in ((WHITE,), (FLICKER, PROCESS), (WALK,)):
+        total = squares[list(terms)].sum()
+        if total > 0.0:
+            influence = gain[list(terms)].sum(axis=0) * fitted.expected / total / 2.0
+            excess[terms[0]] = estimate_excess(parts, curve, influence, covariance)
+        else:
+            excess[terms[0]] = 0.0
+    return excess
+
+
+def _make_estimate(
+    points: _Points, fitted: _Fitted, draws: _Draws, lines: Sequence[Sinusoid]
+) -> Estimate:
+    """Return the estimate: values of the best model, limits of the draws."""
+    curve, model, drawn = points.curve, fitted.model, draws.solutions
+    roots = np.sqrt(drawn.squares)
+    times = np.where(np.isfinite(drawn.times), drawn.times, np.inf)
+    biases = np.hypot(roots[:, FLICKER], roots[:, PROCESS])
+    parameters = {
+        "N": _limit(model.N, roots[:, WHITE]),
+        "B": _limit(model.B, biases, widest=_MAX_DOUBTFUL_RATIO),
+        "T_B": _limit(model.T_B, times) if model.T_B else Parameter(None, "absent", reasons.ABSENT),
+        "K": _limit(model.K, roots[:, WALK], _bound_walk(points)),
+        "R": _limit(model.R, roots[:, RAMP]),
+    }
+    further = [
+        {"B": _limit(process.B, roots[:, PROCESS]), "T_B": _limit(process.T_B, times)}
+        for process in model.further_processes
+    ]
+    end = float(curve.tau[-1])
+    value = float(compute_curve_bias(convert_noise_model(model), end)[0][0])
+    of_curve = np.concatenate([compute_curve_bias(each, end)[0] for each in _group(drawn)])
+    figures = {"B_curve": _limit(value, of_curve, widest=_MAX_DOUBTFUL_RATIO)}
+    figures |= _describe_lowest_point(points, fitted, drawn)
+    return Estimate(
+        "robust",
+        parameters,
+        further=further,
+        curve={name: figures[name] for name in CURVE},
+        draws=_join(drawn),
+    )
+
+
+def _describe_lowest_point(
+    points: _Points, fitted: _Fitted, drawn: Solutions
+) -> dict[str, Parameter]:
+    """Return ``sigma_min`` and ``tau_min``; the deviation need not rise again, but be flat."""
+    curve = points.curve
+    tau = np.geomspace(curve.tau[0], curve.tau[-1], _TIMES_OF_MINIMUM)
+    search = TermSearch(tau, curve.rate, tau * curve.rate, points.search.times)
+    squares = np.concatenate((fitted.solution.squares, drawn.squares))
+    times = np.concatenate((fitted.solution.times, drawn.times))
+    level = np.log([search.design(T) @ s for T, s in zip(times.tolist(), squares, strict=True)])
+    sigma, place, inside = locate_minimum(level, tau)
+    slope = (level[:, -1] - level[:, -2]) / np.log(tau[-1] / tau[-2]) / 2.0
+    # A curve that still falls at its end goes on to the level of its flicker noise.
+    falls = ~inside & (slope <= _MIN_FLOOR_SLOPE)
+    sigma = np.where(falls, FLOOR * np.sqrt(squares[:, FLICKER]), sigma)
+    floor = _limit(float(sigma[0]), sigma[1:], widest=_MAX_DOUBTFUL_RATIO)
+    time = _limit(float(place[0]), place[1:])
+    if not inside[0] or np.mean(~inside[1:]) > _MAX_WITHOUT:
+        time = Parameter(None, "not_identified", texts.MINIMUM_BEYOND, time.lower, None)
+    return {"sigma_min": floor, "tau_min": time}
+
+
+def _limit(
+    value: float, draws: Array, most: float = np.inf, *, widest: float = MAX_LIMIT_RATIO
+) -> Parameter:
+    """Return a parameter with the limits of its draws; without a value where they are too wide."""
+    lower, upper = np.quantile(draws, (0.025, 0.975), method="nearest").tolist()
+    lower, upper = min(lower, value), min(max(upper, value), most)
+    if value == 0.0:
+        return Parameter(None, "absent", reasons.ABSENT_BELOW, 0.0, upper)
+    if not lower > 0.0 or upper > widest * lower:
+        reason = reasons.wide_interval(upper / lower) if lower > 0.0 else texts.MAY_BE_ABSENT
+        return Parameter(None, "not_identified", reason, lower, upper, fitted=value)
+    if upper > MAX_LIMIT_RATIO * lower:
+        reason = reasons.wide_interval(upper / lower)
+        return Parameter(value, "doubtful", reason, lower, upper)
+    return Parameter(value, "ok", None, lower, upper)
+
+
+def _bound_walk(points: _Points) -> float:
+    """Return the K whose random walk alone would explain the end of the curve."""
+    curve = points.curve
+    at = int(np.searchsorted(curve.cluster_size, curve.samples / 9.0)) - 1
+    error = min(float(np.sqrt(2.0 / curve.edf[at])), _MAX_RELATIVE_ERROR)
+    return float(np.sqrt(3.0 * curve.variance[at] / curve.tau[at] * np.exp(1.64 * error)))
+
+
+def _group(drawn: Solutions) -> list[Models]:
+    """Return the draws as models of two groups: without a process, and with one."""
+    roots = np.sqrt(drawn.squares)
+    having = np.isfinite(drawn.times)
+    groups = []
+    for chosen, number in ((~having, 0), (having, 1)):
+        if chosen.any():
+            columns = roots[chosen][:, [WHITE, FLICKER, WALK, *[PROCESS] * number]]
+            times = drawn.times[chosen, None][:, :number]
+            groups.append(Models(Terms("NFK", number), columns, times))
+    return groups
+
+
+def _join(drawn: Solutions) -> JointDraws:
+    """Return the draws as they are kept."""
+    N, F, G, K, R = np.sqrt(drawn.squares).T
+    alone = F == 0.0
+    first = np.column_stack(
+        (np.zeros(len(N)), N, np.where(alone, G, F), np.where(alone, drawn.times, np.nan), K, R)
+    )
+    further = np.stack((np.where(alone, 0.0, G), np.where(alone, np.nan, drawn.times)), axis=-1)
+    return JointDraws(first, further[:, None])
