@@ -66,8 +66,8 @@ def test_the_page_says_what_it_assumes() -> None:
 
 
 def test_fusion_line_shows_temperature_share_of_the_common_part() -> None:
-    assert line(temperature_share=0.1)["common"] == "12.5 % (temperature 10 %)"
-    assert line(temperature_share=0.0)["common"] == "12.5 %"
+    assert line(temperature_share=0.1).common == "12.5 % (temperature 10 %)"
+    assert line(temperature_share=0.0).common == "12.5 %"
 
 
 def test_equal_sensors_have_no_line_and_undetermined_ones_one_line(
