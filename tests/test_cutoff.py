@@ -165,7 +165,7 @@ def test_flicker_noise_that_folds_does_not_move_the_cutoff():
 
 @pytest.mark.release
 @pytest.mark.parametrize("seed", few([1], [2, 3, 4]))
-def test_where_folds_of_other_filters_look_alike_none_is_told(seed):
+def test_cutoff_is_not_identified_if_aliases_of_filters_agree(seed):
     model = SensorModel(noise=NoiseModel(N=1e-4), low_pass=LowPass(28.4, 2))
     found = cutoff_of(simulate_sensor(model, 50.0, 300_000, np.random.default_rng(seed)), 50.0)
     assert found.frequency.status == "not_identified"
@@ -236,7 +236,7 @@ def test_two_processes_are_no_low_pass():
 
 
 @pytest.mark.release  # test_compensation.py has noise on both sides every day
-def test_white_noise_behind_the_filter_is_told_from_that_before_it():
+def test_cutoff_fit_separates_white_noise_before_and_after_the_filter():
     rng = np.random.default_rng(104)
     log = first_order(1e-3, 10.0, 100.0, 100_000, rng)
     log += 3e-4 * math.sqrt(100.0) * rng.standard_normal(len(log))  # as of a register

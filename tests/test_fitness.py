@@ -80,7 +80,7 @@ def test_a_log_of_which_nothing_is_found_is_fit() -> None:
 
 
 @pytest.mark.parametrize("name", sorted(code for code, kind in FINDINGS.items() if kind.unfit))
-def test_what_need_not_be_a_sensor_at_rest_in_its_unit_does_not_decide(name: str) -> None:
+def test_unfit_recording_is_excluded_unless_included(name: str) -> None:
     severity = "fatal" if name == "stuck" else "warning"
     found = list(derive_doubts([finding("noise_grows"), finding(name, severity)], [], []))
     row = verdict(found)
@@ -151,7 +151,7 @@ def test_pools_are_those_without_the_unfit_recording_and_count_it() -> None:
     assert "1 recording not used (the recording is in doubt)" in pooled["reasons"]
 
 
-def test_rows_carry_the_doubts_of_what_they_stand_on() -> None:
+def test_rows_get_the_doubts_of_their_recordings() -> None:
     moved = {"device": "two", "decides": False, "doubts": marked("motion", recording="c")}
     about = typed(
         RecordingRow,

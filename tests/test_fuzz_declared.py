@@ -32,7 +32,7 @@ KEPT = [path for path in sorted(SEEDS.glob("*/*")) if path.is_file()]
 
 
 @pytest.mark.parametrize("path", KEPT, ids=lambda path: f"{path.parent.name}-{path.name}")
-def test_what_something_failed_with_once_is_taken_or_refused(path: Path, tmp_path: Path) -> None:
+def test_former_failing_inputs_are_accepted_or_refused(path: Path, tmp_path: Path) -> None:
     tried(SUBJECTS[path.parent.name], path.read_bytes(), tmp_path)
 
 

@@ -38,7 +38,7 @@ def behind_a_filter(seed: int) -> Likelihood:
 
 @pytest.mark.release
 @pytest.mark.parametrize("logs", [3])
-def test_n_and_its_cutoff_are_not_off_together_behind_a_filter_beside_a_process(logs):
+def test_n_and_cutoff_are_unbiased_for_filtered_noise_with_a_process(logs):
     # Flicker noise in place of the process puts N low and the cut-off high by their intervals.
     N_off, cutoff_off = [], []
     for seed in range(logs):

@@ -23,7 +23,7 @@ def test_one_figure_or_several() -> None:
     assert gyro.printed("random_walk") == ()
 
 
-def test_what_is_null_was_looked_up_and_what_is_missing_was_not() -> None:
+def test_looked_up_is_true_for_null_and_false_for_missing_figures() -> None:
     gyro = QuantityDatasheet.model_validate({"noise_density": None, "offset": {"value": None}})
     assert gyro.looked_up("noise_density") and gyro.looked_up("offset")
     assert not gyro.looked_up("random_walk")

@@ -125,7 +125,7 @@ def test_what_a_failing_step_says_is_not_drawn_over(folder: Path) -> None:
 
 
 @pytest.mark.parametrize("flags", few([], [(("--quiet",),), (("--verbose",),)]))
-def test_who_asks_for_more_or_less_gets_what_snakemake_says(
+def test_verbose_and_quiet_flags_replace_the_progress_lines(
     folder: Path, flags: tuple[str, ...]
 ) -> None:
     written, left = in_terminal(folder, *flags)

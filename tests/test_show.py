@@ -131,7 +131,7 @@ def test_what_was_compared_comes_first(results: Path, capsys: pytest.CaptureFixt
     assert "twice" not in text and "a note" not in text
 
 
-def test_weak_evidence_what_would_turn_a_verdict_and_what_to_do_are_said(
+def test_terminal_shows_weak_evidence_corrected_verdicts_and_next_steps(
     results: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     text = shown(capsys, results, "--width", 200)

@@ -486,7 +486,7 @@ def test_n_in_the_log_of_the_shipped_board_is_sixty_times_what_the_paper_prints(
     assert found == pytest.approx({key: 60 * n * DEGREE for key, n in printed.items()}, rel=5e-3)
 
 
-def test_every_figure_of_the_shipped_board_is_explained_and_says_where_it_is() -> None:
+def test_shipped_board_figures_have_a_place_and_a_reason() -> None:
     figures = [
         (recording.sensor, channel, figure)
         for recording in shipped()
@@ -522,7 +522,7 @@ def settings_of_both(plan: Plan) -> list[str]:
     return [plan.simulated_settings(sensor, "sim_pair") for sensor in ("s", "t")]
 
 
-def test_what_is_said_of_a_published_figure_does_not_simulate_again(tmp_path: Path) -> None:
+def test_published_figure_texts_do_not_change_simulation_settings(tmp_path: Path) -> None:
     before = plan_of(tmp_path, BOARD)
     figures = dict(OF_S["channels"]["gyro_x"])
     reworded = [PUBLISHED | {"printed": "0.41 °/s", "means": "0.61 deg/s", "why": "because"}]

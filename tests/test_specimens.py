@@ -29,7 +29,7 @@ def declared(number: int = 9, spread: float = 0.0, **axis: Any) -> SimulatedReco
     )  # fmt: skip
 
 
-def test_alike_specimens_are_weighed_alike_and_have_a_root_of_their_number_less_noise() -> None:
+def test_equal_units_have_equal_weights_and_noise_reduced_by_sqrt_n() -> None:
     models = [model.axes["gyro_x"].noise for model in make_specimens(declared())]
     _, weights = make_board(models, 20.0)
     assert weights.values == pytest.approx(np.full(9, 1 / 9))

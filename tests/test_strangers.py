@@ -216,7 +216,7 @@ def test_stamps_of_no_clock_are_rejected_with_their_reason(
     assert "'unit' of 'time'" in said[name]["reason"]
 
 
-def test_figures_too_small_for_their_squares_are_those_of_a_dead_channel(
+def test_channel_with_underflowing_squares_is_rejected_as_constant(
     said: dict[str, dict[str, Any]],
 ) -> None:
     assert "gyro x never changes" in said[DEAD]["reason"]

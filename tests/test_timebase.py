@@ -56,7 +56,7 @@ def test_stamps_rounded_to_milliseconds(rate: float) -> None:
 
 
 @pytest.mark.parametrize("every", [3, 5, 10])
-def test_regular_losses_and_rounding_are_told_by_the_rate_alone(every: int) -> None:
+def test_coarse_stamps_are_reported_unless_a_rate_is_stated(every: int) -> None:
     stamps = np.delete(GRID, np.s_[every::every])
     base, _ = found(stamps)
     assert "coarse_stamps" in names(base)

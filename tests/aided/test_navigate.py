@@ -179,7 +179,7 @@ def test_a_share_is_judged_as_far_as_the_runs_tell(
 
 
 @pytest.mark.release
-def test_a_gyro_alone_has_accelerometers_that_are_assumed_and_said(tmp_path: Path) -> None:
+def test_gyro_only_recording_gets_assumed_accelerometers(tmp_path: Path) -> None:
     put(tmp_path / "a", ("gyro_x", "gyro_y"))
     rows = run(tmp_path / "a", [], None)
     assert {row["assumed"] for row in rows} == {"accelerometers: 100 ug/sqrt(Hz)"}

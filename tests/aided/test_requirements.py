@@ -91,5 +91,5 @@ def test_a_run_of_something_else_does_not_answer(changes: dict[str, Any]) -> Non
     assert "navigate" in "; ".join(row["reasons"])
 
 
-def test_what_settings_and_requirements_may_ask_for_is_there() -> None:
+def test_trajectory_names_match_the_settings() -> None:
     assert set(Trajectory.__args__) == set(TRAJECTORY_NAMES)

@@ -20,7 +20,7 @@ from tests.aided.mechanisation import mechanise
 
 
 @pytest.mark.parametrize("name", TRAJECTORY_NAMES)
-def test_what_ideal_sensors_measure_leads_through_the_trajectory(name: str) -> None:
+def test_mechanisation_of_ideal_measurements_follows_the_trajectory(name: str) -> None:
     way = simulate_trajectory(name, 600.0, 100.0)
     reached = mechanise(
         way.position[0], way.velocity[0], way.attitude[0], way.rate, way.force, 0.01, way.earth

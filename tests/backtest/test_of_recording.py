@@ -86,7 +86,7 @@ def test_a_log_of_white_noise_drifts_as_its_budget_says(
     assert list(rows.values()) == rows_of(logs, estimates)
 
 
-def test_a_drift_that_no_model_has_is_a_doubt_and_stands_in_the_ranking(
+def test_unmodelled_drift_adds_a_doubt_to_the_ranking(
     white: tuple[np.ndarray, Estimate], tmp_path: Path
 ) -> None:
     log, estimate = white

@@ -259,7 +259,7 @@ def test_a_mean_that_crosses_the_edge_of_a_coarse_register_is_no_step(
     assert ("step" in found) == (levels > 1.5)
 
 
-def test_where_rounding_is_all_there_is_nothing_else_is_told(rng: np.random.Generator) -> None:
+def test_coarse_log_without_noise_has_only_the_coarse_warning(rng: np.random.Generator) -> None:
     # Three levels: the level wanders from the edge of one to the middle of another, and stays.
     samples = 540_000
     level = np.concatenate([np.full(samples - 800, 0.5), np.full(800, 1.0)])

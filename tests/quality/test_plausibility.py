@@ -312,7 +312,7 @@ def test_a_noise_about_as_printed_is_not(rng: np.random.Generator, scale: float)
 
 
 @pytest.mark.parametrize(("times", "said"), [(10.0, True), (0.1, True), (2.0, False)])
-def test_a_rate_that_no_stamp_tells_is_held_against_the_printed_noise(
+def test_stated_rate_is_checked_against_the_datasheet_noise(
     rng: np.random.Generator, times: float, said: bool
 ) -> None:
     sensor = printing(noise_density=density(math.degrees(GYRO.N)))

@@ -129,7 +129,7 @@ def row(page: Read, figure: str) -> list[str]:
 # What the page says.
 
 
-def test_a_printed_figure_stands_with_its_unit_beside_what_is_found(read: dict[str, Read]) -> None:
+def test_boards_page_shows_printed_and_estimated_figures_with_units(read: dict[str, Read]) -> None:
     cells = row(read["boards.html"], "Table 5: PSD")
     # 0.006 °/s/√Hz are 0.36 °/√h.
     assert cells == [
@@ -162,7 +162,7 @@ def test_each_parameter_has_the_unit_of_the_page(read: dict[str, Read]) -> None:
     assert offset[8:10] == ["1", "1.02"]
 
 
-def test_what_is_printed_of_a_datasheet_is_compared_with_the_datasheet(
+def test_printed_datasheet_figure_is_compared_with_the_datasheet(
     read: dict[str, Read],
 ) -> None:
     cells = row(read["boards.html"], "coefficient")

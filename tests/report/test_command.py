@@ -58,7 +58,7 @@ def test_results_without_a_table_are_not_those_of_a_finished_run(
     assert "found no drift.parquet" in said(capsys)[1]
 
 
-def test_a_report_that_is_there_is_left_as_it_is_and_one_that_is_not_is_written(
+def test_report_writes_only_missing_files(
     results: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     copy = shutil.copytree(results, tmp_path / "copy")

@@ -49,7 +49,7 @@ def test_each_quantity_has_a_table_with_the_channels_of_all_sensors() -> None:
     assert [line["view"].simulated for line in gyro["lines"]] == [False, False, True, True]
 
 
-def test_the_papers_model_stands_once_where_it_is_the_recommended_one() -> None:
+def test_recommended_papers_model_has_one_line() -> None:
     rows = recording_rows("a", "r")
     rows["parameters"] = [
         replace(row, recommended=row.method == "likelihood_gm") for row in rows["parameters"]
@@ -83,7 +83,7 @@ def test_a_cell_has_value_interval_and_status() -> None:
     assert k["words"] == "K is not in the model: the data do not support it; below 3 °/h/√h."
 
 
-def test_the_doubts_of_a_channel_stand_beside_its_parameters() -> None:
+def test_comparison_lines_have_the_warnings_of_the_channel() -> None:
     findings = [{"finding": "missing_samples"}, {"finding": "lines", "severity": "note"}]
     assert [line["warnings"] for line in lines(recording_rows("a", "r", findings=findings))] == [
         ["missing_samples"]

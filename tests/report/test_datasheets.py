@@ -84,7 +84,7 @@ def test_less_than_printed_has_a_minus() -> None:
     assert reading["value"] == -0.257
 
 
-def test_an_unpublished_figure_is_told_from_one_that_cannot_be_compared() -> None:
+def test_unpublished_and_incomparable_figures_are_shown_differently() -> None:
     nothing = dict.fromkeys(("comparable", "measured", "lower", "upper", "delta", "delta_lower",
                              "delta_upper"))  # fmt: skip
     missing = FIGURE | nothing | {"printed": None, "unit": None, "kind": None}
@@ -104,7 +104,7 @@ def test_an_unpublished_figure_is_told_from_one_that_cannot_be_compared() -> Non
 @pytest.mark.parametrize(
     ("quantity", "figure"), [("N", "N"), ("bias_instability", "B"), ("K", "K"), ("T_B", "T_B")]
 )
-def test_what_nobody_looked_up_is_not_said_to_be_unpublished(quantity: str, figure: str) -> None:
+def test_figure_not_looked_up_is_not_shown_as_unpublished(quantity: str, figure: str) -> None:
     missing = FIGURE | {"printed": None, "quantity": quantity}
     known = {("a", "gyro", figure): "not looked up", ("a", "accel", figure): "yes"}
     (row,) = deltas(missing, coverage=known)
@@ -220,7 +220,7 @@ def test_who_publishes_what_is_counted() -> None:
     assert list(make_coverage_tables([])) == []
 
 
-def test_the_spread_of_turn_ons_stands_beside_what_is_printed() -> None:
+def test_turn_on_spread_is_compared_with_the_printed_figure() -> None:
     row = RepeatabilityRow(
         sensor="a",
         device="1",

@@ -106,7 +106,7 @@ def test_the_page_of_a_run_says_what_was_found(read: dict[str, Read]) -> None:
     assert set(courses) == {"pairs", "triples", "filter", "smoother", "drift"} | given
 
 
-def test_a_run_whose_noise_is_not_known_says_so_and_shows_its_turns(read: dict[str, Read]) -> None:
+def test_earth_rate_page_without_noise_model_shows_turns_and_reason(read: dict[str, Read]) -> None:
     page = read["recordings/s/unknown.html"]
     assert "The noise of this sensor is not known" in page.text
     assert page.naming("turn 19", "tr") and "Required recordings" not in page.text
@@ -136,7 +136,7 @@ def test_the_page_of_all_runs(read: dict[str, Read]) -> None:
     assert page.data["published"][0]["published"] == PUBLISHED["published"]
 
 
-def test_every_page_leads_there_only_where_there_are_such_runs(read: dict[str, Read]) -> None:
+def test_earth_rate_page_is_linked_only_with_turned_runs(read: dict[str, Read]) -> None:
     assert all("Earth’s rate" in page.text for page in read.values())
     others = site(joined(recording_rows("s", "night")))
     assert "earth_rate.html" not in {page.path for page in list_pages(others)}

@@ -65,12 +65,12 @@ def test_the_page_says_what_it_assumes() -> None:
     )
 
 
-def test_what_temperature_adds_is_told_apart_of_what_is_common() -> None:
+def test_fusion_line_shows_temperature_share_of_the_common_part() -> None:
     assert line(temperature_share=0.1).common == "12.5 % (temperature 10 %)"
     assert line(temperature_share=0.0).common == "12.5 %"
 
 
-def test_sensors_that_are_alike_have_no_line_and_one_where_nothing_is_known(
+def test_equal_sensors_have_no_line_and_undetermined_ones_one_line(
     tmp_path: Path,
 ) -> None:
     made = site(joined(*(recording_rows(name) for name in ("one", "two"))), tmp_path)
@@ -91,7 +91,7 @@ GRADE = {"quantity": "gyro", "sensor": "a", "recording": "r", "channel": "gyro_x
          "n_lower": 8.41, "n_upper": 9.61}  # fmt: skip
 
 
-def test_how_many_reach_a_class_stands_in_a_line_of_both_figures() -> None:
+def test_grade_line_has_noise_and_lowest_point() -> None:
     floor = GRADE | {"statistic": "sigma_min", "value": None, "n": None, "n_lower": 0.0,
                      "n_upper": 4.2, "reason": "it still falls"}  # fmt: skip
     (found,) = make_grade_lines(GradeRow.rows_of(build("grades", [GRADE, floor])))

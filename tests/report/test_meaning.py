@@ -65,7 +65,7 @@ def test_sensors_stand_in_their_order_with_what_decides() -> None:
     assert position.decides and position.source.startswith("gyro N in the static window (")
 
 
-def test_a_verdict_stands_beside_what_is_doubted_of_its_logs() -> None:
+def test_verdict_groups_have_the_doubts_of_their_logs() -> None:
     requirements = {"robot": Requirement.model_validate(ROBOT)}
     about = {sensor: {"price_class": None} for sensor, _ in SIMULATED}
     table = RankingRow.rows_of(build("ranking", ranking_rows(errors(), requirements, about)))
@@ -112,7 +112,7 @@ def shown(rows: list[dict[str, Any]], system: Any = "practical") -> dict[str, An
     return table
 
 
-def test_one_channel_that_is_the_worst_and_the_median_stands_once() -> None:
+def test_budget_merges_worst_and_median_axis_of_one_channel() -> None:
     table = shown(budget())
     assert table["times"] == ["60 s", "10 min"]
     (line,) = table["lines"]
@@ -157,7 +157,7 @@ def test_an_error_of_more_than_a_right_angle_is_no_number() -> None:
     assert (limit.sigma, limit.interval) == ("over 90 °", "–")
 
 
-def test_what_is_assumed_is_said_once_with_the_errors_that_it_is_about() -> None:
+def test_budget_notes_are_grouped_by_error() -> None:
     note = "K of gyro_x is not identified"
     rows = budget(reasons=[note]) + budget(reasons=[note], error="attitude")
     rows += budget(error="position", unit="m")
@@ -169,7 +169,7 @@ def test_what_requirements_ask_for_is_no_part_of_a_budget() -> None:
     assert list(make_budget_tables(rows, {}, "si")) == []
 
 
-def test_words_of_a_budget_tell_the_rest_before_and_the_latitude() -> None:
+def test_budget_text_has_static_window_and_latitude() -> None:
     words = explain_budget({"static_window": "60 s", "latitude": "45 deg"})
     assert "over 60 s at rest right before" in words and "a latitude of 45 deg" in words
 

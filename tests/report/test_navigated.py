@@ -88,7 +88,7 @@ def test_the_longest_outage_answers_and_a_filter_that_is_wrong_of_itself_is_name
     assert answer.inconsistent == "likelihood"
 
 
-def test_sensors_are_ranked_by_the_recommended_tuning_and_overlaps_are_said() -> None:
+def test_navigation_ranking_uses_recommended_tuning_and_lists_ties() -> None:
     far = {"position": 9.0, "position_lower": 8.0, "position_upper": 10.0}
     near = {"position": 2.1, "position_lower": 1.9, "position_upper": 2.3}
     better = {"position": 1.0, "position_lower": 0.9, "position_upper": 1.1}
@@ -110,7 +110,7 @@ def test_sensors_are_ranked_by_the_recommended_tuning_and_overlaps_are_said() ->
     ]
 
 
-def test_what_decides_nothing_has_no_place_and_says_why() -> None:
+def test_excluded_recordings_are_not_ranked_and_have_a_reason() -> None:
     sold, apart = (
         recording_rows(name, decides=not doubts, doubts=doubts)
         for name, doubts in (("sold", ()), ("fused", (DoubtMark("day1", "not_sold"),)))
@@ -287,7 +287,7 @@ def test_every_number_of_an_answer_is_that_of_its_table(
     assert told > 2
 
 
-def test_without_a_script_a_table_says_how_much_of_it_stands_there(
+def test_table_without_script_shows_the_number_of_rows(
     source: str, drives: list[dict[str, Any]]
 ) -> None:
     (note,) = re.findall("<noscript>(.*?)</noscript>", source)

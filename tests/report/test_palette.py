@@ -73,7 +73,7 @@ def test_methods_differ_in_more_than_their_colour() -> None:
         assert one.dash != other.dash
 
 
-def test_markers_and_dashes_are_such_as_both_kinds_of_figures_know() -> None:
+def test_styles_use_markers_and_dashes_of_both_figure_libraries() -> None:
     for look in [*all_looks(), *make_recording_styles(all_looks()[0])]:
         assert look.marker in MARKERS
         assert look.dash in DASHES

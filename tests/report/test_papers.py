@@ -49,7 +49,7 @@ def read(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Read]:
     return sound_pages(folder, {f"figures/allan_gyro_x.{kind}" for kind in ("svg", "pdf")})
 
 
-def test_printed_and_found_stand_side_by_side_in_the_unit_of_the_paper(
+def test_papers_page_shows_printed_and_computed_values_in_printed_units(
     read: dict[str, Read],
 ) -> None:
     page = read["papers.html"]

@@ -202,9 +202,7 @@ def test_a_value_has_the_unit_of_engineers_and_none_is_a_dash() -> None:
         (1e9, "11600 days"),
     ],
 )
-def test_times_are_told_in_the_unit_in_which_they_are_easily_read(
-    seconds: float, text: str
-) -> None:
+def test_duration_text_uses_readable_units(seconds: float, text: str) -> None:
     assert duration_text(seconds) == text
 
 

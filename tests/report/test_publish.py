@@ -244,7 +244,7 @@ def test_figures_of_a_rejected_recording_are_not_offered(read: dict[str, Read]) 
     assert "To recompute the results: snakemake" in read["recordings/one/torn.html"].text
 
 
-def test_a_simulated_recording_is_called_so_on_every_page_that_names_it(
+def test_pages_mark_simulated_recordings_as_simulated(
     read: dict[str, Read],
 ) -> None:
     naming = {path: page for path, page in read.items() if "phantom" in page.text}
@@ -268,7 +268,7 @@ def test_what_is_measured_is_not_called_simulated(read: dict[str, Read]) -> None
         assert not [line for line in lines if re.search(r"\bsimulated\b", line)], path
 
 
-def test_the_truth_of_a_simulation_stands_below_the_estimates(read: dict[str, Read]) -> None:
+def test_recording_page_shows_the_simulated_truth(read: dict[str, Read]) -> None:
     rows = read["recordings/two/phantom.html"].naming("truth of the simulation", "tr")
     assert len(rows) == 2
     assert all("assumed" in row.text for row in rows)
@@ -349,7 +349,7 @@ def test_a_sensor_without_a_datasheet_says_so(read: dict[str, Read]) -> None:
             if one.attributes.get("data-sensor")] == ["V & Co one"] * 2  # fmt: skip
 
 
-def test_requirements_are_answered_on_the_start_page_and_that_of_each_sensor(
+def test_start_page_and_sensor_pages_have_the_verdict_on_a_requirement(
     read: dict[str, Read],
 ) -> None:
     page = read["index.html"]

@@ -57,7 +57,7 @@ def test_best_worst_and_measured_stand_side_by_side(read: dict[str, Read]) -> No
     assert "not judged" in line.text and "no gyro" in line.text
 
 
-def test_the_spread_of_turn_ons_stands_on_the_page_of_the_sensor(read: dict[str, Read]) -> None:
+def test_sensor_page_shows_turn_on_spread(read: dict[str, Read]) -> None:
     page = read["sensors/one.html"]
     assert "Repeatability of the turn-on bias" in page.text
     assert any("not sure" in one.text and "the power" in one.text

@@ -138,7 +138,7 @@ def test_tables_of_one_recording_are_not_offered_and_none_in_one_file() -> None:
     assert of().shown(alone=True)["tables"] == []
 
 
-def test_a_device_that_has_changed_is_named_with_what_has_changed() -> None:
+def test_changed_devices_lists_changed_parameters() -> None:
     (changed,) = of(*series(1.0, 1.001, 0.999, 1.0, 1.001, 3.0)).changed_devices()
     assert (changed["sensor"], changed["device"], changed["recording"]) == ("imu", "unit 7", "run6")
     assert changed["page"] == "devices/imu/unit 7.html"
@@ -210,7 +210,7 @@ def test_a_summary_says_how_many_recordings_how_long_and_of_when() -> None:
     assert summarise_recordings([]) == "0 recordings of 0 sensors: 0 analysed, 0 rejected."
 
 
-def test_the_command_that_makes_results_again_has_what_the_run_was_given() -> None:
+def test_recompute_command_includes_the_settings_of_the_run() -> None:
     target = "results/recordings/imu/r/scores.parquet"
     plain = of(recording_rows("imu", "r"))
     assert plain.again(plain.views[0], "scores") == (f"snakemake -c2 --forcerun ingest -- {target}")

@@ -206,7 +206,7 @@ def test_terms_pass_through_the_points_where_they_are_read() -> None:
 
 
 @pytest.mark.release
-def test_a_term_that_the_log_does_not_tell_is_called_so() -> None:
+def test_undetermined_term_is_marked_not_determined() -> None:
     unsure = KNOWN | {
         "K": Parameter(
             None, "not_identified", "too short", MODEL.K / 9, MODEL.K * 9, fitted=MODEL.K
@@ -327,7 +327,7 @@ def test_recordings_of_a_sensor_share_one_entry(recordings: int, tmp_path: Path)
 
 
 @pytest.mark.release
-def test_the_recording_that_stands_for_many_is_the_middle_one() -> None:
+def test_comparison_figure_marks_the_median_recording() -> None:
     levels = (1.0, 9.0, 3.0, 2.0, 4.0)
     views = views_of(*(rows_of(recording=f"r{n}", level=one) for n, one in enumerate(levels)))
     (axes,) = draw_comparison_figure(views, ["imu"]).axes

@@ -42,7 +42,7 @@ def lines(view: ChannelView) -> dict[str, dict[str, Any]]:
 # In sentences.
 
 
-def test_a_temperature_that_is_followed_is_said_with_what_is_left() -> None:
+def test_thermal_text_has_sensitivity_and_compensated_deviation() -> None:
     said = describe_thermal(warm(), "practical")
     assert said == [
         "The bias changes with temperature by 90 °/h/K. Compensated, the Allan deviation is lower "

@@ -225,7 +225,7 @@ def test_a_key_is_the_same_where_rows_of_recordings_are_mixed() -> None:
     assert keys(mixed) == keys_before()
 
 
-def test_a_key_tells_a_missing_number_from_nothing_and_text_from_its_neighbour() -> None:
+def test_key_distinguishes_null_zero_and_missing_values() -> None:
     def key(**score: Any) -> str:
         rows = recording_rows()
         rows["scores"][0] |= score

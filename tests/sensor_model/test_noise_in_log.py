@@ -72,7 +72,7 @@ def test_from_the_log_back_before_the_filter(low_pass: LowPass | None, resolutio
     assert back.allan_variance(100.0) == pytest.approx(noise.allan_variance(100.0), rel=1e-9)
 
 
-def test_a_log_that_shows_less_than_its_rounding_has_no_noise_before_it() -> None:
+def test_noise_before_filter_is_zero_if_below_rounding() -> None:
     model = SensorModel(noise=NoiseModel(), resolution=1e-2)
     assert before_the_filter(model, NoiseModel(N=1e-4), 100.0).N == 0.0
 

@@ -149,7 +149,7 @@ def test_a_bank_has_the_density_of_flicker_noise() -> None:
 
 
 @pytest.mark.parametrize("order", [1, 3])
-def test_what_is_simulated_for_flicker_noise_has_its_allan_variance(order: int) -> None:
+def test_flicker_bank_has_the_allan_variance_of_flicker_noise(order: int) -> None:
     model = SensorModel(noise=NoiseModel(B=0.7), low_pass=LowPass(64.0, order))
     terms = bank_for(model, RATE, 3600.0)
     assert all(isinstance(term, GaussMarkov) for term in terms)

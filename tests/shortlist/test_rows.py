@@ -131,7 +131,7 @@ def test_what_fails_at_its_best_cannot_meet_the_limits() -> None:
         assert row["verdict"] == verdict
 
 
-def test_b_of_the_datasheets_of_its_class_stands_for_one_that_is_not_published() -> None:
+def test_unpublished_b_is_taken_from_datasheets_of_the_class() -> None:
     printed = {"value": 36, "unit": "deg/h"}
     silent, other = sensor(noise_density=DENSITY), sensor(bias_instability=printed)
     classes = {"s": "consumer", "o": "consumer"}

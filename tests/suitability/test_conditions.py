@@ -102,7 +102,7 @@ def test_a_tilt_has_the_turn_on_bias_of_the_datasheet() -> None:
     )
 
 
-def test_a_bias_that_is_calibrated_as_it_says_keeps_the_limit() -> None:
+def test_calibrated_bias_at_its_condition_meets_the_limit() -> None:
     asked = requirement("attitude", "5 deg", environment={})
     (condition,) = ranking(asked, s={"accel": ACCEL})["s"]["conditions"]
     size = convert_from_si(condition["largest"], "mg", "acceleration")

@@ -49,7 +49,7 @@ def test_limits_far_apart_are_weak_evidence_though_the_verdict_is_sure() -> None
     assert reasons(logs={"a": gyro(80.0), "b": gyro(100.0)}) == ["wide_interval"]
 
 
-def test_doubts_count_that_bear_on_what_makes_the_error() -> None:
+def test_only_doubts_about_the_dominant_source_weaken_evidence() -> None:
     """The error comes of N of gyro_x; in half the recordings or more."""
 
     def of(*names: str, **values: Any) -> list[dict[str, Any]]:
@@ -65,7 +65,7 @@ def test_doubts_count_that_bear_on_what_makes_the_error() -> None:
     assert reasons(doubts=of("a", "b", parameters=("K", "R")), logs=slow) == ["not_explained"]
 
 
-def test_of_what_is_not_known_no_evidence_is_spoken_of() -> None:
+def test_unjudged_sensor_has_no_evidence() -> None:
     (row,), _ = judge({"s": {"a": {"accel_x": known_white()}}}, {"robot": HEADING})
     assert (row["evidence"], row["evidence_reasons"]) == (None, [])
 

@@ -101,7 +101,7 @@ def test_a_short_log_is_to_be_as_long_as_it_takes() -> None:
     assert step["text"] == ("Extend c by 8.5 h to 9 h: this would give 1 verdict stronger evidence")
 
 
-def test_what_no_file_says_is_to_be_found_out_and_no_log_settles_it() -> None:
+def test_unknown_figures_give_the_step_find_figures() -> None:
     turns = {"environment": {"turns": "360 deg", "temperature_change": "2 K"}}
     asked = {"robot": requirement(("heading", "100 s", "0.1 deg"), **turns)}
     (row,), steps = judge({"s": {"r": gyro(5.0)}}, asked)
@@ -115,7 +115,7 @@ def test_what_no_file_says_is_to_be_found_out_and_no_log_settles_it() -> None:
     assert "log_longer" not in {one["action"] for one in steps}
 
 
-def test_nothing_is_to_do_with_a_sensor_that_lacks_what_it_must_have() -> None:
+def test_excluded_sensor_has_no_next_steps() -> None:
     must = {"full_scale": {"gyro": "300 deg/s"}}
     asked = {"robot": requirement(("heading", "100 s", "0.1 deg"), must=must)}
     (row,), steps = judge({"s": {"r": gyro(1.1)}}, asked, abilities={"full_scale": {"gyro": 1.0}})

@@ -59,7 +59,7 @@ def test_the_interval_holds_the_next_specimen(
         assert held / sets <= 0.99  # and it is no wider than it must be
 
 
-def test_one_specimen_stands_for_itself_where_no_spread_is_known() -> None:
+def test_single_unit_has_no_spread_if_none_is_known() -> None:
     (row,) = totals(np.array([0.2]), 0.1)
     found = predict_error([row], {"0": "unit"})
     assert (found.sigma, found.lower, found.upper, found.within) == (
@@ -78,7 +78,7 @@ def test_one_specimen_has_the_spread_of_other_sensors() -> None:
     assert found.spread_of == "other sensors"
 
 
-def test_recordings_of_one_specimen_tell_how_they_differ_and_no_more() -> None:
+def test_recordings_of_one_unit_give_only_the_spread_of_recordings() -> None:
     rows = totals(np.array([0.0, 0.2, 0.4]), 1e-7)
     found = predict_error(rows, dict.fromkeys(each(rows), "unit"))
     assert (found.specimens, found.recordings, found.spread_of) == (1, 3, "recordings")

@@ -19,7 +19,7 @@ def words(row: dict[str, Any]) -> str:
     return corrected_text(RankingRow.rows_of(build("ranking", [row]))[0])
 
 
-def test_a_sensor_in_another_unit_stands_as_it_would_in_the_right_one() -> None:
+def test_corrected_verdict_equals_verdict_in_the_right_unit() -> None:
     """The truth is the verdict on the same sensor, logged in the right unit."""
     right = {"gyro_x": white(1e-4), "accel_x": white(1e-3)}
     wrong = right | {"gyro_x": white(1e-4 * DEGREES)}
@@ -41,7 +41,7 @@ def test_a_sensor_in_another_unit_stands_as_it_would_in_the_right_one() -> None:
     assert {row["corrected_verdict"] for row in rows} > {"fails"}
 
 
-def test_a_verdict_that_stands_is_said_with_what_would_turn_it() -> None:
+def test_verdict_text_has_the_corrected_unit() -> None:
     rows, _ = judge({"s": {"r": gyro(7.5 / DEGREES)}}, {"robot": HEADING}, doubts=UNIT)
     assert rows[0]["verdict"] == "fails"
     expected = "it meets the limits (margin 7.5) if the gyro data are in °/s, not rad/s"
@@ -69,7 +69,7 @@ def test_a_unit_that_turns_nothing_is_not_spoken_of() -> None:
     assert words(rows[0]) == "" and rows[0]["corrected_units"] == []
 
 
-def test_a_log_left_out_for_motion_says_what_it_gave_as_logged() -> None:
+def test_moved_log_has_a_logged_verdict() -> None:
     moved = about("s", "r", decides=False, doubts=marked("r", "motion"))
     rows, steps = judge({"s": {"r": gyro(3.0)}}, {"robot": HEADING}, [moved])
     assert rows[0]["verdict"] == "not_enough_data"
@@ -95,7 +95,7 @@ def test_a_turn_on_bias_that_is_stated_keeps_its_size() -> None:
     ("factor", "units"),
     [(9.80665, "g, not m/s²"), (1 / 9.80665, "m/s², not g"), (1e-3, "mg, not g")],
 )
-def test_an_accelerometer_in_another_unit_turns_what_it_makes(factor: float, units: str) -> None:
+def test_corrected_accelerometer_unit_changes_margin_and_text(factor: float, units: str) -> None:
     right = {"gyro_x": white(1e-7), "accel_x": white(1e-2)}
     truth, _ = judge({"s": {"r": right}}, {"along": ALONG})
     wrong = right | {"accel_x": white(1e-2 / factor)}

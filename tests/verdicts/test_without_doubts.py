@@ -31,7 +31,7 @@ def test_a_doubt_leaves_every_figure(code: str) -> None:
     assert figures(doubted) == figures(clean)
 
 
-def test_what_is_let_in_although_it_is_unfit_has_its_figures() -> None:
+def test_included_unfit_recording_keeps_its_figures() -> None:
     clean, _ = judge(SENSORS, ASKED)
     recordings = [about("s", "r", doubts=marked("r", "motion")), about("s", "q"), about("t", "r")]
     let_in, _ = judge(SENSORS, ASKED, recordings, [doubt("s", "r", "motion")])

@@ -125,7 +125,7 @@ FILE = {"size": 1, "sha256": "0", "changed": 0}
         {"inputs": {"/etc/passwd": "0"}},
     ],
 )
-def test_a_seal_of_other_types_or_of_what_lies_elsewhere_is_none(
+def test_read_seal_refuses_wrong_types_and_outside_paths(
     tmp_path: Path, change: dict[str, Any]
 ) -> None:
     seal = Seal("allan", "form", {"b": "0"}, {"a": SealedFile(**FILE)})

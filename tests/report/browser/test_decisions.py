@@ -78,7 +78,7 @@ def test_every_number_of_a_verdict_is_that_of_its_table(
     assert min(columns.values()) > 2
 
 
-def test_every_number_of_a_verdict_stands_again_where_it_leads(pages: dict[str, Read]) -> None:
+def test_linked_sections_repeat_the_numbers_of_verdicts(pages: dict[str, Read]) -> None:
     links = [
         (link.attributes["href"] or "").partition("#")
         for link in pages["index.html"].elements

@@ -162,9 +162,7 @@ def test_the_recordings_of_one_sensor(read: Open, bench: Report) -> None:
 
 
 @pytest.mark.release
-def test_a_first_look_shows_the_same_curve_before_what_draws_is_there(
-    read: Open, bench: Report
-) -> None:
+def test_sketch_matches_the_curve_before_the_script_loads(read: Open, bench: Report) -> None:
     reader = read(bench.folder, OF_NIGHT)  # which waits with what draws
     sketch = reader.page.locator("figure[data-sketched] .canvas > svg.sketch").first
     sketch.wait_for()

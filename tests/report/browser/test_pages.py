@@ -42,7 +42,7 @@ def test_there_is_a_page_of_everything(seen: Seen, bench: Report) -> None:
     assert all(title.endswith(f" · {made.TITLE}") for title in titles)
 
 
-def test_a_browser_that_cannot_unpack_says_so_and_shows_what_is_plain(
+def test_browser_without_decompression_shows_plain_content_and_an_alert(
     browser: Browser, bench: Report
 ) -> None:
     page = browser.new_page()

@@ -200,7 +200,7 @@ def test_a_long_table_is_sorted_whole(read: Open, many: Path) -> None:
 
 @pytest.mark.release  # every day test_pages.py has a browser that unfolds nothing
 @pytest.mark.parametrize("script", [False, True], ids=["without JavaScript", "of 2021"])
-def test_a_browser_that_unfolds_nothing_says_how_much_is_left_out(
+def test_browser_without_decompression_shows_the_number_of_rows(
     script: bool, browser: Browser, many: Path
 ) -> None:
     context = browser.new_context(java_script_enabled=script)

@@ -383,6 +383,8 @@ def _limit(
     """Return a parameter with the limits of its draws; without a value where they are too wide."""
     lower, upper = np.quantile(draws, (0.025, 0.975), method="nearest").tolist()
     lower, upper = min(lower, value), min(max(upper, value), most)
+    if not np.isfinite(upper):  # some draws have no process
+        return Parameter(None, "not_identified", texts.MAY_BE_ABSENT, lower, None, fitted=value)
     if value == 0.0:
         return Parameter(None, "absent", reasons.ABSENT_BELOW, 0.0, upper)
     if not lower > 0.0 or upper > widest * lower:
