@@ -391,8 +391,7 @@ def _limit(
         reason = reasons.wide_interval(upper / lower) if lower > 0.0 else texts.MAY_BE_ABSENT
         return Parameter(None, "not_identified", reason, lower, upper, fitted=value)
     if upper > MAX_LIMIT_RATIO * lower:
-        reason = reasons.wide_interval(upper / lower)
-        return Parameter(value, "doubtful", reason, lower, upper)
+        return Parameter(value, "doubtful", reasons.wide_limits(upper / lower), lower, upper)
     return Parameter(value, "ok", None, lower, upper)
 
 

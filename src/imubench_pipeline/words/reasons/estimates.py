@@ -50,6 +50,14 @@ def wide_interval(ratio: float) -> str:
     )
 
 
+def wide_limits(ratio: float) -> str:
+    """Return why a value is doubtful; ``ratio``: upper over lower limit."""
+    return (
+        f"the upper 95 % limit is {number_text(ratio, 2)} times the lower one. A longer log narrows "
+        "them"
+    )
+
+
 def interval_with_zero(*, at_limit: bool) -> str:
     where = "the lower 95 % limit is 0" if at_limit else "the 95 % interval includes 0"
     return f"{where}: only the interval is given"
