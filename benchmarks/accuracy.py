@@ -29,6 +29,8 @@ from imubench_pipeline.estimators.estimate import PARAMETERS, Estimate, Paramete
 from imubench_pipeline.estimators.identifiability import compute_cramer_rao_bounds
 from imubench_pipeline.estimators.likelihood import fit
 from imubench_pipeline.estimators.model_choice import PAPERS_MODEL
+from imubench_pipeline.estimators.robust import fit as robust
+from imubench_pipeline.estimators.robust.parts import compute_part_variances
 from imubench_pipeline.estimators.whittle import make_whittle
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.simulate import simulate
@@ -77,6 +79,8 @@ def of_log(case: Case, others: int, number: int) -> tuple[Found, str, float]:
         fits: list[Estimate] = [reading.read(curve, longest=1 / 9)]
         methods: tuple[Literal["paper", "weighted"], ...] = ("paper", "weighted")
         fits += [least_squares.fit(curve, method=method) for method in methods]
+        parts = compute_part_variances([log], curve, holes=False)
+        fits.append(robust.fit(curve, parts, rng=rng))
         found |= {estimate.method: dict(estimate.parameters) for estimate in fits}
         for peer in PEERS:
             printed = peer.estimate(log, case.rate)
