@@ -35,7 +35,7 @@ IN_OUTLOOK = """
 IN_INGEST = """
     if recording == "unread":
         raise IndexError("list index out of range")
-    names = {"sensor": sensor, "device": notes.device or recording, "recording": recording}
+    names = _name_recording(plan, sensor, recording)
 """
 
 
@@ -74,9 +74,7 @@ def faulty(project: Project, tmp_path_factory: pytest.TempPathFactory) -> dict[s
         "channel = _Channel(key, log, curve, settings, bandwidth)",
         FAULTS,
     )
-    names = (
-        'names = {"sensor": sensor, "device": notes.device or recording, "recording": recording}'
-    )
+    names = "names = _name_recording(plan, sensor, recording)"
     put_fault(copy / "recordings/ingest.py", names, IN_INGEST)
     rows = 'rows: dict[str, Sequence[TableRow]] = {"alignment": [], "earth_rate_prediction": []}'
     put_fault(copy / "extensions/earth_rate/outlook.py", rows, IN_OUTLOOK)
