@@ -120,7 +120,15 @@ def _run(connection: Connection[Any, Any], job: Job, *, imported: bool) -> None:
         signal.signal(signal.SIGCHLD, signal.SIG_DFL)
         signal.pthread_sigmask(signal.SIG_UNBLOCK, _CHILD_SIGNALS)
         if sys.platform == "linux":
-            _end_with_who_asked(connection)
+            # The system ends this process when the peer of the connection closes or sends; the end
+            # of the server would come later: it may be importing for another step.
+            signal.signal(signal.SIGIO, signal.SIG_DFL)
+            fcntl.fcntl(connection, fcntl.F_SETOWN, os.getpid())
+            fcntl.fcntl(
+                connection, fcntl.F_SETFL, fcntl.fcntl(connection, fcntl.F_GETFL) | os.O_ASYNC
+            )
+            if select.select([connection], [], [], 0.0)[0]:  # closed before
+                os._exit(1)
             Path("/proc/self/comm").write_text(job.name)  # for ps and top
         connection.send(None)
         job.log.parent.mkdir(parents=True, exist_ok=True)
@@ -153,18 +161,6 @@ def _run(connection: Connection[Any, Any], job: Job, *, imported: bool) -> None:
             sys.stderr.flush()
         connection.send(outcome)
         os._exit(isinstance(outcome, StepError))
-
-
-def _end_with_who_asked(connection: Connection[Any, Any]) -> None:
-    """Make the system end this process when the peer of a connection closes or sends.
-
-    The end of the server would come later: it may be importing for another step.
-    """
-    signal.signal(signal.SIGIO, signal.SIG_DFL)
-    fcntl.fcntl(connection, fcntl.F_SETOWN, os.getpid())
-    fcntl.fcntl(connection, fcntl.F_SETFL, fcntl.fcntl(connection, fcntl.F_GETFL) | os.O_ASYNC)
-    if select.select([connection], [], [], 0.0)[0]:  # closed before
-        os._exit(1)
 
 
 def _trace(error: BaseException, script: str) -> str:

@@ -45,7 +45,6 @@ from imubench_pipeline.settings.yaml_files import read_settings
 from imubench_pipeline.units import add_key_to_errors, parse_quantity
 
 _Around = TypeVar("_Around", bound=Surroundings)
-
 _NAME_PATTERN = r"^sim_[A-Za-z0-9_.-]+$"
 _MAX_SAMPLES = 1e10  # 80 GB per channel; more is due to a wrong unit
 

@@ -45,7 +45,6 @@ _MAX_SHOWN_LENGTH, _MAX_ERROR_LENGTH = 100, 1000
 """Largest number of characters of a value, and of an error, that are shown."""
 
 _MAX_SHOWN_FAULTS = 20  # largest number of faults of a file that are shown
-
 _SHORT_REPR = reprlib.Repr()
 _SHORT_REPR.maxstring = _SHORT_REPR.maxother = _SHORT_REPR.maxlong = _MAX_SHOWN_LENGTH
 
