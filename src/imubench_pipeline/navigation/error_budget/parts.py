@@ -141,7 +141,5 @@ class Largest:
         name = DATASHEET_KEY_OF_CAUSE[row.source]  # type: ignore[index]  # a figure of a quantity
         dimension = FIGURE_DIMENSIONS[row.quantity or ""][name][0]
         return replace(
-            row,
-            largest=self.room / lever if self.room else None,
-            largest_unit=SI_UNITS[dimension],
+            row, largest=self.room / lever if self.room else None, largest_unit=SI_UNITS[dimension]
         )
