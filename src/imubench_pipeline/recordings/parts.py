@@ -114,7 +114,7 @@ class PartWriter:
 def read_part(file: LogFile, use: UsedPart, scratch: Path, number: int) -> Part:
     """Read one file of a recording, in bounded memory; its number names the files in ``scratch``.
 
-    Raises RecordingError if the file cannot be read, or no sample lies in the part to use.
+    Raises RecordingError if that fails, or no sample lies in the part to use.
     """
     rate = file.log.rate_hz
     read_rows = 0
@@ -147,8 +147,7 @@ def leave_out_knocks(
 ) -> dict[str, list[Knock]]:
     """Replace the samples of knocks by NaN in the file of a part; return the knocks by column.
 
-    ``sigmas``: least distance of a knock from the level, in standard deviations. ``longest``:
-    longest knock, records; a longer event is motion.
+    ``sigmas``: least distance from the level, in standard deviations. ``longest``: in records.
     """
     blocks = {name: column.blocks() for name, column in part.columns.items()}
     doubtful = [name for name, b in blocks.items() if len(find_outlier_blocks(b, sigmas)[0])]
