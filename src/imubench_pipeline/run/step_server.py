@@ -35,10 +35,7 @@ _MAX_ERROR_LENGTH = 300  # max. length of an error in one line, characters.
 
 
 def serve(requests: socket.socket) -> None:
-    """Fork for each job that comes through a socket as a connection, until the other end is closed.
-
-    The connection returns None at the begin of the step, and then its cost, or a `StepError`.
-    """
+    """Fork for each job from a socket; its connection gets None, then the cost or `StepError`."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the forks end, and that the run ends is seen
     signal.signal(signal.SIGCHLD, _reap)
     ready: dict[Path, bool] = {}

@@ -35,10 +35,7 @@ def parse_seconds(text: str) -> float:
 def make_number_type(
     least: float, most: float, words: str, read: Callable[[str], T]
 ) -> Callable[[str], T]:
-    """Return an argument type for a finite number in a closed range.
-
-    ``words`` are the expected value in the error; ``read`` converts a text to a number.
-    """
+    """Return an argument type for a finite number in a range, ``words`` in the error."""
 
     def value(text: str) -> T:
         try:

@@ -181,10 +181,7 @@ class SimulatedRecording(OfASensor, Surroundings, WithBlocks):
 
     @property
     def moved_gyro(self) -> str | None:
-        """The gyro of its experiment; None without one, or if it uses all axes.
-
-        Raises ValueError if it is not stated, or not simulated.
-        """
+        """The gyro of its experiment, or None; ValueError if it is not stated or simulated."""
         channels = [str(name) for name in self.channels]
         for experiment in stated_experiments(self).values():
             return experiment.moved_gyro(channels, column=False)

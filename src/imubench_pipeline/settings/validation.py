@@ -52,10 +52,7 @@ _SHORT_REPR.maxstring = _SHORT_REPR.maxother = _SHORT_REPR.maxlong = _MAX_SHOWN_
 def cut(
     value: object, words: Callable[[object], str] = _SHORT_REPR.repr, most: int = _MAX_SHOWN_LENGTH
 ) -> str:
-    """Return a value of a file as text for messages, shortened to ``most`` characters.
-
-    ``words`` converts the value to text; by default a shortened `repr`.
-    """
+    """Return a value of a file for messages, by `repr` or ``words``, cut to ``most`` characters."""
     text = words(value)
     return text if len(text) <= most else f"{text[: most - 3]}..."
 

@@ -184,10 +184,7 @@ def _compare(
 
 
 def findings(rows: Iterable[BacktestRow]) -> Iterator[FindingRow]:
-    """Yield the rows of the table ``findings`` for logs that contradict their own budgets.
-
-    There is one for each channel, about the error with the smallest p-value.
-    """
+    """Yield a finding for each channel that contradicts its budget: the least p-value."""
     by_channel: dict[tuple[str, str, str], list[tuple[float, float, BacktestRow]]] = {}
     for row in rows:
         if row.contradicted and row.chance is not None and row.ratio is not None:

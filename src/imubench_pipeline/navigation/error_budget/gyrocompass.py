@@ -34,10 +34,7 @@ _WINDOW_LENGTHS: NDArray[np.float64] = np.geomspace(1e-3, 1e9, 601)
 
 @dataclass(frozen=True, kw_only=True)
 class Gyrocompass:
-    """A horizontal gyro that is used for north-finding.
-
-    Raises a ValueError if a value is out of its range.
-    """
+    """A horizontal gyro for north-finding; ValueError for a value out of its range."""
 
     gyro: NoiseModel
     latitude: float  # rad, between the poles

@@ -248,10 +248,7 @@ class _Search:
         ]
 
     def _likelihood(self, split: Split) -> tuple[float, ...]:
-        """Return a score of a delimiter for comparison; the first of equals is used.
-
-        By priority: required names; as many names as cells; several columns; share of numbers.
-        """
+        """Return a score of a delimiter: required names, even width, several columns, numbers."""
         comments, lines = self._parted(split)
         rows = [split.cells(line.text) for line in lines[-_SCORED_LINES:]]
         if not rows:
