@@ -279,7 +279,7 @@ def _write_parts(part: Part, clocks: list[_Clock], records: _Records, scratch: P
             blocks = zip(records.times(), part.present(), strict=True)
             for group, (times, present) in enumerate(blocks):
                 table = read_row_group(file, group)
-                for clock, (of_clock, writer), readings in zip(clocks, made, waiting, strict=True):
+                for clock, (of_clock, write), readings in zip(clocks, made, waiting, strict=True):
                     chosen = has_one(present, clock.bits)
                     columns = {}
                     for name in of_clock.columns:
@@ -288,7 +288,7 @@ def _write_parts(part: Part, clocks: list[_Clock], records: _Records, scratch: P
                             columns[name], readings[name] = _carry(values, chosen, readings[name])
                         else:
                             columns[name] = values[chosen]
-                    writer.add(times[chosen], columns)
+                    write(times[chosen], columns)
     part.data.unlink()
     parts = [of_clock for of_clock, _ in made]
     for clock, of_clock in zip(clocks, parts, strict=True):
