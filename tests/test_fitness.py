@@ -9,11 +9,10 @@ from imubench_pipeline.estimators.estimate import Estimate, Parameter
 from imubench_pipeline.extensions.fusion.tables import RECORDINGS_OF_A_PAIR, FusionRow
 from imubench_pipeline.model.comparisons import ErrorBudgetRow, PooledRow
 from imubench_pipeline.model.estimates import ModelRow, ParameterRow
-from imubench_pipeline.model.recordings import FindingRow, RecordingRow
+from imubench_pipeline.model.recordings import DoubtRow, FindingRow, RecordingRow
 from imubench_pipeline.model.verdicts import DoubtMark
 from imubench_pipeline.navigation.pooled import list_pooled_rows
 from imubench_pipeline.recordings.fitness import (
-    Doubt,
     attach_doubts,
     attach_doubts_to_pools,
     derive_doubts,
@@ -46,7 +45,7 @@ def marked(*codes: str, recording: str = "a") -> tuple[DoubtMark, ...]:
     return tuple(DoubtMark(recording, code, ("gyro_x",)) for code in codes)
 
 
-def verdict(found: Iterable[Doubt], include: Sequence[str] = (), **changes: Any) -> RecordingRow:
+def verdict(found: Iterable[DoubtRow], include: Sequence[str] = (), **changes: Any) -> RecordingRow:
     (row,) = judge_recordings(typed(RecordingRow, [ABOUT | changes]), found, include)
     return row
 
@@ -100,13 +99,13 @@ def test_other_doubts_leave_the_figures_and_are_said() -> None:
     assert (row.fitness, row.decides) == ("fit with doubts", True)
     assert row.doubts == marked("bias_step", "not_explained")
     slow = ("B", "B_curve", "K", "R", "T_B", "bias", "sigma_min", "tau_min")
-    assert found[0].row().parameters == slow
-    assert found[1].row().parameters == ()
+    assert found[0].parameters == slow
+    assert found[1].parameters == ()
 
 
 def test_a_doubtful_parameter_is_no_doubt_of_the_log() -> None:
     (one,) = derive_doubts([], [parameter("doubtful")], [])
-    assert one.row().parameters == ("K",)
+    assert one.parameters == ("K",)
     assert one.reason == "drift"
     assert judge_fitness([one]) == "fit"
 

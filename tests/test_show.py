@@ -1,4 +1,3 @@
-import argparse
 import subprocess
 import sys
 from pathlib import Path
@@ -8,8 +7,9 @@ import pytest
 from rich.cells import cell_len
 
 from imubench_pipeline.model.verdicts import UnitFactor
-from imubench_pipeline.report import show
+from imubench_pipeline.report.show import show
 from imubench_pipeline.report.terminal import render_logs
+from imubench_pipeline.run.cli import main
 from imubench_pipeline.tables import build, write
 
 DEGREE = 3.141592653589793 / 180
@@ -94,9 +94,7 @@ def results(tmp_path: Path) -> Path:
 
 
 def run(*arguments: object) -> int:
-    parser = argparse.ArgumentParser()
-    show.add_arguments(parser)
-    return show.run(parser.parse_args([str(argument) for argument in arguments]))
+    return main(["show", *map(str, arguments)])
 
 
 def shown(capsys: pytest.CaptureFixture[str], *arguments: object) -> str:
@@ -261,15 +259,13 @@ def test_a_wrong_name_is_answered_with_those_that_are_there(
 
 
 @pytest.mark.usefixtures("capsys")
-def test_a_reader_that_has_gone_is_seen_by_the_caller(
-    results: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_reader_that_has_gone_is_seen_by_the_caller(monkeypatch: pytest.MonkeyPatch) -> None:
     def gone(lines: object) -> None:
         raise BrokenPipeError
 
     monkeypatch.setattr(sys.stdout, "writelines", gone, raising=False)
     with pytest.raises(BrokenPipeError):
-        run(results)
+        show(lambda _: ["a line"])
 
 
 def test_other_commands_do_not_wait_for_what_draws() -> None:

@@ -146,7 +146,7 @@ def joined(folder: Path, *rows: RecordingRow) -> dict[str, dict[str, Any]]:
         doubts = list(doubt_simulated_recordings(own))
         own_tables: dict[str, Sequence[TableRow]] = {
             "recordings": judge_recordings(own, doubts, ["one/sim", "two/sim"]),
-            "doubts": [doubt.row() for doubt in doubts],
+            "doubts": doubts,
             "findings": [],
         }
         for name, of_sensor in own_tables.items():

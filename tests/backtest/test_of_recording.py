@@ -102,7 +102,7 @@ def test_unmodelled_drift_adds_a_doubt_to_the_ranking(
     assert finding["channel"] == "gyro_x" and finding["value"] == heading["ratio"]
     assert "periodic drift" in finding["detail"] and "600 s" in finding["detail"]
     (doubt,) = derive_doubts([finding], [], [])
-    assert not doubt.unfit and {"K", "B_curve"} <= set(doubt.parameters)
+    assert doubt.fitness != "unfit" and {"K", "B_curve"} <= set(doubt.parameters)
     about = RecordingRow(
         **NAMES,
         device="r",

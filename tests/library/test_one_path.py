@@ -115,7 +115,7 @@ def test_the_library_says_of_a_log_what_analyse_says(tmp_path: Path, name: str) 
     assert [{key: getattr(f, key) for key in names} for f in estimates.findings] == [
         {key: row[key] for key in names} for row in FindingRow.rows_of(tables["findings"])
     ]
-    assert [doubt.row() for doubt in estimates.doubts] == DoubtRow.rows_of(tables["doubts"])
+    assert list(estimates.doubts) == DoubtRow.rows_of(tables["doubts"])
 
 
 def test_copies_of_a_log_have_the_same_limits(tmp_path: Path) -> None:

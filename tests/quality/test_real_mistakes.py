@@ -78,7 +78,7 @@ def unfit(found: Rows) -> dict[str, dict[str | None, float]]:
     doubted = list(derive_doubts(found, [], []))
     serious: dict[str, dict[str | None, float]] = {}
     for one in doubted:
-        if one.unfit:
+        if one.fitness == "unfit":
             serious.setdefault(one.code, {})[one.channel] = one.factor or 0.0
     assert (judge_fitness(doubted) == "unfit") == bool(serious)
     return serious

@@ -1,4 +1,3 @@
-import argparse
 import math
 import xml.etree.ElementTree as ET
 from collections.abc import Iterator, Sequence
@@ -18,7 +17,6 @@ from imubench_pipeline.estimators.estimate import Estimate, Parameter
 from imubench_pipeline.estimators.rows import make_parameter_rows
 from imubench_pipeline.noise import FLOOR, PEAK_TAU, NoiseModel
 from imubench_pipeline.report.practical import choose_page_unit
-from imubench_pipeline.report.static_figures.command import add_arguments, run
 from imubench_pipeline.report.static_figures.comparison import (
     draw_comparison_figure,
     draw_forest_figure,
@@ -39,6 +37,7 @@ from imubench_pipeline.report.static_figures.files import (
     save,
 )
 from imubench_pipeline.report.view import ChannelView, gather_recordings
+from imubench_pipeline.run.cli import main
 from imubench_pipeline.tables import write
 from imubench_pipeline.tables.keys import Key
 from imubench_pipeline.tables.schemas import TABLES
@@ -416,9 +415,7 @@ def results(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
 
 
 def command(*words: object) -> int:
-    parser = argparse.ArgumentParser()
-    add_arguments(parser)
-    return run(parser.parse_args([str(word) for word in words]))
+    return main(["figures", *map(str, words)])
 
 
 def test_the_command_writes_what_is_asked_for(

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from imubench_pipeline.registry import files_of
-from imubench_pipeline.run.resources import Cost, OfMany, OfRecording
+from imubench_pipeline.run.resources import Cost
 from tests.conftest import PROJECT
 
 FILES = [*sorted((PROJECT / "workflow/rules").glob("*.smk")), *files_of("rules")]
@@ -41,7 +41,8 @@ def rules(place: Path) -> list[Any]:
 @cache
 def costs() -> dict[str, Cost]:
     """What each rule says that it takes."""
-    names = {"OfMany": OfMany, "OfRecording": OfRecording}
     text = "".join(path.read_text() for path in FILES)
     written = {rule: _COST.search(body) for rule, body in _RULE.findall(text)}
-    return {rule: eval(found[1].strip(), names) for rule, found in written.items() if found}
+    return {
+        rule: eval(found[1].strip(), {"Cost": Cost}) for rule, found in written.items() if found
+    }

@@ -18,8 +18,7 @@ from imubench_pipeline.run.lock import Lock, TakenError, locate_lock
 from imubench_pipeline.run.recovery import STILL_WRITTEN, remove_temporary
 from imubench_pipeline.run.plan import Plan
 from imubench_pipeline.run.resources import (
-    OfMany,
-    OfRecording,
+    Cost,
     make_resource_functions,
     make_step_limits,
 )

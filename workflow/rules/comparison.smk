@@ -12,7 +12,7 @@ rule tables:
     group:
         "comparison"
     resources:
-        **cost(OfMany(memory=300, memory_of_each=0.5, time=1, time_of_each=0.005)),
+        **cost(Cost(memory=300, memory_of_each=0.5, time=1, time_of_each=0.005)),
     params:
         code=plan.code("tables"),
     script:
@@ -30,7 +30,7 @@ rule files:
     group:
         "comparison"
     resources:
-        **cost(OfMany(memory=300, memory_of_each=0.1, time=1, time_of_each=0.1)),
+        **cost(Cost(memory=300, memory_of_each=0.1, time=1, time_of_each=0.1)),
     params:
         files=plan.files(),
         code=plan.code("files"),
@@ -53,7 +53,7 @@ rule ranking:
     group:
         "comparison"
     resources:
-        **cost(OfMany(memory=300, memory_of_each=0.1, time=1, time_of_each=0.01)),
+        **cost(Cost(memory=300, memory_of_each=0.1, time=1, time_of_each=0.01)),
     params:
         settings=plan.ranking_settings(),
         code=plan.code("ranking"),
@@ -73,7 +73,7 @@ rule shortlist:
     group:
         "comparison"
     resources:
-        **cost(OfMany(memory=300, memory_of_each=0.2, time=3, time_of_each=0.01)),
+        **cost(Cost(memory=300, memory_of_each=0.2, time=3, time_of_each=0.01)),
     params:
         settings=plan.ranking_settings(),
         catalogue=plan.catalogue(
@@ -95,7 +95,7 @@ rule repeatability:
     group:
         "comparison"
     resources:
-        **cost(OfMany(memory=300, memory_of_each=0.1, time=1, time_of_each=0.01)),
+        **cost(Cost(memory=300, memory_of_each=0.1, time=1, time_of_each=0.01)),
     params:
         settings=plan.settings("datasheet"),
         catalogue=plan.catalogue(),
@@ -112,7 +112,7 @@ rule catalogue:
     group:
         "comparison"
     resources:
-        **cost(OfMany(memory=300, time=1)),
+        **cost(Cost(memory=300, time=1)),
     params:
         catalogue=plan.catalogue(),
         code=plan.code("catalogue"),

@@ -9,7 +9,7 @@ rule simulate:
     group:
         "recording"
     resources:
-        **cost(OfRecording(memory=300, time=1, time_of_values=0.2)),
+        **cost(Cost(memory=300, time=1, time_of_values=0.2)),
     params:
         settings=lambda w: plan.simulated_settings(w.sensor, w.recording),
         code=plan.code("simulate"),
@@ -29,7 +29,7 @@ rule ingest:
     group:
         "recording"
     resources:
-        **cost(OfRecording(memory=400, time=1, time_of_values=0.15)),
+        **cost(Cost(memory=400, time=1, time_of_values=0.15)),
     params:
         source=lambda w: str(plan.recordings[w.sensor, w.recording].path),
         settings=lambda w: plan.ingest_settings(w.sensor, w.recording),
@@ -51,9 +51,7 @@ rule allan:
     group:
         "recording"
     resources:
-        **cost(
-            OfRecording(memory=400, memory_of_samples=20, time=10, time_of_values=0.2)
-        ),
+        **cost(Cost(memory=400, memory_of_samples=20, time=10, time_of_values=0.2)),
     params:
         settings=plan.settings("allan"),
         code=plan.code("allan"),
@@ -85,7 +83,7 @@ rule estimate:
         "recording"
     resources:
         **cost(
-            OfRecording(
+            Cost(
                 memory=400,
                 memory_of_samples=5,
                 time=10,
@@ -116,7 +114,7 @@ rule reconstruct:
         "recording"
     resources:
         **cost(
-            OfRecording(
+            Cost(
                 memory=350,
                 memory_of_samples=15,
                 time=1,
@@ -147,9 +145,7 @@ rule samples_of_models:
     group:
         "recording"
     resources:
-        **cost(
-            OfRecording(memory=400, memory_of_samples=20, time=4, time_of_values=0.1)
-        ),
+        **cost(Cost(memory=400, memory_of_samples=20, time=4, time_of_values=0.1)),
     params:
         settings=plan.settings("reconstruction"),
         code=plan.code("samples_of_models"),
@@ -173,7 +169,7 @@ rule datasheet:
     group:
         "recording"
     resources:
-        **cost(OfRecording(memory=300, time=1)),
+        **cost(Cost(memory=300, time=1)),
     params:
         settings=lambda w: plan.datasheet_settings(w.sensor),
         code=plan.code("datasheet"),
@@ -199,9 +195,7 @@ rule error_budget:
     group:
         "recording"
     resources:
-        **cost(
-            OfRecording(memory=350, time=3, time_of_channels=0.5, time_of_values=0.05)
-        ),
+        **cost(Cost(memory=350, time=3, time_of_channels=0.5, time_of_values=0.05)),
     params:
         settings=lambda w: plan.error_budget_settings(w.sensor),
         code=plan.code("error_budget"),

@@ -19,7 +19,7 @@ rule report:
     group:
         "comparison"
     resources:
-        **cost(OfMany(memory=350, memory_of_each=3, time=2, time_of_each=0.12)),
+        **cost(Cost(memory=350, memory_of_each=3, time=2, time_of_each=0.12)),
     params:
         settings=plan.report_settings(),
         code=plan.code("report"),
@@ -39,7 +39,7 @@ rule figures:
     log:
         LOGS + "/figures.log",
     resources:
-        **cost(OfMany(memory=350, memory_of_each=3, time=12, time_of_each=0.06)),
+        **cost(Cost(memory=350, memory_of_each=3, time=12, time_of_each=0.06)),
     params:
         settings=plan.figures_settings(),
         code=plan.code("figures"),
@@ -59,7 +59,7 @@ rule exports:
     log:
         LOGS + "/exports.log",
     resources:
-        **cost(OfMany(memory=300, memory_of_each=0.5, time=1, time_of_each=0.05)),
+        **cost(Cost(memory=300, memory_of_each=0.5, time=1, time_of_each=0.05)),
     params:
         settings=plan.settings("exports"),
         code=plan.code("exports"),

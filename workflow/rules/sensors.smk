@@ -20,7 +20,7 @@ rule sensor_tables:
         "comparison"
     resources:
         **cost(
-            OfMany(
+            Cost(
                 memory=300, memory_of_each=2, time=1, time_of_each=0.03, many_jobs=True
             )
         ),

@@ -13,16 +13,7 @@ from imubench_pipeline import allan
 from imubench_pipeline.allan import AllanCurve
 from imubench_pipeline.allan.threads import count_threads
 from imubench_pipeline.estimators.rows import make_allan_rows
-from imubench_pipeline.library.given import (
-    Channels,
-    Units,
-    check_present,
-    convert_to_numbers,
-    get_dimension,
-    has_columns,
-    read_columns,
-    read_rate,
-)
+from imubench_pipeline.library import given
 from imubench_pipeline.library.logs import Log
 from imubench_pipeline.library.shown import Shown, Summary
 from imubench_pipeline.recordings.recording import ChannelLog
@@ -37,7 +28,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 Overlap = Literal["full", "octave"]
-
 _SUMMARY_HEADS = ("channel", "tau", "from", "to", "at the shortest", "lowest", "at tau")
 _TABLE_COLUMNS = (
     "tau",
@@ -166,7 +156,7 @@ def _make_table(curves: Iterable[Curve]) -> pd.DataFrame:
 
     rows = []
     for curve in curves:
-        unit = None if curve.channel is None else SI_UNITS[get_dimension(curve.channel)]
+        unit = None if curve.channel is None else SI_UNITS[given.get_dimension(curve.channel)]
         for row in make_allan_rows(Key("", "", curve.channel or ""), curve):
             kept = {key: getattr(row, key) for key in _TABLE_COLUMNS}
             rows.append(({"channel": curve.channel, "unit": unit} if unit else {}) | kept)
@@ -179,8 +169,8 @@ def allan_variance(
     data: Any,
     rate: float | str | None = None,
     *,
-    channels: Channels | None = None,
-    units: Units | None = None,
+    channels: given.Channels | None = None,
+    units: given.Units | None = None,
     cluster_sizes: ArrayLike | None = None,
     overlap: Overlap = "full",
     valid: ArrayLike | None = None,
@@ -254,7 +244,7 @@ def allan_variance(
             reasons = [report_too_sparse(name, log).detail for name, log in chosen.items()]
             raise ValueError(f"{data.name}: {'; '.join(reasons)}")
         return Curves((curve for curve in curves if curve is not None), data.name)
-    hertz = read_rate(rate, data)
+    hertz = given.read_rate(rate, data)
 
     def of_samples(samples: Any, channel: str | None) -> Curve:
         curve = allan.allan_variance(
@@ -268,12 +258,12 @@ def allan_variance(
         )
         return Curve.of(curve, channel)
 
-    if channels is None and units is None and not has_columns(data):
-        samples = convert_to_numbers(data, "the array")
+    if channels is None and units is None and not given.has_columns(data):
+        samples = given.convert_to_numbers(data, "the array")
         if samples.ndim == 1:
-            check_present(samples, "the array")
+            given.check_present(samples, "the array")
             return of_samples(samples, None)
-    columns = read_columns(data, channels, units)
+    columns = given.read_columns(data, channels, units)
     return Curves(
         of_samples(column.in_si(name), name)
         for name, column in columns.items()

@@ -15,8 +15,9 @@ from imubench_pipeline.library.curves import Curve, Curves, measured
 from imubench_pipeline.library.given import Channels, Units, read_columns, read_rate
 from imubench_pipeline.library.logs import Log, ingest_columns
 from imubench_pipeline.library.shown import Shown, Summary, cut
+from imubench_pipeline.model.recordings import DoubtRow
 from imubench_pipeline.noise import NoiseModel
-from imubench_pipeline.recordings.fitness import Doubt, derive_doubts
+from imubench_pipeline.recordings.fitness import derive_doubts
 from imubench_pipeline.report.practical import System, choose_page_unit
 from imubench_pipeline.settings.config import AllanSettings, EstimateSettings, Method
 from imubench_pipeline.settings.sensor import quantity_of, shipped_sensors
@@ -32,7 +33,6 @@ from imubench_pipeline.words.numbers import interval_text
 if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.axes import Axes
-
 
 _SUMMARY_HEADS = ("channel", "", "value", "95 % interval", "unit", "status")
 
@@ -101,7 +101,7 @@ class Estimates(Shown, Mapping[str, ChannelEstimate]):
     method : str
     findings : tuple of Finding
         Findings of ingest and estimation, as in a run with this log only.
-    doubts : tuple of Doubt
+    doubts : tuple of DoubtRow
         Reasons why values may be wrong, as in such a run.
     left_out : dict of str to str
         Channels without an estimate, with the reason.
@@ -113,7 +113,7 @@ class Estimates(Shown, Mapping[str, ChannelEstimate]):
         log: Log,
         method: str,
         findings: Sequence[Finding],
-        doubts: Sequence[Doubt],
+        doubts: Sequence[DoubtRow],
         left_out: Mapping[str, str],
     ) -> None:
         self._estimates = {estimate.channel: estimate for estimate in estimates}

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from imubench_pipeline.estimators.estimate import Estimate, JointDraws, Parameter
+from imubench_pipeline.estimators.estimate import Estimate, JointDraws
 from imubench_pipeline.navigation.error_budget.uncertainty import draw_models
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.typing import Array
@@ -95,22 +95,18 @@ class ComparedChannel:
             for name, parameter in group.items():
                 if parameter.value is not None or parameter.status in ("absent", "not_shown"):
                     continue
-                part = _bound_variance(name, group, tau)
+                # The largest Allan variance of a parameter, from its value or upper limit
+                size = {
+                    key: parameter.in_model if parameter.upper is None else parameter.upper
+                    for key, parameter in group.items()
+                }
+                if name in ("B", "T_B"):
+                    time = group["T_B"].in_model if "T_B" in group else None
+                    model = NoiseModel(B=size["B"] or 0.0, T_B=time or None)
+                else:
+                    of = {key: (size[name] or 0.0) * (key == name) for key in ("Q", "N", "K", "R")}
+                    model = NoiseModel(Q=of["Q"], N=of["N"], K=of["K"], R=of["R"])
+                part = float(model.allan_variance(tau))
                 if part > _MIN_RELEVANT_SHARE * total:
                     recording = f"{self.sensor}/{self.recording}"
                     yield texts.undetermined(name, recording, self.channel, parameter.status)
-
-
-def _bound_variance(name: str, group: Mapping[str, Parameter], tau: float) -> float:
-    """Return the largest Allan variance of a parameter, from its value or upper limit."""
-    size = {
-        key: parameter.in_model if parameter.upper is None else parameter.upper
-        for key, parameter in group.items()
-    }
-    if name in ("B", "T_B"):
-        time = group["T_B"].in_model if "T_B" in group else None
-        model = NoiseModel(B=size["B"] or 0.0, T_B=time or None)
-    else:
-        of = {key: (size[name] or 0.0) * (key == name) for key in ("Q", "N", "K", "R")}
-        model = NoiseModel(Q=of["Q"], N=of["N"], K=of["K"], R=of["R"])
-    return float(model.allan_variance(tau))

@@ -37,12 +37,7 @@ from imubench_pipeline.model.comparisons import DriftRow
 from imubench_pipeline.model.estimates import FixedBiasRow, ParameterRow
 from imubench_pipeline.model.recordings import RecordingRow
 from imubench_pipeline.model.states import DriftVerdict, Status
-from imubench_pipeline.navigation.pooled import (
-    POOLED_PARAMETERS,
-    centre_on_median,
-    compute_bounded_exp,
-    is_usable,
-)
+from imubench_pipeline.navigation import pooled
 from imubench_pipeline.noise import PARAMETERS, TERMS
 from imubench_pipeline.words.reasons import pools as texts
 
@@ -58,7 +53,7 @@ _MIN_RECORDINGS = 3  # to estimate the spread between recordings
 _MIN_RECORDINGS_FOR_LINE = 8  # a line takes one degree of freedom more
 # tau is estimated again with each of 32 recordings, then with each 5 % more
 _RECORDINGS_UPDATED_EACH, _UPDATE_GROWTH = 32, 1.05
-_COMPARED_NAMES = (*POOLED_PARAMETERS, "bias")
+_COMPARED_NAMES = (*pooled.POOLED_PARAMETERS, "bias")
 _BIAS_TERMS = {kind.symbol for kind in TERMS if PARAMETERS["B"] in kind.parameters}
 _EMPTY_RESULT = (math.nan, math.nan, math.nan, math.nan, 0.0, -1.0, -1.0)
 
@@ -162,7 +157,7 @@ def _make_rows(
             index = columns.get((*key, _get_bias_terms(own)), -1)
             *y, p, changed, count, alone = _EMPTY_RESULT if index < 0 else levels[place][index]
             expected = [
-                None if math.isnan(x) else compute_bounded_exp(x) if noise else x for x in y
+                None if math.isnan(x) else pooled.compute_bounded_exp(x) if noise else x for x in y
             ]
             value = own.value if own is not None and _get_status(own) == "ok" else None
             change = value / expected[0] - 1.0 if noise and value and expected[0] else None
@@ -218,9 +213,9 @@ def _make_point(row: Estimated) -> tuple[float, ...]:
     if isinstance(row, FixedBiasRow):
         return row.value, 0.0, 0.0
     triple = (row.value if row.status == "ok" else None, row.lower, row.upper)
-    if not is_usable(triple):
+    if not pooled.is_usable(triple):
         return math.nan, math.nan, math.nan
-    y, points = centre_on_median([triple])
+    y, points = pooled.centre_on_median([triple])
     return y, *points[0][1:]
 
 

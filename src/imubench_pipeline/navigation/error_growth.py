@@ -17,15 +17,9 @@ import numpy as np
 from imubench_pipeline.earth import STANDARD_GRAVITY
 from imubench_pipeline.estimators.estimate import Estimate
 from imubench_pipeline.model.estimates import ErrorGrowthRow
+from imubench_pipeline.navigation import expected_errors
 from imubench_pipeline.navigation.error_budget import Figures, Uncalibrated, draw_models
 from imubench_pipeline.navigation.error_budget.budget import ACCEL_ORDER, GYRO_ORDER
-from imubench_pipeline.navigation.expected_errors import (
-    NO_FIGURES_OF_CHANNELS,
-    AxisErrors,
-    collect_axis_errors,
-    list_standard_questions,
-    select_channels,
-)
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.growth import Calibrated
 from imubench_pipeline.noise.model import sum_over_terms
@@ -47,7 +41,7 @@ def list_growth_rows(
     window: float,
     draws: int,
     seed: int,
-    figures: Mapping[str, Figures] = NO_FIGURES_OF_CHANNELS,
+    figures: Mapping[str, Figures] = expected_errors.NO_FIGURES_OF_CHANNELS,
 ) -> Iterator[ErrorGrowthRow]:
     """Yield the rows of the table ``error_growth`` of a recording.
 
@@ -55,7 +49,7 @@ def list_growth_rows(
     ``window``, s, are used in addition to the default times; the others are as in
     `expected_errors.error_rows`.
     """
-    axes = collect_axis_errors(estimates, figures)
+    axes = expected_errors.collect_axis_errors(estimates, figures)
 
     @cache
     def models(channel: str) -> Sequence[NoiseModel]:
@@ -86,15 +80,17 @@ def list_growth_rows(
     for letter in letters if len(letters) > 1 else []:
         answerers[letter] = {name: errors for name, errors in axes.items() if name[-1] == letter}
     for axis, at_rest in product(answerers, sorted({*_STANDARD_WINDOWS, window})):
-        for question in list_standard_questions(
+        for question in expected_errors.list_standard_questions(
             sorted({*_STANDARD_TIMES, *times}), at_rest, 0.0, ["worst"]
         ):
             if question.error == "north":
                 continue
-            chosen = select_channels(question, answerers[axis])
+            chosen = expected_errors.select_channels(question, answerers[axis])
             if chosen is None:
                 continue
-            budget = question.answer(*(axes[c] if c else AxisErrors() for c in chosen.values()))
+            budget = question.answer(
+                *(axes[c] if c else expected_errors.AxisErrors() for c in chosen.values())
+            )
             gyro, accel = chosen["gyro"], chosen["accel"]
             assert gyro is not None  # every error needs one
             drawn = noise(question.error, question.time, Calibrated(at_rest), gyro, accel)

@@ -25,7 +25,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from functools import lru_cache
 from typing import TypeGuard, TypeVar
 
@@ -44,11 +44,8 @@ POOLED_PARAMETERS = ("N", "B_curve", "sigma_min", "K", "B", "T_B", "Q", "R")
 """Pooled parameters, in their order in the table."""
 
 NORMAL_QUANTILE = 1.959963984540054  # 97.5 % quantile of the standard normal distribution
-
 _MIN_HALF_WIDTH_RATIO = 0.25
-
 E = TypeVar("E", ParameterRow, FixedBiasRow)
-
 _Point = tuple[float, float, float]  # y, and its variance for a truth below and above
 _Group = tuple[str, str | None, str, str]  # sensor, device, channel and parameter
 
@@ -343,25 +340,11 @@ def _make_parameter_row(
 
 
 def _make_row(group: _Group, pooled: Pool, unit: str, reasons: Iterable[str]) -> PooledRow:
-    sensor, device, channel, parameter = group
-    return PooledRow(
-        sensor=sensor,
-        device=device,
-        channel=channel,
-        parameter=parameter,
-        recordings=pooled.recordings,
-        left_out=pooled.left_out,
-        value=pooled.value,
-        lower=pooled.lower,
-        upper=pooled.upper,
-        unit=unit,
-        spread=pooled.spread,
-        spread_lower=pooled.spread_lower,
-        spread_upper=pooled.spread_upper,
-        p_value=pooled.p_value,
-        verdict=pooled.verdict,
-        reasons=tuple(reasons),
-    )
+    names = ("sensor", "device", "channel", "parameter")
+    found = dict(zip(names, group, strict=True)) | asdict(pooled)
+    for name in ("contradicting", "error"):
+        del found[name]
+    return PooledRow(**found, unit=unit, reasons=tuple(reasons))
 
 
 def _make_bias_row(

@@ -30,7 +30,6 @@ from imubench_pipeline.typing import Array
 from imubench_pipeline.words.reasons import pools as texts
 
 _TAIL_PROBABILITY = 0.025  # probability beyond each 95 % limit
-
 _TAUS_PER_DECADE = 2  # number of tau per decade in the table ``drawn_deviations``
 
 

@@ -16,12 +16,7 @@ from pydantic import Field
 from imubench_pipeline.model.comparisons import ErrorBudgetRow
 from imubench_pipeline.model.states import Measured, Verdict
 from imubench_pipeline.model.verdicts import Condition, Figure, Property, Share, Shortfall
-from imubench_pipeline.settings.printed import (
-    FIGURE_DIMENSIONS,
-    SENSORS,
-    Datasheet,
-    PrintedFigure,
-)
+from imubench_pipeline.settings.printed import FIGURE_DIMENSIONS, SENSORS, Datasheet, PrintedFigure
 from imubench_pipeline.settings.requirements import Must
 from imubench_pipeline.settings.sensor import QUANTITIES, Sensor
 from imubench_pipeline.settings.validation import Strict
@@ -253,10 +248,7 @@ def select_known_errors(rows: Iterable[ErrorBudgetRow]) -> list[tuple[ErrorBudge
 def compute_variance_shares(
     total: float, sources: Iterable[ErrorBudgetRow], least: float = 0.01
 ) -> tuple[Share, ...]:
-    """Return the sources of an error with their shares of the variance, the largest first.
-
-    ``total`` is 1 sigma. Shares below ``least`` are left out.
-    """
+    """Return the sources with at least such a share of the variance, the largest first."""
     if total <= 0.0:
         return ()
     shares = (

@@ -20,10 +20,9 @@ __all__ = ["Batch", "LogFile", "RecordingError", "find_only_log", "is_endless", 
 
 
 def log_files(path: Path) -> list[Path]:
-    """Return the files of a recording: the file itself, or the visible files of its folder.
+    """Return the file itself, or the visible files of a folder; OSError for devices and pipes.
 
-    Broken links to files are included; links to folders are not followed. Raise an OSError if the
-    ``path`` is a device or a named pipe, which may never end, or a folder cannot be listed.
+    Broken links to files are included; links to folders are not followed.
     """
     if is_endless(path):
         raise OSError(errno.EINVAL, "it is neither a file nor a folder")
@@ -136,10 +135,7 @@ def _compose_accents(name: str) -> str:
 
 
 def find_only_log(path: Path, present: list[Path]) -> Path:
-    """Return the only log of a folder or archive; files in subfolders describe it.
-
-    Raise `RecordingError` if there is no log among the files ``present``, or more than one.
-    """
+    """Return the only log of a folder or archive, without its subfolders; else RecordingError."""
     if not present and not path.is_dir():
         raise RecordingError(
             f"{path.name}: the archive has no log: it is empty or cut short, or has folders, "

@@ -72,10 +72,7 @@ class LogFile(ABC):
 
     @abstractmethod
     def batches(self) -> Iterator[Batch]:
-        """Yield the records in the order of the file.
-
-        Raise `RecordingError` if the file does not match its sensor file, or is corrupt.
-        """
+        """Yield the records in order; `RecordingError` if the file is corrupt or another one."""
 
     def note(self, data: FindingData, value: float, severity: Severity = "warning") -> None:
         """Add a finding about the whole file."""

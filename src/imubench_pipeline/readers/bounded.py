@@ -20,9 +20,7 @@ import psutil
 
 P = ParamSpec("P")
 T = TypeVar("T")
-
 _PIPE_BLOCK = 1 << 20
-
 _OVERLOAD_FACTOR = 5.0  # on the time limit, while a process waits for a core or a disk
 _FORK_LOCK = Lock()
 """Held between opening a pipe and closing its unused ends: a process forked by another thread in
@@ -40,8 +38,8 @@ class BoundError(Exception):
 def limit_memory(more: int) -> None:
     """Limit the additional memory of this process to ``more`` bytes, on Linux.
 
-    Larger allocations fail. Unlike RLIMIT_AS, the limit does not count reserved addresses, of which
-    Arrow and numba have many.
+    Unlike RLIMIT_AS, the limit does not count reserved addresses, of which Arrow and numba have
+    many.
     """
     if sys.platform != "linux":
         return
@@ -57,9 +55,9 @@ def run_bounded(
 ) -> T:
     """Return the result of a function in a process of its own, with limits of time and memory.
 
-    ``seconds``: on a busy machine they are of a core, and the real time may be five times as long.
-    ``memory``: additional bytes. The result or the exception of the function is pickled. Raise a
-    `BoundError` if a limit is exceeded, or the system ends the process.
+    ``seconds``: of a core; five times as long on a busy machine. ``memory``: additional bytes.
+    Raises `BoundError` if a limit is exceeded, or the system ends the process. The result is
+    pickled.
     """
     return Bounded(memory, function, *arguments, **named).result(seconds)
 

@@ -34,8 +34,7 @@ _READ_BLOCK = 1 << 16
 class _CompressedParts:
     """The decompressed bytes of one or several consecutive compressed parts; zeros may follow each.
 
-    The number of nearly empty parts is limited: the libraries skip millions of them before they
-    return. ``new`` creates the decompressor of one part.
+    Nearly empty parts are limited: the libraries skip millions of them. ``new``: a decompressor.
     """
 
     def __init__(self, file: FileWithoutHoles, new: Callable[[], Any]) -> None:
@@ -167,10 +166,7 @@ class Bytes:
         self._left = max(bounds.MIN_CHECKED_EXPANSION, bounds.MAX_EXPANSION_RATIO * size)
 
     def read(self, size: int) -> bytes:
-        """Return the next bytes, at most ``size``; none at the end.
-
-        Raise `RecordingError` if they are corrupt, encrypted, or expand beyond the limit.
-        """
+        """Return the next bytes, at most ``size``, or RecordingError; none at the end."""
         try:
             # Not `read`, which discards the data before an early end.
             block: bytes = self._stream.read1(size)
@@ -484,9 +480,8 @@ BLOCK_BYTES = 1 << 20
 def blocks(path: Path, findings: list[Finding], least_zeros: int) -> Iterator[bytes]:
     """Yield the bytes of a log, compressed or not, in blocks of about `BLOCK_BYTES`.
 
-    ``findings`` receives findings about truncated compressed data, and about runs of
-    ``least_zeros`` zero bytes. Raise `RecordingError` if the file cannot be opened, or compressed
-    data are corrupt.
+    ``findings`` gets those about truncated data, and about runs of ``least_zeros`` zero bytes.
+    Raises `RecordingError` if the file cannot be opened, or compressed data are corrupt.
     """
     zeros = ZeroRuns(least_zeros)
     with closing(open_bytes(path)) as stream:

@@ -46,9 +46,8 @@ def find_format(path: Path, stated: Reader | None = None) -> FileFormat:
 def recognise_content(path: Path) -> tuple[FileFormat, str]:
     """Return the format of a log, and its compression; empty if it is not compressed.
 
-    ``path``: a file, the folder of a ROS 2 bag, or a member of a zip archive; an archive of several
-    files is text. Raise `RecordingError` if it cannot be opened, is compressed twice, or is
-    compressed and its format does not allow that.
+    ``path``: a file, the folder of a ROS 2 bag, or a member of an archive; an archive of several
+    files is text. Raises `RecordingError` if it cannot be opened, or may not be compressed so.
     """
     if (of_folder := recognise_folder(path)) is not None:
         return of_folder, ""

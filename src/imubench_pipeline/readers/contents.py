@@ -15,7 +15,6 @@ from imubench_pipeline.readers.formats import TEXT
 from imubench_pipeline.tables.findings import RecordingError
 
 _MAX_SHOWN_FAULTS = 5
-
 MAX_FILES = 200  # largest number of files of a folder that are examined
 
 

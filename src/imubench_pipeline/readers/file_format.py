@@ -17,7 +17,6 @@ from imubench_pipeline.settings.validation import cut
 from imubench_pipeline.tables.findings import RecordingError
 
 Kind = Literal["number", "date", "text", "other"]
-
 MAX_EXAMINED_RECORDS = 1000  # largest number of records that are examined in an inspection
 MAX_SHOWN_VALUES = 4  # largest number of values of a column that are shown
 
@@ -56,11 +55,12 @@ class FileFormat:
     title: str  # common name of the format
     endings: tuple[str, ...]  # usual suffixes of its files, for messages
     signature: Signature
-    streamed: bool  # read sequentially: may be compressed or in a zip archive
-    clock_of: Literal["file", "variable", "length"]  # data that share a clock; length: of arrays
-    time_columns: tuple[str, ...]  # names that the format fixes; empty if it fixes none
-    settings: tuple[str, ...]  # entries of `log` that apply to this format, but not to all
     code: Callable[[], Code]  # imports and returns the code, when a run needs the format
+    streamed: bool = False  # read sequentially: may be compressed or in a zip archive
+    clock_of: Literal["file", "variable", "length"] = "length"
+    """Data that share a clock: those of a file or a topic, or arrays of equal length."""
+    time_columns: tuple[str, ...] = ()  # names that the format fixes
+    settings: tuple[str, ...] = ()  # entries of `log` that apply to this format, but not to all
     vendor: str | None = None  # vendor of all sensors with such logs
     measured_by_name: bool = False  # linear acceleration includes gravity
     extra: Extra | None = None  # extra of the package with a library for the code

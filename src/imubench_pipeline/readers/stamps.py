@@ -34,10 +34,7 @@ class Clock:
         self.first: Any = None
 
     def seconds(self, stamps: NDArray[Any], present: NDArray[np.bool_]) -> NDArray[np.float64]:
-        """Return s since the first stamp, shape (n,); NaN where the stamp is not present.
-
-        Raise `RecordingError` if the first records have no stamp.
-        """
+        """Return s since the first stamp, shape (n,); NaN without one, `RecordingError` if all."""
         if self._wraps is not None:
             stamps = stamps.copy()
             stamps[present] = unwrap(stamps[present], self._wraps, self._state)
@@ -64,9 +61,8 @@ class WrapState:
 def unwrap(stamps: NDArray[Any], wraps: float, state: WrapState) -> NDArray[Any]:
     """Unwrap the stamps of a counter; int64 for integers, exact, else float64 with NaN if missing.
 
-    A step back by more than half of ``wraps``, the value at which the counter wraps to 0, is a
-    wrap. A step forward by more than half is a late record, or a damaged stamp, which does not
-    affect the others. ``state``: between blocks; changed in place.
+    A step back by more than half of ``wraps`` is a wrap; such a step forward is a late record or a
+    damaged stamp, which does not affect the others. ``state``: between blocks; changed in place.
     """
     whole = stamps.dtype.kind in "iu" and float(wraps).is_integer()
     going_on = stamps.astype(np.int64 if whole else np.float64)

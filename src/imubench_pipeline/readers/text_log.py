@@ -22,27 +22,12 @@ _DECIMALS = 12  # more are rounding errors, and would double the size of the fil
 
 
 class TextLog(AbstractContextManager["TextLog"]):
-    """A text file in the layout of the logs of a sensor.
+    """A text file in the layout of the logs of a sensor; the rate is in Hz.
 
-    Parameters
-    ----------
-    path : Path
-    log : LogFormat
-        Format with delimiter, comments, skipped lines and stamps.
-    sources : mapping of str to ColumnSource
-        Column, unit, scale and offset of each channel, and of ``temperature``, of this file.
-    rate : float
-        Hz.
-    remarks : iterable of str
-        Comments at its top, below the mark of a simulated log, if the layout has comments.
-    kind : dtype
-        Type of the numbers: float32 has seven digits, far finer than the noise, and halves the
-        text.
-
-    Raises
-    ------
-    ConfigError
-        If its stamps are not simple numbers.
+    ``sources`` are of the channels, and of ``temperature``, of this file. ``remarks`` are comments
+    at its top, below the mark of a simulated log, if the layout has comments. ``kind`` is the type
+    of the numbers: float32 has seven digits, far finer than the noise, and halves the text. Raise
+    `ConfigError` if its stamps are not simple numbers.
     """
 
     def __init__(

@@ -18,10 +18,9 @@ _MESSAGE_CLASSES = frozenset(
 class Frames:
     """Iterator over UBX messages in blocks of bytes: class and id, and payload.
 
-    NMEA and RTCM in between are skipped. After a damaged message the search continues after its
-    sync bytes, since its length may be wrong. ``right``, ``wrong`` and ``cut``: number of messages
-    by class and id that are valid, have a wrong checksum, or extend beyond the end. ``read``: bytes
-    so far.
+    After a damaged message the search continues after its sync bytes, since its length may be
+    wrong. ``right``, ``wrong``, ``cut``: number by class and id that are valid, have a wrong
+    checksum, or extend beyond the end. ``read``: bytes so far.
     """
 
     def __init__(self, source: Iterator[bytes]) -> None:

@@ -152,11 +152,7 @@ def find_position(kind: str, column: str | int) -> int:
 
 
 def read_lines(path: Path, findings: list[Finding]) -> Iterator[bytes]:
-    """Yield the text of a log in blocks of complete lines.
-
-    A last line without its line break is used if its checksum is right, else reported in
-    ``findings``.
-    """
+    """Yield the text of a log in blocks of complete lines; a last one that is cut is reported."""
     rest = b""
     for block in blocks(path, findings, _MIN_ZEROS):
         text = rest + block

@@ -97,10 +97,7 @@ def _read_columns(parts: list[Part]) -> Iterator[dict[str, NDArray[Any]]]:
 def count_samples(
     path: Path, parts: list[Part], repeated: Mapping[str, int]
 ) -> dict[str, SampleCounts]:
-    """Return how many samples of each column are used and left out, by reason (see `assemble`).
-
-    Raises RuntimeError if the numbers do not add up, which is an error of this program.
-    """
+    """Return how many samples of each column are used and left out, by reason (see `assemble`)."""
     file = pq.read_metadata(path)
     used = dict.fromkeys(file.schema.names, 0)
     for group in range(file.num_row_groups):

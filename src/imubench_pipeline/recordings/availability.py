@@ -33,12 +33,12 @@ _ABSENT = frozenset({errno.ENOENT, errno.ENOTDIR})
 def watch_log(source: Path, planned: Collection[str] = ()) -> Iterator[Callable[[], bool]]:
     """Let a `RecordingError` pass only where it is a property of the log, which may change.
 
-    The function that is yielded returns whether the log is still the one that was there at first.
-    ``planned``: the files that the plan found there, by their place in the log.
+    Yields a function that returns whether the log is unchanged. ``planned``: files that the plan
+    found.
 
-    Raises RecordingError if the path itself cannot be used, such as a link to itself or an empty
-    folder; UnavailableError if the log is not there, cannot be read for a reason outside of it, or
-    changed while it was rejected; OSError if a disk is full, or there are too many open files.
+    Raises RecordingError if the path itself cannot be used; UnavailableError if the log is not
+    there, cannot be read for a reason outside of it, or changed while it was rejected; OSError if a
+    disk is full, or there are too many open files.
     """
     try:
         before = read_identity(source)

@@ -53,9 +53,8 @@ class Recording:
     def inputs(self) -> list[Path]:
         """Files whose date decides whether Snakemake reads the recording again.
 
-        The content of logs and notes is in the settings of the ingest instead, as they may have any
-        date. If the recording is held back, the file does not exist but its results do: Snakemake
-        leaves them.
+        The settings of the ingest have the content of logs and notes. The file of a recording that
+        is held back does not exist but its results do: Snakemake leaves them.
         """
         if self.held_back:
             return [self.path / "held back"]
@@ -73,10 +72,7 @@ class FoundFile:
 
 
 def find_logs(logs: Path) -> list[Recording]:
-    """Return the recordings of a drop zone, in order; two logs of one name give two entries.
-
-    Logs in no folder of a sensor have the reason why they cannot be analysed.
-    """
+    """Return the recordings of a drop zone, in order; an error if in no folder of a sensor."""
     recordings: list[Recording] = []
     for path in _shown(logs):
         if path.is_dir():

@@ -9,21 +9,20 @@ from __future__ import annotations
 import math
 from collections import defaultdict
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
-from typing import TypeVar
+from dataclasses import replace
+from typing import Any, TypeVar
 
 from imubench_pipeline.model.comparisons import DatasheetRow, ErrorBudgetRow, PooledRow
 from imubench_pipeline.model.estimates import FixedBiasRow, ModelRow, ParameterRow
 from imubench_pipeline.model.recordings import DoubtRow, FindingRow, RecordingRow
 from imubench_pipeline.model.states import Fitness
-from imubench_pipeline.model.table import ChannelRow, OfRecordingRow, TableRow
+from imubench_pipeline.model.table import OfRecordingRow, TableRow
 from imubench_pipeline.model.verdicts import DoubtMark
 from imubench_pipeline.tables.findings import LEFT_OUT
 from imubench_pipeline.words.findings import FINDINGS
 from imubench_pipeline.words.reasons import simulations as texts
 
 Key = tuple[str, str]  # sensor, recording
-
 BESIDE_MEASURED = "simulated_beside_measured"  # leaves out simulated recordings
 
 WITH_DOUBTS: Mapping[str, type[ErrorBudgetRow] | type[DatasheetRow]] = {
@@ -33,41 +32,15 @@ WITH_DOUBTS: Mapping[str, type[ErrorBudgetRow] | type[DatasheetRow]] = {
 """Tables of one recording whose rows repeat the doubts about it."""
 
 
-@dataclass(frozen=True)
-class Doubt:
-    """Why figures of a recording may be wrong."""
-
-    sensor: str
-    recording: str
-    channel: str | None  # None: the whole recording
-    code: str  # the finding, `not_explained` (by a model), or the status of a parameter
-    reason: str
-    parameters: tuple[str, ...] = ()  # that it affects; none: all
-    unfit: bool = False  # the figures may be of something else
-    factor: float | None = None  # of a possible change of a value, if known
-    start: float | None = None
-    end: float | None = None  # the part of the recording, s; None: all of it
-
-    @property
-    def of_recording(self) -> bool:
-        """Whether the doubt is about the log, not only about a poorly determined parameter."""
-        return self.code != "doubtful"
-
-    def row(self) -> DoubtRow:
-        """Return the row of the table ``derive_doubts``."""
-        own = {name: value for name, value in vars(self).items() if name != "unfit"}
-        return DoubtRow(fitness="unfit" if self.unfit else "fit with doubts", **own)
-
-
 Estimated = TypeVar("Estimated", ParameterRow, FixedBiasRow)
 Doubted = TypeVar("Doubted", bound=TableRow)
 
 
 def derive_doubts(
     findings: Iterable[FindingRow], parameters: Iterable[ParameterRow], models: Iterable[ModelRow]
-) -> Iterator[Doubt]:
+) -> Iterator[DoubtRow]:
     """Yield doubts about recordings, the most serious first, from recommended ``parameters``."""
-    every: list[Doubt] = []
+    every: list[DoubtRow] = []
     for finding in findings:
         code = finding.finding
         kind = FINDINGS[code]
@@ -81,12 +54,13 @@ def derive_doubts(
             for name, power in kind.scales.items():
                 by_factor.setdefault(finding.value**power, []).append(name)
         every += [
-            Doubt(
-                *_place(finding),
+            _doubt(
+                finding,
                 code,
                 finding.detail,
-                parameters=tuple(sorted(names)),
+                finding.channel,
                 unfit=kind.unfit,
+                parameters=tuple(sorted(names)),
                 factor=factor,
                 start=finding.start,
                 end=finding.end,
@@ -94,48 +68,52 @@ def derive_doubts(
             for factor, names in (by_factor or {None: [*affected]}).items()
         ]
     every += [
-        Doubt(*_place(row), "not_explained", texts.no_model_explains(row.channel))
+        _doubt(row, "not_explained", texts.no_model_explains(row.channel), row.channel)
         for row in models
         if row.chosen and row.verdict == "not explained"
     ]
     every += [
-        Doubt(*_place(row), "doubtful", row.reason or texts.ESTIMATE_DOUBTFUL, (row.parameter,))
+        _doubt(
+            row,
+            "doubtful",
+            row.reason or texts.ESTIMATE_DOUBTFUL,
+            row.channel,
+            parameters=(row.parameter,),
+        )
         for row in parameters
         if row.status == "doubtful"
     ]
-    yield from sorted(every, key=lambda doubt: not doubt.unfit)
+    yield from sorted(every, key=lambda doubt: doubt.fitness != "unfit")
 
 
 def doubt_unsold_sensors(
     recordings: Iterable[RecordingRow], sensors: Collection[str]
-) -> Iterator[Doubt]:
+) -> Iterator[DoubtRow]:
     """Yield a doubt for each recording of sensors not for sale, which are not compared."""
     for row in recordings:
         if row.sensor in sensors:
-            yield Doubt(*_key(row), None, "not_sold", texts.NOT_SOLD, unfit=True)
+            yield _doubt(row, "not_sold", texts.NOT_SOLD, unfit=True)
 
 
-def doubt_simulated_recordings(recordings: Sequence[RecordingRow]) -> Iterator[Doubt]:
+def doubt_simulated_recordings(recordings: Sequence[RecordingRow]) -> Iterator[DoubtRow]:
     """Yield a doubt for each simulated recording, where any measured one was analysed."""
     reason = texts.SIMULATED_BESIDE_MEASURED
     if any(row.status == "ok" and not row.simulated for row in recordings):
         for row in recordings:
             if row.simulated:
-                yield Doubt(*_key(row), None, BESIDE_MEASURED, reason, unfit=True)
+                yield _doubt(row, BESIDE_MEASURED, reason, unfit=True)
 
 
-def exclude_simulated(recordings: Sequence[RecordingRow]) -> tuple[list[RecordingRow], list[Doubt]]:
+def exclude_simulated(
+    recordings: Sequence[RecordingRow],
+) -> tuple[list[RecordingRow], list[DoubtRow]]:
     """Return the recordings of all sensors with new verdicts, and the new doubts.
 
     A simulated recording of one sensor decides until a measured one of another sensor is known.
     """
     known = {_key(row) for row in recordings if any(d.code == BESIDE_MEASURED for d in row.doubts)}
-    new = [
-        doubt
-        for doubt in doubt_simulated_recordings(recordings)
-        if (doubt.sensor, doubt.recording) not in known
-    ]
-    apart = {(doubt.sensor, doubt.recording): mark_doubts([doubt]) for doubt in new}
+    new = [doubt for doubt in doubt_simulated_recordings(recordings) if _key(doubt) not in known]
+    apart = {_key(doubt): mark_doubts([doubt]) for doubt in new}
     judged_anew = [
         replace(
             row,
@@ -150,21 +128,21 @@ def exclude_simulated(recordings: Sequence[RecordingRow]) -> tuple[list[Recordin
     return judged_anew, new
 
 
-def judge_fitness(of_recording: Iterable[Doubt]) -> Fitness:
+def judge_fitness(of_recording: Iterable[DoubtRow]) -> Fitness:
     """Return the verdict on a recording from all doubts about it."""
-    of_log = [doubt for doubt in of_recording if doubt.of_recording]
-    if any(doubt.unfit for doubt in of_log):
+    of_log = [doubt for doubt in of_recording if _is_of_log(doubt)]
+    if any(doubt.fitness == "unfit" for doubt in of_log):
         return "unfit"
     return "fit with doubts" if of_log else "fit"
 
 
 def judge_recordings(
-    recordings: Sequence[RecordingRow], doubts: Iterable[Doubt], included: Collection[str]
+    recordings: Sequence[RecordingRow], doubts: Iterable[DoubtRow], included: Collection[str]
 ) -> list[RecordingRow]:
     """Return the recordings with their doubts, and whether they decide, as ``included`` ones do."""
-    by_recording: dict[Key, list[Doubt]] = defaultdict(list)
+    by_recording: dict[Key, list[DoubtRow]] = defaultdict(list)
     for doubt in doubts:
-        by_recording[doubt.sensor, doubt.recording].append(doubt)
+        by_recording[_key(doubt)].append(doubt)
     rows = []
     for row in recordings:
         own = by_recording[_key(row)]
@@ -176,11 +154,11 @@ def judge_recordings(
     return rows
 
 
-def mark_doubts(of_recording: Iterable[Doubt]) -> tuple[DoubtMark, ...]:
+def mark_doubts(of_recording: Iterable[DoubtRow]) -> tuple[DoubtMark, ...]:
     """Return the codes of the doubts of a recording with channels, the most serious first."""
     channels: dict[tuple[str, str], dict[str, None]] = {}
     for doubt in of_recording:
-        if doubt.of_recording:
+        if _is_of_log(doubt):
             own = channels.setdefault((doubt.recording, doubt.code), {})
             if doubt.channel:
                 own[doubt.channel] = None
@@ -237,8 +215,30 @@ def attach_doubts_to_pools(
         yield replace(row, doubts=tuple(own))
 
 
-def _place(row: FindingRow | ChannelRow) -> tuple[str, str, str | None]:
-    return row.sensor, row.recording, row.channel
+def _doubt(
+    row: RecordingRow | OfRecordingRow,
+    code: str,
+    reason: str,
+    channel: str | None = None,
+    *,
+    unfit: bool = False,
+    **more: Any,
+) -> DoubtRow:
+    """Return the row of the table ``doubts`` about a recording."""
+    return DoubtRow(
+        sensor=row.sensor,
+        recording=row.recording,
+        channel=channel,
+        code=code,
+        fitness="unfit" if unfit else "fit with doubts",
+        reason=reason,
+        **more,
+    )
+
+
+def _is_of_log(doubt: DoubtRow) -> bool:
+    """Return whether a doubt is about the log, not only about a poorly determined parameter."""
+    return doubt.code != "doubtful"
 
 
 def _key(row: RecordingRow | OfRecordingRow) -> Key:

@@ -76,26 +76,11 @@ def ingest(
     folder: Path,
     names: LogNames,
 ) -> Ingested:
-    """Read a recording and store it as Parquet in ``folder``.
+    """Read a recording, a log file or a folder, and store it as Parquet in ``folder``.
 
-    Parameters
-    ----------
-    source : Path
-        The log file, or the folder of a recording.
-    log : LogFormat
-    notes : RecordingNotes
-        The part to use, and when it started.
-    settings : QualitySettings
-    folder : Path
-        Folder of the Parquet files; files of an earlier run are replaced.
-    names : LogNames
-        Stored in the metadata of every file. The kind says whether the sensor was at rest: knocks
-        and changes are looked for then alone.
-
-    Raises
-    ------
-    RecordingError
-        If the recording cannot be used; nothing is left in ``folder`` then.
+    Files of an earlier run are replaced. ``names`` are stored in the metadata of every file; their
+    kind says whether the sensor was at rest: knocks and changes are looked for then alone. Raise
+    `RecordingError` if the recording cannot be used; nothing is left in ``folder`` then.
     """
     folder.mkdir(parents=True, exist_ok=True)
     remove_kept(folder)
@@ -339,23 +324,10 @@ def ingest_as_planned(
 ) -> Quality:
     """Ingest a recording by its plan; reject an unusable one, with the reason.
 
-    Parameters
-    ----------
-    source : Path
-        The log file, or the folder of a recording.
-    settings : str
-        As `imubench_pipeline.run.plan.Plan.ingest_settings` gives them.
-    sensor, recording : str
-    folder : Path
-        Folder of the Parquet files.
-    guarded : bool
-        A process of its own opens the log first (`availability.check_opening`), so that none that
-        hangs or crashes its reader does so here; it takes 0.1 s.
-
-    Raises
-    ------
-    UnavailableError
-        If the log cannot be read now, for a reason outside of it.
+    The settings are from `imubench_pipeline.run.plan.Plan.ingest_settings`. ``guarded``: a process
+    of its own opens the log first (`availability.check_opening`), so that none that hangs or
+    crashes its reader does so here; it takes 0.1 s. Raise `UnavailableError` if the log cannot be
+    read now, for a reason outside of it.
     """
     plan = IngestPlan.model_validate_json(settings)
     notes = plan.notes or RecordingNotes()
@@ -392,10 +364,7 @@ def ingest_as_planned(
 
 
 def write_failed(settings: str, failure: Failure, path: Path) -> None:
-    """Write the ``quality.json`` of a recording whose ingest failed; remove its samples.
-
-    `settings` are as of `ingest_as_planned`, `failure` is the reason, `path` the file.
-    """
+    """Write the ``quality.json`` of a recording whose ingest failed; remove its samples."""
     plan = IngestPlan.model_validate_json(settings)
     names = _name_recording(plan, failure.sensor, str(failure.recording))
     started = plan.notes.started if plan.notes else None

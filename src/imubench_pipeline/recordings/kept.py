@@ -76,11 +76,7 @@ class Quality:
         write_sealed_json(asdict(self), path)
 
     def fault(self, folder: Path, *, whole: bool = False) -> str | None:
-        """Return the fault of the samples kept in a folder; None where nothing is seen.
-
-        With ``whole`` all is read, otherwise size and metadata only: pages have checksums of their
-        own.
-        """
+        """Return the fault of the samples in a folder, or None; all is read only with ``whole``."""
         for name, stated in (self.kept or {}).items():
             path = folder / name
             try:
@@ -138,8 +134,7 @@ def _footer(path: Path) -> str:
 def load_logs(folder: Path) -> dict[str, ChannelLog]:
     """Return the usable channels of a recording, by name; none of a rejected one.
 
-    ``folder`` contains its ``quality.json``. Raises RecordingError if files of samples are not
-    there, are not those that the ingest left, or are damaged.
+    Raises RecordingError if files of samples are missing, damaged, or not those of the ingest.
     """
     quality = Quality.read(folder / "quality.json")
     if fault := quality.fault(folder):

@@ -100,8 +100,7 @@ def identify_log_files(
 ) -> dict[str, KnownFile]:
     """Read all files of a log (file or folder); return their identity by their place in the log.
 
-    ``is_stopped`` is called now and then: whether digests of large files are not needed any more.
-    Raises OSError if the folder cannot be listed.
+    ``is_stopped``: whether digests of large files are not needed any more. Raises OSError.
     """
     return {name: KnownFile.of(file, is_stopped) for name, file in _places(source).items()}
 
@@ -109,8 +108,8 @@ def identify_log_files(
 def read_identity(source: Path) -> dict[str, tuple[int, ...]]:
     """Return size, times and inode of the files of a log and of their folder, by relative path.
 
-    It is another value whenever a file was changed, replaced, renamed, or moved away and back.
-    Raises OSError if the log is not there, or cannot be listed.
+    It differs whenever a file was changed, replaced, renamed, or moved away and back. Raises
+    OSError.
     """
     paths = {".": source} | _places(source)
     return {
@@ -123,8 +122,8 @@ def read_identity(source: Path) -> dict[str, tuple[int, ...]]:
 def plan_versions(source: Path, folder: Path) -> dict[str, str]:
     """Return a version of each file of a log; a changed version requires an ingest.
 
-    It stays as long as the evidence of the last ingest holds. New stamps of unchanged files are
-    noted in ``folder``, the results of the log.
+    It stays while the evidence of the last ingest, in ``folder``, holds; new stamps are noted
+    there.
     """
     known = read_known(folder)
     places: dict[str, Path] = {}
@@ -202,11 +201,7 @@ def plan_recording_versions(recording: Recording, results: Path) -> dict[str, st
 
 
 def digest_blocks(path: Path) -> str:
-    """Return the size of a file and a digest of it; above 1 MB, of 16 blocks spread over it.
-
-    The first and the last block are among them. A change that leaves the size and all blocks as
-    they are has no effect; the stamps tell that one. Raises OSError if it cannot be read.
-    """
+    """Return the size of a file and a digest of it; above 1 MB, of 16 blocks from first to last."""
     digest = hashlib.sha256()
     with _opened(path) as file:
         size = os.fstat(file.fileno()).st_size

@@ -25,7 +25,6 @@ BUCKETS = 400  # default number of intervals of time of an envelope
 BUCKETS_OF_TURNS = 2400  # the same of a recording with turns in it, which should be seen
 MOST_BINS = 120  # bins of a histogram; at least half as many, if there are the levels
 _BINS = 100  # where no steps show
-
 _DRAWN = 1 << 16  # samples, spread over the recording, that tell the bins of a histogram
 _BEYOND = 0.8  # widths of the middle that bins go beyond it: to 6 standard deviations
 _SAME = 0.01  # part of the mean gap between levels within which two are one, written in two ways
@@ -45,8 +44,8 @@ def overview(folder: Path, sensor: str, recording: str, buckets: int | None = No
     """Return envelopes and histograms of a recording; no row if it was rejected.
 
     Channels that cannot be analysed are left out. The temperature has an envelope alone.
-    ``folder``: of its ``log*.parquet``; ``sensor``, ``recording``: names; ``buckets``: max.
-    intervals of time of an envelope; by default more if the sensor was turned.
+    ``folder``: of its ``log*.parquet``; ``buckets``: max. intervals of an envelope; None: more if
+    it was turned.
     """
     result = Overview([], [])
     logs = [*kept.open_channel_logs(folder).values()]
@@ -119,9 +118,8 @@ def bin_edges(drawn: Array, low: float, high: float) -> Array:
     """Return the edges of the bins of a histogram, SI, increasing, shape (n + 1,).
 
     ``drawn``: samples that stand for all, SI; ``low``, ``high``: extremes of all. The bins are
-    equally wide, over some 6 standard deviations either side; the first and the last end at the
-    extremes. Where the samples have steps, a bin holds a whole number of levels, and no level is on
-    an edge. Where all samples are equal there are two equal edges.
+    equally wide, over some 6 standard deviations either side; the outer ones end at the extremes.
+    Where the samples have steps, a bin holds a whole number of levels. All equal: two equal edges.
     """
     if low == high:
         return np.array([low, high])

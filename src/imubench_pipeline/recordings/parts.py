@@ -5,10 +5,9 @@ from __future__ import annotations
 import contextlib
 import hashlib
 import math
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import BinaryIO
 
 import numpy as np
 import pyarrow as pa
@@ -72,8 +71,11 @@ class Part:
 @contextlib.contextmanager
 def open_part(
     source: LogFile, columns: Iterable[str], scratch: Path, name: str
-) -> Iterator[tuple[Part, PartWriter]]:
-    """Begin a part with scratch files of this ``name``; yield it with the writer of its records."""
+) -> Iterator[tuple[Part, Callable[[Array | None, Mapping[str, Array]], None]]]:
+    """Begin a part with scratch files of this ``name``; yield it with a function that writes it.
+
+    The function writes consecutive records and adds them to the statistics: stamps, s, and samples.
+    """
     data, stamps, present = (
         scratch / f"{name}.{ending}" for ending in ("parquet", "stamps", "present")
     )
@@ -82,43 +84,33 @@ def open_part(
     part = Part(source, data, stamps, present, writer, columns=summaries)
     part.patterns = np.zeros(1 << len(summaries), np.int64)
     with stamps.open("wb") as stamps_file, present.open("wb") as present_file:
-        yield part, PartWriter(part, stamps_file, present_file)
 
+        def write(time: Array | None, columns: Mapping[str, Array]) -> None:
+            # Not `tofile`: it does not report a failed write when the C library closes the file.
+            if time is not None:
+                part.stamped = True
+                stamps_file.write(np.ascontiguousarray(time).data)
+            counted = {name: part.columns[name].add(values) for name, values in columns.items()}
+            rows = len(next(iter(counted.values())))
+            bits = np.zeros(rows, np.uint16)
+            for place, name in enumerate(part.columns):
+                bits |= np.isfinite(counted[name]).astype(np.uint16) << np.uint16(place)
+            part.patterns += np.bincount(bits, minlength=len(part.patterns))
+            present_file.write(bits.data)
+            part.rows += rows
+            part.writer.write(counted)
 
-@dataclass
-class PartWriter:
-    """Writes the records of a part and collects their statistics."""
-
-    _part: Part
-    _stamps: BinaryIO
-    _present: BinaryIO
-
-    def add(self, time: Array | None, columns: Mapping[str, Array]) -> None:
-        """Write consecutive records and add them to the statistics: stamps, s, and samples, SI."""
-        part = self._part
-        # Not `tofile`: it does not report a failed write when the C library closes the file.
-        if time is not None:
-            part.stamped = True
-            self._stamps.write(np.ascontiguousarray(time).data)
-        counted = {name: part.columns[name].add(values) for name, values in columns.items()}
-        rows = len(next(iter(counted.values())))
-        bits = np.zeros(rows, np.uint16)
-        for place, name in enumerate(part.columns):
-            bits |= np.isfinite(counted[name]).astype(np.uint16) << np.uint16(place)
-        part.patterns += np.bincount(bits, minlength=len(part.patterns))
-        self._present.write(bits.data)
-        part.rows += rows
-        part.writer.write(counted)
+        yield part, write
 
 
 def read_part(file: LogFile, use: UsedPart, scratch: Path, number: int) -> Part:
     """Read one file of a recording, in bounded memory; its number names the files in ``scratch``.
 
-    Raises RecordingError if the file cannot be read, or no sample lies in the part to use.
+    Raises RecordingError if that fails, or no sample lies in the part to use.
     """
     rate = file.log.rate_hz
     read_rows = 0
-    with open_part(file, file.sources, scratch, f"part{number}") as (part, writer):
+    with open_part(file, file.sources, scratch, f"part{number}") as (part, write):
         for batch in file.batches():
             clock, columns = batch.time, batch.columns
             if use.start > 0.0 or use.end is not None:
@@ -130,7 +122,7 @@ def read_part(file: LogFile, use: UsedPart, scratch: Path, number: int) -> Part:
                 clock = clock[keep]
                 columns = {name: values[keep] for name, values in columns.items()}
             read_rows += len(batch)
-            writer.add(None if batch.time is None else clock, columns)
+            write(None if batch.time is None else clock, columns)
     not_used = read_rows - part.rows
     if part.rows == 0:
         raise RecordingError(
@@ -147,8 +139,7 @@ def leave_out_knocks(
 ) -> dict[str, list[Knock]]:
     """Replace the samples of knocks by NaN in the file of a part; return the knocks by column.
 
-    ``sigmas``: least distance of a knock from the level, in standard deviations. ``longest``:
-    longest knock, records; a longer event is motion.
+    ``sigmas``: least distance from the level, in standard deviations. ``longest``: in records.
     """
     blocks = {name: column.blocks() for name, column in part.columns.items()}
     doubtful = [name for name, b in blocks.items() if len(find_outlier_blocks(b, sigmas)[0])]

@@ -29,7 +29,6 @@ from imubench_pipeline.typing import Array
 
 ROW_GROUP = 1 << 20  # rows of a row group
 MEND = "remove it, and the next run reads the log again"
-
 BESIDE = frozenset({TEMPERATURE, POSITION, TABLE_RATE})  # columns that are no channels
 _NOT_CHANNELS = BESIDE | {"time", "sample"}
 
@@ -167,10 +166,7 @@ class ChannelLog:
     table_rate: bool = False  # a column on the same grid has the rate of the rate table
 
     def blocks(self) -> Iterator[Array]:
-        """Yield the samples on the uniform grid in SI, in consecutive blocks; NaN where missing.
-
-        Raises RecordingError if the file is damaged.
-        """
+        """Yield the samples on the grid in SI, by block; NaN if missing; or RecordingError."""
         try:
             with open_parquet(self.path) as file:
                 placed = "sample" in file.schema_arrow.names

@@ -101,10 +101,7 @@ class _Records:
             yield chosen[chosen >= 0]
 
     def stride(self, base: TimeBase, bits: int) -> int:
-        """Return the sampling interval of a channel, in intervals of all records.
-
-        It is found with any number of missing samples. 1: the samples are not on a slower clock.
-        """
+        """Return the sampling interval of a channel, in records, with any samples missing."""
         hits = np.zeros(_MAX_STRIDE + 1)
         total = 0
         for points in self.points(base, bits):
@@ -131,9 +128,8 @@ def separate_clocks(
 ) -> list[Part]:
     """Return one part for each clock of a file, or the part itself if there is only one clock.
 
-    ``stated``: rate of its records, Hz. ``whole`` returns the time base of all records.
-    ``scratch``: folder for the scratch files. Raises RecordingError if channels have no clock of
-    their own, and all records together have none either.
+    ``stated``: rate of its records, Hz. ``whole`` returns the time base of all records. Raises
+    RecordingError if neither channels nor all records together have a clock.
     """
     records = _Records(part, stated, settings)
     channels = [
@@ -269,10 +265,7 @@ def _assign_to_clocks(
 
 
 def _write_parts(part: Part, clocks: list[_Clock], records: _Records, scratch: Path) -> list[Part]:
-    """Write the records of each clock to a part of its own.
-
-    Readings of additional columns, such as the temperature, go into the next record of each part.
-    """
+    """Write the records of each clock; other readings go into the next record of each."""
     part.writer.finish({})
     beside = [name for name in part.columns if name in BESIDE]
     with ExitStack() as stack:
@@ -286,7 +279,7 @@ def _write_parts(part: Part, clocks: list[_Clock], records: _Records, scratch: P
             blocks = zip(records.times(), part.present(), strict=True)
             for group, (times, present) in enumerate(blocks):
                 table = read_row_group(file, group)
-                for clock, (of_clock, writer), readings in zip(clocks, made, waiting, strict=True):
+                for clock, (of_clock, write), readings in zip(clocks, made, waiting, strict=True):
                     chosen = has_one(present, clock.bits)
                     columns = {}
                     for name in of_clock.columns:
@@ -295,7 +288,7 @@ def _write_parts(part: Part, clocks: list[_Clock], records: _Records, scratch: P
                             columns[name], readings[name] = _carry(values, chosen, readings[name])
                         else:
                             columns[name] = values[chosen]
-                    writer.add(times[chosen], columns)
+                    write(times[chosen], columns)
     part.data.unlink()
     parts = [of_clock for of_clock, _ in made]
     for clock, of_clock in zip(clocks, parts, strict=True):

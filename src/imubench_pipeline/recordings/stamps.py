@@ -219,8 +219,7 @@ def _assign_grid_points(
 ) -> float:
     """Assign a grid point to each stamp; return the time between stamps within segments, s.
 
-    ``state``: time of the last grid point, last stamp, interval, last stamped point, sum of
-    squares.
+    ``state``: time of the last point, last stamp, interval, last stamped point, sum of squares.
     """
     origin, last, interval, stamped = state[0], state[1], state[2], state[3]
     point = grid - 1

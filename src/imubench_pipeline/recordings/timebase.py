@@ -83,8 +83,8 @@ def fit_time_base(
 ) -> TimeBase:
     """Return the time base of a file from its stamps, which are read several times.
 
-    ``stated``: rate in the sensor file, Hz. ``known``: sampling interval, s; needed if most samples
-    are missing. Raises RecordingError if the stamps do not advance, or jump or stop too often.
+    ``stated``: rate, Hz. ``known``: interval, s, if most samples are missing. Raises
+    RecordingError.
     """
     typical = tracking.estimate_interval(stamps) if known is None else tracking.Interval(known)
     if typical is None:
@@ -175,8 +175,8 @@ def find_rate_changes(
 ) -> list[Finding]:
     """Return a finding if a part of a log has only every second (third, ...) sample.
 
-    ``points``: grid points of the samples, below 0 for those left out; ``rate``: of the grid, Hz.
-    Random losses do not give 32 equal steps in a row.
+    ``points``: of the samples on a grid of ``rate``, Hz; below 0: left out. 32 equal steps are no
+    chance.
     """
     samples: Counter[int] = Counter()
     begin: dict[int, int] = {}
@@ -250,11 +250,7 @@ def _check_segments(number: int) -> None:
 
 
 def _describe_segments(times: list[float], jumps: list[float], *, has_grid: bool) -> Finding:
-    """Return the finding about pauses, with the position of the longest one.
-
-    ``times``: s of samples before each pause. ``jumps``: steps of the stamps, s; negative:
-    backwards.
-    """
+    """Return the finding about pauses, by samples before them, s, and jumps of the stamps, s."""
     jump, at = max(zip(jumps, times, strict=True), key=lambda place: abs(place[0]))
     data = time_base.Segments(has_grid, len(jumps), float(jump), float(at))
     return find(data, "warning", len(jumps) + 1, start=at, end=at)
@@ -366,11 +362,7 @@ class Groups:
             self._pairs = None
 
     def rate(self) -> tuple[float, int]:
-        """Return the rate, Hz, and the number of irregular groups that were left out of it.
-
-        Stamps in whole seconds have equal numbers of samples, unless the clock was set or samples
-        lost.
-        """
+        """Return the rate, Hz, and the number of irregular groups that were left out of it."""
         everything = self.samples / self.elapsed, 0
         if not self._pairs:
             return everything

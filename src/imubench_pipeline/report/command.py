@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from imubench_pipeline.report.folder import is_report, list_report_files
+from imubench_pipeline.settings.command_line import CommandError
 from imubench_pipeline.settings.extras import require_extra
 from imubench_pipeline.tables.outputs import OutputFolder, add_output
 
@@ -45,27 +46,21 @@ def run(arguments: argparse.Namespace) -> int:
     try:
         site = load_site(arguments.results)
     except FileNotFoundError as error:
-        print(
+        raise CommandError(
             f"{arguments.results}: found no {Path(error.filename).name}; expected the results of a "
-            "finished run: run snakemake -c2 first",
-            file=sys.stderr,
-        )
-        return 2
+            "finished run: run snakemake -c2 first"
+        ) from None
     except ValueError as error:
-        print(error, file=sys.stderr)
-        return 2
+        raise CommandError(str(error)) from None
     if lost := list_missing_inputs(arguments.results, "report"):
-        print(
+        raise CommandError(
             f"{arguments.results / lost[0]}: is no longer there; run snakemake -c2 again, as for "
-            "these results, and it is made anew",
-            file=sys.stderr,
+            "these results, and it is made anew"
         )
-        return 2
     try:
         _write(site, arguments)
     except RecordingError as error:
-        print(error, file=sys.stderr)
-        return 2
+        raise CommandError(str(error)) from None
     for path, reason in site.failed.items():
         print(f"{path}: could not be made: {reason}", file=sys.stderr)
     return int(bool(site.failed))

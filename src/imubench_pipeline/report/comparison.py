@@ -7,14 +7,8 @@ from dataclasses import dataclass
 from itertools import chain
 
 from imubench_pipeline.estimators.estimate import SHOWN
+from imubench_pipeline.report import payload
 from imubench_pipeline.report.parameters import describe_model, make_parameter_cell, select_symbols
-from imubench_pipeline.report.payload import (
-    Arrays,
-    ComparedChannel,
-    Json,
-    pack_compared_channel,
-    pack_datasheet_lines,
-)
 from imubench_pipeline.report.practical import System
 from imubench_pipeline.report.view import QUANTITY_NAMES, RecordingView
 
@@ -26,15 +20,15 @@ class ComparedRecording:
     """The compared data of a recording, gathered once for all pages."""
 
     view: RecordingView
-    channels: list[ComparedChannel]
-    datasheet: Mapping[str, list[Json]]  # its lines, by channel
-    lines: Mapping[str, list[Json]]  # of the tables of parameters, by quantity
+    channels: list[payload.ComparedChannel]
+    datasheet: Mapping[str, list[payload.Json]]  # its lines, by channel
+    lines: Mapping[str, list[payload.Json]]  # of the tables of parameters, by quantity
 
 
 def gather_recording(view: RecordingView, system: System) -> ComparedRecording:
     """Gather the compared data of a recording; ``system`` has the units of its numbers."""
     channels = view.channels()
-    lines: dict[str, list[Json]] = {name: [] for name in QUANTITY_NAMES}
+    lines: dict[str, list[payload.Json]] = {name: [] for name in QUANTITY_NAMES}
     for channel in channels:
         shown = select_symbols(chain(*channel.parameters.values()))
         methods = {channel.recommended: "recommended"}
@@ -55,9 +49,9 @@ def gather_recording(view: RecordingView, system: System) -> ComparedRecording:
             }
             for method, asked in methods.items()
         ]
-    datasheet = {channel.channel: pack_datasheet_lines(channel) for channel in channels}
+    datasheet = {channel.channel: payload.pack_datasheet_lines(channel) for channel in channels}
     return ComparedRecording(
-        view, [pack_compared_channel(channel) for channel in channels], datasheet, lines
+        view, [payload.pack_compared_channel(channel) for channel in channels], datasheet, lines
     )
 
 
@@ -66,10 +60,10 @@ class Comparison:
 
     def __init__(self, recordings: Iterable[ComparedRecording], names: Mapping[str, str]) -> None:
         self._names = names
-        self.arrays = Arrays()
-        self.channels: list[Json] = []
-        self._datasheets: dict[str, Json] = {}
-        self._lines: dict[str, list[Json]] = {name: [] for name in QUANTITY_NAMES}
+        self.arrays = payload.Arrays()
+        self.channels: list[payload.Json] = []
+        self._datasheets: dict[str, payload.Json] = {}
+        self._lines: dict[str, list[payload.Json]] = {name: [] for name in QUANTITY_NAMES}
         for recording in recordings:
             self.channels += [channel.among(self.arrays) for channel in recording.channels]
             for channel, lines in recording.datasheet.items():
@@ -79,7 +73,7 @@ class Comparison:
                 self._lines[quantity] += recording.lines[quantity]
 
     @property
-    def page(self) -> Json:
+    def page(self) -> payload.Json:
         """The data of the figures of the page."""
         return {
             "channels": self.channels,
@@ -87,7 +81,7 @@ class Comparison:
             "arrays": self.arrays.texts,
         }
 
-    def tables(self) -> Iterator[Json]:
+    def tables(self) -> Iterator[payload.Json]:
         """Yield a table per quantity, with the recommended method and the papers' model."""
         for quantity, lines in self._lines.items():
             if not lines:

@@ -37,10 +37,7 @@ _COVERAGE_SIGNS = {"yes": "yes", "no": "no", "other convention": "other", "not l
 def compare_with_datasheet(
     view: ChannelView, coverage: Mapping[tuple[str, str, str], str], system: System
 ) -> Iterator[Json]:
-    """Yield each printed figure with its interpretations, the measured value and a verdict.
-
-    ``coverage`` has the publication status by sensor, quantity and figure.
-    """
+    """Yield each printed figure with its interpretations, the measured value and a verdict."""
     own = [row for row in view.datasheet if row.method in (view.recommended, *_WITHOUT_METHOD)]
     for rows in _group_by_figure(own).values():
         first = rows[0]
@@ -163,10 +160,7 @@ def _list_deltas(rows: Iterable[DatasheetRow]) -> list[float]:
 def format_repeatability(
     rows: Sequence[RepeatabilityRow], sensor: str, system: System
 ) -> Iterator[Json]:
-    """Yield the scatter of the fixed biases of each device of a sensor, and the printed figure.
-
-    ``rows`` belong to the table ``repeatability``.
-    """
+    """Yield the scatter of the fixed biases of each device of a sensor, and the printed figure."""
     for row in rows:
         if row.sensor != sensor:
             continue

@@ -22,21 +22,11 @@ from imubench_pipeline.report.meaning import (
 from imubench_pipeline.report.site import Site
 from imubench_pipeline.report.view import RecordingView
 from imubench_pipeline.settings.requirements import Requirement
+from imubench_pipeline.words import verdicts
 from imubench_pipeline.words.numbers import counted, duration_text, number_text
-from imubench_pipeline.words.verdicts import (
-    SHORT_VERDICTS,
-    VERDICT_MEANINGS,
-    answer_text,
-    doubts_text,
-    evidence_text,
-    shortfall_text,
-    used_doubts_text,
-)
 
 _VERDICTS: tuple[Verdict, ...] = get_args(Verdict)
-
 _MAX_ORDER_DECADES = 4.0  # maximum decades from 1 by which margins are sorted
-
 _MAX_BAR_DECADES = 2.0  # maximum decades from 1 that a bar shows
 
 
@@ -86,7 +76,7 @@ class Cell:
     @property
     def word(self) -> str:
         """The verdict in words."""
-        return SHORT_VERDICTS[self.verdict]
+        return verdicts.SHORT_VERDICTS[self.verdict]
 
     @property
     def hatched(self) -> bool:
@@ -154,7 +144,7 @@ def make_decision_matrix(site: Site) -> Matrix | None:
         judged = sorted((cell for cell in cells if cell.margin), key=lambda cell: -cell.order)
         best = [rows[name, cell.sensor] for cell in judged]
         excluded = sum(cell.verdict == "excluded" for cell in cells)
-        answer = answer_text(best, site.names, len(cells), excluded)
+        answer = verdicts.answer_text(best, site.names, len(cells), excluded)
         requirement = Requirement.model_validate(declared)
         limits = [
             f"{x.error} {x.at_most} in {x.after or f'{x.outage} without GNSS'}"
@@ -166,7 +156,10 @@ def make_decision_matrix(site: Site) -> Matrix | None:
         sorted(lines.items(), key=lambda line: order(line[0])),
         apart,
         scale,
-        [(verdict, SHORT_VERDICTS[verdict], VERDICT_MEANINGS[verdict]) for verdict in _VERDICTS],
+        [
+            (verdict, verdicts.SHORT_VERDICTS[verdict], verdicts.VERDICT_MEANINGS[verdict])
+            for verdict in _VERDICTS
+        ],
     )
 
 
@@ -175,7 +168,7 @@ def explain_missing_rank(own: Iterable[RecordingView]) -> str:
     at_rest = [view for view in own if view.static]
     if not at_rest:
         return "no recording at rest"
-    return doubts_text(doubt for view in at_rest for doubt in view.row.doubts)
+    return verdicts.doubts_text(doubt for view in at_rest for doubt in view.row.doubts)
 
 
 def _empty(site: Site, requirement: str, sensor: str) -> Cell:
@@ -198,9 +191,9 @@ def _cell(row: RankingRow, scale: Scale) -> Cell:
         order = round(10.0 * place + log, 4)
         reason = ""
     elif row.verdict == "excluded":
-        reason = "; ".join(map(shortfall_text, row.shortfalls))
+        reason = "; ".join(map(verdicts.shortfall_text, row.shortfalls))
     elif row.left_out:
-        reason = doubts_text(row.left_out[:1])
+        reason = verdicts.doubts_text(row.left_out[:1])
     else:
         reason = "; ".join(row.reasons) or "too little is known"
     # Margins with the recordings that are not used, and with corrected units.
@@ -219,8 +212,8 @@ def _cell(row: RankingRow, scale: Scale) -> Cell:
         len(row.conditions) if judged else 0,
         format_margin(row) if judged else None,
         bar,
-        evidence_text(row) if judged else "",
-        used_doubts_text(row),
+        verdicts.evidence_text(row) if judged else "",
+        verdicts.used_doubts_text(row),
         reason,
         alternatives,
         order,

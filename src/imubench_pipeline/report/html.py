@@ -39,10 +39,7 @@ def make_templates(system: System) -> jinja2.Environment:
     )
 
     def si(value: float | None, unit: str, digits: int = 4, *, inside: bool = False) -> Markup:
-        """Return an SI number that the reader can switch to another unit.
-
-        ``inside``: the surrounding element states the unit, and the digits unless they are 4.
-        """
+        """Return an SI number whose unit the reader can switch; ``inside``: without the unit."""
         if value is None or not math.isfinite(value):
             return Markup(number_text(value))
         rounded = f"{value:.7g}"
@@ -116,10 +113,7 @@ def _link_term(context: Context, key: str, text: str | None = None) -> Markup:
 
 @cache
 def _explain_term(key: str, text: str | None = None) -> Markup:
-    """Return a term with only its explanation, for tables with many rows.
-
-    An empty key, such as the status of a plain value that is not there, is `NO_VALUE`.
-    """
+    """Return a term with only its explanation, for tables; an empty key is `NO_VALUE`."""
     if not key:
         return Markup(NO_VALUE)
     entry = find_term(key)

@@ -15,6 +15,7 @@ from imubench_pipeline.navigation.suitability import compute_variance_shares
 from imubench_pipeline.report.payload import Json
 from imubench_pipeline.report.practical import System, choose_unit
 from imubench_pipeline.settings.requirements import DIMENSIONS, Requirement
+from imubench_pipeline.words import verdicts
 from imubench_pipeline.words.numbers import (
     NO_VALUE,
     Unit,
@@ -22,16 +23,6 @@ from imubench_pipeline.words.numbers import (
     duration_text,
     interval_text,
     number_text,
-)
-from imubench_pipeline.words.verdicts import (
-    VERDICT_WORDS,
-    corrected_text,
-    evidence_text,
-    share_text,
-    source_kind_text,
-    source_text,
-    stated_verdict,
-    used_doubts_text,
 )
 
 
@@ -193,20 +184,17 @@ def _group(limits: Sequence[RankingRow], simulated: Simulated, system: System) -
         row,
         simulated=all(simulated.get((row.sensor, name or ""), False) for name in used),
         rank=str(row.rank or NO_VALUE),
-        verdict=VERDICT_WORDS[row.verdict],
-        stated=stated_verdict(row),
-        weak=evidence_text(row) if row.rank else "",
-        doubts=used_doubts_text(row) if row.rank else "",
-        corrected=corrected_text(row),
+        verdict=verdicts.VERDICT_WORDS[row.verdict],
+        stated=verdicts.stated_verdict(row),
+        weak=verdicts.evidence_text(row) if row.rank else "",
+        doubts=verdicts.used_doubts_text(row) if row.rank else "",
+        corrected=verdicts.corrected_text(row),
         limits=[_limit(limit, system) for limit in limits],
     )
 
 
 def _order(row: RankingRow) -> tuple[int, int, float]:
-    """Sort by rank, and equal ranks by conditions and margin.
-
-    A sensor with unknown figures has a large margin, and conditions.
-    """
+    """Sort by rank, then by conditions (with them, margins are large) and margin."""
     meets = row.verdict in ("meets", "likely_meets")
     return row.rank or 10**6, int(bool(row.conditions)) if meets else 2, -(row.margin or 0.0)
 
@@ -223,8 +211,10 @@ def _limit(row: RankingRow, system: System) -> LimitLine:
         margin=size[0] if size else NO_VALUE,
         margins=SourcedInterval(size[1], size[2]) if size else "",
         chance=chance,
-        source=f"{source_text(row.parts[0])} ({_percent(row.share)})" if row.parts else NO_VALUE,
-        parts=[share_text(share) for share in row.parts] or [NO_VALUE],
+        source=f"{verdicts.source_text(row.parts[0])} ({_percent(row.share)})"
+        if row.parts
+        else NO_VALUE,
+        parts=[verdicts.share_text(share) for share in row.parts] or [NO_VALUE],
         reached=duration_text(row.reached_after),
         decides=row.decides,
         reason="; ".join(row.reasons),
@@ -276,10 +266,7 @@ def describe_limit(row: RankingRow) -> str:
 def make_budget_tables(
     rows: Sequence[ErrorBudgetRow], simulated: Simulated, system: System
 ) -> Iterator[Json]:
-    """Yield the error budget of each recording: a line per error and axis, a column per time.
-
-    ``rows``: of ``error_budget``; errors of requirements are omitted.
-    """
+    """Yield the error budget of each recording: a line per error and axis, a column per time."""
     own = [row for row in rows if row.requirement is None]
     for key in dict.fromkeys((row.sensor, row.recording) for row in own):
         parts = [row for row in own if (row.sensor, row.recording) == key]
@@ -313,10 +300,7 @@ def make_budget_tables(
 
 
 def make_budget_bars(rows: Sequence[ErrorBudgetRow], system: System) -> list[Json]:
-    """Return a bar for each error and time of the worst axes: the parts of its variance.
-
-    Of the rows of the table ``error_budget`` of one recording.
-    """
+    """Return a bar for each error and time of the worst axes of a recording: its variance."""
     own = [row for row in rows if row.requirement is None]
     groups: dict[tuple[str, float], list[ErrorBudgetRow]] = {}
     for row in own:
@@ -330,7 +314,11 @@ def make_budget_bars(rows: Sequence[ErrorBudgetRow], system: System) -> list[Jso
             continue
         size = _format_error(total, sigma, choose_unit(DIMENSIONS[error], system, sigma))
         shares = [
-            (source_text(row), float(f"{(row.sigma / sigma) ** 2:.3g}"), source_kind_text(row))
+            (
+                verdicts.source_text(row),
+                float(f"{(row.sigma / sigma) ** 2:.3g}"),
+                verdicts.source_kind_text(row),
+            )
             for row in parts
             if row.source != "total" and row.sigma
         ]
@@ -359,9 +347,9 @@ def _cell(rows: Sequence[ErrorBudgetRow], system: System) -> Json:
         lines.append(interval_text(total.lower, total.upper, unit, digits))
     sources = [row for row in rows if row.source != "total"]
     if total.sigma > 0.0:
-        lines += [share_text(share) for share in compute_variance_shares(total.sigma, sources)] or [
-            ""
-        ]
+        lines += [
+            verdicts.share_text(share) for share in compute_variance_shares(total.sigma, sources)
+        ] or [""]
     return {"lines": lines, "note": "; ".join(total.reasons), "known": True}
 
 

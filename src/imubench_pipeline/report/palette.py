@@ -38,7 +38,6 @@ TERM_COLOURS = tuple(
 
 _MARKERS = ("circle", "square", "diamond", "triangle-up", "triangle-down", "cross", "x")
 _DASHES = ("solid", "dash", "dot", "dashdot", "longdash")
-
 _INK_COLOURS = ("#1b1b1b", "#e8e8e8")
 _INK_SHARES = (0.0, 0.5, 0.25, 0.75)
 _STYLES_PER_DASH = len(_INK_SHARES) * len(_MARKERS)  # recordings with the same dash
@@ -56,10 +55,7 @@ _METHOD_STYLES = {
 
 
 def assign_sensor_styles(sensors: list[str]) -> dict[str, Appearance]:
-    """Return the appearance of each sensor, by its position among all sensors of the run.
-
-    Colours repeat after eight sensors; marker and dash then differ.
-    """
+    """Return the appearance of each sensor, by its position; after eight, colours repeat."""
     looks = {}
     for place, sensor in enumerate(sensors):
         colour, turn = place % len(_COLOURS), place // len(_COLOURS)

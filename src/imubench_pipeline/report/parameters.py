@@ -18,10 +18,7 @@ from imubench_pipeline.words.numbers import Unit, counted, limit_digits
 
 
 def select_symbols(rows: Iterable[ParameterRow]) -> list[str]:
-    """Return the parameters of the papers' model, and others that were estimated.
-
-    N_sensor is listed with the low-pass.
-    """
+    """Return the parameters of the papers' model, and others that were estimated, but N_sensor."""
     estimated = {row.parameter for row in rows if row.status != "absent"}
     return [s for s in SHOWN if s in PARAMETERS or (s in estimated and s != SENSOR)]
 
@@ -99,10 +96,7 @@ def _cell(parts: Sequence[Json], words: str, digits: int) -> Json:
 
 
 def count_digits(unit: Unit, value: float | None, lower: float | None, upper: float | None) -> int:
-    """Return the digits of a parameter and its limits in a unit.
-
-    The interval determines them; the two limits must differ as printed.
-    """
+    """Return the digits of a parameter by its interval, whose two limits must differ as printed."""
     if value is None or lower is None or upper is None:
         return limit_digits(lower, upper)
     return max(unit.digits(value, lower, upper), limit_digits(lower, upper, 2))

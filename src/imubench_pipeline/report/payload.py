@@ -25,7 +25,6 @@ FOREST = (*COMPARED, "B", "T_B")
 """The parameters that are drawn across sensors."""
 
 _SPECTRUM_POINTS = 80  # points of the curve of a term in a spectrum
-
 _COMPARED_MODEL_POINTS = 24  # points of the curve of a model in a comparison of channels
 
 
@@ -211,10 +210,7 @@ def _name_terms(model: NoiseModel) -> list[tuple[str, Term]]:
 
 
 def pack_datasheet_lines(view: ChannelView) -> list[Json]:
-    """Return the lines of the datasheet that can be drawn beside the curve of a channel.
-
-    Each is the power ``slope`` of tau, with the value at 1 s.
-    """
+    """Return the datasheet's lines beside a curve: power ``slope`` of tau, and value at 1 s."""
     lines = []
     names = {"N": ("noise density", -0.5), "adev_minimum": ("bias instability", 0.0)}
     for row in view.datasheet:

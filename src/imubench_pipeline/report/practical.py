@@ -105,10 +105,7 @@ def _find_unit(quantity: str, symbol: str, choice: str) -> Unit:
 
 
 def choose_unit(dimension: str, system: System, size: float | None = None) -> Unit:
-    """Return the unit of an angle, a velocity or a length on a page.
-
-    A prefix is chosen for ``size`` (SI) in practical units.
-    """
+    """Return the unit of an angle, velocity or length, with a prefix for ``size`` (SI)."""
     if not size:
         return _make_unit(_SIGNS_OF_DIMENSIONS[system][dimension], dimension)
     return next(unit for least, unit in list_units_by_size(dimension, system) if abs(size) >= least)

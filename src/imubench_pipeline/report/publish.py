@@ -150,18 +150,7 @@ def _render(
 
 
 def _make_assets() -> dict[str, str]:
-    return {
-        "assets/report.css": "".join(
-            (_STATIC_FOLDER / name).read_text(encoding="utf-8")
-            for name in ("report.css", "decisions.css")
-        ),
-        "assets/report.js": _make_script(),
-        "assets/plotly.min.js": read_plotting_script(),
-    }
-
-
-def _make_script() -> str:
-    """Return all scripts of the pages as one, with units, status names and terms."""
+    # All scripts of the pages as one, with units, status names and terms
     units = {
         quantity: {
             choice: {symbol: [unit.sign, unit.per_si] for symbol, unit in symbols.items()}
@@ -183,7 +172,14 @@ def _make_script() -> str:
             ("TERM_COLOURS", TERM_COLOURS),
         )
     )
-    return '(() => {\n"use strict";\n' + head + "\n".join(parts) + "})();\n"
+    return {
+        "assets/report.css": "".join(
+            (_STATIC_FOLDER / name).read_text(encoding="utf-8")
+            for name in ("report.css", "decisions.css")
+        ),
+        "assets/report.js": ('(() => {\n"use strict";\n' + head + "\n".join(parts) + "})();\n"),
+        "assets/plotly.min.js": read_plotting_script(),
+    }
 
 
 def render_one_file(site: Site) -> str:

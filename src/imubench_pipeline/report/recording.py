@@ -16,22 +16,9 @@ from imubench_pipeline.recordings.recording import (
     read_metadata,
 )
 from imubench_pipeline.registry import Hook
-from imubench_pipeline.report import thermal
+from imubench_pipeline.report import meaning, payload, thermal
 from imubench_pipeline.report.datasheets import compare_with_datasheet, format_curve_distances
-from imubench_pipeline.report.meaning import (
-    explain_budget,
-    format_backtest,
-    make_budget_bars,
-    make_budget_tables,
-)
 from imubench_pipeline.report.parameters import count_digits, make_methods_table
-from imubench_pipeline.report.payload import (
-    Arrays,
-    pack_channel,
-    pack_model_samples,
-    pack_samples,
-    pack_styles,
-)
 from imubench_pipeline.report.practical import System, choose_page_unit, format_temperature
 from imubench_pipeline.report.site import Page, RecordingPage, Site, make_command
 from imubench_pipeline.report.view import ChannelView, RecordingView
@@ -49,9 +36,7 @@ from imubench_pipeline.words.numbers import (
 )
 
 _MAX_HIDDEN_RATE_ERROR = 1e-9  # relative error of a rate up to which the page does not state it
-
 _SHOWN_MODELS = 4  # models with the lowest BIC that the page lists, besides the model of the papers
-
 _SEVERITIES = ("fatal", "warning", "note")
 _RATE_FROM = {"stamps": "from the time stamps", "stated": "as stated"}
 
@@ -65,18 +50,14 @@ _SECTIONS: Hook[Section] = Hook("recording_sections")
 def make_recording_page(site: Site, view: RecordingView, of: RecordingPage) -> Page:
     """Return the page of a recording of any kind."""
     folder = site.results / "recordings" / view.sensor / view.name
-    key = hash_recording(site, view, folder)
-    return Page(view.page, of.template, key, lambda: of.context(site, view, folder))
-
-
-def hash_recording(site: Site, view: RecordingView, folder: Path) -> str:
-    """Return the digest of the data of a recording's page; ``folder`` is the recording's."""
+    # The digest of the data of a recording's page; `folder` is the recording's
     shown = ("envelope", "histogram", "samples_of_models")
     samples = [folder / f"{table}.parquet" for table in shown]
     own = [path.read_bytes() for path in samples if path.is_file()]
     published = [row for row in site.rows(CoverageRow) if row.sensor == view.sensor]
     look = site.looks.get(view.sensor)
-    return site.key_of(view.key, view.device_page, look, published, load_metadata(folder), *own)
+    key = site.key_of(view.key, view.device_page, look, published, load_metadata(folder), *own)
+    return Page(view.page, of.template, key, lambda: of.context(site, view, folder))
 
 
 def read_sample_rows(folder: Path, of: type[R]) -> list[R]:
@@ -87,7 +68,7 @@ def read_sample_rows(folder: Path, of: type[R]) -> list[R]:
 
 def make_recording_context(site: Site, view: RecordingView, folder: Path) -> Mapping[str, object]:
     """Return the context of the template; ``folder`` is the recording's."""
-    arrays = Arrays()
+    arrays = payload.Arrays()
     envelope = read_sample_rows(folder, EnvelopeRow)
     histogram = read_sample_rows(folder, HistogramRow)
     channels = view.channels()
@@ -97,9 +78,11 @@ def make_recording_context(site: Site, view: RecordingView, folder: Path) -> Map
         {**row.columns(), "number": i, "linked": row.channel in names}
         for i, row in enumerate(sorted_findings, start=1)
     ]
-    samples = pack_samples(envelope, histogram, arrays)
+    samples = payload.pack_samples(envelope, histogram, arrays)
     of_models = read_sample_rows(folder, ModelSampleRow)
-    budgets = list(make_budget_tables(view.budget, {view.full_name: view.simulated}, site.system))
+    budgets = list(
+        meaning.make_budget_tables(view.budget, {view.full_name: view.simulated}, site.system)
+    )
     return {
         **describe_recording(site, view, channels, folder),
         "summary": _summarise(view, len(channels)),
@@ -112,10 +95,10 @@ def make_recording_context(site: Site, view: RecordingView, folder: Path) -> Map
         "has_temperature": "temperature" in samples["envelope"],
         "added": [made for add in _SECTIONS.objects() if (made := add(site, view)) is not None],
         "budget": budgets[0] if budgets else None,
-        "backtest": format_backtest(
+        "backtest": meaning.format_backtest(
             view.rows(BacktestRow), site.settings["requirements"], site.system
         ),
-        "budget_words": explain_budget(site.settings["settings"]["error_budget"]),
+        "budget_words": meaning.explain_budget(site.settings["settings"]["error_budget"]),
         "command": site.again(view, "scores"),
         # A recording that is left out has no figures.
         "figures_command": None
@@ -124,11 +107,11 @@ def make_recording_context(site: Site, view: RecordingView, folder: Path) -> Map
             "figures", site.results_name, {"--sensor": view.sensor, "--recording": view.name}
         ),
         "page": {
-            "looks": pack_styles({view.sensor: site.looks[view.sensor]}),
-            "channels": [pack_channel(channel, arrays) for channel in channels],
+            "looks": payload.pack_styles({view.sensor: site.looks[view.sensor]}),
+            "channels": [payload.pack_channel(channel, arrays) for channel in channels],
             "samples": samples,
-            "of_models": pack_model_samples(of_models, arrays),
-            "budgets": [make_budget_bars(view.budget, site.system)] if budgets else [],
+            "of_models": payload.pack_model_samples(of_models, arrays),
+            "budgets": [meaning.make_budget_bars(view.budget, site.system)] if budgets else [],
             "findings": [
                 {name: row[name] for name in ("number", "finding", "channel", "start", "end")}
                 for row in numbered
@@ -251,10 +234,7 @@ def _describe_values(channel: ChannelView, system: System) -> str:
 
 
 def _compare_deviations(rows: Sequence[ModelSampleRow], channel: str) -> str:
-    """Return the standard deviations of the simulated samples relative to the log, as a sentence.
-
-    ``rows``: of ``samples_of_models`` of a recording; empty without such rows.
-    """
+    """Return the standard deviations of the simulated samples relative to the log in words."""
     own = {row.of: row for row in rows if row.channel == channel and row.what == "deviation"}
     log = own.get("log")
     widths = [(of, own[of].mean) for of in ("before", "after") if of in own]

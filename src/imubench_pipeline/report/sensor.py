@@ -8,27 +8,12 @@ from functools import partial
 from typing import Any
 from urllib.parse import urlencode
 
-from imubench_pipeline.model.comparisons import (
-    CoverageRow,
-    DriftRow,
-    ErrorBudgetRow,
-    PooledRow,
-    RankingRow,
-    RepeatabilityRow,
-)
+from imubench_pipeline.model import comparisons
 from imubench_pipeline.navigation.drift import SIGNIFICANCE_LEVEL
+from imubench_pipeline.report import meaning
 from imubench_pipeline.report.comparison import Comparison
 from imubench_pipeline.report.datasheets import compare_with_datasheet, format_repeatability
 from imubench_pipeline.report.decisions import explain_missing_rank
-from imubench_pipeline.report.meaning import (
-    describe_limit,
-    explain_budget,
-    format_rankings,
-    format_recording_error,
-    make_budget_bars,
-    make_budget_tables,
-    source_number,
-)
 from imubench_pipeline.report.palette import make_recording_styles
 from imubench_pipeline.report.payload import FOREST, pack_styles
 from imubench_pipeline.report.practical import format_temperature
@@ -60,10 +45,10 @@ def make_sensor_page(site: Site, sensor: str) -> Page:
     key = site.key_of(
         *(view.key for view in own),
         *(view.device_page for view in own),
-        [row for row in site.rows(PooledRow) if row.sensor == sensor],
-        [row for row in site.rows(RepeatabilityRow) if row.sensor == sensor],
-        [row for row in site.rows(RankingRow) if row.decides or row.sensor == sensor],
-        [row for row in site.rows(CoverageRow) if row.sensor == sensor],
+        [row for row in site.rows(comparisons.PooledRow) if row.sensor == sensor],
+        [row for row in site.rows(comparisons.RepeatabilityRow) if row.sensor == sensor],
+        [row for row in site.rows(comparisons.RankingRow) if row.decides or row.sensor == sensor],
+        [row for row in site.rows(comparisons.CoverageRow) if row.sensor == sensor],
         site.looks[sensor],
     )
     context = partial(_make_sensor_context, site, sensor, own)
@@ -82,7 +67,7 @@ def _make_sensor_context(
             "ref": f"{quantity_of(row.channel)}.{_UNIT_SYMBOLS.get(row.parameter, row.parameter)}",
             "name": symbol_text(row.parameter),
         }
-        for row in site.rows(PooledRow)
+        for row in site.rows(comparisons.PooledRow)
         if row.sensor == sensor
     ]
     shown = own if len(own) <= _MAX_DETAILED_RECORDINGS else []
@@ -115,11 +100,13 @@ def _make_sensor_context(
             "axis": list(dict.fromkeys(row["axis"] for row in pooled)),
             "parameter": list(dict.fromkeys(row["name"] for row in pooled)),
         },
-        "budgets": list(make_budget_tables(budget, simulated, site.system)),
-        "budget_words": explain_budget(site.settings["settings"]["error_budget"]),
+        "budgets": list(meaning.make_budget_tables(budget, simulated, site.system)),
+        "budget_words": meaning.explain_budget(site.settings["settings"]["error_budget"]),
         "too_many": len(own) > _MAX_DETAILED_RECORDINGS,
         "deltas": deltas,
-        "repeated": list(format_repeatability(site.rows(RepeatabilityRow), sensor, site.system)),
+        "repeated": list(
+            format_repeatability(site.rows(comparisons.RepeatabilityRow), sensor, site.system)
+        ),
         "page": {
             "grouped": "recording",
             "recordings": [view.name for view in own],
@@ -127,7 +114,7 @@ def _make_sensor_context(
             | {"places": [asdict(look) for look in make_recording_styles(site.looks[sensor])]},
             "names": site.names,
             "budgets": [
-                make_budget_bars(view.budget, site.system) for view in shown if view.budget
+                meaning.make_budget_bars(view.budget, site.system) for view in shown if view.budget
             ],
             **together.page,
         },
@@ -138,7 +125,7 @@ def make_device_page(site: Site, page: str) -> Page:
     """Return the page of a device: its recordings over time."""
     own = [view for view in site.views if view.device_page == page]
     named = {view.full_name for view in own}
-    rows = [row for row in site.rows(DriftRow) if (row.sensor, row.recording) in named]
+    rows = [row for row in site.rows(comparisons.DriftRow) if (row.sensor, row.recording) in named]
     key = site.key_of(*(view.key for view in own), rows)
 
     def make_context() -> Mapping[str, object]:
@@ -167,7 +154,7 @@ def make_device_page(site: Site, page: str) -> Page:
 
 
 def _list_trends(
-    rows: Sequence[DriftRow], *, dated: bool, simulated: bool
+    rows: Sequence[comparisons.DriftRow], *, dated: bool, simulated: bool
 ) -> tuple[dict[str, list[dict[str, Any]]], list[dict[str, Any]]]:
     """Return the trends of a device by channel, and the data of their figures."""
     trends: dict[str, list[dict[str, Any]]] = {}
@@ -215,7 +202,7 @@ def _list_trends(
     return trends, payload
 
 
-def describe_change(row: DriftRow, *, simulated: bool) -> str:
+def describe_change(row: comparisons.DriftRow, *, simulated: bool) -> str:
     """Return a change of a device in words."""
     name = symbol_text(row.parameter)
     by = "" if row.change is None else f" by {100 * row.change:+.0f} %".replace("-", "−")
@@ -228,20 +215,17 @@ def describe_change(row: DriftRow, *, simulated: bool) -> str:
 def trace_verdicts(
     site: Site, sensor: str, own: Sequence[RecordingView]
 ) -> Iterator[Mapping[str, object]]:
-    """Yield each requirement with the verdict on a sensor, its numbers and its recordings.
-
-    ``own`` are the recordings of the sensor. Requirements without a verdict are included.
-    """
-    rows = site.rows(RankingRow)
+    """Yield each requirement with the verdict on a sensor, its numbers and its recordings."""
+    rows = site.rows(comparisons.RankingRow)
     own_rows = [row for row in rows if row.sensor == sensor]
     totals = [
-        (view, [row for row in view.rows(ErrorBudgetRow) if row.source == "total"])
+        (view, [row for row in view.rows(comparisons.ErrorBudgetRow) if row.source == "total"])
         for view in own
         if view.static
     ]
     simulated = {view.full_name: view.simulated for view in own}
     requirements = site.settings["requirements"] if rows else {}
-    for ranking in format_rankings(own_rows, requirements, simulated, site.system):
+    for ranking in meaning.format_rankings(own_rows, requirements, simulated, site.system):
         name, requirement = ranking.name, ranking.requirement
         about = {"name": name, "title": requirement.title, "asked": requirement_text(requirement)}
         if not ranking.groups:
@@ -277,14 +261,14 @@ def trace_verdicts(
                 (
                     words,
                     verdict_text(verdict) if verdict else "",
-                    source_number(row, column, number_text(size, 3)),
+                    meaning.source_number(row, column, number_text(size, 3)),
                 )
                 for words, column, size, verdict in alternatives
                 if size is not None
             ],
             "window": window,
             "limits": [
-                describe_limit(each)
+                meaning.describe_limit(each)
                 for each in own_rows
                 if each.requirement == name and each.trajectory is None
             ],
@@ -294,7 +278,7 @@ def trace_verdicts(
                     "axes": counted(len(view.recommended()), "axis", "axes"),
                     "temperature": format_temperature(view.row),
                     "errors": [
-                        format_recording_error(total, site.system)
+                        meaning.format_recording_error(total, site.system)
                         for total in of_view
                         if total.requirement == name
                     ],

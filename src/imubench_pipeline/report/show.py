@@ -9,14 +9,14 @@ from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from imubench_pipeline.settings.command_line import make_integer_type
+from imubench_pipeline.settings.command_line import CommandError, make_number_type
 
 if TYPE_CHECKING:
     import pyarrow as pa
     from rich.console import RenderableType
 
 _NEEDED_TABLES = ("recordings", "findings", "failures", "ranking", "next_steps", "parameters")
-_parse_width = make_integer_type(40, 10_000, "40 to 10000 columns")
+_parse_width = make_number_type(40, 10_000, "40 to 10000 columns", int)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -51,14 +51,10 @@ def run(arguments: argparse.Namespace) -> int:
     from imubench_pipeline.report.terminal import render_comparison
     from imubench_pipeline.tables import find_tables_folder
 
-    try:
-        tables = _load(arguments.results)
-        _check(tables["ranking"], "requirement", arguments.requirement)
-        _check(tables["parameters"], "channel", arguments.channel)
-        _check(tables["parameters"], "method", arguments.method)
-    except _ShowError as error:
-        print(error, file=sys.stderr)
-        return 2
+    tables = _load(arguments.results)
+    _check(tables["ranking"], "requirement", arguments.requirement)
+    _check(tables["parameters"], "channel", arguments.channel)
+    _check(tables["parameters"], "method", arguments.method)
 
     def shown(width: int) -> Iterator[RenderableType]:
         yield from render_comparison(
@@ -100,24 +96,20 @@ def show(parts: Callable[[int], Iterable[RenderableType]], width: int | None = N
     sys.stdout.writelines(f"{line.rstrip()}\n" for line in captured.get().splitlines())
 
 
-class _ShowError(ValueError):
-    """The results do not contain the requested data."""
-
-
 def _load(results: Path) -> dict[str, pa.Table]:
     from imubench_pipeline.tables import TableError, find_tables, read
 
     try:
         paths = find_tables(results, _NEEDED_TABLES)
     except TableError as error:
-        raise _ShowError(str(error)) from error
+        raise CommandError(str(error)) from error
     try:
         return {name: read(name, [path]) for name, path in paths.items()}
     except (OSError, ValueError) as error:
-        raise _ShowError(f"{error}\n`snakemake -c2` makes the tables again") from error
+        raise CommandError(f"{error}\n`snakemake -c2` makes the tables again") from error
 
 
 def _check(table: pa.Table, column: str, asked: str | None) -> None:
     existing = table[column].unique().to_pylist()
     if asked is not None and asked not in existing:
-        raise _ShowError(f"no {column} {asked!r}; there are: {', '.join(existing) or 'none'}")
+        raise CommandError(f"no {column} {asked!r}; there are: {', '.join(existing) or 'none'}")

@@ -39,10 +39,7 @@ def make_command(name: str, results: str, options: Mapping[str, str] | None = No
 
 
 def make_recompute_command(target: str, overrides: Sequence[str] = ()) -> str:
-    """Return the command that recomputes a file of a recording from its log.
-
-    ``overrides`` are the settings of the run for ``snakemake --config``.
-    """
+    """Return the command that recomputes a file of a recording, with the settings ``overrides``."""
     stated = ["--config", *overrides] if overrides else []
     # After the two dashes, nothing is read as an option.
     return shlex.join(["snakemake", "-c2", *stated, "--forcerun", "ingest", "--", target])
@@ -272,10 +269,7 @@ class Site:
         return _make_digest(self.common, *parts)
 
     def shown(self, *, alone: bool = False) -> Mapping[str, object]:
-        """Return the data of the site for all templates.
-
-        ``alone``: no other file lies beside the report.
-        """
+        """Return the data of the site for all templates; ``alone``: for a report of one file."""
         return {
             "title": self.title,
             "navigation": self.navigation,

@@ -9,30 +9,18 @@ from markupsafe import Markup
 
 from imubench_pipeline.model.comparisons import CoverageRow, NextStepRow, RankingRow
 from imubench_pipeline.model.recordings import FailureRow, FileRow, FindingRow
+from imubench_pipeline.report import datasheets
 from imubench_pipeline.report.comparison import Comparison
-from imubench_pipeline.report.datasheets import (
-    compare_sensors_with_datasheets,
-    make_coverage_tables,
-)
 from imubench_pipeline.report.decisions import make_decision_matrix, summarise_counts
 from imubench_pipeline.report.meaning import Group, format_rankings
 from imubench_pipeline.report.payload import FOREST, pack_styles
 from imubench_pipeline.report.site import Entry, Site
 from imubench_pipeline.report.view import RecordingView
 from imubench_pipeline.settings.requirements import Requirement
+from imubench_pipeline.words import verdicts
 from imubench_pipeline.words.numbers import counted, duration_text, join_names, sentence
-from imubench_pipeline.words.verdicts import (
-    answer_text,
-    condition_text,
-    doubts_text,
-    list_others,
-    requirement_text,
-    spread_text,
-    used_doubts_text,
-)
 
 _STEPS = 3  # next steps on the start page; the table has all
-
 _LINE = 100  # characters of a reason that fit on one line
 
 
@@ -163,7 +151,7 @@ def _list_rankings(site: Site) -> Iterator[_Answer]:
             ranking.name,
             ranking.requirement,
             groups,
-            requirement_text(ranking.requirement),
+            verdicts.requirement_text(ranking.requirement),
             _answer(site, groups, ranked),
             list(_details(site, groups, ranked)),
             {group.sensor: _name_tied(site, group) for group in groups},
@@ -179,7 +167,7 @@ def _answer(site: Site, groups: Sequence[Group], ranked: Sequence[Group]) -> str
     marked = {g.sensor: f"{site.names[g.sensor]} (simulated)" for g in ranked if g.simulated}
     excluded = sum(group.row.verdict == "excluded" for group in groups)
     rows = [group.row for group in ranked]
-    return answer_text(rows, {**site.names, **marked}, len(groups), excluded)
+    return verdicts.answer_text(rows, {**site.names, **marked}, len(groups), excluded)
 
 
 def _details(site: Site, groups: Sequence[Group], ranked: Sequence[Group]) -> Iterator[str]:
@@ -193,10 +181,12 @@ def _details(site: Site, groups: Sequence[Group], ranked: Sequence[Group]) -> It
             text += f" Not counted: {decides.reason}."
         yield text + f" {_describe_data(site, group.row)}"  # still markup
         if conditions := group.row.conditions:
-            yield f"Conditions: {'; '.join(map(condition_text, conditions))}."
+            yield f"Conditions: {'; '.join(map(verdicts.condition_text, conditions))}."
         if tied := _name_tied(site, group):
             yield f"The difference from {join_names(tied)} is not statistically significant."
-    yield from list_others((group.row for group in groups if group not in ranked[:1]), site.names)
+    yield from verdicts.list_others(
+        (group.row for group in groups if group not in ranked[:1]), site.names
+    )
     for group in groups:
         if group.corrected:
             yield f"{site.names[group.sensor]}: {group.corrected}."
@@ -222,7 +212,9 @@ def _describe_data(site: Site, row: RankingRow) -> str:
     """Return the recordings of a verdict, and the doubts about them."""
     own = [view for view in site.views if view.sensor == row.sensor and view.static]
     chosen = next((view for view in own if view.name == row.recording), None)
-    left_out = f" Not used: {doubts_text(row.left_out, named=True)}." if row.left_out else ""
+    left_out = (
+        f" Not used: {verdicts.doubts_text(row.left_out, named=True)}." if row.left_out else ""
+    )
     if chosen is None or not row.recordings:
         return left_out.strip()
     axes = counted(len(chosen.recommended()), "axis", "axes")
@@ -232,10 +224,10 @@ def _describe_data(site: Site, row: RankingRow) -> str:
     else:
         units = f" of {counted(row.specimens, 'unit')}" if row.specimens is not None else ""
         text = f"Data: {row.recordings} recordings{units}; {log} is nearest to the prediction."
-    if spread := spread_text(row):
+    if spread := verdicts.spread_text(row):
         text += f" Spread: {spread}."
     if row.doubts:
-        text += f" Doubts: {used_doubts_text(row)}."
+        text += f" Doubts: {verdicts.used_doubts_text(row)}."
     return text + left_out
 
 
@@ -263,12 +255,12 @@ def _recordings(site: Site) -> Mapping[str, object]:
 
 
 def _datasheets(site: Site) -> Mapping[str, object]:
-    lines = list(compare_sensors_with_datasheets(site.views, site.system))
+    lines = list(datasheets.compare_sensors_with_datasheets(site.views, site.system))
     filters = {
         "figure": list(dict.fromkeys(line["quantity"] for line in lines)),
         "sensor": list(dict.fromkeys(site.names[line["sensor"]] for line in lines)),
     }
-    coverage = list(make_coverage_tables(site.rows(CoverageRow)))
+    coverage = list(datasheets.make_coverage_tables(site.rows(CoverageRow)))
     return {"lines": lines, "filters": filters, "coverage": coverage}
 
 

@@ -5,10 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from textwrap import wrap
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import pyarrow as pa
+from rich import box
+from rich.cells import cell_len
 from rich.console import RenderableType
+from rich.table import Table
 from rich.text import Text
 
 from imubench_pipeline.model.comparisons import NextStepRow, RankingRow
@@ -16,27 +19,15 @@ from imubench_pipeline.model.estimates import AllanRow, ParameterRow
 from imubench_pipeline.model.recordings import DoubtRow, FailureRow, FindingRow, RecordingRow
 from imubench_pipeline.model.states import Verdict
 from imubench_pipeline.model.table import OfRecordingRow
+from imubench_pipeline.report import run_summary
 from imubench_pipeline.report.meaning import Group, format_rankings
 from imubench_pipeline.report.parameters import select_symbols
 from imubench_pipeline.report.practical import System, choose_page_unit, format_temperature
-from imubench_pipeline.report.run_summary import (
-    fold_text,
-    list_failures,
-    list_rejections,
-    select_warnings,
-)
-from imubench_pipeline.report.terminal_table import fit_table
 from imubench_pipeline.settings.requirements import Requirement
 from imubench_pipeline.settings.sensor import quantity_of
+from imubench_pipeline.words import numbers
 from imubench_pipeline.words.estimates import STATUS_WORDS, symbol_text
 from imubench_pipeline.words.findings.base import WHITE
-from imubench_pipeline.words.numbers import (
-    NO_VALUE,
-    Unit,
-    counted,
-    duration_text,
-    rates_text,
-)
 from imubench_pipeline.words.verdicts import used_doubts_text
 
 R = TypeVar("R", bound=OfRecordingRow)
@@ -44,6 +35,7 @@ R = TypeVar("R", bound=OfRecordingRow)
 About = Mapping[tuple[str, str], RecordingRow]
 """The row of the table ``recordings`` of each sensor and recording."""
 
+_NAME_FOLDS_AT, _GAP = 16, 2  # of tables, columns of the terminal
 _TITLES = {"gyro": "Gyroscopes", "accel": "Accelerometers"}
 _STYLES: Mapping[Verdict, str] = {
     "meets": "green",
@@ -86,11 +78,11 @@ def render_comparison(
         + f", {failed} failed" * bool(failed)
         + f"; {simulated} simulated, not measured\n"
     )
-    yield from _listed("Failed", list_failures(FailureRow.rows_of(tables["failures"])))
-    yield from _listed("Rejected", list_rejections(recordings))
+    yield from _listed("Failed", run_summary.list_failures(FailureRow.rows_of(tables["failures"])))
+    yield from _listed("Rejected", run_summary.list_rejections(recordings))
     findings = FindingRow.rows_of(tables["findings"])
     warnings = []
-    for row in select_warnings(findings):
+    for row in run_summary.select_warnings(findings):
         place = " ".join(filter(None, (f"{row.sensor}/{row.recording}", row.channel)))
         warnings.append(f"{place} ({row.finding.replace('_', ' ')}): {row.detail}")
     yield from _listed("Warnings", warnings, cut=True)
@@ -112,10 +104,7 @@ def render_comparison(
 def render_logs(
     tables: Mapping[str, pa.Table], system: System, width: int
 ) -> Iterator[RenderableType]:
-    """Yield properties, findings and parameters of each of a few logs.
-
-    The width is in columns of the terminal.
-    """
+    """Yield properties, findings and parameters of each of a few logs; the width is in columns."""
     every_finding = FindingRow.rows_of(tables["findings"])
     every_doubt = DoubtRow.rows_of(tables["doubts"])
     every_parameter = ParameterRow.rows_of(tables["parameters"])
@@ -123,11 +112,13 @@ def render_logs(
     for row in RecordingRow.rows_of(tables["recordings"]):
         findings, parameters = _of(row, every_finding), _of(row, every_parameter)
         length = _length(row, parameters, _of(row, allan))
-        yield Text(fold_text(row.recording) + length, style="bold")
+        yield Text(run_summary.fold_text(row.recording) + length, style="bold")
         if row.status != "ok":
-            yield Text(f"  {row.status}: {fold_text(row.reason or '', _LONGEST_FINDING)}\n")
+            yield Text(
+                f"  {row.status}: {run_summary.fold_text(row.reason or '', _LONGEST_FINDING)}\n"
+            )
             continue
-        warnings = list(select_warnings(findings))
+        warnings = list(run_summary.select_warnings(findings))
         yield from _listed("Warnings", map(_of_log, warnings))
         doubts = []
         warned = {(warning.channel, warning.finding) for warning in warnings}
@@ -161,8 +152,8 @@ def _length(
         return ""
     channels = len({line.channel for line in parameters})
     rates = [line.cluster_size / line.tau for line in allan]
-    words = [f"{duration_text(row.duration)} at {rates_text(row.rate, rates)}"]
-    words += [counted(channels, "channel")]
+    words = [f"{numbers.duration_text(row.duration)} at {numbers.rates_text(row.rate, rates)}"]
+    words += [numbers.counted(channels, "channel")]
     words += [text] if (text := format_temperature(row)) else []
     return ": " + ", ".join(words) + ", simulated" * row.simulated
 
@@ -193,7 +184,7 @@ def _parameter_tables(
                     remark = f"{symbol_text(row.parameter)}: {row.reason}"
                     channels.setdefault(remark, {})[row.channel] = None
             for remark, of in channels.items():
-                yield Text(fold_text(f"{', '.join(of)}: {remark}", _LONGEST_FINDING))
+                yield Text(run_summary.fold_text(f"{', '.join(of)}: {remark}", _LONGEST_FINDING))
             yield Text()
 
 
@@ -203,7 +194,7 @@ def _listed(title: str, lines: Iterable[str], *, cut: bool = False) -> Iterator[
     if listed:
         yield Text(f"{title}: {len(listed)}", style="bold")
         for line in listed:
-            text = fold_text(line, _LONGEST_FINDING)
+            text = run_summary.fold_text(line, _LONGEST_FINDING)
             yield Text(f"  {text}", no_wrap=cut, overflow="ellipsis")
         yield Text()
 
@@ -233,11 +224,11 @@ def _ranking_tables(
 def _ranking_lines(group: Group, *, every: bool) -> Iterator[list[str | Text]]:
     """Yield the lines of a sensor: of every limit, or of the deciding one."""
     row = group.row
-    sensor = fold_text(group.sensor + " (simulated)" * group.simulated)
+    sensor = run_summary.fold_text(group.sensor + " (simulated)" * group.simulated)
     if row.tied_with:
-        sensor += "\n" + fold_text(f"similar to {', '.join(row.tied_with)}")
+        sensor += "\n" + run_summary.fold_text(f"similar to {', '.join(row.tied_with)}")
     style = "yellow" if row.conditions else _STYLES[row.verdict]
-    verdict = Text(fold_text(group.stated), style=style)
+    verdict = Text(run_summary.fold_text(group.stated), style=style)
     if group.weak:
         verdict.stylize("dim")
     # A doubt that makes the evidence weak is printed there.
@@ -249,13 +240,13 @@ def _ranking_lines(group: Group, *, every: bool) -> Iterator[list[str | Text]]:
         group.corrected,
     ):
         # The column of names gets the rest of the width.
-        wrapped = wrap(fold_text(line, _LONGEST_FINDING), _BESIDE)
+        wrapped = wrap(run_summary.fold_text(line, _LONGEST_FINDING), _BESIDE)
         verdict.append("".join(f"\n{part}" for part in wrapped), style="yellow")
     first: list[str | Text] = [group.rank, sensor, verdict]
     for limit in group.limits:
         if every or limit.decides:
             known = f"{limit.sigma} of {limit.allowed}\n{limit.interval}"
-            shown = known if limit.sigma != NO_VALUE else limit.reason
+            shown = known if limit.sigma != numbers.NO_VALUE else limit.reason
             error, _, after = limit.limit.rpartition(", ")
             yield [*first, shown, f"{error}\nafter {after}", limit.margin]
             first = ["", "", ""]
@@ -281,14 +272,14 @@ def _parameter_lines(
             _cell([each for each in own if each.parameter == symbol], unit, log.duration)
             for symbol, unit in units.items()
         )
-        lines.append([fold_text(shown), *cells])
+        lines.append([run_summary.fold_text(shown), *cells])
     return [
         "channel" if alone else "recording",
         *(f"{symbol_text(symbol)}\n{unit.sign}" for symbol, unit in units.items()),
     ], lines
 
 
-def _cell(rows: Sequence[ParameterRow], unit: Unit, duration: float | None) -> str:
+def _cell(rows: Sequence[ParameterRow], unit: numbers.Unit, duration: float | None) -> str:
     """Return the value of each component with its interval, or the reason without one."""
     lines = []
     for row in rows:
@@ -303,5 +294,58 @@ def _cell(rows: Sequence[ParameterRow], unit: Unit, duration: float | None) -> s
             lines.append(f"{unit.text(row.lower, 3)} to {unit.text(row.upper, 3)}")
         needed = row.duration_needed
         if row.status != "ok" and needed is not None and needed > (duration or 0.0):
-            lines.append(f"(needs {duration_text(needed)})")
+            lines.append(f"(needs {numbers.duration_text(needed)})")
     return "\n".join(lines) or "–"
+
+
+def fit_table(
+    title: str,
+    heads: Sequence[str],
+    lines: Sequence[Sequence[str | Text]],
+    width: int,
+    *,
+    names: int,
+) -> Table:
+    """Return a table that breaks no word or number, except for names.
+
+    Columns that do not fit into the width are omitted from the right. The head of a
+    column of numbers has their unit on a second line; ``names`` is the column that may be broken
+    anywhere.
+    """
+    cells = [["-", *map(str, column)] for column in zip(heads, *lines, strict=True)]
+    widths = [max(cell_len(word) for cell in column for word in cell.split()) for column in cells]
+    wanted = [
+        max(cell_len(text) for cell in column for text in cell.split("\n")) for column in cells
+    ]
+    widths[names] = min(widths[names], _NAME_FOLDS_AT)
+    shown = len(heads)
+    while shown > names + 1 and sum(widths[:shown]) + _GAP * (shown - 1) > width:
+        shown -= 1
+    spare = width - sum(widths[:shown]) - _GAP * (shown - 1)
+    while spare > 0:
+        lacking = [i for i in range(shown) if widths[i] < wanted[i]]
+        # Names can be broken, so they get the rest.
+        lacking = [i for i in lacking if i != names] or lacking
+        if not lacking:
+            break
+        for i in lacking[:spare]:
+            widths[i] += 1
+        spare -= len(lacking)
+    left_out = ", ".join(" in ".join(head.split("\n")) for head in heads[shown:])
+    table = Table(
+        title=title,
+        caption=f"no room for: {left_out}" if left_out else None,
+        title_justify="left",
+        caption_justify="left",
+        title_style="bold",
+        box=box.SIMPLE_HEAD,
+        show_edge=False,
+        padding=(0, _GAP - 1, 0, 0),
+        pad_edge=False,
+    )
+    for head, own in zip(heads[:shown], widths, strict=False):
+        justify: Any = "right" if "\n" in head else "left"
+        table.add_column(head, justify=justify, width=own, overflow="fold")
+    for line in lines:
+        table.add_row(*line[:shown])
+    return table

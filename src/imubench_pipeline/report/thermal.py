@@ -24,7 +24,6 @@ _UNIT_SYMBOLS |= {"bias": "signal", SENSOR: "N"}
 """Symbol of the unit, for quantities whose unit the reader can choose."""
 
 _Figure = TemperatureRow | LowPassRow | ParameterRow
-
 _FIXED_UNITS = {"lag": "s", "cutoff": "Hz"}
 _SHOWN_TAU = np.array([100.0, 300.0, 1_000.0, 3_000.0, 10_000.0, 30_000.0])
 """Averaging times for which the effect of temperature is stated, s."""

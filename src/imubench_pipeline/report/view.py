@@ -16,18 +16,8 @@ from pandas.util import hash_array
 from scipy.special import chdtri
 
 from imubench_pipeline.estimators.rows import make_estimate
+from imubench_pipeline.model import estimates
 from imubench_pipeline.model.comparisons import DatasheetCurveRow, DatasheetRow, ErrorBudgetRow
-from imubench_pipeline.model.estimates import (
-    DeterministicRow,
-    FixedBiasRow,
-    LineRow,
-    LowPassRow,
-    ModelRow,
-    ParameterRow,
-    ScoreRow,
-    SimulatedTruthRow,
-    TemperatureRow,
-)
 from imubench_pipeline.model.recordings import FindingRow, RecordingRow
 from imubench_pipeline.model.table import R
 from imubench_pipeline.noise import NoiseModel
@@ -38,7 +28,13 @@ from imubench_pipeline.tables.schemas import BY_RECORDING
 Name = tuple[str, str]
 """Sensor and recording."""
 
-_ROWS_OF_CHANNELS = (ModelRow, LineRow, DeterministicRow, DatasheetRow, DatasheetCurveRow)
+_ROWS_OF_CHANNELS = (
+    estimates.ModelRow,
+    estimates.LineRow,
+    estimates.DeterministicRow,
+    DatasheetRow,
+    DatasheetCurveRow,
+)
 
 METHOD_NAMES = {
     "robust": "robust fit",
@@ -67,26 +63,26 @@ class ChannelView:
     lower: NDArray[np.float64]
     upper: NDArray[np.float64]
     rate: float = math.nan
-    parameters: dict[str, list[ParameterRow]] = field(default_factory=dict)
+    parameters: dict[str, list[estimates.ParameterRow]] = field(default_factory=dict)
     recommended: str = ""
     reconstruction: dict[str, dict[str, NDArray[np.float64]]] = field(default_factory=dict)
-    scores: dict[str, ScoreRow] = field(default_factory=dict)
+    scores: dict[str, estimates.ScoreRow] = field(default_factory=dict)
     datasheet: list[DatasheetRow] = field(default_factory=list)
     datasheet_curve: list[DatasheetCurveRow] = field(default_factory=list)
-    true_components: dict[str, list[SimulatedTruthRow]] = field(default_factory=dict)
-    models: list[ModelRow] = field(default_factory=list)
-    lines: list[LineRow] = field(default_factory=list)
+    true_components: dict[str, list[estimates.SimulatedTruthRow]] = field(default_factory=dict)
+    models: list[estimates.ModelRow] = field(default_factory=list)
+    lines: list[estimates.LineRow] = field(default_factory=list)
     spectrum: dict[str, NDArray[np.float64]] = field(default_factory=dict)
     findings: list[FindingRow] = field(default_factory=list)
     fixed_bias: float | None = None
-    temperature: dict[str, TemperatureRow] = field(default_factory=dict)
-    low_pass: dict[str, LowPassRow] = field(default_factory=dict)
-    deterministic: list[DeterministicRow] = field(default_factory=list)
+    temperature: dict[str, estimates.TemperatureRow] = field(default_factory=dict)
+    low_pass: dict[str, estimates.LowPassRow] = field(default_factory=dict)
+    deterministic: list[estimates.DeterministicRow] = field(default_factory=list)
     compensated: dict[str, NDArray[np.float64]] = field(default_factory=dict)
     _models: dict[str, NoiseModel] = field(default_factory=dict)
 
     @property
-    def truth(self) -> dict[str, SimulatedTruthRow]:
+    def truth(self) -> dict[str, estimates.SimulatedTruthRow]:
         """The true parameters of a simulation; only the first of a repeated term."""
         return {name: rows[0] for name, rows in self.true_components.items()}
 
@@ -133,7 +129,7 @@ class ChannelView:
             self._models[method] = make_estimate(method, self.parameters[method]).model
         return self._models[method]
 
-    def named(self, method: str, symbol: str) -> list[ParameterRow]:
+    def named(self, method: str, symbol: str) -> list[estimates.ParameterRow]:
         """Return the rows of a parameter of a method, one per component."""
         return [row for row in self.parameters[method] if row.parameter == symbol]
 
@@ -234,7 +230,7 @@ class RecordingView:
             tau, adev, lower, upper = _read_floats(part, *_CURVE_COLUMNS).values()
             rate = float(part["cluster_size"][0].as_py() / tau[0])
             channels[name] = ChannelView(*named, tau, adev, lower, upper, rate)
-        for row in self.rows(ParameterRow):
+        for row in self.rows(estimates.ParameterRow):
             channel = channels[row.channel]
             channel.parameters.setdefault(row.method, []).append(row)
             if row.recommended:
@@ -251,15 +247,15 @@ class RecordingView:
             channels[name].spectrum = _read_floats(part, *columns)
         for (name,), part in _divide(self.parts["allan_compensated"], "channel").items():
             channels[name].compensated = _read_floats(part, *_CURVE_COLUMNS)
-        for score in self.rows(ScoreRow):
+        for score in self.rows(estimates.ScoreRow):
             channels[score.channel].scores[score.method] = score
-        for thermal in self.rows(TemperatureRow):
+        for thermal in self.rows(estimates.TemperatureRow):
             channels[thermal.channel].temperature[thermal.parameter] = thermal
-        for low_pass in self.rows(LowPassRow):
+        for low_pass in self.rows(estimates.LowPassRow):
             channels[low_pass.channel].low_pass[low_pass.parameter] = low_pass
-        for bias in self.rows(FixedBiasRow):
+        for bias in self.rows(estimates.FixedBiasRow):
             channels[bias.channel].fixed_bias = bias.value
-        for truth in self.rows(SimulatedTruthRow):
+        for truth in self.rows(estimates.SimulatedTruthRow):
             if truth.channel in channels:
                 components = channels[truth.channel].true_components
                 components.setdefault(truth.parameter, []).append(truth)

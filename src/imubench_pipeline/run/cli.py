@@ -29,14 +29,7 @@ from imubench_pipeline.run import simulate_command as simulation
 from imubench_pipeline.run.analysis import command as analysis
 from imubench_pipeline.run.places import find_protected_places
 from imubench_pipeline.run.verification import command as verification
-from imubench_pipeline.settings.command_line import (
-    LONGEST,
-    NO_RESULTS,
-    Command,
-    make_number_type,
-    parse_path,
-    parse_seconds,
-)
+from imubench_pipeline.settings import command_line
 from imubench_pipeline.settings.config import Run, read_config
 from imubench_pipeline.settings.extras import ExtraError
 from imubench_pipeline.settings.sensor import RecordingNotes, Sensor
@@ -44,6 +37,7 @@ from imubench_pipeline.settings.simulated_recordings import Board, Simulated
 from imubench_pipeline.settings.validation import ConfigError
 from imubench_pipeline.tables import outputs
 from imubench_pipeline.tables.texts import escape_invisible
+from imubench_pipeline.units import UnitError
 
 SCHEMAS: dict[str, type[BaseModel]] = {
     "run": Run,
@@ -70,7 +64,7 @@ def make_parser() -> argparse.ArgumentParser:
         command.add_arguments(of_it)
         for action in of_it._actions:
             if action.type is Path:
-                action.type = parse_path
+                action.type = command_line.parse_path
         said = (f"{status} {meaning}" for status, meaning in enumerate(command.statuses) if meaning)
         of_it.epilog = f"Exit status: {'; '.join(said)}."
     return parser
@@ -96,6 +90,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         status = COMMANDS[options.command].run(options)
         sys.stdout.flush()
         return status
+    except (command_line.CommandError, ConfigError, UnitError) as error:
+        print(error, file=sys.stderr)
+        return 2
     except (ExtraError, outputs.OutputError) as error:
         print(f"imubench {options.command}: {error}", file=sys.stderr)
         return 2
@@ -157,7 +154,9 @@ def _add_export(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--horizon",
-        type=make_number_type(1e-9, LONGEST, "a time above 0, such as 60 s", parse_seconds),
+        type=command_line.make_number_type(
+            1e-9, command_line.LONGEST, "a time above 0, such as 60 s", command_line.parse_seconds
+        ),
         default="60 s",
         metavar="TIME",
         help="time of coasting, for the replacement of terms that the program does not support; "
@@ -166,7 +165,7 @@ def _add_export(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--inflate",
         dest="inflation",
-        type=make_number_type(1e-6, 1e6, "a factor of 1e-6 to 1e6"),
+        type=command_line.make_number_type(1e-6, 1e6, "a factor of 1e-6 to 1e6", float),
         default=1.0,
         metavar="FACTOR",
         help="multiplies every deviation",
@@ -180,7 +179,7 @@ def _add_export(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--excess",
         dest="most_excess",
-        type=make_number_type(1.0, 1e6, "a factor of 1 to 1e6"),
+        type=command_line.make_number_type(1.0, 1e6, "a factor of 1 to 1e6", float),
         default=3.0,
         metavar="FACTOR",
         help="largest permitted ratio of the Allan deviation of an overbound to its limit; "
@@ -189,13 +188,15 @@ def _add_export(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--method", help="of the estimates; default: the recommended one")
     parser.add_argument(
         "--latitude",
-        type=make_number_type(-90.0, 90.0, "a latitude of -90 to 90, in degrees"),
+        type=command_line.make_number_type(
+            -90.0, 90.0, "a latitude of -90 to 90, in degrees", float
+        ),
         metavar="DEG",
         help="for gravity",
     )
     parser.add_argument(
         "--rate",
-        type=make_number_type(1e-6, 1e9, "a rate above 0, in Hz"),
+        type=command_line.make_number_type(1e-6, 1e9, "a rate above 0, in Hz", float),
         metavar="HZ",
         help="default: the recording's",
     )
@@ -207,19 +208,16 @@ def _export(options: argparse.Namespace) -> int:
     from imubench_pipeline.export.request import Request, load, make_content, recordings_of
 
     if options.inflation != 1.0 and not options.because:
-        print("--inflate needs its reason; expected --because '...'", file=sys.stderr)
-        return 2
+        raise command_line.CommandError("--inflate needs its reason; expected --because '...'")
     asked = Request(**{field.name: getattr(options, field.name) for field in fields(Request)})
     try:
         content = make_content(load(options.results), asked, recordings_of(options.results))
     except ExportError as error:
-        print(error, file=sys.stderr)
-        return 2
+        raise command_line.CommandError(str(error)) from None
     if options.output is not None:
         options.output.write(content)
     elif isinstance(content, bytes):
-        print(f"{options.target} is no text; expected --output FILE", file=sys.stderr)
-        return 2
+        raise command_line.CommandError(f"{options.target} is no text; expected --output FILE")
     else:
         print(content, end="")
     return 0
@@ -241,16 +239,12 @@ def _check(options: argparse.Namespace) -> int:
     from imubench_pipeline.run.checking import check
     from imubench_pipeline.run.plan import Plan
 
-    try:
-        over: dict[str, object] = {"logs": str(options.logs), "simulated": None}
-        if options.sensors:
-            over["sensors"] = str(options.sensors)
-        plan = Plan({**read_config(options.config), **over})
-        if not plan.recordings:
-            raise ConfigError(f"{options.logs}: no log found; expected <sensor>/<recording> in it")
-    except ConfigError as error:
-        print(error, file=sys.stderr)
-        return 2
+    over: dict[str, object] = {"logs": str(options.logs), "simulated": None}
+    if options.sensors:
+        over["sensors"] = str(options.sensors)
+    plan = Plan({**read_config(options.config), **over})
+    if not plan.recordings:
+        raise ConfigError(f"{options.logs}: no log found; expected <sensor>/<recording> in it")
     for reason in plan.unusable.values():
         print(reason, file=sys.stderr)
     worst = int(bool(plan.unusable))
@@ -289,15 +283,12 @@ def _inspect(options: argparse.Namespace) -> int:
         if output is not None:
             output.write(inspected.block)
     except BoundError as error:
-        print(
+        raise command_line.CommandError(
             f"{options.log.name}: to list it {error}; expected the log of an inertial sensor: copy "
-            "what it measured into a file of its own",
-            file=sys.stderr,
-        )
-        return 2
+            "what it measured into a file of its own"
+        ) from None
     except (RecordingError, OSError) as error:
-        print(error, file=sys.stderr)
-        return 2
+        raise command_line.CommandError(str(error)) from None
     if not options.block:
         print(inspected.listing)
     if output is None:
@@ -332,7 +323,7 @@ def _shortlist(options: argparse.Namespace) -> int:
     from rich.console import Console
 
     from imubench_pipeline.report.shortlist import format_shortlist_row, list_assumptions
-    from imubench_pipeline.report.terminal_table import fit_table
+    from imubench_pipeline.report.terminal import fit_table
     from imubench_pipeline.settings.requirements import Requirement, read_requirements
     from imubench_pipeline.settings.sensor import read_sensors
     from imubench_pipeline.settings.shipped import list_folders
@@ -357,9 +348,8 @@ def _shortlist(options: argparse.Namespace) -> int:
         if options.results is not None:
             tables = find_tables(options.results, NEEDED)
         rows = [*list_shortlist({name: asked}, sensors, tables)]
-    except (ConfigError, OSError, ValueError) as error:
-        print(error, file=sys.stderr)
-        return 2
+    except (OSError, ValueError) as error:
+        raise command_line.CommandError(str(error)) from None
     console = Console(highlight=False, markup=False, emoji=False)
     margins = [f"Margin\n{which}" for which in ("at best", "at worst", "measured")]
     heads = ["Sensor", "Verdict", *margins, "Limit"]
@@ -385,16 +375,16 @@ def _completion(options: argparse.Namespace) -> int:
     )
     for command in of_commands.choices.values():
         for action in command._actions:
-            if action.type is parse_path:
+            if action.type is command_line.parse_path:
                 action.complete = shtab.FILE
     print(shtab.complete(parser, options.shell))
     return 0
 
 
-_ADDED: Hook[Command] = Hook("commands")
+_ADDED: Hook[command_line.Command] = Hook("commands")
 
 COMMANDS = {
-    "analyse": Command(
+    "analyse": command_line.Command(
         "estimate the noise parameters of logs, at once",
         analysis.add_arguments,
         analysis.run,
@@ -404,13 +394,13 @@ COMMANDS = {
             "a log or the sensor file is missing, or incomplete",
         ),
     ),
-    "init": Command(
+    "init": command_line.Command(
         "make a folder of logs",
         project.add_init_arguments,
         project.init,
         ("made", "", "it has one of the files already, or cannot be written"),
     ),
-    "run": Command(
+    "run": command_line.Command(
         "analyse the logs of a folder, as snakemake does in a checkout",
         project.add_run_arguments,
         project.run,
@@ -421,19 +411,19 @@ COMMANDS = {
         ),
         passes_on=True,
     ),
-    "schema": Command(
+    "schema": command_line.Command(
         "write the JSON Schema of a configuration file, for editors",
         _add_schema,
         _schema,
         ("written", "", "cannot be written"),
     ),
-    "check": Command(
+    "check": command_line.Command(
         "check logs without analysing them",
         _add_check,
         _check,
         ("all good", "warnings, or rejected logs", "a setting is wrong, or there are no logs"),
     ),
-    "inspect": Command(
+    "inspect": command_line.Command(
         "show the contents of a log, and draft a sensor file for it",
         _add_inspect,
         _inspect,
@@ -443,56 +433,53 @@ COMMANDS = {
             "the log cannot be read, or the sensor file cannot be written",
         ),
     ),
-    "formats": Command(
+    "formats": command_line.Command(
         "list the logs that are read, and the exports", lambda _: None, formats.run, ("listed",)
     ),
-    "export": Command(
+    "export": command_line.Command(
         "write the input file of a filter or simulator",
         _add_export,
         _export,
-        ("written", "", "the program cannot hold it, or " + NO_RESULTS),
+        ("written", "", "the program cannot hold it, or " + command_line.NO_RESULTS),
     ),
-    "show": Command(
+    "show": command_line.Command(
         "show the comparison of the sensors in the terminal",
         show.add_arguments,
         show.run,
-        ("shown", "", NO_RESULTS),
+        ("shown", "", command_line.NO_RESULTS),
     ),
-    "shortlist": Command(
+    "shortlist": command_line.Command(
         "say by datasheets alone which sensors are worth logging",
         _add_shortlist,
         _shortlist,
-        ("said", "", NO_RESULTS),
+        ("said", "", command_line.NO_RESULTS),
     ),
-    "report": Command(
+    "report": command_line.Command(
         "write the report again, elsewhere or in one file",
         report.add_arguments,
         report.run,
-        ("written", "", NO_RESULTS),
+        ("written", "", command_line.NO_RESULTS),
     ),
-    "figures": Command(
+    "figures": command_line.Command(
         "draw the figures of channels for print",
         figures.add_arguments,
         figures.run,
-        ("drawn", "", NO_RESULTS),
+        ("drawn", "", command_line.NO_RESULTS),
     ),
-    "simulate": Command(
+    "simulate": command_line.Command(
         "write a simulated log of a sensor, to test filters on",
         simulation.add_arguments,
         simulation.run,
-        ("written", "", NO_RESULTS),
+        ("written", "", command_line.NO_RESULTS),
     ),
-    "verify": Command(
+    "verify": command_line.Command(
         "verify that all results are unchanged",
         verification.add_arguments,
         verification.run,
         ("all results are unchanged", "something is not", "there are no results"),
     ),
     **_ADDED.by_key(),
-    "completion": Command(
-        "print a completion script for the shell",
-        _add_completion,
-        _completion,
-        ("printed",),
+    "completion": command_line.Command(
+        "print a completion script for the shell", _add_completion, _completion, ("printed",)
     ),
 }

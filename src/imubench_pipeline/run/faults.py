@@ -46,10 +46,7 @@ class Faults:
         return tried + (again and (failed or self._has_lost_samples(of)))
 
     def _has_lost_samples(self, of: Of) -> bool:
-        """Return whether the outputs of an ingest were changed, as checked at the first call.
-
-        All is read if another step of the recording failed, since damaged samples make steps fail.
-        """
+        """Return whether outputs of an ingest were changed; reads all if another step failed."""
         step, sensor, recording = of
         if step != "ingest" or recording is None:
             return False

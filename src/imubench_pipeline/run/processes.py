@@ -73,10 +73,7 @@ class Processes:
         atexit.register(self.close)
 
     def run(self, job: Job, seconds: float | None = None) -> None:
-        """Run a script to its end; several threads may run one each.
-
-        Raise a `StepError` if it fails, is killed, or takes more than `seconds` without imports.
-        """
+        """Run a script to its end; `StepError` if it fails or exceeds `seconds` without imports."""
         ours, theirs = Pipe()
         with ours:
             with theirs:

@@ -43,7 +43,6 @@ _LEVEL_STYLES = {logging.ERROR: "red", logging.WARNING: "yellow"}
 _MAX_LINE_LENGTH = 200
 _MIN_LINE_INTERVAL = 10.0  # min. time between two lines of progress in a pipe, s.
 _TIME_UNITS = ((3600, "h"), (60, "min"))
-
 Recording = tuple[str, str]  # sensor and name
 _expected: Counter[Recording] = Counter()
 _told: list[Callable[[str, str], str]] = []

@@ -24,10 +24,7 @@ def has_snakefile(folder: Path) -> bool:
 
 
 def find_snakefile(folder: Path) -> Path:
-    """Return the Snakefile of a folder; for a folder of logs, the Snakefile of this package.
-
-    A ConfigError is raised if the folder is neither.
-    """
+    """Return the Snakefile of a checkout, or for a folder of logs the package's; or ConfigError."""
     for own in _SNAKEFILE_PATHS:
         if (folder / own).is_file():
             return (folder / own).absolute()
@@ -82,19 +79,15 @@ def init(options: argparse.Namespace) -> int:
         for path in [source] if source.is_file() else source.glob("*.yaml"):
             files[path.relative_to(shipped).as_posix()] = path
     if there := [name for name in files if (folder / name).exists()]:
-        print(
+        raise ConfigError(
             f"{folder / there[0]}: exists already; expected a folder without it: choose "
-            "another one, or rename that file",
-            file=sys.stderr,
+            "another one, or rename that file"
         )
-        return 2
     absolute = folder.resolve()
     if results := next((one for one in [absolute, *absolute.parents] if has_results(one)), None):
-        print(
-            f"{folder}: lies in the results of runs ({results}); expected a folder outside of them",
-            file=sys.stderr,
+        raise ConfigError(
+            f"{folder}: lies in the results of runs ({results}); expected a folder outside of them"
         )
-        return 2
     for made in ("logs", "config/sensors"):
         (folder / made).mkdir(parents=True, exist_ok=True)
     # The configuration last: it makes the folder a project.
@@ -129,8 +122,7 @@ def run(options: argparse.Namespace) -> int:
         snakefile = find_snakefile(folder)
         os.chdir(folder)
     except (ConfigError, OSError) as error:
-        print(f"imubench run: {error}", file=sys.stderr)
-        return 2
+        raise ConfigError(f"imubench run: {error}") from None
     command = [sys.executable, "-P", "-m", "snakemake", "--snakefile", str(snakefile)]
     command += ["--cores", options.cores, *options.flags]
     sys.stdout.flush()

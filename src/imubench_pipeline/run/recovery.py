@@ -56,10 +56,7 @@ def end_group(group: int) -> None:
 
 
 def was_restarted(note: Mapping[str, Any], boot: float | None = None) -> bool:
-    """Return whether the machine was restarted after the begin of the run of this note.
-
-    `boot`: start of the machine, s since 1970; default: from the system.
-    """
+    """Return whether the machine was restarted after a run of this note; `boot`: s since 1970."""
     try:
         since = datetime.fromisoformat(str(note.get("since"))).timestamp()
     except ValueError:

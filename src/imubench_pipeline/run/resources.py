@@ -23,7 +23,6 @@ the rest for two small steps of the same group."""
 
 _START_TIME = 60  # s; Python from a shared file system, and compilation in a first run
 _BYTES_PER_MB = 10**6
-
 _TIME_MARGIN = 10  # factor on measured times, for a busy node and a slow file system
 _TEXT_SUFFIXES = {".csv", ".txt", ".log", ".tsv", ".dat", ".asc", ".nmea"}
 _BINARY_EXPANSION, _COMPRESSED_EXPANSION = 3, 6  # max. samples per byte of a log, relative to text.
@@ -55,59 +54,34 @@ class Extent:
 
 
 @dataclass(frozen=True, kw_only=True)
-class OfRecording:
-    """Cost of a step of one recording.
+class Cost:
+    """Cost of a step of one recording, or of many, of one sensor or of all.
 
-    Memory in MB, and MB per million samples of a channel. Time in s, s per channel, and s per
-    million values of all channels.
+    Memory in MB, and MB per million samples of a channel and per recording. Time in s, s per
+    channel, s per million values of all channels, and s per recording. ``many_jobs``: a group
+    contains many such jobs, which do not each request a start-up time.
     """
 
     memory: float
     memory_of_samples: float = 0.0
+    memory_of_each: float = 0.0
     time: float
     time_of_channels: float = 0.0
     time_of_values: float = 0.0
-
-    def of(self, extent: Extent) -> tuple[float, float]:
-        """Return memory in MB and time in s."""
-        values = self.time_of_values * extent.million_samples
-        return (
-            self.memory + self.memory_of_samples * extent.million_samples,
-            _START_TIME
-            + _TIME_MARGIN * (self.time + (self.time_of_channels + values) * extent.channels),
-        )
-
-
-@dataclass(frozen=True, kw_only=True)
-class OfMany:
-    """Memory in MB and time in s of a step of many recordings, of one sensor or of all.
-
-    ``many_jobs``: a group contains many such jobs, which do not each request a start-up time.
-    """
-
-    memory: float
-    memory_of_each: float = 0.0
-    time: float
     time_of_each: float = 0.0
     many_jobs: bool = False
 
     def of(self, extent: Extent) -> tuple[float, float]:
         """Return memory in MB and time in s."""
+        memory = self.memory + self.memory_of_samples * extent.million_samples
+        of_channel = self.time_of_channels + self.time_of_values * extent.million_samples
+        time = self.time + of_channel * extent.channels + self.time_of_each * extent.recordings
         start = 0.0 if self.many_jobs else _START_TIME
-        return (
-            self.memory + self.memory_of_each * extent.recordings,
-            start + _TIME_MARGIN * (self.time + self.time_of_each * extent.recordings),
-        )
-
-
-Cost = OfRecording | OfMany
+        return memory + self.memory_of_each * extent.recordings, start + _TIME_MARGIN * time
 
 
 def compute_resources(cost: Cost, extent: Extent, attempt: int = 1) -> dict[str, int]:
-    """Return the memory in MB and the minutes that a job requests, twice as much at each `attempt`.
-
-    `cost`: of its rule; `extent`: of its data.
-    """
+    """Return the memory in MB and the minutes that a job requests, doubled at each `attempt`."""
     memory, seconds = cost.of(extent)
     times: int = 2 ** (attempt - 1)
     return {
@@ -190,10 +164,7 @@ def _estimate_extent(plan: Plan, recording: Recording) -> Extent:
 
 
 def estimate_text_size(path: Path) -> int:
-    """Return the estimated size of a log file as text, in bytes; 0 if there is none.
-
-    Its samples may be packed: counts in binary, compressed text.
-    """
+    """Return the size of a log file as text, bytes; packed samples are estimated. 0: no file."""
     if not path.is_file():
         return 0
     suffix = path.suffix.lower()

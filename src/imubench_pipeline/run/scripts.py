@@ -36,10 +36,7 @@ class Scripts:
         self._processes = Processes()
 
     def __call__(self, *values: Any, **named: Any) -> None:
-        """Run a script to its end, or leave its outputs empty; see `script` of Snakemake.
-
-        Raise a `StepError` if the run cannot continue without the script.
-        """
+        """Run a script to its end, or leave its outputs empty; else raise `StepError`."""
         given = _SCRIPT_SIGNATURE.bind(*values, **named).arguments
         source = infer_source_file(given["path"], infer_source_file(given["basedir"]))
         if isinstance(source, LocalSourceFile):

@@ -13,12 +13,12 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from imubench_pipeline.settings.command_line import MOST_WHOLE, make_integer_type
+from imubench_pipeline.settings.command_line import MOST_WHOLE, make_number_type
 from imubench_pipeline.settings.shipped import list_folders
 from imubench_pipeline.settings.validation import ConfigError, cut, parse
 from imubench_pipeline.settings.yaml_files import list_files, read_settings, read_yaml
 from imubench_pipeline.tables.outputs import OutputFile, add_output
-from imubench_pipeline.units import UnitError, add_key_to_errors, parse_quantity
+from imubench_pipeline.units import add_key_to_errors, parse_quantity
 
 if TYPE_CHECKING:
     from imubench_pipeline.simulate.models import Origin
@@ -66,7 +66,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--seed",
-        type=make_integer_type(0, MOST_WHOLE, "a whole number from 0"),
+        type=make_number_type(0, MOST_WHOLE, "a whole number from 0", int),
         default=1,
         help="of the noise; default: 1",
     )
@@ -84,15 +84,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Simulate the log; return the exit status."""
-    try:
-        _run(options)
-    except (ConfigError, UnitError) as error:
-        print(error, file=sys.stderr)
-        return 2
-    return 0
-
-
-def _run(options: argparse.Namespace) -> None:
     # Numerics are loaded for this command only: the others answer at once.
     from imubench_pipeline.readers.text.header import SIMULATED
     from imubench_pipeline.settings.sensor import TEMPERATURE
@@ -162,6 +153,7 @@ def _run(options: argparse.Namespace) -> None:
         notes.write(notes_text(out.path.name, form, log, f"from {origin.source}"))
     size = out.path.stat().st_size / 1e6
     print(f"{out}: {size:.1f} MB; {notes} says how it is written")
+    return 0
 
 
 def _check_depth(out: OutputFile) -> None:

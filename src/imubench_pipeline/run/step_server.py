@@ -35,10 +35,7 @@ _MAX_ERROR_LENGTH = 300  # max. length of an error in one line, characters.
 
 
 def serve(requests: socket.socket) -> None:
-    """Fork for each job that comes through a socket as a connection, until the other end is closed.
-
-    The connection returns None at the begin of the step, and then its cost, or a `StepError`.
-    """
+    """Fork for each job from a socket; its connection gets None, then the cost or `StepError`."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the forks end, and that the run ends is seen
     signal.signal(signal.SIGCHLD, _reap)
     ready: dict[Path, bool] = {}
@@ -120,7 +117,15 @@ def _run(connection: Connection[Any, Any], job: Job, *, imported: bool) -> None:
         signal.signal(signal.SIGCHLD, signal.SIG_DFL)
         signal.pthread_sigmask(signal.SIG_UNBLOCK, _CHILD_SIGNALS)
         if sys.platform == "linux":
-            _end_with_who_asked(connection)
+            # The system ends this process when the peer of the connection closes or sends; the end
+            # of the server would come later: it may be importing for another step.
+            signal.signal(signal.SIGIO, signal.SIG_DFL)
+            fcntl.fcntl(connection, fcntl.F_SETOWN, os.getpid())
+            fcntl.fcntl(
+                connection, fcntl.F_SETFL, fcntl.fcntl(connection, fcntl.F_GETFL) | os.O_ASYNC
+            )
+            if select.select([connection], [], [], 0.0)[0]:  # closed before
+                os._exit(1)
             Path("/proc/self/comm").write_text(job.name)  # for ps and top
         connection.send(None)
         job.log.parent.mkdir(parents=True, exist_ok=True)
@@ -153,18 +158,6 @@ def _run(connection: Connection[Any, Any], job: Job, *, imported: bool) -> None:
             sys.stderr.flush()
         connection.send(outcome)
         os._exit(isinstance(outcome, StepError))
-
-
-def _end_with_who_asked(connection: Connection[Any, Any]) -> None:
-    """Make the system end this process when the peer of a connection closes or sends.
-
-    The end of the server would come later: it may be importing for another step.
-    """
-    signal.signal(signal.SIGIO, signal.SIG_DFL)
-    fcntl.fcntl(connection, fcntl.F_SETOWN, os.getpid())
-    fcntl.fcntl(connection, fcntl.F_SETFL, fcntl.fcntl(connection, fcntl.F_GETFL) | os.O_ASYNC)
-    if select.select([connection], [], [], 0.0)[0]:  # closed before
-        os._exit(1)
 
 
 def _trace(error: BaseException, script: str) -> str:

@@ -33,23 +33,10 @@ def parse_seconds(text: str) -> float:
 
 
 def make_number_type(
-    least: float, most: float, words: str, read: Callable[[str], float] = float
-) -> Callable[[str], float]:
-    """Return an argument type for a finite number in a closed range.
-
-    ``words`` are the expected value in the error; ``read`` converts a text to a number.
-    """
-    return _make_type(least, most, words, read)
-
-
-def make_integer_type(least: int, most: int, words: str) -> Callable[[str], int]:
-    """Return an argument type for an integer in a closed range; see `make_number_type`."""
-    return _make_type(least, most, words, int)
-
-
-def _make_type(
     least: float, most: float, words: str, read: Callable[[str], T]
 ) -> Callable[[str], T]:
+    """Return an argument type for a finite number in a range, ``words`` in the error."""
+
     def value(text: str) -> T:
         try:
             found: T | None = read(text)
@@ -68,6 +55,10 @@ LONGEST = 1e10  # s, three centuries
 
 NO_RESULTS = "the requested data are missing, or cannot be used"
 """Meaning of the exit status 2 of commands that show results."""
+
+
+class CommandError(Exception):
+    """Ends a command with its text and the exit status 2."""
 
 
 class Command(NamedTuple):

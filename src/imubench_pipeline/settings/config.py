@@ -33,7 +33,6 @@ _SECTIONS_WITHOUT_RECORDING = {"held_back", "exports", "limits", "report"}
 
 
 _Section = TypeVar("_Section", bound=BaseModel)
-
 Folders = NamedPath | Annotated[tuple[NamedPath, ...], Field(min_length=1)]
 
 
@@ -51,7 +50,6 @@ class AllanSettings(Strict):
 
 
 HeldBack = Annotated[Text, Field(pattern=r"^[^/]+/[^/]+$", examples=["my_sensor/run_7"])]
-
 Method = Literal[
     "robust", "likelihood", "likelihood_gm", "compensated", "curve", "paper", "weighted"
 ]
@@ -136,8 +134,7 @@ class ExportSettings(Strict):
     )
     axis: Text = Field("worst", description="worst or median axis, a device or a recording")
     horizon: Time = Field(
-        "60 s",
-        description="time of coasting, for the replacement of unsupported terms",
+        "60 s", description="time of coasting, for the replacement of unsupported terms"
     )
     inflation: float = Field(1.0, ge=1, description="multiplies every deviation")
     because: Text | None = Field(
@@ -281,10 +278,7 @@ def read_run(config: Mapping[str, object], file: str = "config/config.yaml or --
 
 
 def read_config(file: Path) -> JsonObject:
-    """Return the unchecked settings of a configuration; empty if it does not exist.
-
-    Raises ConfigError if it is not YAML, or has no keys.
-    """
+    """Return the unchecked settings of a file, empty without one; ConfigError if it has no keys."""
     content = read_yaml(file) if file.is_file() else None
     if content is not None and not isinstance(content, dict):
         raise ConfigError(f"{file}: found {cut(content)}, expected keys and values")

@@ -21,7 +21,6 @@ AT_REST: Kind = "static"
 """Nothing: it was at rest all the time."""
 
 Gyro = Literal["gyro_x", "gyro_y", "gyro_z"]
-
 _Block = TypeVar("_Block", bound=BaseModel)
 _Model = TypeVar("_Model", bound="WithBlocks")
 

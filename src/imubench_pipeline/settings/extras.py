@@ -16,10 +16,7 @@ class ExtraError(ImportError):
 
 @contextmanager
 def require_extra(name: Extra, purpose: str) -> Iterator[None]:
-    """Raise an `ExtraError` if a package that is imported within is not installed.
-
-    ``purpose`` completes "to ...".
-    """
+    """Raise `ExtraError` if a package imported within, to do the ``purpose``, is missing."""
     try:
         yield
     except ModuleNotFoundError as error:

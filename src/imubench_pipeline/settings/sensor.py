@@ -320,10 +320,7 @@ class RecordingNotes(WithBlocks):
         return kind_of(stated_experiments(self))
 
     def check_gyro(self, log: LogFormat) -> None:
-        """Check that the log has the gyro of an experiment, and all else that it requires.
-
-        Raises ValueError if it is not; the text begins with the key.
-        """
+        """Raise ValueError, with the key, if the log lacks the gyro or a need of an experiment."""
         channels = [str(name) for name in log.channels]
         for key, experiment in stated_experiments(self).items():
             try:
@@ -338,10 +335,7 @@ def read_sensors(folders: Path | Iterable[Path]) -> dict[str, Sensor]:
 
 
 def read_sensor_files(folders: Path | Iterable[Path]) -> dict[str, Sensor | ConfigError]:
-    """Read every sensor file of one or several folders; return the errors of invalid ones.
-
-    Raises ConfigError if there is no folder.
-    """
+    """Read every sensor file of folders; return the errors of invalid ones, or ConfigError."""
     return read_folder(Sensor, folders, "sensor")
 
 

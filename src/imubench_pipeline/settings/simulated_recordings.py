@@ -45,7 +45,6 @@ from imubench_pipeline.settings.yaml_files import read_settings
 from imubench_pipeline.units import add_key_to_errors, parse_quantity
 
 _Around = TypeVar("_Around", bound=Surroundings)
-
 _NAME_PATTERN = r"^sim_[A-Za-z0-9_.-]+$"
 _MAX_SAMPLES = 1e10  # 80 GB per channel; more is due to a wrong unit
 
@@ -182,10 +181,7 @@ class SimulatedRecording(OfASensor, Surroundings, WithBlocks):
 
     @property
     def moved_gyro(self) -> str | None:
-        """The gyro of its experiment; None without one, or if it uses all axes.
-
-        Raises ValueError if it is not stated, or not simulated.
-        """
+        """The gyro of its experiment, or None; ValueError if it is not stated or simulated."""
         channels = [str(name) for name in self.channels]
         for experiment in stated_experiments(self).values():
             return experiment.moved_gyro(channels, column=False)

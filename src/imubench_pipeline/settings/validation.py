@@ -45,7 +45,6 @@ _MAX_SHOWN_LENGTH, _MAX_ERROR_LENGTH = 100, 1000
 """Largest number of characters of a value, and of an error, that are shown."""
 
 _MAX_SHOWN_FAULTS = 20  # largest number of faults of a file that are shown
-
 _SHORT_REPR = reprlib.Repr()
 _SHORT_REPR.maxstring = _SHORT_REPR.maxother = _SHORT_REPR.maxlong = _MAX_SHOWN_LENGTH
 
@@ -53,10 +52,7 @@ _SHORT_REPR.maxstring = _SHORT_REPR.maxother = _SHORT_REPR.maxlong = _MAX_SHOWN_
 def cut(
     value: object, words: Callable[[object], str] = _SHORT_REPR.repr, most: int = _MAX_SHOWN_LENGTH
 ) -> str:
-    """Return a value of a file as text for messages, shortened to ``most`` characters.
-
-    ``words`` converts the value to text; by default a shortened `repr`.
-    """
+    """Return a value of a file for messages, by `repr` or ``words``, cut to ``most`` characters."""
     text = words(value)
     return text if len(text) <= most else f"{text[: most - 3]}..."
 

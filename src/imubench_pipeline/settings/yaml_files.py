@@ -20,7 +20,6 @@ from pydantic import BaseModel
 from imubench_pipeline.settings.validation import ConfigError, UnavailableSettingsError, cut, parse
 
 MAX_BYTES = 4 << 20  # largest size of a file, bytes
-
 MAX_DEPTH = 40  # largest depth of nested lists and mappings
 
 MAX_NODES = 200_000
@@ -35,7 +34,6 @@ else:
     _SAFE = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 
 _Model = TypeVar("_Model", bound=BaseModel)
-
 _TAG_PREFIX = "tag:yaml.org,2002:"
 _MERGE_TAG = f"{_TAG_PREFIX}merge"
 _TEXT_TAGS = {f"{_TAG_PREFIX}str", f"{_TAG_PREFIX}binary"}

@@ -91,7 +91,7 @@ def join_tables(
     ]
     about = fitness.judge_recordings(about, doubted, json.loads(decide).get("include", ()))
     joined["recordings"] = build("recordings", about)
-    joined["doubts"] = build("doubts", (doubt.row() for doubt in doubted))
+    joined["doubts"] = build("doubts", doubted)
     apart = fitness.list_excluded(about)
     pools = list_pooled_rows(
         fitness.mask_excluded(estimated, apart), fitness.mask_excluded(biases, apart), devices

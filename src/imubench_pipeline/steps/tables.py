@@ -24,7 +24,7 @@ def join_all_tables(parts: Mapping[str, Sequence[Path]]) -> dict[str, pa.Table]:
     recordings, new = exclude_simulated(RecordingRow.rows_of(tables["recordings"]))
     if not new:
         return tables
-    doubts = [*(doubt.row() for doubt in new), *DoubtRow.rows_of(tables["doubts"])]
+    doubts = [*new, *DoubtRow.rows_of(tables["doubts"])]
     return tables | {
         "recordings": build("recordings", recordings),
         "doubts": build("doubts", doubts),

@@ -21,7 +21,7 @@ rule navigate:
         "comparison"
     resources:
         **cost(
-            OfMany(
+            Cost(
                 memory=500,
                 memory_of_each=0.2,
                 time=60,

@@ -14,7 +14,7 @@ rule calibration:
     log:
         LOGS + "/recordings/{sensor}/{recording}/calibration.log",
     resources:
-        **cost(OfRecording(memory=450, memory_of_samples=60, time=5, time_of_values=1)),
+        **cost(Cost(memory=450, memory_of_samples=60, time=5, time_of_values=1)),
     params:
         settings=lambda w: plan.experiment_settings(w.sensor, w.recording),
         code=plan.code("calibration", "extensions.calibration"),

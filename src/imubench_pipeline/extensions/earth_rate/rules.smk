@@ -20,7 +20,7 @@ rule earth_rotation:
     log:
         LOGS + "/recordings/{sensor}/{recording}/earth_rotation.log",
     resources:
-        **cost(OfRecording(memory=450, memory_of_samples=60, time=15, time_of_values=3)),
+        **cost(Cost(memory=450, memory_of_samples=60, time=15, time_of_values=3)),
     params:
         settings=lambda w: plan.experiment_settings(w.sensor, w.recording, "earth_rate"),
         code=plan.code("earth_rotation", "extensions.earth_rate"),
@@ -42,7 +42,7 @@ rule outlook:
         "comparison"
     resources:
         **cost(
-            OfMany(
+            Cost(
                 memory=350,
                 memory_of_each=0.1,
                 time=3,

@@ -15,7 +15,7 @@ rule fusion:
     group:
         "comparison"
     resources:
-        **cost(OfMany(memory=300, memory_of_each=0.2, time=6, time_of_each=0.01)),
+        **cost(Cost(memory=300, memory_of_each=0.2, time=6, time_of_each=0.01)),
     params:
         settings=plan.settings("fusion"),
         catalogue=plan.catalogue("price_class", "sold"),

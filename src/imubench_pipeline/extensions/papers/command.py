@@ -85,7 +85,7 @@ def _make_parts(title: str, rows: Sequence[PublishedRow], width: int) -> Iterato
 
     from imubench_pipeline.extensions.papers.page import format_cells
     from imubench_pipeline.extensions.papers.printed import read_terms
-    from imubench_pipeline.report.terminal_table import fit_table
+    from imubench_pipeline.report.terminal import fit_table
 
     reasons = list(dict.fromkeys(row.reason for row in rows if row.reason))
     lines: list[list[str | Text]] = []

@@ -34,7 +34,7 @@ rule papers:
     group:
         "comparison"
     resources:
-        **cost(OfMany(memory=350, memory_of_each=0.3, time=10, time_of_each=0.01)),
+        **cost(Cost(memory=350, memory_of_each=0.3, time=10, time_of_each=0.01)),
     params:
         code=plan.code("papers", "extensions.papers"),
     script:

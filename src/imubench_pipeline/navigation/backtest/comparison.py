@@ -59,11 +59,7 @@ _MIN_SCATTER_SHARE = 0.3
 better known than the error itself, the difference is unreliable. On 600 logs with 7 errors each,
 the ranges cover 94.3 % with 0.2, 95.5 % with 0.3 and 97.1 % with 0.5."""
 
-
-MIN_WINDOWS = 3
-"""Minimum number of consecutive windows in a log."""
-
-
+MIN_WINDOWS = 3  # minimum number of consecutive windows in a log
 CONTRADICTION_LEVEL = 0.01
 """Significance level of a contradiction, for all rows of a recording together (Bonferroni)."""
 
@@ -81,43 +77,6 @@ _INTEGRATIONS: Mapping[tuple[str, Error], tuple[int, float]] = {
 }
 """Number of integrations minus one, and multiplier of the integral, by quantity and error. The
 attitude error of a gyro projects gravity into velocity and position."""
-
-
-@dataclass(frozen=True)
-class Predicted:
-    """Predicted mean square of the errors of a log, from drawn noise models."""
-
-    spreads: Sequence[Spread]  # one for each drawn model, at least one
-    # whether the models are drawn jointly from a likelihood (an efficient estimate); else the
-    # uncertainty of the model is assumed to be independent of the scatter, and adds to it
-    efficient: bool = True
-
-    def limits(self, level: float = 0.95) -> tuple[float, float]:
-        """Return the limits that contain the mean square of a fraction ``level`` of all logs.
-
-        They assume that the model is right, and are in rad^2, (m/s)^2 or m^2.
-        """
-        means = np.array([spread.mean for spread in self.spreads])
-        logarithms = np.log(means)
-        scatter = float(np.mean([spread.variance / spread.mean**2 for spread in self.spreads]))
-        uncertainty = float(np.var(logarithms))
-        left = scatter + uncertainty
-        if self.efficient:
-            left = max(scatter - uncertainty, _MIN_SCATTER_SHARE * scatter)
-        centre = math.exp(float(np.mean(logarithms)))
-        tail = (1.0 - level) / 2.0
-        lower, upper = centre * left * gammaincinv(1.0 / left, [tail, 1.0 - tail])
-        return float(lower), float(upper)
-
-    def chance_above(self, mean_square: float) -> float:
-        """Return the p-value of a mean square: the probability of this or a larger one.
-
-        The uncertainty of the model is added in full to the scatter: a ratio outside its range is
-        not enough to contradict a budget. The mean square is in rad^2, (m/s)^2 or m^2.
-        """
-        means = np.array([spread.mean for spread in self.spreads])
-        variances = np.array([spread.variance for spread in self.spreads])
-        return float(np.mean(gammaincc(means**2 / variances, mean_square * means / variances)))
 
 
 @dataclass(frozen=True)
@@ -142,88 +101,90 @@ class DeadReckoning:
         return math.hypot(*(part.sigma for part in parts))
 
 
-@dataclass(frozen=True)
-class Comparison:
-    """Measured rms error over the windows of a log, and its prediction."""
+def _limit_mean_square(
+    spreads: Sequence[Spread], found: float, *, efficient: bool
+) -> tuple[float, float, float]:
+    """Return the limits of the mean square of 95 % of all logs, and the p-value of the found one.
 
-    windows: int  # number in the log; windows with gaps are left out
-    # predicted, lower, upper: standard deviation, with 95 % limits: rad, m/s or m
-    predicted: float
-    lower: float
-    upper: float
-    measured: float | None = None  # rms over the windows; None if ``reason`` is set
-    independent: float | None = None  # equivalent number of independent windows
-    # least, most: limits of measured in 95 % of logs, if the model is right
-    least: float | None = None
-    most: float | None = None
-    # p-value of the rms (`Predicted.chance_above`)
-    chance: float | None = None
-    reason: str | None = None
+    They assume that the model is right. There is one spread for each drawn model, at least one. The
+    limits and the found mean square are in rad^2, (m/s)^2 or m^2.
 
-    @property
-    def ratio(self) -> float | None:
-        """Measured over predicted."""
-        return None if self.measured is None else self.measured / self.predicted
-
-    @property
-    def verdict(self) -> BacktestVerdict | None:
-        """Position of the measured rms relative to the predicted range."""
-        if self.measured is None or self.least is None or self.most is None:
-            return None
-        if self.measured > self.most:
-            return "more than predicted"
-        return "less than predicted" if self.measured < self.least else "as predicted"
+    ``efficient``: the models are drawn jointly from a likelihood (an efficient estimate); else the
+    uncertainty of the model is assumed to be independent of the scatter, and adds to it. The
+    p-value is the probability of the found mean square or a larger one. It has the uncertainty in
+    full: a ratio outside its range is not enough to contradict a budget.
+    """
+    means = np.array([spread.mean for spread in spreads])
+    variances = np.array([spread.variance for spread in spreads])
+    logarithms = np.log(means)
+    scatter = float(np.mean([spread.variance / spread.mean**2 for spread in spreads]))
+    uncertainty = float(np.var(logarithms))
+    left = scatter + uncertainty
+    if efficient:
+        left = max(scatter - uncertainty, _MIN_SCATTER_SHARE * scatter)
+    centre = math.exp(float(np.mean(logarithms)))
+    tail = (1.0 - 0.95) / 2.0
+    lower, upper = centre * left * gammaincinv(1.0 / left, [tail, 1.0 - tail])
+    p_value = np.mean(gammaincc(means**2 / variances, found * means / variances))
+    return float(lower), float(upper), float(p_value)
 
 
-def compare(
+def _compare(
+    about: BacktestRow,
     asked: DeadReckoning,
     cut: Window,
     means: Sequence[Array],
     model: NoiseModel,
     drawn: Sequence[NoiseModel],
     *,
-    efficient: bool = True,
-) -> Comparison:
-    """Compare the errors of a log with the prediction of its noise model.
+    efficient: bool,
+) -> BacktestRow:
+    """Return a row with the errors of a log, compared with the prediction of its noise model.
 
     ``cut`` is the window for the times at rest and in motion; ``means`` are the block means of each
     segment of the log, NaN where samples are missing. The model has at least one term; ``drawn``
-    are models from the estimate of the log, and ``efficient`` is as in `Predicted`.
+    are models from the estimate of the log, and ``efficient`` is as in `_limit_mean_square`.
     """
     predicted = asked.sigma(model)
     lower, upper = np.quantile([asked.sigma(candidate) for candidate in drawn], [0.025, 0.975])
-    # Draws of an absent term are above 0: extend the limits to the value.
-    budget = (predicted, min(float(lower), predicted), max(float(upper), predicted))
     covariance = WindowCovariance(cut, asked.order, asked.factor)
-    window_errors = compute_window_errors(means, covariance.weights, covariance.lags)
-    if window_errors.count <= (MIN_WINDOWS - 1) * cut.blocks:
-        span, needed = asked.rest + asked.time, asked.duration_needed
+    errors = compute_window_errors(means, covariance.weights, covariance.lags)
+    span, needed = asked.rest + asked.time, asked.duration_needed
+    about = replace(
+        about,
+        window=asked.rest,
+        windows=errors.count,
+        predicted=predicted,
+        # Draws of an absent term are above 0: extend the limits to the value.
+        predicted_lower=min(float(lower), predicted),
+        predicted_upper=max(float(upper), predicted),
+        duration_needed=needed,
+    )
+    if errors.count <= (MIN_WINDOWS - 1) * cut.blocks:
         longest = cut.block * max(len(segment) for segment in means)
-        reason = texts.gaps_between_windows(window_errors.count, MIN_WINDOWS, span, needed)
+        reason = texts.gaps_between_windows(errors.count, MIN_WINDOWS, span, needed)
         if longest < needed:
             reason = texts.short_for_windows(MIN_WINDOWS, span, needed, longest)
-        return Comparison(window_errors.count, *budget, reason=reason)
+        return replace(about, reason=reason)
     possible = [candidate for candidate in drawn if candidate.terms] or [model]
-    by_draws = Predicted(
-        [covariance.spread(candidate, window_errors) for candidate in possible], efficient
-    )
-    least, most = by_draws.limits()
-    return Comparison(
-        window_errors.count,
-        *budget,
-        measured=math.sqrt(window_errors.mean_square),
-        independent=covariance.spread(model, window_errors).degrees,
-        least=math.sqrt(least),
-        most=math.sqrt(most),
-        chance=by_draws.chance_above(window_errors.mean_square),
+    spreads = [covariance.spread(candidate, errors) for candidate in possible]
+    low, high, chance = _limit_mean_square(spreads, errors.mean_square, efficient=efficient)
+    measured, least, most = (math.sqrt(square) for square in (errors.mean_square, low, high))
+    verdict: BacktestVerdict = "less than predicted" if measured < least else "as predicted"
+    return replace(
+        about,
+        independent=covariance.spread(model, errors).degrees,
+        measured=measured,
+        ratio=measured / predicted,
+        ratio_lower=least / predicted,
+        ratio_upper=most / predicted,
+        chance=chance,
+        verdict="more than predicted" if measured > most else verdict,
     )
 
 
 def findings(rows: Iterable[BacktestRow]) -> Iterator[FindingRow]:
-    """Yield the rows of the table ``findings`` for logs that contradict their own budgets.
-
-    There is one for each channel, about the error with the smallest p-value.
-    """
+    """Yield a finding for each channel that contradicts its budget: the least p-value."""
     by_channel: dict[tuple[str, str, str], list[tuple[float, float, BacktestRow]]] = {}
     for row in rows:
         if row.contradicted and row.chance is not None and row.ratio is not None:
@@ -337,21 +298,6 @@ def _test_channel(
         elif (cut := cuts[asked]) is None:
             yield replace(about, reason=texts.long_sampling_interval(log.rate))
         else:
-            found = compare(asked, cut, means[cut.block], estimate.model, drawn, efficient=jointly)
-            yield replace(
-                about,
-                window=asked.rest,
-                windows=found.windows,
-                independent=found.independent,
-                measured=found.measured,
-                predicted=found.predicted,
-                predicted_lower=found.lower,
-                predicted_upper=found.upper,
-                ratio=found.ratio,
-                ratio_lower=None if found.least is None else found.least / found.predicted,
-                ratio_upper=None if found.most is None else found.most / found.predicted,
-                chance=found.chance,
-                verdict=found.verdict,
-                duration_needed=asked.duration_needed,
-                reason=found.reason,
+            yield _compare(
+                about, asked, cut, means[cut.block], estimate.model, drawn, efficient=jointly
             )

@@ -25,30 +25,13 @@ from scipy.optimize import brentq
 from imubench_pipeline.earth import STANDARD_GRAVITY
 from imubench_pipeline.model.states import Cause, Measured, SourcePath
 from imubench_pipeline.model.verdicts import ErrorSource
-from imubench_pipeline.navigation.error_budget.in_use import (
-    BIAS_CAUSES,
-    NO_FIGURES,
-    NO_USE,
-    STATED_FIGURE,
-    Figures,
-    Use,
-    check_not_negative,
-    levers,
-)
-from imubench_pipeline.navigation.error_budget.parts import (
-    Budget,
-    Contribution,
-    Missing,
-    Quantity,
-    compute_figure_contribution,
-    describe_term,
-)
+from imubench_pipeline.navigation.error_budget import in_use, parts
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.growth import Calibrated, SensorStart, Uncalibrated, of_constant
 from imubench_pipeline.words.reasons import budgets as texts
 
-GYRO_ORDER: dict[Quantity, int] = {"attitude": 0, "heading": 0, "velocity": 1, "position": 2}
-ACCEL_ORDER: dict[Quantity, int] = {"velocity": 0, "position": 1}
+GYRO_ORDER: dict[parts.Quantity, int] = {"attitude": 0, "heading": 0, "velocity": 1, "position": 2}
+ACCEL_ORDER: dict[parts.Quantity, int] = {"velocity": 0, "position": 1}
 """Number of integrations minus one, m of `growth`."""
 
 
@@ -64,58 +47,37 @@ class Levelled:
 
     The mean is over the static window of the accelerometers, which must be calibrated. This tilt
     cancels the mean error that caused it, so only the later departure from that mean has an effect
-    on velocity and position.
-
-    Parameters
-    ----------
-    bias : float, optional
-        Turn-on bias of the accelerometer, 1 sigma, m/s^2. None: from the figures of the sensor,
-        else left out of the attitude with a note.
-    on_time : float
-        Time from switch-on to the beginning of the window, s.
-
-    Raises
-    ------
-    ValueError
-        If one is negative or not finite.
+    on velocity and position. A number that is negative or not finite raises a ValueError.
     """
 
+    # turn-on bias of the accelerometer, 1 sigma, m/s^2; None: from the figures of the sensor, else
+    # left out of the attitude with a note
     bias: float | None = None
-    on_time: float = 0.0
+    on_time: float = 0.0  # time from switch-on to the beginning of the window, s
 
     def __post_init__(self) -> None:
-        check_not_negative(bias=self.bias or 0.0, on_time=self.on_time)
+        in_use.check_not_negative(bias=self.bias or 0.0, on_time=self.on_time)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Start:
     """Initial conditions of dead reckoning.
 
-    Parameters
-    ----------
-    gyro, accel : Calibrated or Uncalibrated
-    tilt : Levelled or float
-        Initial tilt: levelled by the accelerometers, or its 1 sigma, rad, if it has another source
-        that is independent of the calibration of the accelerometers.
-    heading : float
-        Initial heading error, 1 sigma, rad.
-
-    Raises
-    ------
-    ValueError
-        If an angle is negative or not finite, or the tilt is levelled by accelerometers that
-        are not calibrated.
+    A ValueError is raised if an angle is negative or not finite, or the tilt is levelled by
+    accelerometers that are not calibrated.
     """
 
     gyro: SensorStart
     accel: SensorStart
+    # initial tilt: levelled by the accelerometers, or its 1 sigma, rad, if it has another source
+    # that is independent of the calibration of the accelerometers
     tilt: Levelled | float = 0.0
-    heading: float = 0.0
+    heading: float = 0.0  # initial heading error, 1 sigma, rad
 
     def __post_init__(self) -> None:
-        check_not_negative(heading=self.heading)
+        in_use.check_not_negative(heading=self.heading)
         if not isinstance(self.tilt, Levelled):
-            check_not_negative(tilt=self.tilt)
+            in_use.check_not_negative(tilt=self.tilt)
         elif not isinstance(self.accel, Calibrated):
             raise ValueError("a levelled start needs the window of calibrated accelerometers")
 
@@ -151,16 +113,16 @@ class Start:
 
 
 def budget(
-    quantity: Quantity,
+    quantity: parts.Quantity,
     time: float,
     *,
     gyro: NoiseModel,
     accel: NoiseModel,
     start: Start,
-    use: Use = NO_USE,
-    gyro_figures: Figures = NO_FIGURES,
-    accel_figures: Figures = NO_FIGURES,
-) -> Budget:
+    use: in_use.Use = in_use.NO_USE,
+    gyro_figures: in_use.Figures = in_use.NO_FIGURES,
+    accel_figures: in_use.Figures = in_use.NO_FIGURES,
+) -> parts.Budget:
     """Return the error after a time of dead reckoning, by source.
 
     The noise of the gyro is integrated once to the attitude and the heading, twice and three times
@@ -170,25 +132,9 @@ def budget(
     the accelerometer. White noise in the window is independent of the noise in motion and has a
     separate contribution; every other term has one, since window and motion are correlated.
 
-    Parameters
-    ----------
-    quantity : {"attitude", "heading", "velocity", "position"}
-    time : float
-        t, s.
-    gyro : NoiseModel
-        The gyro across the axis; for the heading the one that points up.
-    accel : NoiseModel
-        The accelerometer along the axis; the heading does not need it.
-    start : Start
-    use : Use
-        Motion and environment.
-    gyro_figures, accel_figures : mapping of str to Figure
-        Figures of these axes other than noise.
-
-    Raises
-    ------
-    ValueError
-        If the quantity is not known, or the time is not above 0.
+    The time t is in s. The gyro is across the axis, or for the heading points up; the accelerometer
+    is along the axis, and the heading does not need it. The figures of these axes are other than
+    noise. Raise a ValueError if the quantity is not known, or the time is not above 0.
 
     References
     ----------
@@ -196,8 +142,8 @@ def budget(
     2nd ed., Artech House 2013; D. H. Titterton and J. L. Weston, "Strapdown Inertial Navigation
     Technology", 2nd ed., IEE 2004.
     """
-    if quantity not in get_args(Quantity):
-        raise ValueError(f"quantity is {quantity!r}, expected one of {get_args(Quantity)}")
+    if quantity not in get_args(parts.Quantity):
+        raise ValueError(f"quantity is {quantity!r}, expected one of {get_args(parts.Quantity)}")
     if not (math.isfinite(time) and time > 0):
         raise ValueError(f"time is {time}, expected a time above 0")
     order = GYRO_ORDER[quantity]
@@ -207,50 +153,52 @@ def budget(
         contributions.extend(of_sensor("accel", accel, ACCEL_ORDER[quantity], time, start.accel))
     if quantity == "heading":
         heading = ErrorSource("initial_heading")
-        contributions.append(Contribution(heading, start.heading, STATED_FIGURE))
+        contributions.append(parts.Contribution(heading, start.heading, in_use.STATED_FIGURE))
     elif isinstance(start.tilt, Levelled):
         if quantity == "attitude" and isinstance(start.accel, Calibrated):
             for term in accel.terms:
                 variance = term.mean_variance(start.accel.window, start.tilt.on_time)
                 sigma = math.sqrt(variance) / STANDARD_GRAVITY
                 contributions.append(
-                    Contribution(describe_term("accel", term, "initial_tilt"), sigma)
+                    parts.Contribution(parts.describe_term("accel", term, "initial_tilt"), sigma)
                 )
             if start.tilt.bias is not None:
                 source = ErrorSource("turn_on_bias", "accel", "initial_tilt")
                 sigma = start.tilt.bias / STANDARD_GRAVITY
-                contributions.append(Contribution(source, sigma, STATED_FIGURE))
+                contributions.append(parts.Contribution(source, sigma, in_use.STATED_FIGURE))
     else:
         tilt = start.tilt * gravity * of_constant(order - 1, time)
-        contributions.append(Contribution(ErrorSource("initial_tilt"), tilt, STATED_FIGURE))
-    missing: list[Missing] = []
+        contributions.append(
+            parts.Contribution(ErrorSource("initial_tilt"), tilt, in_use.STATED_FIGURE)
+        )
+    missing: list[parts.Missing] = []
     assumptions: list[str] = []
     for measured, cause, lever, through in _list_levers(quantity, time, start, use):
         figures = gyro_figures if measured == "gyro" else accel_figures
-        part = compute_figure_contribution(measured, cause, lever, figures, through)
-        if isinstance(part, Contribution):
+        part = parts.compute_figure_contribution(measured, cause, lever, figures, through)
+        if isinstance(part, parts.Contribution):
             contributions.append(part)
         elif part is not None:
             missing.append(part)
             if cause == "turn_on_bias":
                 assumptions.append(texts.bias_not_known(measured))
-    return Budget(time, quantity, contributions, assumptions, missing)
+    return parts.Budget(time, quantity, contributions, assumptions, missing)
 
 
 def _list_levers(
-    quantity: Quantity, time: float, start: Start, use: Use
+    quantity: parts.Quantity, time: float, start: Start, use: in_use.Use
 ) -> Iterator[tuple[Measured, Cause, float, SourcePath | None]]:
     """Yield sensor, cause, lever and path of the figures of the sensors."""
     order = GYRO_ORDER[quantity]
     gravity = STANDARD_GRAVITY if order > 0 else 1.0
-    for cause, lever in levers("gyro", order, time, start.gyro, use, seen=order == 0):
+    for cause, lever in in_use.levers("gyro", order, time, start.gyro, use, seen=order == 0):
         yield "gyro", cause, gravity * lever, None
     if quantity in ACCEL_ORDER:
-        of_accel = levers("accel", ACCEL_ORDER[quantity], time, start.accel, use, seen=True)
+        of_accel = in_use.levers("accel", ACCEL_ORDER[quantity], time, start.accel, use, seen=True)
         for cause, lever in of_accel:
             yield "accel", cause, lever, None
     if quantity == "attitude" and isinstance(start.tilt, Levelled) and start.tilt.bias is None:
-        for cause in BIAS_CAUSES:
+        for cause in in_use.BIAS_CAUSES:
             yield "accel", cause, 1.0 / STANDARD_GRAVITY, "initial_tilt"
 
 
@@ -261,56 +209,37 @@ def of_sensor(
     time: float,
     start: SensorStart,
     factor: float = 1.0,
-) -> Iterator[Contribution]:
+) -> Iterator[parts.Contribution]:
     """Yield the contributions of one sensor axis, after ``order + 1`` integrations.
 
     ``order`` is m, 0 to 2; the time is in s, and the sigmas are multiplied by ``factor``.
     """
     for term in model.terms:
         for through, sigma in term.sources(order, time, start):
-            yield Contribution(describe_term(measured, term, through), factor * sigma)
+            yield parts.Contribution(parts.describe_term(measured, term, through), factor * sigma)
     if isinstance(start, Uncalibrated) and start.bias is not None:
         grown = factor * start.bias * of_constant(order, time)
-        yield Contribution(ErrorSource("turn_on_bias", measured), grown, STATED_FIGURE)
+        yield parts.Contribution(ErrorSource("turn_on_bias", measured), grown, in_use.STATED_FIGURE)
 
 
 def time_until(
     limit: float,
-    quantity: Quantity,
+    quantity: parts.Quantity,
     *,
     gyro: NoiseModel,
     accel: NoiseModel,
     start: Start,
-    use: Use = NO_USE,
-    gyro_figures: Figures = NO_FIGURES,
-    accel_figures: Figures = NO_FIGURES,
+    use: in_use.Use = in_use.NO_USE,
+    gyro_figures: in_use.Figures = in_use.NO_FIGURES,
+    accel_figures: in_use.Figures = in_use.NO_FIGURES,
 ) -> float | None:
     """Return the time after which an error reaches a limit.
 
     The total of a `budget` increases with time, because the errors at two times never have a
     negative correlation. With lines it may oscillate: the first crossing is then found among 4096
-    times.
-
-    Parameters
-    ----------
-    limit : float
-        1 sigma, rad, m/s or m.
-    quantity : {"attitude", "heading", "velocity", "position"}
-    gyro, accel : NoiseModel
-    start : Start
-    use : Use
-    gyro_figures, accel_figures : mapping of str to Figure
-        All as in `budget`.
-
-    Returns
-    -------
-    float or None
-        s; 0 if the error exceeds the limit from the beginning, None if it does not within 30 years.
-
-    Raises
-    ------
-    ValueError
-        If the limit is not above 0, or the quantity is not known.
+    times. The time is in s: 0 if the error exceeds the limit from the beginning, None if it does
+    not within 30 years. The limit is 1 sigma, rad, m/s or m; the others are as in `budget`. Raise a
+    ValueError if the limit is not above 0, or the quantity is not known.
     """
     if not (math.isfinite(limit) and limit > 0):
         raise ValueError(f"limit is {limit}, expected a number above 0")

@@ -18,12 +18,7 @@ from scipy.optimize import brentq, minimize_scalar
 
 from imubench_pipeline.earth import EARTH_RATE
 from imubench_pipeline.model.verdicts import ErrorSource
-from imubench_pipeline.navigation.error_budget.in_use import (
-    BIAS_CAUSES,
-    STATED_FIGURE,
-    Figures,
-    check_not_negative,
-)
+from imubench_pipeline.navigation.error_budget import in_use
 from imubench_pipeline.navigation.error_budget.parts import (
     Budget,
     Contribution,
@@ -39,10 +34,7 @@ _WINDOW_LENGTHS: NDArray[np.float64] = np.geomspace(1e-3, 1e9, 601)
 
 @dataclass(frozen=True, kw_only=True)
 class Gyrocompass:
-    """A horizontal gyro that is used for north-finding.
-
-    Raises a ValueError if a value is out of its range.
-    """
+    """A horizontal gyro for north-finding; ValueError for a value out of its range."""
 
     gyro: NoiseModel
     latitude: float  # rad, between the poles
@@ -51,12 +43,12 @@ class Gyrocompass:
     # 2: the gyro is turned by 180 degrees after half the time; half the difference of the two means
     # has no turn-on bias
     positions: Literal[1, 2] = 1
-    figures: Figures = field(default_factory=dict)
+    figures: in_use.Figures = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         if not abs(self.latitude) < math.pi / 2.0:
             raise ValueError(f"latitude is {self.latitude}, expected one between the poles, in rad")
-        check_not_negative(bias=self.bias or 0.0)
+        in_use.check_not_negative(bias=self.bias or 0.0)
         if self.positions not in (1, 2):
             raise ValueError(f"positions is {self.positions}, expected 1 or 2")
 
@@ -132,10 +124,10 @@ class Gyrocompass:
             return []
         if self.bias is not None:
             sigma = self.bias / self._north_rate
-            return [Contribution(ErrorSource("turn_on_bias", "gyro"), sigma, STATED_FIGURE)]
+            return [Contribution(ErrorSource("turn_on_bias", "gyro"), sigma, in_use.STATED_FIGURE)]
         parts = (
             compute_figure_contribution("gyro", cause, 1.0 / self._north_rate, self.figures)
-            for cause in BIAS_CAUSES
+            for cause in in_use.BIAS_CAUSES
         )
         return [part for part in parts if part is not None]
 

@@ -45,29 +45,14 @@ _REQUIRED_CAUSES: frozenset[Cause] = frozenset(
 
 @dataclass(frozen=True, kw_only=True)
 class Figure:
-    """Size of an error of one axis.
+    """Size of an error of one axis."""
 
-    Attributes
-    ----------
-    sigma : float or None
-        1 sigma, SI; None if not known.
-    origin : str
-    kind : str or None
-        Kind of a printed figure: typ, max, 1sigma ...
-    convention : str or None
-        How it was converted to a standard deviation.
-    spread : float
-        1 sigma of the figure itself, if it is an estimate.
-    reason : str or None
-        Why it is not known.
-    """
-
-    sigma: float | None = None
+    sigma: float | None = None  # 1 sigma, SI; None if not known
     origin: Origin = "not known"
-    kind: str | None = None
-    convention: str | None = None
-    spread: float = 0.0
-    reason: str | None = None
+    kind: str | None = None  # kind of a printed figure: typ, max, 1sigma ...
+    convention: str | None = None  # how it was converted to a standard deviation
+    spread: float = 0.0  # 1 sigma of the figure itself, if it is an estimate
+    reason: str | None = None  # why it is not known
 
 
 STATED_FIGURE = Figure(origin="requirement", convention=texts.STATED_SIGMA)
@@ -90,24 +75,14 @@ def check_not_negative(**values: float) -> None:
 class Use:
     """Motion and environment of a sensor in dead reckoning; 0 for none.
 
-    Parameters
-    ----------
-    temperature_change, turns, speed_change, vibration : float
-        K; rad about the axis of the gyro; m/s along the axis of the accelerometer; rms, m/s^2.
-    over : float
-        Time during which temperature, heading and speed change evenly, s.
-
-    Raises
-    ------
-    ValueError
-        If one is negative or not finite, or the time is not above 0.
+    A ValueError is raised if a number is negative or not finite, or the time is not above 0.
     """
 
-    temperature_change: float = 0.0
-    turns: float = 0.0
-    speed_change: float = 0.0
-    vibration: float = 0.0
-    over: float = 1.0
+    temperature_change: float = 0.0  # K
+    turns: float = 0.0  # rad about the axis of the gyro
+    speed_change: float = 0.0  # m/s along the axis of the accelerometer
+    vibration: float = 0.0  # rms, m/s^2
+    over: float = 1.0  # time during which temperature, heading and speed change evenly, s
 
     def __post_init__(self) -> None:
         for name in ("temperature_change", "turns", "speed_change", "vibration"):

@@ -70,10 +70,9 @@ def compute_figure_contribution(
     figures: Figures,
     through: SourcePath | None = None,
 ) -> Contribution | Missing | None:
-    """Return the contribution of a figure of a sensor to an error, or that it is missing.
+    """Return the contribution of a figure, or that it is missing; None if it is not required.
 
-    ``lever`` is the error from a figure of 1 SI unit. None if no figure is required, or another is
-    used.
+    ``lever`` is the error from a figure of 1 SI unit.
     """
     figure = figures.get(cause, Figure(reason=texts.NOT_STATED))
     source = ErrorSource(cause, measured, through)
@@ -141,7 +140,5 @@ class Largest:
         name = DATASHEET_KEY_OF_CAUSE[row.source]  # type: ignore[index]  # a figure of a quantity
         dimension = FIGURE_DIMENSIONS[row.quantity or ""][name][0]
         return replace(
-            row,
-            largest=self.room / lever if self.room else None,
-            largest_unit=SI_UNITS[dimension],
+            row, largest=self.room / lever if self.room else None, largest_unit=SI_UNITS[dimension]
         )

@@ -84,10 +84,7 @@ def read_log_figures(rows: Iterable[TemperatureRow]) -> dict[Cause, Figure]:
         if row.lower is not None and row.upper is not None:
             spread = (row.upper - row.lower) / (2.0 * SIGMAS)
         figures[_CAUSE_OF_COEFFICIENT[row.parameter]] = Figure(
-            sigma=abs(row.value),
-            origin="measured",
-            convention=texts.OF_THIS_UNIT,
-            spread=spread,
+            sigma=abs(row.value), origin="measured", convention=texts.OF_THIS_UNIT, spread=spread
         )
     return figures
 

@@ -96,10 +96,7 @@ class Basis:
         return channels is not None and quantity not in map(quantity_of, channels)
 
     def factors(self, key: Key) -> dict[str, float]:
-        """Return the factor that corrects each quantity with a doubtful unit.
-
-        A log has one unit for all axes of a quantity, so a doubt about one axis applies to all.
-        """
+        """Return the factor that corrects each quantity with a doubtful unit, on all axes."""
         factors: dict[str, float] = {}
         for row in self.doubts.get(key, ()):
             if row.factor is not None:

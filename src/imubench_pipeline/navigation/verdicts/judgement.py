@@ -12,12 +12,8 @@ from scipy.special import ndtr
 from imubench_pipeline.model.comparisons import ErrorBudgetRow
 from imubench_pipeline.model.states import Verdict
 from imubench_pipeline.model.verdicts import Condition, DoubtMark, Shortfall
+from imubench_pipeline.navigation import suitability
 from imubench_pipeline.navigation.pooled import NORMAL_QUANTILE
-from imubench_pipeline.navigation.suitability import (
-    Abilities,
-    Conditions,
-    select_known_errors,
-)
 from imubench_pipeline.navigation.verdicts.basis import Basis, Key
 from imubench_pipeline.navigation.verdicts.evidence import PARAMETERS_OF_SOURCE, list_weaknesses
 from imubench_pipeline.navigation.verdicts.specimens import Spread, pool_spreads
@@ -88,7 +84,7 @@ def scale_errors(parts: Sequence[ErrorBudgetRow], factors: Factors) -> list[Erro
     """Return the rows of one error of one recording, with quantities multiplied by factors."""
     own = [row for row in parts if row.source != "total"]
     sources = []
-    for row, sigma in select_known_errors(own):
+    for row, sigma in suitability.select_known_errors(own):
         quantity = row.quantity if row.source in PARAMETERS_OF_SOURCE else None
         sources.append((row, factors.get(quantity or "", 1.0) * sigma))
     missing = [row for row in own if row.sigma is None]
@@ -136,7 +132,7 @@ class Judgement:
     # reasons for weak evidence, by limit; also empty if nothing is known
     weak: Sequence[Sequence[str]]
     price: Shortfall | None  # if the price class is another, or not known
-    open: Conditions  # conditions other than the known errors
+    open: suitability.Conditions  # conditions other than the known errors
     unless: Unless | None  # verdict with doubtful units corrected
 
     @property
@@ -211,9 +207,9 @@ def judge_sensors(
                     for each in by_limit
                 ],
                 price,
-                Conditions.of(
+                suitability.Conditions.of(
                     requirement.must,
-                    Abilities.model_validate(sensors[sensor].get("abilities", {})),
+                    suitability.Abilities.model_validate(sensors[sensor].get("abilities", {})),
                     [row for each in by_limit for row in each.conditions],
                 ),
                 judge_with_corrected_units(sensor, rows, basis),

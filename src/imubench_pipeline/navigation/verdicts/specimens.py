@@ -30,7 +30,6 @@ from imubench_pipeline.model.states import SpreadOf
 from imubench_pipeline.navigation.pooled import NORMAL_QUANTILE, compute_bounded_exp, pool
 
 Limits = tuple[float, float, float]  # value, lower, upper
-
 _MIN_VARIANCE_SHARE = 0.5  # minimum tau^2, as a fraction of the variance of the logarithms
 
 _MIN_FREEDOM = 3

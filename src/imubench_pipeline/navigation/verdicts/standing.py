@@ -11,12 +11,7 @@ from imubench_pipeline.model import table
 from imubench_pipeline.model.comparisons import ErrorBudgetRow
 from imubench_pipeline.model.states import SURE_PROBABILITY, Verdict
 from imubench_pipeline.model.verdicts import Share
-from imubench_pipeline.navigation.suitability import (
-    PASSING_VERDICTS,
-    compute_variance_shares,
-    is_condition,
-    select_known_errors,
-)
+from imubench_pipeline.navigation import suitability
 from imubench_pipeline.navigation.verdicts.specimens import Expected, Spread, predict_error
 from imubench_pipeline.words.reasons import budgets as texts
 
@@ -97,12 +92,12 @@ class Standing:
     @property
     def calibrated_verdict(self) -> Verdict:
         """Verdict after calibration of the biases that exceed the limit."""
-        squares = [size**2 for _, size in select_known_errors(self.conditions)]
+        squares = [size**2 for _, size in suitability.select_known_errors(self.conditions)]
         limit = self.total.limit
-        if squares and limit is not None and self.verdict not in PASSING_VERDICTS:
+        if squares and limit is not None and self.verdict not in suitability.PASSING_VERDICTS:
             # The square of a bias is a term of every draw of the total.
             sizes = self.expected.upper, self.expected.sigma
-            for size, better in zip(sizes, PASSING_VERDICTS, strict=True):
+            for size, better in zip(sizes, suitability.PASSING_VERDICTS, strict=True):
                 if size is not None and size**2 - math.fsum(squares) < limit**2:
                     return better
         return self.verdict
@@ -133,29 +128,32 @@ def list_standings(
         totals = [row for row in parts if row.source == "total"]
         if not totals:
             continue
-        figures = select_known_errors(totals)
+        figures = suitability.select_known_errors(totals)
         with_figure = [row for row, _ in figures]
         prediction = predict_error(with_figure, devices, (usual or {}).get(key))
         if prediction.sigma is None:
             listed.append(Standing(totals[0], with_figure, prediction))
             continue
-        distances = [_compute_distance(sigma, prediction.sigma) for _, sigma in figures]
+        # Logarithmic distances from the prediction; plain ones where an error is 0.
+        distances = [
+            (
+                abs(math.log(sigma / prediction.sigma))
+                if prediction.sigma and sigma
+                else abs(sigma - prediction.sigma)
+            )
+            for _, sigma in figures
+        ]
         answer, sigma = figures[distances.index(min(distances))]
         own = [row for row in parts if row.source != "total" and row.recording == answer.recording]
-        conditions = tuple(row for row in own if is_condition(row))
+        conditions = tuple(row for row in own if suitability.is_condition(row))
         standing = Standing(answer, with_figure, prediction, conditions=conditions)
-        sources = select_known_errors(own)
+        sources = suitability.select_known_errors(own)
         if sources and sigma > 0.0:
             largest, size = max(sources, key=lambda source: source[1])
-            share, shares = (size / sigma) ** 2, compute_variance_shares(sigma, own)
+            share, shares = (size / sigma) ** 2, suitability.compute_variance_shares(sigma, own)
             standing = replace(standing, source=largest, share=share, parts=shares)
         listed.append(standing)
     return listed
-
-
-def _compute_distance(sigma: float, median: float) -> float:
-    """Return the logarithmic distance of an error from the median; the difference if one is 0."""
-    return abs(math.log(sigma / median)) if median and sigma else abs(sigma - median)
 
 
 def make_limit_key(row: ErrorBudgetRow) -> tuple[Any, ...]:

@@ -62,7 +62,6 @@ from imubench_pipeline.tables.findings import RecordingError
 _MAX_BLOCK_ROWS = 1 << 18
 _TIME_KEY = "time"
 _MATRIX_COLUMN = re.compile(r"(.+)\[(\d{1,9})\]")
-
 _Place = tuple[Table, int]
 
 
@@ -158,40 +157,35 @@ class ArrayFile(LogFile):
             where = f"an attribute of {table.shown}"
             if unit := find_stated_unit(key, table.unit(position), where, label):
                 self.units[key] = unit
-        if self.log.time is not None:
-            places[_TIME_KEY] = self._time_place(by_name)
+        if (time := self.log.time) is not None:
+            if time.date is not None:
+                raise UnusableError(
+                    "'date' of 'time' is for text; expected one column of dates or numbers"
+                )
+            if time.format not in (None, "iso8601"):
+                raise UnusableError(
+                    f"found format {time.format!r} of 'time', which is for text; expected "
+                    "'format: iso8601' for a column of dates, or 'unit' for numbers"
+                )
+            variables = {source.variable for source in self.sources.values()}
+            if isinstance(time.column, int) and len(variables) > 1:
+                names = join_first(str(name) for name in variables)
+                raise UnusableError(
+                    f"'time' is column {time.column}, but the channels are from several variables "
+                    f"({names}); say which has the stamps, as in 'column: name' or "
+                    f"'column: name[{time.column}]'"
+                )
+            variable = next(iter(variables)) if len(variables) == 1 else None
+            if isinstance(time.column, str) and not (
+                _make_address(time.column, variable) in by_name
+                or _find_addressed(by_name, time.column, variable)
+            ):
+                variable = None
+            place = _find_column(by_name, time.column, variable, _TIME_KEY)
+            _check_kind(place, _TIME_KEY, NUMBER_KINDS if time.unit else DATE_KIND)
+            places[_TIME_KEY] = place
         self.simulated = any(table.simulated for table, _ in places.values())
         return places
-
-    def _time_place(self, tables: dict[str, Table]) -> _Place:
-        time = self.log.time
-        assert time is not None  # requested if there are stamps
-        if time.date is not None:
-            raise UnusableError(
-                "'date' of 'time' is for text; expected one column of dates or numbers"
-            )
-        if time.format not in (None, "iso8601"):
-            raise UnusableError(
-                f"found format {time.format!r} of 'time', which is for text; expected "
-                "'format: iso8601' for a column of dates, or 'unit' for numbers"
-            )
-        variables = {source.variable for source in self.sources.values()}
-        if isinstance(time.column, int) and len(variables) > 1:
-            names = join_first(str(name) for name in variables)
-            raise UnusableError(
-                f"'time' is column {time.column}, but the channels are from several variables "
-                f"({names}); say which has the stamps, as in 'column: name' or "
-                f"'column: name[{time.column}]'"
-            )
-        variable = next(iter(variables)) if len(variables) == 1 else None
-        if isinstance(time.column, str) and not (
-            _make_address(time.column, variable) in tables
-            or _find_addressed(tables, time.column, variable)
-        ):
-            variable = None
-        place = _find_column(tables, time.column, variable, _TIME_KEY)
-        _check_kind(place, _TIME_KEY, NUMBER_KINDS if time.unit else DATE_KIND)
-        return place
 
 
 def count_block_rows(row_bytes: int, most: int) -> int:
@@ -397,7 +391,7 @@ def list_tables(path: Path, file_format: FileFormat) -> list[LogTable]:
     file = file_format.load().log_file(path, NOTHING_STATED, {})
     assert isinstance(file, ArrayFile)  # the readers of these files
     with explain_errors(path), ExitStack() as stack:
-        tables = list(islice(file.tables(stack), _MAX_TABLES))
+        tables = islice(file.tables(stack), _MAX_TABLES)
         described = [_describe_table(path, file_format, table) for table in tables]
     rates = set()
     for table in described:
@@ -408,25 +402,21 @@ def list_tables(path: Path, file_format: FileFormat) -> list[LogTable]:
     if len(rates) == 1:
         (rate,) = rates
         described = [replace(table, rate=rate) for table in described]
-    return _combine_vectors(described)
-
-
-def _combine_vectors(described: Sequence[LogTable]) -> list[LogTable]:
-    """Combine vectors of equal length in the same group into one table."""
-    tables: dict[object, LogTable] = {}
+    # Combine vectors of equal length in the same group into one table.
+    combined: dict[object, LogTable] = {}
     for number, table in enumerate(described):
         alone = table.fault or table.variable or not table.name or table.rows in (None, 1)
         above = table.name.rpartition("/")[0]
         key = number if alone else (above, table.rows)
-        if key in tables:
-            first = tables[key]
+        if key in combined:
+            first = combined[key]
             columns = (*first.columns, *table.columns)
-            tables[key] = replace(
+            combined[key] = replace(
                 first, name=above, columns=columns, about=f"{len(columns)} vectors of {table.rows}"
             )
         else:
-            tables[key] = table
-    return list(tables.values())
+            combined[key] = table
+    return list(combined.values())
 
 
 def _describe_table(path: Path, file_format: FileFormat, table: Table) -> LogTable:

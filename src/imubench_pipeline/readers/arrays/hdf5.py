@@ -50,8 +50,8 @@ class Hdf5File(ArrayFile):
 def list_data_sets(file: h5py.File, time_axis: int = 0, passed_over: str = "\0") -> list[DataSet]:
     """Return the data sets of a file by name; only hard links are followed.
 
-    ``passed_over``: prefix of names in the root group that are not data. Raise `UnusableError` if
-    there are too many objects, or groups are nested too deeply.
+    ``passed_over``: prefix of root names that are not data. Raises `UnusableError` beyond the
+    bounds.
     """
     objects = 0
     seen = {_get_identity(file)}
@@ -235,8 +235,8 @@ _MAX_MEMORY = 1 << 29
 def _read_variable_length_texts(path: str, *_: int) -> dict[str, str]:
     """Return the units of a file by data set; empty if they cannot be read.
 
-    The library may crash or hang on damaged texts of variable length: another process reads them,
-    and stops at the first one that is too long for a unit, whose length is known only unpacked.
+    The library may crash or hang on damaged texts: another process reads them, and stops at a long
+    one.
     """
     units: dict[str, str] = {}
 

@@ -22,7 +22,6 @@ _KIND_FAULTS = (
     "is sparse; expected a vector or a matrix: save full() of it",
 )
 _VARIABLE_NAME = re.compile(rb"[A-Za-z]\w{0,62}\0")
-
 HEADER_BYTES = struct.calcsize(_HEADER_FORMAT) + 64  # length of the longest header with name, bytes
 
 

@@ -18,15 +18,8 @@ from typing import IO
 
 from numpy.lib import format as npy
 
+from imubench_pipeline.readers.arrays import table
 from imubench_pipeline.readers.arrays.file import ArrayFile
-from imubench_pipeline.readers.arrays.table import (
-    MAX_DEFLATE_RATIO,
-    StreamedArray,
-    Table,
-    UnusableError,
-    describe_shape,
-    read_exactly,
-)
 from imubench_pipeline.readers.bounds import MAX_NPY_HEADER
 from imubench_pipeline.readers.compressed import open_archive
 
@@ -37,7 +30,7 @@ _HEADER_SIZE_FORMATS = {(1, 0): "<H", (2, 0): "<I", (3, 0): "<I"}
 class NumpyFile(ArrayFile):
     """An NPY or NPZ file."""
 
-    def tables(self, stack: ExitStack) -> Iterable[Table]:
+    def tables(self, stack: ExitStack) -> Iterable[table.Table]:
         """Read the headers of the arrays."""
         with self.path.open("rb") as file:
             begin = file.read(len(npy.MAGIC_PREFIX))
@@ -45,7 +38,7 @@ class NumpyFile(ArrayFile):
             size = self.path.stat().st_size
             return [_read_array_header("", lambda: self.path.open("rb"), size, checked=False)]
         if not begin.startswith(b"PK"):
-            raise UnusableError(
+            raise table.UnusableError(
                 "not a NumPy file, or its beginning is damaged; expected the output of numpy.save "
                 "or numpy.savez: mend 'reader' in the sensor file, or copy the file again"
             )
@@ -57,13 +50,13 @@ class NumpyFile(ArrayFile):
                 continue
             name = info.filename.removesuffix(_SUFFIX)
             if info.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
-                raise UnusableError(
+                raise table.UnusableError(
                     f"{name} is packed by method {info.compress_type}; expected stored or "
                     "deflated: save it with numpy.savez or numpy.savez_compressed"
                 )
-            most = MAX_DEFLATE_RATIO * (info.compress_size + 8)
+            most = table.MAX_DEFLATE_RATIO * (info.compress_size + 8)
             if info.compress_size > size or info.file_size > most:
-                raise UnusableError(
+                raise table.UnusableError(
                     f"{name} is said to have {info.file_size} bytes, which {info.compress_size} "
                     f"packed bytes in a file of {size} cannot hold; the file is corrupt: copy it "
                     "again"
@@ -75,38 +68,38 @@ class NumpyFile(ArrayFile):
 
 def _read_array_header(
     name: str, opened: Callable[[], IO[bytes]], size: int, checked: bool
-) -> StreamedArray:
+) -> table.StreamedArray:
     """Read the header of an array, and compare the promised size with the actual one."""
     shown = name or "the table"
     with opened() as stream:
         version = npy.read_magic(stream)
         if version not in _HEADER_SIZE_FORMATS:
-            raise UnusableError(
+            raise table.UnusableError(
                 f"{shown} has format version {version}; expected 1.0 to 3.0: save again"
             )
-        length = read_exactly(stream, struct.calcsize(_HEADER_SIZE_FORMATS[version]))
+        length = table.read_exactly(stream, struct.calcsize(_HEADER_SIZE_FORMATS[version]))
         (header_size,) = struct.unpack(_HEADER_SIZE_FORMATS[version], length)
         if header_size > MAX_NPY_HEADER:
-            raise UnusableError(
+            raise table.UnusableError(
                 f"{shown} has a header of {header_size} bytes; expected at most "
                 f"{MAX_NPY_HEADER}: save fewer fields, or copy the file again"
             )
         read = npy.read_array_header_1_0 if version == (1, 0) else npy.read_array_header_2_0
-        shape, fortran, dtype = read(io.BytesIO(length + read_exactly(stream, header_size)))
+        shape, fortran, dtype = read(io.BytesIO(length + table.read_exactly(stream, header_size)))
         offset = stream.tell()
     if version == (3, 0) and dtype.names is not None:  # differs from 2.0 by UTF-8
         dtype.names = tuple(name.encode("latin1").decode("utf-8") for name in dtype.names)
-    array = StreamedArray(name, shape, dtype, fortran, opened, offset, checked)
+    array = table.StreamedArray(name, shape, dtype, fortran, opened, offset, checked)
     promised = offset + math.prod(shape) * dtype.itemsize
     if min(shape, default=0) < 0 or (promised > size and not dtype.hasobject):
-        raise UnusableError(
-            f"{shown} promises {describe_shape(shape)} values of {dtype.itemsize} bytes, "
+        raise table.UnusableError(
+            f"{shown} promises {table.describe_shape(shape)} values of {dtype.itemsize} bytes, "
             f"{promised} bytes with the header, but {size} are there; the file is cut short or "
             "corrupt: copy it again"
         )
     if promised < size and not dtype.hasobject:
-        raise UnusableError(
-            f"{size - promised} bytes stand behind {shown} ({describe_shape(shape)} values); "
+        raise table.UnusableError(
+            f"{size - promised} bytes stand behind {shown} ({table.describe_shape(shape)} values); "
             "expected one array: save several with numpy.savez"
         )
     return array

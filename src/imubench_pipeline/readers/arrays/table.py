@@ -192,10 +192,9 @@ _SKIP_BLOCK = 1 << 20
 class StreamedArray(Array):
     """An array (see `Array`) with consecutive elements in a file or in a compressed part of it.
 
-    If a matrix is stored column by column, each column is read by a stream of its own. ``fortran``:
-    the first index varies fastest. ``opened``: opens a new stream of the bytes, which its caller
-    closes. ``offset``: bytes before the first element. ``checked``: a checksum is verified at their
-    end.
+    ``fortran``: the first index varies fastest; each column then has a stream of its own.
+    ``opened``: opens a stream, which its caller closes. ``offset``: bytes before the first element.
+    ``checked``: a checksum is verified at their end.
     """
 
     def __init__(

@@ -19,9 +19,5 @@ FORMAT = FileFormat(
     title="Parquet, Feather or Arrow table",
     endings=(".parquet", ".feather", ".arrow"),
     signature=Signature(tells=lambda begin: _MAGIC.match(begin) is not None),
-    streamed=False,
-    clock_of="length",
-    time_columns=(),
-    settings=(),
     code=_code,
 )

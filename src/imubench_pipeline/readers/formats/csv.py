@@ -16,7 +16,6 @@ FORMAT = FileFormat(
     signature=Signature(),
     streamed=True,
     clock_of="file",
-    time_columns=(),
     settings=("delimiter", "header", "skip_lines", "comment", "decimal"),
     code=_code,
 )

@@ -14,9 +14,6 @@ FORMAT = FileFormat(
     title="NumPy arrays",
     endings=(".npy", ".npz"),
     signature=Signature(begins=(b"\x93NUMPY",), archive_has=".npy"),
-    streamed=False,
-    clock_of="length",
-    time_columns=(),
     settings=("variable",),
     code=_code,
 )

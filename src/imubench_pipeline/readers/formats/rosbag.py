@@ -16,7 +16,6 @@ FORMAT = FileFormat(
     signature=Signature(
         begins=(b"#ROSBAG V", b"\x89MCAP0\r\n", b"SQLite format 3\0"), folder_has="metadata.yaml"
     ),
-    streamed=False,
     clock_of="variable",
     time_columns=("header.stamp", "log_time"),
     settings=("variable",),

@@ -22,7 +22,6 @@ FORMAT = FileFormat(
     streamed=True,
     clock_of="file",
     time_columns=("host_time", "counter"),
-    settings=(),
     code=_code,
     vendor="VectorNav",
 )

@@ -51,9 +51,8 @@ class Inspection:
 def inspect(path: Path, model: str | None = None) -> Inspection:
     """Inspect a recording (file, folder, zip archive or ROS 2 bag) and draft a sensor file for it.
 
-    Only the beginning of each file is read, so that the time does not depend on the length.
-    ``model``: name of the sensor; None: the name of the log. Raise `RecordingError` if it cannot be
-    read, or is no log.
+    Only the beginning of each file is read. ``model``: name of the sensor; None: the name of the
+    log. Raises `RecordingError` if it cannot be read, or is no log.
     """
     # Numbers in a damaged file may overflow.
     with np.errstate(all="ignore"):
@@ -166,7 +165,23 @@ def check_draft(path: Path, draft: Draft) -> Proof:
     count = sum(name in CHANNELS for name in names)
     channels = f"{count} channel" + ("s" if count != 1 else "")
     channels += " and temperature" if len(names) > count else ""
-    remarks = [channels, _describe_rate(files, draft), *_describe_vectors(files, unfilled)]
+    means = {
+        name: float(np.nanmean(values)) if np.isfinite(values).any() else np.nan
+        for file in files
+        for name, values in file.columns.items()
+    }
+    lengths = []
+    for quantity, unit in (("gyro", "deg/s"), ("accel", "m/s^2")):
+        axes = [means.get(f"{quantity}_{axis}", np.nan) for axis in "xyz"]
+        if any(f".{quantity}_" in f".{key}" for key in unfilled) or not np.isfinite(axes).all():
+            continue
+        length = float(np.linalg.norm(axes))
+        dimension = "angular_rate" if quantity == "gyro" else "acceleration"
+        shown = convert_from_si(length, unit, dimension)
+        far = quantity == "accel" and abs(length / STANDARD_GRAVITY - 1) > _GRAVITY_TOLERANCE
+        wrong = f" (gravity is {STANDARD_GRAVITY:.2f}: is the unit right?)" if far else ""
+        lengths.append(f"|{quantity}| = {shown:.3g} {unit}{wrong}")
+    remarks = [channels, _describe_rate(files, draft), *lengths]
     started = next((file.started for file in files if file.started), None)
     if started is not None:
         remarks.append(f"from {started[:19]} on")
@@ -213,26 +228,6 @@ def _describe_rate(files: list[_FirstRecords], draft: Draft) -> str:
         return f"{distinct.pop()} from the stamps"
     each = (f"{name} {rates[name]:.4g} Hz" for name in sorted(rates, key=_QUANTITY_ORDER.index))
     return ", ".join(each) + " from the stamps"
-
-
-def _describe_vectors(files: list[_FirstRecords], unfilled: list[str]) -> list[str]:
-    means = {
-        name: float(np.nanmean(values)) if np.isfinite(values).any() else np.nan
-        for file in files
-        for name, values in file.columns.items()
-    }
-    lengths = []
-    for quantity, unit in (("gyro", "deg/s"), ("accel", "m/s^2")):
-        axes = [means.get(f"{quantity}_{axis}", np.nan) for axis in "xyz"]
-        if any(f".{quantity}_" in f".{key}" for key in unfilled) or not np.isfinite(axes).all():
-            continue
-        length = float(np.linalg.norm(axes))
-        dimension = "angular_rate" if quantity == "gyro" else "acceleration"
-        shown = convert_from_si(length, unit, dimension)
-        far = quantity == "accel" and abs(length / STANDARD_GRAVITY - 1) > _GRAVITY_TOLERANCE
-        wrong = f" (gravity is {STANDARD_GRAVITY:.2f}: is the unit right?)" if far else ""
-        lengths.append(f"|{quantity}| = {shown:.3g} {unit}{wrong}")
-    return lengths
 
 
 def _list_keys(keys: list[str]) -> str:

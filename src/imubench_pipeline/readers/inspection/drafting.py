@@ -238,11 +238,14 @@ def choose_columns(contents: Contents) -> Choice:
     others = {id(g.table): find_table_clocks(g.table) for g in able}
     rest = [others[id(g.table)] for g in able if anchor is not g.table]
 
-    def count_shared(clock: Clock) -> int:
-        """Return the number of other groups with the same clock."""
-        return sum(any(_has_equal_entries(clock, other) for other in theirs) for theirs in rest)
-
-    clock = max(ours, key=lambda clock: (not clock.counts, count_shared(clock)), default=None)
+    clock = max(
+        ours,
+        key=lambda clock: (
+            not clock.counts,
+            sum(any(_has_equal_entries(clock, other) for other in theirs) for theirs in rest),
+        ),
+        default=None,
+    )
 
     def fits(group: Group) -> bool:
         table, clock_of = group.table, group.table.file_format.clock_of

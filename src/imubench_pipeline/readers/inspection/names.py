@@ -63,10 +63,7 @@ class Meaning:
 
 
 def interpret_label(label: str, context: str = "") -> Meaning | None:
-    """Return the meaning of the name of a column; None if it is not of an inertial sensor.
-
-    ``context``: name of its table or file, for a label that is an axis only.
-    """
+    """Return the meaning of the name of a column of ``context``, or None if it is not inertial."""
     label = label[:_MAX_LABEL_LENGTH].replace("ω", "omega").replace("Ω", "omega")
     for quantity, dimension in DIMENSIONS.items():
         name, unit = split_unit(label, dimension)

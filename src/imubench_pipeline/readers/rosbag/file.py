@@ -73,8 +73,7 @@ def decode_messages(
 ) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.bool_]]:
     """Return stamps of the headers, ns, numbers, and soundness of messages of ROS 1 or in CDR.
 
-    The numbers have the shape (messages, layout.figures), and are NaN where the message has not the
-    layout of its type.
+    Shape of the numbers: (messages, layout.figures); NaN where a message has another layout.
     """
     stamps = np.zeros(len(messages), np.int64)
     figures = np.full((len(messages), layout.figures), np.nan)

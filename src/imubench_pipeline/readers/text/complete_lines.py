@@ -88,10 +88,9 @@ class _Text:
 class CompleteLines(AbstractContextManager["CompleteLines"]):
     """A file for reading that ends with the last complete line, also if it is compressed and cut.
 
-    The text after the last line break was being written when the power was cut, and may lack
-    digits: it is left out with a finding. ``skipped``: bytes of the text to skip. ``records``:
-    converts complete lines to the text that is read. ``most``: bytes of the text after which
-    reading stops.
+    The text after the last line break may lack digits: it is left out with a finding. ``skipped``:
+    bytes to skip. ``records``: converts complete lines to the text that is read. ``most``: bytes
+    after which reading stops.
     """
 
     closed = False
@@ -216,16 +215,14 @@ _MISSING_CELL = b"nan\n"
 _LINE_WITH_ZEROS = re.compile(rb"^[^\0\n]*+\0[^\0\n]*+\n", re.MULTILINE)
 """A line with one run of zero bytes. A line with several runs may be UTF-16."""
 _MAX_BLANK_LINES = 1 << 24  # consecutive blank lines, limited for memory
-
 _TAB_TO_SPACE = bytes.maketrans(b"\t", b" ")
 
 
 class Records:
     """Removes everything but the records from the lines of a file.
 
-    ``preamble``: the lines before the first record, which a restarted logger repeats. ``runs``: of
-    spaces or tabs separate columns, and become one space. ``blank_is_missing``: a blank line is a
-    cell.
+    ``preamble``: lines before the first record, which a restarted logger repeats. ``runs``: of
+    spaces or tabs become one space. ``blank_is_missing``: a blank line is a cell.
     """
 
     def __init__(

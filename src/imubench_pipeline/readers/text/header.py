@@ -21,8 +21,8 @@ _WORDS_ONLY = re.compile(r"[^\W\d]*(?:[\s./()\[\]-]+[^\W\d]+)*[.)\]]?")
 def find_header(lines: Sequence[Sequence[str]]) -> int | None:
     """Return the index of the line with the most names of columns, the first of equals, or None.
 
-    ``lines``: the cells of the lines before the first record; empty for a line that is not split
-    like the record. Lines of units are no names.
+    ``lines``: the cells of each line before the first record; empty if it is not split like the
+    record.
     """
     best, header = 0, None
     for index, cells in enumerate(lines):

@@ -28,7 +28,6 @@ from imubench_pipeline.settings.sensor import LogFormat
 from imubench_pipeline.tables.findings import RecordingError
 
 Column = str | int
-
 _COMMENT_SIGNS = ("#", "//", "%", ";", "!")
 _CANDIDATE_SPLITS = (*map(Split, ";\t|,"), Split(" ", runs=True), Split(" "))
 _MAX_HEAD_LINES, _MAX_HEAD_BYTES, _MAX_UNIT_LINES = 500, 1 << 20, 3
@@ -249,10 +248,7 @@ class _Search:
         ]
 
     def _likelihood(self, split: Split) -> tuple[float, ...]:
-        """Return a score of a delimiter for comparison; the first of equals is used.
-
-        By priority: required names; as many names as cells; several columns; share of numbers.
-        """
+        """Return a score of a delimiter: required names, even width, several columns, numbers."""
         comments, lines = self._parted(split)
         rows = [split.cells(line.text) for line in lines[-_SCORED_LINES:]]
         if not rows:
@@ -429,9 +425,8 @@ def refuse_binary(file: str, number: int, line: bytes) -> None:
 def refuse_decimals_apart(file: str, number: int, line: str, rows: Sequence[Sequence[str]]) -> None:
     """Raise `RecordingError` if commas may be delimiters as well as decimal signs.
 
-    Decimals have no sign and sometimes begin with 0, unlike integers, unless all integers are
-    padded with zeros. ``line``, ``rows``: first record, and the cells of the first records, split
-    at commas.
+    Decimals have no sign and sometimes begin with 0, unlike integers, unless all of these are
+    padded.
     """
     if {len(row) % 2 for row in rows} != {0}:
         return

@@ -89,7 +89,7 @@ class TextStamps:
         """Return stamps that advance through leap seconds.
 
         Second 60 is read as second 0 of the next minute. If second 0 follows and repeats this time,
-        one second is added; if 60 is only due to rounding, the next stamp is later, and nothing is
+        a second is added; if 60 is only due to rounding, the next stamp is later, and nothing is
         added.
         """
         if not len(time):
@@ -190,10 +190,7 @@ _FORMS_BY_SIGNS = _group_forms_by_signs()
 
 
 def find_stamp_forms(texts: Sequence[str]) -> tuple[str, ...]:
-    """Return the patterns of date, time or both that all stamps match, the most plausible first.
-
-    If day and month are ambiguous, it is the shortest time span. Missing stamps are ignored.
-    """
+    """Return the patterns that all stamps match: those of the shortest time span."""
     stamps = [text.strip() for text in texts if not is_missing(text)]
     if not stamps or not all(
         _MIN_STAMP_LENGTH <= len(stamp) <= _MAX_STAMP_LENGTH for stamp in stamps
@@ -226,9 +223,8 @@ _INTEGER = re.compile(r"-?\d{1,19}")
 class TextTime:
     """Converts the stamps of a text log to seconds.
 
-    ``types``: type for pyarrow by column position; a separate column of dates comes first.
-    ``position`` of the stamps. ``expected``: for messages. ``as_text``: ISO 8601 is not read by
-    pyarrow.
+    ``types``: for pyarrow, by column position; a separate column of dates comes first.
+    ``expected``: for messages. ``as_text``: ISO 8601 is not read by pyarrow.
     """
 
     _text: TextStamps | None = None

@@ -15,14 +15,8 @@ from numba import njit
 from numpy.typing import NDArray
 
 from imubench_pipeline.model.states import Severity
-from imubench_pipeline.recordings.quality import copies, joined, levels, stationarity
+from imubench_pipeline.recordings.quality import copies, joined, levels, stationarity, summary
 from imubench_pipeline.recordings.quality.copies import find_shared_noise
-from imubench_pipeline.recordings.quality.summary import (
-    MAX_MEASUREMENT,
-    PIECE_SIZE,
-    ColumnSummary,
-    Excerpt,
-)
 from imubench_pipeline.recordings.recording import BESIDE
 from imubench_pipeline.settings.quality import QualitySettings
 from imubench_pipeline.settings.sensor import TEMPERATURE
@@ -39,7 +33,7 @@ _MAX_HARMLESS_EMPTY_SHARE = 0.01  # empty cells of a channel that are only noted
 _MIN_STEP_WHERE_ROUNDING_DOMINATES = 1.5  # step over noise from which it does
 
 
-def estimate_excess_repeats(column: ColumnSummary) -> tuple[float, float]:
+def estimate_excess_repeats(column: summary.ColumnSummary) -> tuple[float, float]:
     """Return the share of samples that repeat beyond chance, and the share of pairs by chance.
 
     A register that is read faster than it is updated repeats samples, and between the repeats it
@@ -110,9 +104,9 @@ class Held:
     share: float  # share of repeats among the other samples
 
 
-def find_regular_repeats(pieces: list[Excerpt]) -> Held | None:
+def find_regular_repeats(pieces: list[summary.Excerpt]) -> Held | None:
     """Return the period at which samples repeat their predecessor; None if there is none."""
-    whole = [piece.values for piece in pieces if len(piece.values) >= PIECE_SIZE // 4]
+    whole = [piece.values for piece in pieces if len(piece.values) >= summary.PIECE_SIZE // 4]
     whole = whole[:: max(1, len(whole) // _MAX_PIECES)][:_MAX_PIECES]
     periods = np.arange(3, _MAX_PERIOD + 1)
     regular: list[Held] = []
@@ -156,7 +150,7 @@ def _count_phases(repeats: NDArray[np.int64], counts: NDArray[np.int64]) -> None
         counts[every, 0], counts[every, 1] = most, second
 
 
-def find_held_samples(channel: str, column: ColumnSummary) -> Iterator[Finding]:
+def find_held_samples(channel: str, column: summary.ColumnSummary) -> Iterator[Finding]:
     """Yield a finding if every n-th sample of a channel repeats its predecessor."""
     if column.repeats < column.present / (2 * _MAX_PERIOD):
         return
@@ -168,7 +162,7 @@ def find_held_samples(channel: str, column: ColumnSummary) -> Iterator[Finding]:
 
 
 def check_columns(
-    columns: Mapping[str, ColumnSummary],
+    columns: Mapping[str, summary.ColumnSummary],
     rate: float,
     settings: QualitySettings,
     *,
@@ -179,7 +173,7 @@ def check_columns(
     ``rate``: Hz. ``static``: the sensor was at rest; changes are not reported if it was turned.
     """
     findings: list[Finding] = []
-    usable: dict[str, ColumnSummary] = {}
+    usable: dict[str, summary.ColumnSummary] = {}
     for channel, column in columns.items():
         span = column.high - column.low
         if channel == TEMPERATURE and 0.0 < column.step < math.inf and span <= 2000.0 * column.step:
@@ -215,7 +209,7 @@ def check_columns(
 
 
 def _find_unusable(
-    channel: str, column: ColumnSummary, settings: QualitySettings
+    channel: str, column: summary.ColumnSummary, settings: QualitySettings
 ) -> Finding | None:
     if column.present == 0:
         return find(samples.NoSamples(), "fatal", 0, channel)
@@ -227,7 +221,9 @@ def _find_unusable(
     return None
 
 
-def _find_missing_cells(channel: str, column: ColumnSummary, rate: float) -> Iterator[Finding]:
+def _find_missing_cells(
+    channel: str, column: summary.ColumnSummary, rate: float
+) -> Iterator[Finding]:
     length, last = column.longest_gap
     begin, end = (last - length) / rate, last / rate
     if column.missing:
@@ -237,13 +233,13 @@ def _find_missing_cells(channel: str, column: ColumnSummary, rate: float) -> Ite
         yield find(empty, severity, column.missing, channel, begin, end)
     if column.not_finite:
         number = column.not_finite
-        infinite = samples.NotFinite(number, MAX_MEASUREMENT, length, length / rate, begin)
+        infinite = samples.NotFinite(number, summary.MAX_MEASUREMENT, length, length / rate, begin)
         yield find(infinite, "warning", number, channel, begin, end)
 
 
 def _find_bad_values(
     channel: str,
-    column: ColumnSummary,
+    column: summary.ColumnSummary,
     steps: levels.Quantisation | None,
     rate: float,
     settings: QualitySettings,
@@ -278,7 +274,7 @@ def _find_bad_values(
 
 def _find_changes(
     channel: str,
-    column: ColumnSummary,
+    column: summary.ColumnSummary,
     steps: levels.Quantisation | None,
     rate: float,
     settings: QualitySettings,

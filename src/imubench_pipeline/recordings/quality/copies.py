@@ -141,10 +141,7 @@ def _describe_repeats(
 def find_copied_recordings(
     models: Iterable[ModelRow], biases: Iterable[FixedBiasRow]
 ) -> Iterator[FindingRow]:
-    """Yield rows of the table ``findings`` about recordings that are copies of another one.
-
-    The rows are in the order of the recordings; the first of several copies counts as the original.
-    """
+    """Yield findings about recordings that are copies of an earlier one, in their order."""
     means = {_get_channel_key(row): row.value for row in biases}
     first: dict[tuple[Any, ...], str] = {}
     copies: dict[tuple[str, str], dict[str, list[str]]] = {}

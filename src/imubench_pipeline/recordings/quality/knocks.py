@@ -37,10 +37,9 @@ def find_outlier_blocks(
 ) -> tuple[NDArray[np.int64], Array, Array]:
     """Return the blocks with an outlier, and level and noise around them, SI, shape (n,) each.
 
-    The level is the median of the means of the nearest blocks. The noise is the median of the
-    standard deviations of the blocks around, with a lower bound from the step. ``sigmas``: least
-    distance of an outlier from the level, in standard deviations of the samples. ``step``: least
-    significant bit, SI; a change by one is no outlier. None: not quantised.
+    The level is the median of the means of the nearest blocks, the noise of the standard deviations
+    around, with a lower bound from the step. ``sigmas``: least distance of an outlier, in standard
+    deviations. ``step``: least significant bit, SI; None: not quantised.
     """
     least = _MIN_OUTLIER_STEPS * (step or 0.0) / sigmas
     filled = np.isfinite(blocks.spread)

@@ -139,10 +139,7 @@ def compute_longest_chance_run(column: ColumnSummary) -> float:
 def find_saturation(
     column: ColumnSummary, steps: Quantisation | None, share: float
 ) -> tuple[str, int] | None:
-    """Return ``lowest`` or ``highest`` where a column is saturated, and the samples there, or None.
-
-    ``share``: least share of the samples at a saturated extreme.
-    """
+    """Return the saturated extreme of a column and its samples, at least the ``share``; or None."""
     if steps is not None and steps.levels < 10:
         return None  # with so few levels an extreme is frequent in any case
     for side, number in zip(("lowest", "highest"), column.at_extremes, strict=True):

@@ -27,7 +27,6 @@ from imubench_pipeline.typing import Array
 
 Words = NDArray[np.uint64]
 Numbers = NDArray[np.int64]
-
 WINDOW = 64  # changes of value: the bits of a word, by which the hash is rotated
 _SLOTS = 1 << 16
 _MAX_WINDOWS = _SLOTS // 2  # beyond it, the half with the lowest hashes is kept

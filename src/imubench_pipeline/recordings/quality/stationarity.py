@@ -38,10 +38,7 @@ class WarmUp:
 
 
 def find_steps(blocks: BlockStatistics, sigmas: float) -> list[Step]:
-    """Find sudden changes of the mean.
-
-    ``sigmas``: least size of a step, in robust standard deviations of all steps.
-    """
+    """Find sudden changes of the mean by ``sigmas`` robust standard deviations of all steps."""
     size = max(1, len(blocks.mean) // 400)
     # Medians are robust to knocks. The means of blocks with few samples scatter too much.
     mean = np.where(2 * blocks.count >= blocks.size, blocks.mean, np.nan)

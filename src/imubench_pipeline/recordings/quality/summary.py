@@ -17,7 +17,6 @@ from imubench_pipeline.recordings.quality.repeats import Repeats
 from imubench_pipeline.typing import Array
 
 T = TypeVar("T")
-
 MIN_BLOCK_SIZE = 256  # records of a block, until there are `2 * _MAX_BLOCKS` blocks
 _MAX_BLOCKS = 1 << 15  # pairs of blocks are merged when there are twice this number
 
@@ -112,10 +111,7 @@ class Excerpt:
 
 @dataclass
 class Excerpts:
-    """Collects pieces of a streamed column: every one, every second, every fourth and so on.
-
-    They show steps and periodic repeats, which block statistics cannot.
-    """
+    """Collects every piece of a column, every second, every fourth and so on, as it gets longer."""
 
     _stride: int = 1
     _reached: int = 0
@@ -170,7 +166,6 @@ _BLOCK_RECORDS, _BLOCK_COUNT, _BLOCK_SUM, _BLOCK_SQUARES = range(19, 23)
 _BLOCK_LOWEST, _BLOCK_HIGHEST, _BLOCK_SHIFT = range(23, 26)
 _GAP_LENGTH, _LONGEST_GAP, _GAP_END = range(26, 29)
 _STATE_SIZE = 29
-
 FAR_LAG = 64  # lag, samples, at which low-passed noise is uncorrelated for all usual low-passes
 _MAX_RATIO_OF_ONE_STEP = 1.5
 """Largest ratio of a change to the smallest step that counts as one step: steps of rounded values

@@ -13,6 +13,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from imubench_pipeline.model.recordings import RecordingRow
+from imubench_pipeline.settings.command_line import CommandError
 from imubench_pipeline.settings.extras import require_extra
 from imubench_pipeline.tables import find_tables, find_tables_folder, read
 from imubench_pipeline.tables.outputs import OutputFolder, add_output
@@ -34,10 +35,6 @@ _KIND_NEEDS = {
 """Requirements of each kind besides the curve of a channel."""
 
 _FILE_FORMATS = ("svg", "pdf")
-
-
-class SelectionError(ValueError):
-    """The results do not contain the selection."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -83,75 +80,8 @@ def _make_list_reader(choices: Sequence[str]) -> Callable[[str], tuple[str, ...]
 
 def run(arguments: argparse.Namespace) -> int:
     """Write the selected figures; return the exit status."""
-    try:
-        tables = _load(arguments.results)
-        chosen = select(tables, arguments.sensor, arguments.recording, arguments.channel)
-        written = _write(tables, chosen, arguments)
-    except SelectionError as error:
-        print(error, file=sys.stderr)
-        return 2
-    if not written:
-        needs = [
-            f"{kind} needs {_KIND_NEEDS[kind]}" for kind in arguments.kind if kind in _KIND_NEEDS
-        ]
-        print(f"found nothing to draw: {'; '.join(needs)}", file=sys.stderr)
-        return 2
-    return 0
-
-
-def _load(results: Path) -> dict[str, pa.Table]:
-    """Read the tables of a run; ``results`` may be the folder ``tables`` itself."""
-    folder = find_tables_folder(results)
-    paths = {name: folder / f"{name}.parquet" for name in TABLES}
-    try:
-        find_tables(results, NEEDED)
-        return {name: read(name, [path] if path.is_file() else []) for name, path in paths.items()}
-    except (OSError, ValueError) as error:
-        raise SelectionError(str(error)) from error
-
-
-def select(
-    tables: Mapping[str, pa.Table], sensor: str | None, recording: str | None, channel: str | None
-) -> dict[str, pa.Table]:
-    """Return the rows of the tables for a sensor, recording and channel; None: all.
-
-    Raises SelectionError if there is no such curve; it lists the choices.
-    """
-    chosen = dict(tables)
-    for column, asked in (("sensor", sensor), ("recording", recording), ("channel", channel)):
-        if asked is None:
-            continue
-        existing = chosen["allan"][column].unique().to_pylist()
-        if asked not in existing:
-            # A recording, or all recordings of a sensor, may have no curve for a reason.
-            named = _select_rows(chosen["recordings"], column, asked)
-            reasons = [
-                f" but a {row.status} one ({row.reason})"
-                for row in RecordingRow.rows_of(named)
-                if row.status != "ok" and column != "channel"
-            ]
-            raise SelectionError(
-                f"found no {column} {asked!r}{''.join(reasons[:1])}; there are: "
-                f"{', '.join(sorted(existing))}"
-            )
-        chosen = {name: _select_rows(table, column, asked) for name, table in chosen.items()}
-    if not chosen["allan"].num_rows:
-        raise SelectionError("the results have no curve: no recording could be used")
-    return chosen
-
-
-def _select_rows(table: pa.Table, column: str, asked: str) -> pa.Table:
-    if column not in table.schema.names:
-        return table
-    mask = pc.equal(table[column], asked)
-    # A finding without a channel is about all of them.
-    return table.filter(pc.fill_null(mask, True) if column == "channel" else mask)
-
-
-def _write(
-    tables: Mapping[str, pa.Table], chosen: Mapping[str, pa.Table], arguments: argparse.Namespace
-) -> int:
-    """Write the figures and print their names; return the number of files."""
+    tables = _load(arguments.results)
+    chosen = select(tables, arguments.sensor, arguments.recording, arguments.channel)
     # Matplotlib is loaded only if there is something to draw.
     with require_extra("workflow", "draw figures"):
         from imubench_pipeline.report.static_figures.files import save
@@ -172,24 +102,70 @@ def _write(
                 written.append(output.path / f"{name}.{ending}")
     for path in written:
         print(path)
-    return len(written)
+    if not written:
+        needs = [
+            f"{kind} needs {_KIND_NEEDS[kind]}" for kind in arguments.kind if kind in _KIND_NEEDS
+        ]
+        raise CommandError(f"found nothing to draw: {'; '.join(needs)}")
+    return 0
+
+
+def _load(results: Path) -> dict[str, pa.Table]:
+    """Read the tables of a run; ``results`` may be the folder ``tables`` itself."""
+    folder = find_tables_folder(results)
+    paths = {name: folder / f"{name}.parquet" for name in TABLES}
+    try:
+        find_tables(results, NEEDED)
+        return {name: read(name, [path] if path.is_file() else []) for name, path in paths.items()}
+    except (OSError, ValueError) as error:
+        raise CommandError(str(error)) from error
+
+
+def select(
+    tables: Mapping[str, pa.Table], sensor: str | None, recording: str | None, channel: str | None
+) -> dict[str, pa.Table]:
+    """Return the rows of a sensor, recording and channel, None: all; `CommandError` if none."""
+    chosen = dict(tables)
+    for column, asked in (("sensor", sensor), ("recording", recording), ("channel", channel)):
+        if asked is None:
+            continue
+        existing = chosen["allan"][column].unique().to_pylist()
+        if asked not in existing:
+            # A recording, or all recordings of a sensor, may have no curve for a reason.
+            named = _select_rows(chosen["recordings"], column, asked)
+            reasons = [
+                f" but a {row.status} one ({row.reason})"
+                for row in RecordingRow.rows_of(named)
+                if row.status != "ok" and column != "channel"
+            ]
+            raise CommandError(
+                f"found no {column} {asked!r}{''.join(reasons[:1])}; there are: "
+                f"{', '.join(sorted(existing))}"
+            )
+        chosen = {name: _select_rows(table, column, asked) for name, table in chosen.items()}
+    if not chosen["allan"].num_rows:
+        raise CommandError("the results have no curve: no recording could be used")
+    return chosen
+
+
+def _select_rows(table: pa.Table, column: str, asked: str) -> pa.Table:
+    if column not in table.schema.names:
+        return table
+    mask = pc.equal(table[column], asked)
+    # A finding without a channel is about all of them.
+    return table.filter(pc.fill_null(mask, True) if column == "channel" else mask)
 
 
 def _list_figures(
     chosen: Mapping[str, pa.Table], sensors: Sequence[str], arguments: argparse.Namespace
 ) -> Iterator[tuple[str, Make]]:
     """Yield name and maker of each selected figure."""
+    from imubench_pipeline.report.static_figures import files
     from imubench_pipeline.report.static_figures.curves import draw_theory_figure
-    from imubench_pipeline.report.static_figures.files import (
-        CHANNEL_KINDS,
-        CROSS_KINDS,
-        list_channel_figures,
-        list_cross_figures,
-    )
     from imubench_pipeline.report.view import gather_recordings
 
-    cross = [kind for kind in arguments.kind if kind in CROSS_KINDS]
-    of_channel = [kind for kind in arguments.kind if kind in CHANNEL_KINDS]
+    cross = [kind for kind in arguments.kind if kind in files.CROSS_KINDS]
+    of_channel = [kind for kind in arguments.kind if kind in files.CHANNEL_KINDS]
     if "theory" in arguments.kind:
         yield "theory", partial(draw_theory_figure, arguments.units)
     views = []
@@ -197,8 +173,10 @@ def _list_figures(
         views = [view for recording in gather_recordings(chosen) for view in recording.channels()]
     # A figure of some sensors must not replace the figure of all sensors.
     part = "".join(f"{name}/" for name in (arguments.sensor, arguments.recording) if name)
-    for name, make in list_cross_figures(views, arguments.units, sensors=sensors, kinds=cross):
+    for name, make in files.list_cross_figures(
+        views, arguments.units, sensors=sensors, kinds=cross
+    ):
         yield part + name, make
     for number, view in enumerate(views if of_channel else [], start=1):
         print(f"channel {number} of {len(views)}: {view.label} {view.channel}", file=sys.stderr)
-        yield from list_channel_figures(view, arguments.units, kinds=of_channel)
+        yield from files.list_channel_figures(view, arguments.units, kinds=of_channel)

@@ -17,21 +17,7 @@ from matplotlib.path import Path
 from imubench_pipeline.estimators.estimate import COMPARED
 from imubench_pipeline.report.palette import Appearance, assign_sensor_styles
 from imubench_pipeline.report.practical import System, choose_page_unit
-from imubench_pipeline.report.static_figures.style import (
-    DOUBLE,
-    SINGLE,
-    SYMBOLS,
-    compute_limits,
-    convert_line_style,
-    convert_marker_style,
-    draw_legend_below,
-    fix_layout,
-    make_figure,
-    name_channel,
-    set_log_axis,
-    set_style,
-    shorten_name,
-)
+from imubench_pipeline.report.static_figures import style
 from imubench_pipeline.report.view import ChannelView
 from imubench_pipeline.words.estimates import status_text
 
@@ -39,13 +25,10 @@ _MOST_BANDS = 8
 _MAX_SENSORS_IN_COLUMN = 6  # sensors, in a figure one column wide
 _MOST_CURVES_IN_A_COLUMN = 30
 _MAX_EQUAL_RECORDINGS = 3  # number of recordings of a sensor up to which all are drawn alike
-
 _MARKERS_PER_SENSOR = 9  # on the curves of a sensor
 _THIN_WIDTH, _PALE_OPACITY = 0.4, 0.45  # width in pt and opacity of a curve among many
 _MAX_NAME_WIDTH = 200.0  # pt
-
 Kind = Literal["estimate", "not identified", "limit"]
-
 _SLOT_HEIGHT = 2.6  # mm, of a recording where there is room
 _MIN_ROW_HEIGHT = 4.2  # mm, of a sensor: its name must fit
 _MAX_HEIGHT = 205.0  # mm, of all sensors: the figure fits on one page
@@ -60,7 +43,7 @@ _ARROW_MARKER = Path(
 _ARROW_SIZE = 4.5  # of a dot
 
 
-@set_style()
+@style.set_style()
 def draw_comparison_figure(
     views: Sequence[ChannelView], sensors: Sequence[str], system: System = "practical"
 ) -> Figure:
@@ -76,9 +59,11 @@ def draw_comparison_figure(
     ordered = sorted(groups, key=lambda group: (sensors.index(group[0]), group[1]))
 
     unit = choose_page_unit(views[0].quantity, "adev", system)
-    name = name_channel(views[0].channel)
+    name = style.name_channel(views[0].channel)
     wide = len(groups) > _MAX_SENSORS_IN_COLUMN or len(views) > _MOST_CURVES_IN_A_COLUMN
-    figure = make_figure(DOUBLE if wide else SINGLE, 95.0 if wide else 68.0, f"{name}: all sensors")
+    figure = style.make_figure(
+        style.DOUBLE if wide else style.SINGLE, 95.0 if wide else 68.0, f"{name}: all sensors"
+    )
     axes = figure.add_subplot()
     handles = []
     for place, (sensor, simulated) in enumerate(ordered):
@@ -87,9 +72,9 @@ def draw_comparison_figure(
         _draw_sensor(axes, of_group, looks[sensor], unit.per_si, place, bands=bands)
         recordings = len(of_group)
         words = [f"{recordings} recordings"] * (recordings > 1) + ["simulated"] * simulated
-        label = shorten_name(figure, sensor, _MAX_NAME_WIDTH)
+        label = style.shorten_name(figure, sensor, _MAX_NAME_WIDTH)
         label += f" ({', '.join(words)})" if words else ""
-        look = convert_line_style(looks[sensor]) | convert_marker_style(
+        look = style.convert_line_style(looks[sensor]) | style.convert_marker_style(
             looks[sensor], hollow=simulated
         )
         handles.append(Line2D([], [], label=label, **look))
@@ -97,15 +82,15 @@ def draw_comparison_figure(
         handles.append(Line2D([], [], color="black", label="median of several recordings"))
         pale: dict[str, Any] = {"alpha": _PALE_OPACITY, "linewidth": _THIN_WIDTH}
         handles.append(Line2D([], [], color="black", label="other recordings", **pale))
-    set_log_axis(axes, "x", compute_limits(*(view.tau for view in views)))
-    set_log_axis(
-        axes, "y", compute_limits(*(view.adev * unit.per_si for view in views), margin=1.5)
+    style.set_log_axis(axes, "x", style.compute_limits(*(view.tau for view in views)))
+    style.set_log_axis(
+        axes, "y", style.compute_limits(*(view.adev * unit.per_si for view in views), margin=1.5)
     )
     axes.set_xlabel("averaging time τ (s)")
     axes.set_ylabel(f"Allan deviation ({unit.sign})")
     axes.set_title(name, loc="left")
-    draw_legend_below(figure, handles)
-    return fix_layout(figure)
+    style.draw_legend_below(figure, handles)
+    return style.fix_layout(figure)
 
 
 def _draw_sensor(
@@ -118,7 +103,7 @@ def _draw_sensor(
     bands: bool,
 ) -> None:
     """Draw the recordings of a sensor; if there are many, all but the middle one are thin."""
-    lines = convert_line_style(look)
+    lines = style.convert_line_style(look)
     marked = views
     if len(views) > _MAX_EQUAL_RECORDINGS:
         # Its level is the median at the middle of the common averaging times.
@@ -149,7 +134,7 @@ def _draw_sensor(
             view.tau,
             view.adev * scale,
             **lines,
-            **convert_marker_style(look, hollow=view.simulated),
+            **style.convert_marker_style(look, hollow=view.simulated),
             linewidth=1.0 if len(marked) == 1 else 0.8,
             markevery=(start, step),
             zorder=2.5,
@@ -209,24 +194,21 @@ class _Block:
         return [self.top + step * (number + 0.75) for number in range(len(self.views))]
 
 
-@set_style()
+@style.set_style()
 def draw_forest_figure(
     views: Sequence[ChannelView],
     sensors: Sequence[str],
     symbol: str | Sequence[str] = COMPARED,
     system: System = "practical",
 ) -> Figure:
-    """Draw parameters of one channel across sensors, with their 95 % limits.
-
-    A panel each; the look is by the place among all sensors of the run.
-    """
+    """Draw parameters of one channel across sensors, with 95 % limits, in a panel each."""
     symbols = [symbol] if isinstance(symbol, str) else list(symbol)
     looks = assign_sensor_styles(list(sensors))
     blocks = _make_blocks(views, sensors)
     total = blocks[-1].bottom
-    name = name_channel(views[0].channel)
-    figure = make_figure(
-        SINGLE if len(symbols) == 1 else DOUBLE,
+    name = style.name_channel(views[0].channel)
+    figure = style.make_figure(
+        style.SINGLE if len(symbols) == 1 else style.DOUBLE,
         total + _FRAME_HEIGHT,
         f"{name}: {', '.join(symbols)} of all sensors",
     )
@@ -245,14 +227,14 @@ def draw_forest_figure(
         if simulated:
             words.append("simulated" if simulated == count else f"{simulated} simulated")
         about = f" ({', '.join(words)})" if words else ""
-        names.append(shorten_name(figure, block.sensor, 110.0) + about)
+        names.append(style.shorten_name(figure, block.sensor, 110.0) + about)
     first.set_yticklabels(names)
     for panel in panels:
         panel.tick_params(axis="y", length=0, which="both")
         panel.grid(visible=False, axis="y")
     first.set_title(name, loc="left")
-    draw_legend_below(figure, _make_legend(kinds))
-    return fix_layout(figure)
+    style.draw_legend_below(figure, _make_legend(kinds))
+    return style.fix_layout(figure)
 
 
 def _make_blocks(views: Sequence[ChannelView], sensors: Sequence[str]) -> list[_Block]:
@@ -322,7 +304,7 @@ def _draw_panel(
     if truths:
         axes.plot(values, places, marker="|", ms=6.0, mew=0.8, ls="none", color="black", zorder=3.5)
     _set_limits(axes, drawn, values, unit.per_si, ticks)
-    axes.set_xlabel(f"{SYMBOLS[symbol]} ({unit.sign})")
+    axes.set_xlabel(f"{style.SYMBOLS[symbol]} ({unit.sign})")
     return {mark.kind for mark in drawn} | ({"truth"} if truths else set())
 
 
@@ -340,7 +322,7 @@ def _set_limits(
         return
     reach = 10.0**_MAX_INTERVAL_DECADES
     near = np.clip(ends, min(values) / reach, max(values) * reach)
-    set_log_axis(axes, "x", compute_limits(values, near, margin=1.6), ticks=ticks)
+    style.set_log_axis(axes, "x", style.compute_limits(values, near, margin=1.6), ticks=ticks)
 
 
 def _draw_marks(
@@ -350,9 +332,10 @@ def _draw_marks(
     size = float(np.clip(step * 72.0 / 25.4 * 0.8, 1.2, 4.0))
     width = min(1.0, 0.3 * size)
     dots: dict[Kind, dict[str, Any]] = {
-        "estimate": convert_marker_style(look),
-        "not identified": convert_marker_style(look, hollow=True),
-        "limit": convert_marker_style(look) | {"marker": _ARROW_MARKER, "markerfacecolor": "none"},
+        "estimate": style.convert_marker_style(look),
+        "not identified": style.convert_marker_style(look, hollow=True),
+        "limit": style.convert_marker_style(look)
+        | {"marker": _ARROW_MARKER, "markerfacecolor": "none"},
     }
     for kind, dot in dots.items():
         chosen = [mark for mark in of_block if mark.kind == kind]

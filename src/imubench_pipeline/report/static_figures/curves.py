@@ -313,7 +313,6 @@ def _label_printed(row: DatasheetRow) -> str:
 
 
 _SPECTRUM_METHOD = "likelihood"  # the method whose model the table ``spectrum`` has
-
 _MOST_NAMED = 3
 _LABEL_OFFSET = 0.05  # of the frequency axis: the height of a letter, and more
 _TERM_POINTS = 200  # points of a term: it is smooth
@@ -321,10 +320,7 @@ _TERM_POINTS = 200  # points of a term: it is smooth
 
 @set_style()
 def draw_spectrum_figure(view: ChannelView, system: System = "practical") -> Figure | None:
-    """Draw the root of the two-sided spectrum with the model of the likelihood.
-
-    None where there is no spectrum.
-    """
+    """Draw the root of the two-sided spectrum, if any, with the model of the likelihood."""
     if not view.spectrum:
         return None
     unit = choose_page_unit(view.quantity, "psd", system)

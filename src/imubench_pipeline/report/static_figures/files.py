@@ -13,16 +13,10 @@ import pyarrow as pa
 from matplotlib.figure import Figure
 
 from imubench_pipeline.report.practical import System
+from imubench_pipeline.report.static_figures import curves
 from imubench_pipeline.report.static_figures.comparison import (
     draw_comparison_figure,
     draw_forest_figure,
-)
-from imubench_pipeline.report.static_figures.curves import (
-    draw_allan_figure,
-    draw_datasheet_figure,
-    draw_methods_figure,
-    draw_spectrum_figure,
-    draw_terms_figure,
 )
 from imubench_pipeline.report.static_figures.style import set_style
 from imubench_pipeline.report.view import ChannelView, gather_recordings
@@ -38,11 +32,11 @@ CROSS_KINDS: dict[str, Callable[[Sequence[ChannelView], Sequence[str], System], 
 """Figures of one channel of all sensors."""
 
 CHANNEL_KINDS: dict[str, Callable[[ChannelView, System], Figure | None]] = {
-    "allan": draw_allan_figure,
-    "methods": draw_methods_figure,
-    "terms": draw_terms_figure,
-    "datasheet": draw_datasheet_figure,
-    "spectrum": draw_spectrum_figure,
+    "allan": curves.draw_allan_figure,
+    "methods": curves.draw_methods_figure,
+    "terms": curves.draw_terms_figure,
+    "datasheet": curves.draw_datasheet_figure,
+    "spectrum": curves.draw_spectrum_figure,
 }
 """Figures of one channel of one recording; None where there is nothing to show."""
 
@@ -61,10 +55,7 @@ def list_cross_figures(
     sensors: Sequence[str] | None = None,
     kinds: Sequence[str] = tuple(CROSS_KINDS),
 ) -> Iterator[tuple[str, Callable[[], Figure]]]:
-    """Yield the name of each figure of all sensors, and its maker.
-
-    Colours and markers depend on all sensors of the run, by default on the sensors of the views.
-    """
+    """Yield name and maker of each figure of all sensors; all ``sensors`` give the colours."""
     every = sorted({view.sensor for view in views}) if sensors is None else list(sensors)
     for channel in dict.fromkeys(view.channel for view in views):
         chosen = [view for view in views if view.channel == channel]
@@ -84,10 +75,7 @@ def list_channel_figures(
 
 
 def draw_comparison(tables: Mapping[str, pa.Table], system: System, folder: Path) -> None:
-    """Write the figures of each channel of all sensors from joined tables, as SVG and PDF.
-
-    Missing tables of recordings count as empty.
-    """
+    """Write the figures of each channel of all sensors as SVG and PDF; missing tables are empty."""
     for draw in list_drawings(tables, system, folder):
         draw()
 

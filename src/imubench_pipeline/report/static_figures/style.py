@@ -170,10 +170,7 @@ def convert_marker_style(look: Appearance, *, hollow: bool = False) -> Look:
 
 
 def make_figure(width: float, height: float, title: str) -> Figure:
-    """Return an empty figure, its sides in mm; a legend adds to the height.
-
-    The title is for the metadata of its files.
-    """
+    """Return an empty figure, in mm, to which a legend adds; the title is for its metadata."""
     figure = Figure(figsize=(width / 25.4, height / 25.4))
     figure.set_label(title)
     return figure

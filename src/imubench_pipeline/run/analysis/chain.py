@@ -59,10 +59,7 @@ _MIN_REPORTED_TIME = 3.0  # steps that take longer, s, are reported
 
 
 class Analysis:
-    """The steps of all recordings of a plan: first the estimates, then the results for pages.
-
-    `cores`: number of parallel processes; `say` is called with progress messages.
-    """
+    """The steps of all recordings of a plan, in parallel: first the estimates, then the rest."""
 
     def __init__(self, plan: Plan, compiling: Compilation, cores: int, say: Say) -> None:
         self._plan, self._compiling, self._cores, self._say = plan, compiling, cores, say

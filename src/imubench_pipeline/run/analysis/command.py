@@ -14,7 +14,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from imubench_pipeline.settings.command_line import MOST_WHOLE, make_integer_type
+from imubench_pipeline.settings.command_line import MOST_WHOLE, CommandError, make_number_type
 from imubench_pipeline.settings.extras import require_extra
 from imubench_pipeline.tables.outputs import OutputFolder, add_output
 
@@ -71,7 +71,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "-c",
         "--cores",
-        type=make_integer_type(1, MOST_WHOLE, "at least 1"),
+        type=make_number_type(1, MOST_WHOLE, "at least 1", int),
         default=os.cpu_count() or 1,
         metavar="N",
         help="default: all",
@@ -111,8 +111,7 @@ def _run(arguments: argparse.Namespace, compiling: Compilation) -> int:
             paths = lay_out(arguments.logs, arguments.sensor, stated, catalogue, Path(folder))
             plan = Plan({**read_config(arguments.config), **paths})
         except ConfigError as error:
-            print(f"imubench analyse: {error}", file=sys.stderr)
-            return 2
+            raise CommandError(f"imubench analyse: {error}") from None
         analysis = Analysis(plan, compiling, arguments.cores, _say)
         tables = analysis.estimates()
         show(lambda width: render_logs(tables, arguments.units, width))
@@ -128,19 +127,6 @@ def _run(arguments: argparse.Namespace, compiling: Compilation) -> int:
     return 0 if statuses == {"ok"} else 1
 
 
-def _describe_command(arguments: argparse.Namespace) -> str:
-    """Return the command with its options, for a shell."""
-    options = {
-        "--sensor": arguments.sensor,
-        "--rate": arguments.rate,
-        "--gyro-unit": arguments.gyro_unit,
-        "--accel-unit": arguments.accel_unit,
-        "--output": arguments.output and arguments.output.path,
-    }
-    words = [f"{name}={value}" for name, value in options.items() if value is not None]
-    return shlex.join(["imubench", "analyse", *words, "--", *map(str, arguments.logs)])
-
-
 def _say(text: str) -> None:
     print(text, file=sys.stderr, flush=True)
 
@@ -154,8 +140,18 @@ def _write(plan: Plan, tables: Mapping[str, pa.Table], arguments: argparse.Names
     output: OutputFolder = arguments.output
     # For a single log there are no intervals to compare.
     kinds = ("comparison", "forest") if len(arguments.logs) > 1 else ("comparison",)
-    # The results are temporary: this command makes them again.
-    told = json.loads(plan.report_settings()) | {"at_once": _describe_command(arguments)}
+    # The results are temporary: this command, with its options, makes them again.
+    options = {
+        "--sensor": arguments.sensor,
+        "--rate": arguments.rate,
+        "--gyro-unit": arguments.gyro_unit,
+        "--accel-unit": arguments.accel_unit,
+        "--output": arguments.output and arguments.output.path,
+    }
+    words = [f"{name}={value}" for name, value in options.items() if value is not None]
+    told = json.loads(plan.report_settings()) | {
+        "at_once": shlex.join(["imubench", "analyse", *words, "--", *map(str, arguments.logs)])
+    }
     with output.filling() as folder:
         figures = list_drawings(tables, arguments.units, folder / "figures", kinds=kinds)
         with _draw_in_parallel(figures, arguments.cores):

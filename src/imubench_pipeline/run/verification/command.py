@@ -9,6 +9,8 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from imubench_pipeline.settings.command_line import CommandError
+
 _PATIENCE = 3.0  # s, until progress is shown, and between its lines in a file
 
 
@@ -32,12 +34,10 @@ def run(options: argparse.Namespace) -> int:
     folder: Path = options.results
     made = [name for name in ("recordings", "tables", "report") if (folder / name).is_dir()]
     if not made and not (folder / FOLDER).is_dir():
-        print(
+        raise CommandError(
             f"{folder}: found no results; expected the folder of the results of a run, such as "
-            "results",
-            file=sys.stderr,
+            "results"
         )
-        return 2
     if not (folder / FOLDER).is_dir():
         print(
             f"{folder}/{FOLDER}: expected the seals of the steps, found none: the results are of "

@@ -100,11 +100,7 @@ class Results:
     def _every(self) -> Iterator[Fault]:
         for place, error in self._broken.items():
             words = f"expected the seal of {place}, found one that {error}"
-            yield Fault(
-                sealing.name_seal_file(place),
-                words,
-                self._mended(sealing.name_seal_file(place), place),
-            )
+            yield self._fault(sealing.name_seal_file(place), words, place)
         form = sealing.compute_form_digest()
         if older := sum(seal.form != form for seal in self.seals.values()):
             words = f"expected the form {form}, found {older} steps of another version"
@@ -127,7 +123,7 @@ class Results:
                 words = (
                     f"expected it made of the {others[0]} that is there, found it made of another"
                 )
-                yield Fault(first, words, self._mended(first, place))
+                yield self._fault(first, words, place)
         yield from self._unsealed()
         yield from self._strange_rows()
         for path in find_unfinished(self.folder):
@@ -143,7 +139,7 @@ class Results:
             return  # all of a recording was removed, or of a night that is long past
         for name, file in seal.outputs.items():
             if words := file.fault(self.folder / name, whole=True):
-                yield Fault(name, words, self._mended(name, place))
+                yield self._fault(name, words, place)
             self.read(file.size)
 
     def _samples(self, path: Path) -> Iterator[Fault]:
@@ -153,18 +149,16 @@ class Results:
         try:
             quality = Quality.read(path)
         except (RecordingError, OSError) as error:
-            yield Fault(name, f"expected the output of the ingest, {_of(error)}",
-                        self._mended(name, step))  # fmt: skip
+            yield self._fault(name, f"expected the output of the ingest, {_of(error)}", step)
             return
         of = f"{quality.recording.sensor}/{quality.recording.recording}"
         if f"recordings/{of}" != place:
-            yield Fault(name, f"expected the file of {place}, found the file of {of}",
-                        self._mended(name, step))  # fmt: skip
+            yield self._fault(name, f"expected the file of {place}, found the file of {of}", step)
         samples = quality.kept or {}
         for file, stated in samples.items():
             expected = sealing.SealedFile(stated.size, stated.sha256, 0)
             if words := expected.fault(path.with_name(file), whole=True):
-                yield Fault(f"{place}/{file}", words, self._mended(f"{place}/{file}", step))
+                yield self._fault(f"{place}/{file}", words, step)
             self.read(expected.size)
         for other in sorted(path.parent.glob(_SAMPLE_FILES)):
             if other.name not in samples:
@@ -211,12 +205,11 @@ class Results:
                 declared = own or path.is_dir() or place.as_posix() in self._left
                 if not declared and sealing.is_visible(place):
                     yield self._stray(place.as_posix())
-        for path in sorted(
-            (self.folder / sealing.NIGHTS).glob("[ls]*.*")
-        ):  # the latest, and the state
+        # The latest, and the state.
+        for path in sorted((self.folder / sealing.NIGHTS).glob("[ls]*.*")):
             name = path.relative_to(self.folder).as_posix()
             if name not in self._left:
-                yield Fault(name, _NO_SEAL, self._mended(name, sealing.NIGHTS + "/"))
+                yield self._fault(name, _NO_SEAL, sealing.NIGHTS + "/")
 
     def _strange_rows(self) -> Iterator[Fault]:
         """Yield the tables with recordings that were not compared."""
@@ -244,13 +237,14 @@ class Results:
             keys = zip(rows["sensor"].to_pylist(), rows["recording"].to_pylist(), strict=True)
             if strange := {key for key in keys if key[1] is not None} - compared:
                 words = "expected rows of the recordings compared, found some of {}/{}"
-                yield Fault(place, words.format(*min(strange)), self._mended(place, "tables"))
+                yield self._fault(place, words.format(*min(strange)), "tables")
 
     def _stray(self, name: str) -> Fault:
         return Fault(name, _NO_SEAL, self._removed(name))
 
-    def _mended(self, name: str, place: str) -> str:
-        """Return how a file is made again that a step left."""
+    def _fault(self, name: str, found: str, place: str) -> Fault:
+        """Return the fault of a file that a step left, and how the file is made again."""
+        mend = self._removed(name)
         if place.startswith(f"{sealing.NIGHTS}/"):
             files = (
                 [name]
@@ -258,11 +252,11 @@ class Results:
                 else dict.fromkeys([name, sealing.name_seal_file(place)])
             )
             rm = " ".join(["rm -f", *map(self._quoted, files)])
-            return f"restore it, or {rm}: the next night writes its own"
-        if place.startswith("recordings/") and place not in self._current:
+            mend = f"restore it, or {rm}: the next night writes its own"
+        elif place.startswith("recordings/") and place not in self._current:
             folder = self._quoted("/".join(place.split("/")[:3]))
-            return f"restore it, or rm -r {folder}: its log is in no comparison any more"
-        return self._removed(name)
+            mend = f"restore it, or rm -r {folder}: its log is in no comparison any more"
+        return Fault(name, found, mend)
 
     def _removed(self, name: str) -> str:
         path = self.folder / name
