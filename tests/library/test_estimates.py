@@ -112,7 +112,7 @@ def test_estimates_are_shown_drawn_and_given_as_tables(estimates) -> None:
 @pytest.mark.parametrize(
     ("arguments", "expected"),
     [
-        ({"method": "ols"}, "method is 'ols', expected one of likelihood"),
+        ({"method": "ols"}, "method is 'ols', expected one of robust, likelihood"),
         ({"method": "compensated"}, "has no readings of the temperature"),
         ({"rate": 10.0}, "a log has its own rate and units"),
         ({"seed": -1}, "estimate: seed: found -1"),

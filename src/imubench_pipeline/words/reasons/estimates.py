@@ -53,8 +53,8 @@ def wide_interval(ratio: float) -> str:
 def wide_limits(ratio: float) -> str:
     """Return why a value is doubtful; ``ratio``: upper over lower limit."""
     return (
-        f"the upper 95 % limit is {number_text(ratio, 2)} times the lower one. A longer log narrows "
-        "them"
+        f"the upper 95 % limit is {number_text(ratio, 2)} times the lower one. "
+        "Record a longer log to narrow them"
     )
 
 
