@@ -156,10 +156,7 @@ class OctaveSums:
         ]
 
     def _sum(self, head: Samples, heads: int, body: Samples, sections: int) -> None:
-        """Sum the short clusters that begin in complete sections, and store the decimated phase.
-
-        The first sections are in ``head``, the others in ``body``.
-        """
+        """Sum the short clusters that begin in sections of head, then body; store their phase."""
         if not self._filled:
             self._bias = average_finite((head if heads else body)[:SECTION_SAMPLES])
         # Converted to one type, so that the kernel is compiled only once.
@@ -324,11 +321,7 @@ def _sum_lanes(
 def _sum_end(
     samples: Samples, bias: float, grid: Grid, theta: Array, sums: Array, edges: Array
 ) -> tuple[float, bool]:
-    """Sum the clusters that begin in a section at the end of the log, and decimate its phase.
-
-    Returns the sum of its samples less the bias, and whether no sample is missing; sets nothing if
-    samples are missing.
-    """
+    """Sum as `_sum_lanes` at the end of the log; return total and whether no sample is missing."""
     sizes, steps, _, begins = grid
     own, points = min(SECTION_SAMPLES, samples.size), samples.size + 1
     theta[0] = 0.0
@@ -382,10 +375,7 @@ def _sum_present(
     present: Integers,
     counts: Integers,
 ) -> float:
-    """Sum the clusters that begin in a section where samples are missing; decimate its phase.
-
-    Returned is the sum of the samples less the bias.
-    """
+    """Sum as `_sum_end` where samples are missing; return the sum of samples less the bias."""
     _, steps, _, begins = grid
     own, points = min(SECTION_SAMPLES, samples.size), samples.size + 1
     theta[0] = 0.0

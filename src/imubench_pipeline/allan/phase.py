@@ -132,13 +132,8 @@ def integrate(
 ) -> Phase:
     """Return the cumulative sums of consecutive blocks; memory beyond the result is bounded.
 
-    Without ``holes`` no sample may be missing (NaN), and no counts are stored.
-
-    Raises
-    ------
-    ValueError
-        If the blocks are not ``samples`` long, or a sample is infinite, or missing without
-        ``holes``.
+    Without ``holes`` no sample may be missing (NaN), and no counts are stored. Raises ValueError if
+    the blocks are not ``samples`` long, or a sample is infinite, or missing without ``holes``.
     """
     theta = np.empty(samples + 1)
     theta[0] = 0.0

@@ -5,7 +5,7 @@ from __future__ import annotations
 import cmath
 import math
 from functools import lru_cache
-from typing import overload
+from typing import TypeVar, overload
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +18,7 @@ _SERIES_TOLERANCE = 1e-18  # relative size of the last term of a series, below t
 _ARRAY_SERIES_TERMS = 28  # the next term is below 2^28 / 28! = 9e-22 of the first
 
 ComplexArray = NDArray[np.complex128]
+Real = TypeVar("Real", float, Array)
 
 
 @overload
@@ -59,20 +60,12 @@ def evaluate_phi(order: int, z: complex | Array | ComplexArray) -> complex | Com
     return value
 
 
-@overload
-def evaluate_decay(order: int, x: float) -> float: ...
-@overload
-def evaluate_decay(order: int, x: Array) -> Array: ...
-def evaluate_decay(order: int, x: float | Array) -> float | Array:
+def evaluate_decay(order: int, x: Real) -> Real:
     """Return phi_k(-x) for a real x from 0: it is 1/k! at 0 and decreases."""
     return evaluate_phi(order, -x).real
 
 
-@overload
-def integrate_squared_response(order: int, x: float) -> float: ...
-@overload
-def integrate_squared_response(order: int, x: Array) -> Array: ...
-def integrate_squared_response(order: int, x: float | Array) -> float | Array:
+def integrate_squared_response(order: int, x: Real) -> Real:
     """Return x^-(2m+3) times the integral of E(v)^2 from 0 to x, E(v) = v^(m+1) phi_{m+1}(-v).
 
     E is the response to a pulse of a Gauss-Markov process with unit correlation time and m + 1
@@ -98,11 +91,7 @@ def integrate_squared_response(order: int, x: float | Array) -> float | Array:
     return _sum_squared_response(order, x)
 
 
-@overload
-def _sum_squared_response(order: int, x: float) -> float: ...
-@overload
-def _sum_squared_response(order: int, x: Array) -> Array: ...
-def _sum_squared_response(order: int, x: float | Array) -> float | Array:
+def _sum_squared_response(order: int, x: Real) -> Real:
     m = order
     parts = [(-1) ** j * evaluate_decay(m + 2 + j, x) / math.factorial(m - j) for j in range(m + 1)]
     return (sum(parts) - 0.5 * evaluate_decay(m + 1, x) ** 2) / x

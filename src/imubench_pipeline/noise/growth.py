@@ -4,11 +4,10 @@ The error of a channel at a time t after the start is
 
     e = integral of (t - s)^m / m! z(s) over s from 0 to t, less c times the estimated bias,
 
-with m = 0 for the attitude from a gyro and the velocity from an accelerometer, m = 1 for the
-velocity from a gyro and the position from an accelerometer, m = 2 for the position from a gyro,
-and c = t^(m+1) / (m+1)!, the growth of a constant error. The estimated bias is the mean over a
-static window of length W that ends at the start. So e weights the process by a kernel h(s): the
-weights of the integration on 0..t and -c/W on -W..0, and
+with c = t^(m+1) / (m+1)! and m = 0 for the attitude from a gyro and the velocity from an
+accelerometer, 1 for the next integrals, 2 for the position from a gyro. The estimated bias is the
+mean over a static window of length W that ends at the start. So e weights the process by a kernel
+h(s): the weights of the integration on 0..t and -c/W on -W..0, and
 
     sigma^2 = integral of S(f) |H(f)|^2 df over all f,
 

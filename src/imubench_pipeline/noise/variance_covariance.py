@@ -70,11 +70,9 @@ def compute_variance_covariance(
 
 @lru_cache(maxsize=16)
 def _make_strata(largest: int) -> tuple[Array, Array]:
-    """Return a frequency in each stratum, rad per sample, and the widths of the strata.
-
-    The factors sin^4(n w/2) oscillate many times within a stratum of high frequency. Points at
-    multiples of the golden section (a low-discrepancy sequence) give their mean.
-    """
+    """Return a frequency in each stratum, rad per sample, and the widths of the strata."""
+    # The factors sin^4(n w/2) oscillate many times within a stratum of high frequency. Points at
+    # multiples of the golden section (a low-discrepancy sequence) give their mean.
     lowest = _MIN_PHASE_OF_LARGEST / largest
     number = int(np.ceil(_STRATA_PER_DECADE * np.log10(np.pi / lowest)))
     edges = np.concatenate(([0.0], np.geomspace(lowest, np.pi, number)))

@@ -231,10 +231,8 @@ def _fit_unit_bank(decades: float) -> tuple[Array, Array, float]:
 
 @lru_cache(maxsize=1)
 def _tabulate_integrals() -> Array:
-    """Return the integral of sin^4(n x) / sin^3(x) from 0 to pi/2 for n = 1 to `_MAX_EXACT_SIZE`.
-
-    sin^4(n x) = (3 - 4 cos(2 n x) + cos(4 n x)) / 8.
-    """
+    """Return the integral of sin^4(n x) / sin^3(x) from 0 to pi/2, n = 1 to `_MAX_EXACT_SIZE`."""
+    # sin^4(n x) = (3 - 4 cos(2 n x) + cos(4 n x)) / 8
     integral = _tabulate_sums()
     sizes = np.arange(1, _MAX_EXACT_SIZE + 1)
     return np.asarray((4.0 * integral[sizes] - integral[2 * sizes]) / 8.0)
@@ -242,11 +240,8 @@ def _tabulate_integrals() -> Array:
 
 @lru_cache(maxsize=1)
 def _tabulate_sums() -> Array:
-    """Return the integral of (1 - cos(2 m x)) / sin^3(x) from 0 to pi/2, m to 2 `_MAX_EXACT_SIZE`.
-
-    Its second difference over m is a constant less 8 (1 + 1/3 + ... + 1/(2m - 1)). The constant
-    cancels in the second differences of sums.
-    """
+    """Return the integral of (1 - cos(2 m x)) / sin^3(x) from 0 to pi/2 for m from 0."""
+    # Its second difference over m is a constant, which cancels, less 8 (1 + ... + 1/(2m - 1)).
     m = np.arange(1, 2 * _MAX_EXACT_SIZE)
     steps = np.cumsum(np.concatenate(([0.0], -8.0 * np.cumsum(1.0 / (2.0 * m - 1.0)))))
     return np.concatenate(([0.0, 0.0], np.cumsum(steps)[1:]))  # of m = 0, 1, 2 ...
