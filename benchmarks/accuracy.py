@@ -26,7 +26,7 @@ from imubench_pipeline.allan import allan_variance
 from imubench_pipeline.estimators import curve as reading
 from imubench_pipeline.estimators import least_squares
 from imubench_pipeline.estimators.estimate import PARAMETERS, Estimate, Parameter
-from imubench_pipeline.estimators.identifiability import compute_cramer_rao_bounds
+from imubench_pipeline.estimators.intervals import compute_cramer_rao_bounds
 from imubench_pipeline.estimators.likelihood import fit
 from imubench_pipeline.estimators.model_choice import PAPERS_MODEL
 from imubench_pipeline.estimators.robust import fit as robust

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from imubench_pipeline.estimators.identifiability import compute_cramer_rao_bounds
+from imubench_pipeline.estimators.intervals import compute_cramer_rao_bounds
 from imubench_pipeline.estimators.likelihood import Likelihood
 from imubench_pipeline.noise import NoiseModel
 

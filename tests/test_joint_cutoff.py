@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from scipy.signal import butter, lfilter, sosfilt
 
+from imubench_pipeline.estimators.cutoff import refine_cutoff
 from imubench_pipeline.estimators.filter_fits import get_highest_cutoff
 from imubench_pipeline.estimators.frame import select_for_fit
-from imubench_pipeline.estimators.joint_cutoff import refine_cutoff
 from imubench_pipeline.estimators.likelihood import Likelihood, fit
 from imubench_pipeline.estimators.low_pass import Filter
 from imubench_pipeline.estimators.model_choice import PAPERS_MODEL, compare_models

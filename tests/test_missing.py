@@ -10,8 +10,8 @@ from imubench_pipeline.estimators.missing import (
     fill_missing,
     split_at_gaps,
 )
-from imubench_pipeline.estimators.spectral_shapes import Shapes
 from imubench_pipeline.estimators.spectrum import compute_spectra
+from imubench_pipeline.estimators.whittle import Shapes
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.simulate import simulate
 

@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 import scipy.fft
 
-from imubench_pipeline.estimators.spectral_shapes import Shapes
 from imubench_pipeline.estimators.spectrum import SINGLE, Spectrum, compute_spectra
+from imubench_pipeline.estimators.whittle import Shapes
 from imubench_pipeline.noise.terms.flicker import fit_flicker_bank
 from tests.conftest import few
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import bands
-from imubench_pipeline.estimators.identifiability import compute_cramer_rao_bounds
+from imubench_pipeline.estimators.intervals import compute_cramer_rao_bounds
 from imubench_pipeline.noise import NoiseModel
 
 pytestmark = pytest.mark.release  # as what they test is run

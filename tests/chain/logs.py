@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from hypothesis import strategies as st
 
-from imubench_pipeline.estimators.compilation import compile_kernels
+from imubench_pipeline.estimators.posterior_kernels import compile_kernels
 from imubench_pipeline.run.analysis.chain import Analysis
 from imubench_pipeline.run.analysis.compilation import Compilation
 from imubench_pipeline.run.checking import check

@@ -4,12 +4,11 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from imubench_pipeline.estimators.band import Band, find_band
-from imubench_pipeline.estimators.identifiability import make_ideal_spectrum
+from imubench_pipeline.estimators.frame import Band, find_band
+from imubench_pipeline.estimators.intervals import make_ideal_spectrum
 from imubench_pipeline.estimators.lines import find_lines, mask_lines
-from imubench_pipeline.estimators.spectral_shapes import Shapes
 from imubench_pipeline.estimators.spectrum import Spectrum, compute_spectra
-from imubench_pipeline.estimators.whittle import Terms, make_whittle
+from imubench_pipeline.estimators.whittle import Shapes, Terms, make_whittle
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.simulate import simulate
 from tests.conftest import few

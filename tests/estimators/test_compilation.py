@@ -19,7 +19,7 @@ class Compiled(event.Listener):
         pass
 
 event.register("numba:compile", Compiled())
-from imubench_pipeline.estimators.compilation import compile_kernels
+from imubench_pipeline.estimators.posterior_kernels import compile_kernels
 compile_kernels()
 print(len(Compiled.names))
 Compiled.names.clear()

@@ -15,8 +15,7 @@ from imubench_pipeline.estimators.curve_bias import (
     make_averaging_times,
 )
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
-from imubench_pipeline.estimators.goodness import Goodness
-from imubench_pipeline.estimators.model_choice import Candidate
+from imubench_pipeline.estimators.model_choice import Candidate, Goodness
 from imubench_pipeline.estimators.posterior import Posterior
 from imubench_pipeline.estimators.whittle import Maximum, Terms, make_noise_model
 from imubench_pipeline.noise import FLOOR, GaussMarkov, NoiseModel

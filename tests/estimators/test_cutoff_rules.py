@@ -10,13 +10,12 @@ from imubench_pipeline.estimators.cutoff import (
     _describe_no_filter,
     _explain_ambiguity,
     find_cutoff,
+    select_joint_models,
 )
 from imubench_pipeline.estimators.estimate import Parameter
 from imubench_pipeline.estimators.filter_fits import FilterFits
-from imubench_pipeline.estimators.goodness import Goodness
-from imubench_pipeline.estimators.identifiability import make_ideal_spectrum
-from imubench_pipeline.estimators.joint_cutoff import select_joint_models
-from imubench_pipeline.estimators.model_choice import Candidate
+from imubench_pipeline.estimators.intervals import make_ideal_spectrum
+from imubench_pipeline.estimators.model_choice import Candidate, Goodness
 from imubench_pipeline.estimators.whittle import Behind, Maximum, Terms
 from tests.conftest import few
 from tests.estimators.test_filter_fits import RATE, trial, white

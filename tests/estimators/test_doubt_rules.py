@@ -5,13 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from imubench_pipeline.estimators.band import Band
 from imubench_pipeline.estimators.doubts import add_doubts, describe_drift_alternative
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
-from imubench_pipeline.estimators.frame import FitSelection
-from imubench_pipeline.estimators.goodness import Goodness
-from imubench_pipeline.estimators.identifiability import make_ideal_spectrum
-from imubench_pipeline.estimators.model_choice import Candidate
+from imubench_pipeline.estimators.frame import Band, FitSelection
+from imubench_pipeline.estimators.intervals import make_ideal_spectrum
+from imubench_pipeline.estimators.model_choice import Candidate, Goodness
 from imubench_pipeline.estimators.whittle import Maximum, Terms, make_whittle
 
 RATE, DURATION, N = 10.0, 4000.0, 1e-2

@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
-from imubench_pipeline.estimators.goodness import Goodness
 from imubench_pipeline.estimators.likelihood import fit
-from imubench_pipeline.estimators.model_choice import Candidate
+from imubench_pipeline.estimators.model_choice import Candidate, Goodness
 from imubench_pipeline.estimators.posterior import Posterior, compute_draw_weight, draw_jointly
 from imubench_pipeline.estimators.whittle import Maximum, Terms
 from imubench_pipeline.navigation.error_budget import Start, budget, draw_models

@@ -16,11 +16,10 @@ from imubench_pipeline.estimators.filter_fits import (
     get_highest_cutoff,
     read_as_digital,
 )
-from imubench_pipeline.estimators.identifiability import make_ideal_spectrum
+from imubench_pipeline.estimators.intervals import make_ideal_spectrum
 from imubench_pipeline.estimators.low_pass import Filter, Frequencies, Kind
-from imubench_pipeline.estimators.spectral_shapes import Shapes
 from imubench_pipeline.estimators.spectrum import compute_spectra
-from imubench_pipeline.estimators.whittle import Terms
+from imubench_pipeline.estimators.whittle import Shapes, Terms
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.simulate import simulate
 

@@ -5,14 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from imubench_pipeline.estimators.band import Band
 from imubench_pipeline.estimators.cutoff import Cutoff
 from imubench_pipeline.estimators.estimate import Parameter
 from imubench_pipeline.estimators.filter_fits import Allowed, FilterTrial, OfModel, Reading
-from imubench_pipeline.estimators.frame import FitSelection, select_for_fit
-from imubench_pipeline.estimators.goodness import Goodness
-from imubench_pipeline.estimators.identifiability import make_ideal_spectrum
-from imubench_pipeline.estimators.model_choice import Candidate
+from imubench_pipeline.estimators.frame import Band, FitSelection, select_for_fit
+from imubench_pipeline.estimators.intervals import make_ideal_spectrum
+from imubench_pipeline.estimators.model_choice import Candidate, Goodness
 from imubench_pipeline.estimators.posterior import Posterior
 from imubench_pipeline.estimators.whittle import Behind, Maximum, Terms
 

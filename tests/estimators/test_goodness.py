@@ -4,7 +4,11 @@ import numpy as np
 import pytest
 from scipy import optimize, stats
 
-from imubench_pipeline.estimators.goodness import MIN_FIT_CHANCE, Goodness, assess_goodness_of_fit
+from imubench_pipeline.estimators.model_choice import (
+    MIN_FIT_CHANCE,
+    Goodness,
+    assess_goodness_of_fit,
+)
 from imubench_pipeline.estimators.spectrum import Spectrum, compute_spectra
 from imubench_pipeline.estimators.whittle import Terms, make_whittle
 from imubench_pipeline.noise import NoiseModel

@@ -3,7 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from imubench_pipeline.estimators.identifiability import (
+from imubench_pipeline.estimators.intervals import (
     TARGET_RELATIVE_ERROR,
     compute_cramer_rao_bounds,
     compute_relative_bounds,

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from imubench_pipeline.estimators.importance import Mixture, Weighted, sample_adaptively
+from imubench_pipeline.estimators.posterior import Mixture, Weighted, sample_adaptively
 
 LEVELS = np.array([0.025, 0.5, 0.975])
 ERROR = np.array([0.008, 0.03, 0.008])
@@ -140,11 +140,3 @@ def test_the_highest_weights_are_lowered_to_one_that_several_have() -> None:
     assert found.weights == pytest.approx(np.array([0.2, 0.2, 0.1, 0.1, 0.1, 0.0]) / 0.7)
     one = Weighted(np.zeros((3, 1)), np.array([1.0, 0.0, 0.0]))
     assert one.clipped(2) is one
-
-
-def test_a_part_of_a_mixture_is_another() -> None:
-    first = Mixture(np.ones(1), np.zeros((1, 2)), np.eye(2)[None])
-    other = Mixture(np.array([0.4, 0.6]), np.ones((2, 2)), np.array([np.eye(2)] * 2))
-    found = first.beside(other, 0.25)
-    assert found.weights == pytest.approx([0.75, 0.1, 0.15])
-    assert found.means.tolist() == [[0, 0], [1, 1], [1, 1]]

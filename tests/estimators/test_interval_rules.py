@@ -3,19 +3,17 @@
 import numpy as np
 import pytest
 
-from imubench_pipeline.estimators.band import Band
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
-from imubench_pipeline.estimators.frame import FitSelection
-from imubench_pipeline.estimators.goodness import Goodness
-from imubench_pipeline.estimators.identifiability import make_ideal_spectrum
+from imubench_pipeline.estimators.frame import Band, FitSelection
 from imubench_pipeline.estimators.intervals import (
     add_upper_limits,
     compute_mixture_limits,
     compute_mixture_quantiles,
     describe,
     is_as_good,
+    make_ideal_spectrum,
 )
-from imubench_pipeline.estimators.model_choice import Candidate
+from imubench_pipeline.estimators.model_choice import Candidate, Goodness
 from imubench_pipeline.estimators.posterior import Posterior
 from imubench_pipeline.estimators.whittle import Maximum, Terms, Whittle, make_whittle
 

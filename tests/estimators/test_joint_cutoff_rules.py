@@ -6,14 +6,12 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq, minimize_scalar
 
-from imubench_pipeline.estimators.cutoff import Cutoff, _find_leaky_bins, find_cutoff
+from imubench_pipeline.estimators.cutoff import Cutoff, _find_leaky_bins, find_cutoff, refine_cutoff
 from imubench_pipeline.estimators.estimate import Parameter
 from imubench_pipeline.estimators.filter_fits import Allowed, FilterFits
-from imubench_pipeline.estimators.goodness import Goodness
-from imubench_pipeline.estimators.identifiability import make_ideal_spectrum
-from imubench_pipeline.estimators.joint_cutoff import refine_cutoff
+from imubench_pipeline.estimators.intervals import make_ideal_spectrum
 from imubench_pipeline.estimators.low_pass import Filter, Frequencies
-from imubench_pipeline.estimators.model_choice import Candidate
+from imubench_pipeline.estimators.model_choice import Candidate, Goodness
 from imubench_pipeline.estimators.spectrum import Spectrum
 from imubench_pipeline.estimators.whittle import Behind, Maximum, Terms
 from tests.estimators.test_filter_fits import RATE, trial, white

@@ -8,7 +8,7 @@ from numba import njit
 from scipy import optimize
 from scipy.integrate import quad
 
-from imubench_pipeline.estimators.identifiability import compute_cramer_rao_bounds
+from imubench_pipeline.estimators.intervals import compute_cramer_rao_bounds
 from imubench_pipeline.estimators.spectrum import compute_spectra
 from imubench_pipeline.estimators.whittle import Maximum, Terms, make_whittle
 from imubench_pipeline.noise import NoiseModel

@@ -341,6 +341,7 @@ def test_the_scan_has_the_costs_of_lawson_and_hanson(
     log = simulate(model, 10.0, 50_000, channel_rng(1, model.name, "scan"))
     curve = allan_variance(log, 10.0, overlap="octave")
     search = _Search(curve, curve.cluster_size <= len(log) // 9, method, sampled=sampled)
-    shapes = search._shapes(np.geomspace(search.shortest, search.longest, 40))
+    times = np.geomspace(search.shortest, search.longest, 40)
+    shapes = np.array([search._shape(time) for time in times])
     one_by_one = np.array([search._solved(shape)[1] for shape in shapes]) ** 2
     assert search._costs(shapes) == pytest.approx(one_by_one, rel=1e-6)

@@ -7,8 +7,7 @@ import pytest
 from imubench_pipeline.allan import AllanCurve, allan_variance, cluster_sizes
 from imubench_pipeline.allan.confidence import equivalent_degrees
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
-from imubench_pipeline.estimators.least_squares import fit
-from imubench_pipeline.estimators.limits import Errors, add_limits, fit_errors
+from imubench_pipeline.estimators.least_squares import Errors, add_limits, fit, fit_errors
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.simulate import channel_rng, simulate
 from tests.conftest import few

@@ -7,12 +7,12 @@ import pytest
 import scipy.fft
 from scipy import optimize
 
-from imubench_pipeline.estimators.goodness import assess_goodness_of_fit
 from imubench_pipeline.estimators.likelihood import fit
 from imubench_pipeline.estimators.model_choice import (
     CANDIDATE_MODELS,
     PAPERS_MODEL,
     Candidate,
+    assess_goodness_of_fit,
     compare_models,
     describe_disagreement,
     rescore,

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from imubench_pipeline.estimators.identifiability import make_ideal_spectrum
+from imubench_pipeline.estimators.intervals import make_ideal_spectrum
 from imubench_pipeline.estimators.posterior import _Target, sample
 from imubench_pipeline.estimators.posterior_kernels import compute_log_posteriors, find_mode
 from imubench_pipeline.estimators.whittle import Maximum, Terms, Whittle, make_whittle
@@ -98,7 +98,7 @@ def test_the_mode_is_one_and_curves_as_is_said(whittle: Whittle, terms: Terms) -
 def test_what_is_proposed_has_the_covariance_of_the_fisher_information(whittle: Whittle) -> None:
     terms = Terms("NK", 1)
     target = _Target(whittle, maximum_of(terms))
-    mean, covariance = target.start()
+    mean, covariance = target.make_component(np.log(target.maximum.times), 1.0)
     at_mode = replace(maximum_of(terms), powers=np.exp(2.0 * mean[:3]))
     sensitivity = whittle.sensitivity(at_mode)
     information = sensitivity @ sensitivity.T

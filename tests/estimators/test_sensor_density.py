@@ -6,11 +6,10 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from imubench_pipeline.estimators.band import Band
 from imubench_pipeline.estimators.cutoff import Cutoff
 from imubench_pipeline.estimators.estimate import Parameter
-from imubench_pipeline.estimators.frame import FitSelection, estimate_sensor_density
-from imubench_pipeline.estimators.identifiability import make_ideal_spectrum
+from imubench_pipeline.estimators.frame import Band, FitSelection, estimate_sensor_density
+from imubench_pipeline.estimators.intervals import make_ideal_spectrum
 from imubench_pipeline.estimators.likelihood import fit
 from imubench_pipeline.estimators.posterior import Posterior
 from imubench_pipeline.estimators.whittle import Behind, Maximum, Terms

@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from imubench_pipeline.estimators.band import Band
-from imubench_pipeline.estimators.frame import FitSelection
-from imubench_pipeline.estimators.identifiability import make_ideal_spectrum
+from imubench_pipeline.estimators.frame import Band, FitSelection
+from imubench_pipeline.estimators.intervals import make_ideal_spectrum
 from imubench_pipeline.estimators.spectral_findings import (
     find_missing_slow_noise,
     spectral_findings,

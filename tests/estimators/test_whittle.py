@@ -6,9 +6,15 @@ import pytest
 import scipy.fft
 from scipy import optimize, stats
 
-from imubench_pipeline.estimators.spectral_shapes import Shapes
 from imubench_pipeline.estimators.spectrum import SINGLE, Spectrum, compute_spectra
-from imubench_pipeline.estimators.whittle import SHAPES, Maximum, Terms, Whittle, make_whittle
+from imubench_pipeline.estimators.whittle import (
+    SHAPES,
+    Maximum,
+    Shapes,
+    Terms,
+    Whittle,
+    make_whittle,
+)
 from imubench_pipeline.noise import GaussMarkov, NoiseModel
 from imubench_pipeline.noise.simulate import simulate
 from tests.conftest import few

@@ -21,7 +21,7 @@ from imubench_pipeline.allan.confidence import equivalent_degrees
 from imubench_pipeline.datasheets import coverage
 from imubench_pipeline.earth import EARTH_RATE
 from imubench_pipeline.estimators import estimate, lines
-from imubench_pipeline.estimators.identifiability import compute_cramer_rao_bounds
+from imubench_pipeline.estimators.intervals import compute_cramer_rao_bounds
 from imubench_pipeline.extensions.papers.page import describe_reading
 from imubench_pipeline.extensions.papers.tables import AccuracyRow
 from imubench_pipeline.model.states import (

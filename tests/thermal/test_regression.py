@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 import scipy.fft
 
-from imubench_pipeline.estimators.goodness import Goodness
-from imubench_pipeline.estimators.model_choice import Candidate
+from imubench_pipeline.estimators.model_choice import Candidate, Goodness
 from imubench_pipeline.estimators.spectrum import compute_spectra
 from imubench_pipeline.estimators.thermal.path import TemperaturePath, apply_lag
 from imubench_pipeline.estimators.thermal.regression import BlockSeries, Coefficients, Regressors

@@ -131,13 +131,9 @@ def _read_minimum(points: _Curve) -> tuple[Parameter, Parameter]:
     if reason:
         nothing = Parameter(None, "not_shown", reason)
         return nothing, nothing
-    return (
-        Parameter(
-            float(10.0 ** points.deviation[lowest]) / FLOOR,
-            reason=texts.READ_AT_MINIMUM,
-        ),
-        Parameter(float(10.0 ** points.tau[lowest]) / PEAK_TAU),
-    )
+    bias = float(10.0 ** points.deviation[lowest]) / FLOOR
+    time = float(10.0 ** points.tau[lowest]) / PEAK_TAU
+    return Parameter(bias, reason=texts.READ_AT_MINIMUM), Parameter(time)
 
 
 def _read_walk(points: _Curve) -> Parameter:

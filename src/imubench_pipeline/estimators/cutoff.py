@@ -1,11 +1,10 @@
 """Estimation of the cut-off of a sensor's low-pass filter from the spectrum of its noise at rest.
 
-White noise of density N behind a filter (`imubench_pipeline.estimators.low_pass`) has the density
-N^2 G(f). An analogue cut-off may exceed Nyquist: aliasing then hides most of the bend, but a long
-log can determine it. White noise behind an analogue filter of first order is a Gauss-Markov
-process, without the white noise up to Nyquist that a process has in addition. Where that is not
-visible, a correlation of a few samples is attributed to a filter; a longer one is ambiguous, and no
-filter is reported.
+An analogue cut-off may exceed Nyquist: aliasing then hides most of the bend, but a long log can
+determine it. White noise behind an analogue filter of first order is a Gauss-Markov process. A
+process of a few samples without white noise is attributed to a filter; a longer one is ambiguous,
+and no filter is reported. Each noise model has its own cut-off (`refine_cutoff`), since a process
+or flicker noise affects it.
 """
 
 from __future__ import annotations
@@ -16,10 +15,12 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import brentq, minimize_scalar
 
 from imubench_pipeline.estimators.estimate import SIGMAS, Parameter
 from imubench_pipeline.estimators.filter_fits import (
     FAMILY,
+    HALF_CHI_SQUARED,
     MIN_BINS,
     MIN_PROCESS_SAMPLES,
     Allowed,
@@ -30,12 +31,21 @@ from imubench_pipeline.estimators.filter_fits import (
     Reading,
     compute_density_in_log,
     draw_factors,
+    explains_bend,
     get_highest_cutoff,
     read_as_digital,
 )
 from imubench_pipeline.estimators.low_pass import Kind
+from imubench_pipeline.estimators.model_choice import Candidate
 from imubench_pipeline.estimators.spectrum import Spectrum
-from imubench_pipeline.estimators.whittle import Behind, Terms
+from imubench_pipeline.estimators.whittle import (
+    COARSE,
+    Behind,
+    Maximum,
+    Terms,
+    Whittle,
+    make_whittle,
+)
 from imubench_pipeline.typing import Array
 from imubench_pipeline.words.reasons import spectra as texts
 
@@ -53,7 +63,7 @@ _MIN_DELTA_BIC = 6.0
 
 _CERTAIN_DELTA_BIC = 20.0  # Below it, the interval includes N without a filter
 _NO_FILTER_WEIGHT = 0.1
-_MIN_N_RATIO = 1e-6  # Minimum N at an end of the interval over N at the best cut-off
+_MIN_N_RATIO = 1e-6  # Minimum N over N at the best cut-off, or over the density of the log
 MAX_LIMIT_RATIO = 1.2  # Ratio of the limits of a cut-off above which it is not identified
 _MIN_HALF_WIDTH = 1e-5  # Minimum half width of the interval of a log cut-off
 
@@ -120,25 +130,14 @@ def find_cutoff(
     Noise alone, with processes of ten sampling intervals and more, and noise behind each filter
     of the family are fitted up to Nyquist. BIC selects kind and order, and a floor of white noise
     after the filter in addition to rounding. The interval covers all filters that the log does not
-    exclude: above Nyquist the aliases of two filters may look alike.
+    exclude: above Nyquist the aliases of two filters may look alike. The cut-off is
+    ``not_identified`` if its limits differ by more than a fifth, or if no such filter fits the
+    bend; ``absent`` without a filter.
 
-    Parameters
-    ----------
-    spectrum : Spectrum
-        Of a log, up to Nyquist.
-    clear : ndarray of bool, shape (b,), optional
-        Bins without spectral lines.
-    resolution : float
-        Step of the register (LSB), SI: rounding adds white noise of variance LSB^2 / 12.
-    stated : float, optional
-        Cut-off of the sensor's filter from its data sheet, Hz. It decides between filter and
-        process where the spectrum is ambiguous.
-
-    Returns
-    -------
-    Cutoff
-        With status ``not_identified`` if the limits of the cut-off differ by more than a fifth, or
-        if no such filter fits the bend; ``absent`` without a filter.
+    ``spectrum`` reaches Nyquist; ``clear``, shape (b,), are the bins without spectral lines;
+    ``resolution`` is the step of the register (LSB), SI: rounding adds white noise of variance
+    LSB^2 / 12; ``stated`` is the cut-off in the data sheet, Hz, which decides between filter and
+    process where the spectrum is ambiguous.
     """
     usable = np.ones(len(spectrum.frequency), dtype=np.bool_) if clear is None else clear
     if usable.sum() < MIN_BINS:
@@ -321,3 +320,216 @@ def _explain_ambiguity(
         return None  # another filter fits better than both
     time = 1.0 / (2.0 * math.pi * first.cutoff)
     return texts.process_or_filter(time, first.cutoff), fits.density(first)[0]
+
+
+_MAX_LOG_SHIFT = math.log(2.0)  # Maximum change of log f_c by a joint fit
+_SEARCH_HALF_WIDTHS = 6.0  # Range of the first search for a cut-off, in half widths of its interval
+_RELATIVE_TOLERANCE = 0.04  # Tolerance of a cut-off over the half width of its interval
+_MAX_DELTA_BIC = 6.0  # Above the best model, up to which a joint fit may change the order
+_MIN_AKAIKE_WEIGHT = 0.03  # From which a model is fitted jointly; less than for intervals
+
+_MIN_INTERVAL_WEIGHT = 0.05
+"""Akaike weight from which a joint fit enters the interval of the cut-off."""
+
+
+def select_joint_models(candidates: Sequence[Candidate], always: Terms) -> list[Candidate]:
+    """Return the models to fit jointly with a cut-off, always with the model ``always``."""
+    best = candidates[0]
+    return [
+        candidate
+        for candidate in candidates
+        if candidate.bic < best.bic + _MAX_DELTA_BIC
+        or candidate.akaike_weight >= _MIN_AKAIKE_WEIGHT
+        or candidate.terms == always
+    ]
+
+
+def refine_cutoff(
+    low_pass: Cutoff, spectrum: Spectrum, clear: NDArray[np.bool_], candidates: Sequence[Candidate]
+) -> Cutoff:
+    """Return a low-pass whose cut-off is fitted together with all parameters of a model.
+
+    The model is the best by BIC after joint fits; N under the others, and other allowed filters, is
+    in ``models``. ``clear``, shape (b,), are the bins to fit. The candidates are fits with the
+    present cut-off, best first; ramps are ignored.
+    """
+    if low_pass.kind is None or low_pass.behind is None or not candidates:
+        return low_pass
+    joint = _Joint(spectrum, clear, low_pass)
+    tried: dict[Terms, list[_Fit]] = {}
+    present = low_pass.allowed[0]
+    bic: dict[Terms, float] = {}
+    aic: dict[Terms, float] = {}
+    for candidate in candidates:
+        terms = replace(candidate.terms, ramp=False)
+        if terms not in tried:
+            tried[terms] = joint.fits(terms)
+            common = joint.at(present, math.log(present.filter.cutoff), terms)
+            gained = common.cost - tried[terms][0].cost
+            bic[terms], aic[terms] = candidate.bic - 2.0 * gained, candidate.aic - 2.0 * gained
+    chosen = min(bic, key=lambda terms: bic[terms])
+    fit = tried[chosen][0]
+    best, state = fit.allowed.at(fit.x), joint.at(fit.allowed, fit.x, chosen)
+    models = {terms: joint.of_model(fits, fit) for terms, fits in tried.items()}
+    likely = {terms: math.exp(0.5 * (aic[chosen] - aic[terms])) for terms in aic}
+    least = _MIN_INTERVAL_WEIGHT * sum(likely.values())
+    ends = [
+        each.allowed.at(x).low_pass.half_power(spectrum.rate)
+        for terms, fits in tried.items()
+        if likely[terms] >= least or terms == chosen
+        for each in fits
+        for x in joint.limits(each)
+    ]
+    shown, lower, upper = best.low_pass.half_power(spectrum.rate), min(ends), max(ends)
+    reason = None
+    if upper > MAX_LIMIT_RATIO * lower:
+        reason = texts.cutoff_range(lower, upper)
+    elif not joint.explains(fit):
+        reason = texts.unknown_filter(len(FAMILY))
+    frequency = Parameter(shown, lower=lower, upper=upper)
+    if reason is not None:
+        frequency = Parameter(None, "not_identified", reason, lower, upper, fitted=shown)
+    return replace(
+        low_pass,
+        frequency=frequency,
+        kind=best.kind,
+        order=best.order,
+        floor=math.sqrt(state.floor + low_pass.rounded * state.N**2),
+        behind=joint.behind(BinGains(spectrum), best, state.floor / state.N**2),
+        readings=models[chosen].readings,
+        allowed=[
+            Allowed(each.allowed.at(each.x), each.allowed.half_width) for each in tried[chosen]
+        ],
+        models=models,
+    )
+
+
+@dataclass(frozen=True)
+class _State:
+    """-log L, N, and the squared density of white noise added after the filter, SI."""
+
+    cost: float
+    N: float
+    floor: float
+
+
+@dataclass(frozen=True)
+class _Fit:
+    """The best log cut-off for a filter and a model."""
+
+    allowed: Allowed
+    terms: Terms
+    x: float
+    cost: float
+
+
+class _Joint:
+    """Fits of models behind filters, over their cut-offs."""
+
+    def __init__(self, spectrum: Spectrum, clear: NDArray[np.bool_], low_pass: Cutoff) -> None:
+        self._low_pass = low_pass
+        self._spectrum = spectrum.select(clear)
+        self._gains = BinGains(self._spectrum)
+        shortest = MIN_PROCESS_SAMPLES / spectrum.rate
+        self._plain = make_whittle(self._spectrum, 0.5 * spectrum.rate, COARSE, shortest=shortest)
+        self._states: dict[tuple[FilterTrial, float, Terms], _State] = {}
+
+    def behind(self, gains: BinGains, trial: FilterTrial, floor: float = 0.0) -> Behind:
+        """Return the gains of a filter, with the floor after it over N^2."""
+        white, flicker, slow = gains(trial)
+        return Behind(white + self._low_pass.rounded + floor, flicker, slow)
+
+    def fits(self, terms: Terms) -> list[_Fit]:
+        """Return the fits of a model with the allowed filters, best first."""
+        fits = []
+        for allowed in self._low_pass.allowed:
+            around = math.log(allowed.filter.cutoff)
+            for reach in (_SEARCH_HALF_WIDTHS * allowed.half_width, _MAX_LOG_SHIFT):
+                best = minimize_scalar(
+                    lambda x, allowed=allowed: self.at(allowed, x, terms).cost,
+                    bounds=(around - reach, min(around + reach, self._get_highest(allowed))),
+                    method="bounded",
+                    options={"xatol": _RELATIVE_TOLERANCE * allowed.half_width},
+                )
+                if abs(best.x - around) < 0.9 * reach:
+                    break
+            fits.append(_Fit(allowed, terms, float(best.x), float(best.fun)))
+        fits.sort(key=lambda fit: fit.cost + fit.allowed.filter.floor)
+        return [fit for fit in fits if fit.cost < fits[0].cost + DELTA_LOG_LIKELIHOOD_EXCLUDED]
+
+    def of_model(self, fits: Sequence[_Fit], chosen: _Fit) -> OfModel:
+        """Return N under the filters in a model, relative to N at the selected cut-off."""
+        terms = fits[0].terms
+        common = self.at(chosen.allowed, chosen.x, terms)
+        shown = self._compute_density_in_log(chosen.allowed, chosen.x, common)
+        readings = []
+        for fit in fits:
+            low, high = self.limits(fit)
+            places = low, fit.x, high
+            states = [self.at(fit.allowed, x, terms) for x in places]
+            below, at, above = (math.log(state.N / common.N) for state in states)
+            first, second, third = (
+                math.log(self._compute_density_in_log(fit.allowed, x, state) / shown)
+                for x, state in zip(places, states, strict=True)
+            )
+            weight = math.exp(fits[0].cost - fit.cost)
+            readings.append(Reading(weight, below, at, above, (first, second, third)))
+            best = fit.allowed.at(fit.x)
+            if best.is_first_order_analogue:
+                readings.append(read_as_digital(readings[-1], best, self._spectrum.rate))
+        return OfModel(readings, common.cost - fits[0].cost)
+
+    def _compute_density_in_log(self, allowed: Allowed, x: float, state: _State) -> float:
+        """Return the density of white noise in the log, at a logarithm of the cut-off."""
+        beside = self._low_pass.rounded * state.N**2 + state.floor
+        low_pass = allowed.at(x).low_pass
+        return compute_density_in_log(low_pass, state.N, beside, self._spectrum.rate)
+
+    def explains(self, fit: _Fit) -> bool:
+        """Return whether a fit explains the spectrum where the filter bends it."""
+        whittle, maximum = self._fit_maximum(fit.allowed, fit.x, fit.terms)
+        return explains_bend(self._spectrum, whittle.density(maximum), fit.allowed.at(fit.x))
+
+    def at(self, allowed: Allowed, x: float, terms: Terms) -> _State:
+        """Return the best fit of a model at a logarithm of the cut-off."""
+        key = allowed.filter, x, terms
+        if key not in self._states:
+            maximum = self._fit_maximum(allowed, x, terms)[1]
+            floor = maximum.parameter("Q") ** 2 if allowed.filter.floor else 0.0
+            N = max(maximum.parameter("N"), _MIN_N_RATIO * math.sqrt(self._plain.scale))
+            self._states[key] = _State(maximum.cost, N, floor)
+        return self._states[key]
+
+    def _fit_maximum(self, allowed: Allowed, x: float, terms: Terms) -> tuple[Whittle, Maximum]:
+        whittle = self._plain.standing(self.behind(self._gains, allowed.at(x)))
+        if allowed.filter.floor:
+            # The column of quantization noise is used for white noise after the filter.
+            whittle = whittle.with_column("Q", np.ones(len(self._spectrum.density)))
+            terms = replace(terms, linear="Q" + terms.linear)
+        return whittle, whittle.maximum(terms)
+
+    def limits(self, fit: _Fit) -> tuple[float, float]:
+        """Return the ends of the 95 % interval of the logarithm of the cut-off."""
+        most = fit.cost + HALF_CHI_SQUARED
+
+        def beyond(x: float) -> float:
+            return self.at(fit.allowed, x, fit.terms).cost - most
+
+        highest = self._get_highest(fit.allowed)
+
+        def end(sign: float) -> float:
+            inside, step = fit.x, fit.allowed.half_width
+            while abs(inside - fit.x) < _MAX_LOG_SHIFT:
+                outside = inside + sign * step
+                if outside >= highest:
+                    return highest
+                if beyond(outside) > 0.0:
+                    return float(brentq(beyond, inside, outside, xtol=_RELATIVE_TOLERANCE * step))
+                inside, step = outside, 2.0 * step
+            return inside
+
+        return end(-1.0), end(1.0)
+
+    def _get_highest(self, allowed: Allowed) -> float:
+        trial = allowed.filter
+        return math.log(get_highest_cutoff(trial.kind, trial.order, self._spectrum.rate))

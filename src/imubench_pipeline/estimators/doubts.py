@@ -99,11 +99,7 @@ def _doubt_walk(chosen: Candidate, candidates: Sequence[Candidate]) -> str | Non
 
 
 def _doubt_bias(chosen: Candidate, candidates: Sequence[Candidate]) -> str | None:
-    """Return a reason if a model with fewer or other terms of bias instability may be right.
-
-    Other terms count only for models with processes and without a walk: BIC penalises processes as
-    slow as a walk, and may therefore merge one with another process.
-    """
+    """Return a reason if a model with fewer or other terms of bias instability may be right."""
     terms, biases = chosen.terms, sum(chosen.terms.biases)
     if biases == 0:
         return None
@@ -115,6 +111,7 @@ def _doubt_bias(chosen: Candidate, candidates: Sequence[Candidate]) -> str | Non
         return texts.hardly_worse_bias(best.terms.name, terms.name, worse, several=biases > 1)
     other = min(candidates, key=lambda candidate: candidate.aic)
     better = chosen.aic - other.aic
+    # BIC penalises a process as slow as a walk, and may therefore merge it with another process.
     if terms.gauss_markov == 0 or "K" in terms.linear or other.terms.biases == terms.biases:
         return None
     if better < _DELTA_AIC_OTHER_BIAS_TERMS:

@@ -9,10 +9,41 @@ from typing import Literal
 import numpy as np
 
 from imubench_pipeline import units
-from imubench_pipeline.estimators.dimensions import DIMENSIONS
-from imubench_pipeline.noise import GaussMarkov, NoiseModel, Sinusoid
+from imubench_pipeline.noise import PARAMETERS as TERM_PARAMETERS
+from imubench_pipeline.noise import GaussMarkov, NoiseModel, Sinusoid, TermParameter
+from imubench_pipeline.settings.sensor import QUANTITIES
 from imubench_pipeline.typing import Array
 from imubench_pipeline.words.reasons import estimates as texts
+
+_OF_POWERS = {
+    (1.0, 1.0): "{quantity}_quantization",
+    (1.0, 0.5): "{quantity}_density",
+    (1.0, 0.0): "{signal}",
+    (1.0, -0.5): "{quantity}_random_walk",
+    (1.0, -1.0): "{quantity}_ramp",
+    (0.0, 1.0): "time",
+    (0.0, -1.0): "frequency",
+}
+"""Dimension (`units.SI_UNITS`) by the powers of the signal and of seconds."""
+
+
+def _get_dimension(quantity: str, parameter: TermParameter) -> str:
+    powers = parameter.signal, parameter.seconds
+    if powers not in _OF_POWERS:
+        raise ValueError(
+            f"the parameter {parameter.symbol} has the dimension signal^{powers[0]:g} "
+            f"s^{powers[1]:g}, expected one of which `units.SI_UNITS` has the unit"
+        )
+    return _OF_POWERS[powers].format(quantity=quantity, signal=QUANTITIES[quantity])
+
+
+DIMENSIONS: Mapping[str, Mapping[str, str]] = {
+    quantity: {symbol: _get_dimension(quantity, each) for symbol, each in TERM_PARAMETERS.items()}
+    | {"N_sensor": f"{quantity}_density"}
+    | {"B_curve": signal, "sigma_min": signal, "tau_min": "time"}
+    for quantity, signal in QUANTITIES.items()
+}
+"""Dimension (`units.SI_UNITS`) of each parameter and figure beside them, by quantity."""
 
 Status = Literal["ok", "doubtful", "not_shown", "at_bound", "not_identified", "absent"]
 
@@ -112,19 +143,13 @@ class Parameter:
 
 @dataclass(frozen=True, eq=False)
 class JointDraws:
-    """Noise models drawn from the posterior of an estimate, over the models the log allows.
-
-    Attributes
-    ----------
-    first : ndarray, shape (d, 6)
-        Q, N, B, T_B, K and R, SI, of each draw; 0 for an absent term. T_B is NaN where B is
-        flicker noise, or 0.
-    further : ndarray, shape (d, g, 2)
-        B and T_B of the further Gauss-Markov processes; 0 and NaN where a draw has fewer.
-    """
+    """Noise models drawn from the posterior of an estimate, over the models the log allows."""
 
     first: Array
+    """(d, 6): Q, N, B, T_B, K and R, SI, of each draw; 0 for an absent term. T_B is NaN where B is
+    flicker noise, or 0."""
     further: Array
+    """(d, g, 2): B and T_B of the further Gauss-Markov processes; 0 and NaN where there is none."""
 
     def __len__(self) -> int:
         return len(self.first)

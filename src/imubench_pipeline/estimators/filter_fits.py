@@ -10,8 +10,8 @@ import numpy as np
 from scipy.optimize import brentq, minimize_scalar
 
 from imubench_pipeline.estimators.estimate import SIGMAS
-from imubench_pipeline.estimators.goodness import assess_goodness_of_fit
 from imubench_pipeline.estimators.low_pass import BOXCAR_CUTOFF_LENGTH, Filter, Frequencies, Kind
+from imubench_pipeline.estimators.model_choice import assess_goodness_of_fit
 from imubench_pipeline.estimators.spectrum import Spectrum
 from imubench_pipeline.estimators.whittle import COARSE, Behind, Terms, Whittle, make_whittle
 from imubench_pipeline.estimators.whittle_kernels import TOLERANCE, fit_powers

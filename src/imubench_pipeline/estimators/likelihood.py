@@ -16,9 +16,8 @@ from numpy.typing import ArrayLike, NDArray
 from imubench_pipeline.allan import of_blocks
 from imubench_pipeline.allan.phase import Span, count_gaps, list_spans
 from imubench_pipeline.estimators import least_squares
-from imubench_pipeline.estimators.band import Band
 from imubench_pipeline.estimators.curve_bias import add_curve_figures, make_averaging_times
-from imubench_pipeline.estimators.cutoff import Cutoff
+from imubench_pipeline.estimators.cutoff import Cutoff, select_joint_models
 from imubench_pipeline.estimators.doubts import add_doubts, describe_drift_alternative
 from imubench_pipeline.estimators.estimate import (
     BROADBAND_TIME,
@@ -33,12 +32,12 @@ from imubench_pipeline.estimators.estimate import (
 )
 from imubench_pipeline.estimators.frame import (
     MIN_BINS,
+    Band,
     FitSelection,
     estimate_sensor_density,
     select_for_fit,
 )
 from imubench_pipeline.estimators.intervals import add_upper_limits, describe
-from imubench_pipeline.estimators.joint_cutoff import select_joint_models
 from imubench_pipeline.estimators.lines import Line, select_sinusoids
 from imubench_pipeline.estimators.missing import (
     average_blocks,
@@ -81,38 +80,21 @@ _MAX_ROUNDS = 12
 
 @dataclass(frozen=True)
 class Likelihood:
-    """Result of the likelihood estimation for a channel.
-
-    Attributes
-    ----------
-    estimates : tuple of Estimate
-        ``likelihood``, the model that the data favour, and ``likelihood_gm``, the papers' N, B,
-        T_B and K.
-    candidates : sequence of Candidate
-        The models tried, the best first; empty for a log that is too short.
-    lines : sequence of Line
-    band : Band or None
-        The frequencies used.
-    spectrum : Spectrum
-    clear, used : ndarray of bool, shape (b,)
-        The bins without lines, and the subset below the end of the band, which is used.
-    fitted : ndarray, shape (b,)
-        Density of the chosen model in each bin, its ramp included; NaN without a fit.
-    frame : FitSelection
-    stretch : WhiteStretch or None
-        The stretch of the Allan deviation with the slope -1/2.
-    """
+    """Result of the likelihood estimation for a channel."""
 
     estimates: tuple[Estimate, Estimate]
+    """``likelihood``, by the model that the data favour, and ``likelihood_gm``, by the papers'."""
     candidates: Sequence[Candidate]
+    """The models tried, the best first; empty for a log that is too short."""
     lines: Sequence[Line]
-    band: Band | None
+    band: Band | None  # the frequencies used
     spectrum: Spectrum
-    clear: NDArray[np.bool_]
-    used: NDArray[np.bool_]
+    clear: NDArray[np.bool_]  # (b,): the bins without lines
+    used: NDArray[np.bool_]  # (b,): the subset below the end of the band, which is used
     fitted: Array
+    """(b,): density of the chosen model in each bin, its ramp included; NaN without a fit."""
     frame: FitSelection
-    stretch: WhiteStretch | None = None
+    stretch: WhiteStretch | None = None  # of the Allan deviation, with the slope -1/2
 
     @property
     def low_pass(self) -> Cutoff | None:
@@ -201,16 +183,9 @@ def fit_blocks(
     then by the likelihood's own model, more often if more are missing; the bins count for the
     samples present only.
 
-    Parameters
-    ----------
-    blocks : callable
-        Returns the log in order, in SI, at every call; NaN where a sample is missing.
-    samples, holes : int, bool
-        L, the length of all blocks together; whether samples may be missing.
-    stretch : WhiteStretch or None
-        The stretch of the Allan deviation with the slope -1/2, whose white noise is N.
-    rate, segments, band, bandwidth, resolution, rng
-        As in `fit`.
+    ``blocks`` returns the log in order, in SI, at every call, NaN where a sample is missing;
+    ``samples`` is L, the length of all blocks together; with ``holes``, samples may be missing;
+    ``stretch`` is the stretch of the Allan deviation with the slope -1/2, whose white noise is N.
     """
     spans = list_spans(segments, samples)
     select = partial(select_for_fit, band=band, bandwidth=bandwidth, resolution=resolution)
@@ -241,9 +216,8 @@ def fit_blocks(
         if frame.used.sum() < MIN_BINS:
             break
         if number < rounds:
-            model = make_noise_model(
-                compare_models(frame.whittle(spectrum), quantization=False)[0].maximum
-            )
+            candidates = compare_models(frame.whittle(spectrum), quantization=False)
+            model = make_noise_model(candidates[0].maximum)
     return fit_spectrum(spectrum, frame, rng=rng, stretch=stretch)
 
 
@@ -256,7 +230,15 @@ def fit_spectrum(
 ) -> Likelihood:
     """Estimate the noise parameters from the selected bins of a spectrum (see `fit`)."""
     if frame.used.sum() < MIN_BINS:
-        return _too_short(spectrum, frame)
+        left, hidden = int(frame.used.sum()), int((~frame.clear).sum())
+        reason = texts.few_bins_left(left, MIN_BINS, frame.band.highest, hidden)
+        nothing = Parameter(None, "not_shown", reason)
+        unknown = dict.fromkeys(FAMILY, nothing), (), (), dict.fromkeys(CURVE, nothing)
+        both = Estimate("likelihood", *unknown), not_shown("likelihood_gm", reason)
+        nan = np.full(len(frame.used), np.nan)
+        return Likelihood(
+            both, (), frame.lines, None, spectrum, frame.clear, frame.used, nan, frame
+        )
     frame, whittle, candidates = fit_models(spectrum, frame)
     chosen = candidates[0]
     # A ramp is no noise: it is selected or not, and a possible one does not widen intervals.
@@ -358,19 +340,6 @@ class _InTheLog:
             for c in self.alike
         ]
         return draw_jointly(parts, self._whittle.longest)
-
-
-def _too_short(spectrum: Spectrum, frame: FitSelection) -> Likelihood:
-    """Return the result for a log with too few bins to fit."""
-    used, hidden = int(frame.used.sum()), int((~frame.clear).sum())
-    reason = texts.few_bins_left(used, MIN_BINS, frame.band.highest, hidden)
-    nothing = Parameter(None, "not_shown", reason)
-    estimate = Estimate(
-        "likelihood", dict.fromkeys(FAMILY, nothing), curve=dict.fromkeys(CURVE, nothing)
-    )
-    both = estimate, not_shown("likelihood_gm", reason)
-    fitted = np.full(len(frame.used), np.nan)
-    return Likelihood(both, (), frame.lines, None, spectrum, frame.clear, frame.used, fitted, frame)
 
 
 def fit_models(

@@ -1,16 +1,10 @@
 """Spectral lines: detection of sinusoids in the spectrum, and selection for the noise model.
 
 They are detected in Hann-windowed Fourier spectra averaged over segments (P. D. Welch, IEEE Trans.
-Audio Electroacoust. 15, 1967), so a line need not be phase-coherent over the whole log. Under the
-model the density of a bin over its expectation is chi-squared with two degrees of freedom per
-segment.
-
-The cost of filters and error budgets grows with the number of lines. The strongest are used
-individually, the weaker ones in a few groups of neighbours. Of n sinusoids A_i at f_i,
-
-    A^2 = sum A_i^2,   f^2 = A^2 / sum (A_i / f_i)^2
-
-preserves the variance of the signal, and of its integral.
+Audio Electroacoust. 15, 1967). Under the model the density of a bin over its expectation is
+chi-squared with two degrees of freedom per segment. Of many lines, the weaker ones are merged:
+A^2 = sum A_i^2 and f^2 = A^2 / sum (A_i / f_i)^2 preserve the variance of the signal and of its
+integral.
 """
 
 from __future__ import annotations
@@ -94,12 +88,8 @@ def find_lines(
 ) -> list[Line]:
     """Return the spectral lines of a log, sorted by frequency.
 
-    Parameters
-    ----------
-    spectra : sequence of LineSpectrum
-        Of block means for frequencies up to ``crossover``, Hz, and of samples above; or one only.
-    model : NoiseModel
-        Fit to the spectrum; a median over neighbouring bins corrects it where it deviates.
+    ``spectra`` are of block means for frequencies up to ``crossover``, Hz, and of samples above, or
+    one only; ``model`` is fitted to the spectrum, and a median over neighbouring bins corrects it.
     """
     searched = []
     for spectrum in spectra:
@@ -113,24 +103,18 @@ def find_lines(
             new = _find_in_spectrum(spectrum, model, rate, low, high, total)
             if len(new) > _MAX_FOUND:
                 new = sorted(new, key=lambda line: -line.ratio)[:_MAX_FOUND]
-            lines = _merge_spectra(lines, new)
+            # Above its band, the first spectrum has only skirts of strong lines.
+            for line in new:
+                wide = _LINE_HALF_WIDTH * line.resolution
+                same = [
+                    other
+                    for other in lines
+                    if abs(line.frequency - other.frequency) <= wide + 0.5 * other.width
+                ]
+                if all(line.amplitude > _MIN_AMPLITUDE_RATIO * other.amplitude for other in same):
+                    lines = [other for other in lines if other not in same] + [line]
     lines = [_mark_alias(line, lines, spectra[0].block, rate) for line in lines]
     return sorted(lines, key=lambda line: line.frequency)
-
-
-def _merge_spectra(lines: list[Line], new: list[Line]) -> list[Line]:
-    """Merge the lines of two spectra; the first has only skirts of strong lines above its band."""
-
-    def is_same(line: Line, other: Line) -> bool:
-        wide = _LINE_HALF_WIDTH * line.resolution + 0.5 * other.width
-        return abs(line.frequency - other.frequency) <= wide
-
-    joined = list(lines)
-    for line in new:
-        same = [other for other in joined if is_same(line, other)]
-        if all(line.amplitude > _MIN_AMPLITUDE_RATIO * other.amplitude for other in same):
-            joined = [other for other in joined if other not in same] + [line]
-    return joined
 
 
 def _mark_alias(line: Line, lines: list[Line], block: int, rate: float) -> Line:
@@ -297,7 +281,17 @@ def select_sinusoids(lines: Sequence[Line]) -> list[dict[str, Parameter]]:
     weaker = [line for line in narrow if line not in single]
     if weaker:
         groups = np.array_split(np.arange(len(weaker)), LINE_GROUPS)
-        sinusoids += [_group_lines([weaker[i] for i in group]) for group in groups]
+        for group in groups:
+            members = [weaker[i] for i in group]
+            amplitude = math.hypot(*(line.amplitude for line in members))
+            low = math.hypot(*(line.amplitude_lower for line in members))
+            high = math.hypot(*(line.amplitude_upper for line in members))
+            turns = math.hypot(*(line.amplitude / line.frequency for line in members))
+            first, last = members[0].frequency, members[-1].frequency
+            reason = texts.grouped_lines(len(members), first, last)
+            A = Parameter(amplitude, reason=reason, lower=low, upper=high)
+            f = Parameter(amplitude / turns, reason=reason, lower=first, upper=last)
+            sinusoids.append({"amplitude": A, "frequency": f})
     return sorted(sinusoids, key=lambda sinusoid: sinusoid["frequency"].value or 0.0)
 
 
@@ -314,17 +308,3 @@ def describe_grouping(channel: str, sinusoids: Sequence[Line]) -> Finding:
     number = len(sinusoids)
     data = TooManyLines(number, len(single), LINE_GROUPS, share, math.sqrt(rest))
     return find(data, "warning", float(number), channel)
-
-
-def _group_lines(lines: Sequence[Line]) -> dict[str, Parameter]:
-    """Return one sinusoid with the power, and the power of the integral, of several."""
-    amplitude = math.hypot(*(line.amplitude for line in lines))
-    low = math.hypot(*(line.amplitude_lower for line in lines))
-    high = math.hypot(*(line.amplitude_upper for line in lines))
-    frequency = amplitude / math.hypot(*(line.amplitude / line.frequency for line in lines))
-    first, last = lines[0].frequency, lines[-1].frequency
-    reason = texts.grouped_lines(len(lines), first, last)
-    return {
-        "amplitude": Parameter(amplitude, reason=reason, lower=low, upper=high),
-        "frequency": Parameter(frequency, reason=reason, lower=first, upper=last),
-    }

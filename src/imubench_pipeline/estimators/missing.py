@@ -1,15 +1,9 @@
 """Missing samples drawn from their distribution, given the samples present and a noise model.
 
-A spectrum needs a complete log. Each missing sample is replaced by a draw: white noise, plus the
-slow part of the noise, which a Kalman smoother interpolates from the block means on both sides.
-The result is distributed as a complete log if the model is right, so that fit and filling alternate
-(data augmentation).
-
-References
-----------
-M. Tanner and W. Wong, "The calculation of posterior distributions by data augmentation", J. Am.
-Stat. Assoc. 82, 1987; J. Durbin and S. J. Koopman, "A simple and efficient simulation smoother
-for state space time series analysis", Biometrika 89, 2002.
+A spectrum needs a complete log. A missing sample becomes white noise, plus the slow part of the
+noise, which a Kalman smoother interpolates from the block means on both sides (J. Durbin and S. J.
+Koopman, Biometrika 89, 2002). Fit and filling alternate (data augmentation: M. Tanner and W. Wong,
+J. Am. Stat. Assoc. 82, 1987).
 """
 
 from __future__ import annotations
@@ -182,11 +176,9 @@ def _draw_state_sum(
     state: Array,
     normals: Array,
 ) -> Array:
-    """Draw the sum of scalar states given measurements of it (Durbin and Koopman's smoother).
-
-    A path is simulated; the smoothed difference between the real and the simulated measurements is
-    added to it. It goes through the log in windows, each with a look ahead.
-    """
+    """Draw the sum of scalar states given measurements of it (Durbin and Koopman's smoother)."""
+    # The smoothed difference between the real and simulated measurements is added to a simulated
+    # path, in windows, each with a look ahead.
     # Plain loops: expressions of arrays take four times as long to compile.
     n, s = len(mean), len(decay)
     simulated, difference, path = np.empty(n), np.zeros(n), np.empty(n)

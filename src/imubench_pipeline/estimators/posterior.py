@@ -1,25 +1,23 @@
 """Draws from the posterior of a model, and joint draws over the models that the log allows.
 
 The prior is uniform in the amplitudes Q, N, B and K, in R, and in log T_B up to a fifth of the log.
-(A uniform prior in log N would put all mass at 0 if another term explains the spectrum without N.)
-
-The draws are by importance sampling: for each correlation time of a grid the posterior of the
-amplitudes is nearly normal, and a few Newton steps find its mode. If the effective sample size is
-too small, as along thin curved ridges between interchangeable terms, an adaptive Metropolis chain
-is used instead. Joint draws keep the correlations, such as of N and K, that matter for error
-budgets.
+The draws are by importance sampling, with an adaptive Metropolis chain where the effective sample
+size is too small, as along thin curved ridges between interchangeable terms.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
+from scipy.special import chdtri, ndtri
+from scipy.stats import qmc
 
 from imubench_pipeline.estimators.estimate import FAMILY, JointDraws
-from imubench_pipeline.estimators.importance import Mixture, sample_adaptively
 from imubench_pipeline.estimators.model_choice import (
     BIC_PENALTY_RARE_TERM,
     BIC_PENALTY_UNIT_ROOT,
@@ -29,11 +27,150 @@ from imubench_pipeline.estimators.model_choice import (
 from imubench_pipeline.estimators.posterior_kernels import (
     compute_log_posteriors,
     find_mode,
+    fit_mixture,
     run_metropolis_chain,
+    set_densities,
 )
 from imubench_pipeline.estimators.whittle import Maximum, Terms, Whittle
 from imubench_pipeline.estimators.whittle_kernels import Problem, interpolate_shape
 from imubench_pipeline.typing import Array
+
+_MIN_DEGREES = 5
+_FIRST_MIXTURE_WEIGHT = 0.15  # Of the first mixture in later ones, which keeps its support covered
+_MIN_COMPONENT_MASS = 0.01
+_LEARNING_POINTS = 2048  # Number of points to which a mixture is fitted
+
+_CLIPPED_POINTS = 8
+"""Highest weights that are clipped before a fit (Koblents and Míguez, Stat. Comput. 25, 2015)."""
+
+_EM_STEPS = 3  # Expectation-maximisation steps between two rounds
+
+
+@dataclass(frozen=True)
+class Mixture:
+    """A mixture of multivariate Student's t distributions."""
+
+    weights: Array  # (c,): they sum up to 1
+    means: Array  # (c, d)
+    scales: Array  # (c, d, d): positive definite
+
+    def draw(self, number: int, rng: np.random.Generator) -> Array:
+        """Return points, shape (number, d); ``number`` is a power of 2 (Sobol sequence)."""
+        uniform = qmc.Sobol(self.means.shape[1] + 2, seed=rng).random(number)
+        uniform = np.clip(uniform, 1e-12, 1.0 - 1e-12)
+        ends = np.cumsum(self.weights)
+        which = np.minimum(np.searchsorted(ends / ends[-1], uniform[:, 0]), len(ends) - 1)
+        normal = ndtri(uniform[:, 2:])
+        freedom = _get_degrees(self.means.shape[1])
+        normal /= np.sqrt(chdtri(freedom, uniform[:, 1]) / freedom)[:, None]
+        roots = np.linalg.cholesky(self.scales)
+        return np.asarray(self.means[which] + np.einsum("nij,nj->ni", roots[which], normal))
+
+    def densities(self, points: Array) -> Array:
+        """Return weight times density of each component, up to a constant, shape (n, c)."""
+        densities = np.empty((len(points), len(self.weights)))
+        freedom = _get_degrees(points.shape[1])
+        set_densities(points, self.weights, self.means, self._inverses, freedom, densities)
+        return densities
+
+    @cached_property
+    def _inverses(self) -> Array:
+        """Inverses of the roots of the scales."""
+        return np.linalg.inv(np.linalg.cholesky(self.scales))
+
+    def fitted(self, points: Array) -> Mixture:
+        """Return the mixture after one expectation-maximisation step on points."""
+        parts, freedom = self.densities(points), _get_degrees(points.shape[1])
+        weights, means = np.empty_like(self.weights), np.empty_like(self.means)
+        scales = np.zeros_like(self.scales)
+        old = (points, parts, self.means, self._inverses, freedom, _MIN_COMPONENT_MASS)
+        number = fit_mixture(*old, weights, means, scales)
+        if not number:
+            return self
+        return Mixture(weights[:number] / weights[:number].sum(), means[:number], scales[:number])
+
+
+@dataclass(frozen=True)
+class Weighted:
+    """Points and their weights."""
+
+    points: Array  # (n, d)
+    weights: Array  # (n,): they sum up to 1
+
+    @property
+    def effective(self) -> float:
+        """Effective sample size, 1 / sum w^2 (L. Kish, "Survey Sampling", 1965)."""
+        return float(1.0 / np.sum(self.weights**2))
+
+    def clipped(self, number: int) -> Weighted:
+        """Return the points with the ``number`` highest weights clipped to the lowest of them."""
+        most = np.partition(self.weights, -number)[-number]
+        if not most > 0.0:
+            return self
+        lowered = np.minimum(self.weights, most)
+        return Weighted(self.points, lowered / lowered.sum())
+
+    def drawn(self, number: int, rng: np.random.Generator) -> NDArray[np.int64]:
+        """Return indices of equally weighted points, in random order (systematic resampling)."""
+        ends = np.cumsum(self.weights)
+        places = (np.arange(number) + rng.random()) / number * ends[-1]
+        which = np.minimum(np.searchsorted(ends, places), len(ends) - 1)
+        return rng.permutation(which)
+
+
+def sample_adaptively(
+    log_density: Callable[[Array], Array],
+    first: Mixture,
+    rng: np.random.Generator,
+    *,
+    size: int,
+    wanted: float,
+    most: int,
+) -> Weighted:
+    """Draw weighted points from a density until their effective sample size suffices.
+
+    ``log_density`` returns the logarithm of the density at points, shape (n, d), up to a constant,
+    -inf where it is 0; ``first`` is the proposal of the first round; a round has ``size`` points, a
+    power of 2, all have ``most``; ``wanted`` is the effective sample size.
+
+    References
+    ----------
+    J.-M. Cornuet, J.-M. Marin, A. Mira and C. P. Robert, "Adaptive multiple importance sampling",
+    Scandinavian Journal of Statistics 39, 2012.
+    """
+    mixtures, mixture = [first], first
+    points = first.draw(size, rng)
+    values = log_density(points)
+    proposed = first.densities(points).sum(axis=1)
+    while True:
+        with np.errstate(divide="ignore"):
+            logarithm = values - np.log(proposed)
+        weights = np.exp(logarithm - logarithm.max())
+        weighted = Weighted(points, weights / weights.sum())
+        if weighted.effective >= wanted or len(points) + size > most:
+            return weighted
+        learnt = points[weighted.clipped(_CLIPPED_POINTS).drawn(_LEARNING_POINTS, rng)]
+        for _ in range(_EM_STEPS):
+            mixture = mixture.fitted(learnt)
+        part = _FIRST_MIXTURE_WEIGHT
+        proposal = Mixture(
+            np.concatenate([(1.0 - part) * mixture.weights, part * first.weights]),
+            np.concatenate([mixture.means, first.means]),
+            np.concatenate([mixture.scales, first.scales]),
+        )
+        added = proposal.draw(size, rng)
+        proposed = proposed + proposal.densities(points).sum(axis=1)
+        mixtures.append(proposal)
+        everywhere = [earlier.densities(added).sum(axis=1) for earlier in mixtures]
+        points = np.concatenate([points, added])
+        values = np.concatenate([values, log_density(added)])
+        proposed = np.concatenate([proposed, np.sum(everywhere, axis=0)])
+
+
+def _get_degrees(dimensions: int) -> int:
+    """Return degrees of freedom with an even sum with ``dimensions``: the power has no root."""
+    return _MIN_DEGREES + (_MIN_DEGREES + dimensions) % 2
+
 
 MAX_DRAWS = 80_000  # Default number of draws; a tail of 2.5 % has 2,000 of them
 _DRAWS_PER_POINT = 6  # Draws per independent point; limits of two seeds agree within 3 %
@@ -82,7 +219,8 @@ def sample(
         amplitudes = target.amplitudes(points.points[which])
     else:
         effective = math.nan
-        start, covariance = target.start()
+        # The mode of the amplitudes at the best T_B, and the covariance there.
+        start, covariance = target.make_component(np.log(maximum.times), 1.0)
         amplitudes = run_metropolis_chain(start, covariance, rng, draws, target.problem)
     return target.posterior(amplitudes, effective, rng)
 
@@ -149,7 +287,7 @@ class _Target:
             places += [np.array([a, b]) for i, a in enumerate(grid) for b in grid[i + 1 :]]
         widths = [_MAX_SIGMA] + [_COMPONENT_SIGMA * apart] * (len(places) - 1)
         components = [
-            self._make_component(at, width) for at, width in zip(places, widths, strict=True)
+            self.make_component(at, width) for at, width in zip(places, widths, strict=True)
         ]
         if self.terms > 1:
             components += [self._make_weak_component(term) for term in self.weak]
@@ -171,11 +309,7 @@ class _Target:
         scales *= slope[:, :, None] * slope[:, None, :]
         return Mixture(weights[heavy] / weights[heavy].sum(), means[heavy], scales[heavy])
 
-    def start(self) -> tuple[Array, Array]:
-        """Return the mode of the amplitudes at the best T_B, and the covariance there."""
-        return self._make_component(np.log(self.maximum.times), 1.0)
-
-    def _make_component(self, places: Array, width: float) -> tuple[Array, Array]:
+    def make_component(self, places: Array, width: float) -> tuple[Array, Array]:
         """Return mean and covariance of a normal component about correlation times."""
         return self._approximate_normal(self.log_fitted, places, width, self.problem)
 
@@ -241,12 +375,9 @@ class _Target:
         times = np.exp(amplitudes[:, p:])
         order = np.argsort(times, axis=1)
         biases = np.take_along_axis(np.exp(amplitudes[:, self.linear : p]), order, axis=1)
-        return Posterior(
-            np.concatenate([np.exp(amplitudes[:, : self.linear]), biases], axis=1),
-            np.take_along_axis(times, order, axis=1),
-            ramps * self.ramp_unit,
-            effective,
-        )
+        parameters = np.concatenate([np.exp(amplitudes[:, : self.linear]), biases], axis=1)
+        rising = np.take_along_axis(times, order, axis=1)
+        return Posterior(parameters, rising, ramps * self.ramp_unit, effective)
 
 
 def compute_draw_weight(candidate: Candidate, bins: int) -> float:
@@ -270,42 +401,35 @@ def draw_jointly(
 
     They are selected at equal distances of the cumulative weight (systematic resampling without a
     random start). ``parts`` are the models that the log does not exclude, with unnormalised
-    weights; ``longest`` is the longest correlation time that the log can determine, s.
-
-    Raises
-    ------
-    ValueError
-        If there is no model, or no weight above 0.
+    weights; ``longest`` is the longest correlation time that the log can determine, s. Raises
+    ValueError if there is no model, or no weight above 0.
     """
     if not sum(share for _, _, share in parts) > 0.0:
         raise ValueError("expected models with shares above 0")
     most = max(terms.gauss_markov for terms, _, _ in parts)
-    drawn = [_convert_draws(terms, posterior, most) for terms, posterior, _ in parts]
-    first = np.concatenate([first_components for first_components, _ in drawn])
-    further = np.concatenate([processes for _, processes in drawn])
     counts = [len(posterior.parameters) for _, posterior, _ in parts]
+    firsts, others = [], []
+    for (terms, posterior, _), count in zip(parts, counts, strict=True):
+        linear = len(terms.linear)
+        first = np.zeros((count, len(FAMILY)))
+        first[:, FAMILY.index("T_B")] = np.nan
+        first[:, FAMILY.index("R")] = posterior.ramps
+        for place, letter in enumerate(terms.linear):
+            column = FAMILY.index("B" if letter == "F" else letter)
+            first[:, column] = posterior.parameters[:, place]
+        pairs = np.stack([posterior.parameters[:, linear:], posterior.times], axis=2)
+        if terms.gauss_markov and "F" not in terms.linear:
+            # By convention the first component is flicker noise, or else the fastest process.
+            first[:, FAMILY.index("B")], first[:, FAMILY.index("T_B")] = pairs[:, 0].T
+            pairs = pairs[:, 1:]
+        processes = np.tile([0.0, np.nan], (count, most, 1))
+        processes[:, : pairs.shape[1]] = pairs
+        firsts.append(first)
+        others.append(processes)
+    first, further = np.concatenate(firsts), np.concatenate(others)
     mass = np.repeat([share / n for (_, _, share), n in zip(parts, counts, strict=True)], counts)
     times = np.column_stack((first[:, FAMILY.index("T_B")], further[:, :, 1]))
     slow = (times > WALK_LIKE_TIME_FRACTION * longest).any(axis=1)
     mass = np.cumsum(np.where(slow, math.exp(-0.5 * BIC_PENALTY_UNIT_ROOT), 1.0) * mass)
     rows = np.searchsorted(mass, (np.arange(number) + 0.5) / number * mass[-1])
     return JointDraws(first[rows], further[rows])
-
-
-def _convert_draws(terms: Terms, posterior: Posterior, most: int) -> tuple[Array, Array]:
-    """Return the first components and the further processes of the draws of one model."""
-    linear, count = len(terms.linear), len(posterior.parameters)
-    first = np.zeros((count, len(FAMILY)))
-    first[:, FAMILY.index("T_B")] = np.nan
-    first[:, FAMILY.index("R")] = posterior.ramps
-    for place, letter in enumerate(terms.linear):
-        column = FAMILY.index("B" if letter == "F" else letter)
-        first[:, column] = posterior.parameters[:, place]
-    pairs = np.stack([posterior.parameters[:, linear:], posterior.times], axis=2)
-    if terms.gauss_markov and "F" not in terms.linear:
-        # By convention the first component is flicker noise, or else the fastest process.
-        first[:, FAMILY.index("B")], first[:, FAMILY.index("T_B")] = pairs[:, 0].T
-        pairs = pairs[:, 1:]
-    further = np.tile([0.0, np.nan], (count, most, 1))
-    further[:, : pairs.shape[1]] = pairs
-    return first, further

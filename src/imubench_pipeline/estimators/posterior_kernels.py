@@ -15,8 +15,12 @@ from numba import njit
 from imubench_pipeline.estimators.whittle_kernels import (
     Bins,
     Problem,
+    ShapeTable,
     compute_cost,
+    fit_powers,
+    fit_ramp,
     interpolate_shape,
+    profile_cost,
 )
 from imubench_pipeline.typing import Array
 
@@ -25,17 +29,6 @@ _TOLERANCE = 1e-3
 _LONGEST_STEP = 1.5
 _BURN_IN = 4_000
 _ADAPT_EVERY = 250
-
-
-@njit(cache=True)
-def _ramp_at(bins: Bins, model: Array) -> tuple[float, float]:
-    """Return the best R given the noise, and its information."""
-    nu, _, cross, ramp = bins
-    above, below = 0.0, 0.0
-    for i in range(nu.size):
-        above += nu[i] * cross[i] / model[i]
-        below += nu[i] * ramp[i] / model[i]
-    return (above / below, below) if below > 0.0 else (0.0, 0.0)
 
 
 @njit(cache=True)
@@ -64,7 +57,7 @@ def compute_log_posterior(
         value += point[j]  # flat in the amplitude a is e^x in x = log a
     if not with_ramp:
         return value, 0.0, 0.0
-    best, information = _ramp_at(bins, model)
+    best, information = fit_ramp(bins, model)
     if information > 0.0:
         value += 0.5 * (best * best * information - math.log(information))
     return value, best, information
@@ -86,12 +79,8 @@ def find_mode(start: Array, times: Array, problem: Problem) -> tuple[Array, Arra
 
     ``start``: log amplitudes; D_j, shape (b, p), is the density of a term over the density of
     the model, times 2. The curvature of the posterior is sum nu D_j D_k / 2, and 2 from a flat
-    amplitude, which bounds an absent term away from 0.
-
-    Raises
-    ------
-    LinAlgError
-        If the curvature is not finite, or has no inverse.
+    amplitude, which bounds an absent term away from 0. Raises LinAlgError if the curvature is not
+    finite, or has no inverse.
     """
     fixed, bins, with_ramp, table = problem
     b, linear = fixed.shape
@@ -149,7 +138,7 @@ def _climb(
             for j in range(p):
                 density_i += powers[j] * columns[i, j]
             model[i] = density_i
-        R = _ramp_at(bins, model)[0] if with_ramp else 0.0
+        R = fit_ramp(bins, model)[0] if with_ramp else 0.0
         for i in range(b):
             data[i] = density[i]
             if with_ramp:
@@ -342,3 +331,22 @@ def fit_mixture(
         new_weights[count] = mass
         count += 1
     return count
+
+
+def compile_kernels() -> None:
+    """Compile the kernels, or load them from numba's cache.
+
+    Only numba is imported, so that a separate process can begin during the other imports. The calls
+    have the types of an estimate (see `tests/estimators/test_compilation`).
+    """
+    bins = Bins(*np.ones((4, 8)))
+    problem = Problem(np.ones((8, 1)), bins, False, ShapeTable(0.0, 1.0, np.zeros((2, 8))))
+    place = np.zeros(1)
+    profile_cost(place, problem, 1.0)
+    fit_powers(problem.fixed, bins, False, 1.0)
+    find_mode(np.zeros(2), place, problem)
+    compute_log_posteriors(np.zeros((1, 3)), problem)
+    weights, means, scales = np.ones(1), np.zeros((1, 1)), np.ones((1, 1, 1))
+    points, densities = np.arange(3.0)[:, None], np.empty((3, 1))
+    set_densities(points, weights, means, scales, 5, densities)
+    fit_mixture(points, densities, means, scales, 5, 0.0, weights, means.copy(), scales.copy())

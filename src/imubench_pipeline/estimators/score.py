@@ -19,36 +19,24 @@ SUREST = 0.02
 
 @dataclass(frozen=True)
 class Scores:
-    """Scores of one model; those of draws are the median of single ones and its 90 % range.
-
-    Attributes
-    ----------
-    rms : float
-        Weighted RMS over tau of the model's Allan deviation less the measured one, rad/s or m/s².
-    rms_log10 : float
-        The same of the difference of log10, decades.
-    drawn, drawn_lower, drawn_upper : float
-        ``rms`` of single draws.
-    drawn_log10, drawn_log10_lower, drawn_log10_upper : float
-        ``rms_log10`` of single draws.
-    whole, whole_lower, whole_upper : float
-        RMS of single draws with equal weights up to the longest tau, as in Maia et al., Table 3.
-    inside_band : float
-        Share of the measured curve inside the 95 % band of the draws.
-    """
+    """Scores of one model; for draws, the median of single ones and its 90 % range."""
 
     rms: float
-    rms_log10: float
+    """Weighted RMS over tau of the model's Allan deviation less the measured one, rad/s or m/s²."""
+    rms_log10: float  # the same of the difference of log10, decades
     drawn: float
     drawn_lower: float
     drawn_upper: float
+    """``rms`` of single draws."""
     drawn_log10: float
     drawn_log10_lower: float
     drawn_log10_upper: float
+    """``rms_log10`` of single draws."""
     whole: float
     whole_lower: float
     whole_upper: float
-    inside_band: float
+    """RMS of single draws with equal weights up to the longest tau, as in Maia et al., Table 3."""
+    inside_band: float  # share of the measured curve inside the 95 % band of the draws
 
 
 def weights(error: Array) -> Array:
@@ -78,19 +66,9 @@ def beats(one: Array, other: Array) -> float:
 def score(measured: Array, error: Array, model: Array, draws: Array) -> Scores:
     """Score a model against a measured curve.
 
-    Parameters
-    ----------
-    measured, error : ndarray, shape (m,)
-        Allan deviation, rad/s or m/s², and its relative standard error.
-    model : ndarray, shape (m,)
-        Allan deviation of the model.
-    draws : ndarray, shape (k, m)
-        Allan deviations of simulated logs.
-
-    Raises
-    ------
-    ValueError
-        If the shapes differ.
+    ``measured``, rad/s or m/s², its relative standard ``error``, and ``model`` are Allan
+    deviations, shape (m,); ``draws``, shape (k, m), are of simulated logs. Raises ValueError if the
+    shapes differ.
     """
     if not measured.shape == error.shape == model.shape == draws.shape[1:]:
         raise ValueError(

@@ -74,16 +74,8 @@ def find_missing_slow_noise(
     less had its bias zeroed repeatedly at rest, passed a high-pass, or had a curve or means of its
     parts subtracted: its K and B, and the dead reckoning errors computed from them, are too small.
     Ordinates of white noise over N^2 sum to chi-squared, with nu degrees of freedom: a sum far
-    below is not chance.
-
-    Parameters
-    ----------
-    spectrum : Spectrum
-        Of the log without corrections.
-    fitted : ndarray, shape (b,)
-        Density of the chosen model in each bin; NaN where there is none.
-    white : float or None
-        Lower limit of N, SI; None if unknown.
+    below is not chance. ``spectrum`` is of the log without corrections; ``fitted``, shape (b,), the
+    density of the chosen model in each bin, or NaN; ``white`` the lower limit of N, SI, if known.
     """
     if not white or not np.isfinite(white):
         return None

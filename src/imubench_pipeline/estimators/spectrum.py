@@ -74,23 +74,9 @@ def compute_spectra(
 ) -> tuple[Spectrum, list[LineSpectrum]]:
     """Return the spectrum of a log, and the spectra for the detection of lines.
 
-    Parameters
-    ----------
-    blocks : iterable of ndarray
-        The log in order, in SI, without missing samples inside the segments
-        (`missing.fill_missing`).
-    samples : int
-        L, the length of all blocks together.
-    rate : float
-        Hz.
-    segments : sequence of (int, int), optional
-        First and one-past-last sample of each part of the log; one by default. Each part has its
-        own transform of low frequencies.
-
-    Raises
-    ------
-    ValueError
-        If a sample inside a segment is missing, or the log has fewer than 16 samples.
+    The blocks are the log in order, in SI, ``samples`` long together. Each segment (first and
+    one-past-last sample; one by default) has its own transform of low frequencies. Raises
+    ValueError if a sample inside a segment is missing, or the log has fewer than 16 samples.
 
     References
     ----------

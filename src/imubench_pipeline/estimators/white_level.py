@@ -1,12 +1,8 @@
 """N as the Allan deviation shows it: the level of its first -1/2 stretch.
 
-White noise has sigma(tau) sqrt(tau) = N at every tau. White noise of density N_0 with a
-Gauss-Markov process faster than a second has the level N_0 at tau far below T_B, and
-
-    N^2 = N_0^2 + S_B T_B^2
-
-at tau far above it. N is the level of the first stretch of the curve that lasts. A process that is
-part of N is removed from the model, so that it is not counted twice.
+White noise of density N_0 with a Gauss-Markov process faster than a second has the level N_0 at
+tau far below T_B, and N^2 = N_0^2 + S_B T_B^2 far above it. A process that is part of N is removed
+from the model, so that it is not counted twice.
 """
 
 from __future__ import annotations

@@ -68,6 +68,17 @@ def compute_cost(nu: Array, data: Array, density: Array) -> float:
 
 
 @njit(cache=True)
+def fit_ramp(bins: Bins, model: Array) -> tuple[float, float]:
+    """Return the best R given the density of the noise, shape (b,), and its information."""
+    nu, _, cross, ramp = bins
+    above, below = 0.0, 0.0
+    for i in range(nu.size):
+        above += nu[i] * cross[i] / model[i]
+        below += nu[i] * ramp[i] / model[i]
+    return (above / below, below) if below > 0.0 else (0.0, 0.0)
+
+
+@njit(cache=True)
 def _solved(gram: Array, target: Array, free: NDArray[np.bool_]) -> Array:
     """Return x with gram x = target over the free variables, 0 elsewhere (Cholesky)."""
     p = target.size
@@ -186,11 +197,7 @@ def fit_powers(
     observed, allowed = False, True
     for iteration in range(_MOST_STEPS):
         if with_ramp and iteration > 0:
-            above, below = 0.0, 0.0
-            for i in range(b):
-                above += nu[i] * cross[i] / model[i]
-                below += nu[i] * ramp[i] / model[i]
-            R = above / below if below > 0.0 else 0.0
+            R = fit_ramp(bins, model)[0]
             for i in range(b):
                 data[i] = max(density[i] - 2.0 * R * cross[i] + R * R * ramp[i], 0.0)
             cost = compute_cost(nu, data, model)

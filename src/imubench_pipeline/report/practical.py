@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from functools import cache
 from typing import Literal
 
-from imubench_pipeline.estimators.dimensions import DIMENSIONS
+from imubench_pipeline.estimators.estimate import DIMENSIONS
 from imubench_pipeline.model.comparisons import DatasheetRow, RepeatabilityRow
 from imubench_pipeline.model.recordings import RecordingRow
 from imubench_pipeline.settings.sensor import QUANTITIES

@@ -195,7 +195,13 @@ def _describe(ordinates: Ordinates, searched: SearchResult) -> Iterator[Determin
         if regressor.kind not in ("exponential", "restart"):
             # The place was selected to maximise the size; and the amplitude of less than one
             # period depends on the period.
-            error = math.hypot(error, _compute_spread(ordinates, fit, regressor, own, (low, high)))
+            sizes = [size]
+            for where in (low, high):
+                moved = tuple(
+                    replace(x, where=where) if x is regressor else x for x in fit.regressors
+                )
+                sizes.append(_compute_size(ordinates.solve(moved, fit.density)[0][own]))
+            error = math.hypot(error, 0.5 * float(np.ptp(sizes)))
         place = start + regressor.where * means.interval
         step = regressor.kind in ("step", "restart")
         times: tuple[float | None, ...] = (None, None, None)
@@ -243,17 +249,6 @@ def _find_limits(ordinates: Ordinates, fit: Fit, regressor: Regressor) -> tuple[
             away *= 1.5
         limits.append(min(max(regressor.where + side * away, least), float(n)))
     return limits[0], limits[1]
-
-
-def _compute_spread(
-    ordinates: Ordinates, fit: Fit, regressor: Regressor, own: slice, limits: tuple[float, float]
-) -> float:
-    """Return half the range of the size over the limits of its place."""
-    sizes = [_compute_size(fit.sizes[own])]
-    for where in limits:
-        moved = tuple(replace(x, where=where) if x is regressor else x for x in fit.regressors)
-        sizes.append(_compute_size(ordinates.solve(moved, fit.density)[0][own]))
-    return 0.5 * float(np.ptp(sizes))
 
 
 def _compute_size(amplitudes: Array) -> float:

@@ -140,34 +140,19 @@ def _split_at_gaps(start: int, size: int, rows: Array, interval: float) -> list[
         kurtosis = 0.0
         if square > 0.0:
             kurtosis = 2.0 * (float(fourth[span][usable].mean()) / square**2 - 3.0)
-        parts.append(
-            Part(
-                start + span.start * size,
-                _fill_gaps(mean[span], present),
-                np.where(present, power[span], np.nan),
-                kurtosis,
-                _find_pauses(~present, interval),
-            )
-        )
+        edges = np.flatnonzero(np.diff((~present).astype(np.int8), prepend=0, append=0))
+        begin, end = edges[::2].astype(np.float64), edges[1::2].astype(np.float64)
+        pauses = np.flatnonzero((end - begin) * interval >= _MIN_PAUSE)
+        pauses = pauses[np.argsort(begin[pauses] - end[pauses], kind="stable")][:_MAX_PAUSES]
+        pauses.sort()
+        of_pauses = tuple(zip(0.5 * (begin + end)[pauses], (end - begin)[pauses], strict=True))
+        filled, powers = _fill_gaps(mean[span], present), np.where(present, power[span], np.nan)
+        parts.append(Part(start + span.start * size, filled, powers, kurtosis, of_pauses))
     return parts
 
 
-def _find_pauses(missing: NDArray[np.bool_], interval: float) -> tuple[tuple[float, float], ...]:
-    """Return middle and length of the longest runs of missing blocks, in order."""
-    edges = np.flatnonzero(np.diff(missing.astype(np.int8), prepend=0, append=0))
-    first, end = edges[::2].astype(np.float64), edges[1::2].astype(np.float64)
-    long = np.flatnonzero((end - first) * interval >= _MIN_PAUSE)
-    longest = long[np.argsort(first[long] - end[long], kind="stable")][:_MAX_PAUSES]
-    longest.sort()
-    return tuple(zip(0.5 * (first + end)[longest], (end - first)[longest], strict=True))
-
-
 def _fill_gaps(mean: Array, present: NDArray[np.bool_]) -> Array:
-    """Fill blocks without samples by interpolation, plus white noise as in the other blocks.
-
-    A long gap is interpolated between means of several blocks: the white noise of a single block
-    would create a slow signal across the gap.
-    """
+    """Fill blocks without samples by interpolation, plus white noise as in the other blocks."""
     if present.all():
         return mean
     filled = mean.copy()
@@ -179,6 +164,7 @@ def _fill_gaps(mean: Array, present: NDArray[np.bool_]) -> Array:
     missing = np.flatnonzero(~present)
     for run in np.split(missing, np.flatnonzero(np.diff(missing) > 1) + 1):
         first, last = int(run[0]), int(run[-1])
+        # The white noise of a single block would create a slow signal across a long gap.
         reach = max(1, len(run) // 4)
         before = slice(max(0, first - reach), first)
         after = slice(last + 1, last + 1 + reach)

@@ -151,16 +151,8 @@ class Ordinates:
         assert density is not None  # it was set in every round
         if regressors:
             sizes, covariance, residual, leverage = self.solve(regressors, density)
-        return Fit(
-            tuple(regressors),
-            sizes,
-            covariance,
-            noise,
-            density,
-            residual,
-            leverage,
-            self.log_likelihood(residual, density),
-        )
+        fitted = sizes, covariance, noise, density, residual, leverage
+        return Fit(tuple(regressors), *fitted, self.log_likelihood(residual, density))
 
     def extrapolate_density(self, fit: Fit, held_out: int) -> Array:
         """Return the density of noise fitted without the lowest ordinates, extrapolated to them."""

@@ -93,11 +93,8 @@ def _tabulate_half_angles(n: int) -> tuple[Array, Array, Array]:
 
 
 def _transform_sinusoid(n: int, angle: float) -> Array:
-    """Return the coefficients of cos and sin of angle (i + 1/2), shape (2, n - 1).
-
-    It uses sum_i cos(t (i + 1/2)) = sin(n t) / (2 sin(t / 2)), and the same sum of sines, for t the
-    sum and the difference of both angles.
-    """
+    """Return the coefficients of cos and sin of angle (i + 1/2), shape (2, n - 1)."""
+    # sum_i cos(t (i + 1/2)) = sin(n t) / (2 sin(t / 2)), t the sum or difference of both angles.
     cos, sin, sign = _tabulate_half_angles(n)
     a, b = math.sin(0.5 * angle) * cos, math.cos(0.5 * angle) * sin
     both = np.zeros((2, n - 1))

@@ -71,7 +71,14 @@ def find_best_scores(
         basis = _orthonormalise([row for x in others for row in ordinates.columns(x)], w)
         if not smooth:
             yield from _score_steps_and_pulses(number, n, w, r, basis, parts)
-        yield _score_exponentials(number, n, w, r, basis, parts)
+        times, columns = _tabulate_exponentials(n)
+        low = slice(0, columns.shape[1])
+        gains = _compute_gains(columns, w[low], r[low], basis[:, low])
+        best = int(np.argmax(gains))
+        chance = FALSE_ALARM_PROBABILITY["exponential"] / parts
+        threshold = _compute_threshold(chance, float(_TIME_CONSTANTS), _TIME_CONSTANTS)
+        exponential = Regressor("exponential", number, float(times[best]))
+        yield Score(exponential, float(gains[best]), threshold)
         yield _score_sinusoids(number, n, w, r, basis, parts)
         ramp = Regressor("ramp", number)
         gain = _compute_gains(ordinates.columns(ramp), w, r, basis)[0]
@@ -144,13 +151,14 @@ def _score_steps_and_pulses(
 ) -> Iterator[Score]:
     k = np.arange(1, n)
     slope = -math.sqrt(2.0 / n) / (2.0 * np.sin(np.pi * k / (2.0 * n)))
-    above = _sum_sines(slope * w * r)
+    # The sums of sin(pi k t / n) over k, for t = 1 ... n - 1, are half a DST-I.
+    above = 0.5 * scipy.fft.dst(slope * w * r, type=1)
     power = slope**2 * w
     turned = scipy.fft.fft(np.concatenate(([0.0], power))).real
     whole = 0.5 * (turned[0] - turned[1:])
     left = whole.copy()
     for row in basis:
-        left -= _sum_sines(slope * w * row) ** 2
+        left -= (0.5 * scipy.fft.dst(slope * w * row, type=1)) ** 2
     gains = _normalise_output(above, whole, left)
     gains[: _EDGE_BLOCKS - 1] = 0.0
     gains[n - _EDGE_BLOCKS :] = 0.0
@@ -195,11 +203,6 @@ def _compute_threshold(chance: float, apart: float, places: int) -> float:
     return high
 
 
-def _sum_sines(values: Array) -> Array:
-    """Return sum_k a_k sin(pi k t / n) for t = 1 ... n - 1."""
-    return np.asarray(0.5 * scipy.fft.dst(values, type=1))
-
-
 @lru_cache(maxsize=8)
 def _tabulate_exponentials(n: int) -> tuple[Array, Array]:
     """Return time constants in blocks and their coefficients, shape (t, n - 1)."""
@@ -208,18 +211,6 @@ def _tabulate_exponentials(n: int) -> tuple[Array, Array]:
         Regressor("exponential", 0, t).coefficients(n)[:, :_EXPONENTIAL_ORDINATES] for t in times
     ]
     return times, np.concatenate(rows)
-
-
-def _score_exponentials(number: int, n: int, w: Array, r: Array, basis: Array, parts: int) -> Score:
-    times, columns = _tabulate_exponentials(n)
-    low = slice(0, columns.shape[1])
-    gains = _compute_gains(columns, w[low], r[low], basis[:, low])
-    best = int(np.argmax(gains))
-    chance = FALSE_ALARM_PROBABILITY["exponential"] / parts
-    threshold = _compute_threshold(chance, float(_TIME_CONSTANTS), _TIME_CONSTANTS)
-    return Score(
-        Regressor("exponential", number, float(times[best])), float(gains[best]), threshold
-    )
 
 
 @lru_cache(maxsize=8)
@@ -251,12 +242,8 @@ def _score_sinusoids(number: int, n: int, w: Array, r: Array, basis: Array, part
     c = c - np.sum(projected[0] * projected[1], axis=1)
     left = a * b - c**2
     good = left > 10.0 * _MIN_INDEPENDENT_POWER * whole
-    gains = np.where(
-        good,
-        (b * above[0] ** 2 - 2.0 * c * above[0] * above[1] + a * above[1] ** 2)
-        / np.where(good, left, 1.0),
-        0.0,
-    )
+    form = b * above[0] ** 2 - 2.0 * c * above[0] * above[1] + a * above[1] ** 2
+    gains = np.where(good, form / np.where(good, left, 1.0), 0.0)
     best = int(np.argmax(gains))
     # Each has two amplitudes; there are two independent frequencies per cycle.
     chance = FALSE_ALARM_PROBABILITY["sinusoid"] / parts / (2.0 * len(cycles) * _CYCLE_STEP)

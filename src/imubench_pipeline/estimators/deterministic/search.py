@@ -1,14 +1,9 @@
 """Search for deterministic signals: forward selection by likelihood ratios, then elimination.
 
-Noise and signals compete: a step increases the fitted random walk, and noise fitted to a signal
-hides it. Signals are therefore searched above the noise as fitted, and slow signals also above the
-noise as extrapolated from higher frequencies. A candidate above its threshold is tested by the
-likelihood ratio of the models with and without it, the noise refitted.
-
-A signal that a random walk hides completely is found by comparing noise without a walk plus the
-signal with noise including the walk. If it is not significantly better, it is not removed from the
-log, but reported as the walk's rival. The places of steps at the pauses of a log are known, so
-their threshold depends on their number only.
+Noise fitted to a signal hides it: slow signals are also searched above the noise as extrapolated
+from higher frequencies. A candidate above its threshold is tested by the likelihood ratio of the
+models with and without it, the noise refitted. A signal that a random walk hides completely is
+compared with the walk; if it is not significantly better, it is reported as the walk's rival.
 """
 
 from __future__ import annotations
@@ -287,21 +282,15 @@ def _extend_fit(ordinates: Ordinates, fit: Fit) -> Fit | None:
 def _eliminate(ordinates: Ordinates, fit: Fit) -> tuple[Fit, tuple[float, ...]]:
     """Remove regressors that others made unnecessary; return the gain of each of the rest."""
     while True:
-        gains = [_compute_loss_without(ordinates, fit, i) for i in range(len(fit.regressors))]
-        margins = [
-            gain - _MIN_KEPT_GAIN[x.kind] for x, gain in zip(fit.regressors, gains, strict=True)
-        ]
+        gains, margins = [], []
+        for which, regressor in enumerate(fit.regressors):
+            others, least = leave_out(fit.regressors, which), _MIN_KEPT_GAIN[regressor.kind]
+            gain = Gain(ordinates, others, fit.density, regressor.part).of(regressor)
+            if len(others) <= 2 or gain <= _CERTAIN_GAIN_FACTOR * least:
+                without = ordinates.fit(others, fit.density)
+                gain = 2.0 * (fit.log_likelihood - without.log_likelihood)
+            gains.append(gain)
+            margins.append(gain - least)
         if not margins or min(margins) > 0.0:
             return fit, tuple(gains)
         fit = ordinates.fit(leave_out(fit.regressors, int(np.argmin(margins))), fit.density)
-
-
-def _compute_loss_without(ordinates: Ordinates, fit: Fit, which: int) -> float:
-    """Return twice the log likelihood that is lost without a regressor."""
-    regressor = fit.regressors[which]
-    others = leave_out(fit.regressors, which)
-    for_this_noise = Gain(ordinates, others, fit.density, regressor.part).of(regressor)
-    if len(others) > 2 and for_this_noise > _CERTAIN_GAIN_FACTOR * _MIN_KEPT_GAIN[regressor.kind]:
-        return for_this_noise
-    without = ordinates.fit(others, fit.density)
-    return 2.0 * (fit.log_likelihood - without.log_likelihood)

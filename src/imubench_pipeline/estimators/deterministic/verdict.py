@@ -19,7 +19,6 @@ from imubench_pipeline.estimators.deterministic.courses import (
 )
 from imubench_pipeline.estimators.deterministic.means import (
     Means,
-    Stationarity,
     assess_stationarity,
 )
 from imubench_pipeline.estimators.deterministic.ordinates import Ordinates
@@ -32,8 +31,7 @@ from imubench_pipeline.estimators.estimate import (
     Parameter,
     Status,
 )
-from imubench_pipeline.estimators.spectral_shapes import Shapes
-from imubench_pipeline.estimators.whittle import Maximum
+from imubench_pipeline.estimators.whittle import Maximum, Shapes
 from imubench_pipeline.model.estimates import DeterministicRow
 from imubench_pipeline.tables.findings import Finding, find
 from imubench_pipeline.typing import Array
@@ -177,7 +175,11 @@ def assess_signals(channel: str, signals: DeterministicSignals) -> Verdict:
     growth = scatter = 0.0
     steady = assess_stationarity(signals.means)
     if steady is not None and (steady.has_trend or steady.is_variable):
-        finding = _describe_nonstationarity(channel, steady)
+        data: FindingData = NoiseVaries(steady.spread)
+        value = steady.spread
+        if steady.has_trend:
+            data, value = NoiseTrend(steady.trend, SIGMAS * steady.trend_error), steady.trend
+        finding = find(data, "warning", value, channel, steady.start, steady.end)
         findings.append(finding)
         caveats["N"] = ("doubtful", finding.detail)
         if steady.has_trend:
@@ -191,7 +193,9 @@ def assess_signals(channel: str, signals: DeterministicSignals) -> Verdict:
         return Verdict(tuple(findings), caveats, widening, growth, scatter)
     for halves in compare_halves(signals.without(), signals.searched.fit.noise):
         if halves.differ:
-            finding = _describe_difference(channel, halves)
+            change = RandomWalkChanges if halves.of == "K" else SlowNoiseChanges
+            data = change(halves.middle, halves.first, halves.second)
+            finding = find(data, "warning", halves.ratio, channel, halves.begin, halves.end)
             findings.append(finding)
             doubted = ("K",) if halves.of == "K" else ("B", "T_B", "K")
             caveats |= {name: ("doubtful", finding.detail) for name in doubted}
@@ -206,23 +210,9 @@ def tabulate_signals(
 ) -> Iterator[DeterministicRow]:
     """Yield the rows of the table ``deterministic``; the key is sensor, recording and channel."""
     for signal in signals.signals:
-        yield DeterministicRow(
-            sensor=key["sensor"],
-            recording=key["recording"],
-            channel=key["channel"],
-            kind=signal.kind,
-            start=signal.start,
-            end=signal.end,
-            size=signal.size,
-            size_lower=signal.size_lower,
-            size_upper=signal.size_upper,
-            unit=unit,
-            time=signal.time,
-            time_lower=signal.time_lower,
-            time_upper=signal.time_upper,
-            place_error=signal.place_error,
-            gain=signal.gain,
-        )
+        columns = {**key, **vars(signal), "unit": unit}
+        del columns["regressor"], columns["amplitudes"]
+        yield DeterministicRow(**columns)
 
 
 def _describe_signal(channel: str, signal: DeterministicSignal) -> Finding:
@@ -238,20 +228,6 @@ def _describe_signal(channel: str, signal: DeterministicSignal) -> Finding:
         kind = WarmUpDrift if signal.kind == "warm_up_drift" else PeriodicDrift
         data = kind(*size, *time)
     return find(data, "warning", signal.size, channel, signal.start, signal.end)
-
-
-def _describe_nonstationarity(channel: str, steady: Stationarity) -> Finding:
-    data: FindingData = NoiseVaries(steady.spread)
-    value = steady.spread
-    if steady.has_trend:
-        data, value = NoiseTrend(steady.trend, SIGMAS * steady.trend_error), steady.trend
-    return find(data, "warning", value, channel, steady.start, steady.end)
-
-
-def _describe_difference(channel: str, halves: Halves) -> Finding:
-    kind = RandomWalkChanges if halves.of == "K" else SlowNoiseChanges
-    data = kind(halves.middle, halves.first, halves.second)
-    return find(data, "warning", halves.ratio, channel, halves.begin, halves.end)
 
 
 @dataclass(frozen=True)
@@ -290,7 +266,14 @@ def compare_halves(means: Means, noise: Maximum) -> Iterator[Halves]:
         ordinates = Ordinates(replace(means, parts=(half,)))
         if not ordinates.is_usable:
             return
-        densities.append(_compute_densities(ordinates, noise))
+        spectrum = ordinates.spectrum(ordinates.coefficient, np.ones_like(ordinates.length))
+        shapes = Shapes(spectrum)
+        units = {"N": shapes.white, "F": shapes.flicker, "K": shapes.random_walk}
+        columns = {letter: noise.parameter(letter) ** 2 * units[letter]() for letter in "NFK"}
+        columns["G"] = np.zeros(len(spectrum.density))
+        for B, time in zip(noise.biases, noise.times, strict=True):
+            columns["G"] += B**2 * shapes.gauss_markov(float(time))
+        densities.append((spectrum.ordinates, spectrum.density, columns))
     begin = part.start / means.rate
     length = size * means.interval
     compared: list[tuple[Literal["K", "slow noise"], str]] = [("K", "K"), ("slow noise", "FKG")]
@@ -300,29 +283,8 @@ def compare_halves(means: Means, noise: Maximum) -> Iterator[Halves]:
             continue
         best = [int(np.argmax(earlier)), int(np.argmax(later))]
         ratio = 2.0 * float(earlier[best[0]] + later[best[1]] - np.max(earlier + later))
-        yield Halves(
-            name,
-            math.sqrt(_POWER_RATIOS[best[0]]),
-            math.sqrt(_POWER_RATIOS[best[1]]),
-            ratio,
-            begin,
-            begin + length,
-            begin + 2.0 * length,
-        )
-
-
-def _compute_densities(
-    ordinates: Ordinates, noise: Maximum
-) -> tuple[Array, Array, dict[str, Array]]:
-    """Return ordinates and density of each bin, and the density of each term in it."""
-    spectrum = ordinates.spectrum(ordinates.coefficient, np.ones_like(ordinates.length))
-    shapes = Shapes(spectrum)
-    units = {"N": shapes.white, "F": shapes.flicker, "K": shapes.random_walk}
-    columns = {letter: noise.parameter(letter) ** 2 * units[letter]() for letter in "NFK"}
-    columns["G"] = np.zeros(len(spectrum.density))
-    for B, time in zip(noise.biases, noise.times, strict=True):
-        columns["G"] += B**2 * shapes.gauss_markov(float(time))
-    return spectrum.ordinates, spectrum.density, columns
+        before, after = (math.sqrt(_POWER_RATIOS[place]) for place in best)
+        yield Halves(name, before, after, ratio, begin, begin + length, begin + 2.0 * length)
 
 
 def _evaluate_log_likelihoods(

@@ -78,32 +78,12 @@ def fit_temperature(
 ) -> ThermalFit:
     """Estimate the temperature effect of a channel together with its noise.
 
-    Parameters
-    ----------
-    blocks : callable
-        Returns the log in order, in SI, at each call; NaN where a sample is missing.
-    samples : int
-        L.
-    rate : float
-        Hz.
-    path : TemperaturePath
-        Temperature of the log; its segments are those of the log.
-    holes : bool
-        Samples may be missing.
-    band, bandwidth, resolution : float, optional
-        As in `imubench_pipeline.estimators.likelihood.fit`.
-    quadratic : bool, optional
-        Whether the square of the temperature is in the model; by default if BIC favours it.
-    longest_lag : float, optional
-        s; by default a twentieth of the longest segment, at most half an hour. 0: no lag.
-    plain : Likelihood, optional
-        The noise of the log without compensation, if it is known.
-    rng : numpy.random.Generator
-
-    Raises
-    ------
-    ValueError
-        If the log has fewer than 16 samples.
+    ``blocks`` returns the log in order, in SI, at each call, NaN where a sample is missing;
+    ``path`` is its temperature, in the same segments. With ``holes``, samples may be missing;
+    ``band``, ``bandwidth`` and ``resolution`` are as in `likelihood.fit`. The square of the
+    temperature is in the model by ``quadratic``, or if BIC favours it. ``longest_lag``, s, is a
+    twentieth of the longest segment by default, at most half an hour; 0: no lag. ``plain`` is the
+    noise without compensation, if known. Raises ValueError below 16 samples.
 
     References
     ----------
@@ -141,10 +121,8 @@ def fit_temperature(
             if not (fit.possible and varies):
                 break
             settled = fit.settle(quadratic)
-            model, effect = (
-                make_noise_model(settled.noise),
-                settled.regressors.effect(settled.regression),
-            )
+            model = make_noise_model(settled.noise)
+            effect = settled.regressors.effect(settled.regression)
     else:
         fit = _Fit(blocks(), samples, rate, spans, path, frame, longest_lag)
         plain = plain or likelihood.fit_spectrum(fit.spectrum, fit.frame, rng=rng, stretch=None)
@@ -163,9 +141,8 @@ def fit_temperature(
     def spectra_left() -> tuple[Spectrum, list[LineSpectrum]]:
         effect, log = settled.regressors.effect(settled.regression), blocks()
         if holes:
-            log = complete_log(
-                blocks, spans, make_noise_model(settled.noise), path, effect, rate, rng
-            )
+            left = make_noise_model(settled.noise)
+            log = complete_log(blocks, spans, left, path, effect, rate, rng)
         return compute_spectra(remove_temperature_effect(log, path, effect), samples, rate, spans)
 
     lines = fit.lines
@@ -330,15 +307,8 @@ class _Fit:
         """Return the verdict on a converged fit."""
         terms = self.of_the_log[0].terms
         plain = self._cost(self.whittle, self.of_the_log, terms.parameters)
-        return assess_fit(
-            settled.regressors,
-            settled.regression,
-            settled.whittle,
-            settled.candidates,
-            self.lags,
-            gained=2.0 * (plain - settled.cost),
-            rng=rng,
-        )
+        fitted = settled.regressors, settled.regression, settled.whittle, settled.candidates
+        return assess_fit(*fitted, self.lags, gained=2.0 * (plain - settled.cost), rng=rng)
 
     @cached_property
     def of_the_log(self) -> Sequence[Candidate]:
@@ -385,19 +355,8 @@ def _described(
     bias = Parameter(
         mean - shift, lower=mean - shift - SIGMAS * spread, upper=mean - shift + SIGMAS * spread
     )
-    return ThermalFit(
-        path.mean,
-        verdict.sensitivity,
-        verdict.quadratic,
-        verdict.lag,
-        bias,
-        verdict.compensated,
-        verdict.reason,
-        plain,
-        without,
-        effect,
-        path,
-    )
+    described = verdict.sensitivity, verdict.quadratic, verdict.lag, bias, verdict.compensated
+    return ThermalFit(path.mean, *described, verdict.reason, plain, without, effect, path)
 
 
 def _mean_error(candidates: Sequence[Candidate], fitted: Likelihood, spectrum: Spectrum) -> float:
@@ -414,16 +373,6 @@ def _mean_error(candidates: Sequence[Candidate], fitted: Likelihood, spectrum: S
 def _nothing(plain: Likelihood, path: TemperaturePath, fit: _Fit, reason: str) -> ThermalFit:
     unknown = Parameter(None, "not_identified", reason)
     mean, spread = fit.spectrum.mean, _mean_error(plain.candidates, plain, fit.spectrum)
-    return ThermalFit(
-        path.mean,
-        unknown,
-        unknown,
-        unknown,
-        Parameter(mean, lower=mean - SIGMAS * spread, upper=mean + SIGMAS * spread),
-        False,
-        reason,
-        plain,
-        plain,
-        np.zeros(len(path.value)),
-        path,
-    )
+    bias = Parameter(mean, lower=mean - SIGMAS * spread, upper=mean + SIGMAS * spread)
+    described, effect = (unknown, unknown, unknown, bias, False), np.zeros(len(path.value))
+    return ThermalFit(path.mean, *described, reason, plain, plain, effect, path)

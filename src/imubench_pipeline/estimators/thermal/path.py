@@ -1,14 +1,9 @@
 """The smooth path of a temperature from the readings of a register, with its error.
 
-The temperature is an integrated random walk. A block of equal readings gives the cell of the
-register, and a block with two readings the time at the edge between their cells. The rate of the
-walk and the noise of the register maximise the evidence.
-
-References
-----------
-T. Minka, "Expectation propagation for approximate Bayesian inference", UAI 2001; G. Wahba,
-"Improper priors, spline smoothing and the problem of guarding against model errors in
-regression", J. R. Stat. Soc. B 40, 1978.
+The temperature is an integrated random walk (G. Wahba, J. R. Stat. Soc. B 40, 1978). A block of
+equal readings gives the cell of the register, and a block with two readings the time at the edge
+between their cells (expectation propagation: T. Minka, UAI 2001). The rate of the walk and the
+noise of the register maximise the evidence.
 """
 
 from __future__ import annotations
@@ -109,12 +104,7 @@ def estimate_temperature_path(
     """Return the path of a temperature from the readings of its register.
 
     The readings, °C, are on the grid of the log, NaN where missing; the time between segments is
-    unknown.
-
-    Raises
-    ------
-    ValueError
-        If no reading is present.
+    unknown. Raises ValueError if no reading is present.
     """
     read = gather_readings(blocks, segments)
     level = float(np.nanmedian(read.mean))
@@ -144,15 +134,10 @@ def estimate_temperature_path(
         inside = read.high == read.low
         half = 0.5 * read.step
         value[inside] = np.clip(value, read.mean - half, read.mean + half)[inside]
+    spans = tuple((int(start), int(stop)) for start, stop in segments)
+    deviation = np.sqrt(variance)
     return TemperaturePath(
-        read.centre,
-        value,
-        np.sqrt(variance),
-        draws,
-        read.parts,
-        tuple((int(start), int(stop)) for start, stop in segments),
-        read.step,
-        noise,
+        read.centre, value, deviation, draws, read.parts, spans, read.step, noise
     )
 
 
@@ -212,17 +197,10 @@ class _Evidence:
         )
         height += float((-0.5 * at**2 / variance)[two | many].sum())
         half = self._compute_half_width(part, noise)
-        path, spread, evidence = propagate(
-            self.steps(part),
-            q,
-            self._spread,
-            cell,
-            np.where(cell, mean - half, 0.0),
-            np.where(cell, mean + half, 0.0),
-            (noise * self._soft[part]) ** 2 + least,
-            precision,
-            shift,
-        )
+        low, high = (np.where(cell, mean + side * half, 0.0) for side in (-1.0, 1.0))
+        softened = (noise * self._soft[part]) ** 2 + least
+        prior = self.steps(part), q, self._spread
+        path, spread, evidence = propagate(*prior, cell, low, high, softened, precision, shift)
         return path, spread, evidence + float(height), precision, shift
 
     def _compute_half_width(self, part: slice, noise: float) -> Array:
@@ -271,13 +249,14 @@ class _Evidence:
             np.array([k, math.log10(noise)]) for k in _LOG_DENSITY_GRID for noise in sorted(noises)
         ]
         first = min(starts, key=cost)
+        simplex = first + np.array([[0.0, 0.0], [0.7, 0.0], [0.0, 0.3]])
         minimum = minimize(
             cost,
             first,
             method="Nelder-Mead",
             options={
                 "maxfev": _MAX_ITERATIONS,
-                "initial_simplex": first + np.array([[0.0, 0.0], [0.7, 0.0], [0.0, 0.3]]),
+                "initial_simplex": simplex,
                 "xatol": 0.05,
                 "fatol": 0.05,
             },
@@ -306,12 +285,7 @@ def apply_lag(times: Array, values: Array, lag: float) -> Array:
     """Return a temperature, shape (k,), behind a first-order lag: L dT_lag/dt = T - T_lag.
 
     Exact at the ascending knots ``times``, s, for a temperature that is linear between them and in
-    equilibrium at the first.
-
-    Raises
-    ------
-    ValueError
-        If the lag, s, is below 0 or not finite.
+    equilibrium at the first. Raises ValueError if the lag, s, is below 0 or not finite.
     """
     if not (lag >= 0.0 and math.isfinite(lag)):
         raise ValueError(f"the lag is {lag} s, expected a time from 0")

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
@@ -59,10 +59,7 @@ class Readings:
 def gather_readings(blocks: Iterable[Array], segments: Sequence[Span]) -> Readings:
     """Return the block means of temperature readings, °C, NaN where missing, in one pass.
 
-    Raises
-    ------
-    ValueError
-        If no reading is present.
+    Raises ValueError if no reading is present.
     """
     width = max(1, -(-sum(stop - start for start, stop in segments) // MAX_BLOCKS))
     begins = [np.arange(start, stop, width) for start, stop in segments]
@@ -88,17 +85,10 @@ def gather_readings(blocks: Iterable[Array], segments: Sequence[Span]) -> Readin
     stops = np.cumsum([len(part) for part in begins])
     empty = count == 0
     parts = tuple(slice(int(b - len(p)), int(b)) for p, b in zip(begins, stops, strict=True))
-    return Readings(
-        begin,
-        end,
-        count,
-        np.where(empty, np.nan, total / np.maximum(count, 1)),
-        np.where(empty, np.nan, low),
-        np.where(empty, np.nan, high),
-        estimate_resolution(levels, present),
-        parts,
-        parts,
-    )
+    columns = [total / np.maximum(count, 1), low, high]
+    mean, low, high = (np.where(empty, np.nan, column) for column in columns)
+    step = estimate_resolution(levels, present)
+    return Readings(begin, end, count, mean, low, high, step, parts, parts)
 
 
 def estimate_resolution(levels: Array, present: int) -> float:
@@ -151,29 +141,36 @@ def split_at_jumps(read: Readings) -> Readings:
     parts = [_find_jumps(read, part) for part in read.parts]
     if not any(parts):
         return read
+    names = ("begin", "end", "count", "mean", "low", "high")
     columns: list[Array] = []
     pieces: list[slice] = []
     places: list[slice] = []
     begun = 0
     for part, jumps in zip(read.parts, parts, strict=True):
-        blocks, cuts = _cut_blocks(read, part, jumps)
+        blocks = np.array([getattr(read, name)[part] for name in names], dtype=np.float64)
+        cuts: list[int] = []
+        for i, sample in reversed(jumps):
+            before, after = blocks[:, i - 1], blocks[:, i + 1]
+            # Replace three blocks around a jump, which may be at an edge of the middle one.
+            edges = sorted({before[0], sample - 1.0, float(sample), sample + 1.0, after[1]})
+            made = []
+            for first, last in pairwise(edges):
+                level = (before if last <= sample else after).copy()
+                share = (last - first) / (level[1] - level[0])
+                level[:3] = first, last, max(round(level[2] * share), 1)
+                made.append(level)
+            around = blocks[:, : i - 1], np.array(made).T, blocks[:, i + 2 :]
+            blocks = np.concatenate(around, axis=1)
+            cuts = [i - 1 + edges.index(float(sample)), *(cut + len(made) - 3 for cut in cuts)]
         columns.append(blocks)
         ends = [begun, *(begun + cut for cut in cuts), begun + blocks.shape[1]]
         places.append(slice(begun, ends[-1]))
         pieces += [slice(a, b) for a, b in pairwise(ends)]
         begun = ends[-1]
-    begin, end, count, mean, low, high = np.concatenate(columns, axis=1)
-    return replace(
-        read,
-        begin=begin.astype(np.int64),
-        end=end.astype(np.int64),
-        count=count.astype(np.int64),
-        mean=mean,
-        low=low,
-        high=high,
-        parts=tuple(places),
-        pieces=tuple(pieces),
-    )
+    joined = np.concatenate(columns, axis=1)
+    begin, end, count = joined[:3].astype(np.int64)
+    mean, low, high = joined[3:]
+    return Readings(begin, end, count, mean, low, high, read.step, tuple(places), tuple(pieces))
 
 
 def _find_jumps(read: Readings, part: slice) -> list[tuple[int, int]]:
@@ -210,40 +207,15 @@ def _find_jumps(read: Readings, part: slice) -> list[tuple[int, int]]:
     return jumps if len(jumps) <= _MAX_JUMPS else []
 
 
-def _cut_blocks(
-    read: Readings, part: slice, jumps: Sequence[tuple[int, int]]
-) -> tuple[Array, list[int]]:
-    """Return the columns of a part's blocks, cut at its jumps, and the first block after each."""
-    names = ("begin", "end", "count", "mean", "low", "high")
-    blocks = np.array([getattr(read, name)[part] for name in names], dtype=np.float64)
-    cuts: list[int] = []
-    for i, sample in reversed(jumps):
-        before, after = blocks[:, i - 1], blocks[:, i + 1]
-        # Replace three blocks around a jump, which may be at an edge of the middle one.
-        edges = sorted({before[0], sample - 1.0, float(sample), sample + 1.0, after[1]})
-        made = []
-        for first, last in pairwise(edges):
-            level = (before if last <= sample else after).copy()
-            share = (last - first) / (level[1] - level[0])
-            level[:3] = first, last, max(round(level[2] * share), 1)
-            made.append(level)
-        blocks = np.concatenate([blocks[:, : i - 1], np.array(made).T, blocks[:, i + 2 :]], axis=1)
-        inserted = len(made) - 3
-        cuts = [i - 1 + edges.index(float(sample)), *(cut + inserted for cut in cuts)]
-    return blocks, cuts
-
-
 def find_cell_stays(
     inside: NDArray[np.bool_], level: Array, half: float, q: float
 ) -> Iterator[tuple[slice, Array]]:
     """Yield the blocks of a segment in long stays in one cell of the register, and their taper.
 
-    The taper, shape (b,), is from 0 where the path crosses an edge of the cell, and is therefore
-    known, to 1 at a distance of one crossing time.
-
-    ``inside``, shape (k,): all readings of a block are of one cell; ``level``, shape (k,): mean
-    reading of a block, K; ``half``: half the width of a cell, K; ``q``: density of the second
-    derivative of the path (an integrated random walk), K² per block³.
+    The taper, shape (b,), rises from 0 where the path crosses an edge of the cell, and is therefore
+    known, to 1 at a distance of one crossing time. ``inside``, shape (k,): all readings of a block
+    are of one cell; ``level``, shape (k,): mean reading of a block, K; ``half``: half the width of
+    a cell, K; ``q``: density of the second derivative of the path, K² per block³.
     """
     if not inside.any():
         return

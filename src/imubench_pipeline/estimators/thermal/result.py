@@ -56,41 +56,21 @@ def complete_log(
 
 @dataclass(frozen=True)
 class ThermalFit:
-    """Temperature dependence of a channel.
+    """Temperature dependence of a channel."""
 
-    Attributes
-    ----------
-    reference : float
-        T_0, the mean temperature, °C.
-    sensitivity, quadratic : Parameter
-        s and q, SI per K and per K²; q has status ``absent`` where it is not in the model.
-    lag : Parameter
-        L, s.
-    bias : Parameter
-        Mean of the log, at T_0, SI.
-    compensated : bool
-        Temperature is removed from the noise: the interval of s (or q) excludes 0, and BIC
-        favours it.
-    reason : str
-        Reason for ``compensated``.
-    plain, without_temperature : Likelihood
-        The noise of the log before and after compensation; the same without compensation.
-    effect : ndarray, shape (k,)
-        Effect of temperature at the knots of the path, SI; zeros without compensation.
-    path : TemperaturePath
-        Temperature of the log.
-    """
-
-    reference: float
-    sensitivity: Parameter
-    quadratic: Parameter
-    lag: Parameter
-    bias: Parameter
+    reference: float  # T_0, the mean temperature, °C
+    sensitivity: Parameter  # s, SI per K
+    quadratic: Parameter  # q, SI per K²; ``absent`` where it is not in the model
+    lag: Parameter  # L, s
+    bias: Parameter  # mean of the log, at T_0, SI
     compensated: bool
-    reason: str
+    """Temperature is removed from the noise: the interval of s (or q) excludes 0, and BIC favours
+    it."""
+    reason: str  # for ``compensated``
     plain: Likelihood
     without_temperature: Likelihood
-    effect: Array
+    """The noise of the log before and after compensation; the same without compensation."""
+    effect: Array  # (k,): of temperature at the knots of the path, SI; 0 without compensation
     path: TemperaturePath
 
     def compensate(self, blocks: Iterable[Array]) -> Iterator[Array]:

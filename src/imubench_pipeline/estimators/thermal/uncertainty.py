@@ -1,12 +1,8 @@
 """Intervals of a thermal fit, and tests whether temperature and time are distinguishable.
 
-The noise is drawn from its posterior, over the models that the log does not exclude; the lag from
-its likelihood for that noise (uniform prior from 0 to the longest); s and q from their normal
-distribution given both.
-
-A register determines the temperature path only within its resolution. The errors of its drawn paths
-that correlate with the temperature change s, q and the lag; the rest, times s, remains in the log
-as additional noise.
+The noise is drawn from its posterior, the lag from its likelihood for that noise (uniform prior),
+s and q from their normal distribution given both. Errors of the drawn temperature paths change s, q
+and the lag where they correlate with the temperature; the rest, times s, is additional noise.
 """
 
 from __future__ import annotations
@@ -106,15 +102,8 @@ def assess_fit(
     q = Parameter(None, "absent", texts.ABSENT)
     if regressors.quadratic:
         q = _make_parameter(float(regression.beta[1]), float(lower[1]), float(upper[1]), confused)
-    return Verdict(
-        s,
-        q,
-        assess_lag(regression.lag, drawn_lags, float(lags[-1]), compensated),
-        compensated,
-        reason,
-        float(np.std(betas @ at_mean)),
-        residual,
-    )
+    lag = assess_lag(regression.lag, drawn_lags, float(lags[-1]), compensated)
+    return Verdict(s, q, lag, compensated, reason, float(np.std(betas @ at_mean)), residual)
 
 
 def _make_parameter(value: float, lower: float, upper: float, confused: str | None) -> Parameter:
@@ -164,12 +153,8 @@ def _explain_confusion(
         z = both.beta[0] / both.error
         if excluded and abs(z) < SIGMAS:
             return texts.MONOTONE_TEMPERATURE
-    if (
-        not excluded
-        and _compute_explained_fraction(regressors, regression) > _MIN_EXPLAINED_FRACTION
-    ):
-        return texts.TEMPERATURE_BY_CHANCE
-    return None
+    explained = 0.0 if excluded else _compute_explained_fraction(regressors, regression)
+    return texts.TEMPERATURE_BY_CHANCE if explained > _MIN_EXPLAINED_FRACTION else None
 
 
 def _compute_explained_fraction(regressors: Regressors, regression: Regression) -> float:

@@ -14,7 +14,7 @@ from imubench_pipeline.allan import allan_variance
 from imubench_pipeline.estimators import curve as reading
 from imubench_pipeline.estimators import least_squares
 from imubench_pipeline.estimators.estimate import PARAMETERS
-from imubench_pipeline.estimators.identifiability import compute_cramer_rao_bounds
+from imubench_pipeline.estimators.intervals import compute_cramer_rao_bounds
 from imubench_pipeline.estimators.model_choice import PAPERS_MODEL
 from imubench_pipeline.estimators.spectrum import compute_spectra
 from imubench_pipeline.estimators.whittle import Whittle, make_whittle

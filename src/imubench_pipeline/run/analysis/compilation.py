@@ -6,7 +6,7 @@ import threading
 from collections.abc import Callable
 from contextlib import AbstractContextManager, suppress
 
-from imubench_pipeline.estimators.compilation import compile_kernels
+from imubench_pipeline.estimators.posterior_kernels import compile_kernels
 from imubench_pipeline.readers.bounded import Bounded
 
 _MAX_COMPILE_TIME, _MAX_COMPILE_MEMORY = 600.0, 4 << 30
