@@ -8,7 +8,7 @@ from importlib.metadata import version as installed
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parent))
-from extensions.declared import counts
+from extensions.declared import substitutions
 
 os.environ.setdefault("NUMBA_NUM_THREADS", "1")
 
@@ -32,7 +32,7 @@ suppress_warnings = [
 ]
 
 myst_enable_extensions = ["dollarmath", "colon_fence", "deflist", "substitution"]
-myst_substitutions = counts()
+myst_substitutions = substitutions()
 myst_heading_anchors = 4
 nb_execution_mode = "force"
 nb_execution_raise_on_error = True

@@ -13,16 +13,24 @@ from imubench_pipeline.readers.formats import FILE_FORMATS
 from imubench_pipeline.report.glossary import Term, read_glossary
 from imubench_pipeline.run.formats_command import Line, list_export_targets, list_log_formats
 from imubench_pipeline.tables.schemas import TABLES
+from imubench_pipeline.words.verdicts import VERDICT_MEANINGS, VERDICT_WORDS
 
 
-def counts() -> dict[str, int]:
-    """Return the numbers of exported programs, shipped sensors and log formats, for the pages."""
+def substitutions() -> dict[str, int | str]:
+    """Return the counts of programs, sensors and formats, and the words of verdicts, for pages."""
     sensors = Path(__file__).parents[2] / "config/sensors"
     return {
         "programs": len(TARGETS),
         "sensors": sum("sold: false" not in file.read_text() for file in sensors.glob("*.yaml")),
         "formats": len(FILE_FORMATS),
+        **dict(VERDICT_WORDS.items()),
     }
+
+
+def verdicts() -> str:
+    """Return the verdicts on a sensor with their words and probabilities."""
+    rows = ((code(v), cell(VERDICT_WORDS[v]), cell(VERDICT_MEANINGS[v])) for v in VERDICT_WORDS)
+    return table(("`verdict`", "the page says", "meaning"), rows)
 
 
 def tables() -> str:

@@ -17,6 +17,7 @@ PARTS: dict[str, Callable[[], str]] = {
     "simulated": models.simulated,
     "tables": declared.tables,
     "statuses": declared.statuses,
+    "verdicts": declared.verdicts,
     "findings": declared.findings,
     "glossary": declared.terms_of_the_report,
     "formats": declared.formats,

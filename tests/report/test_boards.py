@@ -347,9 +347,9 @@ def test_found_over_printed() -> None:
 
 def test_limits_that_are_close_have_the_digits_to_differ() -> None:
     n = 0.006 * DEGREE
-    assert line().digits == 4
+    assert line().digits == 3
     assert line(value=n, lower=n * (1 - 1e-5), upper=n * (1 + 1e-5)).digits > 4
-    assert line(lower=None, upper=None).digits == 4
+    assert line(lower=None, upper=None).digits == 3
 
 
 def test_an_accelerometer_has_its_own_units() -> None:

@@ -57,7 +57,7 @@ def test_a_printed_figure_stands_beside_what_was_measured() -> None:
     assert row["verdict"] == "as printed"
     (row,) = deltas(FIGURE, system="si")
     (reading,) = row["readings"]
-    assert (reading["comparable"], reading["unit"]) == ("8.727×10⁻⁵", "rad/s/√Hz")
+    assert (reading["comparable"], reading["unit"]) == ("8.73×10⁻⁵", "rad/s/√Hz")
 
 
 def test_a_printed_figure_has_one_verdict_however_it_is_read() -> None:

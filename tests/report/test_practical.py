@@ -14,12 +14,13 @@ from imubench_pipeline.report.practical import (
     format_printed,
     list_page_units,
 )
+from imubench_pipeline.words import numbers
 from imubench_pipeline.words.numbers import (
     Unit,
+    count_digits,
     degrees_text,
     duration_text,
     interval_text,
-    limit_digits,
     number_text,
     percent_text,
 )
@@ -208,40 +209,50 @@ def test_duration_text_uses_readable_units(seconds: float, text: str) -> None:
 
 def test_an_interval_needs_both_ends() -> None:
     unit = Unit("x", 10.0)
-    assert interval_text(0.1234, 2.0, unit) == "1.23 to 20"
-    assert interval_text(0.1234, 2.0, unit, 2) == "1.2 to 20"
+    assert interval_text(0.1234, 2.0, unit) == interval_text(0.1234, 2.0, unit, 1.0) == "1.2 to 20"
+    assert interval_text(1.234, 2.0, unit, 1.5) == "12 to 20"
     for lower, upper in ((None, 2.0), (0.1, None)):
         assert interval_text(lower, upper, unit) == "–"
 
 
-@given(magnitudes, st.floats(1e-4, 1.0), st.integers(2, 4))
-def test_the_ends_of_an_interval_are_seen_to_differ(lower: float, width: float, least: int) -> None:
+@given(magnitudes, st.floats(1e-4, 1.0))
+def test_the_ends_of_an_interval_are_seen_to_differ(lower: float, width: float) -> None:
     upper = lower + abs(lower) * width
-    begin, _, end = interval_text(lower, upper, Unit("x", 1.0), least).partition(" to ")
+    begin, _, end = interval_text(lower, upper, Unit("x", 1.0)).partition(" to ")
     assert number_of(begin) < number_of(end)
-    digits = limit_digits(lower, upper, least)
-    assert least <= digits <= 7
-    # No more digits than needed: with one less, a tenth of the width could not be told.
-    if digits > least:
-        assert 10.0 ** (1 - digits) * max(abs(lower), abs(upper)) > 0.0099 * (upper - lower)
+    digits = count_digits(None, lower, upper)
+    assert 2 <= digits <= 7
+    # No more digits than needed: the last one is a twentieth of the width or more.
+    if digits > 2:
+        assert 10.0 ** (2 - digits) * max(abs(lower), abs(upper)) > 0.0495 * (upper - lower)
 
 
 @pytest.mark.parametrize(
     ("lower", "upper", "digits"),
     [
-        (None, 1.0, 3),
+        (None, 1.0, 2),
         (1.0, None, 3),
         (1.0, 1.0, 3),
         (0.9, 1.1, 3),
-        (0.9999, 1.0001, 5),
+        (0.9999, 1.0001, 6),
         (1.0, 1.0 + 1e-12, 7),
-        (0.0, 1.0, 3),
+        (0.0, 1.0, 2),
     ],
 )
 def test_limits_have_as_many_digits_as_tell_them_apart(
     lower: float | None, upper: float | None, digits: int
 ) -> None:
-    assert limit_digits(lower, upper) == digits
+    assert count_digits(None, lower, upper) == digits
+
+
+def test_the_digits_of_a_parameter_have_limits_everywhere(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(numbers, "DIGITS", {**numbers.DIGITS, "B": (4, 5)})
+    unit = Unit("x", 1.0, "B")
+    assert unit.text(1.23456) == "1.235"
+    assert unit.estimate_texts(1.23456, 1.0, 1.5) == ("1.235", "1 to 1.5")
+    assert unit.estimate_texts(1.23456, 1.2345599, 1.2345601) == ("1.2346", "1.2346 to 1.2346")
+    assert unit.estimate_texts(None, None, 1.23456) == ("–", "below 1.235")
+    assert Unit("x", 1.0, "N").estimate_texts(1.23456, 1.0, 1.5) == ("1.2", "1 to 1.5")
 
 
 def test_what_is_not_there_is_a_dash() -> None:

@@ -18,7 +18,7 @@ from imubench_pipeline.settings.config import FusionSettings, Method
 from imubench_pipeline.settings.sensor import quantity_of
 from imubench_pipeline.units import parse_setting
 from imubench_pipeline.words.estimates import symbol_text
-from imubench_pipeline.words.numbers import limit_digits, number_text
+from imubench_pipeline.words.numbers import count_digits, number_text
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -114,14 +114,14 @@ class Comparison(Shown, Sequence[Compared]):
         rows = []
         for each in self:
             unit = choose_page_unit(quantity_of(each.channel), each.symbol, "practical")
-            row = [each.channel, each.label, *(unit.text(value, 3) for value in each.values)]
+            row = [each.channel, each.label, *map(unit.text, each.values)]
             lower, upper = each.ratio.lower or 0.0, each.ratio.upper
-            digits, interval = limit_digits(each.ratio.lower, upper), "–"
+            digits, interval = count_digits(each.ratio.value, each.ratio.lower, upper), "–"
             if upper is not None:
                 interval = f"{number_text(lower, digits)} to {number_text(upper, digits)}"
             elif each.ratio.lower is not None:
                 interval = f"above {number_text(lower, digits)}"
-            ratio = "–" if each.ratio.value is None else number_text(each.ratio.value, 3)
+            ratio = "–" if each.ratio.value is None else number_text(each.ratio.value, digits)
             row += [unit.sign, ratio, interval, each.verdict]
             row.append(cut("; ".join(each.ratio.reasons), 50))
             rows.append([f"{each.names[0]} / {each.names[1]}", *row] if several else row)

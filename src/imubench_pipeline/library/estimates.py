@@ -28,7 +28,6 @@ from imubench_pipeline.steps.sensor_tables import collect_findings
 from imubench_pipeline.tables.findings import Finding, make_finding
 from imubench_pipeline.tables.keys import Key
 from imubench_pipeline.words.estimates import STATUS_WORDS, symbol_text
-from imubench_pipeline.words.numbers import interval_text
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -316,14 +315,11 @@ def _make_rows(estimate: ChannelEstimate) -> Iterator[list[str]]:
     ]
     for component, symbol, parameter in sorted(components, key=lambda c: (c[0], order[c[1]])):
         unit = choose_page_unit(estimate.quantity, symbol, "practical")
-        if parameter.value is None and not parameter.lower and parameter.upper is not None:
-            interval = f"below {unit.text(parameter.upper, 3)}"
-        else:
-            interval = interval_text(parameter.lower, parameter.upper, unit)
+        value, interval = unit.estimate_texts(parameter.value, parameter.lower, parameter.upper)
         yield [
             estimate.channel,
             symbol_text(symbol) + (f" {component}" if component > 1 else ""),
-            unit.text(parameter.value, 3),
+            value,
             interval,
             unit.sign,
             STATUS_WORDS[parameter.status],

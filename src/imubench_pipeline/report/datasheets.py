@@ -131,7 +131,7 @@ def compare_sensors_with_datasheets(
                 {
                     "as": name,
                     "comparable": unit.text(rows[0].comparable),
-                    "measured": _format_range([unit.text(value, 3) for value in ends]),
+                    "measured": _format_range([unit.text(value) for value in ends]),
                     "difference": _format_range([*map(_format_percent, (deltas[0], deltas[-1]))]),
                 }
             )
@@ -202,7 +202,7 @@ def format_curve_distances(view: ChannelView, system: System) -> Iterator[str]:
         reading = f", density read as {row.sidedness}" if row.sidedness else ""
         away = row.rms_log10
         decades = NO_VALUE if away is None else f"{away:.3f}"
-        yield f"{unit.text(row.rms, 3)} {unit.sign}, {decades} decades{reading}"
+        yield f"{unit.text(row.rms)} {unit.sign}, {decades} decades{reading}"
 
 
 def _format_percent(share: float | None) -> str:
@@ -211,11 +211,8 @@ def _format_percent(share: float | None) -> str:
 
 def _format_measured(row: DatasheetRow | RepeatabilityRow, unit: Unit) -> list[str]:
     """Return the measured value, and its 95 % limits below it."""
-    value, lower, upper = row.measured, row.lower, row.upper
-    if value is None or lower is None or upper is None:
-        return [unit.text(value)]
-    digits = unit.digits(value, lower, upper)
-    return [unit.text(value, digits), f"{unit.text(lower, digits)} to {unit.text(upper, digits)}"]
+    value, interval = unit.estimate_texts(row.measured, row.lower, row.upper)
+    return [value] if row.measured is None or interval == NO_VALUE else [value, interval]
 
 
 def _format_difference(row: DatasheetRow) -> list[str]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -12,14 +13,24 @@ from pydantic import RootModel
 
 from imubench_pipeline.settings.validation import ConfigError, Strict, parse
 from imubench_pipeline.settings.yaml_files import read_yaml
+from imubench_pipeline.words.estimates import STATUS_WORDS
+from imubench_pipeline.words.verdicts import SHORTLIST_WORDS, VERDICT_WORDS
 
 _FILE = Path(__file__).with_name("glossary.yaml")
+
+_NAMES: Mapping[str, str] = {
+    **dict(STATUS_WORDS.items()),
+    **{f"verdict_{code}": words for code, words in VERDICT_WORDS.items()},
+    **{f"shortlist_{code}": words for code, words in SHORTLIST_WORDS.items()},
+    "conditions": f"{VERDICT_WORDS['meets']} if …",
+}
+"""Names of terms whose wording is in `words`."""
 
 
 class _Entry(Strict):
     """A term in the file."""
 
-    name: str
+    name: str | None = None
     short: str
     action: str | None = None
 
@@ -66,7 +77,8 @@ def read_glossary() -> dict[str, Term]:
             if key in terms:
                 raise ConfigError(f"{_FILE}: {key} stands in {terms[key].section} and {section}")
             anchor = f"finding-{key}" if entry.action else section
-            terms[key] = Term(key, entry.name, entry.short, anchor, entry.action)
+            name = entry.name or _NAMES.get(key, key.replace("_", " "))
+            terms[key] = Term(key, name, entry.short, anchor, entry.action)
     return terms
 
 

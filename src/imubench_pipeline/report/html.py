@@ -38,13 +38,16 @@ def make_templates(system: System) -> jinja2.Environment:
         lstrip_blocks=True,
     )
 
-    def si(value: float | None, unit: str, digits: int = 4, *, inside: bool = False) -> Markup:
+    def si(
+        value: float | None, unit: str, digits: int | None = None, *, inside: bool = False
+    ) -> Markup:
         """Return an SI number whose unit the reader can switch; ``inside``: without the unit."""
         if value is None or not math.isfinite(value):
             return Markup(number_text(value))
         rounded = f"{value:.7g}"
         text = _find_unit(unit, system).text(float(rounded), digits)
-        of = "" if inside else f' data-unit="{unit}" data-digits="{digits}"'
+        of = "" if inside else f' data-unit="{unit}"'
+        of += f' data-digits="{digits}"' if digits and not inside else ""
         # Escaping would be slow and is not necessary: numbers and units only.
         return Markup(f'<data value="{rounded}"{of}>{text}</data>')
 
@@ -65,7 +68,8 @@ def make_templates(system: System) -> jinja2.Environment:
                 text += f"<br><small>{limits} {number(upper)}</small>"
             parts.append(text)
         none = " none" if cell["value"] is None else ""
-        of_digits = f' data-digits="{digits}"' if digits != 3 else ""
+        usual = _find_unit(unit, system).digits(None, None, None)
+        of_digits = f' data-digits="{digits}"' if digits != usual else ""
         # Numbers and fixed texts only, which need no escaping.
         return Markup(f'<td class="number{none}"{of_digits}>{"<br>".join(parts) or NO_VALUE}</td>')
 

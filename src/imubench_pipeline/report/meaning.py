@@ -19,7 +19,7 @@ from imubench_pipeline.words import verdicts
 from imubench_pipeline.words.numbers import (
     NO_VALUE,
     Unit,
-    digits_by,
+    count_digits,
     duration_text,
     interval_text,
     number_text,
@@ -81,7 +81,7 @@ def format_margin(row: RankingRow) -> tuple[SourcedNumber, SourcedNumber, Source
     if row.margin is None:
         return None
     low, high = compute_margin_limits(row)
-    digits = digits_by(row.margin, low, high)
+    digits = count_digits(row.margin, low, high)
     named = (("margin", row.margin), ("limit:upper", low), ("limit:lower", high))
     first, lower, upper = (source_number(row, name, number_text(x, digits)) for name, x in named)
     return first, lower, upper
@@ -205,7 +205,7 @@ def _limit(row: RankingRow, system: System) -> LimitLine:
     unit = choose_unit(DIMENSIONS[row.error], system, row.limit)
     return LimitLine(
         limit=describe_limit(row),
-        allowed=source_number(row, "limit", f"{unit.text(row.limit, 3)} {unit.sign}", unit.sign),
+        allowed=source_number(row, "limit", f"{unit.text(row.limit)} {unit.sign}", unit.sign),
         sigma=_expected(row, system),
         interval=_interval(row, system),
         margin=size[0] if size else NO_VALUE,
@@ -343,8 +343,7 @@ def _cell(rows: Sequence[ErrorBudgetRow], system: System) -> Json:
     unit = choose_unit(DIMENSIONS[total.error], system, total.sigma)
     lines = [_format_error(total, total.sigma, unit)]
     if _is_sensible(total, total.sigma):
-        digits = unit.digits(total.sigma, total.lower, total.upper)
-        lines.append(interval_text(total.lower, total.upper, unit, digits))
+        lines.append(interval_text(total.lower, total.upper, unit, total.sigma))
     sources = [row for row in rows if row.source != "total"]
     if total.sigma > 0.0:
         lines += [
@@ -363,8 +362,7 @@ def _format_error(row: ErrorRow, sigma: float, unit: Unit) -> str:
     if not _is_sensible(row, sigma):
         north = row.error == "north"
         return "not determined" if north else f"over {unit.text(_QUARTER_TURN, 3)} {unit.sign}"
-    digits = unit.digits(sigma, row.lower, row.upper)
-    return f"{unit.text(sigma, digits)} {unit.sign}"
+    return f"{unit.estimate_texts(sigma, row.lower, row.upper)[0]} {unit.sign}"
 
 
 def _percent(share: float | None) -> str:
@@ -404,9 +402,9 @@ def format_backtest(
             "why": row.reason or "",
         }
         if row.predicted is not None:
-            line["predicted"] = f"{unit.text(row.predicted, 3)} {unit.sign}"
+            line["predicted"] = f"{unit.text(row.predicted)} {unit.sign}"
         if row.ratio is not None:
-            line["measured"] = f"{unit.text(row.measured, 3)} {unit.sign}"
+            line["measured"] = f"{unit.text(row.measured)} {unit.sign}"
             line["ratio"] = number_text(row.ratio, 3)
             line["range"] = format_range(row.ratio_lower, row.ratio_upper)
             independent = f"({number_text(row.independent, 2)} independent)"

@@ -14,7 +14,7 @@ from imubench_pipeline.report.payload import Json
 from imubench_pipeline.report.practical import System, choose_page_unit
 from imubench_pipeline.report.view import ChannelView
 from imubench_pipeline.words.estimates import estimate_text, model_text
-from imubench_pipeline.words.numbers import Unit, counted, limit_digits
+from imubench_pipeline.words.numbers import count_digits, counted
 
 
 def select_symbols(rows: Iterable[ParameterRow]) -> list[str]:
@@ -39,10 +39,11 @@ def make_methods_table(
     ]
     if channel.true_components:
         cells = []
-        for rows in (channel.true_components.get(symbol, []) for symbol in symbols):
+        for symbol in symbols:
+            rows = channel.true_components.get(symbol, [])
             parts = [_part(row.value, None, None, "assumed" if row.assumed else "") for row in rows]
             source = rows[0].source if rows else "Not simulated."
-            cells.append(_cell(parts, source, 3))
+            cells.append(_cell(parts, source, count_digits(None, None, None, symbol)))
         lines.append({"method": None, "recommended": False, "model": "", "cells": cells})
     return symbols, lines
 
@@ -81,7 +82,7 @@ def make_parameter_cell(
         )
         for row in rows
     ]
-    digits = max((count_digits(unit, row.value, row.lower, row.upper) for row in rows), default=3)
+    digits = max((unit.digits(row.value, row.lower, row.upper) for row in rows), default=3)
     words = [sentence for row in rows if (sentence := estimate_text(row, unit, duration))]
     return _cell(parts, " ".join(words), digits)
 
@@ -93,10 +94,3 @@ def _part(value: float | None, lower: float | None, upper: float | None, status:
 def _cell(parts: Sequence[Json], words: str, digits: int) -> Json:
     value = parts[0]["value"] if parts else None
     return {"parts": parts, "words": words, "value": value, "digits": digits}
-
-
-def count_digits(unit: Unit, value: float | None, lower: float | None, upper: float | None) -> int:
-    """Return the digits of a parameter by its interval, whose two limits must differ as printed."""
-    if value is None or lower is None or upper is None:
-        return limit_digits(lower, upper)
-    return max(unit.digits(value, lower, upper), limit_digits(lower, upper, 2))

@@ -101,7 +101,7 @@ def _find_unit(quantity: str, symbol: str, choice: str) -> Unit:
     signs = _UNIT_CHOICES[quantity][choice]
     # A parameter without its own unit has the unit of the first parameter of its dimension.
     alike = next((other for other in signs if dimensions.get(other) == dimension), symbol)
-    return _make_unit(signs.get(symbol) or signs[alike], dimension)
+    return _make_unit(signs.get(symbol) or signs[alike], dimension, symbol)
 
 
 def choose_unit(dimension: str, system: System, size: float | None = None) -> Unit:
@@ -119,9 +119,9 @@ def list_units_by_size(dimension: str, system: System) -> list[tuple[float, Unit
     return [(least, _make_unit(prefix + sign, dimension)) for least, prefix in prefixes]
 
 
-def _make_unit(sign: str, dimension: str) -> Unit:
+def _make_unit(sign: str, dimension: str, parameter: str = "") -> Unit:
     factor, _ = find_conversion(sign, dimension)
-    return Unit(sign, 1.0 / factor)
+    return Unit(sign, 1.0 / factor, parameter)
 
 
 def format_temperature(row: RecordingRow) -> str:

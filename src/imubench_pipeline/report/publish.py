@@ -29,6 +29,7 @@ from imubench_pipeline.tables.failures import describe_error
 from imubench_pipeline.tables.provenance import digest_sources
 from imubench_pipeline.tables.schemas import OF_ONE_RECORDING, TABLES
 from imubench_pipeline.words.estimates import STATUS_WORDS, symbol_text
+from imubench_pipeline.words.numbers import digit_limits
 
 _SETTINGS_FILE = "settings.json"
 _REQUIRED_SETTINGS = {"report", "settings", "sensors", "boards", "requirements"}
@@ -153,7 +154,10 @@ def _make_assets() -> dict[str, str]:
     # All scripts of the pages as one, with units, status names and terms
     units = {
         quantity: {
-            choice: {symbol: [unit.sign, unit.per_si] for symbol, unit in symbols.items()}
+            choice: {
+                symbol: [unit.sign, unit.per_si, digit_limits(symbol)]
+                for symbol, unit in symbols.items()
+            }
             for choice, symbols in choices.items()
         }
         for quantity, choices in list_page_units().items()
@@ -166,6 +170,7 @@ def _make_assets() -> dict[str, str]:
         f"const {name} = {json.dumps(value, ensure_ascii=False)};\n"
         for name, value in (
             ("UNITS", units),
+            ("DIGITS", digit_limits()),
             ("STATUS_NAMES", STATUS_WORDS),
             ("SYMBOL_TEXTS", {symbol: symbol_text(symbol) for symbol in SHOWN}),
             ("TERMS", terms),

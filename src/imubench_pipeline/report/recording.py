@@ -18,7 +18,7 @@ from imubench_pipeline.recordings.recording import (
 from imubench_pipeline.registry import Hook
 from imubench_pipeline.report import meaning, payload, thermal
 from imubench_pipeline.report.datasheets import compare_with_datasheet, format_curve_distances
-from imubench_pipeline.report.parameters import count_digits, make_methods_table
+from imubench_pipeline.report.parameters import make_methods_table
 from imubench_pipeline.report.practical import System, choose_page_unit, format_temperature
 from imubench_pipeline.report.site import Page, RecordingPage, Site, make_command
 from imubench_pipeline.report.view import ChannelView, RecordingView
@@ -224,7 +224,7 @@ def _describe_values(channel: ChannelView, system: System) -> str:
             if row.value is not None:
                 doubt = "doubtful" if row.status == "doubtful" else ""
                 certainty = ", ".join(filter(None, [precision_text(row, unit), doubt]))
-                size = unit.text(row.value, count_digits(unit, row.value, row.lower, row.upper))
+                size, _ = unit.estimate_texts(row.value, row.lower, row.upper)
                 text = f"{symbol_text(symbol)} {size} {unit.sign}"
                 parts.append(f"{text} ({certainty})" if certainty else text)
     if channel.fixed_bias is not None:

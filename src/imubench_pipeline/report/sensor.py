@@ -22,7 +22,7 @@ from imubench_pipeline.report.start import summarise_recordings
 from imubench_pipeline.report.view import QUANTITY_NAMES, RecordingView
 from imubench_pipeline.settings.sensor import quantity_of
 from imubench_pipeline.words.estimates import symbol_text
-from imubench_pipeline.words.numbers import counted, limit_digits, number_text
+from imubench_pipeline.words.numbers import count_digits, counted, number_text
 from imubench_pipeline.words.verdicts import (
     SHORT_VERDICTS,
     condition_text,
@@ -63,7 +63,7 @@ def _make_sensor_context(
         row.columns()
         | {
             "axis": row.channel.replace("_", " "),
-            "digits": limit_digits(row.lower, row.upper, 4),
+            "digits": count_digits(row.value, row.lower, row.upper, row.parameter),
             "ref": f"{quantity_of(row.channel)}.{_UNIT_SYMBOLS.get(row.parameter, row.parameter)}",
             "name": symbol_text(row.parameter),
         }

@@ -284,14 +284,13 @@ def _cell(rows: Sequence[ParameterRow], unit: numbers.Unit, duration: float | No
     lines = []
     for row in rows:
         words = STATUS_WORDS[row.status]
+        value, interval = unit.estimate_texts(row.value, row.lower, row.upper)
         if row.value is None:
             lines.append(words)
         else:
-            lines.append(unit.text(row.value) + f" ({words})" * (row.status != "ok"))
-        if row.status == "absent" and row.upper is not None:
-            lines.append(f"below {unit.text(row.upper, 3)}")
-        elif row.lower is not None and row.upper is not None:
-            lines.append(f"{unit.text(row.lower, 3)} to {unit.text(row.upper, 3)}")
+            lines.append(value + f" ({words})" * (row.status != "ok"))
+        if interval != numbers.NO_VALUE:
+            lines.append(interval)
         needed = row.duration_needed
         if row.status != "ok" and needed is not None and needed > (duration or 0.0):
             lines.append(f"(needs {numbers.duration_text(needed)})")

@@ -10,7 +10,7 @@ from imubench_pipeline.estimators.estimate import SENSOR
 from imubench_pipeline.model.estimates import LowPassRow, ParameterRow, TemperatureRow
 from imubench_pipeline.report.practical import System, choose_page_unit
 from imubench_pipeline.report.view import ChannelView
-from imubench_pipeline.words.numbers import limit_digits, number_text, sentence
+from imubench_pipeline.words.numbers import count_digits, number_text, sentence
 
 _TEMPERATURE_TERMS = (
     ("sensitivity", "temperature_sensitivity", "sensitivity"),
@@ -58,7 +58,7 @@ def list_thermal_figures(channel: ChannelView) -> Iterator[Mapping[str, object]]
             "value": row.value,
             "lower": row.lower,
             "upper": row.upper,
-            "digits": limit_digits(row.lower, row.upper, 4),
+            "digits": count_digits(row.value, row.lower, row.upper, name),
             "status": "" if row.status == "ok" else row.status,
             "truth": truth.value if truth else None,
             "why": sentence(row.reason),
@@ -73,7 +73,7 @@ def describe_thermal(channel: ChannelView, system: System) -> list[str]:
         sensitivity = temperature["sensitivity"]
         if sensitivity.compensated:
             unit = choose_page_unit(channel.quantity, "sensitivity", system)
-            size = f"{unit.text(sensitivity.value, 3)} {unit.sign}"
+            size = f"{unit.text(sensitivity.value)} {unit.sign}"
             change = f"The bias changes with temperature by {size}."
             lines += [change + _describe_reduction(channel), _NOT_COMPENSATED]
         else:

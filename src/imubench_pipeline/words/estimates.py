@@ -57,13 +57,13 @@ def estimate_text(row: ParameterRow, unit: Unit, duration: float | None) -> str:
         return f"{symbol}: {row.reason.rstrip('.')}." if row.reason else ""
     if status == "absent":
         text = f"{symbol} is not in the model: the data do not support it"
-        below = f"; below {unit.text(row.upper, 2)} {unit.sign}" if row.upper is not None else ""
-        return f"{text}{below}."
+        _, below = unit.estimate_texts(None, None, row.upper)
+        return text + f"; {below} {unit.sign}" * (row.upper is not None) + "."
     if status == "not_identified":
         text = f"{symbol} is not determined"
         text += f" by {duration_text(duration)} of data" if duration else ""
         if row.lower is not None and row.upper is not None:
-            text += f"; 95 % interval: {interval_text(row.lower, row.upper, unit, 2)} {unit.sign}"
+            text += f"; 95 % interval: {interval_text(row.lower, row.upper, unit)} {unit.sign}"
         return f"{text}{_describe_needed(row, duration)}."
     reason = (row.reason or STATUS_WORDS[status]).rstrip(".")
     return f"{symbol}: {reason}{_describe_needed(row, duration)}."
@@ -82,7 +82,7 @@ def precision_text(row: ParameterRow, unit: Unit) -> str:
         return ""
     half = (row.upper - row.lower) / 2.0 / abs(row.value)
     if half > _MAX_SYMMETRIC:
-        return interval_text(row.lower, row.upper, unit, 2)
+        return interval_text(row.lower, row.upper, unit, row.value)
     return f"± {percent_text(half, 2)}"
 
 

@@ -4,14 +4,18 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from decimal import ROUND_HALF_UP, Context, Decimal
 from functools import cache
 
 _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 _MIN_PLAIN, _MAX_PLAIN = Decimal("0.0001"), 1_000_000
-_MAX_DIGITS = 7
+
+DIGITS: Mapping[str, tuple[int, int]] = {"default": (2, 7)}
+"""Minimum and maximum digits of a value by parameter, such as ``B``."""
+
+_DIGITS_WITHOUT_INTERVAL = 3
 
 
 NO_VALUE = "–"
@@ -58,35 +62,38 @@ def join_names(names: Sequence[str]) -> str:
     return " and ".join(filter(None, (", ".join(names[:-1]), *names[-1:])))
 
 
-def digits_by(
-    value: float | None, lower: float | None, upper: float | None, otherwise: int = 3
+def digit_limits(parameter: str = "") -> tuple[int, int]:
+    """Return the minimum and maximum digits of a parameter, or of any other value."""
+    return DIGITS.get(parameter) or DIGITS["default"]
+
+
+def count_digits(
+    value: float | None, lower: float | None, upper: float | None, parameter: str = ""
 ) -> int:
     """Return the number of significant digits of a value and its limits, from its interval.
 
-    The last digit is the first of half the interval, or the second where that begins with 1. They
-    are two at least. Where there are no limits or no value, they are as many as ``otherwise``.
+    The last digit is the first of half the interval, or the second where that begins with 1, and
+    the limits differ as printed. An upper limit alone is an interval from 0. ``countDigits`` in
+    ``report/static/numbers.js`` does the same.
     """
-    if lower is None or upper is None or not upper > lower or not value:
-        return otherwise
-    half = (upper - lower) / 2.0
-    if not math.isfinite(half):
-        return 2
-    place = _find_first_digit(half)
-    place -= half < 2.0 * 10.0**place
-    return min(max(_find_first_digit(abs(value)) - place + 1, 2), _MAX_DIGITS)
+    least, most = digit_limits(parameter)
+    digits = _DIGITS_WITHOUT_INTERVAL
+    lower = 0.0 if value is None and lower is None else lower
+    if lower is not None and upper is not None and upper > lower:
+        half = (upper - lower) / 2.0
+        if not math.isfinite(half):
+            return least
+        largest = max(abs(lower), abs(upper))
+        place = _find_first_digit(half)
+        place -= half < 2.0 * 10.0**place
+        digits = _find_first_digit(abs(value or largest)) - place + 1
+        digits = max(digits, math.ceil(math.log10(largest / (upper - lower))) + 1)
+    return min(max(digits, least), most)
 
 
 def _find_first_digit(value: float) -> int:
     """Return the power of ten of the first digit, ignoring rounding errors below a power of ten."""
     return math.floor(math.log10(value) + 1e-9)
-
-
-def limit_digits(lower: float | None, upper: float | None, least: int = 3) -> int:
-    """Return the number of digits at which printed limits differ visibly."""
-    if lower is None or upper is None or not upper > lower:
-        return least
-    ratio = max(abs(lower), abs(upper)) / (upper - lower)
-    return min(max(least, math.ceil(math.log10(ratio)) + 1), _MAX_DIGITS)
 
 
 def duration_text(seconds: float | None) -> str:
@@ -125,23 +132,38 @@ class Unit:
 
     sign: str
     per_si: float
+    parameter: str = ""  # sets the digits
 
-    def text(self, value: float | None, digits: int = 4) -> str:
+    def text(self, value: float | None, digits: int | None = None) -> str:
         """Return an SI value in this unit, rounded to some digits; a dash if there is none."""
+        if digits is None:
+            digits = self.digits(value, None, None)
         return number_text(None if value is None else value * self.per_si, digits)
 
     def digits(self, value: float | None, lower: float | None, upper: float | None) -> int:
         """Return the number of digits of an SI value and its limits in this unit."""
-        if value is None or lower is None or upper is None:
-            return digits_by(value, None, None)
-        return digits_by(value * self.per_si, lower * self.per_si, upper * self.per_si)
+        value, lower, upper = (
+            None if size is None else size * self.per_si for size in (value, lower, upper)
+        )
+        return count_digits(value, lower, upper, self.parameter)
+
+    def estimate_texts(
+        self, value: float | None, lower: float | None, upper: float | None
+    ) -> tuple[str, str]:
+        """Return an SI value and its interval, or ``below`` an upper limit, as texts."""
+        digits = self.digits(value, lower, upper)
+        if value is None and not lower and upper is not None:
+            return NO_VALUE, f"below {self.text(upper, digits)}"
+        return self.text(value, digits), interval_text(lower, upper, self, value)
 
 
-def interval_text(lower: float | None, upper: float | None, unit: Unit, least: int = 3) -> str:
-    """Return ``lower to upper``; a dash if they are not known."""
+def interval_text(
+    lower: float | None, upper: float | None, unit: Unit, value: float | None = None
+) -> str:
+    """Return ``lower to upper``, with the digits of a value; a dash if they are not known."""
     if lower is None or upper is None:
         return NO_VALUE
-    digits = limit_digits(lower, upper, least)
+    digits = unit.digits(value, lower, upper)
     return f"{unit.text(lower, digits)} to {unit.text(upper, digits)}"
 
 

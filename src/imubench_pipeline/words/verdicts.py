@@ -336,10 +336,9 @@ def answer_text(
     elif best.verdict == "not_enough_data":
         text = "No sensor is shown to meet the limits. "
         text += f"{name} is closest, but there is not enough data"
-    elif best.verdict == "likely_fails":
-        text = f"No sensor is shown to meet the limits. {name} is closest, but likely fails"
     else:
-        text = f"No sensor meets the limits. {name} is closest, but {VERDICT_WORDS[best.verdict]}"
+        shown = "is shown to meet" if best.verdict == "likely_fails" else "meets"
+        text = f"No sensor {shown} the limits. {name} is closest, but {VERDICT_WORDS[best.verdict]}"
     weak = evidence_text(best)
     if len(rows) == 1:
         rank = f"Only sensor with {having}"

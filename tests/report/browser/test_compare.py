@@ -14,7 +14,6 @@ from playwright.sync_api import Locator
 
 from imubench_pipeline.estimators.estimate import COMPARED
 from imubench_pipeline.navigation.ratios import Ratio, compare_deviations, compare_parameters
-from imubench_pipeline.report.parameters import count_digits
 from imubench_pipeline.report.practical import choose_page_unit
 from imubench_pipeline.settings.sensor import quantity_of
 from tests.report.browser import made
@@ -78,7 +77,7 @@ def test_ratios_and_verdicts_are_those_of_the_library(read: Open, bench: Report)
             unit = choose_page_unit(quantity_of(channel), symbol, "practical")
             shown = (own.value, own.lower, own.upper)
             kept = (float(f"{number:.7g}") for number in shown)
-            value, *ends = (unit.text(number, count_digits(unit, *shown)) for number in kept)
+            value, *ends = (unit.text(number, unit.digits(*shown)) for number in kept)
             assert rows[symbol]["texts"][3] == f"{value} {unit.sign}{' to '.join(ends)}"
         for tau in (1.0, 10.0, 100.0):
             pair = (made.fused(log, channel) for log in (first, second))

@@ -5,7 +5,7 @@ from importlib import resources
 import numpy as np
 import pytest
 
-from imubench_pipeline.words.numbers import digits_by, limit_digits, number_text
+from imubench_pipeline.words.numbers import count_digits, digit_limits, number_text
 from tests.conftest import few
 from tests.report.browser import made
 from tests.report.browser.factors import FACTORS
@@ -23,8 +23,7 @@ NUMBERS = """root => [...root.querySelectorAll("data")].map(one => {
   const head = cell?.closest("table").tHead.rows[0].cells[cell.cellIndex];
   return { value: Number(one.value), text: one.textContent,
     unit: one.dataset.unit ?? head.dataset.unit,
-    digits: Number(one.dataset.digits ?? one.closest("[data-digits]")?.dataset.digits
-      ?? (one.parentNode.localName === "small" ? 3 : 4)) };
+    digits: Number(one.closest("[data-digits]")?.dataset.digits ?? 3) };
 })"""
 SIGNS = """root => [...root.querySelectorAll("[data-sign]")]
   .map(one => [one.dataset.sign, one.textContent])"""
@@ -147,7 +146,7 @@ def test_a_value_that_is_not_known_says_why(read: Open, bench: Report) -> None:
         "K is not in the model: the data do not support it; below 1.2 °/h/√h.",
     ]
     # 1e-7 rad/s/√s are 1.24 °/h/√h.
-    assert absent.inner_text().split("\n") == ["not in the model", "below 1.24"]
+    assert absent.inner_text().split("\n") == ["not in the model", "below 1.2"]
     unsure = tables.nth(2).locator("tr.recommended td.none")
     assert unsure.inner_text().split("\n") == ["not determined", "20 to 500"]
     assert "± 10 % needs 10 h" in reader.page.locator("ul.untold").last.inner_text()
@@ -197,14 +196,15 @@ def test_the_browser_rounds_10_000_numbers_as_the_tables_are_printed(
     ]
     reader = read(bench.folder, PAGES[0])
     script = resources.files("imubench_pipeline") / "report/static/numbers.js"
-    reader.page.add_script_tag(content=script.read_text(encoding="utf-8"))
+    digits = f"const DIGITS = {list(digit_limits())};\n"
+    reader.page.add_script_tag(content=digits + script.read_text(encoding="utf-8"))
     printed = reader.page.evaluate(
         "cases => cases.map(([v, low, high, d]) =>"
-        " [numberText(v, d), digitsBy(v, low, high), limitDigits(low, high)])",
+        " [numberText(v, d), countDigits(v, low, high), countDigits(null, low, high)])",
         cases,
     )
     expected = [
-        [number_text(v, d), digits_by(v, low, high), limit_digits(low, high)]
+        [number_text(v, d), count_digits(v, low, high), count_digits(None, low, high)]
         for v, low, high, d in cases
     ]
     different = [

@@ -15,9 +15,9 @@ from imubench_pipeline.report.recording import describe_recording, summarise_rec
 from imubench_pipeline.report.site import RecordingPage, Section, Site
 from imubench_pipeline.report.view import RecordingView
 from imubench_pipeline.words.numbers import (
+    count_digits,
     counted,
     degrees_text,
-    limit_digits,
     number_text,
     percent_text,
     sentence,
@@ -82,7 +82,7 @@ def _format_half_width(
     """Return a value and half the width of its interval as text, such as ``1.2 ± 0.3``."""
     value, lower, upper = limits
     half = None if lower is None or upper is None else (upper - lower) / 2.0
-    return f"{as_text(value, limit_digits(lower, upper, 3))} ± {as_text(half, 2)}"
+    return f"{as_text(value, count_digits(value, lower, upper))} ± {as_text(half, 2)}"
 
 
 @dataclass(frozen=True)
@@ -110,7 +110,7 @@ def format_estimates(rows: Sequence[CalibrationRow]) -> Iterator[CalibrationLine
             row=row,
             words=WORDS[row.parameter],
             why=sentence(row.reason),
-            digits=limit_digits(row.lower, row.upper, 4),
+            digits=count_digits(row.value, row.lower, row.upper, row.parameter),
             percent="–" if row.chance is None else percent_text(row.chance, 2),
         )
         name, shown = row.parameter, (row.value, row.lower, row.upper, row.truth)
@@ -257,7 +257,7 @@ def format_attitude(rows: Sequence[CalibrationRow]) -> Iterator[CalibrationLine]
             None if angle is None else math.degrees(angle)
             for angle in (row.value, row.lower, row.upper, row.truth)
         )
-        digits = limit_digits(lower, upper, 3)
+        digits = count_digits(value, lower, upper)
         off = None
         if value is not None and truth is not None and row.sigma is not None:
             off = math.remainder(value - truth, 360.0) / math.degrees(row.sigma)

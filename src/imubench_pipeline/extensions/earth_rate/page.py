@@ -35,10 +35,10 @@ from imubench_pipeline.report.recording import (
 from imubench_pipeline.report.site import Entry, RecordingPage, Section, Site
 from imubench_pipeline.report.view import RecordingView
 from imubench_pipeline.words.numbers import (
+    count_digits,
     counted,
     degrees_text,
     duration_text,
-    limit_digits,
     number_text,
     percent_text,
     sentence,
@@ -163,7 +163,8 @@ def summarise_earth_rate(rows: Sequence[EarthRateRow], system: System) -> str:
     if best.value is None:
         return sentence("; ".join(best.reasons))
     unit = choose_page_unit("gyro", "adev", system)
-    value, truth = (unit.text(number, 4) for number in (best.value, best.truth))
+    digits = unit.digits(best.value, best.lower, best.upper)
+    value, truth = (unit.text(number, digits) for number in (best.value, best.truth))
     size = None if best.upper is None else best.upper - best.value
     away = None if best.off_sigma is None else abs(best.off_sigma)
     text = (
@@ -211,7 +212,7 @@ def format_estimate(row: EarthRateRow) -> EarthRateLine:
         row=row,
         term=term,
         words=words,
-        digits=limit_digits(row.lower, row.upper, 4),
+        digits=count_digits(row.value, row.lower, row.upper),
         off="–" if row.off_sigma is None else f"{number_text(row.off_sigma, 2)} σ",
         why=sentence("; ".join(row.reasons)),
         use=row.method == "filter" and row.status == "ok",

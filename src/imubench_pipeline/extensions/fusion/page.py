@@ -11,7 +11,7 @@ from imubench_pipeline.report import thermal
 from imubench_pipeline.report.payload import pack_page
 from imubench_pipeline.report.site import Entry, Site
 from imubench_pipeline.report.view import QUANTITY_NAMES, ChannelView, RecordingView
-from imubench_pipeline.words.numbers import limit_digits, number_text, percent_text
+from imubench_pipeline.words.numbers import count_digits, number_text, percent_text
 
 _PARAMETER_TEXTS = {"N": "white noise", "B": "bias instability", "K": "random walk", "R": "ramp"}
 
@@ -272,7 +272,7 @@ def make_published_line(row: PublishedFigureRow) -> PublishedLine:
     return PublishedLine(
         row=row,
         unit=f"{quantity}.{_UNIT_SYMBOLS.get(row.parameter, row.parameter)}",
-        digits=limit_digits(row.lower, row.upper, 4),
+        digits=count_digits(row.value, row.lower, row.upper, row.parameter),
         ratio="–" if ratio is None else number_text(ratio, 3),
         differs=ratio is not None and abs(ratio - 1.0) > _MAX_AGREEING_DIFFERENCE,
     )

@@ -25,6 +25,7 @@ from imubench_pipeline.report.run_summary import (
 )
 from imubench_pipeline.tables import read
 from imubench_pipeline.tables.digests import read_sealed_json, write_sealed_json
+from imubench_pipeline.words.numbers import Unit
 
 
 class StateError(ValueError):
@@ -443,10 +444,11 @@ def format_summary(summary: Summary) -> str:
 
 
 def _describe_drift(drift: Drift) -> str:
-    value = f" {drift.value:.4g} {drift.unit}" if drift.value is not None else ""
-    expected = ""
-    if drift.expected_lower is not None and drift.expected_upper is not None:
-        expected = f", expected {drift.expected_lower:.4g} to {drift.expected_upper:.4g}"
+    unit = Unit(drift.unit, 1.0, drift.parameter)
+    low, high = drift.expected_lower, drift.expected_upper
+    size, limits = unit.estimate_texts(drift.value, low, high)
+    value = f" {size} {drift.unit}" if drift.value is not None else ""
+    expected = f", expected {limits}" if low is not None and high is not None else ""
     return (
         f"{drift.sensor}, device {drift.device}: {drift.channel} {drift.parameter}{value} in "
         f"{drift.recording}{expected}" + f" ({'; '.join(drift.reasons)})" * bool(drift.reasons)

@@ -12,7 +12,7 @@ from imubench_pipeline.report.payload import pack_page
 from imubench_pipeline.report.search import Found
 from imubench_pipeline.report.site import Entry, Section, Site
 from imubench_pipeline.report.view import ChannelView, RecordingView
-from imubench_pipeline.words.numbers import limit_digits, number_text, percent_text
+from imubench_pipeline.words.numbers import count_digits, number_text, percent_text
 
 
 def _make_context(site: Site) -> dict[str, Any]:
@@ -125,7 +125,7 @@ def format_cells(row: PublishedRow) -> dict[str, str]:
     """Return result, in the unit of the paper, ratio and tolerance of a row, as texts."""
     found = ""
     if row.found is not None:
-        digits = limit_digits(row.lower, row.upper, 3)
+        digits = count_digits(row.found, row.lower, row.upper)
         shown = (row.found, row.lower, row.upper)
         value, lower, upper = (
             x if x is None else number_text(x / row.scale, digits) for x in shown

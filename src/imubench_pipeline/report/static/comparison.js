@@ -163,22 +163,18 @@ function verdictCell(ratio, first, second) {
 function ratioCell(ratio) {
   const cell = cellOf("", { className: "number ratio" });
   Object.assign(cell.dataset, { ratio: ratio.value ?? "", lower: ratio.lower ?? "", upper: ratio.upper ?? "" });
-  const digits = digitsOf(ratio.value, ratio.lower, ratio.upper);
+  const digits = countDigits(ratio.value, ratio.lower, ratio.upper);
   cell.append(element("strong", { textContent: ratio.value === null ? "–" : numberText(ratio.value, digits) }), element("br"), element("small", { textContent: ratioText(ratio) }));
   return cell;
 }
 
-function ownCell(one, unit, digitsFor = digitsOf) {
+function ownCell(one, unit) {
   const cell = cellOf("", { className: "number" });
-  const { sign, factor } = typeof unit === "function" ? unit(one.value) : unit;
-  const [value, lower, upper] = [one.value, one.lower, one.upper].map((number) => (number === null ? null : number * factor));
-  const bounded = lower !== null && upper !== null;
-  const digits = digitsFor(value, lower, upper);
-  const bound = one.status === "absent" && upper !== null ? `below ${numberText(upper, 2)} ${sign}` : statusText(one.status);
-  cell.append(value !== null ? `${numberText(value, digits)} ${sign}` : bound);
-  if (bounded && value !== null) {
-    cell.append(element("br"), element("small", { textContent: `${numberText(lower, digits)} to ${numberText(upper, digits)}` }));
-  }
+  const shown = typeof unit === "function" ? unit(one.value) : unit;
+  const [value, limits] = estimateTexts(one.value, one.lower, one.upper, shown);
+  const bound = one.status === "absent" && one.upper !== null ? `${limits} ${shown.sign}` : statusText(one.status);
+  cell.append(one.value !== null ? `${value} ${shown.sign}` : bound);
+  if (one.value !== null && one.lower !== null && one.upper !== null) cell.append(element("br"), element("small", { textContent: limits }));
   return cell;
 }
 
@@ -189,7 +185,7 @@ function linesOf(figures) {
     const name = element(figure.term ? "i" : "span", { textContent: figure.label });
     if (figure.term) name.dataset.term = figure.term;
     const judged = figure.ratios.flatMap((ratio, place) => [verdictCell(ratio, chosen[0], chosen[place + 1]), ratioCell(ratio)]);
-    const row = element("tr", {}, element("th", { scope: "row" }, name), ...judged, ...figure.own.map((one) => ownCell(one, figure.unit, figure.digits)));
+    const row = element("tr", {}, element("th", { scope: "row" }, name), ...judged, ...figure.own.map((one) => ownCell(one, figure.unit)));
     row.dataset.figure = figure.tau ? `adev ${figure.tau}` : figure.symbol;
     return row;
   });

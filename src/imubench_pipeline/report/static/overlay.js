@@ -68,10 +68,6 @@ function lookOf(view) {
 const groupOf = (view) => (pageData.grouped === "sensor" ? view.sensor : view.recording);
 const nameOf = (key) => pageData.names[key] ?? key;
 
-function interval(low, high) {
-  return Number.isFinite(low) && Number.isFinite(high) ? `${numberText(low, 3)} to ${numberText(high, 3)}` : "not known";
-}
-
 // A printed figure is a power of tau.
 const printedLine = (printed, tau, unit) => tau.map((t) => printed.value * unit.factor * t ** printed.slope);
 
@@ -191,9 +187,10 @@ kinds.forest = (figure) => {
       extent.push(middle * unit.factor, ...(bounded ? [lower * unit.factor, upper * unit.factor] : []));
       const look = lookOf(view);
       const colour = colourOf(look);
-      const words = value !== null ? `<b>${numberText(value * unit.factor, 4)} ${unit.sign}</b>${identified ? "" : ` (${statusText(status)})`}`
-        : status === "absent" ? `${statusText(status)}: below ${numberText(upper * unit.factor, 3)} ${unit.sign}` : statusText(status);
-      const limits = bounded ? `<br>95 %: ${interval(lower * unit.factor, upper * unit.factor)} ${unit.sign}` : "";
+      const [size, between] = estimateTexts(value, lower, upper, unit);
+      const words = value !== null ? `<b>${size} ${unit.sign}</b>${identified ? "" : ` (${statusText(status)})`}`
+        : status === "absent" ? `${statusText(status)}: ${between} ${unit.sign}` : statusText(status);
+      const limits = bounded ? `<br>95 %: ${between} ${unit.sign}` : "";
       traces.push({
         type: "scatter", mode: "markers", x: [middle * unit.factor], y: [place],
         marker: {

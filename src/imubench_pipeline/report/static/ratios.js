@@ -69,14 +69,8 @@ function drawnAt(channel, place) {
   return every.slice(place * draws, (place + 1) * draws);
 }
 
-// Enough digits that the two limits are seen to differ.
-function digitsOf(value, lower, upper) {
-  if (value === null || lower === null || upper === null) return limitDigits(lower, upper);
-  return Math.max(digitsBy(value, lower, upper), limitDigits(lower, upper, 2));
-}
-
 function ratioText({ value, lower, upper }) {
-  const digits = digitsOf(value, lower, upper);
+  const digits = countDigits(value, lower, upper);
   if (lower === null && upper === null) return "–";
   if (upper === null) return `above ${numberText(lower, digits)}`;
   return `${numberText(lower ?? 0, digits)} to ${numberText(upper, digits)}`;

@@ -81,7 +81,7 @@ kinds.pair = (figure) => {
     traces.push({
       group: "ratio", yaxis: "y2", type: "scatter", mode: "lines+markers", x, y, name: label, meta: { low, high, of: "ratio" },
       line: lineOf(other.look), marker: { color: colourOf(other.look), size: 6, symbol: ratios.map((ratio) => (["not significant", "not determined"].includes(ratio.verdict) ? `${(other.look.plain ?? other.look.marker)}-open` : other.look.plain ?? other.look.marker)) },
-      text: ratios.map((ratio, i) => `σ<sub>${chosen[0].letter}</sub>/σ<sub>${other.one.letter}</sub> at ${numberText(x[i], 3)} s: <b>${numberText(y[i], limitDigits(low[i], high[i], 2))}</b><br>95 %: ${ratioText(ratio)}<br>${verdictOf(ratio, chosen[0], other.one).text}`),
+      text: ratios.map((ratio, i) => `σ<sub>${chosen[0].letter}</sub>/σ<sub>${other.one.letter}</sub> at ${numberText(x[i], 3)} s: <b>${numberText(y[i], countDigits(y[i], low[i], high[i]))}</b><br>95 %: ${ratioText(ratio)}<br>${verdictOf(ratio, chosen[0], other.one).text}`),
       hovertemplate: "%{text}<extra></extra>",
     });
   });
@@ -162,7 +162,7 @@ kinds.dumbbells = (figure) => {
   const extent = [1];
   const { soft } = inks();
   const narrow = figure.clientWidth < 560;
-  const words = figures.map(({ label, long, own, unit }) => narrow ? symbolMarkup(label) : `${long}<br>${own.map((one, i) => `${chosen[i].letter} ${one.value === null ? "–" : numberText(one.value * unit.factor, 3)}`).join(", ")} ${unit.sign}`);
+  const words = figures.map(({ label, long, own, unit }) => narrow ? symbolMarkup(label) : `${long}<br>${own.map((one, i) => `${chosen[i].letter} ${one.value === null ? "–" : estimateTexts(one.value, one.lower, one.upper, unit)[0]}`).join(", ")} ${unit.sign}`);
   figures.forEach(({ own }, place) => {
     const base = own[0].value;
     const middle = (one) => one.value ?? (one.lower > 0 && one.upper ? Math.sqrt(one.lower * one.upper) : one.upper);
@@ -280,7 +280,7 @@ function drawErrors(root) {
         return { value, lower, upper, status: "ok" };
       });
       if (own.includes(null)) continue;
-      figures.push({ symbol: error, label: error, unit: (size) => errorUnit(error, size), digits: digitsBy, own, ratios: own.slice(1).map((other) => ratioOfParameters(own[0], other)) });
+      figures.push({ symbol: error, label: error, unit: (size) => errorUnit(error, size), own, ratios: own.slice(1).map((other) => ratioOfParameters(own[0], other)) });
     }
   }
   table.tHead.replaceChildren(headOf(`After ${timeText(growthOf.time)}`, ...headsOfPairs(), ...chosen.map(shortName)));
@@ -309,7 +309,7 @@ kinds.growth = () => {
     traces.push({
       type: "scatter", mode: "lines+markers", x: times, y, name: shortName(one), meta: { low, high }, line: lineOf(look),
       marker: { color: colourOf(look), symbol: look.marker, size: 7 },
-      text: times.map((t, i) => `${shortName(one)} after ${timeText(t)}: <b>${numberText(y[i], limitDigits(low[i], high[i], 2))} ${sign}</b><br>95 %: ${interval(low[i], high[i])}<br>${axes.map((name) => CHANNEL_NAMES[name]).join(", ")}, ${timeText(windows[window])} at rest`),
+      text: times.map((t, i) => `${shortName(one)} after ${timeText(t)}: <b>${numberText(y[i], countDigits(y[i], low[i], high[i]))} ${sign}</b><br>95 %: ${interval(low[i], high[i])}<br>${axes.map((name) => CHANNEL_NAMES[name]).join(", ")}, ${timeText(windows[window])} at rest`),
       hovertemplate: "%{text}<extra></extra>",
     });
     ends.push({ y: Math.log10(y.at(-1)), text: one.letter, colour: colourOf(look) });
@@ -347,8 +347,8 @@ kinds.sources = (figure) => {
   return stackedShares(
     here.map((one) => {
       const ends = ["sigma", "lower", "upper"].map((name) => array(grownOf(one)[name])[chosenPlace(one).at]);
-      const { sign, factor } = errorUnit(growthOf.error, ends[0]);
-      return `${wrapped(shortName(one))}<br>${numberText(ends[0] * factor, digitsBy(...ends.map((end) => end * factor)))} ${sign}`;
+      const unit = errorUnit(growthOf.error, ends[0]);
+      return `${wrapped(shortName(one))}<br>${estimateTexts(...ends, unit)[0]} ${unit.sign}`;
     }),
     shares, here.map(shortName), figure.clientWidth,
   );

@@ -21,7 +21,7 @@ kinds.trend = (figure) => {
         array: value.map((each, i) => (each === null || upper[i] === null ? 0 : upper[i] - each)),
         arrayminus: value.map((each, i) => (each === null || lower[i] === null ? 0 : each - lower[i])),
       },
-      text: value.map((each, i) => `${trend.recordings[i]}<br>${symbolText(trend.parameter)} ${each === null ? "not known" : `<b>${numberText(each, 4)} ${unit.sign}</b>`}<br>${trend.verdict[i] ?? ""}`),
+      text: value.map((each, i) => `${trend.recordings[i]}<br>${symbolText(trend.parameter)} ${each === null ? "not known" : `<b>${estimateTexts(trend.value[i], trend.lower[i], trend.upper[i], unit)[0]} ${unit.sign}</b>`}<br>${trend.verdict[i] ?? ""}`),
       hovertemplate: "%{text}<extra></extra>",
     },
   ];

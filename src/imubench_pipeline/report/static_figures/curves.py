@@ -246,21 +246,18 @@ def mark_point(
 
 def _label_term(view: ChannelView, term: Term, system: System) -> str:
     """Return the name of a term with its parameters, and their status if not estimated."""
-    values = ", ".join(
-        f"{SYMBOLS[symbol]} = {unit.text(abs(value), 3)} {unit.sign}"
-        for symbol, value in term.values.items()
-        for unit in [choose_page_unit(view.quantity, symbol, system)]
-    )
-    doubts = {
-        status_text(row.status)
-        for symbol, value in term.values.items()
-        for row in view.named(view.recommended, symbol)
-        if row.value is None and row.fitted is not None
-        if math.isclose(row.fitted, value)
-    }
-    return f"{TERM_NAMES[view.quantity][term.symbol]}, {values}" + "".join(
-        f" ({doubt})" for doubt in sorted(doubts)
-    )
+    values, doubts = [], set()
+    for symbol, value in term.values.items():
+        unit, lower, upper = choose_page_unit(view.quantity, symbol, system), None, None
+        for row in view.named(view.recommended, symbol):
+            if row.value is not None and math.isclose(row.value, value):
+                lower, upper = row.lower, row.upper
+            elif row.value is None and row.fitted and math.isclose(row.fitted, value):
+                doubts.add(f" ({status_text(row.status)})")
+        size, _ = unit.estimate_texts(abs(value), lower, upper)
+        values.append(f"{SYMBOLS[symbol]} = {size} {unit.sign}")
+    name = TERM_NAMES[view.quantity][term.symbol]
+    return f"{name}, {', '.join(values)}{''.join(sorted(doubts))}"
 
 
 @set_style()

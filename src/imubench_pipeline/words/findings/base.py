@@ -19,7 +19,7 @@ from functools import cache
 from typing import ClassVar, Literal, dataclass_transform
 
 from imubench_pipeline.units import convert_from_si
-from imubench_pipeline.words.numbers import Unit, interval_text
+from imubench_pipeline.words.numbers import Unit
 
 SLOW = frozenset({"B", "B_curve", "sigma_min", "tau_min", "T_B", "K", "R"})
 """Parameters of slow noise."""
@@ -119,6 +119,5 @@ def value_text(value: float, channel: str, kind: Kind, digits: int = 3) -> str:
 
 def estimate_text(value: float, lower: float, upper: float, unit: Unit) -> str:
     """Return an estimate with its 95 % interval: ``30 °/h (95 %: 28 to 32 °/h)``."""
-    digits = unit.digits(value, lower, upper)
-    limits = interval_text(lower, upper, unit, digits)
-    return f"{unit.text(value, digits)} {unit.sign} (95 %: {limits} {unit.sign})"
+    text, limits = unit.estimate_texts(value, lower, upper)
+    return f"{text} {unit.sign} (95 %: {limits} {unit.sign})"

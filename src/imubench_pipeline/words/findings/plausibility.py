@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 from imubench_pipeline.earth import STANDARD_GRAVITY
 from imubench_pipeline.settings.printed import SENSORS
@@ -79,10 +80,10 @@ class SuspiciousUnit(
             assert self.noise is not None
             assert self.usual is not None
             unit = unit_of(channel, "density")
-            seen = f"its noise is {unit.text(self.noise, 3)} {unit.sign}"
-            limits = " to ".join(unit.text(limit, 3) for limit in self.usual)
+            seen = f"its noise is {unit.text(self.noise)} {unit.sign}"
+            limits = " to ".join(unit.text(limit) for limit in self.usual)
             usual = f"expected {limits} {'by its data sheet' if self.printed else 'for any gyro'}"
-            mended = f"{unit.text(self.noise * self.factor, 3)} {unit.sign}"
+            mended = f"{unit.text(self.noise * self.factor)} {unit.sign}"
         return (
             f"The unit of {name} is probably wrong: {seen}; {usual}. "
             f"If the log is in {self.likely}, and not {self.stated}, it is {mended}. "
@@ -122,9 +123,9 @@ class NoiseUnlikeDatasheet(
         name, unit = channel_name(self.measured_on), unit_of(self.measured_on, "density")
         rate = f"the stated rate of {number_text(self.stated_rate)} Hz, " * bool(self.stated_rate)
         return (
-            f"The noise of {name} is {unit.text(self.noise, 3)} {unit.sign}, "
+            f"The noise of {name} is {unit.text(self.noise)} {unit.sign}, "
             f"{number_text(self.noise / self.printed, 3)} times the "
-            f"{unit.text(self.printed, 3)} of its data sheet. "
+            f"{unit.text(self.printed)} of its data sheet. "
             f"Check {rate}scale, range and column of the channel, and whether it is this sensor"
         )
 
@@ -234,7 +235,8 @@ class UnusualFigure(
     def text(self, channel: str) -> str:
         symbol = "σ_min" if self.figure == "B" and self.estimated else self.figure
         unit = unit_of(self.quantity, "density" if self.figure == "N" else "level")
-        digits = unit.digits(self.value, self.lower, self.upper)
+        unit = replace(unit, parameter=self.figure)
+        value, _ = unit.estimate_texts(self.value, self.lower, self.upper)
         if self.value > self.usual:
             how = f"{number_text(self.value / self.usual, 3)} times the median"
         else:
@@ -244,11 +246,11 @@ class UnusualFigure(
         )
         return (
             f"{symbol} of {channel_name(channel) if channel else SENSORS[self.quantity]} is "
-            f"{unit.text(self.value, digits)} {unit.sign}, {how} of {self.sensors} sensors "
-            f"({unit.text(self.usual, 3)} {unit.sign}). "
+            f"{value} {unit.sign}, {how} of {self.sensors} sensors "
+            f"({unit.text(self.usual)} {unit.sign}). "
             + (
                 f"If it is in {mistake}, the value is "
-                f"{unit.text(self.value * (self.factor or 1.0), 3)} {unit.sign}: check its unit"
+                f"{unit.text(self.value * (self.factor or 1.0))} {unit.sign}: check its unit"
                 if mistake
                 else "Check whether its unit is right"
             )

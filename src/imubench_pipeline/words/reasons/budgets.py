@@ -110,11 +110,11 @@ def only_maximum(quantity: str, symbol: str) -> str:
 
 def assumed_range(quantity: str, symbol: str, low: float, high: float, source: str) -> str:
     """Return the range that is assumed for a figure, SI, with its source."""
-    unit = Unit("s", 1.0)
+    unit = Unit("s", 1.0, symbol)
     if symbol != "T_B":
         sign, dimension = _FIGURE_UNITS[quantity, symbol]
-        unit = Unit(sign, convert_from_si(1.0, sign, dimension))
-    limits = interval_text(low, high, unit, 2) if high > low else unit.text(low, 2)
+        unit = Unit(sign, convert_from_si(1.0, sign, dimension), symbol)
+    limits = interval_text(low, high, unit) if high > low else unit.text(low)
     return f"{SENSORS[quantity]} {symbol}: {limits} {unit.sign}, {source}"
 
 
