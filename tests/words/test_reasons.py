@@ -38,6 +38,7 @@ ESTIMATES = [
     of(estimates.correlation_bound, "longest correlation time", 4444.4, longest=True),
     of(estimates.correlation_bound, "shortest correlation time", 0.1, longest=False),
     of(estimates.wide_interval, "11 times", 11.2),
+    of(estimates.wide_limits, "11 times", 11.2),
     of(estimates.interval_with_zero, "lower 95 % limit is 0", at_limit=True),
     of(estimates.interval_with_zero, "includes 0", at_limit=False),
     of(estimates.excluded_by_likelihood, "0.52 to 0.61 times", "N", 0.52, 0.61),

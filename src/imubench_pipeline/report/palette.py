@@ -43,7 +43,7 @@ _INK_SHARES = (0.0, 0.5, 0.25, 0.75)
 _STYLES_PER_DASH = len(_INK_SHARES) * len(_MARKERS)  # recordings with the same dash
 
 _METHOD_STYLES = {
-    "robust": Appearance("#1B6F3A", "#5FC98A", "solid", "star"),
+    "robust": Appearance("#1B6F3A", "#5FC98A", "11px,3px,5px,3px", "star"),
     "likelihood": Appearance("#008F6B", "#2EC4A0", "solid", "diamond"),
     "likelihood_gm": Appearance("#9A6B00", "#E0A82E", "longdash", "square"),
     "compensated": Appearance("#5B5FC7", "#A3A6F2", "longdashdot", "x"),

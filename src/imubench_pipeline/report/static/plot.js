@@ -196,11 +196,12 @@ function drawFigure(figure) {
   showZoom(figure);
 }
 
-const DASHES = { solid: "", dash: "6 4", dot: "2 3", dashdot: "7 3 2 3", longdash: "11 4", longdashdot: "11 3 2 3", "7px,3px,2px,3px,2px,3px": "7 3 2 3 2 3" };
+const DASHES = { solid: "", dash: "6 4", dot: "2 3", dashdot: "7 3 2 3", longdash: "11 4", longdashdot: "11 3 2 3", "11px,3px,5px,3px": "11 3 5 3", "7px,3px,2px,3px,2px,3px": "7 3 2 3 2 3" };
 const SHAPES = {
   circle: '<circle cx="14" cy="7" r="4"/>', square: '<rect x="10" y="3" width="8" height="8"/>',
   diamond: '<path d="M14 2l5 5-5 5-5-5z"/>', "triangle-up": '<path d="M14 2l5 9H9z"/>',
   "triangle-down": '<path d="M14 12l5-9H9z"/>', cross: '<path d="M12.5 2h3v3.5H19v3h-3.5V12h-3V8.5H9v-3h3.5z"/>',
+  star: '<path d="M14 1.5l1.5 4h4l-3.2 2.5 1.2 4-3.5-2.4-3.5 2.4 1.2-4L8.5 5.5h4z"/>',
   x: '<path d="M10 4l1.6-1.6L14 5l2.4-2.6L18 4l-2.5 3 2.5 3-1.6 1.6L14 9l-2.4 2.6L10 10l2.5-3z"/>',
 };
 

@@ -90,10 +90,11 @@ _DASHES: dict[str, str | tuple[float, tuple[float, ...]]] = {
     "dashdot": (0.0, (5.0, 1.5, 1.0, 1.5)),
     "longdash": (0.0, (8.0, 2.0)),
     "longdashdot": (0.0, (8.0, 2.0, 1.0, 2.0)),
+    "11px,3px,5px,3px": (0.0, (8.0, 2.0, 4.0, 2.0)),
     "7px,3px,2px,3px,2px,3px": (0.0, (5.0, 1.5, 1.0, 1.5, 1.0, 1.5)),
 }
 _MARKERS = {"circle": "o", "square": "s", "diamond": "D", "triangle-up": "^", "triangle-down": "v"}
-_MARKERS |= {"cross": "P", "x": "X"}
+_MARKERS |= {"cross": "P", "x": "X", "star": "*"}
 
 TERM_LOOKS: dict[str, Look] = {
     "Q": {"color": "#9A6B00", "linestyle": (0, (1, 1.4))},
