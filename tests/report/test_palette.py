@@ -10,9 +10,9 @@ from imubench_pipeline.report.palette import (
 )
 from imubench_pipeline.report.view import METHOD_NAMES
 
-MARKERS = {"circle", "square", "diamond", "triangle-up", "triangle-down", "cross", "x"}
+MARKERS = {"circle", "square", "diamond", "triangle-up", "triangle-down", "cross", "x", "star"}
 DASHES = {"solid", "dash", "dot", "dashdot", "longdash", "longdashdot"}
-DASHES |= {"7px,3px,2px,3px,2px,3px"}
+DASHES |= {"7px,3px,2px,3px,2px,3px", "11px,3px,5px,3px"}
 BACKGROUNDS = {"light": "#ffffff", "dark": "#161a1e"}  # of report.css
 
 
