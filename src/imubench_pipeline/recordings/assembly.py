@@ -111,9 +111,11 @@ def count_samples(
                 present=column.present,
                 used=used[name],
                 knocks=part.knocks.get(name, 0),
+                interpolated=part.interpolated.get(name, 0),
                 repeated=repeated.get(name, 0),
             )
-            if count.present != count.used + count.knocks + count.repeated:
+            left_out = count.knocks + count.interpolated + count.repeated
+            if count.present != count.used + left_out:
                 raise RuntimeError(f"samples were lost or invented: {name} {count}")
             counts[name] = count
     return counts

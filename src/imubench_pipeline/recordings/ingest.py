@@ -18,7 +18,7 @@ from imubench_pipeline.recordings import assembly, timebase
 from imubench_pipeline.recordings.availability import check_opening, watch_log
 from imubench_pipeline.recordings.kept import AnalysedChannel, KeptFile, Quality, identify_files
 from imubench_pipeline.recordings.known_logs import KnownFile, identify_log_files, write_known
-from imubench_pipeline.recordings.parts import Part, leave_out_knocks, read_part
+from imubench_pipeline.recordings.parts import Part, leave_out_disturbed, read_part
 from imubench_pipeline.recordings.quality.columns import check_columns
 from imubench_pipeline.recordings.quality.copies import find_copied_channels
 from imubench_pipeline.recordings.quality.levels import summarise_level
@@ -44,7 +44,7 @@ from imubench_pipeline.settings.sensor import (
 )
 from imubench_pipeline.tables.failures import Failure
 from imubench_pipeline.tables.findings import Finding, RecordingError, UnavailableError, find
-from imubench_pipeline.words.findings import files
+from imubench_pipeline.words.findings import files, samples
 
 _MAX_NAMES = 5
 _MAX_TIMES = 5  # of knocks that are listed
@@ -234,7 +234,7 @@ def _findings(
         findings += [finding for finding in found if finding not in findings]
         findings += part.findings
         if static:  # a turn looks like a knock
-            findings += _knock_findings(part, base.rate, settings, scratch)
+            findings += _list_left_out(part, base.rate, settings, scratch)
     channels = {name: column for part in parts for name, column in part.columns.items()}
     findings += find_copied_channels({n: c for n, c in channels.items() if n not in BESIDE})
     whole = [part for part in parts if part.base is None]
@@ -255,8 +255,8 @@ def _find_holes(parts: list[Part], base: timebase.TimeBase) -> tuple[dict[str, b
     holes, empty = {}, []
     for part in parts:
         for name, column in part.columns.items():
-            lacks = (base.missing, column.missing, column.not_finite, part.knocks.get(name))
-            holes[name] = any(lacks)
+            left_out = (part.knocks.get(name), part.interpolated.get(name))
+            holes[name] = any((base.missing, column.missing, column.not_finite, *left_out))
             if name in BESIDE and not column.present:
                 empty.append(name)
     return holes, empty
@@ -272,18 +272,22 @@ def _gravity(parts: list[Part], bases: list[timebase.TimeBase]) -> GravityTurn |
     return detect_gravity_turn(blocks, bases[place[axes[0]]].rate)
 
 
-def _knock_findings(
+def _list_left_out(
     part: Part, rate: float, settings: QualitySettings, scratch: Path
 ) -> list[Finding]:
     longest = round(settings.longest_knock * rate)
     findings = []
-    for channel, events in leave_out_knocks(part, settings.knock, longest, scratch).items():
+    for channel, events in leave_out_disturbed(part, settings.knock, longest, scratch).items():
         worst = max(events, key=lambda knock: knock.size)
         times = tuple(max(knock.first, 0) / rate for knock in events[:_MAX_TIMES])
         begin, end = max(events[0].first, 0) / rate, events[-1].last / rate
         number = part.knocks[channel]
         data = files.Knocks(len(events), worst.size, times, number)
         findings.append(find(data, "warning", number, channel, begin, end))
+    for channel, number in part.interpolated.items():
+        if number:
+            share = number / part.columns[channel].present
+            findings.append(find(samples.Interpolated(number, share), "warning", number, channel))
     return findings
 
 

@@ -15,9 +15,13 @@ from numpy.typing import NDArray
 
 from imubench_pipeline.readers import LogFile
 from imubench_pipeline.recordings.quality import levels
+from imubench_pipeline.recordings.quality.interpolated import (
+    detect_interpolation,
+    mark_straight_lines,
+)
 from imubench_pipeline.recordings.quality.knocks import Knock, find_knocks, find_outlier_blocks
 from imubench_pipeline.recordings.quality.summary import ColumnSummary
-from imubench_pipeline.recordings.recording import ROW_GROUP, LogWriter
+from imubench_pipeline.recordings.recording import BESIDE, ROW_GROUP, LogWriter
 from imubench_pipeline.recordings.timebase import TimeBase
 from imubench_pipeline.settings.sensor import UsedPart
 from imubench_pipeline.tables import open_parquet, read_row_group
@@ -45,6 +49,7 @@ class Part:
     """Number of records for each bit mask of columns with a number: entry 5 counts the records with
     the first and the third column."""
     knocks: dict[str, int] = field(default_factory=dict)  # samples of columns left out as knocks
+    interpolated: dict[str, int] = field(default_factory=dict)  # samples left out as interpolated
     stamped: bool = False  # records have stamps
     base: TimeBase | None = None  # set when the columns of a file were separated
     findings: list[Finding] = field(default_factory=list)  # of columns whose rate changes
@@ -134,12 +139,13 @@ def read_part(file: LogFile, use: UsedPart, scratch: Path, number: int) -> Part:
     return part
 
 
-def leave_out_knocks(
+def leave_out_disturbed(
     part: Part, sigmas: float, longest: int, scratch: Path
 ) -> dict[str, list[Knock]]:
-    """Replace the samples of knocks by NaN in the file of a part; return the knocks by column.
+    """Replace knocks and interpolated samples by NaN in the file of a part.
 
-    ``sigmas``: least distance from the level, in standard deviations. ``longest``: in records.
+    Returns the knocks by column. ``sigmas``: their least distance from the level, in standard
+    deviations. ``longest``: in records.
     """
     blocks = {name: column.blocks() for name, column in part.columns.items()}
     doubtful = [name for name, b in blocks.items() if len(find_outlier_blocks(b, sigmas)[0])]
@@ -148,7 +154,12 @@ def leave_out_knocks(
     doubtful = [
         name for name in doubtful if len(find_outlier_blocks(blocks[name], sigmas, step[name])[0])
     ]
-    if not doubtful:
+    rules = {
+        name: detect_interpolation(column.excerpts(), part.rows)
+        for name, column in part.columns.items()
+        if name not in BESIDE
+    }
+    if not doubtful and not any(rules.values()):
         return {}
     part.writer.finish({})
     knocks_of = {}
@@ -156,11 +167,12 @@ def leave_out_knocks(
         values = _read_row_groups(part.data, name)
         if here := list(find_knocks(values, blocks[name], sigmas, longest, step[name])):
             knocks_of[name] = here
-    # Write the columns again without the samples of knocks; the new writer stays open.
+    # Write the columns again without those samples; the new writer stays open.
     old = part.data
     part.data = scratch / f"{old.stem}.calm.parquet"
     part.writer = LogWriter(part.data, dict.fromkeys(part.columns, pa.float64()))
     part.knocks = dict.fromkeys(part.columns, 0)
+    part.interpolated = dict.fromkeys(part.columns, 0)
     reached = 0
     with open_parquet(old) as file:
         for number in range(file.num_row_groups):
@@ -172,7 +184,11 @@ def leave_out_knocks(
                 for knock in knocks_of.get(name, []):
                     start = max(knock.first - reached, 0)
                     samples[start : max(knock.last - reached, 0)] = np.nan
-                part.knocks[name] += before - int(np.isfinite(samples).sum())
+                after = int(np.isfinite(samples).sum())
+                part.knocks[name] += before - after
+                if rules.get(name):
+                    samples[mark_straight_lines(samples, rules[name])] = np.nan
+                    part.interpolated[name] += after - int(np.isfinite(samples).sum())
                 columns[name] = samples
             reached += table.num_rows
             part.writer.write(columns)

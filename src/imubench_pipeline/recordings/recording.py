@@ -82,6 +82,7 @@ class SampleCounts:
     present: int
     used: int
     knocks: int
+    interpolated: int = 0
     repeated: int
 
 

@@ -71,6 +71,21 @@ class Coarse(FindingData, affects=ALL, doubt="coarse resolution of {channels}"):
         )
 
 
+class Interpolated(FindingData, affects=NONE):
+    """Samples on straight lines between their neighbours, which are left out."""
+
+    samples: int
+    share: float
+
+    def text(self, channel: str) -> str:
+        return (
+            f"{counted(self.samples, 'sample')} of {channel_name(channel)} "
+            f"({percent_text(self.share, 2)}) {'lies' if self.samples == 1 else 'lie'} on straight "
+            "lines, as lost samples do that were interpolated. They are treated as missing. Record "
+            "losses as gaps"
+        )
+
+
 class RepeatedSamples(FindingData, affects=WHITE, doubt="repeated samples in {channels}"):
     """Samples repeat their predecessor more often than rounding explains."""
 
