@@ -35,12 +35,20 @@ wrong: list[str] = []
 checked: dict[str, int] = {}
 
 
+class Printed(float):
+    """A printed number, with half a unit of its last digit."""
+
+    half_unit: float
+
+
 def check(where: str, channel: Channel, name: str, expected: float | None, found: object) -> None:
-    """Note a number that is another one; printed ones are rounded to four digits."""
+    """Note a number that differs; printed ones may differ by half a unit of their last digit."""
     checked[where] = checked.get(where, 0) + 1
     # Linear algebra on several cores, which a job of a run does not use, rounds otherwise.
-    within = {"terminal": 6e-4, "page": 2e-6, "library": 1e-7}.get(where, 1e-12)
-    if isinstance(found, float) and expected is not None:
+    within = {"page": 2e-6, "library": 1e-7}.get(where, 1e-12)
+    if isinstance(found, Printed) and expected is not None:
+        same = abs(found - expected) <= found.half_unit * (1.0 + 1e-9)
+    elif isinstance(found, float) and expected is not None:
         same = math.isclose(found, expected, rel_tol=within)
     else:
         same = found == expected
@@ -111,13 +119,16 @@ def of_terminal(
             yield (sensor, recording, channel), numbers
 
 
-def number_of(text: str) -> float | None:
+def number_of(text: str) -> Printed | None:
     """Return a number as it is printed, or None of a word."""
     match = re.match(r"(-?[\d.]+)(?:×10([⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+))?(?: |$)", text)
     if match is None:
         return None
     exponent = (match[2] or "⁰").translate(str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789"))
-    return float(f"{match[1]}e{exponent}")
+    number = Printed(f"{match[1]}e{exponent}")
+    decimals = len(match[1].partition(".")[2])
+    number.half_unit = 0.5 * 10.0 ** (int(exponent) - decimals)
+    return number
 
 
 def of_exports(results: Path) -> Iterator[tuple[Channel, Numbers]]:
@@ -172,7 +183,8 @@ def main(results: Path, logs: list[str], channels: list[str] | None) -> int:
                 check("export", channel, symbol, values[channel][symbol], numbers[symbol])
     for row in pq.read_table(results / "tables/error_budget.parquet").to_pylist():
         # White noise of density N grows to N sqrt(t) in the attitude, right from the start.
-        if (row["error"], row["source"], row["time"]) == ("attitude", "gyro N", 1.0):
+        own = (row["error"], row["quantity"], row["source"], row["through"], row["time"])
+        if own == ("attitude", "gyro", "N", None, 1.0):
             channel = (row["sensor"], row["recording"], row["gyro"])
             check("budget", channel, "N", values[channel]["N"], row["sigma"])
     for log in logs:
