@@ -16,7 +16,7 @@ from imubench_pipeline.recordings.quality.interpolated import (
 from imubench_pipeline.recordings.quality.summary import ColumnSummary
 from imubench_pipeline.typing import Array
 
-SAMPLES = 120_000
+SAMPLES = 40_000
 
 
 def fill_losses(log: Array, share: float, rng: np.random.Generator) -> tuple[Array, Array]:

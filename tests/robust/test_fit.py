@@ -21,7 +21,7 @@ from imubench_pipeline.noise.simulate import simulate
 from imubench_pipeline.typing import Array
 
 RATE = 20.0
-SAMPLES = 200_000
+SAMPLES = 100_000
 GYRO = NoiseModel(N=7e-5, B=3e-5, K=5e-7)
 
 
@@ -41,13 +41,13 @@ def simulate_gyro(seed: int, model: NoiseModel = GYRO, samples: int = SAMPLES) -
 
 
 def test_limits_contain_the_truth_of_stationary_logs() -> None:
-    found = [estimate(simulate_gyro(seed)) for seed in range(16)]
+    found = [estimate(simulate_gyro(seed)) for seed in range(8)]
     truth = {"N": GYRO.N, "B_curve": GYRO.B}
     for name, true in truth.items():
         parameters = [{**one.parameters, **one.curve}[name] for one in found]
         limits = [(one.lower, one.upper) for one in parameters]
         inside = sum(low is not None and low <= true <= (high or 0.0) for low, high in limits)
-        assert inside >= 12  # of 16 at 95 %: fewer has a probability of 0.1 %
+        assert inside >= 5  # of 8 at 95 %: fewer has a probability of 0.04 %
     # Two thirds of the information on N of white noise alone, 1/sqrt(2 L), remain.
     errors = [one.parameters["N"].in_model / GYRO.N - 1.0 for one in found]  # type: ignore[operator]  # a number
     assert np.sqrt(np.mean(np.square(errors))) < 1.6 / math.sqrt(2.0 * SAMPLES)
@@ -69,7 +69,7 @@ def test_a_change_of_the_noise_widens_the_limits_of_n() -> None:
     before, after = (estimate(log).parameters["N"] for log in (steady, changing))
     assert before.upper is not None and before.lower is not None
     assert after.upper is not None and after.lower is not None
-    assert before.upper / before.lower < 1.012
+    assert before.upper / before.lower < 1.02
     assert after.lower < 0.93 * GYRO.N * 1.02 and after.upper > 1.07 * GYRO.N * 0.98
 
 
@@ -79,7 +79,7 @@ def test_missing_samples_and_segments_leave_the_values() -> None:
     missing = log.copy()
     missing[np.random.default_rng(0).random(SAMPLES) < 0.02] = np.nan
     assert whole.lower is not None and whole.upper is not None
-    for other in (estimate(missing), estimate(log, segments=((0, 90_000), (90_000, SAMPLES)))):
+    for other in (estimate(missing), estimate(log, segments=((0, 45_000), (45_000, SAMPLES)))):
         value = other.parameters["N"].value
         assert value is not None and whole.lower < value < whole.upper
 
@@ -109,7 +109,7 @@ def test_unfit_curves_are_refused() -> None:
         estimate(np.tile((1.0, -1.0), 5000))
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=12, deadline=None)
 @given(
     st.lists(st.floats(0.01, 10.0), min_size=TERMS, max_size=TERMS),
     st.sets(st.integers(0, TERMS - 1), min_size=1),
@@ -132,9 +132,9 @@ def test_an_exact_curve_gives_its_terms(amplitudes: list[float], present: set[in
 def test_parts_of_a_log_sum_to_its_short_clusters() -> None:
     log = simulate_gyro(7)
     curve = of_blocks([log], SAMPLES, RATE, holes=False)
-    parts = compute_part_variances([log[:77_777], log[77_777:]], curve, holes=False)
+    parts = compute_part_variances([log[:33_333], log[33_333:]], curve, holes=False)
     assert parts.squares.shape == (PARTS, len(curve.tau))
-    few = curve.cluster_size <= 30
+    few = curve.cluster_size <= 15
     np.testing.assert_allclose(parts.divide(1)[0, few], curve.variance[few], rtol=2e-3)
     halves = parts.divide(2)[:, few]
     first = of_blocks([log[: SAMPLES // 2]], SAMPLES // 2, RATE, curve.cluster_size, holes=False)
