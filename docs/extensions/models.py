@@ -50,14 +50,10 @@ def _sections(page: str, model: type[BaseModel]) -> str:
     """Return a section for the model and each that it holds, in the order in which they occur."""
     schema = model.model_json_schema()
     groups: dict[str, Any] = schema.get("$defs", {})
-    order = _reached(schema, groups)
+    order = [name for name in _reached(schema, groups) if groups[name].get("properties")]
     linked = {name: f"{page}-{name.lower()}" for name in order}
     parts = [_section(f"({page}-top)=", "Top level", schema, linked)]
-    parts += [
-        _section(f"({linked[name]})=", _title(name), groups[name], linked)
-        for name in order
-        if groups[name].get("properties")
-    ]
+    parts += [_section(f"({linked[name]})=", _title(name), groups[name], linked) for name in order]
     return "\n".join(parts)
 
 
@@ -108,6 +104,8 @@ def _kind(value: dict[str, Any], linked: dict[str, str]) -> str:
     """Return what a key takes, in words."""
     if "$ref" in value:
         name = value["$ref"].rpartition("/")[2]
+        if name not in linked:  # such as any JSON value
+            return "any value"
         return f"[{_title(name).lower()}](#{linked[name]})"
     if options := value.get("anyOf") or value.get("oneOf") or value.get("allOf"):
         return " or ".join(dict.fromkeys(_kind(option, linked) for option in options))
