@@ -126,5 +126,6 @@ def shared() -> Path:
     """Real logs and the results of other programs, where the project stands beside them."""
     if not SHARED.is_dir():
         # They are not part of the project.
+        # Only a checkout on its own lacks it; CI has it.
         pytest.skip("the folder with real logs and oracles is not beside the project")
     return SHARED

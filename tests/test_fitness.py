@@ -132,7 +132,7 @@ def test_a_recording_that_was_not_analysed_does_not_decide() -> None:
     for status in ("rejected", "failed"):
         row = verdict(derive_doubts([finding("rejected", "fatal")], [], []), status=status)
         assert (row.fitness, row.decides, row.doubts) == (None, False, ())
-        assert list_excluded([row]) == {}  # that is told as rejected
+        assert list_excluded([row]) == {}  # it is reported as rejected
 
 
 def test_pools_are_those_without_the_unfit_recording_and_count_it() -> None:

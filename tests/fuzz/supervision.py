@@ -179,7 +179,7 @@ class _Running:
         self.tried = 0
         self.seconds = 0.0
         self._mine = mine
-        self._errors = tempfile.TemporaryFile()  # noqa: SIM115 (read when the worker has ended)
+        self._errors = tempfile.TemporaryFile()  # noqa: SIM115 - read when the worker has ended
         command = [sys.executable, "-X", "faulthandler", "-m", "tests.fuzz.worker"]
         command += [str(seeds), str(mine), "--target", target]
         command += ["--seed", seed, "--seconds", str(seconds)]

@@ -62,8 +62,8 @@ def test_a_term_without_a_part_cannot_be_made_nor_registered() -> None:
 @pytest.mark.parametrize(
     ("kinds", "what"),
     [
-        ((WhiteNoise, WhiteNoise), "symbol 'N' is that of two"),
-        ((WhiteNoise, changed(RandomWalk, word="N")), "word 'N' is that of two"),
+        ((WhiteNoise, WhiteNoise), "symbol 'N' belongs to two noise terms"),
+        ((WhiteNoise, changed(RandomWalk, word="N")), "word 'N' belongs to two noise terms"),
         (
             (changed(WhiteNoise, parameters=(TermParameter("K", "", 1.0, 0.5),)),),
             r"states the parameters \['K'\], and has \['N'\]",

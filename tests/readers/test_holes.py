@@ -35,6 +35,7 @@ def sparse(path: Path, size: int, **parts: bytes) -> Path:
 def has_holes(tmp_path: Path) -> None:
     with sparse(tmp_path / "probe", 1 << 20).open("rb") as probe:
         if find_next_data(probe.fileno(), 0) is not None:
+            # Holes need a file system with sparse files.
             pytest.skip("this file system stores every zero")
 
 

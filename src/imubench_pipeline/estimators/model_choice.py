@@ -36,7 +36,7 @@ def assess_goodness_of_fit(
     """Test the standardised residuals of a binned spectrum, its columns of shape (b,).
 
     Two tests, each at half the chance: the deviance sum nu (r - 1 - log r) with r = I / S, measured
-    over fitted density, whose mean and variance equal those of chi-squared variates; and the
+    over fitted density, with the mean and variance of chi-squared variates; and the
     correlation of neighbouring residuals, which shows a shape that the model does not have.
     ``parameters`` are the free ones of the model.
     """

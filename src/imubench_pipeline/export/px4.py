@@ -100,9 +100,10 @@ def write(imu: Imu, period: int = DEFAULT_PERIOD) -> str:
         ]
         about.append(
             f"TC_{letter}0_*: x, y and z of the log are taken as the axes of the device, and its "
-            f"temperature as that of the driver. PX4 corrects nothing until TC_{letter}0_ID names "
-            f"the device, as CAL_{calibration}0_ID does, and TC_{letter}_ENABLE is 1. The noise "
-            "above includes the effect of temperature; --method compensated leaves it out."
+            "temperature as the temperature of the driver. PX4 corrects nothing until "
+            f"TC_{letter}0_ID names the device, as CAL_{calibration}0_ID does, and "
+            f"TC_{letter}_ENABLE is 1. The noise above includes the effect of "
+            "temperature; --method compensated leaves it out."
         )
     columns = "# Vehicle-Id Component-Id Name Value Type\n"
     return format_comments(["Onboard parameters for Vehicle 1", *about]) + columns + "".join(rows)

@@ -101,7 +101,7 @@ def write_openvins(imu: Imu) -> str:
     mapped = _map_to_positive_walks(imu, "OpenVINS")
     about = [
         *describe_model(imu, "OpenVINS", _KALIBR_CONVENTION, mapped),
-        "Extrinsics and intrinsics (T_i_b, Tw, Ta, Tg, R_*) are those of an ideal sensor.",
+        "Extrinsics and intrinsics (T_i_b, Tw, Ta, Tg, R_*) describe an ideal sensor.",
     ]
     indent = "  "
 
@@ -148,7 +148,7 @@ def write_vins_fusion(imu: Imu) -> str:
     per_sample, per_step = math.sqrt(2.0 * imu.rate), math.sqrt(imu.rate)
     about = [
         *describe_model(imu, "VINS-Fusion", _VINS_CONVENTION.format(rate=imu.rate), mapped),
-        "These lines replace those of the same name in the configuration.",
+        "These lines replace the lines of the same name in the configuration.",
     ]
     values = [
         ("acc_n", accel.N * per_sample, f"m/s^2 a sample, N = {accel.N:.4e}"),

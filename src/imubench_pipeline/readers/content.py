@@ -81,8 +81,8 @@ def recognise_content(path: Path) -> tuple[FileFormat, str]:
             )
     signatures = [(each, each.signature) for each in FILE_FORMATS.values()]
     begun = (each for each, its in signatures if begin.startswith(its.begins))
-    told = (each for each, its in signatures if its.tells is not None and its.tells(begin))
-    file_format = next(chain(begun, told), TEXT)
+    matching = (each for each, its in signatures if its.tells is not None and its.tells(begin))
+    file_format = next(chain(begun, matching), TEXT)
     if packed and not file_format.streamed:
         raise RecordingError(
             f"{path.name}: holds a file of the reader {file_format.name!r}, compressed by "

@@ -58,7 +58,7 @@ class FileFormat:
     code: Callable[[], Code]  # imports and returns the code, when a run needs the format
     streamed: bool = False  # read sequentially: may be compressed or in a zip archive
     clock_of: Literal["file", "variable", "length"] = "length"
-    """Data that share a clock: those of a file or a topic, or arrays of equal length."""
+    """Data that share a clock: a file, a topic, or arrays of equal length."""
     time_columns: tuple[str, ...] = ()  # names that the format fixes
     settings: tuple[str, ...] = ()  # entries of `log` that apply to this format, but not to all
     vendor: str | None = None  # vendor of all sensors with such logs

@@ -115,8 +115,8 @@ def describe_outcome(results: Path, sensor: str, recording: str) -> str:
         row.finding.replace("_", " ") for row in quality.findings if row.severity != "note"
     )
     hours = about.duration / 3600.0
-    told = f"{name}: {hours:.3g} h at {about.rate:.6g} Hz, {len(quality.channels)} channels"
-    return told + (f"; in doubt: {', '.join(kinds)}" if kinds else "")
+    text = f"{name}: {hours:.3g} h at {about.rate:.6g} Hz, {len(quality.channels)} channels"
+    return text + (f"; in doubt: {', '.join(kinds)}" if kinds else "")
 
 
 def identify_files(paths: Iterable[Path]) -> dict[str, KeptFile]:
@@ -134,7 +134,7 @@ def _footer(path: Path) -> str:
 def load_logs(folder: Path) -> dict[str, ChannelLog]:
     """Return the usable channels of a recording, by name; none of a rejected one.
 
-    Raises RecordingError if files of samples are missing, damaged, or not those of the ingest.
+    Raises RecordingError if files of samples are missing, damaged, or not from the ingest.
     """
     quality = Quality.read(folder / "quality.json")
     if fault := quality.fault(folder):

@@ -24,7 +24,7 @@ _MIN_ROUNDED_REPEATS = 0.02
 """Least share of repeated stamps that is tested: below it, rounding or copies change N by 1 %
 only."""
 
-_MEDIAN_LEVEL = 0.45  # so that of as many short as long steps the short is chosen
+_MEDIAN_LEVEL = 0.45  # below 0.5: the short step is chosen if both are as frequent
 MIN_SET_BACK = 0.45
 """Least step back, s, of a clock that was set back, as by a leap second. Shorter steps back are
 from records that were written twice or out of order."""

@@ -1,7 +1,7 @@
 """The time base of a recording: its rate, its missing samples and its segments.
 
 Stamps on a uniform grid give the position of every sample; positions without one are holes. Stamps
-that scatter by more than half a sampling interval, such as those of arrival, give only the length:
+that scatter by more than half a sampling interval, such as arrival times, give only the length:
 the samples are then treated as consecutive, with a finding.
 """
 

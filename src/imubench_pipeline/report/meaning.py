@@ -29,9 +29,9 @@ from imubench_pipeline.words.numbers import (
 class SourcedNumber(str):
     """A printed number; in HTML it names its source, a value of the tables.
 
-    ``source`` is ``ranking/<requirement>/<sensor>/<error>/<time>/<column>``, or that of a total of
-    ``error_budget``, with the recording after the sensor; two columns with a colon between them are
-    a ratio. ``unit`` is the unit of the number.
+    ``source`` is ``ranking/<requirement>/<sensor>/<error>/<time>/<column>``. For a total of
+    ``error_budget`` it has the recording after the sensor. Two columns with a colon between them
+    are a ratio. ``unit`` is the unit of the number.
     """
 
     __slots__ = ("source", "unit")

@@ -309,12 +309,12 @@ def _add_shortlist(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--requirements",
         type=Path,
-        help="folder of the requirements; default: those of the package and config/requirements",
+        help="folder of the requirements; default: the package's and config/requirements",
     )
     parser.add_argument(
         "--results",
         type=Path,
-        help="of a run: what is measured, and what stands for figures that nobody publishes",
+        help="of a run: measured figures, and substitutes for figures that nobody publishes",
     )
 
 

@@ -45,14 +45,14 @@ _MIN_LINE_INTERVAL = 10.0  # min. time between two lines of progress in a pipe, 
 _TIME_UNITS = ((3600, "h"), (60, "min"))
 Recording = tuple[str, str]  # sensor and name
 _expected: Counter[Recording] = Counter()
-_told: list[Callable[[str, str], str]] = []
+_describe_end: list[Callable[[str, str], str]] = []
 
 
-def follow(jobs: Iterable[Recording], told: Callable[[str, str], str]) -> None:
-    """Show what `told` returns for a recording when the last of its `jobs` has ended."""
+def follow(jobs: Iterable[Recording], describe: Callable[[str, str], str]) -> None:
+    """Show what `describe` returns for a recording when the last of its `jobs` has ended."""
     _expected.clear()
     _expected.update(jobs)
-    _told[:] = [told]
+    _describe_end[:] = [describe]
 
 
 class LogHandler(LogHandlerBase):
@@ -143,8 +143,8 @@ class LogHandler(LogHandlerBase):
             if recording and recording in _expected:
                 _expected[recording] -= 1
                 if _expected[recording] == 0:  # its last job has ended
-                    for told in _told:
-                        self._print(fold_text(told(*recording), _MAX_LINE_LENGTH))
+                    for describe in _describe_end:
+                        self._print(fold_text(describe(*recording), _MAX_LINE_LENGTH))
         if not self._running:
             self._hide()
 

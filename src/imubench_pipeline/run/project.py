@@ -101,8 +101,8 @@ def add_run_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare what `imubench run` is given."""
     parser.usage = "%(prog)s [-h] [-c N] [folder] [-- FLAG ...]"
     parser.description = (
-        "Run the workflow in a folder that imubench init has made, or in a checkout. What stands "
-        "after -- goes to snakemake: targets, and flags such as -n or --config allan='{...}'; "
+        "Run the workflow in a folder that imubench init has made, or in a checkout. Arguments "
+        "after -- go to snakemake: targets, and flags such as -n or --config allan='{...}'; "
         "paths in them are taken from the folder."
     )
     parser.add_argument(
@@ -114,7 +114,7 @@ def add_run_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Become Snakemake, whose exit status is that of the command."""
+    """Become Snakemake, and pass on its exit status."""
     with require_extra("workflow", "run the workflow"):
         import_module("snakemake")
     folder: Path = options.folder

@@ -78,7 +78,7 @@ def select_channels(origin: Origin, channels: Sequence[str]) -> Origin:
     """
     if missing := [name for name in channels if name not in origin.imu.axes]:
         channels_there = ", ".join(origin.imu.axes) or "none"
-        raise ConfigError(f"no figures of {missing[0]}; there are those of {channels_there}")
+        raise ConfigError(f"no figures of {missing[0]}; there are figures of {channels_there}")
     axes = {name: axis for name, axis in origin.imu.axes.items() if name in channels}
     figures = {name: lines for name, lines in origin.figures.items() if name in channels}
     return replace(origin, imu=replace(origin.imu, axes=axes), figures=figures)

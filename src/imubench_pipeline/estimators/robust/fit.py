@@ -126,7 +126,7 @@ def fit(
     points = _Points.of(curve, inside, lines)
     fitted = _fit_points(points)
     draws = _draw(points, fitted, parts.select(inside), rng)
-    return _make_estimate(points, fitted, draws, lines)
+    return _make_estimate(points, fitted, draws)
 
 
 @dataclass(frozen=True)
@@ -260,17 +260,10 @@ def _whiten(covariance: Array, used: NDArray[np.bool_]) -> Array:
     return whitening
 
 
-@dataclass(frozen=True)
-class _Draws:
-    """Models drawn around a fitted one, and the part of their spread that is repeatability."""
-
-    solutions: Solutions
-    excess: dict[int, float]  # variance of the logarithm of a parameter, by column
-
-
 def _draw(
     points: _Points, fitted: _Fitted, parts: PartVariances, rng: np.random.Generator
-) -> _Draws:
+) -> Solutions:
+    """Return models drawn around the fitted one, spread by the excess between parts."""
     covariance = fitted.sampling + points.model_covariance(fitted.error)
     values, vectors = np.linalg.eigh(covariance)
     root = vectors * np.sqrt(np.maximum(values, 0.0))
@@ -286,7 +279,7 @@ def _draw(
     for column, terms in enumerate(((WHITE,), (FLICKER, PROCESS), (WALK, RAMP))):
         for term in terms:
             factors[:, term] = np.exp(2.0 * np.sqrt(excess[terms[0]]) * spread[:, column])
-    return _Draws(replace(drawn, squares=drawn.squares * factors), excess)
+    return replace(drawn, squares=drawn.squares * factors)
 
 
 def _chi_squared_logarithms(relative: Array) -> tuple[Array, Array]:
@@ -322,11 +315,9 @@ def _estimate_excesses(points: _Points, fitted: _Fitted, parts: PartVariances) -
     return excess
 
 
-def _make_estimate(
-    points: _Points, fitted: _Fitted, draws: _Draws, lines: Sequence[Sinusoid]
-) -> Estimate:
+def _make_estimate(points: _Points, fitted: _Fitted, drawn: Solutions) -> Estimate:
     """Return the estimate: values of the best model, limits of the draws."""
-    curve, model, drawn = points.curve, fitted.model, draws.solutions
+    curve, model = points.curve, fitted.model
     roots = np.sqrt(drawn.squares)
     times = np.where(np.isfinite(drawn.times), drawn.times, np.inf)
     biases = np.hypot(roots[:, FLICKER], roots[:, PROCESS])

@@ -105,7 +105,7 @@ def estimate_excess(
     parts : PartVariances
     curve : AllanCurve
     influence : ndarray, shape (m,)
-        Derivatives of the logarithm of the parameter by those of the variances of the curve.
+        Derivatives of the logarithm of the parameter by the logarithms of the variances.
     covariance : callable
         Returns the covariance of the relative variances of a log of a number of samples.
     """

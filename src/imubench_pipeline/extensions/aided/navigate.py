@@ -399,7 +399,7 @@ def _make_rows(
             "signals": source.words,
             "runs": source.runs,
         }
-        told = {
+        rows_of_tunings = {
             name: [
                 NavigationRow(**about | _describe_tuning(drive, outcomes, name, model, length))
                 for length in (None, *lengths)
@@ -410,11 +410,11 @@ def _make_rows(
         # after the longest outage. The true model is none.
         consistent = {
             name: (own[0].states or 0, own[-1].position or 0.0)
-            for name, own in told.items()
+            for name, own in rows_of_tunings.items()
             if name != TRUE and all(row.consistent for row in own)
         }
         smallest = min(consistent, key=lambda name: consistent[name], default=None)
-        for name, own in told.items():
+        for name, own in rows_of_tunings.items():
             for row in own:
                 yield replace(row, smallest=name == smallest)
         for name, reason in lacking.items():

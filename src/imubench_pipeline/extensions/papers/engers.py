@@ -152,7 +152,7 @@ def _get_sample_deviations(run: Evidence, sensor: str) -> dict[tuple[str, str], 
 
 
 def compare_sample_deviations(run: Evidence, sensor: str, if_alike: Verdict) -> Result | None:
-    """Return the deviations of samples of the fitted model over those of the log."""
+    """Return the ratio of the deviations of samples of the fitted model and of the log."""
     by = _get_sample_deviations(run, sensor)
     ratios = [value / by[channel, "log"] for (channel, of), value in by.items() if of == "after"]
     if not ratios:

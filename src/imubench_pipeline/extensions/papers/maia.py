@@ -217,8 +217,8 @@ def _format_power(value: float, digits: int) -> str:
 def _describe(row: ParameterRow | None, what: str) -> str:
     if row is None:
         return ""
-    told = row.status.replace("_", " ") if row.value is None else _format_power(row.value, 3)
-    return f"{what}: {told}"
+    text = row.status.replace("_", " ") if row.value is None else _format_power(row.value, 3)
+    return f"{what}: {text}"
 
 
 def get_optimised_estimate(run: Evidence, key: str, symbol: str) -> Result | None:
@@ -332,7 +332,7 @@ def compute_chance_of_order(_: Evidence, key: str) -> Result:
 
 
 def get_weighted_rms(run: Evidence, key: str, method: str) -> Result | None:
-    """Return the weighted RMS of the curve of a model, with that of single reconstructions."""
+    """Return the weighted RMS of the curve of a model and of single reconstructions."""
     rows = run.of_log(ScoreRow, CHANNELS[key].log, method=method)
     if not rows or rows[0].rms is None:
         return None

@@ -167,7 +167,7 @@ class Result:
     upper: float | None = None
     printed: float | None = None  # value of the line if it has none, SI
     words: str | None = None  # replaces the words of the line
-    verdict: Verdict | None = None  # None: that of the line, or it follows from the numbers
+    verdict: Verdict | None = None  # None: the verdict of the line, or it follows from the numbers
     reason: str | None = None  # replaces the reason of the line
     fields: Mapping[str, object] = field(default_factory=dict)  # for the templates of the line
 

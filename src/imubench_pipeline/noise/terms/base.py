@@ -366,7 +366,7 @@ def register_terms(*kinds: type[Term]) -> tuple[type[Term], ...]:
         stated = [getattr(kind, name) for kind in kinds]
         for value in stated:
             if stated.count(value) > 1:
-                raise TypeError(f"{name} {value!r} is that of two noise terms")
+                raise TypeError(f"{name} {value!r} belongs to two noise terms")
     parameters: dict[str, TermParameter] = {}
     for kind in kinds:
         for parameter in kind.parameters:

@@ -155,7 +155,7 @@ class Bag:
             raise ValueError(f"a topic or type of more than {bounds.MAX_TOPIC_LENGTH} letters")
         if len(self._connections) >= bounds.MAX_TOPICS:
             raise ValueError(
-                f"more than {bounds.MAX_TOPICS} connections, expected those of a vehicle"
+                f"more than {bounds.MAX_TOPICS} connections, expected the connections of a vehicle"
             )
         # The name of the same type in ROS 2.
         self._connections[_UINT32.unpack(header[b"conn"])[0]] = topic, kind.replace("/", "/msg/", 1)

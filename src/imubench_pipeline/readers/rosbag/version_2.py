@@ -60,7 +60,7 @@ class Bag2:
             self._connections: list[Connection] = list(reader.connections)
             if len(self._connections) > bounds.MAX_TOPICS:
                 raise ValueError(
-                    f"more than {bounds.MAX_TOPICS} topics, expected those of a vehicle"
+                    f"more than {bounds.MAX_TOPICS} topics, expected the topics of a vehicle"
                 )
             if any(
                 len(str(c.topic) + str(c.msgtype)) > bounds.MAX_TOPIC_LENGTH

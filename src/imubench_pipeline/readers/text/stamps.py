@@ -190,7 +190,7 @@ _FORMS_BY_SIGNS = _group_forms_by_signs()
 
 
 def find_stamp_forms(texts: Sequence[str]) -> tuple[str, ...]:
-    """Return the patterns that all stamps match: those of the shortest time span."""
+    """Return the patterns of the shortest time span that all stamps match."""
     stamps = [text.strip() for text in texts if not is_missing(text)]
     if not stamps or not all(
         _MIN_STAMP_LENGTH <= len(stamp) <= _MAX_STAMP_LENGTH for stamp in stamps

@@ -139,7 +139,7 @@ function comparedFigures() {
 // Less noise is better.
 function verdictOf(ratio, first, second) {
   const better = { lower: first, higher: second }[ratio.verdict];
-  return better ? { text: `${better.letter} better`, letter: better.letter, kind: "told" } : { text: ratio.verdict, kind: ratio.verdict === "not determined" ? "unknown" : "even" };
+  return better ? { text: `${better.letter} better`, letter: better.letter, kind: "significant" } : { text: ratio.verdict, kind: ratio.verdict === "not determined" ? "unknown" : "even" };
 }
 
 function compareChosen(root) {
@@ -220,8 +220,8 @@ function sentenceOf(figures, first, second, place) {
     const ratio = figure.ratios[place];
     const { text, kind } = verdictOf(ratio, first, second);
     const times = ratio.value === null ? "" : ` (${numberText(ratio.value < 1 ? 1 / ratio.value : ratio.value, 2)} times)`;
-    if (!groups.has(text)) groups.set(text, { better: kind === "told", of: [] });
-    groups.get(text).of.push((figure.tau ? `σ(${numberText(figure.tau, 4)} s)` : symbolText(figure.symbol)) + (kind === "told" ? times : ""));
+    if (!groups.has(text)) groups.set(text, { better: kind === "significant", of: [] });
+    groups.get(text).of.push((figure.tau ? `σ(${numberText(figure.tau, 4)} s)` : symbolText(figure.symbol)) + (kind === "significant" ? times : ""));
   }
   const parts = [...groups].sort(([, a], [, b]) => b.better - a.better).map(([text, { of }]) => `${text}: ${of.join(", ")}`);
   const pair = chosen.length > 2 ? `${first.letter} or ${second.letter}? ` : "";

@@ -1,6 +1,6 @@
 """Run the steps of the workflow for a few logs while the user waits.
 
-The functions and settings are those of the rules, so that the numbers are the same. The channels of
+It uses the functions and settings of the rules, so that the numbers are the same. The channels of
 a recording are estimated and reconstructed in parallel, in forks of one process.
 """
 

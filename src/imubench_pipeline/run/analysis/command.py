@@ -149,13 +149,13 @@ def _write(plan: Plan, tables: Mapping[str, pa.Table], arguments: argparse.Names
         "--output": arguments.output and arguments.output.path,
     }
     words = [f"{name}={value}" for name, value in options.items() if value is not None]
-    told = json.loads(plan.report_settings()) | {
+    settings_of_report = json.loads(plan.report_settings()) | {
         "at_once": shlex.join(["imubench", "analyse", *words, "--", *map(str, arguments.logs)])
     }
     with output.filling() as folder:
         figures = list_drawings(tables, arguments.units, folder / "figures", kinds=kinds)
         with _draw_in_parallel(figures, arguments.cores):
-            site = make_site(tables, json.dumps(told), plan.run.results)
+            site = make_site(tables, json.dumps(settings_of_report), plan.run.results)
             write_content(render_one_file(site), folder / "report.html")
             for name in ("recordings", "findings", "doubts", "parameters", "allan", "models"):
                 write_arrow(tables[name], folder / f"{name}.csv")

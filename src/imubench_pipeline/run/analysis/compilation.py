@@ -19,16 +19,16 @@ class Compilation(AbstractContextManager["Compilation"]):
     def __init__(self, say: Callable[[str], None]) -> None:
         self._say = say
         self._process = Bounded(_MAX_COMPILE_MEMORY, compile_kernels)
-        self._told = threading.Timer(_MESSAGE_DELAY, self._tell)
+        self._timer = threading.Timer(_MESSAGE_DELAY, self._tell)
 
     def expected(self) -> None:
         """Start the timer of the message: the caller will wait for the compilation."""
-        self._told.start()
+        self._timer.start()
 
     def finish(self) -> None:
         """Wait for the end, and load the kernels, so that forks need not load them."""
         self._process.result(_MAX_COMPILE_TIME)
-        self._told.cancel()
+        self._timer.cancel()
         compile_kernels()
 
     def _tell(self) -> None:
@@ -38,5 +38,5 @@ class Compilation(AbstractContextManager["Compilation"]):
             self._say("compiling, once after the installation: some seconds")
 
     def __exit__(self, *_: object) -> None:
-        self._told.cancel()
+        self._timer.cancel()
         self._process.end()

@@ -227,7 +227,7 @@ class Results:
             place = f"tables/{name}.parquet"
             left = self.seals["tables"].outputs.get(place)
             if left is None or left.fault(self.folder / place, whole=False):
-                continue  # it is told
+                continue  # it is reported
             try:
                 if not {"sensor", "recording"} <= set(pq.read_schema(self.folder / place).names):
                     continue

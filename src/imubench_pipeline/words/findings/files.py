@@ -225,7 +225,7 @@ class IncompleteLastRecord(FindingData, affects=NONE):
     shown: str | None = None  # its first letters, if it has no line break
     has_checksum: bool = False  # its kind has a checksum, which is wrong
     columns: int | None = None
-    expected: int | None = None  # number of its columns, and of those of a whole record
+    expected: int | None = None  # number of its columns, and of the columns of a whole record
     messages: int | None = None
     message: str = ""  # number of messages that are cut short, and their name
 

@@ -136,7 +136,7 @@ class AxisUnlike(
     """One axis has much more or much less noise than both others."""
 
     others: tuple[str, ...]
-    ratio: float  # white noise over that of the others
+    ratio: float  # white noise over the white noise of the others
     noise: float  # white noise, SI
     stated: str
     likely: str | None  # units as the sensor file writes them; None: no unit explains it
