@@ -23,7 +23,7 @@ def of_workflow(drop_zone: Path, tmp_path_factory: pytest.TempPathFactory):
     plan = Plan(
         {"logs": str(drop_zone / "logs"), "sensors": str(drop_zone / "sensors"),
          "results": str(folder), "simulated": None, "requirements": None,
-         "estimate": {"methods": ["likelihood", "curve"]}}
+         "estimate": {"methods": ["robust", "likelihood", "curve"]}}
     )  # fmt: skip
     names = ("sensor_1", "run")
     settings = plan.ingest_settings(*names)
@@ -45,18 +45,18 @@ def test_the_truth_is_in_the_intervals(estimates) -> None:
     assert estimates.models["gyro_x"].name == "N+K" and accel.model.name == "N+F"
     with pytest.raises(ValueError, match="models of gyro_x, accel_z; expected"):
         _ = estimates.model
-    with pytest.raises(KeyError, match="no parameter 'ARW'; likelihood has"):
+    with pytest.raises(KeyError, match="no parameter 'ARW'; robust has"):
         gyro["ARW"]
 
 
 def test_a_log_has_the_numbers_of_the_workflow(estimates, of_workflow) -> None:
-    rows = [row for row in of_workflow.parameters if row["method"] == "likelihood"]
+    rows = [row for row in of_workflow.parameters if row["method"] == "robust"]
     table = estimates.to_pandas()
     pd.testing.assert_frame_equal(
         table, pd.DataFrame(rows).drop(columns="recommended"), check_exact=True
     )
     for channel, own in estimates.items():
-        draws = of_workflow.estimates[channel]["likelihood"].draws
+        draws = of_workflow.estimates[channel]["robust"].draws
         np.testing.assert_array_equal(own.draws.first, draws.first)
     found = [row["finding"] for row in of_workflow.estimate_findings]
     assert [finding.finding for finding in estimates.findings][-len(found) or 99 :] == found
@@ -93,7 +93,7 @@ def test_estimates_are_shown_drawn_and_given_as_tables(estimates) -> None:
     assert "gyro_x   N" in text and "°/√h" in text and "µg/√Hz" in text and len(text) < 3000
     assert "warnings: knocks" in text
     assert estimates._repr_html_().count("<tr>") == text.count("\n  ")
-    assert repr(estimates["gyro_x"]).startswith("gyro_x of sensor_1/run: N+K, by likelihood")
+    assert repr(estimates["gyro_x"]).startswith("gyro_x of sensor_1/run: N+F+K, by robust")
     practical = estimates.to_pandas("practical").set_index(["channel", "parameter"])
     N = practical.loc["gyro_x", "N"]
     assert N.unit == "°/√h"
@@ -103,10 +103,10 @@ def test_estimates_are_shown_drawn_and_given_as_tables(estimates) -> None:
     axes = estimates.plot()
     assert [panel.get_title() for panel in axes] == ["gyro_x", "accel_z"]
     lines = {line.get_label(): line for line in axes[0].get_lines()}
-    assert {"log, 95 % limits", "model: N+K"} <= set(lines) and len(lines) == 4
+    assert {"log, 95 % limits", "model: N+F+K"} <= set(lines) and len(lines) == 4
     tau = estimates.curves["gyro_x"].tau
     model = np.degrees(np.sqrt(estimates["gyro_x"].model.allan_variance(tau, RATE))) * 3600.0
-    np.testing.assert_allclose(lines["model: N+K"].get_ydata(), model)
+    np.testing.assert_allclose(lines["model: N+F+K"].get_ydata(), model)
 
 
 @pytest.mark.parametrize(

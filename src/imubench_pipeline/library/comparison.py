@@ -136,7 +136,7 @@ def compare(
     *logs: Log | Estimates,
     names: Sequence[str] | None = None,
     tau: Sequence[float | str] = _DEFAULT_TAUS,
-    method: Method = "likelihood",
+    method: Method = "robust",
 ) -> Comparison:
     """Compare the noise of logs, channel by channel.
 

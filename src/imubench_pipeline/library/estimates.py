@@ -196,7 +196,7 @@ def estimate(
     data: Any,
     rate: float | str | None = None,
     *,
-    method: Method = "likelihood",
+    method: Method = "robust",
     channels: Channels | None = None,
     units: Units | None = None,
     name: str = "samples",
@@ -214,8 +214,8 @@ def estimate(
     rate : float or str, optional
         Sampling rate, Hz, or with its unit: ``"100 Hz"``. A log has its own.
     method : str
-        ``likelihood``, or another of the workflow: ``robust`` (the Allan variance, with limits that
-        hold for sensors that change), ``likelihood_gm`` (the papers' N, B, T_B, K),
+        ``robust`` (the Allan variance, with limits that hold for sensors that change), or another
+        of the workflow: ``likelihood`` (the spectrum), ``likelihood_gm`` (the papers' N, B, T_B, K),
         ``compensated`` (without what temperature explains), ``weighted``, ``curve``, ``paper``.
     channels : str or sequence of str, optional
         For an array, the channels of the columns; for a log or table, the selected channels.
@@ -244,8 +244,6 @@ def estimate(
     >>> gyro = imu.NoiseModel(N=8.7e-5, K=2e-5)
     >>> samples = imu.simulate(gyro, "10 Hz", duration="20 min", seed=1)
     >>> estimates = imu.estimate(samples, "10 Hz", channels="gyro_z")
-    >>> estimates.model.name
-    'N+K'
     >>> N = estimates["gyro_z"]["N"]
     >>> N.lower < 8.7e-5 < N.upper
     True

@@ -59,7 +59,8 @@ class EstimateSettings(Strict):
     """Settings of the estimation of noise parameters."""
 
     methods: tuple[Method, ...] = Field(
-        ("likelihood", "likelihood_gm", "compensated", "curve", "paper", "weighted"), min_length=1
+        ("robust", "likelihood", "likelihood_gm", "compensated", "curve", "paper", "weighted"),
+        min_length=1,
     )
 
     longest: FractionOfLog = Field(

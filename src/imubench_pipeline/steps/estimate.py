@@ -295,7 +295,7 @@ _MIN_SAMPLES_FOR_STEP = 1 << 16  # samples from which the step of a register is 
 _LIKELIHOOD_METHODS = {"robust", "likelihood", "likelihood_gm", "compensated"}
 
 _CURVE_METHODS = ("likelihood_gm", "weighted", "paper", "curve")  # of one model, or of the curve
-_METHODS_BY_PREFERENCE = ("likelihood", "robust", "likelihood_gm", "weighted", "paper", "curve")
+_METHODS_BY_PREFERENCE = ("robust", "likelihood", "likelihood_gm", "weighted", "paper", "curve")
 """Methods in order of preference: the first requested one is recommended."""
 
 

@@ -84,6 +84,7 @@ _TIMES_OF_MINIMUM = 120
 _MAX_DOUBTFUL_RATIO = 10.0  # Of the limits of a bias instability or lowest point with a value
 _MAX_WITHOUT = 0.025  # Share of draws without a floor
 _MIN_DECREASE = 0.5  # of a residual that ends the search for the first point
+_MAX_EXCESS = 1.0  # Standard deviation of a logarithm between parts: nothing is identified beyond
 
 
 def fit(
@@ -141,6 +142,7 @@ class _Points:
     @classmethod
     def of(cls, curve: AllanCurve, inside: NDArray[np.bool_], lines: Sequence[Sinusoid]) -> _Points:
         curve = curve.select(inside)
+        curve = replace(curve, variance=curve.deviation**2)  # tables keep the deviation
         of_lines = NoiseModel(sinusoids=lines).allan_variance(curve.tau, curve.rate)
         rest = np.maximum(curve.variance - of_lines, (1.0 - _MAX_LINE_SHARE) * curve.variance)
         shortest = min(max(_SHORTEST, 20.0 / curve.rate), curve.tau[-1] / 4.0)
@@ -278,7 +280,8 @@ def _draw(
     factors = np.ones((_DRAWS, TERMS))
     for column, terms in enumerate(((WHITE,), (FLICKER, PROCESS), (WALK, RAMP))):
         for term in terms:
-            factors[:, term] = np.exp(2.0 * np.sqrt(excess[terms[0]]) * spread[:, column])
+            excess_error = min(np.sqrt(excess[terms[0]]), _MAX_EXCESS)
+            factors[:, term] = np.exp(2.0 * excess_error * spread[:, column])
     return replace(drawn, squares=drawn.squares * factors)
 
 
@@ -355,7 +358,8 @@ def _describe_lowest_point(
     search = TermSearch(tau, curve.rate, tau * curve.rate, points.search.times)
     squares = np.concatenate((fitted.solution.squares, drawn.squares))
     times = np.concatenate((fitted.solution.times, drawn.times))
-    level = np.log([search.design(T) @ s for T, s in zip(times.tolist(), squares, strict=True)])
+    variance = [search.design(T) @ s for T, s in zip(times.tolist(), squares, strict=True)]
+    level = np.log(np.maximum(variance, np.finfo(np.float64).tiny))
     sigma, place, inside = locate_minimum(level, tau)
     slope = (level[:, -1] - level[:, -2]) / np.log(tau[-1] / tau[-2]) / 2.0
     # A curve that still falls at its end goes on to the level of its flicker noise.
