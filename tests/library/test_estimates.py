@@ -103,7 +103,7 @@ def test_estimates_are_shown_drawn_and_given_as_tables(estimates) -> None:
     axes = estimates.plot()
     assert [panel.get_title() for panel in axes] == ["gyro_x", "accel_z"]
     lines = {line.get_label(): line for line in axes[0].get_lines()}
-    assert {"log, 95 % limits", "model: N+F+K"} <= set(lines) and len(lines) == 4
+    assert {"log, 95 % limits", "model: N+F+K"} <= set(lines) and len(lines) == 5
     tau = estimates.curves["gyro_x"].tau
     model = np.degrees(np.sqrt(estimates["gyro_x"].model.allan_variance(tau, RATE))) * 3600.0
     np.testing.assert_allclose(lines["model: N+F+K"].get_ydata(), model)

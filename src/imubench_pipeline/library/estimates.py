@@ -215,7 +215,7 @@ def estimate(
         Sampling rate, Hz, or with its unit: ``"100 Hz"``. A log has its own.
     method : str
         ``robust`` (the Allan variance, with limits that hold for sensors that change), or another
-        of the workflow: ``likelihood`` (the spectrum), ``likelihood_gm`` (the papers' N, B, T_B, K),
+        of the workflow: ``likelihood`` (spectrum), ``likelihood_gm`` (the papers' N, B, T_B, K),
         ``compensated`` (without what temperature explains), ``weighted``, ``curve``, ``paper``.
     channels : str or sequence of str, optional
         For an array, the channels of the columns; for a log or table, the selected channels.
