@@ -69,11 +69,24 @@ def test_where_several_terms_make_the_bias_that_of_the_curve_is_compared() -> No
     assert doubt_contradicted(other(B=Parameter(2.1)), several).parameters["B"].status == "ok"
 
 
-def test_two_n_that_differ_beyond_their_intervals_are_a_finding() -> None:
-    far = other(N=Parameter(1.1, lower=1.05, upper=1.15))
-    (found,) = yield_disagreements("gyro_x", {"weighted": far, "likelihood": KNOWN})
-    assert (found.finding, found.channel) == ("N_differs", "gyro_x")
-    assert found.value == pytest.approx(1.1)
-    near = other(N=Parameter(1.03, lower=1.01, upper=1.05))
-    assert not list(yield_disagreements("gyro_x", {"weighted": near, "likelihood": KNOWN}))
-    assert not list(yield_disagreements("gyro_x", {"weighted": far}))
+@pytest.mark.parametrize(
+    ("symbol", "robust", "ratio"),
+    [
+        ("N", Parameter(1.2, lower=1.15, upper=1.25), 1.0 / 1.2),
+        ("N", Parameter(1.05, lower=1.04, upper=1.06), None),  # apart, but by 5 %
+        ("N", Parameter(1.2, "doubtful", lower=1.15, upper=1.25), None),
+        ("N", Parameter(1.2, lower=1.0, upper=1.4), None),
+        ("K", Parameter(20.0, lower=15.0, upper=25.0), None),  # the likelihood has no K
+        ("B_curve", Parameter(1.0, lower=0.9, upper=1.1), 2.0),
+    ],
+)
+def test_second_opinion_outside_the_interval_is_a_finding(
+    symbol: str, robust: Parameter, ratio: float | None
+) -> None:
+    parameters = {"N": KNOWN.parameters["N"], symbol: robust}
+    own = Estimate("robust", parameters, curve={symbol: robust})
+    found = list(yield_disagreements("gyro_x", {"robust": own, "likelihood": KNOWN}))
+    assert [(one.finding, one.value) for one in found] == (
+        [] if ratio is None else [("methods_differ", pytest.approx(ratio))]
+    )
+    assert not list(yield_disagreements("gyro_x", {"robust": own}))

@@ -13,7 +13,7 @@ from imubench_pipeline.words.findings.spectrum import (
 from tests.words.sentences import check_sentences, declared
 
 TEXTS: list[tuple[FindingData, list[str]]] = [
-    (MethodsDiffer(1.73), ["N of gyro z", "1.73 times", "quantization noise", "use its N"]),
+    (MethodsDiffer("N", 1.73), ["N of gyro z", "1.73 times", "do not overlap", "use it"]),
     (Lines(1, 0, 0.5691, 2.43), ["has 1 spectral line at 0.5691 Hz, 2.43 times the noise floor"]),
     (Lines(2, 1, 17.0, 1e4), ["2 spectral lines and 1 noise band. The strongest is at 17 Hz"]),
     (StrongLine(0.567, 0.576), ["at 0.567 Hz adds 0.576 times the white-noise error over 1 s"]),

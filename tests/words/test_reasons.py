@@ -41,7 +41,7 @@ ESTIMATES = [
     of(estimates.wide_limits, "11 times", 11.2),
     of(estimates.interval_with_zero, "lower 95 % limit is 0", at_limit=True),
     of(estimates.interval_with_zero, "includes 0", at_limit=False),
-    of(estimates.excluded_by_likelihood, "0.52 to 0.61 times", "N", 0.52, 0.61),
+    of(estimates.excluded_by_reference, "0.52 to 0.61 times", "N", 0.52, 0.61),
     of(estimates.no_reference, "no K: not in the model", "K", "absent", None),
     of(estimates.no_reference, "no K: the log is too short", "K", "absent", "the log is too short"),
     of(estimates.criteria_disagree, "AIC prefers N+K by 2.4", "N+K", 2.4, "N", 1.3),

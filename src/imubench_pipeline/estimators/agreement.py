@@ -1,7 +1,7 @@
-"""Comparison of the methods of a channel with the likelihood, whose intervals are reliable.
+"""Comparison of the methods of a channel: doubts about simple ones, and the second opinion.
 
-Reading or fitting the Allan deviation assumes no low-pass filter, and the papers' model. Its values
-are doubtful where the likelihood, which compares several models, excludes them.
+Reading the Allan deviation, or fitting the papers' model, ignores filters and other terms. Values
+are doubtful where the recommended method, which compares several models, excludes them.
 """
 
 from __future__ import annotations
@@ -14,12 +14,13 @@ from imubench_pipeline.tables.findings import Finding, find
 from imubench_pipeline.words.findings.spectrum import MethodsDiffer
 from imubench_pipeline.words.reasons import estimates as texts
 
-_MAX_FACTOR_BEYOND_LIMITS = 1.25  # Of a value without limits outside the limits of the likelihood
+_MAX_FACTOR_BEYOND_LIMITS = 1.25  # Of a value without limits outside the limits of the reference
 _MAX_VALUE_RATIO = 1.8  # Ratio of two values above which they differ, whatever their limits
+_MIN_STATED_RATIO = 1.1  # Smaller differences of two estimates change no decision
 
 
 def doubt_contradicted(estimate: Estimate, reference: Estimate) -> Estimate:
-    """Return an estimate whose values are doubtful where the likelihood excludes them."""
+    """Return an estimate whose values are doubtful where the reference excludes them."""
     references = dict(reference.parameters)
     if reference.further and "B_curve" in reference.curve:
         # With several terms, each has its own B: compare with the B of the curve.
@@ -54,22 +55,27 @@ def _doubt_group(
         else:
             apart |= parameter.upper < lower or parameter.lower > upper
         if apart or value < lower / ratio or value > upper * ratio:
-            reason = texts.excluded_by_likelihood(name, lower / value, upper / value)
+            reason = texts.excluded_by_reference(name, lower / value, upper / value)
             judged[name] = replace(parameter, status="doubtful", reason=reason)
     return judged
 
 
 def yield_disagreements(channel: str, estimates: Mapping[str, Estimate]) -> Iterator[Finding]:
-    """Yield a finding if N from the curve fit and N from the likelihood disagree."""
-    if not {"weighted", "likelihood"} <= estimates.keys():
+    """Yield a finding for each parameter whose two best estimates are ok and exclude each other."""
+    if not {"robust", "likelihood"} <= estimates.keys():
         return
-    weighted, likelihood = (
-        estimates[method].parameters["N"] for method in ("weighted", "likelihood")
-    )
-    if weighted.value is None or weighted.lower is None or weighted.upper is None:
-        return
-    if likelihood.value is None or likelihood.lower is None or likelihood.upper is None:
-        return
-    if weighted.upper < likelihood.lower or weighted.lower > likelihood.upper:
-        ratio = weighted.value / likelihood.value
-        yield find(MethodsDiffer(ratio), "note", ratio, channel)
+    for symbol in ("N", "B_curve", "K"):
+        robust, likelihood = (
+            {**estimates[method].parameters, **estimates[method].curve}.get(symbol)
+            for method in ("robust", "likelihood")
+        )
+        if robust is None or likelihood is None or {robust.status, likelihood.status} != {"ok"}:
+            continue
+        if not (robust.value and robust.lower and robust.upper):
+            continue
+        if not (likelihood.value and likelihood.lower and likelihood.upper):
+            continue
+        ratio = likelihood.value / robust.value
+        apart = robust.upper < likelihood.lower or robust.lower > likelihood.upper
+        if apart and not 1.0 / _MIN_STATED_RATIO < ratio < _MIN_STATED_RATIO:
+            yield find(MethodsDiffer(symbol, ratio), "note", ratio, channel)

@@ -110,13 +110,14 @@ def estimate_channel(
     else:
         into.allan += make_allan_rows(key, curve)
     into.add_findings(key, yield_disagreements(key.channel, estimates))
-    if "likelihood" in estimates:
+    best = next(method for method in _METHODS_BY_PREFERENCE if method in settings.methods)
+    reference = estimates.get("robust", estimates.get("likelihood"))
+    if reference is not None:
         estimates |= {
-            method: doubt_contradicted(estimates[method], estimates["likelihood"])
+            method: doubt_contradicted(estimates[method], reference)
             for method in _CURVE_METHODS
             if method in estimates
         }
-    best = next(method for method in _METHODS_BY_PREFERENCE if method in settings.methods)
     for method in settings.methods:
         if method in estimates:
             estimate = estimates[method]

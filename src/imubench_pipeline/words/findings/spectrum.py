@@ -6,17 +6,18 @@ from imubench_pipeline.words.findings.base import NONE, SLOW, FindingData, chann
 from imubench_pipeline.words.numbers import counted, number_text, percent_text
 
 
-class MethodsDiffer(FindingData, code="N_differs", affects=NONE):
-    """N of the curve fit and N of the likelihood exclude each other."""
+class MethodsDiffer(FindingData, affects=NONE):
+    """Robust fit and likelihood give a parameter with intervals that exclude each other."""
 
-    ratio: float  # N of the curve fit over N of the likelihood
+    parameter: str
+    ratio: float  # value of the likelihood over value of the robust fit
 
     def text(self, channel: str) -> str:
         return (
-            f"N of {channel_name(channel)} from the fit of the Allan variance is "
-            f"{number_text(self.ratio, 3)} times N of the likelihood, outside both intervals. "
-            "A low-pass filter, spectral lines or quantization noise bend the curve at short τ. "
-            "The likelihood models them: use its N"
+            f"{self.parameter} of {channel_name(channel)} by the likelihood is "
+            f"{number_text(self.ratio, 3)} times the value by the robust fit, and their intervals "
+            "do not overlap. The sensor changes during the log, or no sum of a few noise terms "
+            "describes it. The value of the robust fit follows the Allan deviation: use it"
         )
 
 

@@ -63,16 +63,15 @@ def interval_with_zero(*, at_limit: bool) -> str:
     return f"{where}: only the interval is given"
 
 
-def excluded_by_likelihood(symbol: str, lower: float, upper: float) -> str:
+def excluded_by_reference(symbol: str, lower: float, upper: float) -> str:
     return (
-        f"the likelihood excludes this value: its 95 % interval of {symbol} is "
-        f"{number_text(lower, 3)} to {number_text(upper, 3)} times this value. "
-        "Use the likelihood"
+        f"the recommended method excludes this value: its 95 % interval of {symbol} is "
+        f"{number_text(lower, 3)} to {number_text(upper, 3)} times this value"
     )
 
 
 def no_reference(symbol: str, status: Status, reason: str | None) -> str:
-    return f"the likelihood gives no {symbol}: {reason or STATUS_WORDS[status]}"
+    return f"the recommended method gives no {symbol}: {reason or STATUS_WORDS[status]}"
 
 
 def criteria_disagree(by_aic: str, delta_aic: float, by_bic: str, delta_bic: float) -> str:
