@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.signal import lfilter
 
 from imubench_pipeline.allan import of_blocks
 from imubench_pipeline.allan.phase import Span
@@ -139,3 +140,42 @@ def test_parts_of_a_log_sum_to_its_short_clusters() -> None:
     halves = parts.divide(2)[:, few]
     first = of_blocks([log[: SAMPLES // 2]], SAMPLES // 2, RATE, curve.cluster_size, holes=False)
     np.testing.assert_allclose(halves[0], first.variance[: few.sum()], rtol=5e-3)
+
+
+def test_filters_and_rounding_leave_n_and_the_bias_instability() -> None:
+    """A first-order low-pass at 1/15 of the rate; rounding of the angle to 2 sigma of its noise."""
+    model = NoiseModel(N=1e-4, B=5e-5, T_B=30.0)
+    log = simulate_gyro(11, model)
+    filtered = lfilter([1.0 - math.exp(-0.42)], [1.0, -math.exp(-0.42)], log)
+    step = 5e-5
+    rounded = np.diff(np.round(np.cumsum(log) / RATE / step), prepend=0.0) * step * RATE
+    for samples in (filtered, rounded):
+        found = estimate(samples)
+        for name, true, error in (("N", model.N, 0.05), ("B_curve", None, 0.0)):
+            parameter = {**found.parameters, **found.curve}[name]
+            assert parameter.status == "ok"
+            assert parameter.lower is not None and parameter.upper is not None
+            if true is not None:
+                assert parameter.value == pytest.approx(true, rel=error)
+                assert parameter.lower <= 1.01 * true and parameter.upper >= 0.99 * true
+        assert found.parameters["B"].value == pytest.approx(model.B, rel=0.4)
+
+
+def test_a_ramp_is_not_taken_from_a_walk() -> None:
+    walks = [simulate_gyro(seed, NoiseModel(N=1e-4, K=1e-5)) for seed in range(6)]
+    assert all(estimate(walk).parameters["R"].status == "absent" for walk in walks)
+    ramp = simulate_gyro(0, NoiseModel(N=1e-4)) + 2e-7 * np.arange(SAMPLES) / RATE
+    assert estimate(ramp).parameters["R"].value == pytest.approx(2e-7, rel=0.05)
+
+
+def test_k_of_some_minutes_is_not_identified_but_bounded() -> None:
+    model = NoiseModel(N=1e-3, B=2e-3, T_B=5.0, K=2e-4)
+    for seed in range(4):
+        K = estimate(simulate_gyro(seed, model, samples=5_000)).parameters["K"]
+        assert K.value is None and K.upper is not None and K.upper > 2e-4
+
+
+def test_hidden_white_noise_has_an_upper_limit() -> None:
+    found = estimate(simulate_gyro(5, NoiseModel(N=1e-6, K=1e-3))).parameters["N"]
+    assert (found.value, found.status) == (None, "not_identified")
+    assert found.upper is not None and found.upper > 1e-6

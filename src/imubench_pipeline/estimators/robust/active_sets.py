@@ -8,6 +8,7 @@ little more than one.
 
 from __future__ import annotations
 
+from copy import copy
 from dataclasses import dataclass
 from itertools import combinations
 
@@ -28,6 +29,7 @@ _GAIN_OF_PROCESS = 4.0  # Decrease of the cost (chi-squared) that a correlation 
 _GAIN_OF_BOTH = 8.0  # The same for flicker noise and a process together
 _GAIN_OF_RAMP = 2.0
 _GAIN_WITHOUT_BIAS = 3.0  # Of a walk or ramp without any bias instability: few sensors have none
+_MAX_PROFILE_LOSS = 3.84  # Of chi-squared at 95 % limits
 _RIDGE = 1e-12  # Relative, for collinear columns
 
 
@@ -82,6 +84,21 @@ class TermSearch:
         if not np.isfinite(T_B):
             return self._columns[0]
         return self._columns[int(np.argmin(np.abs(np.log(self.times / T_B))))]
+
+    def exclude(self, term: int) -> TermSearch:
+        """Return the search among the sets without a term."""
+        search = copy(self)
+        search._gains = np.where(self._masks[:, term], np.inf, self._gains)
+        return search
+
+    def find_limits(
+        self, term: int, grid: Array, variance: Array, whitening: Array
+    ) -> tuple[float, float]:
+        """Return the 95 % limits of a square by profile likelihood, on a grid of squares."""
+        curves = variance - grid[:, None] * self._columns[0, :, term]
+        cost = self.exclude(term).solve(curves, whitening).cost
+        likely = grid[cost <= cost.min() + _MAX_PROFILE_LOSS]
+        return float(likely[0]), float(likely[-1])
 
     def solve(self, variances: Array, whitening: Array) -> Solutions:
         """Return the best non-negative solutions.

@@ -76,10 +76,15 @@ _LINE_ERROR = 0.3  # Of the variance of a line: lines are neither constant nor s
 _MAX_LINE_SHARE = 0.98  # Of a variance that may be lines
 _MAX_BEND = 2.0  # Largest standardised residual of the first points that are fitted
 _BENT_POINTS = 6
+_MIN_RAMP = 3.0  # Of a ramp, in standard deviations of the slope of a random walk
+_GAIN_OF_BEND = 4.0  # Decrease of chi-squared by a correction of the short end
+_MAX_CORRECTION = 0.3  # Of the first variance by a filter; at shorter tau it has another shape
 _MAX_RELATIVE_ERROR = 1.0  # Of a variance
 _MIN_EIGENVALUE = 0.02  # Of the correlation matrix that whitens
 _ROUNDS = 4
 _MIN_FLOOR_SLOPE = -0.25  # Of the deviation at its lowest point, where it has reached its floor
+_PROFILE_POINTS = 60
+_MIN_DURATION_OF_WALK = 600.0  # s; in less, a process of some seconds passes for a walk
 _TIMES_OF_MINIMUM = 120
 _MAX_DOUBTFUL_RATIO = 10.0  # Of the limits of a bias instability or lowest point with a value
 _MAX_WITHOUT = 0.025  # Share of draws without a floor
@@ -125,7 +130,12 @@ def fit(
     if not (curve.variance[inside] > 0).all():
         raise UnfitCurveError(texts.REPEATED_SAMPLES)
     points = _Points.of(curve, inside, lines)
-    fitted = _fit_points(points)
+    without = replace(points, search=points.search.exclude(RAMP))
+    fitted, fitted_without = _fit_points(points), _fit_points(without)
+    # The mean slope of a random walk over a time T has the standard deviation K sqrt(1.2 / T).
+    by_walk = fitted_without.model.K * np.sqrt(1.2 * curve.rate / curve.samples)
+    if fitted.model.R <= _MIN_RAMP * by_walk:
+        points, fitted = without, fitted_without
     draws = _draw(points, fitted, parts.select(inside), rng)
     return _make_estimate(points, fitted, draws)
 
@@ -193,8 +203,8 @@ def _fit_points(points: _Points) -> _Fitted:
     """Fit the terms; covariance, error of the model and values are found in turns."""
     curve = points.curve
     relative = np.sqrt(2.0 / curve.edf)
-    used = _find_used(points, relative)
-    solution, expected = _fit_weighted(points, used, relative, _MAX_MODEL_ERROR)
+    start = _find_start(points, relative)
+    solution, expected, used = start.solution, start.expected, start.used
     error, whitening = _MAX_MODEL_ERROR, np.empty((0, 0))
     sampling = np.empty((0, 0))
     for _ in range(_ROUNDS):
@@ -202,40 +212,75 @@ def _fit_points(points: _Points) -> _Fitted:
         error = _estimate_model_error(points, used, expected, np.diag(sampling))
         covariance = sampling + points.model_covariance(error)
         whitening = _whiten(covariance * np.outer(expected, expected), used)
-        solution = points.search.solve(points.variance[None], whitening)
-        expected = points.evaluate(solution)
+        solution, expected, whitening = _fit_whitened(points, whitening, start.bent)
     return _Fitted(solution, used, expected, whitening, sampling, error)
 
 
-def _find_used(points: _Points, relative: Array) -> NDArray[np.bool_]:
-    """Return the points that are fitted: as few of the short end left out as are bent."""
-    number = len(relative)
-    first, least = 0, np.inf
-    for start in range(number // 2):
-        used = np.arange(number) >= start
-        _, expected = _fit_weighted(points, used, relative, _MAX_MODEL_ERROR)
-        total = np.sqrt(relative**2 + _MAX_MODEL_ERROR**2 + points.line_error**2)
-        off = np.abs(points.variance / expected - 1.0) / total
-        largest = float(off[start : start + _BENT_POINTS].max())
-        if largest < least - _MIN_DECREASE:
-            first, least = start, largest
-        if least < _MAX_BEND:
+@dataclass(frozen=True)
+class _Start:
+    """A fit with independent errors, from some point of the short end on."""
+
+    solution: Solutions
+    expected: Array  # (m,)
+    used: NDArray[np.bool_]
+    bent: bool  # with a correction for the filter or the rounding at short tau
+    correction: float  # of the first variance, relative
+    residual: float  # largest one of the first points, in standard errors
+
+
+def _find_start(points: _Points, relative: Array) -> _Start:
+    """Return the fit that leaves out as few points of the short end as are bent.
+
+    Noise of short memory, by a filter or by rounding, has the Allan variance N²/tau + q/tau² above
+    its memory, with q > 0 for rounding, down to the shortest tau, and q < 0 for a filter. This
+    correction is fitted if the fit is much better with it.
+    """
+    best: _Start | None = None
+    for first in range(len(relative) // 2):
+        used = np.arange(len(relative)) >= first
+        start = _fit_weighted(points, used, relative, bent=False)
+        bent = _fit_weighted(points, used, relative, bent=True)
+        gain = start.solution.cost[0] - bent.solution.cost[0]
+        if gain > _GAIN_OF_BEND and (bent.correction < 0.0 or first == 0):
+            start = bent
+        if best is None or start.residual < best.residual - _MIN_DECREASE:
+            best = start
+        if best.residual < _MAX_BEND:
             break
-    return np.arange(number) >= first
+    assert best is not None  # a curve has at least six points
+    return best
 
 
 def _fit_weighted(
-    points: _Points, used: NDArray[np.bool_], relative: Array, error: float
-) -> tuple[Solutions, Array]:
+    points: _Points, used: NDArray[np.bool_], relative: Array, *, bent: bool
+) -> _Start:
     """Fit with independent relative errors, of the fit and not of the noisy curve."""
-    total = np.sqrt(relative**2 + error**2 + points.line_error**2)
+    total = np.sqrt(relative**2 + _MAX_MODEL_ERROR**2 + points.line_error**2)
     expected = points.variance
     for _ in range(3):
-        solution = points.search.solve(
-            points.variance[None], np.diag(used / (total * expected))[used]
-        )
-        expected = np.maximum(points.evaluate(solution), np.finfo(np.float64).tiny)
-    return solution, expected
+        whitening = np.diag(used / (total * expected))[used]
+        solution, expected, _ = _fit_whitened(points, whitening, bent)
+    off = (np.abs(points.variance / expected - 1.0) / total)[used][:_BENT_POINTS]
+    correction = float((1.0 - points.evaluate(solution) / expected)[used][0])
+    residual = float(off.max()) if correction >= -_MAX_CORRECTION else np.inf
+    return _Start(solution, expected, used, bent, correction, residual)
+
+
+def _fit_whitened(points: _Points, whitening: Array, bent: bool) -> tuple[Solutions, Array, Array]:
+    """Return the solution, its variances, and the whitening that leaves out a correction."""
+    column = points.curve.averaged**-2.0
+    image = whitening @ column
+    free = whitening
+    if bent:  # the fit to that part of the data that is orthogonal to the correction
+        free = whitening - np.outer(image, image @ whitening) / (image @ image)
+    solution = points.search.solve(points.variance[None], free)
+    expected = points.evaluate(solution)
+    expected = np.maximum(expected, np.finfo(np.float64).tiny)
+    if bent:  # at the tau that are left out it may be below 0
+        rest = whitening @ (points.variance - expected)
+        corrected = expected + column * (image @ rest) / (image @ image)
+        expected = np.maximum(corrected, 0.5 * expected)
+    return solution, expected, free
 
 
 def _estimate_model_error(
@@ -282,7 +327,9 @@ def _draw(
         for term in terms:
             excess_error = min(np.sqrt(excess[terms[0]]), _MAX_EXCESS)
             factors[:, term] = np.exp(2.0 * excess_error * spread[:, column])
-    return replace(drawn, squares=drawn.squares * factors)
+    step = np.log(points.search.times[1] / points.search.times[0])
+    times = drawn.times * np.exp(step * rng.uniform(-0.5, 0.5, _DRAWS))  # between those tried
+    return replace(drawn, squares=drawn.squares * factors, times=times)
 
 
 def _chi_squared_logarithms(relative: Array) -> tuple[Array, Array]:
@@ -324,11 +371,13 @@ def _make_estimate(points: _Points, fitted: _Fitted, drawn: Solutions) -> Estima
     roots = np.sqrt(drawn.squares)
     times = np.where(np.isfinite(drawn.times), drawn.times, np.inf)
     biases = np.hypot(roots[:, FLICKER], roots[:, PROCESS])
+    if model.further_processes:
+        biases = roots[:, FLICKER]
     parameters = {
-        "N": _limit(model.N, roots[:, WHITE]),
+        "N": _limit(model.N, roots[:, WHITE]) if model.N else _bound_white(points, fitted.used),
         "B": _limit(model.B, biases, widest=_MAX_DOUBTFUL_RATIO),
         "T_B": _limit(model.T_B, times) if model.T_B else Parameter(None, "absent", reasons.ABSENT),
-        "K": _limit(model.K, roots[:, WALK], _bound_walk(points)),
+        "K": _limit_walk(points, fitted, roots[:, WALK]),
         "R": _limit(model.R, roots[:, RAMP]),
     }
     further = [
@@ -390,12 +439,26 @@ def _limit(
     return Parameter(value, "ok", None, lower, upper)
 
 
-def _bound_walk(points: _Points) -> float:
-    """Return the K whose random walk alone would explain the end of the curve."""
+def _bound_white(points: _Points, used: NDArray[np.bool_]) -> Parameter:
+    """Return N without a value, with the limit that the curve leaves for white noise."""
+    curve = points.curve
+    error = np.minimum(np.sqrt(2.0 / curve.edf), _MAX_RELATIVE_ERROR)
+    upper = np.sqrt(points.variance * curve.tau * np.exp(1.96 * error))[used].min()
+    return Parameter(None, "not_identified", texts.MAY_BE_ABSENT, 0.0, float(upper))
+
+
+def _limit_walk(points: _Points, fitted: _Fitted, draws: Array) -> Parameter:
+    """Return K; its limits allow for all other terms in its place, however few support them."""
     curve = points.curve
     at = int(np.searchsorted(curve.cluster_size, curve.samples / 9.0)) - 1
     error = min(float(np.sqrt(2.0 / curve.edf[at])), _MAX_RELATIVE_ERROR)
-    return float(np.sqrt(3.0 * curve.variance[at] / curve.tau[at] * np.exp(1.64 * error)))
+    # The K whose random walk alone would explain the end of the curve.
+    alone = float(np.sqrt(3.0 * curve.variance[at] / curve.tau[at] * np.exp(1.64 * error)))
+    grid = np.append(0.0, np.geomspace(0.01 * alone, alone, _PROFILE_POINTS)) ** 2
+    limits = points.search.find_limits(WALK, grid, points.variance, fitted.whitening)
+    if curve.samples < _MIN_DURATION_OF_WALK * curve.rate:
+        limits = 0.0, limits[1]
+    return _limit(fitted.model.K, np.append(draws, np.repeat(np.sqrt(limits), len(draws))), alone)
 
 
 def _group(drawn: Solutions) -> list[Models]:
