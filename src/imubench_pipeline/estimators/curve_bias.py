@@ -30,7 +30,6 @@ from imubench_pipeline.words.reasons import curves, estimates
 MAX_TAU_FRACTION = 1 / 9  # Maximum tau over the duration of the log
 _POINTS_PER_DECADE = 16  # Averaging times for the search of the lowest point
 _POINTS_BETWEEN_PEAKS = 49  # Averaging times between the peaks of several processes
-_MAX_DRAWS = 16_000  # Draws of a model that are evaluated at many averaging times
 _PEAK_SHAPE = float(evaluate_gauss_markov_shape(np.array([PEAK_TAU]), 1.0)[0])
 
 
@@ -53,11 +52,6 @@ class Models:
     def biases(self) -> Array:
         """B of each Gauss-Markov process, shape (d, g)."""
         return self.parameters[:, len(self.terms.linear) :]
-
-    def fewer(self) -> Models:
-        """Thin the draws to about `_MAX_DRAWS`."""
-        every = max(1, len(self.parameters) // _MAX_DRAWS)
-        return replace(self, parameters=self.parameters[::every], times=self.times[::every])
 
 
 def convert_noise_model(model: NoiseModel) -> Models:
@@ -175,9 +169,7 @@ def add_curve_figures(
 
     def select(candidate: Candidate) -> Models:
         posterior, terms = draws[candidate.terms], candidate.terms
-        models = Models(terms, posterior.parameters, posterior.times, candidate.weight)
-        # The highest point of several processes is searched at many tau.
-        return models.fewer() if terms.gauss_markov > 1 else models
+        return Models(terms, posterior.parameters, posterior.times, candidate.weight)
 
     model, longest = convert_noise_model(estimate.model), float(tau[-1])
     drawn = [select(candidate) for candidate in alike]
@@ -244,7 +236,7 @@ def estimate_lowest_point(
 ) -> dict[str, Parameter]:
     """Return ``sigma_min`` and ``tau_min`` of a model, with limits if draws of models are given."""
     (sigma,), (time,), (inside,) = (part.tolist() for part in find_lowest_point(model, tau))
-    points = [find_lowest_point(models.fewer(), tau) for models in drawn]
+    points = [find_lowest_point(models, tau) for models in drawn]
     weights = [models.weight for models in drawn]
     limits: list[tuple[float | None, float | None]] = [(None, None), (None, None)]
     if drawn:

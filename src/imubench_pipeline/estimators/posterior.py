@@ -1,8 +1,7 @@
 """Draws from the posterior of a model, and joint draws over the models that the log allows.
 
 The prior is uniform in the amplitudes Q, N, B and K, in R, and in log T_B up to a fifth of the log.
-The draws are by importance sampling, with an adaptive Metropolis chain where the effective sample
-size is too small, as along thin curved ridges between interchangeable terms.
+The draws are by adaptive importance sampling.
 """
 
 from __future__ import annotations
@@ -28,7 +27,6 @@ from imubench_pipeline.estimators.posterior_kernels import (
     compute_log_posteriors,
     find_mode,
     fit_mixture,
-    run_metropolis_chain,
     set_densities,
 )
 from imubench_pipeline.estimators.whittle import Maximum, Terms, Whittle
@@ -172,10 +170,9 @@ def _get_degrees(dimensions: int) -> int:
     return _MIN_DEGREES + (_MIN_DEGREES + dimensions) % 2
 
 
-MAX_DRAWS = 80_000  # Default number of draws; a tail of 2.5 % has 2,000 of them
-_DRAWS_PER_POINT = 6  # Draws per independent point; limits of two seeds agree within 3 %
-_MAX_DRAWS_PER_POINT = 80  # Above it, a chain is about as good
-_MAX_ROUNDS = 4
+MAX_DRAWS = 8_000  # Default number of draws; a tail of 2.5 % has 200 of them
+_DRAWS_PER_POINT = 4  # Draws per independent point
+_MAX_ROUNDS = 8
 _GRID_SIZES = (0, 20, 9)  # T_B of the first mixture along each axis, for 0, 1 and 2 processes
 _COMPONENT_SIGMA = 0.7  # of its components in log T_B, in grid spacings
 _MAX_SIGMA = 2.0  # standard deviation in log T_B about the best fit
@@ -200,7 +197,7 @@ class Posterior:
     """(draws, p): the linear parameters in their order, then B of each process; SI."""
     times: Array  # (draws, g): T_B of each process, rising, s
     ramps: Array  # (draws,): R; zeros where the model has none
-    effective: float  # effective sample size; NaN for a chain
+    effective: float  # effective sample size
 
 
 def sample(
@@ -213,16 +210,8 @@ def sample(
     points = sample_adaptively(
         target.log_density, target.first(), rng, size=size, wanted=wanted, most=_MAX_ROUNDS * size
     )
-    effective = points.effective
-    if effective * _MAX_DRAWS_PER_POINT >= draws:
-        which = points.drawn(draws, rng)
-        amplitudes = target.amplitudes(points.points[which])
-    else:
-        effective = math.nan
-        # The mode of the amplitudes at the best T_B, and the covariance there.
-        start, covariance = target.make_component(np.log(maximum.times), 1.0)
-        amplitudes = run_metropolis_chain(start, covariance, rng, draws, target.problem)
-    return target.posterior(amplitudes, effective, rng)
+    amplitudes = target.amplitudes(points.points[points.drawn(draws, rng)])
+    return target.posterior(amplitudes, points.effective, rng)
 
 
 class _Target:
