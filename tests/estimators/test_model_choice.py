@@ -1,6 +1,5 @@
 from collections import Counter
 from collections.abc import Callable
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -15,7 +14,6 @@ from imubench_pipeline.estimators.model_choice import (
     assess_goodness_of_fit,
     compare_models,
     describe_disagreement,
-    rescore,
 )
 from imubench_pipeline.estimators.spectrum import Spectrum, compute_spectra
 from imubench_pipeline.estimators.whittle import Maximum, Terms, make_whittle
@@ -415,26 +413,3 @@ def test_a_ramp_must_be_the_better_and_more_so_in_place_of_a_walk() -> None:
                 plain = 2.0 * found.cost + found.terms.parameters * penalty
                 assert candidate.bic - plain == pytest.approx(10.0 if alone else 6.0, abs=1e-6)
     assert seen == {True, False}
-
-
-def test_what_models_gain_counts_for_their_scores_and_their_order(rng: np.random.Generator) -> None:
-    candidates = candidates_of(simulate(NoiseModel(N=N), RATE, 4_000, rng), quantization=False)
-    second = candidates[1]
-    gain = 0.5 * (second.bic - candidates[0].bic) + 1.0
-    found = rescore(candidates, {second.terms: gain})
-    assert found[0].maximum is second.maximum
-    assert found[0].bic == pytest.approx(candidates[0].bic - 2.0)
-    assert found[0].aic == pytest.approx(second.aic - 2.0 * gain)
-    assert sum(one.akaike_weight for one in found) == pytest.approx(1.0)
-    ratio = found[0].weight / found[1].weight
-    assert ratio == pytest.approx(np.exp(0.5 * (found[1].bic - found[0].bic)))
-    assert [one.maximum for one in rescore(candidates, {})] == [one.maximum for one in candidates]
-
-
-def test_a_model_with_a_ramp_gains_what_it_gains_without(rng: np.random.Generator) -> None:
-    candidates = candidates_of(simulate(NoiseModel(N=N), RATE, 4_000, rng), quantization=False)
-    ramped = next(one for one in candidates if one.terms.ramp)
-    plain = replace(ramped.terms, ramp=False)
-    found = rescore(candidates, {plain: 3.0})
-    again = next(one for one in found if one.maximum is ramped.maximum)
-    assert again.bic == pytest.approx(ramped.bic - 6.0)

@@ -58,10 +58,6 @@ def add_fitted_limits(
     doubtful = np.full(len(curve.tau), chosen.goodness.verdict != "explained")
     if likelihood.band.highest < 0.5 * rate * (1.0 - 1e-9):
         doubtful |= curve.tau * likelihood.band.highest < _MIN_TAU_TIMES_BAND
-    filtered = likelihood.low_pass
-    if filtered is not None and filtered.behind is not None:
-        # The model has the noise before the sensor's low-pass.
-        doubtful |= curve.tau * (filtered.frequency.in_model or np.inf) < _MIN_TAU_TIMES_BAND
     fitted = ~doubtful | (degrees.edf < curve.edf)
     return replace(
         curve,

@@ -33,9 +33,8 @@ def spectral_findings(channel: str, frame: FitSelection, white: float | None) ->
     """Return the findings on the lines and the band of a channel; ``white`` is N, SI, if known."""
     band = frame.band
     findings = describe_lines(channel, frame.lines, white)
-    if band.source in ("bend", "no_model"):
-        data = BandLimit(band.highest, follows_model=band.source == "bend")
-        findings.append(find(data, "note", band.highest, channel))
+    if band.source == "bend":
+        findings.append(find(BandLimit(band.highest), "note", band.highest, channel))
     return findings
 
 

@@ -25,10 +25,10 @@ Status = Literal[
 GoodnessVerdict = Literal["explained", "not explained"]
 """Whether a model explains the spectrum."""
 
-BandSource = Literal["set", "bandwidth", "bend", "no_model", "whole", "filtered", "attenuated"]
+BandSource = Literal["set", "bend", "whole", "filtered", "attenuated"]
 """Reason for the highest fitted frequency of a spectrum.
 
-The user; the stated bandwidth; a bend as by a filter; no model that fits; nothing, the spectrum is
+The user; a bend that neither noise nor a filter of the family explains; nothing, the spectrum is
 fitted up to Nyquist, without a filter or with one; or the attenuation by a fitted filter.
 """
 

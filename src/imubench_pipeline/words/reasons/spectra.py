@@ -20,15 +20,8 @@ def band_text(source: BandSource, highest: float, low_pass: str = "") -> str:
     match source:
         case "set":
             return f"frequencies up to {limit} are fitted, as set"
-        case "bandwidth":
-            return f"the band ends at {limit}, a tenth of the stated bandwidth"
         case "bend":
             return f"the spectrum bends above {limit}, as by the filter of the sensor"
-        case "no_model":
-            return (
-                f"no model fits the spectrum up to any frequency: the band ends at {limit}, a "
-                "twentieth of the sampling rate"
-            )
         case "whole":
             return "the spectrum follows its model up to the Nyquist frequency"
         case "filtered":
@@ -37,10 +30,7 @@ def band_text(source: BandSource, highest: float, low_pass: str = "") -> str:
                 "frequency"
             )
         case "attenuated":
-            return (
-                f"with a filter ({low_pass}), the spectrum follows its model up to {limit}. Above, "
-                "the filter leaves too little noise"
-            )
+            return f"the spectrum is fitted up to {limit}, below the bend of a filter ({low_pass})"
 
 
 def cutoff_range(lower: float, upper: float) -> str:
@@ -50,13 +40,6 @@ def cutoff_range(lower: float, upper: float) -> str:
 def unknown_filter(number: int) -> str:
     """Return why a bend is no known filter; ``number``: of the filters that were tried."""
     return f"the spectrum bends, but like none of the {number} filters that were tried"
-
-
-def filter_or_quantization(lower: float, upper: float) -> str:
-    return (
-        "the spectrum rises towards the Nyquist frequency. Quantization noise explains it as well "
-        f"as a low-pass with a cut-off from {number_text(lower)} to {number_text(upper)} Hz"
-    )
 
 
 def few_bins(bins: int, needed: int) -> str:
@@ -70,21 +53,6 @@ def few_bins_left(bins: int, needed: int, highest: float, hidden: int) -> str:
         f"{number_text(highest)} Hz can be fitted, {needed} are needed"
     )
     return f"{text}. Spectral lines hide {counted(hidden, 'bin')}" if hidden else text
-
-
-def process_or_filter(time: float, cutoff: float) -> str:
-    return (
-        f"a Gauss-Markov process (T_B = {number_text(time, 3)} s) and a first-order low-pass at "
-        f"{number_text(cutoff, 3)} Hz fit equally well, as no white noise is visible. "
-        "State the bandwidth in the sensor file"
-    )
-
-
-def fast_process_or_filter(time: float) -> str:
-    return (
-        f"a process with a correlation time of {number_text(time, 3)} s, a few samples, may be the "
-        "low-pass of the sensor. State the bandwidth in the sensor file"
-    )
 
 
 def unfiltered_noise(share: float, low_pass: str, factor: float) -> str:
