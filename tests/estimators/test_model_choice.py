@@ -13,10 +13,9 @@ from imubench_pipeline.estimators.model_choice import (
     Candidate,
     assess_goodness_of_fit,
     compare_models,
-    describe_disagreement,
 )
 from imubench_pipeline.estimators.spectrum import Spectrum, compute_spectra
-from imubench_pipeline.estimators.whittle import Maximum, Terms, make_whittle
+from imubench_pipeline.estimators.whittle import Terms, make_whittle
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.simulate import simulate
 from tests.conftest import few
@@ -382,19 +381,6 @@ def test_models_of_more_parameters_than_a_quarter_of_the_bins_are_left_out(rng, 
         assert there == (terms.parameters < bins // 4)
     assert max(c.terms.parameters for c in candidates) < bins // 4
     assert sum(c.weight for c in candidates) == pytest.approx(1.0)
-
-
-def scored(terms: Terms, bic: float, aic: float) -> Candidate:
-    found = Maximum(terms, np.ones(len(terms.linear)), np.empty(0), 0.0, 0.0)
-    judgement = assess_goodness_of_fit(np.ones(5), np.ones(5), np.ones(5), np.arange(1.0, 6.0), 1)
-    return Candidate(found, bic, aic, 0.5, 0.5, judgement)
-
-
-def test_a_disagreement_of_aic_and_bic_is_said_with_its_size() -> None:
-    simple, rich = scored(Terms("N"), 100.0, 97.5), scored(Terms("NK"), 101.3, 95.1)
-    assert describe_disagreement([simple, rich]) == "AIC prefers N+K by 2.4, BIC prefers N by 1.3"
-    assert describe_disagreement([simple, scored(Terms("NK"), 104.0, 98.0)]) is None
-    assert describe_disagreement([simple]) is None
 
 
 def test_a_ramp_must_be_the_better_and_more_so_in_place_of_a_walk() -> None:

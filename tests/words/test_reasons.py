@@ -44,7 +44,6 @@ ESTIMATES = [
     of(estimates.excluded_by_reference, "0.52 to 0.61 times", "N", 0.52, 0.61),
     of(estimates.no_reference, "no K: not in the model", "K", "absent", None),
     of(estimates.no_reference, "no K: the log is too short", "K", "absent", "the log is too short"),
-    of(estimates.criteria_disagree, "AIC prefers N+K by 2.4", "N+K", 2.4, "N", 1.3),
     of(estimates.model_disfavoured, "BIC prefers N+F to N+GM+K by 12.3", "N+F", "N+GM+K", 12.3),
     of(estimates.signal_or_walk, "about as well as a random walk", estimates.warm_up(300.0)),
     of(estimates.pause_steps, "a step of the bias at a pause", 1),

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -13,7 +12,6 @@ from scipy.special import erfc, polygamma, psi
 from imubench_pipeline.estimators.whittle import Maximum, Terms, Whittle
 from imubench_pipeline.model.states import GoodnessVerdict
 from imubench_pipeline.typing import Array
-from imubench_pipeline.words.reasons import estimates as texts
 from imubench_pipeline.words.reasons import spectra
 
 MIN_FIT_CHANCE = 1e-3  # Probability below which a fit is rejected
@@ -183,14 +181,3 @@ def compute_information_weights(scores: Array) -> Array:
     """Return the weights of models from their scores, BIC or AIC: e^(-score/2), normalised to 1."""
     weights = np.exp(-0.5 * (scores - scores.min()))
     return np.asarray(weights / weights.sum())
-
-
-def describe_disagreement(candidates: Sequence[Candidate]) -> str | None:
-    """Return a note if AIC and BIC prefer different models, else None."""
-    by_aic = min(candidates, key=lambda candidate: candidate.aic)
-    chosen = candidates[0]
-    if by_aic is chosen:
-        return None
-    return texts.criteria_disagree(
-        by_aic.terms.name, chosen.aic - by_aic.aic, chosen.terms.name, by_aic.bic - chosen.bic
-    )

@@ -173,12 +173,8 @@ def _get_degrees(dimensions: int) -> int:
 MAX_DRAWS = 8_000  # Default number of draws; a tail of 2.5 % has 200 of them
 _DRAWS_PER_POINT = 4  # Draws per independent point
 _MAX_ROUNDS = 8
-_GRID_SIZES = (0, 20, 9)  # T_B of the first mixture along each axis, for 0, 1 and 2 processes
-_COMPONENT_SIGMA = 0.7  # of its components in log T_B, in grid spacings
 _MAX_SIGMA = 2.0  # standard deviation in log T_B about the best fit
 _MIN_BEST_FIT_WEIGHT = 0.3
-_NEGLIGIBLE_WEIGHT, _MIN_WEIGHT = 1e-6, 5e-3
-_WEAK_TERM_ERROR = 0.15  # Relative SD of a squared amplitude above which it may be near 0
 
 _WEAK_AMPLITUDE, _WEAK_LOG_SIGMA = 0.7, 0.8
 """Asinh of an amplitude near 0 over its unit, and standard deviation of its logarithm."""
@@ -241,7 +237,6 @@ class _Target:
         inverse = np.linalg.inv(parts.T @ parts + _RIDGE * np.eye(self.terms))
         error = np.sqrt(np.diag(inverse)) / size
         self.log_unit = 0.5 * np.log(0.25 * error)
-        self.weak = np.flatnonzero(error > _WEAK_TERM_ERROR * maximum.powers).tolist()
         self.log_fitted = 0.5 * np.log(np.maximum(maximum.powers, _MIN_START_SIGMAS / size))
 
     def log_density(self, points: Array) -> Array:
@@ -263,40 +258,22 @@ class _Target:
         return result
 
     def first(self) -> Mixture:
-        """Return a mixture that covers the posterior, with a component for each T_B of a grid."""
-        first, step, logarithms = self.problem.table
-        last = first + step * (len(logarithms) - 1)
-        number = _GRID_SIZES[self.processes]
-        apart = (last - first) / max(number, 1)
-        grid = first + apart * (np.arange(number) + 0.5)
-        places = [np.log(self.maximum.times)]
-        if self.processes == 1:
-            places += [np.array([place]) for place in grid]
-        elif self.processes == 2:
-            places += [np.array([a, b]) for i, a in enumerate(grid) for b in grid[i + 1 :]]
-        widths = [_MAX_SIGMA] + [_COMPONENT_SIGMA * apart] * (len(places) - 1)
-        components = [
-            self.make_component(at, width) for at, width in zip(places, widths, strict=True)
-        ]
+        """Return a mixture about the best fit, with a component for each term that may be 0."""
+        components = [self.make_component(np.log(self.maximum.times), _MAX_SIGMA)]
         if self.terms > 1:
-            components += [self._make_weak_component(term) for term in self.weak]
+            components += [self._make_weak_component(term) for term in range(self.terms)]
         means, scales = (np.array(part) for part in zip(*components, strict=True))
         values, _, _ = compute_log_posteriors(means, self.problem)
         mass = values + 0.5 * np.linalg.slogdet(scales)[1]
         weights = np.exp(mass - mass.max())
-        weights /= weights.sum()
-        heavy = weights > _NEGLIGIBLE_WEIGHT
-        heavy[0] = True
-        heavy[len(places) :] = True
-        weights = np.maximum(weights, _MIN_WEIGHT)
-        weights[len(places) :] = np.maximum(weights[len(places) :], _MIN_WEAK_WEIGHT)
+        weights = np.maximum(weights / weights.sum(), _MIN_WEAK_WEIGHT)
         weights[0] = max(weights[0], _MIN_BEST_FIT_WEIGHT)
         # From log amplitudes to z = asinh(amplitude / unit): dz = tanh z d log amplitude.
         slope = np.ones_like(means)
         z = np.arcsinh(np.exp(means[:, : self.terms] - self.log_unit))
         means[:, : self.terms], slope[:, : self.terms] = z, np.tanh(z)
         scales *= slope[:, :, None] * slope[:, None, :]
-        return Mixture(weights[heavy] / weights[heavy].sum(), means[heavy], scales[heavy])
+        return Mixture(weights / weights.sum(), means, scales)
 
     def make_component(self, places: Array, width: float) -> tuple[Array, Array]:
         """Return mean and covariance of a normal component about correlation times."""

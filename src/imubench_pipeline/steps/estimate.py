@@ -28,7 +28,6 @@ from imubench_pipeline.estimators.estimate import (
 )
 from imubench_pipeline.estimators.likelihood import Likelihood
 from imubench_pipeline.estimators.lines import select_sinusoids
-from imubench_pipeline.estimators.model_choice import describe_disagreement
 from imubench_pipeline.estimators.robust import fit as robust
 from imubench_pipeline.estimators.robust.parts import compute_part_variances
 from imubench_pipeline.estimators.rows import (
@@ -301,9 +300,6 @@ _METHODS_BY_PREFERENCE = ("robust", "likelihood", "likelihood_gm", "weighted", "
 def _model_rows(key: Key, fit: Likelihood) -> Iterator[model.ModelRow]:
     """Yield the rows of the table ``models``, the chosen model first."""
     for place, candidate in enumerate(fit.candidates):
-        notes = [candidate.goodness.where]
-        if place == 0:
-            notes += [describe_disagreement(fit.candidates) or ""]
         yield model.ModelRow(
             **asdict(key),
             model=candidate.terms.name,
@@ -316,7 +312,7 @@ def _model_rows(key: Key, fit: Likelihood) -> Iterator[model.ModelRow]:
             deviance=candidate.goodness.deviance,
             chance=candidate.goodness.chance,
             verdict=candidate.goodness.verdict,
-            note=" ".join(filter(None, map(sentence, notes))),
+            note=sentence(candidate.goodness.where),
             bins=int(fit.used.sum()),
             band=fit.band.highest if fit.band else None,
             band_source=fit.frame.band_words if fit.band else None,

@@ -74,13 +74,6 @@ def no_reference(symbol: str, status: Status, reason: str | None) -> str:
     return f"the recommended method gives no {symbol}: {reason or STATUS_WORDS[status]}"
 
 
-def criteria_disagree(by_aic: str, delta_aic: float, by_bic: str, delta_bic: float) -> str:
-    return (
-        f"AIC prefers {by_aic} by {number_text(delta_aic, 2)}, BIC prefers {by_bic} by "
-        f"{number_text(delta_bic, 2)}"
-    )
-
-
 def model_disfavoured(chosen: str, papers: str, delta_bic: float) -> str:
     return f"BIC prefers {chosen} to {papers} by {number_text(delta_bic, 3)}"
 
