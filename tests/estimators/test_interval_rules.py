@@ -195,13 +195,6 @@ def test_what_is_absent_has_the_limit_of_all_models_that_have_it() -> None:
     found = add_upper_limits(estimate, [plain, near], wider, drawn).parameters
     assert (found["B"].status, found["B"].lower) == ("not_identified", 0.0)
     assert "N+GM, which includes it, fits about as well as N:" in (found["B"].reason or "")
-    assert (found["T_B"].lower, found["T_B"].upper) == pytest.approx((250.0, 360.0), rel=1e-3)
     both = candidate(Terms("NK", 1), 1.0, 9.0)
     found = add_upper_limits(estimate, [plain, near, both], wider, drawn).parameters
     assert "N+GM and N+GM+K, which include it, fit" in (found["B"].reason or "")
-    assert (found["T_B"].lower, found["T_B"].upper) == pytest.approx((10.0, 360.0), rel=1e-2)
-    # A model that has it at 0 says nothing for it.
-    none = candidate(Terms("N", 1), 1.0, 9.0, B=0.0)
-    assert (
-        add_upper_limits(estimate, [plain, none], wider, drawn).parameters["B"].status == "absent"
-    )

@@ -143,21 +143,10 @@ def _describe_filter(spectrum: Spectrum, fits: _Fits, tried: Sequence[_Trial]) -
     frequency = Parameter(shown, lower=min(cutoffs), upper=max(cutoffs))
     share = (best.floor / best.N) ** 2
     if not fits.explains(best):
-        frequency, N = (
-            replace(
-                each,
-                value=None,
-                status="not_identified",
-                reason=texts.unknown_filter(len(_MAX_CUTOFFS)),
-                fitted=each.value,
-            )
-            for each in (frequency, N)
-        )
+        reason = texts.unknown_filter(len(_MAX_CUTOFFS))
+        frequency, N = _withhold(frequency, reason), _withhold(N, reason)
     elif max(cutoffs) > _MAX_LIMIT_RATIO * min(cutoffs):
-        reason = texts.cutoff_range(min(cutoffs), max(cutoffs))
-        frequency = replace(
-            frequency, value=None, status="not_identified", reason=reason, fitted=shown
-        )
+        frequency = _withhold(frequency, texts.cutoff_range(min(cutoffs), max(cutoffs)))
     low_pass = best.low_pass
     found = Cutoff(frequency, low_pass.kind, low_pass.order, N)
     if share > _MIN_FLOOR_RATIO and N.status == "ok" and N.upper is not None:
@@ -172,6 +161,11 @@ def _describe_filter(spectrum: Spectrum, fits: _Fits, tried: Sequence[_Trial]) -
         floor=best.N * math.sqrt(beside),
         gain=gain / (float(low_pass.white(0.0, rate)) + beside),
     )
+
+
+def _withhold(parameter: Parameter, reason: str) -> Parameter:
+    fitted = parameter.value
+    return replace(parameter, value=None, status="not_identified", reason=reason, fitted=fitted)
 
 
 @dataclass(frozen=True)

@@ -184,24 +184,16 @@ def add_upper_limits(
         if not having:
             continue
         upper = max(float(np.quantile(_draws_of(name, terms, draws), 0.975)) for terms in having)
-        good = []
-        for other in alike[1:]:
-            powers = dict(
-                zip(list_parameter_names(other.terms), other.maximum.powers, strict=False)
-            )
-            if is_as_good(other, alike[0]) and powers.get(name, 0.0) > 0.0:
-                good.append(other)
+        good = [
+            other
+            for other in alike[1:]
+            if is_as_good(other, alike[0]) and name in list_parameter_names(other.terms)
+        ]
         if not good:
             parameters[name] = Parameter(None, "absent", texts.ABSENT_BELOW, 0.0, upper)
             continue
         reason = texts.models_alike([c.terms.name for c in good], alike[0].terms.name)
         parameters[name] = Parameter(None, "not_identified", reason, 0.0, upper)
-        timed = [c.terms for c in good if "T_B" in list_parameter_names(c.terms)]
-        if name == "B" and timed:
-            drawn = [_draws_of("T_B", terms, draws) for terms in timed]
-            low = min(float(np.quantile(times, 0.025)) for times in drawn)
-            high = max(float(np.quantile(times, 0.975)) for times in drawn)
-            parameters["T_B"] = Parameter(None, "not_identified", reason, low, high)
     return replace(estimate, parameters=parameters)
 
 

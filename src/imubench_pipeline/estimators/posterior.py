@@ -37,10 +37,6 @@ _MIN_DEGREES = 5
 _FIRST_MIXTURE_WEIGHT = 0.15  # Of the first mixture in later ones, which keeps its support covered
 _MIN_COMPONENT_MASS = 0.01
 _LEARNING_POINTS = 2048  # Number of points to which a mixture is fitted
-
-_CLIPPED_POINTS = 8
-"""Highest weights that are clipped before a fit (Koblents and Míguez, Stat. Comput. 25, 2015)."""
-
 _EM_STEPS = 3  # Expectation-maximisation steps between two rounds
 
 
@@ -100,14 +96,6 @@ class Weighted:
         """Effective sample size, 1 / sum w^2 (L. Kish, "Survey Sampling", 1965)."""
         return float(1.0 / np.sum(self.weights**2))
 
-    def clipped(self, number: int) -> Weighted:
-        """Return the points with the ``number`` highest weights clipped to the lowest of them."""
-        most = np.partition(self.weights, -number)[-number]
-        if not most > 0.0:
-            return self
-        lowered = np.minimum(self.weights, most)
-        return Weighted(self.points, lowered / lowered.sum())
-
     def drawn(self, number: int, rng: np.random.Generator) -> NDArray[np.int64]:
         """Return indices of equally weighted points, in random order (systematic resampling)."""
         ends = np.cumsum(self.weights)
@@ -147,7 +135,7 @@ def sample_adaptively(
         weighted = Weighted(points, weights / weights.sum())
         if weighted.effective >= wanted or len(points) + size > most:
             return weighted
-        learnt = points[weighted.clipped(_CLIPPED_POINTS).drawn(_LEARNING_POINTS, rng)]
+        learnt = points[weighted.drawn(_LEARNING_POINTS, rng)]
         for _ in range(_EM_STEPS):
             mixture = mixture.fitted(learnt)
         part = _FIRST_MIXTURE_WEIGHT
