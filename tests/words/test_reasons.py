@@ -90,6 +90,7 @@ SPECTRA = [
     of(spectra.band_text, "order 2", "attenuated", 7.0, "bilinear low-pass of order 2 at 2 Hz"),
     of(spectra.cutoff_range, "cut-offs from 1 to 2 Hz", 1.0, 2.0),
     of(spectra.unknown_filter, "none of the 12 filters", 12),
+    of(spectra.filter_or_quantization, "from 1 to 2 Hz", 1.0, 2.0),
     of(spectra.few_bins, "12 bins, 24 are needed", 12, 24),
     of(spectra.few_bins_left, "12 bins", 12, 20, 5.0, 0),
     of(spectra.few_bins_left, "lines hide 8 bins", 12, 20, 5.0, 8),

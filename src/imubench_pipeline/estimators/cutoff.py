@@ -30,7 +30,7 @@ _MAX_CUTOFFS: Mapping[tuple[Kind, int], float] = {
     ("analogue", 1): 4.0,
     **{("analogue", order): 1.0 for order in (2, 3, 4)},
     **{("bilinear", order): 0.42 for order in (1, 2, 3, 4)},
-    ("boxcar", 1): 0.222,
+    ("boxcar", 1): BOXCAR_CUTOFF_LENGTH / 2.0,
 }
 """Filters that are tried, and their highest cut-off over the sampling rate.
 
@@ -55,7 +55,8 @@ _HALF_CHI_SQUARED = 1.9207  # Decrease of the log likelihood at the ends of a 95
 _MAX_LIMIT_RATIO = 1.2  # Ratio of the limits of a cut-off above which it is not identified
 _MIN_FLOOR_RATIO = 0.03  # Power of unfiltered over filtered white noise that matters
 
-_UNFILTERED_MODELS = (Terms("NFK", 1), Terms("NK", 2), Terms("QNFK", 1))
+_UNFILTERED_MODELS = (Terms("NFK", 1), Terms("NK", 2))
+_QUANTIZATION_MODELS = (Terms("QN"), Terms("QNFK", 1))
 
 
 @dataclass(frozen=True)
@@ -118,9 +119,16 @@ def find_cutoff(
     if (usable & leaky).any() or rounded > 0.0:
         fits = _Fits(spectrum.select(usable & ~leaky), rounded, lowest)
         tried = fits.try_filters()
-    if not tried or fits.find_gain(tried[0]) < _MIN_GAIN:
+    if not tried or fits.find_gain(tried[0], _UNFILTERED_MODELS) < _MIN_GAIN:
         return absent
-    return _describe_filter(spectrum, fits, tried)
+    found = _describe_filter(spectrum, fits, tried)
+    beside_rounding = fits.find_gain(tried[0], _QUANTIZATION_MODELS)
+    if beside_rounding >= _MIN_GAIN:
+        return found
+    if beside_rounding < -_MIN_GAIN:
+        return absent
+    lower, upper = found.frequency.lower or 0.0, found.frequency.upper or math.inf
+    return Cutoff(_withhold(found.frequency, texts.filter_or_quantization(lower, upper)))
 
 
 def _describe_filter(spectrum: Spectrum, fits: _Fits, tried: Sequence[_Trial]) -> Cutoff:
@@ -192,9 +200,10 @@ class _Gains:
         """Return the gain for white noise, without leakage."""
         return np.asarray(low_pass.white(self._within, self._rate).mean(axis=0))
 
-    def slow(self, low_pass: Filter) -> Array:
-        """Return the gain for slow noise."""
-        return low_pass.slow(self._mean, self._rate)
+    def slow(self, low_pass: Filter) -> tuple[Array, Array]:
+        """Return the gains for flicker noise and for slower noise."""
+        at = self._mean, self._rate
+        return low_pass.flicker(*at), low_pass.slow(*at)
 
     def leakage(self, low_pass: Filter) -> Array:
         """Return the spectral leakage in bins of single samples, 0 in others."""
@@ -226,7 +235,7 @@ class _Fits:
         return any(
             self._fit(Filter(*each, cutoff)).cost < alone - 1.0
             for each in _MAX_CUTOFFS
-            for cutoff in self._list_cutoffs(*each)[:: 3 if each[0] != "boxcar" else 1].tolist()
+            for cutoff in self._list_cutoffs(*each)[::3].tolist()
         )
 
     def try_filters(self) -> list[_Trial]:
@@ -243,14 +252,17 @@ class _Fits:
                 break
         return maxima
 
-    def find_gain(self, trial: _Trial) -> float:
-        """Return half the BIC of the noise without a filter, less that with it."""
+    def find_gain(self, trial: _Trial, models: Sequence[Terms]) -> float:
+        """Return half the BIC of models without a filter, less the one with it."""
         flat = np.column_stack([np.ones(len(self._slow)), self._slow])
         unfiltered = [self._fit_powers(flat)[1]]
-        unfiltered += [self._whittle.maximum(terms).cost for terms in _UNFILTERED_MODELS]
+        unfiltered += [
+            self._whittle.maximum(terms).cost + self._penalty * ("Q" in terms.linear)
+            for terms in models
+        ]
         gain = min(unfiltered) - trial.cost - self._penalty * (1 + trial.with_floor)
         fast = make_whittle(self.spectrum, 0.5 * self.rate, COARSE, shortest=3.0 / self.rate)
-        process = min(fast.maximum(terms).cost for terms in _UNFILTERED_MODELS[:2])
+        process = min(fast.maximum(terms).cost for terms in _UNFILTERED_MODELS)
         # A process of a few samples is a filter of first order, if no white noise is visible.
         is_process_like = trial.low_pass.kind != "boxcar" and trial.low_pass.order == 1
         return min(gain, process - trial.cost + 2.0 * _MIN_GAIN * is_process_like)
@@ -308,18 +320,17 @@ class _Fits:
 
     def _list_cutoffs(self, kind: Kind, order: int) -> Array:
         """Return the cut-offs from which a search starts, ascending, Hz."""
-        first_order = kind != "boxcar" and order == 1
-        lowest = self._lowest if first_order else _MIN_CUTOFF * self.rate
-        scan = np.geomspace(lowest, _MAX_CUTOFFS[kind, order] * self.rate, _SCAN_CUTOFFS)
-        if kind != "boxcar":
-            return scan
-        lengths = np.arange(_MAX_BOXCAR_SAMPLES, 2, -1)
-        return np.unique(np.concatenate([scan, BOXCAR_CUTOFF_LENGTH * self.rate / lengths]))
+        if kind == "boxcar":
+            return BOXCAR_CUTOFF_LENGTH * self.rate / np.arange(_MAX_BOXCAR_SAMPLES, 1.9, -1)
+        lowest = self._lowest if order == 1 else _MIN_CUTOFF * self.rate
+        return np.geomspace(lowest, _MAX_CUTOFFS[kind, order] * self.rate, _SCAN_CUTOFFS)
 
     def _make_columns(self, low_pass: Filter, with_floor: bool) -> Array:
         """Return the densities of the terms behind a filter as columns, white noise first."""
         white = self._gains.white(low_pass) + self._gains.leakage(low_pass) + self.rounded
-        columns = [white[:, None], self._slow * self._gains.slow(low_pass)[:, None]]
+        flicker, slow = self._gains.slow(low_pass)
+        gains = np.hstack([flicker[:, None], np.tile(slow[:, None], self._slow.shape[1] - 1)])
+        columns = [white[:, None], self._slow * gains]
         return np.hstack(columns + [np.ones((len(white), 1))] * with_floor)
 
     def _fit(self, low_pass: Filter, with_floor: bool = False) -> _Trial:

@@ -27,6 +27,7 @@ from imubench_pipeline.typing import Array
 Kind = Literal["analogue", "bilinear", "boxcar"]
 
 BOXCAR_CUTOFF_LENGTH = 0.442946  # Cut-off of a boxcar times its length, where sinc^2 is one half
+_ALIASES = 3  # Of flicker noise on each side; the filter leaves little of the others
 _GRID_SIZE = 512  # Frequencies of the numerical integral over G
 
 
@@ -75,6 +76,16 @@ class Filter:
         warped = tangent / math.tan(math.pi * min(self.cutoff / rate, 0.4999))
         logarithm = np.minimum(2.0 * self.order * np.log(np.maximum(warped, 1e-30)), 600.0)
         return np.asarray(1.0 / (1.0 + np.exp(logarithm)))
+
+    def flicker(self, frequency: Array, rate: float) -> Array:
+        """Return the gain for flicker noise with its nearest aliases, above 0 Hz."""
+        if self.kind == "bilinear":
+            return self.slow(frequency, rate)
+        distance = np.abs(frequency + rate * np.arange(-_ALIASES, _ALIASES + 1)[:, None])
+        # The density of sampled flicker noise is B^2 / (2 rate sin(pi f / rate)).
+        sampled = 2.0 * rate * np.sin(np.pi * frequency / rate)
+        total = (self.slow(distance, rate) / (2.0 * np.pi * distance)).sum(axis=0)
+        return np.asarray(sampled * total)
 
     def half_power(self, rate: float) -> float:
         """Return the frequency at which the density of filtered white noise is halved.

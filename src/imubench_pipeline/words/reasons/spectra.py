@@ -42,6 +42,13 @@ def unknown_filter(number: int) -> str:
     return f"the spectrum bends, but like none of the {number} filters that were tried"
 
 
+def filter_or_quantization(lower: float, upper: float) -> str:
+    return (
+        "the spectrum rises towards the Nyquist frequency. Quantization noise explains it as well "
+        f"as a low-pass with a cut-off from {number_text(lower)} to {number_text(upper)} Hz"
+    )
+
+
 def few_bins(bins: int, needed: int) -> str:
     return f"the spectrum has {bins} bins, {needed} are needed. Record a longer log"
 
