@@ -56,15 +56,6 @@ def test_behind_a_filter_the_band_ends_where_the_bias_of_n_is_half_its_error() -
     assert 0.2 * error < abs(bias) < 0.7 * error
 
 
-def test_where_no_model_explains_the_high_end_the_band_is_halved() -> None:
-    # A resonance, which no filter of the family has.
-    bump = 1.0 + 30.0 * np.exp(-0.5 * (np.log(FLAT.frequency / 25.0) / 0.1) ** 2)
-    frame = FitSelection([], EVERY, EVERY, Band(50.0, "whole"))
-    part = frame.find_explained_part(drawn(bump))
-    assert part is not None and part.band == Band(12.5, "bend")
-    assert frame.find_explained_part(drawn(np.ones(len(EVERY)))) is None
-
-
 def test_n_behind_a_steep_filter_is_that_of_the_log_at_low_frequencies() -> None:
     rng = np.random.default_rng(3)
     white = 1e-3 * np.sqrt(RATE) * rng.standard_normal(102_000)

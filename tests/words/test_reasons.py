@@ -84,7 +84,6 @@ SPECTRA = [
     of(spectra.filter_text, "bilinear low-pass of order 2 at 2 Hz", "bilinear", 2, 2.0),
     of(spectra.filter_text, "running mean (boxcar) at 24.8 Hz", "boxcar", 1, 24.8),
     of(spectra.band_text, "up to 7 Hz are fitted, as set", "set", 7.0),
-    of(spectra.band_text, "bends above 7 Hz", "bend", 7.0),
     of(spectra.band_text, "up to the Nyquist", "whole", 7.0),
     of(spectra.band_text, "boxcar", "filtered", 7.0, "running mean (boxcar) at 24.8 Hz"),
     of(spectra.band_text, "order 2", "attenuated", 7.0, "bilinear low-pass of order 2 at 2 Hz"),

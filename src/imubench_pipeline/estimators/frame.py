@@ -2,7 +2,6 @@
 
 Where the sensor has a low-pass filter (`imubench_pipeline.estimators.cutoff`), the noise is fitted
 only up to the frequency at which the filter changes the estimate of S_N by half its standard error.
-Where no model explains the spectrum, the band is halved until one does.
 """
 
 from __future__ import annotations
@@ -15,7 +14,6 @@ from numpy.typing import NDArray
 
 from imubench_pipeline.estimators.cutoff import MIN_PROCESS_SAMPLES, Cutoff, find_cutoff
 from imubench_pipeline.estimators.lines import Line, find_lines, mask_lines
-from imubench_pipeline.estimators.model_choice import assess_goodness_of_fit
 from imubench_pipeline.estimators.spectrum import LineSpectrum, Spectrum
 from imubench_pipeline.estimators.whittle import (
     COARSE,
@@ -37,8 +35,6 @@ _MIN_CORRELATION_SAMPLES = 3.0  # Of the shortest process that is tried without 
 _MAX_FILTER_BIAS = 0.5  # Of S_N within the band, in standard errors
 _UNKNOWN_FILTER_BAND = 1 / 10  # Over the cut-off, where no filter of the family fits the bend
 _MIN_QUANTIZATION_BAND = 1 / 10  # Fraction of the rate at which quantization noise is visible
-_HALVINGS = 8  # Of the band, at most
-_FLEXIBLE_TERMS = Terms("NFK", 1)
 
 
 @dataclass(frozen=True)
@@ -95,28 +91,6 @@ class FitSelection:
         """Return the selection up to a frequency, Hz."""
         used = self.used & (spectrum.upper <= highest * (1.0 + 1e-9))
         return replace(self, used=used, band=Band(highest, source))
-
-    def find_explained_part(self, spectrum: Spectrum) -> FitSelection | None:
-        """Return the largest part of the band, by halves, that a flexible model explains.
-
-        None where there is none, or where this model explains the rest of the band as well.
-        """
-        part, whole = self, self.likelihood_of_all_bins(spectrum)
-        for _ in range(_HALVINGS):
-            part = part._limit(spectrum, 0.5 * part.band.highest, "bend")
-            if part.used.sum() < 2 * MIN_BINS:
-                return None
-            density = whole.density(part.whittle(spectrum).maximum(_FLEXIBLE_TERMS))
-            if _explains(spectrum, density, part.used):
-                return None if _explains(spectrum, density, self.used & ~part.used) else part
-        return None
-
-
-def _explains(spectrum: Spectrum, density: Array, bins: Mask) -> bool:
-    """Return whether a density, shape (b,), explains some bins of a spectrum."""
-    shown, free = spectrum.select(bins), _FLEXIBLE_TERMS.parameters
-    columns = shown.ordinates, shown.density, density[bins], shown.frequency
-    return assess_goodness_of_fit(*columns, free).verdict == "explained"
 
 
 def select_for_fit(

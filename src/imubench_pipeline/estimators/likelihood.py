@@ -227,7 +227,9 @@ def fit_spectrum(
         return Likelihood(
             both, (), frame.lines, None, spectrum, frame.clear, frame.used, nan, frame
         )
-    frame, whittle, candidates = fit_models(spectrum, frame)
+    whittle = frame.whittle(spectrum)
+    quantization = frame.shows_quantization(spectrum.rate)
+    candidates = compare_models(whittle, quantization=quantization)
     chosen = candidates[0]
     # A ramp is no noise: it is selected or not, and a possible one does not widen intervals.
     alike = [chosen] + [
@@ -330,27 +332,6 @@ class _InTheLog:
             for c in self.alike
         ]
         return draw_jointly(parts, self._whittle.longest)
-
-
-def fit_models(
-    spectrum: Spectrum, frame: FitSelection
-) -> tuple[FitSelection, Whittle, list[Candidate]]:
-    """Fit all models to a selection of bins, or to its lowest part that a model explains.
-
-    Returned are the selection, its likelihood and the models tried, the best first. The selection
-    is left as it is where no part of it is explained.
-    """
-
-    def fitted(tried: FitSelection) -> tuple[FitSelection, Whittle, list[Candidate]]:
-        whittle = tried.whittle(spectrum)
-        quantization = tried.shows_quantization(spectrum.rate)
-        return tried, whittle, compare_models(whittle, quantization=quantization)
-
-    first = fitted(frame)
-    if frame.low_pass is None or first[2][0].goodness.verdict == "explained":
-        return first
-    part = frame.find_explained_part(spectrum)
-    return fitted(part) if part is not None else first
 
 
 def _with_one_more(terms: Terms, number: int = 0) -> list[Terms]:

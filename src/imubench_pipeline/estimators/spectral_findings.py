@@ -31,9 +31,9 @@ _SPACING_RATIO = 1.4  # Ratio of the numbers of ordinates in successive sums
 
 def spectral_findings(channel: str, frame: FitSelection, white: float | None) -> list[Finding]:
     """Return the findings on the lines and the band of a channel; ``white`` is N, SI, if known."""
-    band = frame.band
+    band, low_pass = frame.band, frame.low_pass
     findings = describe_lines(channel, frame.lines, white)
-    if band.source == "bend":
+    if low_pass is not None and low_pass.N is not None and low_pass.N.value is None:
         findings.append(find(BandLimit(band.highest), "note", band.highest, channel))
     return findings
 

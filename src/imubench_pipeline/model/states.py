@@ -25,11 +25,11 @@ Status = Literal[
 GoodnessVerdict = Literal["explained", "not explained"]
 """Whether a model explains the spectrum."""
 
-BandSource = Literal["set", "bend", "whole", "filtered", "attenuated"]
+BandSource = Literal["set", "whole", "filtered", "attenuated"]
 """Reason for the highest fitted frequency of a spectrum.
 
-The user; a bend that neither noise nor a filter of the family explains; nothing, the spectrum is
-fitted up to Nyquist, without a filter or with one; or the attenuation by a fitted filter.
+The user; nothing, the spectrum is fitted up to Nyquist, without a filter or with one; or the
+attenuation by a filter.
 """
 
 Verdict = Literal["meets", "likely_meets", "not_enough_data", "likely_fails", "fails", "excluded"]

@@ -20,8 +20,6 @@ def band_text(source: BandSource, highest: float, low_pass: str = "") -> str:
     match source:
         case "set":
             return f"frequencies up to {limit} are fitted, as set"
-        case "bend":
-            return f"the spectrum bends above {limit}, as by the filter of the sensor"
         case "whole":
             return "the spectrum follows its model up to the Nyquist frequency"
         case "filtered":
