@@ -73,9 +73,6 @@ CURVES = [
     of(curves.no_significant_peak, "of T_B is 90 %", 0.9),
     of(curves.no_significant_peak, "of B is 20 %, but 90 % for T_B", 0.9, 0.2),
     of(curves.broadband_process, "0.3 s is broadband noise", 0.3),
-    of(curves.broadband_peak, "below 1 s", 0.3, 1.0),
-    of(curves.rises_to_end, "still rise at 4000 s", 4000.0),
-    of(curves.time_at_bound, "not determined", estimates.correlation_bound(9.0, longest=True)),
     of(curves.no_model_minimum, "still falls at 4000 s", 4000.0),
     of(curves.no_model_minimum, "rises from its shortest", None),
 ]

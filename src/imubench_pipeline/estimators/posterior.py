@@ -125,10 +125,13 @@ def sample_adaptively(
     Scandinavian Journal of Statistics 39, 2012.
     """
     mixtures, mixture = [first], first
-    points = first.draw(size, rng)
-    values = log_density(points)
-    proposed = first.densities(points).sum(axis=1)
+    points = np.empty((0, first.means.shape[1]))
+    values = np.empty(0)
     while True:
+        added = mixtures[-1].draw(size, rng)
+        points = np.concatenate([points, added])
+        values = np.concatenate([values, log_density(added)])
+        proposed = np.sum([each.densities(points).sum(axis=1) for each in mixtures], axis=0)
         with np.errstate(divide="ignore"):
             logarithm = values - np.log(proposed)
         weights = np.exp(logarithm - logarithm.max())
@@ -144,13 +147,7 @@ def sample_adaptively(
             np.concatenate([mixture.means, first.means]),
             np.concatenate([mixture.scales, first.scales]),
         )
-        added = proposal.draw(size, rng)
-        proposed = proposed + proposal.densities(points).sum(axis=1)
         mixtures.append(proposal)
-        everywhere = [earlier.densities(added).sum(axis=1) for earlier in mixtures]
-        points = np.concatenate([points, added])
-        values = np.concatenate([values, log_density(added)])
-        proposed = np.concatenate([proposed, np.sum(everywhere, axis=0)])
 
 
 def _get_degrees(dimensions: int) -> int:

@@ -100,26 +100,6 @@ def broadband_process(time: float) -> str:
     )
 
 
-def broadband_peak(tau: float, longest: float) -> str:
-    """Return why a peak at ``tau``, s, is no bias instability; ``longest``: correlation time."""
-    return (
-        f"the peak at {number_text(tau, 2)} s is broadband noise with a correlation time below "
-        f"{number_text(longest, 2)} s, not bias instability: only the interval is given"
-    )
-
-
-def rises_to_end(tau: float) -> str:
-    """Return why a curve that still rises at ``tau``, s, has no known peak."""
-    return (
-        f"the processes still rise at {number_text(tau)} s, a ninth of the log: only the interval "
-        "is given"
-    )
-
-
-def time_at_bound(reason: str) -> str:
-    return f"a correlation time is not determined: {reason}"
-
-
 def no_model_minimum(falls_to: float | None) -> str:
     text = "the Allan deviation of the fitted noise has no minimum: it "
     if falls_to is None:
