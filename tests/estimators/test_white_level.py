@@ -40,7 +40,7 @@ def maximum(model: NoiseModel) -> Maximum:
 
 def test_processes_faster_than_a_second_count_into_n() -> None:
     model = replace(fast(3.0), K=1e-6, further=[GaussMarkov(1e-4, 30.0)])
-    assert count_fast_processes(maximum(model)) == 1
+    assert count_fast_processes(maximum(model), RATE) == 1
     merged = merge_fast_processes(maximum(model), 1)
     assert merged.terms == Terms("NK", 1)
     found = make_noise_model(merged)
@@ -50,7 +50,17 @@ def test_processes_faster_than_a_second_count_into_n() -> None:
     late = np.geomspace(5.0, 1000.0, 20)
     assert found.allan_variance(late) == pytest.approx(model.allan_variance(late), rel=0.02)
     slow = maximum(NoiseModel(N=N, B=1e-4, T_B=1.01))
-    assert count_fast_processes(slow) == 0 and merge_fast_processes(slow, 0) is slow
+    assert count_fast_processes(slow, RATE) == 0 and merge_fast_processes(slow, 0) is slow
+
+
+def test_a_process_below_visible_white_noise_does_not_count_into_n() -> None:
+    # The white noise is the stronger up to tau = sqrt(3 N^2 / S_B), 0.3 s here.
+    unit = NoiseModel(B=1.0, T_B=0.9).psd(np.array([1e-9]))[0]
+    B = N * np.sqrt((0.9 / 0.3) ** 2 * 3.0 / unit)
+    best = maximum(NoiseModel(N=N, B=B, T_B=0.9))
+    # A share of 6 % is reached at a quarter of it.
+    assert count_fast_processes(best, 1.1 * 15.0 / 0.0735) == 0
+    assert count_fast_processes(best, 0.9 * 15.0 / 0.0735) == 1
 
 
 def test_draws_are_merged_one_by_one() -> None:

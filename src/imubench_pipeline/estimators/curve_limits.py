@@ -38,8 +38,7 @@ def add_fitted_limits(
     """
     if not likelihood.candidates or likelihood.band is None:
         return curve
-    chosen = likelihood.candidates[0]
-    rate = curve.rate
+    chosen, rate = likelihood.candidates[0], curve.rate
     sinusoids = [line.term for line in likelihood.lines if line.narrow]
     model = replace(make_noise_model(chosen.maximum), sinusoids=sinusoids)
 

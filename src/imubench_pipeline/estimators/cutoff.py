@@ -113,7 +113,9 @@ def find_cutoff(
     tried = fits.try_filters()
     if not tried:
         return absent
-    leaky, rounded = _find_leaky_bins(spectrum, tried[0]), rounding / tried[0].N ** 2
+    gains, low_pass = _Gains(spectrum), tried[0].low_pass
+    leaky = gains.leakage(low_pass) > _MAX_LEAKAGE_FRACTION * gains.white(low_pass)
+    rounded = rounding / tried[0].N ** 2
     if (usable & ~leaky).sum() < MIN_BINS:
         return absent
     if (usable & leaky).any() or rounded > 0.0:
@@ -155,19 +157,18 @@ def _describe_filter(spectrum: Spectrum, fits: _Fits, tried: Sequence[_Trial]) -
         frequency, N = _withhold(frequency, reason), _withhold(N, reason)
     elif max(cutoffs) > _MAX_LIMIT_RATIO * min(cutoffs):
         frequency = _withhold(frequency, texts.cutoff_range(min(cutoffs), max(cutoffs)))
-    low_pass = best.low_pass
-    found = Cutoff(frequency, low_pass.kind, low_pass.order, N)
+    found = Cutoff(frequency, best.low_pass.kind, best.low_pass.order, N)
     if share > _MIN_FLOOR_RATIO and N.status == "ok" and N.upper is not None:
         times = math.sqrt(1.0 + share)
         reason = texts.unfiltered_noise(share, found.words, times)
         N = replace(N, status="doubtful", reason=reason, upper=N.upper * times)
     beside = fits.rounded + share
-    gain = _Gains(spectrum).white(low_pass) + beside
+    gain = _Gains(spectrum).white(best.low_pass) + beside
     return replace(
         found,
         N=N,
         floor=best.N * math.sqrt(beside),
-        gain=gain / (float(low_pass.white(0.0, rate)) + beside),
+        gain=gain / (float(best.low_pass.white(0.0, rate)) + beside),
     )
 
 
@@ -269,7 +270,8 @@ class _Fits:
 
     def explains(self, trial: _Trial) -> bool:
         """Return whether the filter explains the spectrum where it bends it."""
-        fitted, spectrum = self._fit_density(trial), self.spectrum
+        spectrum, columns = self.spectrum, self._make_columns(trial.low_pass, trial.with_floor)
+        fitted = columns @ self._fit_powers(columns)[0]
         lowest = min(0.1 * trial.low_pass.cutoff, spectrum.frequency[-MIN_BINS])
         bent = spectrum.frequency > lowest
         shown = spectrum.select(bent)
@@ -338,10 +340,6 @@ class _Fits:
         floor = math.sqrt(powers[-1]) if with_floor else 0.0
         return _Trial(low_pass, with_floor, cost, math.sqrt(powers[0]), floor)
 
-    def _fit_density(self, trial: _Trial) -> Array:
-        columns = self._make_columns(trial.low_pass, trial.with_floor)
-        return np.asarray(columns @ self._fit_powers(columns)[0])
-
     def _fit_powers(self, columns: Array) -> tuple[Array, float]:
         """Return the squared parameter of each column, and -log L."""
         norm = columns.mean(axis=0)
@@ -349,10 +347,3 @@ class _Fits:
             np.ascontiguousarray(columns / norm), self._bins, False, TOLERANCE
         )
         return powers / norm * self._whittle.scale, cost
-
-
-def _find_leaky_bins(spectrum: Spectrum, trial: _Trial) -> NDArray[np.bool_]:
-    """Return the bins that spectral leakage dominates."""
-    gains = _Gains(spectrum)
-    white = gains.white(trial.low_pass)
-    return np.asarray(gains.leakage(trial.low_pass) > _MAX_LEAKAGE_FRACTION * white)

@@ -65,27 +65,23 @@ class FitSelection:
     @property
     def gain(self) -> Array:
         """Density of white noise behind the filter over its density at 0 Hz, shape (b,)."""
-        gain = self.low_pass.gain if self.low_pass is not None else None
-        return np.ones(len(self.used)) if gain is None else gain
+        return np.ones(len(self.used)) if self._gain is None else self._gain
 
-    def whittle(self, spectrum: Spectrum) -> Whittle:
-        """Return the likelihood of the bins that are fitted."""
-        return self._whittle(spectrum, self.used, SHAPES)
+    @property
+    def _gain(self) -> Array | None:
+        return self.low_pass.gain if self.low_pass is not None else None
 
-    def likelihood_of_all_bins(self, spectrum: Spectrum) -> Whittle:
-        """Return the likelihood over all bins, including bins that are not fitted."""
-        return self._whittle(spectrum, np.ones(len(self.used), dtype=np.bool_), COARSE)
-
-    def _whittle(self, spectrum: Spectrum, bins: Mask, shapes: int) -> Whittle:
-        filtered = self.low_pass is not None and self.low_pass.gain is not None
-        samples = MIN_PROCESS_SAMPLES if filtered else _MIN_CORRELATION_SAMPLES
-        shortest = samples / spectrum.rate
-        return make_whittle(spectrum.select(bins), self.band.highest, shapes, shortest=shortest)
+    def whittle(self, spectrum: Spectrum, *, all_bins: bool = False) -> Whittle:
+        """Return the likelihood of the bins that are fitted, or roughly of all."""
+        if not all_bins:
+            spectrum = spectrum.select(self.used)
+        samples = _MIN_CORRELATION_SAMPLES if self._gain is None else MIN_PROCESS_SAMPLES
+        shapes, shortest = COARSE if all_bins else SHAPES, samples / spectrum.rate
+        return make_whittle(spectrum, self.band.highest, shapes, shortest=shortest)
 
     def shows_quantization(self, rate: float) -> bool:
         """Return whether quantization noise is visible: no filter, and a sufficient band."""
-        filtered = self.low_pass is not None and self.low_pass.gain is not None
-        return not filtered and self.band.highest >= _MIN_QUANTIZATION_BAND * rate
+        return self._gain is None and self.band.highest >= _MIN_QUANTIZATION_BAND * rate
 
     def _limit(self, spectrum: Spectrum, highest: float, source: BandSource) -> FitSelection:
         """Return the selection up to a frequency, Hz."""

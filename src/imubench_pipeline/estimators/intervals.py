@@ -253,12 +253,11 @@ def describe(
         if f"B{number}" in described and described[f"B{number}"].status == "absent":
             bias = described[f"B{number}"]
             described[f"T_B{number}"] = replace(bias, lower=None, upper=None, duration_needed=None)
-    absent = Parameter(None, "absent", texts.ABSENT)
-    parameters = {name: described.get(name, absent) for name in FAMILY}
+    parameters = dict.fromkeys(FAMILY, Parameter(None, "absent", texts.ABSENT))
+    parameters |= {name: described[name] for name in FAMILY if name in described}
     if "B" in described and "T_B" not in described:
         parameters["T_B"] = Parameter(None, "absent", texts.FLICKER_WITHOUT_TIME)
-    second = "B 2" in described
-    further = [{"B": described["B 2"], "T_B": described["T_B 2"]}] if second else []
+    further = [{"B": described["B 2"], "T_B": described["T_B 2"]}] if "B 2" in described else []
     return Estimate(method, parameters, further)
 
 

@@ -19,6 +19,7 @@ from imubench_pipeline.estimators import least_squares
 from imubench_pipeline.estimators.curve_bias import add_curve_figures, make_averaging_times
 from imubench_pipeline.estimators.cutoff import Cutoff
 from imubench_pipeline.estimators.estimate import (
+    BROADBAND_TIME,
     CURVE,
     FAMILY,
     PARAMETERS,
@@ -211,10 +212,7 @@ def fit_blocks(
 
 
 def fit_spectrum(
-    spectrum: Spectrum,
-    frame: FitSelection,
-    *,
-    rng: np.random.Generator,
+    spectrum: Spectrum, frame: FitSelection, *, rng: np.random.Generator
 ) -> Likelihood:
     """Estimate the noise parameters from the selected bins of a spectrum (see `fit`)."""
     if frame.used.sum() < MIN_BINS:
@@ -228,57 +226,52 @@ def fit_spectrum(
             both, (), frame.lines, None, spectrum, frame.clear, frame.used, nan, frame
         )
     whittle = frame.whittle(spectrum)
-    quantization = frame.shows_quantization(spectrum.rate)
-    candidates = compare_models(whittle, quantization=quantization)
+    candidates = compare_models(whittle, quantization=frame.shows_quantization(spectrum.rate))
     chosen = candidates[0]
     # A ramp is no noise: it is selected or not, and a possible one does not widen intervals.
     alike = [chosen] + [
         c for c in candidates[1:] if c.akaike_weight >= MIN_AKAIKE_WEIGHT and not c.terms.ramp
     ]
-    fast = count_fast_processes(chosen.maximum)
+    fast = count_fast_processes(chosen.maximum, spectrum.rate)
     wider = [c for c in candidates if c.terms in _with_one_more(chosen.terms, fast)]
     papers = next(c for c in candidates if c.terms == PAPERS_MODEL)
     drawn = [c for c in candidates if c in alike or c in wider or c is papers]
     posteriors = {c.terms: sample(whittle, c.maximum, rng) for c in drawn}
     of_data = _InTheLog(whittle, frame, posteriors, alike, wider)
-    estimate = of_data.estimate("likelihood")
-    if frame.low_pass is not None and frame.low_pass.N is not None:
-        sensor = {SENSOR: frame.low_pass.N}
-        estimate = replace(estimate, parameters={**estimate.parameters, **sensor})
+    estimate, low_pass = of_data.estimate("likelihood"), frame.low_pass
+    if low_pass is not None and low_pass.N is not None:
+        estimate = replace(estimate, parameters={**estimate.parameters, SENSOR: low_pass.N})
     of_papers = _InTheLog(whittle, frame, posteriors, [papers], [])
     gauss_markov = of_papers.estimate("likelihood_gm")
-    noise = frame.likelihood_of_all_bins(spectrum).density(chosen.maximum)
+    noise = frame.whittle(spectrum, all_bins=True).density(chosen.maximum)
     fitted = noise * frame.gain + chosen.maximum.ramp**2 * spectrum.ramp
-    against = papers.bic - chosen.bic
-    if against > _DELTA_BIC_AGAINST_PAPERS:
-        reason = reasons.model_disfavoured(chosen.terms.name, papers.terms.name, against)
-        gauss_markov = _doubt_bias_and_walk(gauss_markov, reason)
+    doubt = None
+    if papers.bic > chosen.bic + _DELTA_BIC_AGAINST_PAPERS:
+        names = chosen.terms.name, papers.terms.name
+        doubt = reasons.model_disfavoured(*names, papers.bic - chosen.bic)
     sinusoids = select_sinusoids(frame.lines)
     estimate = replace(estimate, lines=sinusoids, draws=of_data.draw_jointly())
+    parameters = {name: gauss_markov.parameters[name] for name in PARAMETERS}
     gauss_markov = replace(
         gauss_markov,
-        parameters={name: gauss_markov.parameters[name] for name in PARAMETERS},
+        parameters=_cast_doubt(parameters, doubt),
+        curve=_cast_doubt(gauss_markov.curve, doubt),
         lines=sinusoids,
         draws=of_papers.draw_jointly(),
     )
-    lines, band, clear, used = frame.lines, frame.band, frame.clear, frame.used
-    both = (estimate, gauss_markov)
+    both, lines, band = (estimate, gauss_markov), frame.lines, frame.band
+    clear, used = frame.clear, frame.used
     return Likelihood(both, candidates, lines, band, spectrum, clear, used, fitted, frame)
 
 
-def _doubt_bias_and_walk(estimate: Estimate, reason: str) -> Estimate:
-    """Return an estimate whose bias instability and random walk are doubtful, if estimated."""
-
-    def doubt(group: Mapping[str, Parameter]) -> dict[str, Parameter]:
-        return {
-            name: replace(parameter, status="doubtful", reason=reason)
-            if parameter.status == "ok" and name not in ("N", "Q", "R")
-            else parameter
-            for name, parameter in group.items()
-        }
-
-    parameters, curve = doubt(estimate.parameters), doubt(estimate.curve)
-    return replace(estimate, parameters=parameters, curve=curve)
+def _cast_doubt(group: Mapping[str, Parameter], reason: str | None) -> dict[str, Parameter]:
+    """Return parameters, all but N of status ``ok`` made doubtful if there is a reason."""
+    return {
+        name: replace(each, status="doubtful", reason=reason)
+        if reason is not None and each.status == "ok" and name != "N"
+        else each
+        for name, each in group.items()
+    }
 
 
 class _InTheLog:
@@ -293,7 +286,7 @@ class _InTheLog:
         wider: Sequence[Candidate],
     ) -> None:
         self._whittle, self._highest = whittle, frame.band.highest
-        self._number = count_fast_processes(alike[0].maximum)
+        self._number = count_fast_processes(alike[0].maximum, whittle.spectrum.rate)
         self.draws: dict[Terms, Posterior] = {}
         self._posteriors = posteriors
         self.alike = list(self._merged(alike))
@@ -303,15 +296,14 @@ class _InTheLog:
         """Yield each model once, without the processes that are part of N, and store its draws."""
         merged: set[Terms] = set()
         for candidate in candidates:
-            number = min(self._number, count_fast_processes(candidate.maximum))
+            number = min(self._number, int(np.sum(candidate.maximum.times < BROADBAND_TIME)))
             maximum = merge_fast_processes(candidate.maximum, number)
             if maximum.terms in merged:
                 continue
             merged.add(maximum.terms)
             if maximum.terms not in self.draws:
-                terms = candidate.terms
-                draws = merge_fast_draws(self._posteriors[terms], terms, number)
-                self.draws[maximum.terms] = draws
+                posterior = self._posteriors[candidate.terms]
+                self.draws[maximum.terms] = merge_fast_draws(posterior, candidate.terms, number)
             yield replace(candidate, maximum=maximum)
 
     def estimate(self, method: str) -> Estimate:
@@ -324,14 +316,13 @@ class _InTheLog:
 
     def draw_jointly(self) -> JointDraws:
         """Return draws over all models that the log does not rule out."""
-        bins = len(self._whittle.spectrum.density)
-        # The weight of a single model, which may be nearly 0, does not matter.
-        alone = len(self.alike) == 1
+        bins, longest = len(self._whittle.spectrum.density), self._whittle.longest
+        # The weight of a single model, which may be 0, does not matter.
         parts = [
-            (c.terms, self.draws[c.terms], 1.0 if alone else compute_draw_weight(c, bins))
+            (c.terms, self.draws[c.terms], max(compute_draw_weight(c, bins), 1e-300))
             for c in self.alike
         ]
-        return draw_jointly(parts, self._whittle.longest)
+        return draw_jointly(parts, longest)
 
 
 def _with_one_more(terms: Terms, number: int = 0) -> list[Terms]:

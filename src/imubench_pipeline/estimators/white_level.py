@@ -1,26 +1,45 @@
 """N as the Allan deviation shows it at tau of a second and more.
 
 White noise of density N_0 with a Gauss-Markov process faster than a second has the level N_0 at
-tau far below T_B, and N^2 = N_0^2 + S_B T_B^2 far above it. Such a process is part of N, and is
-removed from the model, so that it is not counted twice.
+tau far below T_B, and N^2 = N_0^2 + S_B T_B^2 far above it. Where the first level is not visible,
+such a process is part of N, and is removed from the model, so that it is not counted twice.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
 
 from imubench_pipeline.estimators.estimate import BROADBAND_TIME
 from imubench_pipeline.estimators.posterior import Posterior
-from imubench_pipeline.estimators.whittle import Maximum, Terms
+from imubench_pipeline.estimators.whittle import Maximum, Terms, make_noise_model
 from imubench_pipeline.noise.terms import compute_driving_density
 from imubench_pipeline.typing import Array
 
+_MAX_PROCESS_SHARE = 0.06  # Of the Allan variance, up to which it has the slope of white noise
+_MIN_TAU_OVER_TIME = 25.0  # Up to which the level of white noise and process must be visible
+_MIN_WHITE_SAMPLES = 15.0  # Longest cluster with this slope, where white noise is visible
 
-def count_fast_processes(maximum: Maximum) -> int:
-    """Return the number of processes faster than a second."""
-    return int(np.sum(maximum.times < BROADBAND_TIME))
+
+def count_fast_processes(maximum: Maximum, rate: float) -> int:
+    """Return the number of processes faster than a second that are part of the visible N.
+
+    At tau far below T_B the Allan variance is N^2 / tau + S_B tau / 3: there the white noise is not
+    visible. At tau far above T_B slower noise must not hide the level of both. ``rate`` in Hz.
+    """
+    fast = maximum.times < BROADBAND_TIME
+    powers, times = maximum.process_powers[fast], maximum.times[fast]
+    driving = float(np.sum(powers * compute_driving_density(1.0, 1.0) / times))
+    if not driving > 0.0:
+        return 0
+    longest = maximum.parameter("N") * math.sqrt(3.0 * _MAX_PROCESS_SHARE / driving)
+    merged, tau = merge_fast_processes(maximum, len(times)), _MIN_TAU_OVER_TIME * times[-1:]
+    model = replace(make_noise_model(merged), R=0.0)
+    level = float(model.allan_variance(tau)[0] * tau[0]) / model.N**2
+    hidden, visible = longest < _MIN_WHITE_SAMPLES / rate, level < 1.0 + 2.0 * _MAX_PROCESS_SHARE
+    return len(times) if hidden and visible else 0
 
 
 def merge_fast_processes(maximum: Maximum, number: int) -> Maximum:
