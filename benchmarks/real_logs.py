@@ -30,6 +30,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import math
 import sys
 import warnings
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -41,9 +42,8 @@ import numpy as np
 from scipy.stats import beta
 
 import imubench_pipeline as imu
-from imubench_pipeline.allan import allan_variance
+from imubench_pipeline.allan import AllanCurve, allan_variance
 from imubench_pipeline.earth import STANDARD_GRAVITY
-from imubench_pipeline.estimators.white_level import WhiteStretch, find_white_stretch
 from imubench_pipeline.library.estimates import ChannelEstimate
 from imubench_pipeline.settings.config import Method
 from imubench_pipeline.typing import Array
@@ -53,6 +53,48 @@ PARAMETERS = ("N", "B_curve", "B", "K", "T_B", "sigma_min", "tau_min")
 LOGS = Path(__file__).resolve().parents[2] / "shared/logs"
 MIN_SAMPLES, MIN_DURATION = 20_000, 3_600.0  # of a piece: so many samples, or so long (s)
 DECADES = range(-3, 5)
+
+MIN_DECADES = 0.7  # Length of a stretch
+MIN_CLUSTER = 3  # Samples; fewer show the register and the sensor's filter
+MAX_ERROR = 0.03  # Relative standard error of the deviation within a stretch
+
+FLAT_WITHIN, MAX_FLAT_WITHIN = 0.03, 0.06
+"""Maximum distance from the median: the first, or two standard errors up to the second."""
+
+
+@dataclass(frozen=True)
+class WhiteStretch:
+    """The first stretch of slope -1/2 of an Allan deviation."""
+
+    level: float  # median of sigma sqrt(tau), SI
+    first: float  # shortest tau, s
+    last: float  # longest tau, s
+
+
+def find_white_stretch(curve: AllanCurve) -> WhiteStretch | None:
+    """Return the first -1/2 stretch of an Allan deviation; None without one.
+
+    The first 0.7 decade or more, from clusters of 3 samples on, whose points all lie within 3 % of
+    their median (or two standard errors, at most 6 %), up to a standard error of 3 %.
+    """
+    n, averaged = curve.cluster_size.astype(np.float64), curve.averaged
+    degrees = 1.5 * curve.samples / (2.0 * n) * 4.0 * n**2 / (4.0 * n**2 + 5.0) - 1.0
+    error = 0.5 * np.sqrt(2.0 / np.maximum(degrees, 1.0))
+    # Where samples are missing, white noise is averaged over fewer than n: as at a shorter tau.
+    level = curve.deviation * np.sqrt(averaged / curve.rate)
+    within = np.clip(2.0 * error, FLAT_WITHIN, MAX_FLAT_WITHIN)
+    for start in np.flatnonzero(n >= MIN_CLUSTER):
+        stop = start
+        while stop < len(n) and error[stop] < MAX_ERROR:
+            part = level[start : stop + 1]
+            middle = np.median(part)
+            if not middle > 0.0 or np.any(np.abs(part / middle - 1.0) > within[start : stop + 1]):
+                break
+            stop += 1
+        if stop > start and math.log10(n[stop - 1] / n[start]) >= MIN_DECADES:
+            first, last = float(curve.tau[start]), float(curve.tau[stop - 1])
+            return WhiteStretch(float(np.median(level[start:stop])), first, last)
+    return None
 
 
 @dataclass(frozen=True)

@@ -1,5 +1,4 @@
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -206,30 +205,6 @@ def test_what_is_known_to_a_factor_is_an_interval() -> None:
         pytest.approx(7e-5),
     )
     assert found.lower is not None and found.upper is not None
-
-
-def test_a_process_that_still_rises_at_the_end_is_no_bias_instability() -> None:
-    chosen = candidate("N", [1e-4, 3e-4], [5000.0], 0.0)
-    found = add_curve_figures(of(chosen), [chosen], [], draws_of(chosen), TAU).curve["B_curve"]
-    assert (found.value, found.status) == (None, "not_identified")
-    assert "still rise" in (found.reason or "")
-
-
-def test_a_process_faster_than_a_second_is_no_bias_instability() -> None:
-    for T_B, status in ((0.99, "not_identified"), (1.01, "ok")):
-        chosen = candidate("N", [1e-5, 3e-4], [T_B], 0.0)
-        found = add_curve_figures(of(chosen), [chosen], [], draws_of(chosen), TAU).curve["B_curve"]
-        assert found.status == status
-
-
-def test_a_time_at_the_bound_of_its_search_leaves_no_bias_instability() -> None:
-    chosen = candidate("NK", [1e-4, 3e-6, 7e-5], [100.0], 0.0)
-    known = of(chosen)
-    at_bound = Parameter(100.0, "at_bound", "the longest is 100 s")
-    given = replace(known, parameters={**known.parameters, "T_B": at_bound})
-    found = add_curve_figures(given, [chosen], [], draws_of(chosen), TAU).curve["B_curve"]
-    assert (found.value, found.status) == (None, "not_identified")
-    assert "the longest is 100 s" in (found.reason or "")
 
 
 def test_models_hold_the_terms_of_a_noise_model() -> None:

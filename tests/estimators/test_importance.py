@@ -132,11 +132,3 @@ def test_a_step_towards_points_is_that_of_expectation_and_maximisation(rng) -> N
     far = Mixture(np.ones(1), np.array([[500.0, 500.0]]), 1e-6 * np.eye(2)[None])
     alone = far.fitted(points[:5])
     assert alone is far
-
-
-def test_the_highest_weights_are_lowered_to_one_that_several_have() -> None:
-    weights = np.array([0.5, 0.2, 0.1, 0.1, 0.1, 0.0])
-    found = Weighted(np.zeros((6, 1)), weights).clipped(2)
-    assert found.weights == pytest.approx(np.array([0.2, 0.2, 0.1, 0.1, 0.1, 0.0]) / 0.7)
-    one = Weighted(np.zeros((3, 1)), np.array([1.0, 0.0, 0.0]))
-    assert one.clipped(2) is one

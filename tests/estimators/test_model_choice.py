@@ -1,6 +1,5 @@
 from collections import Counter
 from collections.abc import Callable
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -14,11 +13,9 @@ from imubench_pipeline.estimators.model_choice import (
     Candidate,
     assess_goodness_of_fit,
     compare_models,
-    describe_disagreement,
-    rescore,
 )
 from imubench_pipeline.estimators.spectrum import Spectrum, compute_spectra
-from imubench_pipeline.estimators.whittle import Maximum, Terms, make_whittle
+from imubench_pipeline.estimators.whittle import Terms, make_whittle
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.simulate import simulate
 from tests.conftest import few
@@ -386,19 +383,6 @@ def test_models_of_more_parameters_than_a_quarter_of_the_bins_are_left_out(rng, 
     assert sum(c.weight for c in candidates) == pytest.approx(1.0)
 
 
-def scored(terms: Terms, bic: float, aic: float) -> Candidate:
-    found = Maximum(terms, np.ones(len(terms.linear)), np.empty(0), 0.0, 0.0)
-    judgement = assess_goodness_of_fit(np.ones(5), np.ones(5), np.ones(5), np.arange(1.0, 6.0), 1)
-    return Candidate(found, bic, aic, 0.5, 0.5, judgement)
-
-
-def test_a_disagreement_of_aic_and_bic_is_said_with_its_size() -> None:
-    simple, rich = scored(Terms("N"), 100.0, 97.5), scored(Terms("NK"), 101.3, 95.1)
-    assert describe_disagreement([simple, rich]) == "AIC prefers N+K by 2.4, BIC prefers N by 1.3"
-    assert describe_disagreement([simple, scored(Terms("NK"), 104.0, 98.0)]) is None
-    assert describe_disagreement([simple]) is None
-
-
 def test_a_ramp_must_be_the_better_and_more_so_in_place_of_a_walk() -> None:
     """It pays 6; beside a walk that is left at 0 what a slow process pays, too."""
     seen = set()
@@ -415,26 +399,3 @@ def test_a_ramp_must_be_the_better_and_more_so_in_place_of_a_walk() -> None:
                 plain = 2.0 * found.cost + found.terms.parameters * penalty
                 assert candidate.bic - plain == pytest.approx(10.0 if alone else 6.0, abs=1e-6)
     assert seen == {True, False}
-
-
-def test_what_models_gain_counts_for_their_scores_and_their_order(rng: np.random.Generator) -> None:
-    candidates = candidates_of(simulate(NoiseModel(N=N), RATE, 4_000, rng), quantization=False)
-    second = candidates[1]
-    gain = 0.5 * (second.bic - candidates[0].bic) + 1.0
-    found = rescore(candidates, {second.terms: gain})
-    assert found[0].maximum is second.maximum
-    assert found[0].bic == pytest.approx(candidates[0].bic - 2.0)
-    assert found[0].aic == pytest.approx(second.aic - 2.0 * gain)
-    assert sum(one.akaike_weight for one in found) == pytest.approx(1.0)
-    ratio = found[0].weight / found[1].weight
-    assert ratio == pytest.approx(np.exp(0.5 * (found[1].bic - found[0].bic)))
-    assert [one.maximum for one in rescore(candidates, {})] == [one.maximum for one in candidates]
-
-
-def test_a_model_with_a_ramp_gains_what_it_gains_without(rng: np.random.Generator) -> None:
-    candidates = candidates_of(simulate(NoiseModel(N=N), RATE, 4_000, rng), quantization=False)
-    ramped = next(one for one in candidates if one.terms.ramp)
-    plain = replace(ramped.terms, ramp=False)
-    found = rescore(candidates, {plain: 3.0})
-    again = next(one for one in found if one.maximum is ramped.maximum)
-    assert again.bic == pytest.approx(ramped.bic - 6.0)

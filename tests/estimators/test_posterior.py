@@ -3,7 +3,6 @@ import pytest
 from scipy import stats
 from scipy.interpolate import PchipInterpolator
 
-from imubench_pipeline.estimators import posterior as posteriors
 from imubench_pipeline.estimators.posterior import MAX_DRAWS, sample
 from imubench_pipeline.estimators.spectrum import compute_spectra
 from imubench_pipeline.estimators.whittle import SHAPES, Maximum, Terms, Whittle, make_whittle
@@ -196,38 +195,6 @@ def test_the_same_stream_gives_the_same_draws(rng) -> None:
     middle = np.median(one.parameters, axis=0), np.median(other.parameters, axis=0)
     spread = one.parameters.std(axis=0)
     assert (np.abs(middle[0] - middle[1]) < 0.35 * spread).all()
-
-
-@pytest.mark.release  # the tests with a grid have quantiles every day
-@pytest.mark.parametrize(
-    ("model", "terms"),
-    [
-        (NoiseModel(N=1e-3, B=2e-3, T_B=20.0), Terms("NK", 1, True)),
-        (NoiseModel(N=1e-3), PAPERS),
-        (NoiseModel(N=1e-3, B=3e-3, T_B=3.0, further=[GaussMarkov(9e-3, 60.0)]), Terms("N", 2)),
-        (MTI_7, PAPERS),
-        (NoiseModel(N=1e-3), Terms("NFK")),
-        (NoiseModel(N=1e-3, B=1e-3, T_B=20.0), Terms("QNK", 1)),
-        (NoiseModel(N=1e-3, B=1e-3, K=1e-5), Terms("NF", 1)),
-    ],
-    ids=["no ramp", "nothing but N", "two processes", "MTi-7", "no flicker", "weak Q", "flicker"],
-)
-def test_quantiles_are_those_of_a_long_chain(monkeypatch, model: NoiseModel, terms: Terms) -> None:
-    whittle = whittle_for(model, 20_000, np.random.default_rng(5), 96)
-    found = whittle.maximum(terms)
-    weighted = sample(whittle, found, np.random.default_rng(1))
-    assert weighted.effective > 1000
-    monkeypatch.setattr(posteriors, "_MAX_DRAWS_PER_POINT", 0)
-    chain = sample(whittle, found, np.random.default_rng(2), 300_000)
-    assert np.isnan(chain.effective)
-    columns = (np.column_stack([one.parameters, one.times, one.ramps]) for one in (weighted, chain))
-    for ours, theirs in zip(*(part.T for part in columns), strict=True):
-        if theirs.std() > 0.0:
-            theirs = np.sort(theirs)
-            chance = np.searchsorted(theirs, np.quantile(ours, [0.025, 0.5, 0.975])) / len(theirs)
-            # Both have their Monte Carlo error: some thousand independent draws. That of the lower
-            # limit of a term that hardly shows is the largest: few draws lie near 0.
-            assert (np.abs(chance - [0.025, 0.5, 0.975]) < [0.019, 0.05, 0.016]).all(), chance
 
 
 def test_where_the_draws_start_does_not_matter(rng) -> None:

@@ -6,13 +6,14 @@ import numpy as np
 import pytest
 from scipy import stats
 
+from imubench_pipeline.estimators.cutoff import Cutoff
+from imubench_pipeline.estimators.estimate import Parameter
 from imubench_pipeline.estimators.frame import Band, FitSelection
 from imubench_pipeline.estimators.intervals import make_ideal_spectrum
 from imubench_pipeline.estimators.spectral_findings import (
     find_missing_slow_noise,
     spectral_findings,
 )
-from imubench_pipeline.model.states import BandSource
 from imubench_pipeline.tables.findings import Finding
 
 FLAT = make_ideal_spectrum(10.0, 1000.0, 5.0)
@@ -73,15 +74,14 @@ def test_nothing_is_said_below_a_low_pass_or_without_n() -> None:
     )
 
 
-def test_a_band_that_ends_before_nyquist_is_told() -> None:
-    def found(source: BandSource) -> list[Finding]:
+def test_a_bend_like_that_of_no_known_filter_is_noted() -> None:
+    def found(N: Parameter | None) -> list[Finding]:
         every = np.ones(BINS, dtype=np.bool_)
-        return spectral_findings("gyro_x", FitSelection([], every, every, Band(5.0, source)), None)
+        low_pass = Cutoff(Parameter(50.0), "analogue", 4, N)
+        band = Band(5.0, "attenuated")
+        return spectral_findings("gyro_x", FitSelection([], every, every, band, low_pass), None)
 
-    assert found("whole") == []
-    (note,) = found("bend")
+    assert found(None) == found(Parameter(1.0)) == []
+    (note,) = found(Parameter(None, "not_identified"))
     assert (note.finding, note.severity, note.value) == ("band_limit", "note", 5.0)
     assert note.detail.startswith("The spectrum of gyro x bends above 5 Hz")
-    (note,) = found("no_model")
-    assert note.detail.startswith("No noise model fits the spectrum of gyro x up to any frequency")
-    assert "5 Hz, a twentieth of the sampling rate" in note.detail

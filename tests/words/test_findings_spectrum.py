@@ -21,8 +21,7 @@ TEXTS: list[tuple[FindingData, list[str]]] = [
         TooManyLines(363, 12, 4, 0.0123, 1e-3),
         ["363 sinusoids", "12 strongest", "The other 351", "1.23 %", "0.0573 °/s rms"],
     ),
-    (BandLimit(5.0, follows_model=True), ["bends above 5 Hz", "state the bandwidth"]),
-    (BandLimit(5.0, follows_model=False), ["5 Hz, a twentieth of the sampling rate"]),
+    (BandLimit(5.0), ["bends above 5 Hz", "state the bandwidth"]),
     (SlowNoiseMissing(0.1, 0.31), ["Up to 0.1 Hz", "0.31 times", "Switch off automatic zeroing"]),
 ]
 

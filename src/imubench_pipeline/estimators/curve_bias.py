@@ -17,7 +17,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from imubench_pipeline.estimators.estimate import BROADBAND_TIME, CURVE, Estimate, Parameter
+from imubench_pipeline.estimators.estimate import CURVE, Estimate, Parameter
 from imubench_pipeline.estimators.intervals import compute_mixture_limits, is_as_good
 from imubench_pipeline.estimators.model_choice import Candidate
 from imubench_pipeline.estimators.posterior import Posterior
@@ -30,7 +30,6 @@ from imubench_pipeline.words.reasons import curves, estimates
 MAX_TAU_FRACTION = 1 / 9  # Maximum tau over the duration of the log
 _POINTS_PER_DECADE = 16  # Averaging times for the search of the lowest point
 _POINTS_BETWEEN_PEAKS = 49  # Averaging times between the peaks of several processes
-_MAX_DRAWS = 16_000  # Draws of a model that are evaluated at many averaging times
 _PEAK_SHAPE = float(evaluate_gauss_markov_shape(np.array([PEAK_TAU]), 1.0)[0])
 
 
@@ -53,11 +52,6 @@ class Models:
     def biases(self) -> Array:
         """B of each Gauss-Markov process, shape (d, g)."""
         return self.parameters[:, len(self.terms.linear) :]
-
-    def fewer(self) -> Models:
-        """Thin the draws to about `_MAX_DRAWS`."""
-        every = max(1, len(self.parameters) // _MAX_DRAWS)
-        return replace(self, parameters=self.parameters[::every], times=self.times[::every])
 
 
 def convert_noise_model(model: NoiseModel) -> Models:
@@ -175,14 +169,12 @@ def add_curve_figures(
 
     def select(candidate: Candidate) -> Models:
         posterior, terms = draws[candidate.terms], candidate.terms
-        models = Models(terms, posterior.parameters, posterior.times, candidate.weight)
-        # The highest point of several processes is searched at many tau.
-        return models.fewer() if terms.gauss_markov > 1 else models
+        return Models(terms, posterior.parameters, posterior.times, candidate.weight)
 
     model, longest = convert_noise_model(estimate.model), float(tau[-1])
     drawn = [select(candidate) for candidate in alike]
     if any(alike[0].terms.biases):
-        bias = _estimate_bias(model, drawn, longest, estimate)
+        bias = _estimate_bias(model, drawn, longest)
     else:
         having = [c for c in alike if is_as_good(c, alike[0]) and any(c.terms.biases)]
         every = [select(c) for c in wider if any(c.terms.biases)] + [select(c) for c in having]
@@ -190,29 +182,15 @@ def add_curve_figures(
     return replace(estimate, curve={"B_curve": bias} | estimate_lowest_point(model, drawn, tau))
 
 
-def _estimate_bias(
-    model: Models, drawn: Sequence[Models], longest: float, estimate: Estimate
-) -> Parameter:
+def _estimate_bias(model: Models, drawn: Sequence[Models], longest: float) -> Parameter:
     """Return the bias instability of a curve, with limits from draws."""
     biased = [models for models in drawn if any(models.terms.biases)]
     parts = [(compute_curve_bias(models, longest)[0], models.weight) for models in biased]
-    value, at = (float(of_one[0]) for of_one in compute_curve_bias(model, longest))
+    value = float(compute_curve_bias(model, longest)[0][0])
     lower, upper = _compute_limits(parts, value)
     if value == 0.0:
         return Parameter(None, "absent", estimates.ABSENT_BELOW, 0.0, upper)
-    reason = None
-    if model.terms.gauss_markov and at >= longest * (1.0 - 1e-9):
-        reason = curves.rises_to_end(longest)
-    elif model.terms.gauss_markov and at < PEAK_TAU * BROADBAND_TIME:
-        reason = curves.broadband_peak(at, BROADBAND_TIME)
-    else:
-        # The end of the search decides the amplitude of a process whose T_B ran into it.
-        times = [group.get("T_B") for group in (estimate.parameters, *estimate.further)]
-        bounds = [time.reason or "" for time in times if time and time.status == "at_bound"]
-        if not bounds:
-            return Parameter(value, "ok", None, lower, upper)
-        reason = curves.time_at_bound(bounds[0])
-    return Parameter(None, "not_identified", reason, lower, upper, fitted=value)
+    return Parameter(value, "ok", None, lower, upper)
 
 
 def _describe_weak_bias(drawn: Sequence[Models], as_good: bool, longest: float) -> Parameter:
@@ -244,7 +222,7 @@ def estimate_lowest_point(
 ) -> dict[str, Parameter]:
     """Return ``sigma_min`` and ``tau_min`` of a model, with limits if draws of models are given."""
     (sigma,), (time,), (inside,) = (part.tolist() for part in find_lowest_point(model, tau))
-    points = [find_lowest_point(models.fewer(), tau) for models in drawn]
+    points = [find_lowest_point(models, tau) for models in drawn]
     weights = [models.weight for models in drawn]
     limits: list[tuple[float | None, float | None]] = [(None, None), (None, None)]
     if drawn:

@@ -38,8 +38,7 @@ def add_fitted_limits(
     """
     if not likelihood.candidates or likelihood.band is None:
         return curve
-    chosen = likelihood.candidates[0]
-    rate = curve.rate
+    chosen, rate = likelihood.candidates[0], curve.rate
     sinusoids = [line.term for line in likelihood.lines if line.narrow]
     model = replace(make_noise_model(chosen.maximum), sinusoids=sinusoids)
 
@@ -58,10 +57,6 @@ def add_fitted_limits(
     doubtful = np.full(len(curve.tau), chosen.goodness.verdict != "explained")
     if likelihood.band.highest < 0.5 * rate * (1.0 - 1e-9):
         doubtful |= curve.tau * likelihood.band.highest < _MIN_TAU_TIMES_BAND
-    filtered = likelihood.low_pass
-    if filtered is not None and filtered.behind is not None:
-        # The model has the noise before the sensor's low-pass.
-        doubtful |= curve.tau * (filtered.frequency.in_model or np.inf) < _MIN_TAU_TIMES_BAND
     fitted = ~doubtful | (degrees.edf < curve.edf)
     return replace(
         curve,

@@ -7,13 +7,12 @@ d_i log S_k d_j log S_k, nu_k ordinates in bin k of density S_k (P. Whittle, Ark
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from imubench_pipeline.estimators.estimate import FAMILY, Estimate, Parameter
-from imubench_pipeline.estimators.frame import FitSelection
 from imubench_pipeline.estimators.model_choice import Candidate
 from imubench_pipeline.estimators.posterior import Posterior
 from imubench_pipeline.estimators.spectrum import SINGLE, WIDTH, Spectrum
@@ -25,8 +24,7 @@ from imubench_pipeline.words.reasons import estimates as texts
 TARGET_RELATIVE_ERROR = 0.1
 """Relative standard deviation at which `find_durations_needed` calls a parameter known."""
 
-_MIN_DURATION_RATIO, _MAX_DURATION_RATIO = 1e-4, 1e4
-_DURATIONS_PER_DECADE = 6
+_DURATION_RATIOS = np.geomspace(1e-4, 1e4, 17)  # Durations tried over the duration of the log
 
 
 def compute_relative_bounds(whittle: Whittle, maximum: Maximum) -> Array:
@@ -120,67 +118,30 @@ def find_durations_needed(
     In the order of `compute_relative_bounds`; None where 10,000 times the duration does not
     suffice. Rate and highest frequency used are in Hz.
     """
-    lengths = np.geomspace(
-        duration * _MIN_DURATION_RATIO,
-        duration * _MAX_DURATION_RATIO,
-        1 + round(math.log10(_MAX_DURATION_RATIO / _MIN_DURATION_RATIO) * _DURATIONS_PER_DECADE),
-    )
+    lengths = duration * _DURATION_RATIOS
     lengths = lengths[lengths * 2.0 * min(highest, 0.5 * rate) > 4.0 * maximum.terms.parameters]
-    excesses: dict[int, Array] = {}
-
-    def excess(place: int) -> Array:
-        if place not in excesses:
-            errors = _compute_relative_errors(
-                make_ideal_spectrum(rate, float(lengths[place]), highest), maximum
-            )
-            excesses[place] = np.log(errors / TARGET_RELATIVE_ERROR)
-        return excesses[place]
-
+    errors = [
+        _compute_relative_errors(make_ideal_spectrum(rate, length, highest), maximum)
+        for length in lengths.tolist()
+    ]
     return [
-        _find_crossing(np.log(lengths), excess, excesses, number)
-        for number in range(len(list_parameter_names(maximum.terms)))
+        _find_crossing(np.log(lengths), np.log(column / TARGET_RELATIVE_ERROR))
+        for column in np.array(errors).T
     ]
 
 
-def _find_crossing(
-    log_lengths: Array, excess: Callable[[int], Array], excesses: dict[int, Array], number: int
-) -> float | None:
-    """Return the length where ``excess`` of a parameter, known at ``excesses``, falls to 0."""
-    low, high = -1, len(log_lengths)
-    for place, values in excesses.items():
-        if values[number] > 0.0:
-            low = max(low, place)
-        else:
-            high = min(high, place)
-    steps = 0
-    while high - low > 1:
-        place = (low + high) // 2
-        left = excesses[low][number] if low >= 0 else np.inf
-        right = excesses[high][number] if high < len(log_lengths) else -np.inf
-        if steps % 3 < 2 and (np.isfinite(left) or np.isfinite(right)):
-            # Interpolate, or extrapolate with error ~ length^(-1/2) where one end is known.
-            if not np.isfinite(left):
-                where = log_lengths[high] + 2.0 * right
-            elif not np.isfinite(right):
-                where = log_lengths[low] + 2.0 * left
-            else:
-                part = left / (left - right)
-                where = log_lengths[low] + part * (log_lengths[high] - log_lengths[low])
-            guess = int(np.searchsorted(log_lengths, where))
-            # First the index before the crossing, then the one after it.
-            place = min(max(guess - (low < guess - 1), low + 1), high - 1)
-        if excess(place)[number] > 0.0:
-            low = place
-        else:
-            high = place
-        steps += 1
-    if high == len(log_lengths):
+def _find_crossing(log_lengths: Array, excess: Array) -> float | None:
+    """Return the length from which an excess stays at or below 0, interpolated; None: never."""
+    (above,) = np.nonzero(excess > 0.0)
+    if not len(above):
+        return float(np.exp(log_lengths[0]))
+    low = int(above[-1])
+    if low == len(excess) - 1:
         return None
-    if low < 0 or not np.isfinite(excesses[low][number]):
-        return float(np.exp(log_lengths[high]))
-    left, right = excesses[low][number], excesses[high][number]
-    part = left / (left - right)
-    return float(np.exp(log_lengths[low] + part * (log_lengths[high] - log_lengths[low])))
+    if not np.isfinite(excess[low]):
+        return float(np.exp(log_lengths[low + 1]))
+    part = excess[low] / (excess[low] - excess[low + 1])
+    return float(np.exp(log_lengths[low] + part * (log_lengths[low + 1] - log_lengths[low])))
 
 
 def _compute_relative_errors(spectrum: Spectrum, maximum: Maximum) -> Array:
@@ -223,24 +184,16 @@ def add_upper_limits(
         if not having:
             continue
         upper = max(float(np.quantile(_draws_of(name, terms, draws), 0.975)) for terms in having)
-        good = []
-        for other in alike[1:]:
-            powers = dict(
-                zip(list_parameter_names(other.terms), other.maximum.powers, strict=False)
-            )
-            if is_as_good(other, alike[0]) and powers.get(name, 0.0) > 0.0:
-                good.append(other)
+        good = [
+            other
+            for other in alike[1:]
+            if is_as_good(other, alike[0]) and name in list_parameter_names(other.terms)
+        ]
         if not good:
             parameters[name] = Parameter(None, "absent", texts.ABSENT_BELOW, 0.0, upper)
             continue
         reason = texts.models_alike([c.terms.name for c in good], alike[0].terms.name)
         parameters[name] = Parameter(None, "not_identified", reason, 0.0, upper)
-        timed = [c.terms for c in good if "T_B" in list_parameter_names(c.terms)]
-        if name == "B" and timed:
-            drawn = [_draws_of("T_B", terms, draws) for terms in timed]
-            low = min(float(np.quantile(times, 0.025)) for times in drawn)
-            high = max(float(np.quantile(times, 0.975)) for times in drawn)
-            parameters["T_B"] = Parameter(None, "not_identified", reason, low, high)
     return replace(estimate, parameters=parameters)
 
 
@@ -259,7 +212,7 @@ def describe(
     chosen: Candidate,
     alike: Sequence[Candidate],
     draws: dict[Terms, Posterior],
-    frame: FitSelection,
+    highest: float,
 ) -> Estimate:
     """Describe a fit: values with intervals, what is not identified, and what is absent.
 
@@ -270,10 +223,8 @@ def describe(
     maximum = chosen.maximum
     names = list_parameter_names(maximum.terms)
     values = [*np.sqrt(maximum.powers), *maximum.times] + [maximum.ramp] * maximum.terms.ramp
-    if "N" in names:
-        values[names.index("N")] *= math.sqrt(frame.folding)
     needed = find_durations_needed(
-        maximum, whittle.spectrum.rate, float(whittle.spectrum.duration), frame.band.highest
+        maximum, whittle.spectrum.rate, float(whittle.spectrum.duration), highest
     )
     described: dict[str, Parameter] = {}
     for i, (name, value) in enumerate(zip(names, values, strict=True)):
@@ -302,12 +253,11 @@ def describe(
         if f"B{number}" in described and described[f"B{number}"].status == "absent":
             bias = described[f"B{number}"]
             described[f"T_B{number}"] = replace(bias, lower=None, upper=None, duration_needed=None)
-    absent = Parameter(None, "absent", texts.ABSENT)
-    parameters = {name: described.get(name, absent) for name in FAMILY}
+    parameters = dict.fromkeys(FAMILY, Parameter(None, "absent", texts.ABSENT))
+    parameters |= {name: described[name] for name in FAMILY if name in described}
     if "B" in described and "T_B" not in described:
         parameters["T_B"] = Parameter(None, "absent", texts.FLICKER_WITHOUT_TIME)
-    second = "B 2" in described
-    further = [{"B": described["B 2"], "T_B": described["T_B 2"]}] if second else []
+    further = [{"B": described["B 2"], "T_B": described["T_B 2"]}] if "B 2" in described else []
     return Estimate(method, parameters, further)
 
 

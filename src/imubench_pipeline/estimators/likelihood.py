@@ -17,8 +17,7 @@ from imubench_pipeline.allan import of_blocks
 from imubench_pipeline.allan.phase import Span, count_gaps, list_spans
 from imubench_pipeline.estimators import least_squares
 from imubench_pipeline.estimators.curve_bias import add_curve_figures, make_averaging_times
-from imubench_pipeline.estimators.cutoff import Cutoff, select_joint_models
-from imubench_pipeline.estimators.doubts import add_doubts, describe_drift_alternative
+from imubench_pipeline.estimators.cutoff import Cutoff
 from imubench_pipeline.estimators.estimate import (
     BROADBAND_TIME,
     CURVE,
@@ -34,7 +33,6 @@ from imubench_pipeline.estimators.frame import (
     MIN_BINS,
     Band,
     FitSelection,
-    estimate_sensor_density,
     select_for_fit,
 )
 from imubench_pipeline.estimators.intervals import add_upper_limits, describe
@@ -59,20 +57,19 @@ from imubench_pipeline.estimators.posterior import (
 )
 from imubench_pipeline.estimators.spectrum import Spectrum, compute_spectra
 from imubench_pipeline.estimators.white_level import (
-    WhiteStretch,
     count_fast_processes,
-    describe_white_level,
-    find_white_stretch,
     merge_fast_draws,
     merge_fast_processes,
 )
 from imubench_pipeline.estimators.whittle import Terms, Whittle, make_noise_model
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.typing import Array
+from imubench_pipeline.words.reasons import estimates as reasons
 from imubench_pipeline.words.reasons import spectra as texts
 
-_FLEXIBLE_TERMS = Terms("NFK", 1)
-"""Model for the joint fit of the cut-off where no candidate explains the spectrum."""
+_DELTA_BIC_AGAINST_PAPERS = 6.0
+"""BIC of the papers' model over the best one, above which its bias instability and random walk are
+doubtful: in `silent_errors.py` without it, 3 of 203 logs have a silently wrong K."""
 
 _MAX_REMAINING_MEMORY = 1e-3
 _MAX_ROUNDS = 12
@@ -94,7 +91,6 @@ class Likelihood:
     fitted: Array
     """(b,): density of the chosen model in each bin, its ramp included; NaN without a fit."""
     frame: FitSelection
-    stretch: WhiteStretch | None = None  # of the Allan deviation, with the slope -1/2
 
     @property
     def low_pass(self) -> Cutoff | None:
@@ -147,16 +143,12 @@ def fit(
     present = np.isfinite(values)
     if not present.any():
         raise ValueError(f"none of the {len(values)} samples is present")
-    holes = not bool(present.all())
-    gaps = count_gaps([values])
-    curve = of_blocks([values], len(values), rate, holes=holes, gaps=gaps, segments=segments)
     return fit_blocks(
         lambda: [values],
         len(values),
         rate,
         segments=segments,
-        holes=holes,
-        stretch=find_white_stretch(curve),
+        holes=not bool(present.all()),
         band=band,
         bandwidth=bandwidth,
         resolution=resolution,
@@ -170,7 +162,6 @@ def fit_blocks(
     rate: float,
     *,
     holes: bool,
-    stretch: WhiteStretch | None,
     segments: Sequence[Span] | None = None,
     band: float | None = None,
     bandwidth: float | None = None,
@@ -184,14 +175,13 @@ def fit_blocks(
     samples present only.
 
     ``blocks`` returns the log in order, in SI, at every call, NaN where a sample is missing;
-    ``samples`` is L, the length of all blocks together; with ``holes``, samples may be missing;
-    ``stretch`` is the stretch of the Allan deviation with the slope -1/2, whose white noise is N.
+    ``samples`` is L, the length of all blocks together; with ``holes``, samples may be missing.
     """
     spans = list_spans(segments, samples)
     select = partial(select_for_fit, band=band, bandwidth=bandwidth, resolution=resolution)
     if not holes:
         spectrum, lines = compute_spectra(blocks(), samples, rate, spans)
-        return fit_spectrum(spectrum, select(spectrum, lines), rng=rng, stretch=stretch)
+        return fit_spectrum(spectrum, select(spectrum, lines), rng=rng)
     means = average_blocks(blocks(), spans)
     parts = split_at_gaps(means, spans)
     if not parts:
@@ -218,15 +208,11 @@ def fit_blocks(
         if number < rounds:
             candidates = compare_models(frame.whittle(spectrum), quantization=False)
             model = make_noise_model(candidates[0].maximum)
-    return fit_spectrum(spectrum, frame, rng=rng, stretch=stretch)
+    return fit_spectrum(spectrum, frame, rng=rng)
 
 
 def fit_spectrum(
-    spectrum: Spectrum,
-    frame: FitSelection,
-    *,
-    rng: np.random.Generator,
-    stretch: WhiteStretch | None,
+    spectrum: Spectrum, frame: FitSelection, *, rng: np.random.Generator
 ) -> Likelihood:
     """Estimate the noise parameters from the selected bins of a spectrum (see `fit`)."""
     if frame.used.sum() < MIN_BINS:
@@ -239,44 +225,53 @@ def fit_spectrum(
         return Likelihood(
             both, (), frame.lines, None, spectrum, frame.clear, frame.used, nan, frame
         )
-    frame, whittle, candidates = fit_models(spectrum, frame)
+    whittle = frame.whittle(spectrum)
+    candidates = compare_models(whittle, quantization=frame.shows_quantization(spectrum.rate))
     chosen = candidates[0]
     # A ramp is no noise: it is selected or not, and a possible one does not widen intervals.
     alike = [chosen] + [
         c for c in candidates[1:] if c.akaike_weight >= MIN_AKAIKE_WEIGHT and not c.terms.ramp
     ]
-    number = count_fast_processes(chosen.maximum, frame.folding, stretch)
-    wider = [c for c in candidates if c.terms in _with_one_more(chosen.terms, number)]
+    fast = count_fast_processes(chosen.maximum, spectrum.rate)
+    wider = [c for c in candidates if c.terms in _with_one_more(chosen.terms, fast)]
     papers = next(c for c in candidates if c.terms == PAPERS_MODEL)
     drawn = [c for c in candidates if c in alike or c in wider or c is papers]
     posteriors = {c.terms: sample(whittle, c.maximum, rng) for c in drawn}
-    in_the_log = {
-        terms: frame.in_the_log(posterior, terms, rng) for terms, posterior in posteriors.items()
-    }
-    of_data = _InTheLog(whittle, frame, in_the_log, stretch, alike, wider)
-    estimate = of_data.estimate("likelihood")
-    sensor = estimate_sensor_density(frame, chosen.maximum, posteriors[chosen.terms], spectrum, rng)
-    if sensor is not None:
-        estimate = replace(estimate, parameters={**estimate.parameters, SENSOR: sensor})
-    of_papers = _InTheLog(whittle, frame, in_the_log, stretch, [papers], [])
+    of_data = _InTheLog(whittle, frame, posteriors, alike, wider)
+    estimate, low_pass = of_data.estimate("likelihood"), frame.low_pass
+    if low_pass is not None and low_pass.N is not None:
+        estimate = replace(estimate, parameters={**estimate.parameters, SENSOR: low_pass.N})
+    of_papers = _InTheLog(whittle, frame, posteriors, [papers], [])
     gauss_markov = of_papers.estimate("likelihood_gm")
-    fitted = (
-        frame.likelihood_of_all_bins(spectrum).density(chosen.maximum)
-        + chosen.maximum.ramp**2 * spectrum.ramp
-    )
-    drift = describe_drift_alternative(whittle, chosen.maximum)
-    estimate, gauss_markov = add_doubts(estimate, gauss_markov, frame, candidates, papers, drift)
+    noise = frame.whittle(spectrum, all_bins=True).density(chosen.maximum)
+    fitted = noise * frame.gain + chosen.maximum.ramp**2 * spectrum.ramp
+    doubt = None
+    if papers.bic > chosen.bic + _DELTA_BIC_AGAINST_PAPERS:
+        names = chosen.terms.name, papers.terms.name
+        doubt = reasons.model_disfavoured(*names, papers.bic - chosen.bic)
     sinusoids = select_sinusoids(frame.lines)
     estimate = replace(estimate, lines=sinusoids, draws=of_data.draw_jointly())
+    parameters = {name: gauss_markov.parameters[name] for name in PARAMETERS}
     gauss_markov = replace(
         gauss_markov,
-        parameters={name: gauss_markov.parameters[name] for name in PARAMETERS},
+        parameters=_cast_doubt(parameters, doubt),
+        curve=_cast_doubt(gauss_markov.curve, doubt),
         lines=sinusoids,
         draws=of_papers.draw_jointly(),
     )
-    lines, band, clear, used = frame.lines, frame.band, frame.clear, frame.used
-    both = (estimate, gauss_markov)
-    return Likelihood(both, candidates, lines, band, spectrum, clear, used, fitted, frame, stretch)
+    both, lines, band = (estimate, gauss_markov), frame.lines, frame.band
+    clear, used = frame.clear, frame.used
+    return Likelihood(both, candidates, lines, band, spectrum, clear, used, fitted, frame)
+
+
+def _cast_doubt(group: Mapping[str, Parameter], reason: str | None) -> dict[str, Parameter]:
+    """Return parameters, all but N of status ``ok`` made doubtful if there is a reason."""
+    return {
+        name: replace(each, status="doubtful", reason=reason)
+        if reason is not None and each.status == "ok" and name != "N"
+        else each
+        for name, each in group.items()
+    }
 
 
 class _InTheLog:
@@ -287,17 +282,11 @@ class _InTheLog:
         whittle: Whittle,
         frame: FitSelection,
         posteriors: Mapping[Terms, Posterior],
-        stretch: WhiteStretch | None,
         alike: Sequence[Candidate],
         wider: Sequence[Candidate],
     ) -> None:
-        self._whittle, self._frame, self._stretch = whittle, frame, stretch
-        self._fastest = alike[0].maximum.times
-        self._number = count_fast_processes(alike[0].maximum, frame.folding, stretch)
-        self._level = 1.0  # of the curve over N with all of those processes
-        if stretch is not None and np.any(self._fastest < BROADBAND_TIME):
-            merged = merge_fast_processes(alike[0].maximum, self._number, frame.folding)
-            self._level = stretch.level / (merged.parameter("N") * math.sqrt(frame.folding))
+        self._whittle, self._highest = whittle, frame.band.highest
+        self._number = count_fast_processes(alike[0].maximum, whittle.spectrum.rate)
         self.draws: dict[Terms, Posterior] = {}
         self._posteriors = posteriors
         self.alike = list(self._merged(alike))
@@ -307,78 +296,33 @@ class _InTheLog:
         """Yield each model once, without the processes that are part of N, and store its draws."""
         merged: set[Terms] = set()
         for candidate in candidates:
-            terms, times = candidate.terms, candidate.maximum.times
-            fast = int(np.sum(times < BROADBAND_TIME))
-            number, level = min(self._number, fast), self._level if fast else 1.0
-            maximum = merge_fast_processes(candidate.maximum, number, self._frame.folding, level)
+            number = min(self._number, int(np.sum(candidate.maximum.times < BROADBAND_TIME)))
+            maximum = merge_fast_processes(candidate.maximum, number)
             if maximum.terms in merged:
                 continue
             merged.add(maximum.terms)
             if maximum.terms not in self.draws:
-                posterior = self._posteriors[terms]
-                self.draws[maximum.terms] = merge_fast_draws(posterior, terms, number, level)
+                posterior = self._posteriors[candidate.terms]
+                self.draws[maximum.terms] = merge_fast_draws(posterior, candidate.terms, number)
             yield replace(candidate, maximum=maximum)
 
     def estimate(self, method: str) -> Estimate:
         """Return the parameters, the figures of the curve, and their intervals."""
         chosen, spectrum = self.alike[0], self._whittle.spectrum
-        estimate = describe(method, self._whittle, chosen, self.alike, self.draws, self._frame)
+        estimate = describe(method, self._whittle, chosen, self.alike, self.draws, self._highest)
         estimate = add_upper_limits(estimate, self.alike, self.wider, self.draws)
         tau = make_averaging_times(spectrum.rate, float(spectrum.length.max()))
-        estimate = add_curve_figures(estimate, self.alike, self.wider, self.draws, tau)
-        N, counted = estimate.parameters["N"], self._fastest[: self._number]
-        reason = N.reason or describe_white_level(self._stretch, counted.tolist())
-        return replace(estimate, parameters={**estimate.parameters, "N": replace(N, reason=reason)})
+        return add_curve_figures(estimate, self.alike, self.wider, self.draws, tau)
 
     def draw_jointly(self) -> JointDraws:
         """Return draws over all models that the log does not rule out."""
-        bins = len(self._whittle.spectrum.density)
-        # The weight of a single model, which may be nearly 0, does not matter.
-        alone = len(self.alike) == 1
+        bins, longest = len(self._whittle.spectrum.density), self._whittle.longest
+        # The weight of a single model, which may be 0, does not matter.
         parts = [
-            (c.terms, self.draws[c.terms], 1.0 if alone else compute_draw_weight(c, bins))
+            (c.terms, self.draws[c.terms], max(compute_draw_weight(c, bins), 1e-300))
             for c in self.alike
         ]
-        return draw_jointly(parts, self._whittle.longest)
-
-
-def fit_models(
-    spectrum: Spectrum, frame: FitSelection
-) -> tuple[FitSelection, Whittle, list[Candidate]]:
-    """Fit all models to a selection of bins, and to another one where it explains more.
-
-    If noise up to Nyquist, behind the filter found, is not explained: with processes of a few
-    sampling intervals; then without the frequencies that bend. Returned are the selection, its
-    likelihood and the models tried, the best first.
-    """
-
-    def fitted(tried: FitSelection) -> tuple[FitSelection, Whittle, list[Candidate]]:
-        whittle = tried.whittle(spectrum)
-        quantization = tried.shows_quantization(spectrum.rate)
-        candidates = compare_models(whittle, quantization=quantization)
-        return tried, whittle, tried.rescore(candidates)
-
-    first = fitted(frame)
-    if frame.low_pass is None:
-        return first
-    if not _explains(first):
-        flexible = [candidate for candidate in first[2] if candidate.terms == _FLEXIBLE_TERMS]
-        first = fitted(frame.refine(spectrum, flexible))
-    if _explains(first) and first[0].needs_cutoff_per_model(spectrum, first[2][0].maximum.times):
-        first = fitted(first[0].refine(spectrum, select_joint_models(first[2], PAPERS_MODEL)))
-    if _explains(first):
-        return first
-    faster = fitted(frame.with_fast_processes(spectrum.rate))
-    if _explains(faster):
-        return faster
-    limited = frame.limited(spectrum)
-    if limited.band.highest >= frame.band.highest or limited.used.sum() < MIN_BINS:
-        return first
-    return fitted(limited)
-
-
-def _explains(fitted: tuple[FitSelection, Whittle, list[Candidate]]) -> bool:
-    return fitted[2][0].goodness.verdict == "explained"
+        return draw_jointly(parts, longest)
 
 
 def _with_one_more(terms: Terms, number: int = 0) -> list[Terms]:

@@ -15,7 +15,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
 from typing import Literal
 
 import numpy as np
@@ -28,119 +27,65 @@ from imubench_pipeline.typing import Array
 Kind = Literal["analogue", "bilinear", "boxcar"]
 
 BOXCAR_CUTOFF_LENGTH = 0.442946  # Cut-off of a boxcar times its length, where sinc^2 is one half
-_FLICKER_ALIASES = 3  # On each side; the filter leaves little of the others
-_MIN_ALIASES = 2  # On each side, in addition to those up to four times the cut-off
+_ALIASES = 3  # Of flicker noise on each side; the filter leaves little of the others
 _GRID_SIZE = 512  # Frequencies of the numerical integral over G
-
-
-class Frequencies:
-    """Frequencies f up to Nyquist (Hz) of samples at a rate (Hz), and cached functions of them."""
-
-    def __init__(self, frequency: ArrayLike, rate: float) -> None:
-        self.f = np.asarray(frequency, dtype=np.float64)
-        self.rate = rate
-        self._folds: dict[int, Array] = {}
-
-    @cached_property
-    def cosine(self) -> Array:
-        """cos(w), w = 2 pi f / rate."""
-        return np.asarray(np.cos(2.0 * np.pi * self.f / self.rate))
-
-    @cached_property
-    def difference_gain(self) -> Array:
-        """2 - 2 cos(w), the power gain of first differences."""
-        return np.asarray(2.0 - 2.0 * self.cosine)
-
-    @cached_property
-    def end_gain(self) -> Array:
-        """cos^2(w / 2), the gain of the ends of a DCT-II."""
-        return np.asarray(np.cos(2.0 * np.pi * self.f / self.rate / 2.0) ** 2)
-
-    @cached_property
-    def tangent(self) -> Array:
-        """tan(w / 2), clipped below Nyquist, where a bilinear filter passes nothing."""
-        return np.asarray(np.tan(np.minimum(np.pi * self.f / self.rate, 0.5 * np.pi - 1e-7)))
-
-    @cached_property
-    def half_angle(self) -> tuple[Array, Array]:
-        """Half of w, above 0, and its sine."""
-        half = np.pi * np.maximum(self.f, 1e-9 * self.rate) / self.rate
-        return half, np.sin(half)
-
-    @cached_property
-    def nearest_aliases(self) -> tuple[Array, Array, Array]:
-        """Absolute frequencies of the nearest aliases, shape (7, ...), Hz and rad/s; sampled w.
-
-        The sampled frequency is sqrt(2 - 2 cos w) times the rate, the counterpart of 2 pi f.
-        """
-        distance = np.abs(self.aliases(_FLICKER_ALIASES))
-        sampled = 2.0 * self.rate * np.sin(np.pi * self.f / self.rate)
-        return distance, 2.0 * np.pi * distance, sampled
-
-    def aliases(self, number: int) -> Array:
-        """Return the frequencies that alias onto these, ``number`` on each side, shape (k, ...)."""
-        if number not in self._folds:
-            k = np.arange(-number, number + 1).reshape(-1, *[1] * self.f.ndim)
-            self._folds[number] = self.f + k * self.rate
-        return self._folds[number]
-
-
-@lru_cache(maxsize=4)
-def _make_integration_grid(rate: float) -> Frequencies:
-    return Frequencies((np.arange(_GRID_SIZE) + 0.5) / _GRID_SIZE * 0.5 * rate, rate)
 
 
 @dataclass(frozen=True)
 class Filter:
-    """A low-pass filter; results have the shape of the frequencies."""
+    """A low-pass filter; results have the shape of the frequencies (Hz, 0 to half the rate)."""
 
     kind: Kind
     order: int  # n of the Butterworth filter; 1 for the boxcar
     cutoff: float  # f_c, Hz
 
-    def white(self, at: Frequencies) -> Array:
-        """Return G, the density of white noise of N = 1 behind the filter, sampled."""
+    def white(self, frequency: ArrayLike, rate: float) -> Array:
+        """Return G, the density of white noise of N = 1 behind the filter, sampled at a rate, Hz.
+
+        For the analogue filter the sum over all aliases is exact: 1 / (1 + x^(2 n)) has the poles
+        p_j with p_j^(2 n) = -1, and sum_k 1 / (x + k / r - p_j) = pi r cot(pi r (x - p_j)) with
+        x = f / f_c and r = f_c / f_s.
+        """
+        f = np.asarray(frequency, dtype=np.float64)
         if self.kind == "bilinear":
-            return self._evaluate_bilinear(at)
+            return self.slow(f, rate)
         if self.kind == "boxcar":
-            length = BOXCAR_CUTOFF_LENGTH / self.cutoff * at.rate  # in samples
+            length = BOXCAR_CUTOFF_LENGTH / self.cutoff * rate  # in samples
             whole = math.ceil(length)
             # Split 1 - k / length into 1 - k / whole and a constant: Fejer and Dirichlet kernels.
-            half, sine = at.half_angle
-            fejer = (np.sin(whole * half) / sine) ** 2 / whole
-            dirichlet = np.sin((2 * whole - 1) * half) / sine
+            half = np.pi * np.maximum(f, 1e-9 * rate) / rate
+            fejer = (np.sin(whole * half) / np.sin(half)) ** 2 / whole
+            dirichlet = np.sin((2 * whole - 1) * half) / np.sin(half)
             part = whole / length
             total = part * fejer + (1.0 - part) * dirichlet
             return np.asarray(np.maximum(total, 1e-12) / length)
-        if self.order > 1:
-            return self._sum_aliases(at, self._evaluate_aliases(at))
-        # The spectrum of a sampled Gauss-Markov process, the sum over the aliases for n = 1:
-        # (h / 2) sinh(h) / (cosh(h) - cos w). Both are divided by e^h, which may overflow.
-        h = 2.0 * np.pi * self.cutoff / at.rate
-        decay = math.exp(-h)
-        sinh, cosh = 0.5 * -math.expm1(-2.0 * h), 0.5 * (1.0 + decay**2)
-        return np.asarray(0.5 * h * sinh / (cosh - decay * at.cosine))
+        ratio, total = self.cutoff / rate, np.zeros(f.shape)
+        for j in range(self.order):
+            pole = np.exp(0.5j * np.pi * (2 * j + 1) / self.order)
+            total -= (pole / np.tan(np.pi * (f / rate - pole * ratio))).real
+        return np.asarray(np.maximum(np.pi * ratio / self.order * total, 1e-12))
 
-    def slow(self, at: Frequencies) -> Array:
+    def slow(self, frequency: ArrayLike, rate: float) -> Array:
         """Return the power gain for noise that is slow against the rate, without aliases."""
-        if self.kind == "bilinear":
-            return self._evaluate_bilinear(at)
-        return self._evaluate_power(at.f)
+        f = np.asarray(frequency, dtype=np.float64)
+        if self.kind == "boxcar":
+            return np.asarray(np.sinc(f * BOXCAR_CUTOFF_LENGTH / self.cutoff) ** 2)
+        if self.kind == "analogue":
+            return LowPass(self.cutoff, self.order).power(f)
+        tangent = np.tan(np.minimum(np.pi * f / rate, 0.5 * np.pi - 1e-7))
+        warped = tangent / math.tan(math.pi * min(self.cutoff / rate, 0.4999))
+        logarithm = np.minimum(2.0 * self.order * np.log(np.maximum(warped, 1e-30)), 600.0)
+        return np.asarray(1.0 / (1.0 + np.exp(logarithm)))
 
-    def gains(self, at: Frequencies) -> tuple[Array, Array, Array]:
-        """Return the gains for white noise, G, flicker noise with aliases, and slow noise."""
+    def flicker(self, frequency: Array, rate: float) -> Array:
+        """Return the gain for flicker noise with its nearest aliases, above 0 Hz."""
         if self.kind == "bilinear":
-            same = self._evaluate_bilinear(at)
-            return same, same, same
-        distance, turned, sampled = at.nearest_aliases
-        if self.kind == "analogue" and self.order > 1:
-            powers = self._evaluate_aliases(at)
-            further = len(powers) // 2 - _FLICKER_ALIASES
-            white, nearest = self._sum_aliases(at, powers), powers[further : len(powers) - further]
-        else:
-            white, nearest = self.white(at), self._evaluate_power(distance)
-        flicker = np.asarray(sampled * (nearest / turned).sum(axis=0))
-        return white, flicker, nearest[_FLICKER_ALIASES]
+            return self.slow(frequency, rate)
+        distance = np.abs(frequency + rate * np.arange(-_ALIASES, _ALIASES + 1)[:, None])
+        # The density of sampled flicker noise is B^2 / (2 rate sin(pi f / rate)).
+        sampled = 2.0 * rate * np.sin(np.pi * frequency / rate)
+        total = (self.slow(distance, rate) / (2.0 * np.pi * distance)).sum(axis=0)
+        return np.asarray(sampled * total)
 
     def half_power(self, rate: float) -> float:
         """Return the frequency at which the density of filtered white noise is halved.
@@ -150,51 +95,26 @@ class Filter:
         """
         if self.kind != "boxcar":
             return self.cutoff
+        half = 0.5 * float(self.white(0.0, rate))
+        ends = 0.5 * self.cutoff, 0.5 * rate
+        return float(brentq(lambda f: float(self.white(f, rate)) - half, *ends))
 
-        def white(f: float) -> float:
-            return float(self.white(Frequencies(f, rate)))
-
-        half = 0.5 * white(0.0)
-        return float(brentq(lambda f: white(f) - half, 0.5 * self.cutoff, 0.5 * rate))
-
-    def leakage(self, at: Frequencies, length: ArrayLike) -> Array:
+    def leakage(self, frequency: ArrayLike, rate: float, length: ArrayLike) -> Array:
         """Return the spectral leakage of the DCT-II of filtered white noise, as a density.
 
         The even continuation of a smooth signal has discontinuous slopes at its ends. They add the
         density (4 V T / n) cos^2(w/2) / (2 - 2 cos w)^2, V the variance of first differences.
         ``length`` is the duration of the transform at each frequency, s.
         """
-        rate, grid = at.rate, _make_integration_grid(at.rate)
-        variance = float(np.mean(self.white(grid) * grid.difference_gain)) * rate
-        ends = 4.0 * variance / (np.asarray(length) * rate) / rate * at.end_gain
+        grid = (np.arange(_GRID_SIZE) + 0.5) / _GRID_SIZE * 0.5 * rate
+        variance = float(np.mean(self.white(grid, rate) * _difference_gain(grid, rate))) * rate
+        f = np.asarray(frequency, dtype=np.float64)
+        ends = 4.0 * variance / (np.asarray(length) * rate) / rate * np.cos(np.pi * f / rate) ** 2
         # Where the filter passes, the second differences cancel the terms of the ends.
-        bent = 1.0 - np.minimum(self.slow(at), 1.0)
-        return np.asarray(ends * bent**2 / np.maximum(at.difference_gain, 1e-12) ** 2)
+        bent = 1.0 - np.minimum(self.slow(f, rate), 1.0)
+        return np.asarray(ends * bent**2 / np.maximum(_difference_gain(f, rate), 1e-12) ** 2)
 
-    def _evaluate_power(self, f: Array) -> Array:
-        """Return the power gain at frequencies, before the sampling."""
-        if self.kind == "boxcar":
-            return np.asarray(np.sinc(f * BOXCAR_CUTOFF_LENGTH / self.cutoff) ** 2)
-        return LowPass(self.cutoff, self.order).power(f)
 
-    def _evaluate_aliases(self, at: Frequencies) -> Array:
-        further = math.ceil(4.0 * self.cutoff / at.rate)
-        return self._evaluate_power(at.aliases(_MIN_ALIASES + further))
-
-    def _sum_aliases(self, at: Frequencies, powers: Array) -> Array:
-        """Return the sum over all aliases, from the powers of the nearest, shape (k, ...)."""
-        total = powers.sum(axis=0)
-        # Further aliases: the integral of (f / f_c)^(-2 n) on each side, with the next term of the
-        # Euler-Maclaurin formula.
-        steep = 2 * self.order
-        for side in (at.f, -at.f):
-            end = 0.5 * len(powers) + side / at.rate
-            power = math.prod([end] * (steep - 2), start=end)
-            rest = (self.cutoff / at.rate) ** steep / power / (steep - 1)
-            total += rest * (1.0 - steep * (steep - 1) / 24.0 / end**2)
-        return np.asarray(total)
-
-    def _evaluate_bilinear(self, at: Frequencies) -> Array:
-        warped = at.tangent / math.tan(math.pi * min(self.cutoff / at.rate, 0.4999))
-        logarithm = np.minimum(2.0 * self.order * np.log(np.maximum(warped, 1e-30)), 600.0)
-        return np.asarray(1.0 / (1.0 + np.exp(logarithm)))
+def _difference_gain(frequency: Array, rate: float) -> Array:
+    """Return 2 - 2 cos(w), w = 2 pi f / rate, the power gain of first differences."""
+    return np.asarray(2.0 - 2.0 * np.cos(2.0 * np.pi * frequency / rate))

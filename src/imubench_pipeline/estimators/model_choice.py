@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -13,7 +12,6 @@ from scipy.special import erfc, polygamma, psi
 from imubench_pipeline.estimators.whittle import Maximum, Terms, Whittle
 from imubench_pipeline.model.states import GoodnessVerdict
 from imubench_pipeline.typing import Array
-from imubench_pipeline.words.reasons import estimates as texts
 from imubench_pipeline.words.reasons import spectra
 
 MIN_FIT_CHANCE = 1e-3  # Probability below which a fit is rejected
@@ -141,16 +139,23 @@ def compare_models(whittle: Whittle, *, quantization: bool) -> list[Candidate]:
     best = min(tried.values(), key=bic).terms
     linear = best.linear if "K" in best.linear else best.linear + "K"
     add(Terms(linear, best.gauss_markov, ramp=True))
+    maxima = sorted(tried.values(), key=bic)
+    bics = np.array([bic(maximum) for maximum in maxima])
+    aics = np.array([2.0 * (maximum.cost + maximum.terms.parameters) for maximum in maxima])
+    weights, akaike_weights = compute_information_weights(bics), compute_information_weights(aics)
     candidates = []
-    for maximum in tried.values():
-        parameters, spectrum = maximum.terms.parameters, whittle.spectrum
-        data, density = whittle.data(maximum), whittle.density(maximum)
-        tested = assess_goodness_of_fit(
-            spectrum.ordinates, data, density, spectrum.frequency, parameters
+    for i, maximum in enumerate(maxima):
+        spectrum, density = whittle.spectrum, whittle.density(maximum)
+        goodness = assess_goodness_of_fit(
+            spectrum.ordinates,
+            whittle.data(maximum),
+            density,
+            spectrum.frequency,
+            maximum.terms.parameters,
         )
-        aic = 2.0 * (maximum.cost + parameters)
-        candidates.append(Candidate(maximum, bic(maximum), aic, math.nan, math.nan, tested))
-    return rescore(candidates, {})
+        scores = float(bics[i]), float(aics[i]), float(weights[i]), float(akaike_weights[i])
+        candidates.append(Candidate(maximum, *scores, goodness))
+    return candidates
 
 
 def _penalised_bic(maximum: Maximum, bins: int, longest: float) -> float:
@@ -169,24 +174,6 @@ def _penalised_bic(maximum: Maximum, bins: int, longest: float) -> float:
     )
 
 
-def rescore(candidates: Sequence[Candidate], gained: Mapping[Terms, float]) -> list[Candidate]:
-    """Return the candidates, sorted by BIC, with gains of log likelihood without a ramp."""
-    gains = [gained.get(replace(candidate.terms, ramp=False), 0.0) for candidate in candidates]
-    bics = np.array([candidate.bic for candidate in candidates]) - 2.0 * np.array(gains)
-    aics = np.array([candidate.aic for candidate in candidates]) - 2.0 * np.array(gains)
-    weights, akaike_weights = compute_information_weights(bics), compute_information_weights(aics)
-    return [
-        replace(
-            candidates[i],
-            bic=float(bics[i]),
-            aic=float(aics[i]),
-            weight=float(weights[i]),
-            akaike_weight=float(akaike_weights[i]),
-        )
-        for i in np.argsort(bics, kind="stable")
-    ]
-
-
 MIN_AKAIKE_WEIGHT = 0.05  # Candidates with a smaller Akaike weight do not enter the intervals
 
 
@@ -194,14 +181,3 @@ def compute_information_weights(scores: Array) -> Array:
     """Return the weights of models from their scores, BIC or AIC: e^(-score/2), normalised to 1."""
     weights = np.exp(-0.5 * (scores - scores.min()))
     return np.asarray(weights / weights.sum())
-
-
-def describe_disagreement(candidates: Sequence[Candidate]) -> str | None:
-    """Return a note if AIC and BIC prefer different models, else None."""
-    by_aic = min(candidates, key=lambda candidate: candidate.aic)
-    chosen = candidates[0]
-    if by_aic is chosen:
-        return None
-    return texts.criteria_disagree(
-        by_aic.terms.name, chosen.aic - by_aic.aic, chosen.terms.name, by_aic.bic - chosen.bic
-    )

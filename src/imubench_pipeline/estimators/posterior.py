@@ -1,8 +1,7 @@
 """Draws from the posterior of a model, and joint draws over the models that the log allows.
 
 The prior is uniform in the amplitudes Q, N, B and K, in R, and in log T_B up to a fifth of the log.
-The draws are by importance sampling, with an adaptive Metropolis chain where the effective sample
-size is too small, as along thin curved ridges between interchangeable terms.
+The draws are by adaptive importance sampling.
 """
 
 from __future__ import annotations
@@ -28,7 +27,6 @@ from imubench_pipeline.estimators.posterior_kernels import (
     compute_log_posteriors,
     find_mode,
     fit_mixture,
-    run_metropolis_chain,
     set_densities,
 )
 from imubench_pipeline.estimators.whittle import Maximum, Terms, Whittle
@@ -39,10 +37,6 @@ _MIN_DEGREES = 5
 _FIRST_MIXTURE_WEIGHT = 0.15  # Of the first mixture in later ones, which keeps its support covered
 _MIN_COMPONENT_MASS = 0.01
 _LEARNING_POINTS = 2048  # Number of points to which a mixture is fitted
-
-_CLIPPED_POINTS = 8
-"""Highest weights that are clipped before a fit (Koblents and Míguez, Stat. Comput. 25, 2015)."""
-
 _EM_STEPS = 3  # Expectation-maximisation steps between two rounds
 
 
@@ -102,14 +96,6 @@ class Weighted:
         """Effective sample size, 1 / sum w^2 (L. Kish, "Survey Sampling", 1965)."""
         return float(1.0 / np.sum(self.weights**2))
 
-    def clipped(self, number: int) -> Weighted:
-        """Return the points with the ``number`` highest weights clipped to the lowest of them."""
-        most = np.partition(self.weights, -number)[-number]
-        if not most > 0.0:
-            return self
-        lowered = np.minimum(self.weights, most)
-        return Weighted(self.points, lowered / lowered.sum())
-
     def drawn(self, number: int, rng: np.random.Generator) -> NDArray[np.int64]:
         """Return indices of equally weighted points, in random order (systematic resampling)."""
         ends = np.cumsum(self.weights)
@@ -139,17 +125,20 @@ def sample_adaptively(
     Scandinavian Journal of Statistics 39, 2012.
     """
     mixtures, mixture = [first], first
-    points = first.draw(size, rng)
-    values = log_density(points)
-    proposed = first.densities(points).sum(axis=1)
+    points = np.empty((0, first.means.shape[1]))
+    values = np.empty(0)
     while True:
+        added = mixtures[-1].draw(size, rng)
+        points = np.concatenate([points, added])
+        values = np.concatenate([values, log_density(added)])
+        proposed = np.sum([each.densities(points).sum(axis=1) for each in mixtures], axis=0)
         with np.errstate(divide="ignore"):
             logarithm = values - np.log(proposed)
         weights = np.exp(logarithm - logarithm.max())
         weighted = Weighted(points, weights / weights.sum())
         if weighted.effective >= wanted or len(points) + size > most:
             return weighted
-        learnt = points[weighted.clipped(_CLIPPED_POINTS).drawn(_LEARNING_POINTS, rng)]
+        learnt = points[weighted.drawn(_LEARNING_POINTS, rng)]
         for _ in range(_EM_STEPS):
             mixture = mixture.fitted(learnt)
         part = _FIRST_MIXTURE_WEIGHT
@@ -158,13 +147,7 @@ def sample_adaptively(
             np.concatenate([mixture.means, first.means]),
             np.concatenate([mixture.scales, first.scales]),
         )
-        added = proposal.draw(size, rng)
-        proposed = proposed + proposal.densities(points).sum(axis=1)
         mixtures.append(proposal)
-        everywhere = [earlier.densities(added).sum(axis=1) for earlier in mixtures]
-        points = np.concatenate([points, added])
-        values = np.concatenate([values, log_density(added)])
-        proposed = np.concatenate([proposed, np.sum(everywhere, axis=0)])
 
 
 def _get_degrees(dimensions: int) -> int:
@@ -172,16 +155,11 @@ def _get_degrees(dimensions: int) -> int:
     return _MIN_DEGREES + (_MIN_DEGREES + dimensions) % 2
 
 
-MAX_DRAWS = 80_000  # Default number of draws; a tail of 2.5 % has 2,000 of them
-_DRAWS_PER_POINT = 6  # Draws per independent point; limits of two seeds agree within 3 %
-_MAX_DRAWS_PER_POINT = 80  # Above it, a chain is about as good
-_MAX_ROUNDS = 4
-_GRID_SIZES = (0, 20, 9)  # T_B of the first mixture along each axis, for 0, 1 and 2 processes
-_COMPONENT_SIGMA = 0.7  # of its components in log T_B, in grid spacings
+MAX_DRAWS = 8_000  # Default number of draws; a tail of 2.5 % has 200 of them
+_DRAWS_PER_POINT = 4  # Draws per independent point
+_MAX_ROUNDS = 8
 _MAX_SIGMA = 2.0  # standard deviation in log T_B about the best fit
 _MIN_BEST_FIT_WEIGHT = 0.3
-_NEGLIGIBLE_WEIGHT, _MIN_WEIGHT = 1e-6, 5e-3
-_WEAK_TERM_ERROR = 0.15  # Relative SD of a squared amplitude above which it may be near 0
 
 _WEAK_AMPLITUDE, _WEAK_LOG_SIGMA = 0.7, 0.8
 """Asinh of an amplitude near 0 over its unit, and standard deviation of its logarithm."""
@@ -200,7 +178,7 @@ class Posterior:
     """(draws, p): the linear parameters in their order, then B of each process; SI."""
     times: Array  # (draws, g): T_B of each process, rising, s
     ramps: Array  # (draws,): R; zeros where the model has none
-    effective: float  # effective sample size; NaN for a chain
+    effective: float  # effective sample size
 
 
 def sample(
@@ -213,16 +191,8 @@ def sample(
     points = sample_adaptively(
         target.log_density, target.first(), rng, size=size, wanted=wanted, most=_MAX_ROUNDS * size
     )
-    effective = points.effective
-    if effective * _MAX_DRAWS_PER_POINT >= draws:
-        which = points.drawn(draws, rng)
-        amplitudes = target.amplitudes(points.points[which])
-    else:
-        effective = math.nan
-        # The mode of the amplitudes at the best T_B, and the covariance there.
-        start, covariance = target.make_component(np.log(maximum.times), 1.0)
-        amplitudes = run_metropolis_chain(start, covariance, rng, draws, target.problem)
-    return target.posterior(amplitudes, effective, rng)
+    amplitudes = target.amplitudes(points.points[points.drawn(draws, rng)])
+    return target.posterior(amplitudes, points.effective, rng)
 
 
 class _Target:
@@ -252,7 +222,6 @@ class _Target:
         inverse = np.linalg.inv(parts.T @ parts + _RIDGE * np.eye(self.terms))
         error = np.sqrt(np.diag(inverse)) / size
         self.log_unit = 0.5 * np.log(0.25 * error)
-        self.weak = np.flatnonzero(error > _WEAK_TERM_ERROR * maximum.powers).tolist()
         self.log_fitted = 0.5 * np.log(np.maximum(maximum.powers, _MIN_START_SIGMAS / size))
 
     def log_density(self, points: Array) -> Array:
@@ -274,40 +243,22 @@ class _Target:
         return result
 
     def first(self) -> Mixture:
-        """Return a mixture that covers the posterior, with a component for each T_B of a grid."""
-        first, step, logarithms = self.problem.table
-        last = first + step * (len(logarithms) - 1)
-        number = _GRID_SIZES[self.processes]
-        apart = (last - first) / max(number, 1)
-        grid = first + apart * (np.arange(number) + 0.5)
-        places = [np.log(self.maximum.times)]
-        if self.processes == 1:
-            places += [np.array([place]) for place in grid]
-        elif self.processes == 2:
-            places += [np.array([a, b]) for i, a in enumerate(grid) for b in grid[i + 1 :]]
-        widths = [_MAX_SIGMA] + [_COMPONENT_SIGMA * apart] * (len(places) - 1)
-        components = [
-            self.make_component(at, width) for at, width in zip(places, widths, strict=True)
-        ]
+        """Return a mixture about the best fit, with a component for each term that may be 0."""
+        components = [self.make_component(np.log(self.maximum.times), _MAX_SIGMA)]
         if self.terms > 1:
-            components += [self._make_weak_component(term) for term in self.weak]
+            components += [self._make_weak_component(term) for term in range(self.terms)]
         means, scales = (np.array(part) for part in zip(*components, strict=True))
         values, _, _ = compute_log_posteriors(means, self.problem)
         mass = values + 0.5 * np.linalg.slogdet(scales)[1]
         weights = np.exp(mass - mass.max())
-        weights /= weights.sum()
-        heavy = weights > _NEGLIGIBLE_WEIGHT
-        heavy[0] = True
-        heavy[len(places) :] = True
-        weights = np.maximum(weights, _MIN_WEIGHT)
-        weights[len(places) :] = np.maximum(weights[len(places) :], _MIN_WEAK_WEIGHT)
+        weights = np.maximum(weights / weights.sum(), _MIN_WEAK_WEIGHT)
         weights[0] = max(weights[0], _MIN_BEST_FIT_WEIGHT)
         # From log amplitudes to z = asinh(amplitude / unit): dz = tanh z d log amplitude.
         slope = np.ones_like(means)
         z = np.arcsinh(np.exp(means[:, : self.terms] - self.log_unit))
         means[:, : self.terms], slope[:, : self.terms] = z, np.tanh(z)
         scales *= slope[:, :, None] * slope[:, None, :]
-        return Mixture(weights[heavy] / weights[heavy].sum(), means[heavy], scales[heavy])
+        return Mixture(weights / weights.sum(), means, scales)
 
     def make_component(self, places: Array, width: float) -> tuple[Array, Array]:
         """Return mean and covariance of a normal component about correlation times."""

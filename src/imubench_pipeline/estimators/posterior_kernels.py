@@ -2,7 +2,7 @@
 
 A point is (log amplitude of each term ..., log T_B of each process ...). The posterior is flat in
 the amplitudes and in R, over which it is integrated, and flat in log T_B within the table of
-shapes. An adaptive Metropolis chain is used where importance sampling fails.
+shapes.
 """
 
 from __future__ import annotations
@@ -27,8 +27,6 @@ from imubench_pipeline.typing import Array
 _MOST_STEPS = 40
 _TOLERANCE = 1e-3
 _LONGEST_STEP = 1.5
-_BURN_IN = 4_000
-_ADAPT_EVERY = 250
 
 
 @njit(cache=True)
@@ -166,86 +164,6 @@ def _climb(
             curvature[k, j] = curvature[j, k]
         curvature[j, j] += 2.0
     return value
-
-
-def run_metropolis_chain(
-    start: Array, covariance: Array, rng: np.random.Generator, draws: int, problem: Problem
-) -> Array:
-    """Return draws of a point, shape (draws, d).
-
-    ``covariance``, shape (d, d), is the covariance of the first proposals. It is adapted during the
-    burn-in, which is not returned.
-
-    References
-    ----------
-    H. Haario, E. Saksman and J. Tamminen, "An adaptive Metropolis algorithm", Bernoulli 7, 2001.
-    """
-    number, d = _BURN_IN + draws, len(start)
-    root = np.linalg.cholesky(covariance) * 2.4 / np.sqrt(d)
-    normals = rng.standard_normal((number, d))
-    log_uniforms = np.log(rng.random(number))
-    x, mean, covariance = start.copy(), start.copy(), root @ root.T * d / 5.76
-    current, scale = compute_log_posteriors(start[None], problem)[0][0], 1.0
-    points = np.empty((number, d))
-    # Learn the covariance, and the scale, while burning in only.
-    for first in range(0, _BURN_IN, _ADAPT_EVERY):
-        part = slice(first, first + _ADAPT_EVERY)
-        proposals = (normals[part], log_uniforms[part], points[part])
-        taken, current = _walk(x, current, scale, root, *proposals, problem)
-        _learn(mean, covariance, points[part], first)
-        scale *= min(2.0, max(0.5, math.exp(2.0 * (taken / _ADAPT_EVERY - 0.27))))
-        stable = covariance.copy()
-        np.fill_diagonal(stable, np.diag(covariance) * (1.0 + 1e-6) + 1e-14)
-        root = np.ascontiguousarray(np.linalg.cholesky(stable, upper=True).T) * 2.4 / np.sqrt(d)
-    part = slice(_BURN_IN, number)
-    _walk(x, current, scale, root, normals[part], log_uniforms[part], points[part], problem)
-    return points[part]
-
-
-@njit(cache=True)
-def _walk(
-    x: Array,
-    current: float,
-    scale: float,
-    root: Array,
-    normals: Array,
-    log_uniforms: Array,
-    points: Array,
-    problem: Problem,
-) -> tuple[int, float]:
-    """Accept or reject proposals; return the number accepted and the log posterior."""
-    n, d = normals.shape
-    model, shape = np.empty(problem.bins.nu.size), np.empty(problem.bins.nu.size)
-    away, proposal = np.empty(d), np.empty(d)
-    taken = 0
-    for k in range(n):
-        np.dot(root, normals[k], away)
-        for a in range(d):
-            proposal[a] = x[a] + scale * away[a]
-        proposed = compute_log_posterior(proposal, problem, model, shape)[0]
-        if log_uniforms[k] < proposed - current:
-            for a in range(d):
-                x[a] = proposal[a]
-            current = proposed
-            taken += 1
-        for a in range(d):
-            points[k, a] = x[a]
-    return taken, current
-
-
-@njit(cache=True)
-def _learn(mean: Array, covariance: Array, points: Array, first: int) -> None:
-    """Update mean and covariance with points; ``first`` points came before."""
-    n, d = points.shape
-    change = np.empty(d)
-    for k in range(n):
-        gain = 1.0 / ((first + k) / 2.0 + 50.0)
-        for a in range(d):
-            change[a] = points[k, a] - mean[a]
-            mean[a] += gain * change[a]
-        for a in range(d):
-            for c in range(d):
-                covariance[a, c] += gain * (change[a] * change[c] - covariance[a, c])
 
 
 @njit(cache=True)

@@ -31,11 +31,10 @@ _SPACING_RATIO = 1.4  # Ratio of the numbers of ordinates in successive sums
 
 def spectral_findings(channel: str, frame: FitSelection, white: float | None) -> list[Finding]:
     """Return the findings on the lines and the band of a channel; ``white`` is N, SI, if known."""
-    band = frame.band
+    highest, low_pass = frame.band.highest, frame.low_pass
     findings = describe_lines(channel, frame.lines, white)
-    if band.source in ("bend", "no_model"):
-        data = BandLimit(band.highest, follows_model=band.source == "bend")
-        findings.append(find(data, "note", band.highest, channel))
+    if low_pass is not None and low_pass.N is not None and low_pass.N.value is None:
+        findings.append(find(BandLimit(highest), "note", highest, channel))
     return findings
 
 
@@ -46,8 +45,7 @@ def describe_lines(channel: str, lines: Iterable[Line], white: float | None) -> 
         return []
     strongest = max(group, key=lambda line: line.ratio)
     sinusoids = [line for line in group if line.kind == "sinusoid"]
-    number = len(sinusoids)
-    data = Lines(number, len(group) - number, strongest.frequency, strongest.ratio)
+    data = Lines(len(sinusoids), len(group) - len(sinusoids), strongest.frequency, strongest.ratio)
     findings = [find(data, "note", strongest.frequency, channel)]
     if white:
         # After t the integral A / (2 pi f) of a sinusoid differs by A sin(pi f t) / (pi f sqrt(2))
@@ -60,7 +58,7 @@ def describe_lines(channel: str, lines: Iterable[Line], white: float | None) -> 
         if most >= _MIN_SINUSOID_RATIO:
             strong = StrongLine(integrals[most].frequency, most)
             findings.append(find(strong, "warning", most, channel))
-    if number > MAX_LINES:
+    if len(sinusoids) > MAX_LINES:
         findings.append(describe_grouping(channel, sinusoids))
     return findings
 

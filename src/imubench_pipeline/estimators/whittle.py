@@ -10,9 +10,9 @@ from __future__ import annotations
 
 import copy
 import math
-from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import cache, cached_property
+from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
@@ -136,13 +136,13 @@ def _flicker_edge(order: float) -> float:
 
 SHAPES = 192  # Correlation times at which the shape of a Gauss-Markov process is tabulated
 COARSE = 48  # Correlation times that suffice to detect lines and the band
-_SCAN_STEP = 4
-_PAIR_STEP = 12
+_GRID_STEPS = {1: 4, 2: 8}  # Of the table of shapes, between places where a search may start
 _MIN_TIME_RATIO = 2.5  # Minimum ratio of two correlation times of one model
 _SCAN_TOLERANCE = 1e-2  # Tolerance of the cost when correlation times are only compared
 _POLISH_TOLERANCE = 1e-6
 _LOG_TIME_TOLERANCE = 5e-4  # Tolerance of the logarithm of a correlation time
 _MAX_TURNS = 8
+_MIN_TURN_GAIN = 1e-4  # Of log likelihood by a turn over both correlation times
 
 
 @dataclass(frozen=True)
@@ -198,19 +198,6 @@ class Maximum:
         return np.asarray(np.sqrt(self.process_powers))
 
 
-@dataclass(frozen=True)
-class Behind:
-    """Power gains of a low-pass in each bin of a spectrum, each of shape (b,)."""
-
-    white: Array  # of sampled white noise, with white noise after the filter over N^2
-    flicker: Array  # of flicker noise, with its aliases
-    slow: Array  # of slower noise
-
-    def select(self, chosen: NDArray[np.bool_]) -> Behind:
-        """Return the gains in chosen bins."""
-        return Behind(self.white[chosen], self.flicker[chosen], self.slow[chosen])
-
-
 @dataclass
 class Whittle:
     """The likelihood of one spectrum."""
@@ -219,7 +206,6 @@ class Whittle:
     shortest: float  # correlation time of a Gauss-Markov process that is searched, s
     longest: float
     shapes: int = SHAPES  # correlation times at which its shape is tabulated
-    behind: Behind | None = None  # the sensor's low-pass; quantization noise does not pass it
     scale: float = field(init=False)
     columns: dict[str, Array] = field(init=False)
     shape_of: Shapes = field(init=False)
@@ -235,8 +221,7 @@ class Whittle:
     @cached_property
     def table(self) -> Array:
         """Logarithms of the shapes of Gauss-Markov processes at `times`, shape (t, b)."""
-        table = np.log(np.array([self.shape_of.gauss_markov(time) for time in self.times]))
-        return table if self.behind is None else table + np.log(self.behind.slow)
+        return np.log(np.array([self.shape_of.gauss_markov(time) for time in self.times]))
 
     def of(self, spectrum: Spectrum) -> Whittle:
         """Return the likelihood of other data in the same bins."""
@@ -246,25 +231,9 @@ class Whittle:
         other.scale = float(np.median(spectrum.density))
         return other
 
-    def standing(self, behind: Behind) -> Whittle:
-        """Return the likelihood of the same data without a low-pass."""
-        other = copy.copy(self)
-        other.columns, other.behind = {}, behind
-        vars(other)["table"] = self.table + np.log(behind.slow)
-        return other
-
-    def with_column(self, letter: str, shape: Array) -> Whittle:
-        """Return the likelihood with another density, shape (b,), for Q, N, F or K of 1."""
-        _ = self.table  # made once for both
-        other = copy.copy(self)
-        other.columns = self.columns | {letter: shape}
-        return other
-
     def select(self, spectrum: Spectrum, chosen: NDArray[np.bool_]) -> Whittle:
         """Return the likelihood of other data in chosen bins."""
         other = self.of(spectrum.select(chosen))
-        if other.behind is not None:
-            other.behind = other.behind.select(chosen)
         other.columns = {letter: self.column(letter)[chosen] for letter in "QNFK"}
         other.table = np.ascontiguousarray(self.table[:, chosen])
         return other
@@ -272,16 +241,14 @@ class Whittle:
     def column(self, letter: str) -> Array:
         """Return the density of a unit linear term (Q, N, F or K) in each bin."""
         if letter not in self.columns:
-            shapes, behind = self.shape_of, self.behind
-            if letter == "Q":
-                shape = shapes.quantization()
-            elif letter == "N":
-                shape = shapes.white() if behind is None else behind.white
-            elif letter == "F":
-                shape = shapes.flicker() * (1.0 if behind is None else behind.flicker)
-            else:
-                shape = shapes.random_walk() * (1.0 if behind is None else behind.slow)
-            self.columns[letter] = shape
+            shapes = self.shape_of
+            shape = {
+                "Q": shapes.quantization,
+                "N": shapes.white,
+                "F": shapes.flicker,
+                "K": shapes.random_walk,
+            }
+            self.columns[letter] = shape[letter]()
         return self.columns[letter]
 
     def gauss_markov(self, time: float) -> Array:
@@ -330,13 +297,7 @@ class Whittle:
         where = np.empty(0)
         if terms.gauss_markov:
             problem = Problem(fixed, bins, terms.ramp, self.shape_table())
-            if terms.gauss_markov == 1:
-                where = _fit_one_process(problem)
-            else:
-                # Polish the best pair of a coarse grid, and the best process with another one.
-                begun = [_descend(pair, cost, problem, turns=1) for pair, cost in _pairs(problem)]
-                pair, cost = min(begun, key=lambda one: one[1])
-                where = _descend(pair, cost, problem, turns=_MAX_TURNS)[0]
+            where = _fit_times(problem, terms.gauss_markov)
         times = np.sort(np.exp(where))
         processes = [self.gauss_markov(float(time)) for time in times]
         columns = np.ascontiguousarray(np.column_stack([fixed, *processes]))
@@ -380,18 +341,16 @@ def make_whittle(
     shapes: int = SHAPES,
     *,
     shortest: float | None = None,
-    behind: Behind | None = None,
 ) -> Whittle:
     """Return the likelihood of a spectrum, with the correlation times that it can show.
 
     ``highest`` is the frequency up to which its bins reach, Hz; ``shortest`` the shortest
-    correlation time, s, by default twenty sampling intervals; ``shapes`` and ``behind``: from
-    `Whittle`.
+    correlation time, s, by default twenty sampling intervals; ``shapes``: from `Whittle`.
     """
     longest = CORRELATION_TIMES.of_log * float(spectrum.length.max())
     least = CORRELATION_TIMES.samples / spectrum.rate if shortest is None else shortest
     least = max(least, 1.0 / (np.pi * highest))
-    return Whittle(spectrum, min(least, longest / 4.0), longest, shapes, behind)
+    return Whittle(spectrum, min(least, longest / 4.0), longest, shapes)
 
 
 def make_noise_model(maximum: Maximum) -> NoiseModel:
@@ -414,105 +373,39 @@ def make_noise_model(maximum: Maximum) -> NoiseModel:
     )
 
 
-def _polish(
-    places: Array, which: int, low: float, high: float, problem: Problem
-) -> tuple[float, float]:
-    """Minimise the cost over one correlation time between limits (Brent's method)."""
-    tried = places.copy()
+def _fit_times(problem: Problem, number: int) -> Array:
+    """Return the logarithms of one or two correlation times at the lowest cost, rising.
 
-    def cost(place: float) -> float:
-        tried[which] = place
-        return profile_cost(tried, problem, _POLISH_TOLERANCE)
-
-    best = minimize_scalar(
-        cost, bounds=(low, high), method="bounded", options={"xatol": _LOG_TIME_TOLERANCE}
-    )
-    return float(best.x), float(best.fun)
-
-
-def _scan(
-    places: Array, which: int, low: float, high: float, problem: Problem
-) -> tuple[float, float]:
-    """Return the best of one correlation time on a grid between limits, and its cost."""
-    tried, table = places.copy(), problem.table
-    best, lowest = places[which], np.inf
-    for i in range(0, table.logarithms.shape[0], _SCAN_STEP):
-        tried[which] = table.first + i * table.step
-        if low <= tried[which] <= high:
-            cost = profile_cost(tried, problem, _SCAN_TOLERANCE)
-            if cost < lowest:
-                best, lowest = tried[which], cost
-    return best, lowest
-
-
-def _fit_one_process(problem: Problem) -> Array:
-    """Scan the correlation time, then polish the best.
-
-    The search is not compiled: numba would inline and compile each of its levels for seconds.
+    The best place of a grid is polished for each time in turn. The search is not compiled: numba
+    would inline and compile each of its levels for seconds.
     """
     first, step, logarithms = problem.table
-    last = first + step * (logarithms.shape[0] - 1)
-    place = np.array([first])
-    best, lowest = _scan(place, 0, first, last, problem)
-    reach = _SCAN_STEP * step
-    place[0] = best
-    low, high = max(first, best - reach), min(last, best + reach)
-    polished, cost = _polish(place, 0, low, high, problem)
-    place[0] = polished if cost < lowest else best
-    return place
-
-
-def _pairs(problem: Problem) -> Iterator[tuple[Array, float]]:
-    """Yield pairs of correlation times to begin with, and their costs."""
-    first, step, logarithms = problem.table
-    last = first + step * (logarithms.shape[0] - 1)
-    apart = np.log(_MIN_TIME_RATIO)
-    lowest = np.inf
-    pair = np.array([first, last])
-    places = np.empty(2)
-    for i in range(0, logarithms.shape[0], _PAIR_STEP):
-        for j in range(i + _PAIR_STEP, logarithms.shape[0], _PAIR_STEP):
-            places[0], places[1] = first + i * step, first + j * step
-            if places[1] - places[0] < apart:
-                continue
-            cost = profile_cost(places, problem, _SCAN_TOLERANCE)
-            if cost < lowest:
-                lowest = cost
-                pair = places.copy()
-    yield pair, lowest
-    single = _fit_one_process(problem)[0]
-    for which in (1, 0):
-        beside = np.array([single, single])
-        low, high = (single + apart, last) if which == 1 else (first, single - apart)
-        if high <= low:
-            continue
-        beside[which], cost = _scan(beside, which, low, high, problem)
-        if cost < np.inf:
-            yield beside, cost
-
-
-def _descend(pair: Array, lowest: float, problem: Problem, *, turns: int) -> tuple[Array, float]:
-    """Polish each of two correlation times in turn."""
-    first, step, logarithms = problem.table
-    last = first + step * (logarithms.shape[0] - 1)
-    apart = np.log(_MIN_TIME_RATIO)
-    best = pair.copy()
-    reach = _PAIR_STEP * step
-    for _ in range(turns):
+    last = first + step * (len(logarithms) - 1)
+    apart = math.log(_MIN_TIME_RATIO)
+    spacing = _GRID_STEPS[number] * step
+    grid = np.arange(first, last + 0.5 * step, spacing).tolist()
+    places = [np.array(place) for place in combinations(grid, number)]
+    places = [place for place in places if (np.diff(place) >= apart).all()]
+    costs = [profile_cost(place, problem, _SCAN_TOLERANCE) for place in places]
+    best, lowest = places[int(np.argmin(costs))], min(costs)
+    for _ in range(_MAX_TURNS if number > 1 else 1):
         before = lowest
-        for g in range(2):
-            low, high = max(first, best[g] - reach), min(last, best[g] + reach)
-            if g == 0:
-                high = min(high, best[1] - apart)
-            else:
-                low = max(low, best[0] + apart)
+        for g in range(number):
+            low = max(best[g] - spacing, first if g == 0 else best[g - 1] + apart)
+            high = min(best[g] + spacing, last if g == number - 1 else best[g + 1] - apart)
             if high <= low:
                 continue
-            polished, cost = _polish(best, g, low, high, problem)
-            if cost < lowest:
-                lowest = cost
-                best[g] = polished
-        reach = max(0.7 * reach, 0.1 * step)
-        if before - lowest < 1e-4:
+            tried = best.copy()
+
+            def cost(place: float, tried: Array = tried, g: int = g) -> float:
+                tried[g] = place
+                return profile_cost(tried, problem, _POLISH_TOLERANCE)
+
+            polished = minimize_scalar(
+                cost, bounds=(low, high), method="bounded", options={"xatol": _LOG_TIME_TOLERANCE}
+            )
+            if polished.fun < lowest:
+                best[g], lowest = polished.x, polished.fun
+        if before - lowest < _MIN_TURN_GAIN:
             break
-    return best, lowest
+    return best

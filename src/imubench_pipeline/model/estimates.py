@@ -108,7 +108,7 @@ class ModelRow(ChannelRow):
         None
     )
     verdict: Annotated[GoodnessVerdict, Column("whether the model explains the spectrum")]
-    note: Annotated[str | None, Column("frequency of the largest deviation; note on AIC")] = None
+    note: Annotated[str | None, Column("frequency of the largest deviation")] = None
     bins: Annotated[int, Column("bins of the spectrum used")]
     band: Annotated[float | None, Column("highest frequency used", "Hz")] = None
     band_source: Annotated[str | None, Column("method of detection")] = None

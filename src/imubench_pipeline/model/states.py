@@ -25,11 +25,11 @@ Status = Literal[
 GoodnessVerdict = Literal["explained", "not explained"]
 """Whether a model explains the spectrum."""
 
-BandSource = Literal["set", "bandwidth", "bend", "no_model", "whole", "filtered", "attenuated"]
+BandSource = Literal["set", "whole", "filtered", "attenuated"]
 """Reason for the highest fitted frequency of a spectrum.
 
-The user; the stated bandwidth; a bend as by a filter; no model that fits; nothing, the spectrum is
-fitted up to Nyquist, without a filter or with one; or the attenuation by a fitted filter.
+The user; nothing, the spectrum is fitted up to Nyquist, without a filter or with one; or the
+attenuation by a filter.
 """
 
 Verdict = Literal["meets", "likely_meets", "not_enough_data", "likely_fails", "fails", "excluded"]

@@ -7,8 +7,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from imubench_pipeline.datasheets.plausibility import implausible_of
-from imubench_pipeline.estimators.frame import MIN_BINS, select_for_fit
-from imubench_pipeline.estimators.likelihood import fit_models
+from imubench_pipeline.estimators.frame import select_for_fit
 from imubench_pipeline.estimators.spectral_findings import spectral_findings
 from imubench_pipeline.estimators.spectrum import compute_spectra
 from imubench_pipeline.model.recordings import RecordingRow
@@ -67,6 +66,4 @@ def findings_of_channel(
         )
     spectrum, line_spectra = compute_spectra(log.blocks(), log.grid, log.rate, log.segments)
     frame = select_for_fit(spectrum, line_spectra, bandwidth=bandwidth)
-    if frame.used.sum() >= MIN_BINS:
-        frame, _, _ = fit_models(spectrum, frame)
     return spectral_findings(channel, frame, None)

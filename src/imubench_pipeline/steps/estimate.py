@@ -28,7 +28,6 @@ from imubench_pipeline.estimators.estimate import (
 )
 from imubench_pipeline.estimators.likelihood import Likelihood
 from imubench_pipeline.estimators.lines import select_sinusoids
-from imubench_pipeline.estimators.model_choice import describe_disagreement
 from imubench_pipeline.estimators.robust import fit as robust
 from imubench_pipeline.estimators.robust.parts import compute_part_variances
 from imubench_pipeline.estimators.rows import (
@@ -45,7 +44,6 @@ from imubench_pipeline.estimators.thermal.fit import fit_temperature
 from imubench_pipeline.estimators.thermal.path import TemperaturePath, estimate_temperature_path
 from imubench_pipeline.estimators.thermal.register import estimate_resolution
 from imubench_pipeline.estimators.thermal.result import ThermalFit, add_temperature_effect
-from imubench_pipeline.estimators.white_level import find_white_stretch
 from imubench_pipeline.model import estimates as model
 from imubench_pipeline.model.recordings import FindingRow
 from imubench_pipeline.noise.simulate import channel_rng
@@ -275,7 +273,6 @@ class _Channel:
             samples=log.grid,
             rate=log.rate,
             holes=log.holes,
-            stretch=find_white_stretch(self._bare),
             segments=log.segments,
             band=self._band,
             bandwidth=self._bandwidth,
@@ -303,9 +300,6 @@ _METHODS_BY_PREFERENCE = ("robust", "likelihood", "likelihood_gm", "weighted", "
 def _model_rows(key: Key, fit: Likelihood) -> Iterator[model.ModelRow]:
     """Yield the rows of the table ``models``, the chosen model first."""
     for place, candidate in enumerate(fit.candidates):
-        notes = [candidate.goodness.where]
-        if place == 0:
-            notes += [describe_disagreement(fit.candidates) or ""]
         yield model.ModelRow(
             **asdict(key),
             model=candidate.terms.name,
@@ -318,7 +312,7 @@ def _model_rows(key: Key, fit: Likelihood) -> Iterator[model.ModelRow]:
             deviance=candidate.goodness.deviance,
             chance=candidate.goodness.chance,
             verdict=candidate.goodness.verdict,
-            note=" ".join(filter(None, map(sentence, notes))),
+            note=sentence(candidate.goodness.where),
             bins=int(fit.used.sum()),
             band=fit.band.highest if fit.band else None,
             band_source=fit.frame.band_words if fit.band else None,

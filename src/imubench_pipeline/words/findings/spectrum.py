@@ -91,16 +91,9 @@ class BandLimit(FindingData, affects=NONE):
     """The fit uses only frequencies below a limit."""
 
     highest: float  # Hz
-    follows_model: bool  # whether the spectrum follows a noise model up to there
 
     def text(self, channel: str) -> str:
         name, limit = channel_name(channel), f"{number_text(self.highest)} Hz"
-        if not self.follows_model:
-            return (
-                f"No noise model fits the spectrum of {name} up to any frequency. The fit is "
-                f"limited to {limit}, a twentieth of the sampling rate. "
-                "Look at the spectrum for vibration"
-            )
         return (
             f"The spectrum of {name} bends above {limit}, as by the filter of the sensor. The fit "
             "is limited to lower frequencies. Look at the spectrum for vibration, and state the "

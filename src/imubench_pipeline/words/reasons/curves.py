@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 from imubench_pipeline.words.numbers import number_text, percent_text
 
 _MAX_PRINTED_ERROR = 10.0  # maximum relative standard error that is printed as a number
@@ -102,48 +100,8 @@ def broadband_process(time: float) -> str:
     )
 
 
-def broadband_peak(tau: float, longest: float) -> str:
-    """Return why a peak at ``tau``, s, is no bias instability; ``longest``: correlation time."""
-    return (
-        f"the peak at {number_text(tau, 2)} s is broadband noise with a correlation time below "
-        f"{number_text(longest, 2)} s, not bias instability: only the interval is given"
-    )
-
-
-def rises_to_end(tau: float) -> str:
-    """Return why a curve that still rises at ``tau``, s, has no known peak."""
-    return (
-        f"the processes still rise at {number_text(tau)} s, a ninth of the log: only the interval "
-        "is given"
-    )
-
-
-def time_at_bound(reason: str) -> str:
-    return f"a correlation time is not determined: {reason}"
-
-
 def no_model_minimum(falls_to: float | None) -> str:
     text = "the Allan deviation of the fitted noise has no minimum: it "
     if falls_to is None:
         return f"{text}rises from its shortest τ"
     return f"{text}still falls at {number_text(falls_to)} s, a ninth of the log"
-
-
-def white_level_of_model(decades: float) -> str:
-    return (
-        f"the Allan deviation has no slope of −1/2 over {number_text(decades, 2)} decades: N is "
-        "the white noise of the fitted model"
-    )
-
-
-def white_level_of_curve(first: float, last: float, times: Sequence[float]) -> str:
-    listed = " and ".join(f"{number_text(time, 3)} s" for time in times)
-    process = (
-        "a process with a correlation time"
-        if len(times) == 1
-        else "processes with correlation times"
-    )
-    return (
-        f"N is the level of the Allan deviation from {number_text(first, 3)} to "
-        f"{number_text(last, 3)} s and includes {process} of {listed}"
-    )

@@ -74,73 +74,8 @@ def no_reference(symbol: str, status: Status, reason: str | None) -> str:
     return f"the recommended method gives no {symbol}: {reason or STATUS_WORDS[status]}"
 
 
-def criteria_disagree(by_aic: str, delta_aic: float, by_bic: str, delta_bic: float) -> str:
-    return (
-        f"AIC prefers {by_aic} by {number_text(delta_aic, 2)}, BIC prefers {by_bic} by "
-        f"{number_text(delta_bic, 2)}"
-    )
-
-
 def model_disfavoured(chosen: str, papers: str, delta_bic: float) -> str:
     return f"BIC prefers {chosen} to {papers} by {number_text(delta_bic, 3)}"
-
-
-def hardly_worse_without(symbol: str, without: str, chosen: str, delta_bic: float) -> str:
-    return (
-        f"{without}, without {symbol}, fits almost as well as {chosen}: its BIC is only "
-        f"{number_text(delta_bic, 2)} higher"
-    )
-
-
-def hardly_worse_bias(other: str, chosen: str, delta_bic: float, *, several: bool) -> str:
-    """Return why B is doubtful; ``several``: the chosen model has more than one."""
-    has = "has another B. B_curve includes both" if several else "has no B"
-    return (
-        f"{other} fits almost as well as {chosen}, with a BIC only {number_text(delta_bic, 2)} "
-        f"higher, and {has}"
-    )
-
-
-def other_bias_terms(other: str, delta_aic: float) -> str:
-    return (
-        f"AIC prefers {other}, with other terms of bias instability, by {number_text(delta_aic, 2)}"
-    )
-
-
-def slow_process(other: str, delta_aic: float) -> str:
-    return (
-        f"AIC prefers {other}, which has no random walk, by {number_text(delta_aic, 2)}: a process "
-        "as slow as the log may look like a random walk"
-    )
-
-
-def ramp_explains(other: str, delta_aic: float, ratio: float) -> str:
-    """Return why K is doubtful beside a ramp; ``ratio``: K with it over K without it."""
-    return (
-        f"AIC prefers {other} by {number_text(delta_aic, 2)}, and with its ramp K is only "
-        f"{number_text(ratio, 2)} times as large"
-    )
-
-
-def drift_or_walk(lowest: int, without: str) -> str:
-    return (
-        f"without the {lowest} lowest frequencies, {without} fits as well. In these, drift with "
-        "temperature or time may look like a random walk"
-    )
-
-
-def smooth_drift(without: str, delta_aic: float) -> str:
-    return (
-        f"AIC prefers {without} and a smooth drift, with a spectrum falling as f⁻⁴, by "
-        f"{number_text(delta_aic, 2)}. Drift with temperature or time may look like a random walk"
-    )
-
-
-def few_frequencies(lowest: int) -> str:
-    return (
-        f"the log has too few frequencies above the {lowest} lowest, which drift affects as well. "
-        "Record a longer log"
-    )
 
 
 def signal_or_walk(signal: str) -> str:
@@ -163,18 +98,6 @@ def warm_up(time: float) -> str:
 
 def periodic_drift(period: float) -> str:
     return f"a periodic drift with a period of {number_text(period, 3)} s"
-
-
-def curve_bias_unknown(reason: str | None) -> str:
-    text = "the bias instability of the curve is not determined"
-    return f"{text}: {reason}" if reason else text
-
-
-def band_excluded(highest: float) -> str:
-    return (
-        f"above {number_text(highest)} Hz neither a process nor a low-pass explains the spectrum, "
-        "so a faster process is not visible"
-    )
 
 
 def small_temperature_range(kelvin: float) -> str:

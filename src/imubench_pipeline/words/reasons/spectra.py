@@ -20,15 +20,6 @@ def band_text(source: BandSource, highest: float, low_pass: str = "") -> str:
     match source:
         case "set":
             return f"frequencies up to {limit} are fitted, as set"
-        case "bandwidth":
-            return f"the band ends at {limit}, a tenth of the stated bandwidth"
-        case "bend":
-            return f"the spectrum bends above {limit}, as by the filter of the sensor"
-        case "no_model":
-            return (
-                f"no model fits the spectrum up to any frequency: the band ends at {limit}, a "
-                "twentieth of the sampling rate"
-            )
         case "whole":
             return "the spectrum follows its model up to the Nyquist frequency"
         case "filtered":
@@ -37,10 +28,7 @@ def band_text(source: BandSource, highest: float, low_pass: str = "") -> str:
                 "frequency"
             )
         case "attenuated":
-            return (
-                f"with a filter ({low_pass}), the spectrum follows its model up to {limit}. Above, "
-                "the filter leaves too little noise"
-            )
+            return f"the spectrum is fitted up to {limit}, below the bend of a filter ({low_pass})"
 
 
 def cutoff_range(lower: float, upper: float) -> str:
@@ -70,21 +58,6 @@ def few_bins_left(bins: int, needed: int, highest: float, hidden: int) -> str:
         f"{number_text(highest)} Hz can be fitted, {needed} are needed"
     )
     return f"{text}. Spectral lines hide {counted(hidden, 'bin')}" if hidden else text
-
-
-def process_or_filter(time: float, cutoff: float) -> str:
-    return (
-        f"a Gauss-Markov process (T_B = {number_text(time, 3)} s) and a first-order low-pass at "
-        f"{number_text(cutoff, 3)} Hz fit equally well, as no white noise is visible. "
-        "State the bandwidth in the sensor file"
-    )
-
-
-def fast_process_or_filter(time: float) -> str:
-    return (
-        f"a process with a correlation time of {number_text(time, 3)} s, a few samples, may be the "
-        "low-pass of the sensor. State the bandwidth in the sensor file"
-    )
 
 
 def unfiltered_noise(share: float, low_pass: str, factor: float) -> str:
