@@ -146,6 +146,20 @@ def test_a_square_is_found_where_there_is_one():
     assert re.search(r"by ([\d.]+)$", fit.reason)
 
 
+def test_a_sensor_that_settles_has_another_sensitivity_at_first():
+    rng = np.random.default_rng(8)
+    off = DAY - DAY.mean()
+    warm = np.where(TIME < TIME[-1] / 32.0, off - off[SAMPLES // 32], 0.0)
+    log = simulate(NOISE, RATE, SAMPLES, rng) + 6e-5 * off - 3e-4 * warm
+    fit = fitted(log, DAY)
+    assert fit.compensated and "follow the temperature differently" in fit.reason
+    assert fit.sensitivity.lower < 6e-5 < fit.sensitivity.upper
+    taken = log - np.concatenate(list(fit.compensate([log])))
+    truth = 6e-5 * off - 3e-4 * warm
+    error = taken - truth - (taken - truth).mean()
+    assert np.abs(error).max() < 0.3 * np.ptp(truth[: SAMPLES // 32])
+
+
 @pytest.mark.release
 def test_gyro_y_of_the_tag_follows_its_temperature(shared):
     log = pd.read_csv(shared / "logs/cats/day1.csv.gz")

@@ -67,6 +67,7 @@ ESTIMATES = [
     of(estimates.small_temperature_range, "only 0.2 K", 0.2),
     of(estimates.temperature_preferred, "by 12.3", 12.3, enough=True),
     of(estimates.temperature_preferred, "not enough", 2.3, enough=False),
+    of(estimates.settling_excluded, "first 600 s", 600.0),
     of(estimates.lag_range, "lags from 3 to 90 s", 3.0, 90.0),
     of(estimates.temperature_like_ramp, "95 % of the information", 0.95),
 ]

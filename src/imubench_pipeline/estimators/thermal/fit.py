@@ -16,14 +16,15 @@ from imubench_pipeline.estimators.deterministic.means import average_blocks
 from imubench_pipeline.estimators.deterministic.ordinates import Ordinates
 from imubench_pipeline.estimators.estimate import SIGMAS, Parameter
 from imubench_pipeline.estimators.thermal.path import TemperaturePath
-from imubench_pipeline.estimators.thermal.regression import Effect, Posterior, Regression
+from imubench_pipeline.estimators.thermal.regression import Effect, Posterior, Regression, Shape
 from imubench_pipeline.estimators.whittle import Maximum, make_noise_model
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.typing import Array
 from imubench_pipeline.words.reasons import estimates as texts
 
 _MIN_DELTA_BIC = 4.0  # least gain of BIC by temperature, which easily fits a random walk
-_MIN_GAIN_BY_SQUARE = 6.0  # least gain of log likelihood beyond BIC
+_MIN_EXTRA_GAIN = 6.0  # least gain of log likelihood beyond BIC, by the square or by settling
+_SETTLING_FRACTIONS = (1 / 64, 1 / 32, 1 / 16)  # times of settling, over the log
 _MAX_RAMP_FRACTION = 0.95  # of the information on s that a ramp shares; above it they are confused
 _MAX_LAG_WIDTH = 0.5  # of the interval of a lag that has a value, over the longest lag
 
@@ -93,26 +94,37 @@ def fit_temperature(
     bias = _limit_bias(level, _compute_mean_error(noise, plain, length, rate))
     if not (path.range > 0.0 and path.range >= 2.0 * float(np.median(path.deviation))):
         return _describe_nothing(path, bias, texts.small_temperature_range(path.range))
-    effect = _choose_square(regression)
+    effect = _choose_shape(regression, length)
     lags = regression.bracket_likely_lags(effect)
-    effect = regression.fit(quadratic=effect.quadratic, lags=lags)
+    effect = regression.fit(effect.shape, lags)
     before = ordinates.log_likelihood(ordinates.coefficient, density)
     fitted = _describe(regression, effect, lags, before, bias, length)
     if not fitted.compensated:
         # Without an effect, the fitted lag only makes a random walk look like temperature.
         lags = np.zeros(1)
-        effect = regression.fit(quadratic=effect.quadratic, lags=lags)
+        effect = regression.fit(effect.shape, lags)
         lagless = _describe(regression, effect, lags, before, bias, length)
         fitted = replace(lagless, lag=fitted.lag)
     return fitted
 
 
-def _choose_square(regression: Regression) -> Effect:
-    """Return the fit with or without the square of the temperature."""
-    needed = 0.5 * math.log(regression.bins) + _MIN_GAIN_BY_SQUARE
-    linear = regression.fit(quadratic=False, lags=regression.lags)
-    square = regression.fit(quadratic=True, lags=regression.lags)
-    return square if square.log_likelihood > linear.log_likelihood + needed else linear
+def _choose_shape(regression: Regression, length: float) -> Effect:
+    """Return the fit with the terms that the log supports: the square, and settling."""
+    needed = 0.5 * math.log(regression.bins) + _MIN_EXTRA_GAIN
+    effect = regression.fit(Shape(), regression.lags)
+    for _ in range(2):
+        shape = effect.shape
+        wider = [] if shape.quadratic else [replace(shape, quadratic=True)]
+        if not shape.settling:
+            wider += [replace(shape, settling=part * length) for part in _SETTLING_FRACTIONS]
+        gains = [regression.gain(effect, each) for each in (shape, *wider)]
+        if not wider or max(gains) < gains[0] + needed:
+            break
+        other = regression.fit(wider[int(np.argmax(gains[1:]))], regression.lags)
+        if other.log_likelihood < effect.log_likelihood + needed:
+            break
+        effect = other
+    return effect
 
 
 def _describe(
@@ -139,6 +151,8 @@ def _describe(
     reason = confused or texts.SENSITIVITY_WITH_ZERO
     if excluded and confused is None:
         reason = texts.temperature_preferred(gained, enough=gained > _MIN_DELTA_BIC)
+    if effect.shape.settling > 0.0:
+        reason += f"; {texts.settling_excluded(effect.shape.settling)}"
     figures = [
         Parameter(None, "not_identified", confused, low, high, fitted=value)
         if confused
@@ -147,13 +161,13 @@ def _describe(
             *(each.tolist() for each in (effect.beta, lower, upper)), strict=True
         )
     ]
-    q = figures[1] if effect.quadratic else Parameter(None, "absent", texts.ABSENT)
+    q = figures[1] if effect.shape.quadratic else Parameter(None, "absent", texts.ABSENT)
     lag = _limit_lag(effect.lag, posterior, math.sqrt(moved[p, p]), float(regression.lags[-1]))
     if not compensated:
         lag = Parameter(None, "not_identified", texts.NO_EFFECT_TO_LAG)
         nothing = np.zeros(len(path.value))
         return ThermalFit(path.mean, figures[0], q, lag, bias, False, reason, nothing, 0.0, path)
-    terms = np.array([regression.knots(effect.lag) ** (1 + i) for i in range(p)])
+    terms = regression.terms(effect.lag, effect.shape)
     at_knots = effect.beta @ terms
     shift = float(regression.means(at_knots).mean())
     # The error of T_0 is the error of the mean of the path.
@@ -192,7 +206,7 @@ def _limit_lag(value: float, posterior: Posterior, by_path: float, longest: floa
 
 def _explain_confusion(regression: Regression, effect: Effect) -> str | None:
     """Return why temperature and time are not distinguishable, or None."""
-    columns = np.vstack([regression.columns(effect.lag, False), regression.time])
+    columns = np.vstack([regression.columns(effect.lag, Shape()), regression.time])
     information = (columns * regression.ordinates.weights(effect.density)) @ columns.T
     shared = information[0, 1] ** 2 / (information[0, 0] * information[1, 1])
     return texts.temperature_like_ramp(float(shared)) if shared > _MAX_RAMP_FRACTION else None

@@ -8,7 +8,7 @@ weighted sum. For given noise the lag is scanned; the noise is fitted to the res
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -33,17 +33,31 @@ _WALK_FACTORS = np.concatenate(([0.0], np.geomspace(0.05, 20.0, 28)))
 
 
 @dataclass(frozen=True)
+class Shape:
+    """The terms of an effect."""
+
+    quadratic: bool = False  # whether the square of the temperature is one
+    settling: float = 0.0
+    """Time from the beginning, s, in which the sensitivity has another value; 0: none."""
+
+
+@dataclass(frozen=True)
 class Effect:
     """Effect of temperature and the noise, fitted together."""
 
-    quadratic: bool
+    shape: Shape
     lag: float  # s
-    beta: Array  # (p,): s, and q if it is in the model; SI per K and K²
+    beta: Array
+    """(p,): s; q and the change of s while settling, if they are terms; SI per K and K²."""
     covariance: Array  # (p, p): for the noise and the lag as fitted
     noise: Maximum
     density: Array  # (k,): of the noise at each ordinate, SI²/Hz
     log_likelihood: float  # up to a constant that all fits of the log share
-    free: int  # number of parameters
+
+    @property
+    def free(self) -> int:
+        """Number of parameters."""
+        return len(self.beta) + (self.lag > 0.0)
 
 
 @dataclass(frozen=True)
@@ -65,7 +79,7 @@ class Regression:
     def __init__(self, ordinates: Ordinates, path: TemperaturePath, rate: float) -> None:
         self.ordinates, self.path, self.rate = ordinates, path, rate
         self.block = ordinates.means.block
-        self._known: dict[float, Array] = {}
+        self._known: dict[tuple[float, Shape], Array] = {}
         highest = float(ordinates.frequency[ordinates.used].max())
         ones = np.ones_like(ordinates.coefficient)
         spectrum = ordinates.spectrum(ordinates.coefficient, ones)
@@ -89,12 +103,26 @@ class Regression:
         """Return T_lag - T_0 at the knots of the path, shape (k,), K."""
         return self.path.apply_lag(self.path.value, self.rate, lag) - self.path.mean
 
-    def columns(self, lag: float, quadratic: bool) -> Array:
-        """Return the coefficients of the temperature and of its square, shape (p, k)."""
-        if lag not in self._known:
-            means = self.means(self.knots(lag))
-            self._known[lag] = self.transform(np.array([means, means**2]))
-        return self._known[lag][: 1 + quadratic]
+    def terms(self, lag: float, shape: Shape) -> Array:
+        """Return the terms of an effect at the knots of the path, shape (p, k), K or K²."""
+        knots = self.knots(lag)
+        terms = [knots, knots**2] if shape.quadratic else [knots]
+        if shape.settling > 0.0:
+            end = self.first_settled(shape)
+            terms.append(np.where(np.arange(len(knots)) < end, knots - knots[end], 0.0))
+        return np.array(terms)
+
+    def first_settled(self, shape: Shape) -> int:
+        """Return the first knot at which the sensor has settled."""
+        end = self.path.sample[0] + shape.settling * self.rate
+        return min(int(np.searchsorted(self.path.sample, end)), len(self.path.sample) - 1)
+
+    def columns(self, lag: float, shape: Shape) -> Array:
+        """Return the coefficients of the terms of an effect, shape (p, k)."""
+        if (lag, shape) not in self._known:
+            means = [self.means(term) for term in self.terms(lag, shape)]
+            self._known[lag, shape] = self.transform(np.array(means))
+        return self._known[lag, shape]
 
     @cached_property
     def time(self) -> Array:
@@ -122,25 +150,29 @@ class Regression:
         beta = covariance @ target
         return beta, covariance, 0.5 * float(target @ beta)
 
-    def fit(self, *, quadratic: bool, lags: Array) -> Effect:
+    def gain(self, effect: Effect, shape: Shape) -> float:
+        """Return the log likelihood gained by a shape, for the noise and the lag of a fit."""
+        return self.solve(self.columns(effect.lag, shape), effect.density)[2]
+
+    def fit(self, shape: Shape, lags: Array) -> Effect:
         """Return the fit with the highest likelihood, from the noise with and without the effect.
 
         ``lags``, shape (l,): the lags that are tried, s.
         """
         white = np.full(len(self.ordinates.coefficient), self.ordinates.means.interval)
-        beta, *_ = self.solve(self.columns(0.0, quadratic), white)
-        left = self.ordinates.coefficient - beta @ self.columns(0.0, quadratic)
+        beta, *_ = self.solve(self.columns(0.0, shape), white)
+        left = self.ordinates.coefficient - beta @ self.columns(0.0, shape)
         starts = [self.fit_noise(residual)[1] for residual in (self.ordinates.coefficient, left)]
-        fits = [self._fit(quadratic, lags, density) for density in starts]
+        fits = [self._fit(shape, lags, density) for density in starts]
         return max(fits, key=lambda fit: fit.log_likelihood)
 
-    def _fit(self, quadratic: bool, lags: Array, density: Array) -> Effect:
+    def _fit(self, shape: Shape, lags: Array, density: Array) -> Effect:
         """Return a fit by turns of effect and noise, from the density of the noise."""
         before = math.inf
         for _ in range(_MAX_ROUNDS):
-            gains = [self.solve(self.columns(lag, quadratic), density)[2] for lag in lags.tolist()]
+            gains = [self.solve(self.columns(lag, shape), density)[2] for lag in lags.tolist()]
             lag = float(lags[int(np.argmax(gains))])
-            columns = self.columns(lag, quadratic)
+            columns = self.columns(lag, shape)
             beta, covariance, _ = self.solve(columns, density)
             residual = self.ordinates.coefficient - beta @ columns
             leverage = np.einsum("ik,ij,jk->k", columns, covariance, columns)
@@ -149,9 +181,8 @@ class Regression:
             if abs(beta[0] - before) < _TOLERANCE * math.sqrt(covariance[0, 0]):
                 break
             before = float(beta[0])
-        free = len(beta) + (lag > 0.0)
         log_likelihood = self.ordinates.log_likelihood(residual, density)
-        return Effect(quadratic, lag, beta, covariance, noise, density, log_likelihood, free)
+        return Effect(shape, lag, beta, covariance, noise, density, log_likelihood)
 
     def fit_noise(self, residual: Array, weight: Array | None = None) -> tuple[Maximum, Array]:
         """Return the noise model of coefficients, each with its weight, and its density."""
@@ -163,12 +194,8 @@ class Regression:
         """Return a fine scan of the lags that are not excluded."""
         lags = self.lags
         for _ in range(2):
-            gains = np.array(
-                [
-                    self.solve(self.columns(lag, effect.quadratic), effect.density)[2]
-                    for lag in lags.tolist()
-                ]
-            )
+            effects = [replace(effect, lag=lag) for lag in lags.tolist()]
+            gains = np.array([self.gain(each, effect.shape) for each in effects])
             likely = np.flatnonzero(gains > gains.max() - _MAX_DELTA_LOG_LIKELIHOOD)
             low, high = lags[max(likely[0] - 1, 0)], lags[min(likely[-1] + 1, len(lags) - 1)]
             lags = np.linspace(low, high, _FINE_LAGS)
@@ -198,7 +225,7 @@ class Regression:
         for i, lag in enumerate(lags.tolist()):
             if effect is None:
                 continue
-            columns = self.columns(lag, effect.quadratic)
+            columns = self.columns(lag, effect.shape)
             fitted = np.linalg.slogdet(self.solve(columns, density)[1])[1]
             for j, each in enumerate(densities):
                 beta, covariance, gain = self.solve(columns, each)
@@ -218,10 +245,14 @@ class Regression:
     def path_errors(self, effect: Effect) -> Array:
         """Return the changes of beta and the lag by the errors of the drawn paths, (d, p + 1)."""
         knots = self.knots(effect.lag)
-        slope = effect.beta[0] + (2.0 * effect.beta[1] * knots if effect.quadratic else 0.0)
+        slope = np.full(len(knots), effect.beta[0])
+        if effect.shape.quadratic:
+            slope += 2.0 * effect.beta[1] * knots
+        if effect.shape.settling > 0.0:
+            slope[: self.first_settled(effect.shape)] += effect.beta[-1]
         step = max(0.05 * effect.lag, 0.5 * self.block / self.rate)
         by_lag = self.means(slope * (self.knots(effect.lag + step) - knots) / step)
-        columns = np.vstack([self.columns(effect.lag, effect.quadratic), self.transform(by_lag)])
+        columns = np.vstack([self.columns(effect.lag, effect.shape), self.transform(by_lag)])
         weighted = columns * self.ordinates.weights(effect.density)
         information = weighted @ columns.T
         scale = np.sqrt(np.maximum(np.diag(information), 1e-300))

@@ -177,6 +177,13 @@ def temperature_preferred(delta_bic: float, *, enough: bool) -> str:
     return f"BIC prefers the model with temperature by {number_text(delta_bic, 3)}{short}"
 
 
+def settling_excluded(seconds: float) -> str:
+    return (
+        f"the first {number_text(seconds, 3)} s follow the temperature differently, and are not "
+        "used for the sensitivity"
+    )
+
+
 def lag_range(lower: float, upper: float) -> str:
     return f"lags from {number_text(lower, 3)} to {number_text(upper, 3)} s fit the log"
 
