@@ -146,7 +146,8 @@ def _describe(
     error = SIGMAS * np.sqrt(np.diag(covariance))
     lower, upper = effect.beta - error, effect.beta + error
     confused = _explain_confusion(regression, effect)
-    excluded = bool(((lower > 0.0) | (upper < 0.0)).any())
+    of_temperature = slice(1 + effect.shape.quadratic)
+    excluded = bool(((lower > 0.0) | (upper < 0.0))[of_temperature].any())
     compensated = excluded and confused is None and gained > _MIN_DELTA_BIC
     reason = confused or texts.SENSITIVITY_WITH_ZERO
     if excluded and confused is None:
@@ -177,10 +178,9 @@ def _describe(
     assert bias.value is not None  # the mean of the log
     bias = _limit_bias(bias.value - shift, math.sqrt(noise**2 + by_effect + of_reference**2))
     varying = terms - terms.mean(axis=1, keepdims=True)
-    error = np.einsum("ik,ij,jk->", varying, covariance, varying) / np.sum(
-        (effect.beta @ varying) ** 2
-    )
-    described = figures[0], q, lag, bias, True, reason, at_knots, math.sqrt(float(error))
+    power = np.sum((effect.beta @ varying) ** 2)
+    relative_error = float(np.sqrt(np.einsum("ik,ij,jk->", varying, covariance, varying) / power))
+    described = figures[0], q, lag, bias, True, reason, at_knots, relative_error
     return ThermalFit(path.mean, *described, path)
 
 
