@@ -22,7 +22,6 @@ from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.typing import Array
 from imubench_pipeline.words.reasons import estimates as texts
 
-_MIN_DELTA_BIC = 4.0  # least gain of BIC by temperature, which easily fits a random walk
 _MIN_EXTRA_GAIN = 6.0  # least gain of log likelihood beyond BIC, by the square or by settling
 _SETTLING_FRACTIONS = (1 / 64, 1 / 32, 1 / 16)  # times of settling, over the log
 _MAX_RAMP_FRACTION = 0.95  # of the information on s that a ramp shares; above it they are confused
@@ -88,7 +87,7 @@ def fit_temperature(
     if not ordinates.is_usable:
         return _describe_nothing(path, Parameter(level, "not_identified", texts.SHORT_LOG))
     regression = Regression(ordinates, path, rate)
-    noise, density = regression.fit_noise(ordinates.coefficient)
+    noise, density = regression.plain
     plain = regression.posterior(None, noise, density, np.zeros(1))
     length = sum(ordinates.sizes) * means.interval
     bias = _limit_bias(level, _compute_mean_error(noise, plain, length, rate))
@@ -148,10 +147,10 @@ def _describe(
     confused = _explain_confusion(regression, effect)
     of_temperature = slice(1 + effect.shape.quadratic)
     excluded = bool(((lower > 0.0) | (upper < 0.0))[of_temperature].any())
-    compensated = excluded and confused is None and gained > _MIN_DELTA_BIC
+    compensated = excluded and confused is None and gained > 0.0
     reason = confused or texts.SENSITIVITY_WITH_ZERO
     if excluded and confused is None:
-        reason = texts.temperature_preferred(gained, enough=gained > _MIN_DELTA_BIC)
+        reason = texts.temperature_preferred(gained)
     if effect.shape.settling > 0.0:
         reason += f"; {texts.settling_excluded(effect.shape.settling)}"
     figures = [

@@ -22,8 +22,7 @@ from imubench_pipeline.typing import Array
 LAGS = 16  # lags of a scan
 _MAX_LAG_FRACTION = 1 / 20  # longest lag over the log; a longer lag looks like drift
 _MAX_LAG = 1800.0  # s
-_MAX_ROUNDS = 10
-_TOLERANCE = 0.02  # change of s in a round, in standard errors
+_ROUNDS = 3  # of effect and noise; more change nothing in benchmarks/temperature.py
 _MIN_WEIGHT = 0.05  # weight of an ordinate that the temperature explains almost completely
 _FINE_LAGS = 48
 _MAX_DELTA_LOG_LIKELIHOOD = 8.0  # below the best; less likely lags are not in the fine scan
@@ -154,22 +153,18 @@ class Regression:
         """Return the log likelihood gained by a shape, for the noise and the lag of a fit."""
         return self.solve(self.columns(effect.lag, shape), effect.density)[2]
 
+    @cached_property
+    def plain(self) -> tuple[Maximum, Array]:
+        """The noise of the log as it is, and its density at each ordinate."""
+        return self.fit_noise(self.ordinates.coefficient)
+
     def fit(self, shape: Shape, lags: Array) -> Effect:
-        """Return the fit with the highest likelihood, from the noise with and without the effect.
+        """Return a fit by turns of effect and noise.
 
         ``lags``, shape (l,): the lags that are tried, s.
         """
-        white = np.full(len(self.ordinates.coefficient), self.ordinates.means.interval)
-        beta, *_ = self.solve(self.columns(0.0, shape), white)
-        left = self.ordinates.coefficient - beta @ self.columns(0.0, shape)
-        starts = [self.fit_noise(residual)[1] for residual in (self.ordinates.coefficient, left)]
-        fits = [self._fit(shape, lags, density) for density in starts]
-        return max(fits, key=lambda fit: fit.log_likelihood)
-
-    def _fit(self, shape: Shape, lags: Array, density: Array) -> Effect:
-        """Return a fit by turns of effect and noise, from the density of the noise."""
-        before = math.inf
-        for _ in range(_MAX_ROUNDS):
+        density = self.plain[1]
+        for _ in range(_ROUNDS):
             gains = [self.solve(self.columns(lag, shape), density)[2] for lag in lags.tolist()]
             lag = float(lags[int(np.argmax(gains))])
             columns = self.columns(lag, shape)
@@ -178,9 +173,6 @@ class Regression:
             leverage = np.einsum("ik,ij,jk->k", columns, covariance, columns)
             leverage *= self.ordinates.weights(density)
             noise, density = self.fit_noise(residual, np.maximum(1.0 - leverage, _MIN_WEIGHT))
-            if abs(beta[0] - before) < _TOLERANCE * math.sqrt(covariance[0, 0]):
-                break
-            before = float(beta[0])
         log_likelihood = self.ordinates.log_likelihood(residual, density)
         return Effect(shape, lag, beta, covariance, noise, density, log_likelihood)
 

@@ -172,9 +172,9 @@ def small_temperature_range(kelvin: float) -> str:
     return f"the temperature changes by only {number_text(kelvin, 2)} K"
 
 
-def temperature_preferred(delta_bic: float, *, enough: bool) -> str:
-    short = "" if enough else ", which is not enough"
-    return f"BIC prefers the model with temperature by {number_text(delta_bic, 3)}{short}"
+def temperature_preferred(delta_bic: float) -> str:
+    which = "with" if delta_bic > 0.0 else "without"
+    return f"BIC prefers the model {which} temperature by {number_text(abs(delta_bic), 3)}"
 
 
 def settling_excluded(seconds: float) -> str:
