@@ -12,7 +12,7 @@ from __future__ import annotations
 import argparse
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -21,8 +21,12 @@ import scipy.fft
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
-from imubench_pipeline.allan import allan_variance
-from imubench_pipeline.estimators.thermal.fit import fit_temperature
+from imubench_pipeline.allan import allan_variance, of_blocks
+from imubench_pipeline.estimators import likelihood
+from imubench_pipeline.estimators.estimate import Estimate
+from imubench_pipeline.estimators.robust import fit as robust
+from imubench_pipeline.estimators.robust.parts import compute_part_variances
+from imubench_pipeline.estimators.thermal.fit import ThermalFit, fit_temperature
 from imubench_pipeline.estimators.thermal.path import estimate_temperature_path
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.simulate import simulate
@@ -123,7 +127,7 @@ def of_log(number: int) -> dict[str, object]:
     made = case(number)
     rng = np.random.default_rng([number, 9])
     path = estimate_temperature_path([made.readings], [(0, len(made.log))], rng)
-    fit = fit_temperature(lambda: [made.log], len(made.log), made.rate, path, rng=rng)
+    fit = fit_temperature([made.log], len(made.log), made.rate, path)
     s, lag, bias = fit.sensitivity, fit.lag, fit.bias
     value = s.in_model
     row: dict[str, object] = {
@@ -155,16 +159,38 @@ def of_log(number: int) -> dict[str, object]:
         "reason": fit.reason,
     }
     truth = MODELS[number % len(MODELS)]
+    estimates = estimate_rest(made.log, made.rate, fit, rng)
     for name, true in (("N", truth.N), ("B", truth.B), ("K", truth.K)):
-        found = fit.without_temperature.estimates[0].parameters[name]
-        low, high = found.lower, found.upper
-        row |= {
-            f"{name}_true": true,
-            f"{name}_found": found.value,
-            f"{name}_told": low is not None and high is not None and true > 0.0,
-            f"{name}_inside": low is not None and high is not None and low <= true <= high,
-        }
+        for method, estimate in estimates.items():
+            found = estimate.parameters[name]
+            low, high = found.lower, found.upper
+            row |= {
+                f"{method}_{name}_true": true,
+                f"{method}_{name}_found": found.value,
+                f"{method}_{name}_given": low is not None and high is not None and true > 0.0,
+                f"{method}_{name}_inside": low is not None
+                and high is not None
+                and low <= true <= high,
+            }
     return row
+
+
+def estimate_rest(
+    log: Array, rate: float, fit: ThermalFit, rng: np.random.Generator
+) -> dict[str, Estimate]:
+    """Return the estimates of a compensated log by the robust method and the likelihood."""
+    left = np.concatenate(list(fit.compensate([log])))
+    fitted = likelihood.fit_blocks(lambda: [left], len(log), rate, holes=False, rng=rng)
+    curve, added = (
+        of_blocks([values], len(log), rate, holes=False) for values in (left, log - left)
+    )
+    curve = replace(curve, variance=curve.variance + fit.relative_error**2 * added.variance)
+    parts = compute_part_variances([left], curve, holes=False)
+    lines = [line.term for line in fitted.lines if line.kind != "alias"]
+    return {
+        "robust": robust.fit(curve, parts, lines, rng=rng),
+        "likelihood": fitted.estimates[0],
+    }
 
 
 def summary(rows: pd.DataFrame) -> list[tuple[str, str]]:
@@ -173,14 +199,16 @@ def summary(rows: pd.DataFrame) -> list[tuple[str, str]]:
     nothing, something = told[told.true == 0.0], told[told.true != 0.0]
     lagged = something[(something.lag_status == "ok") & (something.lag > 0)]
     given = something[something.compensated]
-    left = [
-        (
-            f"coverage of {name}, temperature taken out",
-            f"{100 * those[f'{name}_inside'].mean():.1f} % of {len(those)}",
-        )
-        for name in ("N", "B", "K")
-        for those in [given[given[f"{name}_told"]]]
-    ]
+    left = []
+    for method in ("robust", "likelihood"):
+        for name in ("N", "B", "K"):
+            limited = given[given[f"{method}_{name}_given"].astype(bool)]
+            inside = limited[f"{method}_{name}_inside"].astype(float)
+            value = limited[f"{method}_{name}_found"].astype(float)
+            error = np.log(value / limited[f"{method}_{name}_true"]).dropna()
+            text = f"{100 * inside.mean():.1f} % of {len(limited)}, {len(error)} values, "
+            text += f"rms error {100 * math.sqrt((error**2).mean()):.1f} %"
+            left.append((f"coverage of {name}, {method} of the compensated log", text))
     lag_error = (lagged.lag_found.astype(float) - lagged.lag) / lagged.lag_bound
     return [
         ("logs", f"{len(rows)}, s told in {len(told)}"),
@@ -210,7 +238,7 @@ def real(path: Path) -> None:
     course = estimate_temperature_path([readings], [(0, len(readings))], rng)
     for axis in "xyz":
         values = log[f"gyro_{axis}_mrad_s"].to_numpy() * 1e-3
-        fit = fit_temperature(lambda v=values: [v], len(values), 1.0, course, rng=rng)  # type: ignore[misc]  # mypy infers no type of a lambda's default
+        fit = fit_temperature([values], len(values), 1.0, course)
         s = fit.sensitivity
         print(
             f"gyro_{axis}: s = {1e3 * (s.in_model or 0.0):.4f} mrad/s/K "

@@ -157,6 +157,22 @@ def test_method_compensated_has_the_noise_that_temperature_leaves(found: Estimat
     assert all(row["recommended"] for row in by_method["likelihood"])
 
 
+def test_the_robust_method_fits_the_compensated_log_if_it_is_among_the_methods(
+    found: Estimation, warm: ChannelLog
+) -> None:
+    robust = estimated(warm, methods=("robust", "compensated"))
+    own, other = (
+        figures([row for row in rows if row["method"] == "compensated"])
+        for rows in (robust.parameters, found.parameters)
+    )
+    assert own["N"]["lower"] < NOISE.N < own["N"]["upper"]
+    assert own["K"]["upper"] > NOISE.K
+    assert own["N"]["upper"] != other["N"]["upper"]  # of the likelihood
+    assert [row["adev"] for row in robust.allan_compensated] == [
+        row["adev"] for row in found.allan_compensated
+    ]
+
+
 def test_the_tables_give_estimate_and_curve_back(
     found: Estimation, warm: ChannelLog, tmp_path: Path
 ) -> None:

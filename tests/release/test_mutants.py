@@ -29,9 +29,9 @@ def source(tmp_path_factory: pytest.TempPathFactory) -> Path:
         ("allan/phase.py", "longer = longer_last[i]", "longer = (longer_last[i])", SURVIVED),
         # Tests that call a kernel, and run no line of the package that is seen.
         (
-            "estimators/thermal/path_kernels.py",
-            "x, s = means[n - 1, 0], means[n - 1, 1]",
-            "x, s = means[n - 1, 0], means[n - 2, 1]",
+            "estimators/posterior_kernels.py",
+            "value += point[j]",
+            "value -= point[j]",
             KILLED,
         ),
     ],

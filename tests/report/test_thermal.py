@@ -48,7 +48,7 @@ def test_thermal_text_has_sensitivity_and_compensated_deviation() -> None:
         "The bias changes with temperature by 90 °/h/K. Compensated, the Allan deviation is lower "
         "by a factor of 2 at τ = 100 s, 2 at τ = 300 s, 2 at τ = 1000 s.",
         "Ranking, datasheet comparison and budgets use the log with its temperature effect. The "
-        "method “likelihood, temperature compensated” gives the noise at constant temperature.",
+        "method “temperature compensated” gives the noise at constant temperature.",
         "The mean temperature T₀ is 22.5 °C.",
         "The sensor's own low-pass has its cut-off at 64 Hz (first order).",
     ]

@@ -428,7 +428,9 @@ class DeterministicRow(ChannelRow):
 class DrawRow(ChannelRow):
     """A row of the table ``draws``."""
 
-    method: Annotated[str, Column("estimation method: likelihood, likelihood_gm or compensated")]
+    method: Annotated[
+        str, Column("estimation method: robust, likelihood, likelihood_gm or compensated")
+    ]
     draw: Annotated[int, Column("number of the draw, from 0: a noise model that the log allows")]
     component: Annotated[int, Column("number of a repeated term, from 1")]
     Q: Annotated[

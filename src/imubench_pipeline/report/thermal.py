@@ -30,7 +30,7 @@ _SHOWN_TAU = np.array([100.0, 300.0, 1_000.0, 3_000.0, 10_000.0, 30_000.0])
 
 _NOT_COMPENSATED = (
     "Ranking, datasheet comparison and budgets use the log with its temperature effect. The "
-    "method “likelihood, temperature compensated” gives the noise at constant temperature."
+    "method “temperature compensated” gives the noise at constant temperature."
 )
 _MIN_SHOWN_RATIO = 1.05
 """Ratio of Allan deviations without and with compensation from which it is stated."""

@@ -40,7 +40,7 @@ METHOD_NAMES = {
     "robust": "robust fit",
     "likelihood": "likelihood",
     "likelihood_gm": "likelihood, papers' model",
-    "compensated": "likelihood, temperature compensated",
+    "compensated": "temperature compensated",
     "curve": "read from the curve",
     "paper": "fit, weights as printed",
     "weighted": "fit, correct weights",

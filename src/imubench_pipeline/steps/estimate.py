@@ -40,10 +40,13 @@ from imubench_pipeline.estimators.spectral_findings import (
     find_missing_slow_noise,
     spectral_findings,
 )
-from imubench_pipeline.estimators.thermal.fit import fit_temperature
+from imubench_pipeline.estimators.thermal.fit import (
+    ThermalFit,
+    add_temperature_effect,
+    fit_temperature,
+)
 from imubench_pipeline.estimators.thermal.path import TemperaturePath, estimate_temperature_path
 from imubench_pipeline.estimators.thermal.register import estimate_resolution
-from imubench_pipeline.estimators.thermal.result import ThermalFit, add_temperature_effect
 from imubench_pipeline.model import estimates as model
 from imubench_pipeline.model.recordings import FindingRow
 from imubench_pipeline.noise.simulate import channel_rng
@@ -150,9 +153,10 @@ class _Channel:
         self._bandwidth = bandwidth
         self._band = parse_quantity(settings.band, "frequency") if settings.band else None
         limits = [limit for limit in (self._band, 0.5 * (bandwidth or 0.0)) if limit]
-        unfiltered = min(limits, default=None)  # the noise is not attenuated up to this frequency
+        # The noise is not attenuated up to this frequency.
+        self._unfiltered = min(limits, default=None)
         self.signals = find_deterministic_signals(
-            log.blocks, log.grid, log.rate, segments=log.segments, highest=unfiltered
+            log.blocks, log.grid, log.rate, segments=log.segments, highest=self._unfiltered
         )
         self._presence = count_presence(log.blocks(), log.grid, log.segments) if log.holes else None
         self._bare = self._curve_of(self._blocks()) if self.signals.signals else curve
@@ -174,20 +178,27 @@ class _Channel:
     def by_likelihood(self, into: Estimation) -> dict[str, Estimate]:
         """Return the estimates from the spectrum, and store the associated rows."""
         key, log = self.key, self.log
-        self.fitted = fitted = self._fitted(self._blocks)
+        self.fitted = fitted = self._fitted(self._blocks, self._bare)
         estimates = {estimate.method: estimate for estimate in fitted.estimates}
         if "robust" in self.settings.methods:
-            estimates["robust"] = self._fit_robustly(fitted)
+            estimates["robust"] = self._fit_robustly(self._blocks, self._bare, fitted)
         compensating = log.temperature and "compensated" in self.settings.methods
-        warm = self._temperature(fitted, into) if compensating else None
+        warm = self._fit_temperature(into) if compensating else None
         if warm is not None and warm.compensated:
-            without = warm.without_temperature
-            estimates["compensated"] = replace(without.estimates[0], method="compensated")
-            left = self._curve_of(warm.compensate(log.blocks()))
+            rest = partial(_compensate, warm, log)
+            left = self._curve_of(rest())
+            without = self._fitted(rest, left)
             nothing = (np.zeros(len(values)) for values in log.blocks())
             added = self._curve_of(
                 add_temperature_effect(nothing, warm.path, warm.effect), whole=True
             )
+            best = without.estimates[0]
+            if "robust" in self.settings.methods:
+                # The effect that is fitted takes some of the noise with it.
+                taken = warm.relative_error**2 * added.variance
+                whole = replace(left, variance=left.variance + taken)
+                best = self._fit_robustly(rest, whole, without)
+            estimates["compensated"] = replace(best, method="compensated")
 
         limited = partial(add_fitted_limits, segments=log.segments, presence=self._presence)
         into.allan += make_allan_rows(key, limited(self.curve, fitted))
@@ -213,19 +224,21 @@ class _Channel:
                     into.allan_compensated.append(row)
         return estimates
 
-    def _fit_robustly(self, fitted: Likelihood) -> Estimate:
+    def _fit_robustly(
+        self, blocks: Callable[[], Iterator[Array]], curve: AllanCurve, fitted: Likelihood
+    ) -> Estimate:
         """Return the estimate from the curve and its parts; the lines are of the spectrum."""
         log, there = self.log, self._presence
         parts = compute_part_variances(
-            self._blocks(),
-            self._bare,
+            blocks(),
+            curve,
             holes=there is not None,
             gaps=there.gaps if there else NO_GAPS,
             segments=log.segments,
         )
         lines = [line.term for line in fitted.lines if line.kind != "alias"]
         try:
-            estimate = robust.fit(self._bare, parts, lines, rng=self._stream("robust"))
+            estimate = robust.fit(curve, parts, lines, rng=self._stream("robust"))
         except least_squares.UnfitCurveError as error:
             return not_shown("robust", str(error))
         return replace(estimate, lines=select_sinusoids(fitted.lines))
@@ -244,29 +257,21 @@ class _Channel:
             segments=log.segments,
         )
 
-    def _temperature(self, fitted: Likelihood, into: Estimation) -> ThermalFit:
-        """Return the temperature effect of the channel."""
+    def _fit_temperature(self, into: Estimation) -> ThermalFit:
+        """Return the temperature effect of the channel.
+
+        Temperature explains a warm-up, so deterministic signals remain in the log.
+        """
         log = self.log
         if log.path not in into.paths:
             of_clock = f"{log.path.name} {average_blocks(log.temperatures())!r}"
             rng = channel_rng(self.settings.seed, of_clock, "temperature")
             into.paths[log.path] = estimate_temperature_path(log.temperatures(), log.segments, rng)
-        # Temperature explains a warm-up, so it remains in the log to which they are fitted.
-        plain = self._fitted(log.blocks) if self.signals.signals else fitted
         return fit_temperature(
-            log.blocks,
-            log.grid,
-            log.rate,
-            into.paths[log.path],
-            holes=log.holes,
-            band=self._band,
-            bandwidth=self._bandwidth,
-            resolution=estimate_register_step(log),
-            plain=plain,
-            rng=self._stream("temperature"),
+            log.blocks(), log.grid, log.rate, into.paths[log.path], highest=self._unfiltered
         )
 
-    def _fitted(self, blocks: Callable[[], Iterator[Array]]) -> Likelihood:
+    def _fitted(self, blocks: Callable[[], Iterator[Array]], curve: AllanCurve) -> Likelihood:
         log = self.log
         return likelihood.fit_blocks(
             blocks,
@@ -287,6 +292,11 @@ class _Channel:
     def _stream(self, use: str) -> np.random.Generator:
         """Return a random stream that depends only on the samples, not on file names."""
         return channel_rng(self.settings.seed, f"{self.mean!r}", f"{self.log.grid}", use)
+
+
+def _compensate(fit: ThermalFit, log: ChannelLog) -> Iterator[Array]:
+    """Yield a log without the effect of temperature."""
+    return fit.compensate(log.blocks())
 
 
 _MIN_SAMPLES_FOR_STEP = 1 << 16  # samples from which the step of a register is found

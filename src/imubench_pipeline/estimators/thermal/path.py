@@ -1,9 +1,11 @@
 """The smooth path of a temperature from the readings of a register, with its error.
 
-The temperature is an integrated random walk (G. Wahba, J. R. Stat. Soc. B 40, 1978). A block of
-equal readings gives the cell of the register, and a block with two readings the time at the edge
-between their cells (expectation propagation: T. Minka, UAI 2001). The rate of the walk and the
-noise of the register maximise the evidence.
+The temperature is a random walk of its slope, which makes the most likely path a smoothing spline
+(G. Wahba, J. R. Stat. Soc. B 40, 1978). The spline is computed by its second differences (C.
+Reinsch, Numer. Math. 10, 1967), and the density of the walk maximises their likelihood.
+
+A reading in whole steps says little of the temperature within its cell. All readings of a stay in a
+cell are one measurement, of its centre; a change between two cells measures their edge.
 """
 
 from __future__ import annotations
@@ -16,27 +18,23 @@ from typing import Any
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
-from scipy.optimize import minimize
-from scipy.special import ndtri
+from scipy.linalg import LinAlgError, cho_solve_banded, cholesky_banded
+from scipy.optimize import minimize_scalar
 
 from imubench_pipeline.allan.phase import Span
-from imubench_pipeline.estimators.thermal.path_kernels import draw_paths, propagate
-from imubench_pipeline.estimators.thermal.register import (
-    Readings,
-    find_cell_stays,
-    gather_readings,
-    split_at_jumps,
-)
+from imubench_pipeline.estimators.thermal.register import Readings, gather_readings
 from imubench_pipeline.typing import Array
 
-DRAWN_PATHS = 24  # paths drawn from the posterior of the temperature
-_LOG_DENSITY_GRID = range(-14, 5, 2)
-_NOISE_GRID = (0.01, 0.1, 0.4)
-_MIN_NOISE = 1e-4
-_MAX_ITERATIONS = 40
-_IMPOSSIBLE_COST = 1e300
-_FLOOR = 1e-3
-_MAX_BOUNDING_NOISE = 0.25  # ratio of noise and step below which a reading bounds the temperature
+DRAWN_PATHS = 24  # paths drawn around the most likely one
+_LOG_DENSITIES = (-16.0, 4.0)  # of the walk, over the squared range of the readings
+_MIN_CELL_FRACTION = 0.5
+"""Fraction of blocks with readings of one level; if fewer, noise averages the steps."""
+
+_CROSSING_ERROR = 0.5
+"""Error of a crossing, in typical changes over the time between its blocks: 2 / sqrt(12)."""
+
+_UNKNOWN_VARIANCE = 1e4  # of a block without a measurement, over the squared range of the readings
+_SIGMA_OVER_MAD = 1.4826  # standard deviation over median absolute deviation of normal noise
 
 
 @dataclass(frozen=True)
@@ -44,14 +42,15 @@ class TemperaturePath:
     """A temperature on a coarse grid, linear between the knots of a segment."""
 
     sample: Array  # (k,): place of the knots on the grid of the log
-    value: Array
-    deviation: Array
-    """(k,): temperature, and its standard deviation, °C."""
+    value: Array  # (k,): temperature, °C
     draws: Array  # (d, k): paths drawn from their distribution, given the readings, °C
     parts: tuple[slice, ...]  # knots of each segment
     segments: tuple[Span, ...]  # first and one-past-last sample of each segment
-    step: float  # least significant bit of the register, °C; 0: unknown
-    noise: float  # standard deviation of the noise of a reading, °C
+
+    @property
+    def deviation(self) -> Array:
+        """Standard deviation of the temperature at the knots, shape (k,), °C."""
+        return np.asarray(np.sqrt(np.mean((self.draws - self.value) ** 2, axis=0)))
 
     @property
     def mean(self) -> float:
@@ -75,27 +74,27 @@ class TemperaturePath:
         return np.concatenate(pieces_at)
 
     def means(self, first: int, block: int, count: int, values: Array) -> Array:
-        """Return means over blocks, shape (..., count), of values at the knots, shape (..., k).
+        """Return means over blocks, shape (count,), of values at the knots, shape (k,).
 
         ``first`` is the first sample of ``count`` adjacent blocks of ``block`` samples in a
         segment.
         """
         part = self.parts[sum(start <= first for start, _ in self.segments) - 1]
         edges = first - 0.5 + block * np.arange(count + 1)
-        knots, at_knots = self.sample[part], values[..., part]
-        # Flat beyond the first and the last knot.
-        x = np.concatenate(
-            ([min(edges[0], knots[0]) - 1.0], knots, [max(edges[-1], knots[-1]) + 1])
-        )
-        y = np.concatenate((at_knots[..., :1], at_knots, at_knots[..., -1:]), axis=-1)
-        width = np.diff(x)
-        below = np.cumsum(width * 0.5 * (y[..., 1:] + y[..., :-1]), axis=-1)
-        below = np.concatenate((np.zeros_like(y[..., :1]), below), axis=-1)
-        at = np.clip(np.searchsorted(x, edges, side="right") - 1, 0, len(x) - 2)
-        inside = edges - x[at]
-        slope = (y[..., at + 1] - y[..., at]) / width[at]
-        integral = below[..., at] + inside * (y[..., at] + 0.5 * slope * inside)
-        return np.asarray(np.diff(integral, axis=-1) / block)
+        # The integral from the first edge; flat beyond the first and the last knot.
+        points = np.union1d(edges, np.clip(self.sample[part], edges[0], edges[-1]))
+        at = np.interp(points, self.sample[part], values[part])
+        integral = np.cumsum(np.diff(points) * 0.5 * (at[1:] + at[:-1]))
+        integral = np.concatenate(([0.0], integral))
+        return np.asarray(np.diff(integral[np.searchsorted(points, edges)]) / block)
+
+    def apply_lag(self, values: Array, rate: float, lag: float) -> Array:
+        """Return temperatures at the knots, shape (k,), behind a lag in s (see `apply_lag`).
+
+        Each segment begins in equilibrium. ``rate``: of the log, Hz.
+        """
+        parts = [apply_lag(self.sample[part] / rate, values[part], lag) for part in self.parts]
+        return np.concatenate(parts)
 
 
 def estimate_temperature_path(
@@ -107,162 +106,125 @@ def estimate_temperature_path(
     unknown. Raises ValueError if no reading is present.
     """
     read = gather_readings(blocks, segments)
-    level = float(np.nanmedian(read.mean))
     spread = max(float(np.nanmax(read.high) - np.nanmin(read.low)), read.step, 1e-6)
-    evidence = _Evidence(read, level, spread)
-    q, noise, height = evidence.best()
-    cut = split_at_jumps(read)
-    if cut is not read:
-        jumping = _Evidence(cut, level, spread)
-        *best, higher = jumping.best()
-        if higher > height:
-            read, evidence, (q, noise) = cut, jumping, best
-    value, variance = np.empty(len(read.begin)), np.empty(len(read.begin))
-    draws = np.empty((DRAWN_PATHS, len(read.begin)))
-    for part in read.pieces:
-        if evidence.stays_in_a_cell(part):
-            # Anywhere in the cell, all the time: the largest error that the level can have.
-            value[part], variance[part] = read.mean[part] - level, read.step**2 / 12.0
-            draws[:, part] = value[part] + read.step * (rng.random((DRAWN_PATHS, 1)) - 0.5)
-            continue
-        value[part], variance[part], _, precision, shift = evidence.part(part, q, noise)
-        normals = rng.standard_normal((DRAWN_PATHS, part.stop - part.start, 2))
-        draws[:, part] = draw_paths(evidence.steps(part), q, spread, precision, shift, normals)
-        draws[:, part] += evidence.draw_stays(part, q, noise, variance[part], rng)
-    value, draws = value + level, draws + level
-    if noise < _MAX_BOUNDING_NOISE * read.step:
-        inside = read.high == read.low
-        half = 0.5 * read.step
-        value[inside] = np.clip(value, read.mean - half, read.mean + half)[inside]
+    measured, variance, stay = _measure(read, spread)
+    splines = [_Spline(read.centre[part], measured[part], variance[part]) for part in read.parts]
+
+    def cost(logarithm: float) -> float:
+        return sum(spline.cost(spread**2 * 10.0**logarithm) for spline in splines)
+
+    best = minimize_scalar(cost, bounds=_LOG_DENSITIES, method="bounded", options={"xatol": 0.05})
+    density = spread**2 * 10.0 ** float(best.x)
+    value = np.concatenate([spline.smooth(density) for spline in splines])
+    # The error of a reading in a stay is the same in all of the stay.
+    within = read.step * (rng.random((DRAWN_PATHS, stay.max() + 1))[:, stay] - 0.5)
+    noise = np.sqrt(variance) * rng.standard_normal((DRAWN_PATHS, len(value)))
+    errors = np.where(stay > 0, within, noise)
+    drawn = [
+        spline.draw_errors(density, errors[:, part], rng)
+        for spline, part in zip(splines, read.parts, strict=True)
+    ]
     spans = tuple((int(start), int(stop)) for start, stop in segments)
-    deviation = np.sqrt(variance)
     return TemperaturePath(
-        read.centre, value, deviation, draws, read.parts, spans, read.step, noise
+        read.centre, value, value + np.concatenate(drawn, axis=1), read.parts, spans
     )
 
 
-class _Evidence:
-    """The readings as the kernels take them, and their likelihood."""
+def _measure(read: Readings, spread: float) -> tuple[Array, Array, NDArray[np.int64]]:
+    """Return the temperature of each block by its readings, its variance, and its stay (0: none).
 
-    def __init__(self, read: Readings, level: float, spread: float) -> None:
-        self._read, self._level, self._spread = read, level, spread
-        self._width = float(np.median(read.end - read.begin))
-        present = read.count > 0
-        stepped = present & (read.step > 0.0)
-        self._cell = stepped & (read.high == read.low)
-        self._two = stepped & ~self._cell & (read.high - read.low < 1.5 * read.step)
-        self._mean = present & ~self._cell & ~self._two
-        count = np.maximum(read.count, 1)
-        # All of n readings are in one cell: x is away from its edges by about the largest of n
-        # normal variates, with this median and (nearly) this standard deviation.
-        self._clear = ndtri(0.5 ** (1.0 / count))
-        self._soft = 1.0 / np.sqrt(1.0 + 0.9 * np.log(count))
-        # Readings on both sides of an edge: x follows from the share of each.
-        share = (read.mean - read.low) / max(read.step, 1e-300)
-        share = np.clip((share * count + 0.5) / (count + 1.0), 0.01, 0.99)
-        self._beyond = ndtri(share)
-        density = np.exp(-0.5 * self._beyond**2) / math.sqrt(2.0 * math.pi)
-        self._share_variance = share * (1.0 - share) / count / density**2
-        # x changes within a block.
-        self._floor = max(_FLOOR * read.step, 2.0 * spread / len(count))
+    All shapes are (k,).
+    """
+    n = len(read.mean)
+    # The noise of block means, by their second differences: the temperature changes slowly.
+    bends = np.abs(np.diff(read.mean, 2))
+    white = _SIGMA_OVER_MAD * float(np.median(bends)) / math.sqrt(6.0) if len(bends) else 0.0
+    measured = read.mean.copy()
+    variance = np.full(n, white**2 + (1e-6 * spread) ** 2)
+    stay = np.zeros(n, dtype=np.int64)
+    inside = np.flatnonzero(read.high == read.low)
+    if read.step == 0.0 or len(inside) < _MIN_CELL_FRACTION * n:
+        return measured, variance, stay
+    steps = np.abs(np.diff(read.mean[inside])) / read.step
+    segment = np.searchsorted([part.start for part in read.parts], inside, side="right")
+    same = np.diff(segment) == 0
+    stay[inside] = 1 + np.cumsum(np.concatenate(([False], (steps > 0.5) | ~same)))
+    crosses = (steps > 0.5) & (steps < 1.5) & same  # a larger step is a jump
+    length = np.bincount(stay)
+    variance = np.where(stay > 0, length[stay] * read.step**2 / 12.0, _UNKNOWN_VARIANCE * spread**2)
+    before, after = inside[:-1][crosses], inside[1:][crosses]
+    place = (before + after + 1) // 2
+    measured[place] = 0.5 * (read.mean[before] + read.mean[after])
+    variance[place] = (_CROSSING_ERROR * spread / n * (after - before)) ** 2
+    stay[place] = 0
+    return measured, variance, stay
 
-    def stays_in_a_cell(self, part: slice) -> bool:
-        """Return whether a piece between jumps stays in one cell of the register."""
-        read = self._read
-        in_one_cell = bool(self._cell[part].all() and np.ptp(read.mean[part]) < 0.5 * read.step)
-        return in_one_cell and part not in read.parts
 
-    def steps(self, part: slice) -> Array:
-        """Return the time from the block before, in blocks; 1 for the first."""
-        centre = self._read.centre[part] / self._width
-        return np.asarray(np.diff(centre, prepend=centre[0] - 1.0))
+class _Spline:
+    """The smoothing spline of a segment, in the second differences of its blocks."""
 
-    def part(self, part: slice, q: float, noise: float) -> tuple[Array, Array, float, Array, Array]:
-        """Return mean, variance and log evidence of a segment, and its Gaussian equivalents."""
-        read, least = self._read, (1e-6 * self._spread) ** 2
-        mean = read.mean[part] - self._level
-        cell, two, many = self._cell[part], self._two[part], self._mean[part]
-        edge = 0.5 * (read.low[part] + read.high[part]) - self._level
-        at = np.where(two, edge + noise * self._beyond[part], mean)
-        variance = noise**2 * np.where(
-            two, self._share_variance[part], 1.0 / np.maximum(read.count[part], 1)
+    def __init__(self, centre: Array, measured: Array, variance: Array) -> None:
+        self._measured, self._variance = measured, variance
+        step = np.diff(centre / float(np.median(np.diff(centre)))) if len(centre) > 1 else centre
+        first, last = 1.0 / step[:-1], 1.0 / step[1:]
+        # (3, k - 2): the difference of two slopes.
+        self._rows = np.array([first, -(first + last), last]) if len(centre) > 2 else None
+        if self._rows is not None:
+            self._walk = 0.5 * (step[:-1] + step[1:])
+            self._bent = self._bend(measured)
+
+    def _bend(self, values: Array) -> Array:
+        """Return the second differences, shape (..., k - 2), of values, shape (..., k)."""
+        a, b, c = self._rows  # type: ignore[misc]  # only called where there are rows
+        return np.asarray(a * values[..., :-2] + b * values[..., 1:-1] + c * values[..., 2:])
+
+    def _spread(self, values: Array) -> Array:
+        """Return the transpose of `_bend`, from shape (..., k - 2) to (..., k)."""
+        a, b, c = self._rows  # type: ignore[misc]  # only called where there are rows
+        result = np.zeros((*values.shape[:-1], values.shape[-1] + 2))
+        result[..., :-2] += a * values
+        result[..., 1:-1] += b * values
+        result[..., 2:] += c * values
+        return result
+
+    def _factor(self, density: float) -> Array:
+        """Return the banded Cholesky factor of the covariance of the second differences."""
+        a, b, c = self._rows  # type: ignore[misc]  # only called where there are rows
+        v = self._variance
+        bands = np.zeros((3, len(a)))
+        bands[0] = a**2 * v[:-2] + b**2 * v[1:-1] + c**2 * v[2:] + density * self._walk
+        bands[1, :-1] = b[:-1] * a[1:] * v[1:-2] + c[:-1] * b[1:] * v[2:-1]
+        bands[2, :-2] = c[:-2] * a[2:] * v[2:-2]
+        return np.asarray(cholesky_banded(bands, lower=True, check_finite=False))
+
+    def cost(self, density: float) -> float:
+        """Return -log of the likelihood of the second differences, up to a constant."""
+        if self._rows is None:
+            return 0.0
+        try:
+            factor = self._factor(density)
+        except LinAlgError:  # a walk far too smooth
+            return math.inf
+        solved = cho_solve_banded((factor, True), self._bent)
+        return float(np.log(factor[0]).sum() + 0.5 * self._bent @ solved)
+
+    def smooth(self, density: float) -> Array:
+        """Return the most likely path, shape (k,)."""
+        if self._rows is None:
+            return self._measured
+        solved = cho_solve_banded((self._factor(density), True), self._bent)
+        return np.asarray(self._measured - self._variance * self._spread(solved))
+
+    def draw_errors(self, density: float, errors: Array, rng: np.random.Generator) -> Array:
+        """Return errors of the path, shape (d, k), by ``errors`` of the readings and the walk."""
+        if self._rows is None:
+            return errors
+        walk = np.sqrt(density * self._walk) * rng.standard_normal(
+            (len(errors), errors.shape[1] - 2)
         )
-        variance += np.where(two, self._floor**2, 0.0) + least
-        precision = np.where(two | many, 1.0 / variance, 0.0)
-        shift = np.where(two | many, at / variance, 0.0)
-        height = -0.5 * np.log(variance[many]).sum()
-        # The share of a block is given, not the x that follows from it: dx = noise dz.
-        height += (
-            0.5 * np.log((noise**2 * self._share_variance[part] + least) / variance)[two].sum()
-        )
-        height += float((-0.5 * at**2 / variance)[two | many].sum())
-        half = self._compute_half_width(part, noise)
-        low, high = (np.where(cell, mean + side * half, 0.0) for side in (-1.0, 1.0))
-        softened = (noise * self._soft[part]) ** 2 + least
-        prior = self.steps(part), q, self._spread
-        path, spread, evidence = propagate(*prior, cell, low, high, softened, precision, shift)
-        return path, spread, evidence + float(height), precision, shift
-
-    def _compute_half_width(self, part: slice, noise: float) -> Array:
-        """Return half the width of the range of the path in the cell of each block."""
-        step = self._read.step
-        return np.maximum(0.5 * step - noise * self._clear[part], 0.05 * step)
-
-    def draw_stays(
-        self, part: slice, q: float, noise: float, variance: Array, rng: np.random.Generator
-    ) -> Array:
-        """Draw errors of a path that are constant during a stay in a cell, shape (d, k).
-
-        They increase its variance to the variance of a level anywhere in the cell.
-        """
-        inside, mean = self._cell[part], self._read.mean[part]
-        half = self._compute_half_width(part, noise)
-        off = np.zeros((DRAWN_PATHS, len(inside)))
-        if not inside.any():
-            return off
-        for blocks, taper in find_cell_stays(inside, mean, float(np.median(half[inside])), q):
-            missing = np.maximum(half**2 / 3.0 - variance, 0.0)[blocks]
-            level = math.sqrt(3.0) * (2.0 * rng.random((DRAWN_PATHS, 1)) - 1.0)
-            off[:, blocks] = level * taper * np.sqrt(missing)
-        return off
-
-    def best(self) -> tuple[float, float, float]:
-        """Return q and the noise with the maximum evidence, and its logarithm."""
-        read = self._read
-        present = read.mean[read.count > 0]
-        rough = float(np.median(np.abs(np.diff(present)))) if len(present) > 1 else 0.0
-        least = _MIN_NOISE * self._spread
-        noises = {max(part * read.step, least) for part in _NOISE_GRID} | {max(rough, least)}
-        moving = [part for part in read.pieces if not self.stays_in_a_cell(part)]
-        # A level has a uniform prior over the spread of all levels.
-        level_pieces = len(read.pieces) - len(moving)
-        constant = level_pieces * math.log(read.step / self._spread) if level_pieces else 0.0
-
-        def cost(at: Array) -> float:
-            q, noise = self._spread**2 * 10.0 ** float(at[0]), 10.0 ** float(at[1])
-            if not (-16.0 < at[0] < 6.0 and 0.99 * least < noise < 10.0 * self._spread):
-                return _IMPOSSIBLE_COST
-            evidence = sum(self.part(part, q, noise)[2] for part in moving)
-            return min(-(evidence + constant), _IMPOSSIBLE_COST)
-
-        starts = [
-            np.array([k, math.log10(noise)]) for k in _LOG_DENSITY_GRID for noise in sorted(noises)
-        ]
-        first = min(starts, key=cost)
-        simplex = first + np.array([[0.0, 0.0], [0.7, 0.0], [0.0, 0.3]])
-        minimum = minimize(
-            cost,
-            first,
-            method="Nelder-Mead",
-            options={
-                "maxfev": _MAX_ITERATIONS,
-                "initial_simplex": simplex,
-                "xatol": 0.05,
-                "fatol": 0.05,
-            },
-        )
-        best = float(minimum.x[0]), float(minimum.x[1])
-        return self._spread**2 * 10.0 ** best[0], 10.0 ** best[1], -float(minimum.fun)
+        bent = walk + self._bend(errors)
+        solved = cho_solve_banded((self._factor(density), True), bent.T).T
+        return np.asarray(errors - self._variance * self._spread(solved))
 
 
 @njit(cache=True)
@@ -293,13 +255,3 @@ def apply_lag(times: Array, values: Array, lag: float) -> Array:
     if lag == 0.0:
         return values.copy()
     return np.asarray(_lagged(np.asarray(times, dtype=np.float64), values, lag))
-
-
-def apply_lag_to_path(path: TemperaturePath, values: Array, rate: float, lag: float) -> Array:
-    """Return temperatures at the knots, shape (k,), behind a lag in s (see `apply_lag`).
-
-    Each segment begins in equilibrium.
-    """
-    return np.concatenate(
-        [apply_lag(path.sample[part] / rate, values[part], lag) for part in path.parts]
-    )

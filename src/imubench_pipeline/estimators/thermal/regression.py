@@ -1,351 +1,256 @@
-"""Generalised least squares of a log on its temperature, for given noise: s, q and the lag.
+"""Generalised least squares of a log on its temperature, together with the noise: s, q and the lag.
 
-A mean beta . x in a log changes the density I of a bin to I - 2 beta . cross + beta . gram beta.
-The temperature varies slowly: it is compared at low frequencies only, in the DCT coefficients of
-the log or of its block means.
+The cosine transforms of the block means of the log and of the temperature are compared. Their
+coefficients are independent, with the density of the noise as variance, so that least squares is a
+weighted sum. For given noise the lag is scanned; the noise is fitted to the residual in turn.
 """
 
 from __future__ import annotations
 
-import copy
 import math
-from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 import scipy.fft
-from numpy.typing import NDArray
-from scipy.optimize import minimize_scalar
 
-from imubench_pipeline.allan.phase import Span
-from imubench_pipeline.estimators.spectrum import BLOCK_BAND, Spectrum
-from imubench_pipeline.estimators.thermal.path import TemperaturePath, apply_lag_to_path
+from imubench_pipeline.estimators.deterministic.ordinates import NOISE_TERMS, Ordinates
+from imubench_pipeline.estimators.thermal.path import TemperaturePath
+from imubench_pipeline.estimators.whittle import COARSE, Maximum, make_whittle
 from imubench_pipeline.typing import Array
 
-_LAG_GRID_SIZE = 16
+LAGS = 16  # lags of a scan
 _MAX_LAG_FRACTION = 1 / 20  # longest lag over the log; a longer lag looks like drift
-_MAX_LAG = 1800.0
-_MIN_ORDINATES = 0.02
-_LAGS_PER_BATCH = 8  # lags whose regressors are in memory at the same time
-
-
-class BlockSeries:
-    """Block means of a log, gathered while its samples pass.
-
-    An incomplete block at the end of a segment is dropped.
-    """
-
-    def __init__(self, segments: Sequence[Span], block: int) -> None:
-        self.segments, self.block = tuple(segments), block
-        self._sums: list[Array] = [np.zeros((stop - start) // block) for start, stop in segments]
-
-    def watch(self, blocks: Iterable[Array]) -> Iterator[Array]:
-        """Yield the blocks of a complete log, in order, SI, unchanged, and gather the means."""
-        reached = 0
-        for values in blocks:
-            for sums, (start, _) in zip(self._sums, self.segments, strict=True):
-                first = max(start, reached)
-                last = min(start + len(sums) * self.block, reached + len(values))
-                if first < last:
-                    inside = values[first - reached : last - reached]
-                    place = (np.arange(first, last) - start) // self.block
-                    low = int(place[0])
-                    sums[low : int(place[-1]) + 1] += np.bincount(place - low, weights=inside)
-            reached += len(values)
-            yield values
-
-    @property
-    def means(self) -> list[Array]:
-        """Means of the blocks of each part that has two and more."""
-        return [np.asarray(sums / self.block) for sums in self._sums if len(sums) >= 2]
-
-    @property
-    def places(self) -> list[tuple[int, int, int]]:
-        """First sample, samples in a block, and number of blocks of these parts."""
-        return [
-            (start, self.block, len(sums))
-            for sums, (start, _) in zip(self._sums, self.segments, strict=True)
-            if len(sums) >= 2
-        ]
+_MAX_LAG = 1800.0  # s
+_ROUNDS = 3  # of effect and noise; more change nothing in benchmarks/temperature.py
+_MIN_WEIGHT = 0.05  # weight of an ordinate that the temperature explains almost completely
+_FINE_LAGS = 48
+_MAX_DELTA_LOG_LIKELIHOOD = 8.0  # below the best; less likely lags are not in the fine scan
+_MIN_OTHER_NOISE = 1e-3  # least fraction of the density that is not random walk
+_WALK_FACTORS = np.concatenate(([0.0], np.geomspace(0.05, 20.0, 28)))
+"""Grid of K over which the posterior is averaged, over the fitted K or the least visible one."""
 
 
 @dataclass(frozen=True)
-class Products:
-    """Mean products of coefficients in each bin of a spectrum, as densities."""
+class Shape:
+    """The terms of an effect."""
 
-    cross: Array  # (b, p): of the log and each of p regressors, SI times its unit, per Hz
-    gram: Array  # (b, p, p): of the regressors, in the product of their units, per Hz
+    quadratic: bool = False  # whether the square of the temperature is one
+    settling: float = 0.0
+    """Time from the beginning, s, in which the sensitivity has another value; 0: none."""
 
 
-class Coefficients:
-    """The DCT coefficients of a log at low frequencies, and their products with regressors.
+@dataclass(frozen=True)
+class Effect:
+    """Effect of temperature and the noise, fitted together."""
 
-    They are computed from its block means, for the bins of the spectrum with the same blocks.
+    shape: Shape
+    lag: float  # s
+    beta: Array
+    """(p,): s; q and the change of s while settling, if they are terms; SI per K and K²."""
+    covariance: Array  # (p, p): for the noise and the lag as fitted
+    noise: Maximum
+    density: Array  # (k,): of the noise at each ordinate, SI²/Hz
+    log_likelihood: float  # up to a constant that all fits of the log share
+
+    @property
+    def free(self) -> int:
+        """Number of parameters."""
+        return len(self.beta) + (self.lag > 0.0)
+
+
+@dataclass(frozen=True)
+class Posterior:
+    """Joint distribution of K, the lag and beta, given the shape of the other noise."""
+
+    lags: Array  # (l,): s
+    lag_weights: Array  # (l,): sum 1
+    mean_walk: float  # rms of K, SI
+    covariance: Array  # (p, p): of beta about its fitted value
+
+
+class Regression:
+    """The ordinates of a log, and of its temperature at any lag.
+
+    ``rate`` is the rate of the log, Hz.
     """
 
-    def __init__(self, spectrum: Spectrum, series: BlockSeries) -> None:
-        self._interval = series.block / spectrum.rate
-        self.places = series.places
-        low = spectrum.block == series.block
-        self._bins, self._low = len(low), np.flatnonzero(low)
-        counts = np.rint(spectrum.ordinates[low]).astype(np.int64)
-        lengths = [len(means) for means in series.means]
-        f = np.concatenate([np.arange(1, n) / (2.0 * n * self._interval) for n in lengths])
-        highest = BLOCK_BAND if series.block > 1 else np.inf
-        low_ordinates = np.flatnonzero(2.0 * np.pi * f * self._interval <= highest)
-        self._order = low_ordinates[np.argsort(f[low_ordinates], kind="stable")]
-        self._edges = np.concatenate(([0], np.cumsum(counts)[:-1]))
-        self._counts = counts
-        self.ordinates = spectrum.ordinates
-        self.log = self._of(series.means)
+    def __init__(self, ordinates: Ordinates, path: TemperaturePath, rate: float) -> None:
+        self.ordinates, self.path, self.rate = ordinates, path, rate
+        self.block = ordinates.means.block
+        self._known: dict[tuple[float, Shape], Array] = {}
+        highest = float(ordinates.frequency[ordinates.used].max())
+        ones = np.ones_like(ordinates.coefficient)
+        spectrum = ordinates.spectrum(ordinates.coefficient, ones)
+        self.bins = len(spectrum.density)
+        self._whittle = make_whittle(spectrum, highest, COARSE)
 
-    def _of(self, parts: Sequence[Array]) -> Array:
-        centred = [values - values.mean(axis=-1, keepdims=True) for values in parts]
-        transformed = [
-            scipy.fft.dct(values, type=2, norm="ortho", axis=-1)[..., 1:] for values in centred
-        ]
-        return np.asarray(np.concatenate(transformed, axis=-1)[..., self._order])
-
-    def of_knots(self, path: TemperaturePath, values: Sequence[Array]) -> Array:
-        """Return the coefficients of regressors that are linear between knots, shape (p, n).
-
-        ``values``: p regressors at the knots, shape (k,). Several together take half the time, or
-        less if the length of the log has large prime factors.
-        """
-        rows = np.array(values)
-        return self._of([path.means(*place, rows) for place in self.places])
-
-    def of_time(self, rate: float) -> Array:
-        """Return the coefficients of a ramp of 1 a second, shape (n,), s."""
-        return self._of(
-            [
-                (first + (np.arange(count, dtype=np.float64) + 0.5) * block - 0.5) / rate
-                for first, block, count in self.places
-            ]
+    def means(self, knots: Array) -> Array:
+        """Return the mean in each block of the log of a signal at the knots of the path."""
+        parts = zip(self.ordinates.means.parts, self.ordinates.sizes, strict=True)
+        return np.concatenate(
+            [self.path.means(part.start, self.block, size, knots) for part, size in parts]
         )
 
-    def density(self) -> Array:
-        """Return the density of the log in each bin with coefficients, else 0."""
-        return self._binned(self.log**2)
-
-    def products(self, regressors: Sequence[Array]) -> Products:
-        """Return the products of log and regressors in each bin with coefficients, else 0."""
-        p = len(regressors)
-        cross, gram = np.zeros((self._bins, p)), np.zeros((self._bins, p, p))
-        for i, left in enumerate(regressors):
-            cross[:, i] = self._binned(left * self.log)
-            for j in range(i + 1):
-                gram[:, i, j] = gram[:, j, i] = self._binned(left * regressors[j])
-        return Products(cross, gram)
-
-    def _binned(self, products: Array) -> Array:
-        result = np.zeros(self._bins)
-        result[self._low] = np.add.reduceat(products, self._edges) / self._counts * self._interval
-        return result
-
-
-@dataclass(frozen=True)
-class Regression:
-    """A fit for given noise."""
-
-    beta: Array
-    """(p,): s; q and the change of s while settling, if they are in the model; R, if there is a
-    ramp. SI per K, K², K and s."""
-    information: Array  # (p, p): inverse of their covariance
-    lag: float  # s
-    log_likelihood_gain: float  # log likelihood minus the value for beta = 0
-
-    @property
-    def covariance(self) -> Array:
-        """Covariance of beta, for given noise and lag."""
-        return np.asarray(np.linalg.inv(self.information))
-
-    @property
-    def error(self) -> float:
-        """Standard deviation of s, for given noise and lag."""
-        return math.sqrt(float(self.covariance[0, 0]))
-
-
-class Regressors:
-    """The regressors of a log, and their products with it, for any lag.
-
-    ``rate`` is in Hz, ``reference`` is T_0, °C, and ``used``, shape (b,), are the bins to use.
-    """
-
-    def __init__(
-        self,
-        coefficients: Coefficients,
-        path: TemperaturePath,
-        rate: float,
-        reference: float,
-        used: NDArray[np.bool_],
-    ) -> None:
-        self.coefficients, self.path, self.rate = coefficients, path, rate
-        self.reference, self.used = reference, used
-        # Whether the square of the temperature and time are regressors, and the duration, s, of
-        # settling from the beginning, in which the sensitivity may be different.
-        self.quadratic, self.ramp, self.settling = False, False, 0.0
-        self._products: dict[float, Products] = {}
-        self._time = coefficients.of_time(rate)
-        # With the ramp and in all bins, shared by `also`, since the transforms take most time.
-        self._full: dict[tuple[float, bool, float], Products] = {}
-        self.ordinates = coefficients.ordinates[used]
-
-    def also(
-        self,
-        *,
-        quadratic: bool | None = None,
-        ramp: bool | None = None,
-        settling: float | None = None,
-        used: NDArray[np.bool_] | None = None,
-    ) -> Regressors:
-        """Return the regressors with other terms, or in other bins; None: unchanged."""
-        other = copy.copy(self)
-        other.used = self.used if used is None else used
-        other.quadratic = self.quadratic if quadratic is None else quadratic
-        other.ramp = self.ramp if ramp is None else ramp
-        other.settling = self.settling if settling is None else settling
-        other._products = {}
-        other.ordinates = self.coefficients.ordinates[other.used]
-        return other
-
-    @property
-    def thermal(self) -> int:
-        """Number of regressors of temperature."""
-        return 1 + self.quadratic + (self.settling > 0.0)
+    def transform(self, means: Array) -> Array:
+        """Return the coefficients, shape (..., k), of signals by their means in the blocks."""
+        parts = np.split(means, np.cumsum(self.ordinates.sizes)[:-1], axis=-1)
+        transformed = [scipy.fft.dct(part, type=2, norm="ortho")[..., 1:] for part in parts]
+        return np.concatenate(transformed, axis=-1)
 
     def knots(self, lag: float) -> Array:
-        """Return T_lag - T_0 at the knots of the path, shape (k,), K, for a lag in s."""
-        return apply_lag_to_path(self.path, self.path.value, self.rate, lag) - self.reference
+        """Return T_lag - T_0 at the knots of the path, shape (k,), K."""
+        return self.path.apply_lag(self.path.value, self.rate, lag) - self.path.mean
 
-    def effect(self, regression: Regression) -> Array:
-        """Return the effect of temperature at the knots of the path, shape (k,), SI."""
-        terms = np.array(self._make_terms(self.knots(regression.lag)))
-        return np.asarray(np.einsum("i,ik->k", regression.beta[: self.thermal], terms))
+    def terms(self, lag: float, shape: Shape) -> Array:
+        """Return the terms of an effect at the knots of the path, shape (p, k), K or K²."""
+        knots = self.knots(lag)
+        terms = [knots, knots**2] if shape.quadratic else [knots]
+        if shape.settling > 0.0:
+            end = self.first_settled(shape)
+            terms.append(np.where(np.arange(len(knots)) < end, knots - knots[end], 0.0))
+        return np.array(terms)
 
-    def _make_terms(self, knots: Array) -> list[Array]:
-        """Return the regressors of temperature at the knots."""
-        terms = [knots, knots**2] if self.quadratic else [knots]
-        if self.settling > 0.0:
-            end = self._get_first_settled()
-            settled = knots[min(end, len(knots) - 1)]
-            terms.append(np.where(np.arange(len(knots)) < end, knots - settled, 0.0))
-        return terms
-
-    def slope(self, regression: Regression) -> Array:
-        """Return the derivative of the effect by temperature at the knots, shape (k,), SI per K."""
-        knots = self.knots(regression.lag)
-        slope = np.full(len(knots), regression.beta[0])
-        if self.quadratic:
-            slope += 2.0 * regression.beta[1] * knots
-        if self.settling > 0.0:
-            slope[: self._get_first_settled()] += regression.beta[self.thermal - 1]
-        return slope
-
-    def _get_first_settled(self) -> int:
+    def first_settled(self, shape: Shape) -> int:
         """Return the first knot at which the sensor has settled."""
-        begin = self.path.sample[0] + self.settling * self.rate
-        return int(np.searchsorted(self.path.sample, begin))
+        end = self.path.sample[0] + shape.settling * self.rate
+        return min(int(np.searchsorted(self.path.sample, end)), len(self.path.sample) - 1)
 
-    def means(self, lag: float) -> Array:
-        """Return the mean over the log of each regressor of temperature, K, or K² of the square."""
-        return np.array([float(term.mean()) for term in self._make_terms(self.knots(lag))])
+    def columns(self, lag: float, shape: Shape) -> Array:
+        """Return the coefficients of the terms of an effect, shape (p, k)."""
+        if (lag, shape) not in self._known:
+            means = [self.means(term) for term in self.terms(lag, shape)]
+            self._known[lag, shape] = self.transform(np.array(means))
+        return self._known[lag, shape]
 
-    def columns(self, lag: float) -> list[Array]:
-        """Return the coefficients of the regressors, shape (n,), ordered as `Regression.beta`."""
-        columns = self.coefficients.of_knots(self.path, self._make_terms(self.knots(lag)))
-        return [*columns] + [self._time] * self.ramp
+    @cached_property
+    def time(self) -> Array:
+        """The coefficients of a ramp of 1 a second, shape (k,), s."""
+        places = [part.start + self.block * np.arange(len(part.mean))
+                  for part in self.ordinates.means.parts]  # fmt: skip
+        return self.transform(np.concatenate(places) / self.rate)
 
-    def prepare(self, lags: Sequence[float] | Array) -> None:
-        """Compute the products for several lags together, which takes less time."""
-        lags_to_do = [float(lag) for lag in lags if self._make_key(float(lag)) not in self._full]
-        for first in range(0, len(lags_to_do), _LAGS_PER_BATCH):
-            batch = lags_to_do[first : first + _LAGS_PER_BATCH]
-            terms = [term for lag in batch for term in self._make_terms(self.knots(lag))]
-            columns = self.coefficients.of_knots(self.path, terms).reshape(
-                len(batch), self.thermal, -1
-            )
-            for lag, own in zip(batch, columns, strict=True):
-                self._full[self._make_key(lag)] = self.coefficients.products([*own, self._time])
-
-    def _make_key(self, lag: float) -> tuple[float, bool, float]:
-        return lag, self.quadratic, self.settling
-
-    def products(self, lag: float) -> Products:
-        """Return the products of log and regressors at a lag in the bins used."""
-        if lag not in self._products:
-            self.prepare([lag])
-            full, own = self._full[self._make_key(lag)], slice(None if self.ramp else self.thermal)
-            cross, gram = full.cross[self.used, own], full.gram[self.used, own, own]
-            self._products[lag] = Products(cross, gram)
-        return self._products[lag]
-
-    def at(self, lag: float, weights: Array) -> Regression:
-        """Return the fit at a lag in s.
-
-        ``weights``, shape (b,): ordinates nu over density S of the noise in the bins used, Hz/SI².
-        """
-        products = self.products(lag)
-        information = np.einsum("b,bij->ij", weights, products.gram)
-        target = weights @ products.cross
-        information += 1e-12 * np.diag(np.diag(information)) + 1e-300 * np.eye(len(target))
-        beta = np.linalg.solve(information, target)
-        return Regression(beta, information, lag, 0.5 * float(target @ beta))
-
-    def lags(self, longest: float | None = None) -> Array:
-        """Return the lags to scan, s: 0, then ascending; only 0 if the knots are too far apart.
-
-        The longest is by default a twentieth of the longest segment, at most half an hour.
-        """
+    @cached_property
+    def lags(self) -> Array:
+        """The lags to scan, s: 0, then ascending to a twentieth of the longest segment."""
         duration = max(stop - start for start, stop in self.path.segments) / self.rate
-        knot = float(np.median(np.diff(self.path.sample))) / self.rate
-        last = longest if longest is not None else min(_MAX_LAG_FRACTION * duration, _MAX_LAG)
-        first = max(0.5 * knot, last / 1000.0)
-        if first >= last:
-            return np.array([0.0])
-        return np.concatenate(([0.0], np.geomspace(first, last, _LAG_GRID_SIZE)))
+        last = min(_MAX_LAG_FRACTION * duration, _MAX_LAG)
+        first = min(max(0.5 * self.block / self.rate, last / 1000.0), 0.5 * last)
+        return np.concatenate(([0.0], np.geomspace(first, last, LAGS)))
 
-    def best(self, weights: Array, lags: Array) -> Regression:
-        """Return the fit with the maximum log likelihood, by a scan of the lags and optimisation.
+    def solve(self, columns: Array, density: Array) -> tuple[Array, Array, float]:
+        """Return beta, its covariance, and the log likelihood that it gains."""
+        weighted = columns * self.ordinates.weights(density)
+        information = weighted @ columns.T
+        scale = np.sqrt(np.maximum(np.diag(information), 1e-300))
+        inverse = np.linalg.pinv(information / np.outer(scale, scale), rcond=1e-10, hermitian=True)
+        covariance = inverse / np.outer(scale, scale)
+        target = weighted @ self.ordinates.coefficient
+        beta = covariance @ target
+        return beta, covariance, 0.5 * float(target @ beta)
 
-        ``weights``: as for `at`.
+    def gain(self, effect: Effect, shape: Shape) -> float:
+        """Return the log likelihood gained by a shape, for the noise and the lag of a fit."""
+        return self.solve(self.columns(effect.lag, shape), effect.density)[2]
+
+    @cached_property
+    def plain(self) -> tuple[Maximum, Array]:
+        """The noise of the log as it is, and its density at each ordinate."""
+        return self.fit_noise(self.ordinates.coefficient)
+
+    def fit(self, shape: Shape, lags: Array) -> Effect:
+        """Return a fit by turns of effect and noise.
+
+        ``lags``, shape (l,): the lags that are tried, s.
         """
-        self.prepare(lags)
-        fits = [self.at(float(lag), weights) for lag in lags]
-        place = int(np.argmax([fit.log_likelihood_gain for fit in fits]))
-        best = fits[place]
-        if len(lags) == 1:
-            return best
-        low, high = float(lags[max(place - 1, 0)]), float(lags[min(place + 1, len(lags) - 1)])
-        polished = minimize_scalar(
-            lambda lag: -self.at(float(lag), weights).log_likelihood_gain,
-            bounds=(low, high),
-            method="bounded",
-            options={"xatol": 2e-3 * high, "maxiter": 25},
-        )
-        other = self.at(float(polished.x), weights)
-        return other if other.log_likelihood_gain > best.log_likelihood_gain + 1e-9 else best
+        density = self.plain[1]
+        for _ in range(_ROUNDS):
+            gains = [self.solve(self.columns(lag, shape), density)[2] for lag in lags.tolist()]
+            lag = float(lags[int(np.argmax(gains))])
+            columns = self.columns(lag, shape)
+            beta, covariance, _ = self.solve(columns, density)
+            residual = self.ordinates.coefficient - beta @ columns
+            leverage = np.einsum("ik,ij,jk->k", columns, covariance, columns)
+            leverage *= self.ordinates.weights(density)
+            noise, density = self.fit_noise(residual, np.maximum(1.0 - leverage, _MIN_WEIGHT))
+        log_likelihood = self.ordinates.log_likelihood(residual, density)
+        return Effect(shape, lag, beta, covariance, noise, density, log_likelihood)
 
-    def without(self, spectrum: Spectrum, regression: Regression, weights: Array) -> Spectrum:
-        """Return the spectrum (of the bins used) less the effect of temperature.
+    def fit_noise(self, residual: Array, weight: Array | None = None) -> tuple[Maximum, Array]:
+        """Return the noise model of coefficients, each with its weight, and its density."""
+        weight = np.ones_like(residual) if weight is None else weight
+        noise = self._whittle.of(self.ordinates.spectrum(residual, weight)).maximum(NOISE_TERMS)
+        return noise, self.ordinates.density(noise)
 
-        The degrees of freedom of the fit are subtracted from the ordinates of each bin, so that the
-        density stays unbiased. ``weights``: of the fit, as for `at`.
+    def bracket_likely_lags(self, effect: Effect) -> Array:
+        """Return a fine scan of the lags that are not excluded."""
+        lags = self.lags
+        for _ in range(2):
+            effects = [replace(effect, lag=lag) for lag in lags.tolist()]
+            gains = np.array([self.gain(each, effect.shape) for each in effects])
+            likely = np.flatnonzero(gains > gains.max() - _MAX_DELTA_LOG_LIKELIHOOD)
+            low, high = lags[max(likely[0] - 1, 0)], lags[min(likely[-1] + 1, len(lags) - 1)]
+            lags = np.linspace(low, high, _FINE_LAGS)
+        return lags
+
+    def posterior(
+        self, effect: Effect | None, noise: Maximum, density: Array, lags: Array
+    ) -> Posterior:
+        """Return the distribution of beta and the lag, averaged over K.
+
+        A weak walk is often fitted as none, and the error of s would be too small. The prior of K
+        and of the lag is uniform, the weights are the restricted likelihood (REML; D. A. Harville,
+        J. Am. Stat. Assoc. 72, 1977), and the other noise is fixed. Without an effect, only K is
+        uncertain.
         """
-        products = self.products(regression.lag)
-        p = self.thermal
-        beta, cross, gram = regression.beta[:p], products.cross[:, :p], products.gram[:, :p, :p]
-        left = spectrum.density - 2.0 * cross @ beta + np.einsum("i,bij,j->b", beta, gram, beta)
-        covariance = np.linalg.inv(regression.information[:p, :p])
-        degrees = np.minimum(weights * np.einsum("bij,ij->b", gram, covariance), 1.0)
-        ordinates = np.maximum(spectrum.ordinates - degrees, _MIN_ORDINATES * spectrum.ordinates)
-        with_time = self.also(ramp=True).products(regression.lag) if not self.ramp else products
-        return replace(
-            spectrum,
-            ordinates=ordinates,
-            density=np.maximum(left, 1e-12 * spectrum.density) * spectrum.ordinates / ordinates,
-            cross=(spectrum.cross - with_time.gram[:, :p, -1] @ beta)
-            * spectrum.ordinates
-            / ordinates,
-            ramp=spectrum.ramp * spectrum.ordinates / ordinates,
+        ordinates = self.ordinates
+        walk = 1.0 / (2.0 * np.pi * ordinates.frequency) ** 2
+        K = noise.parameter("K")
+        rest = np.maximum(density - K**2 * walk, _MIN_OTHER_NOISE * density)
+        lowest = int(np.argmin(ordinates.frequency))
+        walks = _WALK_FACTORS * max(K, math.sqrt(rest[lowest] / walk[lowest]))
+        densities = [rest + each**2 * walk for each in walks]
+        alone = np.array([ordinates.log_likelihood(ordinates.coefficient, d) for d in densities])
+        chance = np.repeat(alone[:, None], len(lags), axis=1)
+        p = len(effect.beta) if effect else 0
+        second = np.zeros((len(walks), len(lags), p, p))
+        for i, lag in enumerate(lags.tolist()):
+            if effect is None:
+                continue
+            columns = self.columns(lag, effect.shape)
+            fitted = np.linalg.slogdet(self.solve(columns, density)[1])[1]
+            for j, each in enumerate(densities):
+                beta, covariance, gain = self.solve(columns, each)
+                # Less the determinant for the fitted noise: no lag is preferred by its size.
+                chance[j, i] += gain + 0.5 * (np.linalg.slogdet(covariance)[1] - fitted)
+                away = beta - effect.beta
+                second[j, i] = covariance + np.outer(away, away)
+        mass = np.exp(chance - chance.max()) * np.gradient(walks)[:, None]
+        mass /= mass.sum()
+        return Posterior(
+            lags,
+            mass.sum(axis=0),
+            math.sqrt(float(mass.sum(axis=1) @ walks**2)),
+            np.einsum("wl,wlij->ij", mass, second),
         )
+
+    def path_errors(self, effect: Effect) -> Array:
+        """Return the changes of beta and the lag by the errors of the drawn paths, (d, p + 1)."""
+        knots = self.knots(effect.lag)
+        slope = np.full(len(knots), effect.beta[0])
+        if effect.shape.quadratic:
+            slope += 2.0 * effect.beta[1] * knots
+        if effect.shape.settling > 0.0:
+            slope[: self.first_settled(effect.shape)] += effect.beta[-1]
+        step = max(0.05 * effect.lag, 0.5 * self.block / self.rate)
+        by_lag = self.means(slope * (self.knots(effect.lag + step) - knots) / step)
+        columns = np.vstack([self.columns(effect.lag, effect.shape), self.transform(by_lag)])
+        weighted = columns * self.ordinates.weights(effect.density)
+        information = weighted @ columns.T
+        scale = np.sqrt(np.maximum(np.diag(information), 1e-300))
+        # A poorly determined lag must not absorb the error of the path.
+        ridge = information / np.outer(scale, scale) + 1e-6 * np.eye(len(scale))
+        drawn = [self.path.apply_lag(draw - self.path.value, self.rate, effect.lag)
+                 for draw in self.path.draws]  # fmt: skip
+        errors = self.transform(np.array([self.means(slope * each) for each in drawn]))
+        return np.asarray(np.linalg.solve(ridge, (weighted @ errors.T) / scale[:, None]).T / scale)

@@ -17,16 +17,7 @@ FLICKER_WITHOUT_TIME = (
 SIGNALS_HIDE_WALK = "the deterministic signals contain most of the information on a random walk"
 SHORT_LOG = "the log is too short"
 SENSITIVITY_WITH_ZERO = "the 95 % interval of the temperature sensitivity includes 0"
-LAG_NOT_ASKED = "no lag was asked for"
 NO_EFFECT_TO_LAG = "no effect of the temperature is shown that could lag"
-MONOTONE_TEMPERATURE = (
-    "the temperature only rises or only falls, and a drift with time explains as much. "
-    "Vary it up and down"
-)
-TEMPERATURE_BY_CHANCE = (
-    "temperature follows most of the slow drift, but a random walk as strong as in this log "
-    "would do so by chance"
-)
 
 
 def models_alike(others: Sequence[str], chosen: str) -> str:
@@ -104,9 +95,9 @@ def small_temperature_range(kelvin: float) -> str:
     return f"the temperature changes by only {number_text(kelvin, 2)} K"
 
 
-def temperature_preferred(delta_bic: float, *, enough: bool) -> str:
-    short = "" if enough else ", which is not enough"
-    return f"BIC prefers the model with temperature by {number_text(delta_bic, 3)}{short}"
+def temperature_preferred(delta_bic: float) -> str:
+    which = "with" if delta_bic > 0.0 else "without"
+    return f"BIC prefers the model {which} temperature by {number_text(abs(delta_bic), 3)}"
 
 
 def settling_excluded(seconds: float) -> str:
