@@ -62,8 +62,6 @@ def test_of_a_log_interpolated_at_any_place_n_sensor_is_doubtful_and_n_on_the_cu
     samples = white(len(place) + 1, RATE, 2)
     found = fit((1.0 - place) * samples[:-1] + place * samples[1:], RATE)
     in_the_log, sensor = (found.estimates[0].parameters[name] for name in ("N", "N_sensor"))
-    assert found.stretch is not None
-    assert in_the_log.value == pytest.approx(found.stretch.level, rel=0.03)
     for parameter, truth, status in (
         (in_the_log, N * np.sqrt(7.0 / 6.0), "ok"),
         (sensor, N, "doubtful"),
@@ -81,8 +79,6 @@ def test_of_a_log_interpolated_to_twice_the_rate_n_is_on_the_curve() -> None:
     log[1::2] = 0.5 * (log[::2] + np.roll(log[::2], -1))
     found = fit(log, 2.0 * RATE)
     in_the_log = found.estimates[0].parameters["N"]
-    assert found.stretch is not None
-    assert in_the_log.value == pytest.approx(found.stretch.level, rel=0.03)
     assert in_the_log.value == pytest.approx(N, rel=0.03)
     assert in_the_log.status == "ok"
 

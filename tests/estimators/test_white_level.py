@@ -1,4 +1,4 @@
-"""N is the level of the first -1/2 stretch of the Allan deviation."""
+"""N includes the processes that are faster than a second."""
 
 from __future__ import annotations
 
@@ -9,102 +9,26 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from imubench_pipeline.allan import AllanCurve, allan_variance, cluster_sizes
 from imubench_pipeline.estimators.estimate import MAX_LIMIT_RATIO, Estimate, Parameter
 from imubench_pipeline.estimators.likelihood import Likelihood, fit
 from imubench_pipeline.estimators.posterior import Posterior
 from imubench_pipeline.estimators.white_level import (
-    WhiteStretch,
     count_fast_processes,
-    find_white_stretch,
     merge_fast_draws,
     merge_fast_processes,
 )
 from imubench_pipeline.estimators.whittle import Maximum, Terms, make_noise_model
 from imubench_pipeline.noise import GaussMarkov, NoiseModel
 from imubench_pipeline.noise.simulate import simulate
-from imubench_pipeline.typing import Array
 
 RATE, SAMPLES = 100.0, 360_000
 N, T_B = 1e-4, 0.05
-SIZES = cluster_sizes(SAMPLES)
-TAU = SIZES / RATE
-
-
-def noiseless(variance: Array) -> AllanCurve:
-    return AllanCurve(TAU, SIZES, variance, np.ones(len(SIZES)), SAMPLES)
 
 
 def fast(times: float) -> NoiseModel:
     """White noise beside a fast process of so many times its density at low frequencies."""
     unit = NoiseModel(B=1.0, T_B=T_B).psd(np.array([1e-9]))[0]
     return NoiseModel(N=N, B=N * np.sqrt(times / unit), T_B=T_B)
-
-
-@given(st.floats(1e-9, 1e3), st.floats(0.0, 0.2))
-def test_white_noise_has_its_level_and_a_walk_ends_the_stretch(density: float, part: float) -> None:
-    # The walk is as strong as the white noise at 1 / part s.
-    K = np.sqrt(3.0) * density * part
-    found = find_white_stretch(noiseless(NoiseModel(N=density, K=K).allan_variance(TAU)))
-    assert found is not None
-    assert found.level == pytest.approx(density, rel=0.03)
-    assert found.first == pytest.approx(0.03, rel=0.1)
-    # All of it lies within 3 % of the middle: the variance rises by 12 % at most.
-    assert part * found.last < 0.4
-
-
-def test_a_curve_without_the_slope_has_no_stretch() -> None:
-    assert find_white_stretch(noiseless(NoiseModel(B=1e-4).allan_variance(TAU))) is None
-    assert find_white_stretch(noiseless(NoiseModel(K=1e-4).allan_variance(TAU))) is None
-    assert find_white_stretch(noiseless(np.zeros(len(TAU)))) is None
-
-
-def test_clusters_of_one_and_two_samples_do_not_count() -> None:
-    variance = NoiseModel(N=N).allan_variance(TAU)
-    variance[SIZES < 3] *= 0.5  # as behind a low-pass
-    found = find_white_stretch(noiseless(variance))
-    assert found is not None and found.level == pytest.approx(N, rel=1e-9)
-
-
-@given(st.floats(4.0, 30.0), st.floats(1e-9, 1e3))
-def test_behind_a_low_pass_the_stretch_begins_beyond_its_bend(cutoff: float, N: float) -> None:
-    # White noise of density N behind a filter of first order is a Gauss-Markov process.
-    time = 1.0 / (2.0 * np.pi * cutoff)
-    B = N / np.sqrt(NoiseModel(B=1.0, T_B=time).psd(np.array([1e-9]))[0])
-    found = find_white_stretch(noiseless(NoiseModel(B=B, T_B=time).allan_variance(TAU)))
-    assert found is not None
-    assert found.level == pytest.approx(N, rel=0.03) and found.level <= N
-    # Its variance is about 1 - 1.5 T_B / tau of that of white noise, and 6 % below the middle at
-    # most. (Of lower cut-offs an hour has too few long clusters.)
-    assert found.first > 8.0 * time
-
-
-@given(st.integers(0, 2**32 - 1), st.floats(1e-9, 1e3))
-def test_the_level_of_white_noise_is_known_to_its_error(seed: int, density: float) -> None:
-    samples = 20_000
-    log = density * np.sqrt(RATE) * np.random.default_rng(seed).standard_normal(samples)
-    found = find_white_stretch(allan_variance(log, RATE))
-    # The longest clusters that count are known to 3 %; a short log may show no stretch.
-    if found is not None:
-        assert found.level == pytest.approx(density, rel=0.06)
-    longer = density * np.sqrt(RATE) * np.random.default_rng(seed).standard_normal(8 * samples)
-    found = find_white_stretch(allan_variance(longer, RATE))
-    assert found is not None and found.level == pytest.approx(density, rel=0.04)
-
-
-def test_missing_samples_leave_the_level() -> None:
-    whole = noiseless(NoiseModel(N=N).allan_variance(TAU))
-    thinned = replace(whole, variance=2.0 * whole.variance, averaged=SIZES / 2.0)
-    found = find_white_stretch(thinned)
-    assert found is not None and found.level == pytest.approx(N, rel=1e-9)
-
-
-def test_beyond_a_fast_process_the_stretch_has_both() -> None:
-    model = fast(3.0)
-    found = find_white_stretch(noiseless(model.allan_variance(TAU)))
-    assert found is not None
-    assert found.level == pytest.approx(2.0 * N, rel=0.04)
-    assert found.first > 5.0 * T_B
 
 
 def maximum(model: NoiseModel) -> Maximum:
@@ -115,13 +39,10 @@ def maximum(model: NoiseModel) -> Maximum:
 
 
 @pytest.mark.parametrize("folding", [1.0, 1.7])
-def test_as_many_fast_processes_count_as_the_level_asks(folding: float) -> None:
+def test_processes_faster_than_a_second_count_into_n(folding: float) -> None:
     model = replace(fast(3.0), K=1e-6, further=[GaussMarkov(1e-4, 30.0)])
     best = maximum(replace(model, N=model.N / np.sqrt(folding)))
-    for level, number in ((N, 0), (2.0 * N, 1), (9.0 * N, 1)):
-        stretch = WhiteStretch(level, 1.0, 10.0)
-        assert count_fast_processes(best, folding, stretch) == number
-    assert count_fast_processes(best, folding, None) == 0
+    assert count_fast_processes(best) == 1
     merged = merge_fast_processes(best, 1, folding)
     assert merged.terms == Terms("NK", 1)
     in_the_log = replace(make_noise_model(merged), N=make_noise_model(merged).N * np.sqrt(folding))
@@ -131,22 +52,6 @@ def test_as_many_fast_processes_count_as_the_level_asks(folding: float) -> None:
     late = np.geomspace(5.0, 1000.0, 20)
     assert in_the_log.allan_variance(late) == pytest.approx(model.allan_variance(late), rel=0.02)
     assert merge_fast_processes(best, 0, folding) is best
-
-
-def test_n_and_its_draws_go_to_the_level_of_the_curve_by_one_factor() -> None:
-    # With the process N is twice as high; the curve has not quite come to it.
-    model = fast(3.0)
-    lower = merge_fast_processes(maximum(model), 1, 1.0, 0.98)
-    assert make_noise_model(lower).N == pytest.approx(0.98 * 2.0 * N, rel=1e-6)
-    posterior = Posterior(np.array([[N, 0.0, model.B]]), np.full((1, 1), T_B), np.zeros(1), 1.0)
-    drawn = merge_fast_draws(posterior, Terms("NK", 1), 1, 0.98)
-    assert drawn.parameters[0, 0] == pytest.approx(0.98 * 2.0 * N, rel=1e-6)
-    # Where none counts into it, the process stays.
-    for number in (0, 1):
-        left = merge_fast_processes(maximum(model), number, 1.7, 0.98)
-        assert len(left.times) == 1 - number
-    alone = merge_fast_draws(posterior, Terms("NK", 1), 0, 0.98)
-    assert alone.parameters[0] == pytest.approx([0.98 * N, 0.0, model.B])
 
 
 def test_draws_are_merged_one_by_one() -> None:
@@ -166,14 +71,9 @@ def hour_beside_a_fast_process() -> Likelihood:
 def test_white_noise_beside_a_fast_process_is_what_the_curve_shows(
     hour_beside_a_fast_process: Likelihood,
 ) -> None:
-    estimate, stretch = (
-        hour_beside_a_fast_process.estimates[0],
-        hour_beside_a_fast_process.stretch,
-    )
-    assert stretch is not None and stretch.level == pytest.approx(2.0 * N, rel=0.05)
+    estimate = hour_beside_a_fast_process.estimates[0]
     white = estimate.parameters["N"]
     assert white.value == pytest.approx(2.0 * N, rel=0.03)
-    assert white.value == pytest.approx(stretch.level, rel=0.03)
     assert white.lower is not None and white.upper is not None
     assert white.lower < 2.0 * N < white.upper and white.upper < 1.1 * white.lower
     assert "correlation time of 0.05" in (white.reason or "")
@@ -204,15 +104,6 @@ def test_beside_a_fast_process_no_limit_of_n_is_that_of_the_white_noise_alone(
         white = estimate.parameters["N"]
         assert white.lower is not None and white.upper is not None and white.value is not None
         assert white.lower > 0.97 * white.value and white.upper < 1.03 * white.value
-
-
-def test_where_the_curve_has_no_stretch_n_says_that_it_is_of_the_model() -> None:
-    model = NoiseModel(N=1e-4, K=3e-3)
-    log = simulate(model, 10.0, 40_000, np.random.default_rng(2))
-    curve = allan_variance(log, 10.0)
-    assert find_white_stretch(curve) is None
-    white = fit(log, 10.0).estimates[0].parameters["N"]
-    assert "no slope of −1/2" in (white.reason or "")
 
 
 numbers = st.one_of(st.none(), st.floats(-1e6, 1e6))

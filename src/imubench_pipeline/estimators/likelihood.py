@@ -59,10 +59,8 @@ from imubench_pipeline.estimators.posterior import (
 )
 from imubench_pipeline.estimators.spectrum import Spectrum, compute_spectra
 from imubench_pipeline.estimators.white_level import (
-    WhiteStretch,
     count_fast_processes,
     describe_white_level,
-    find_white_stretch,
     merge_fast_draws,
     merge_fast_processes,
 )
@@ -94,7 +92,6 @@ class Likelihood:
     fitted: Array
     """(b,): density of the chosen model in each bin, its ramp included; NaN without a fit."""
     frame: FitSelection
-    stretch: WhiteStretch | None = None  # of the Allan deviation, with the slope -1/2
 
     @property
     def low_pass(self) -> Cutoff | None:
@@ -148,15 +145,12 @@ def fit(
     if not present.any():
         raise ValueError(f"none of the {len(values)} samples is present")
     holes = not bool(present.all())
-    gaps = count_gaps([values])
-    curve = of_blocks([values], len(values), rate, holes=holes, gaps=gaps, segments=segments)
     return fit_blocks(
         lambda: [values],
         len(values),
         rate,
         segments=segments,
         holes=holes,
-        stretch=find_white_stretch(curve),
         band=band,
         bandwidth=bandwidth,
         resolution=resolution,
@@ -170,7 +164,6 @@ def fit_blocks(
     rate: float,
     *,
     holes: bool,
-    stretch: WhiteStretch | None,
     segments: Sequence[Span] | None = None,
     band: float | None = None,
     bandwidth: float | None = None,
@@ -184,14 +177,13 @@ def fit_blocks(
     samples present only.
 
     ``blocks`` returns the log in order, in SI, at every call, NaN where a sample is missing;
-    ``samples`` is L, the length of all blocks together; with ``holes``, samples may be missing;
-    ``stretch`` is the stretch of the Allan deviation with the slope -1/2, whose white noise is N.
+    ``samples`` is L, the length of all blocks together; with ``holes``, samples may be missing.
     """
     spans = list_spans(segments, samples)
     select = partial(select_for_fit, band=band, bandwidth=bandwidth, resolution=resolution)
     if not holes:
         spectrum, lines = compute_spectra(blocks(), samples, rate, spans)
-        return fit_spectrum(spectrum, select(spectrum, lines), rng=rng, stretch=stretch)
+        return fit_spectrum(spectrum, select(spectrum, lines), rng=rng)
     means = average_blocks(blocks(), spans)
     parts = split_at_gaps(means, spans)
     if not parts:
@@ -218,7 +210,7 @@ def fit_blocks(
         if number < rounds:
             candidates = compare_models(frame.whittle(spectrum), quantization=False)
             model = make_noise_model(candidates[0].maximum)
-    return fit_spectrum(spectrum, frame, rng=rng, stretch=stretch)
+    return fit_spectrum(spectrum, frame, rng=rng)
 
 
 def fit_spectrum(
@@ -226,7 +218,6 @@ def fit_spectrum(
     frame: FitSelection,
     *,
     rng: np.random.Generator,
-    stretch: WhiteStretch | None,
 ) -> Likelihood:
     """Estimate the noise parameters from the selected bins of a spectrum (see `fit`)."""
     if frame.used.sum() < MIN_BINS:
@@ -245,7 +236,7 @@ def fit_spectrum(
     alike = [chosen] + [
         c for c in candidates[1:] if c.akaike_weight >= MIN_AKAIKE_WEIGHT and not c.terms.ramp
     ]
-    number = count_fast_processes(chosen.maximum, frame.folding, stretch)
+    number = count_fast_processes(chosen.maximum)
     wider = [c for c in candidates if c.terms in _with_one_more(chosen.terms, number)]
     papers = next(c for c in candidates if c.terms == PAPERS_MODEL)
     drawn = [c for c in candidates if c in alike or c in wider or c is papers]
@@ -253,12 +244,12 @@ def fit_spectrum(
     in_the_log = {
         terms: frame.in_the_log(posterior, terms, rng) for terms, posterior in posteriors.items()
     }
-    of_data = _InTheLog(whittle, frame, in_the_log, stretch, alike, wider)
+    of_data = _InTheLog(whittle, frame, in_the_log, alike, wider)
     estimate = of_data.estimate("likelihood")
     sensor = estimate_sensor_density(frame, chosen.maximum, posteriors[chosen.terms], spectrum, rng)
     if sensor is not None:
         estimate = replace(estimate, parameters={**estimate.parameters, SENSOR: sensor})
-    of_papers = _InTheLog(whittle, frame, in_the_log, stretch, [papers], [])
+    of_papers = _InTheLog(whittle, frame, in_the_log, [papers], [])
     gauss_markov = of_papers.estimate("likelihood_gm")
     fitted = (
         frame.likelihood_of_all_bins(spectrum).density(chosen.maximum)
@@ -276,28 +267,23 @@ def fit_spectrum(
     )
     lines, band, clear, used = frame.lines, frame.band, frame.clear, frame.used
     both = (estimate, gauss_markov)
-    return Likelihood(both, candidates, lines, band, spectrum, clear, used, fitted, frame, stretch)
+    return Likelihood(both, candidates, lines, band, spectrum, clear, used, fitted, frame)
 
 
 class _InTheLog:
-    """Models that the log does not rule out, with N as its Allan deviation shows it."""
+    """Models that the log does not rule out, with the processes faster than a second in N."""
 
     def __init__(
         self,
         whittle: Whittle,
         frame: FitSelection,
         posteriors: Mapping[Terms, Posterior],
-        stretch: WhiteStretch | None,
         alike: Sequence[Candidate],
         wider: Sequence[Candidate],
     ) -> None:
-        self._whittle, self._frame, self._stretch = whittle, frame, stretch
+        self._whittle, self._frame = whittle, frame
         self._fastest = alike[0].maximum.times
-        self._number = count_fast_processes(alike[0].maximum, frame.folding, stretch)
-        self._level = 1.0  # of the curve over N with all of those processes
-        if stretch is not None and np.any(self._fastest < BROADBAND_TIME):
-            merged = merge_fast_processes(alike[0].maximum, self._number, frame.folding)
-            self._level = stretch.level / (merged.parameter("N") * math.sqrt(frame.folding))
+        self._number = count_fast_processes(alike[0].maximum)
         self.draws: dict[Terms, Posterior] = {}
         self._posteriors = posteriors
         self.alike = list(self._merged(alike))
@@ -308,15 +294,14 @@ class _InTheLog:
         merged: set[Terms] = set()
         for candidate in candidates:
             terms, times = candidate.terms, candidate.maximum.times
-            fast = int(np.sum(times < BROADBAND_TIME))
-            number, level = min(self._number, fast), self._level if fast else 1.0
-            maximum = merge_fast_processes(candidate.maximum, number, self._frame.folding, level)
+            number = min(self._number, int(np.sum(times < BROADBAND_TIME)))
+            maximum = merge_fast_processes(candidate.maximum, number, self._frame.folding)
             if maximum.terms in merged:
                 continue
             merged.add(maximum.terms)
             if maximum.terms not in self.draws:
                 posterior = self._posteriors[terms]
-                self.draws[maximum.terms] = merge_fast_draws(posterior, terms, number, level)
+                self.draws[maximum.terms] = merge_fast_draws(posterior, terms, number)
             yield replace(candidate, maximum=maximum)
 
     def estimate(self, method: str) -> Estimate:
@@ -327,7 +312,7 @@ class _InTheLog:
         tau = make_averaging_times(spectrum.rate, float(spectrum.length.max()))
         estimate = add_curve_figures(estimate, self.alike, self.wider, self.draws, tau)
         N, counted = estimate.parameters["N"], self._fastest[: self._number]
-        reason = N.reason or describe_white_level(self._stretch, counted.tolist())
+        reason = N.reason or describe_white_level(counted.tolist())
         return replace(estimate, parameters={**estimate.parameters, "N": replace(N, reason=reason)})
 
     def draw_jointly(self) -> JointDraws:

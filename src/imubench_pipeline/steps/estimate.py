@@ -45,7 +45,6 @@ from imubench_pipeline.estimators.thermal.fit import fit_temperature
 from imubench_pipeline.estimators.thermal.path import TemperaturePath, estimate_temperature_path
 from imubench_pipeline.estimators.thermal.register import estimate_resolution
 from imubench_pipeline.estimators.thermal.result import ThermalFit, add_temperature_effect
-from imubench_pipeline.estimators.white_level import find_white_stretch
 from imubench_pipeline.model import estimates as model
 from imubench_pipeline.model.recordings import FindingRow
 from imubench_pipeline.noise.simulate import channel_rng
@@ -275,7 +274,6 @@ class _Channel:
             samples=log.grid,
             rate=log.rate,
             holes=log.holes,
-            stretch=find_white_stretch(self._bare),
             segments=log.segments,
             band=self._band,
             bandwidth=self._bandwidth,

@@ -107,7 +107,6 @@ def fit_temperature(
             samples,
             rate,
             holes=True,
-            stretch=None,
             segments=path.segments,
             band=band,
             bandwidth=bandwidth,
@@ -125,7 +124,7 @@ def fit_temperature(
             effect = settled.regressors.effect(settled.regression)
     else:
         fit = _Fit(blocks(), samples, rate, spans, path, frame, longest_lag)
-        plain = plain or likelihood.fit_spectrum(fit.spectrum, fit.frame, rng=rng, stretch=None)
+        plain = plain or likelihood.fit_spectrum(fit.spectrum, fit.frame, rng=rng)
     if not fit.possible:
         return _nothing(plain, path, fit, texts.SHORT_LOG)
     if not varies:
@@ -339,9 +338,7 @@ def _described(
             left, fit.used, settled.whittle, best.terms, verdict.path_errors
         )
         effect = regressors.effect(settled.regression)
-        without = likelihood.fit_spectrum(
-            left, find_frame(left, lines), rng=rng, stretch=plain.stretch
-        )
+        without = likelihood.fit_spectrum(left, find_frame(left, lines), rng=rng)
     added = [path.means(*place, effect) for place in fit.series.places]
     shift = float(np.concatenate(added).mean())
     candidates = settled.candidates if verdict.compensated else fit.of_the_log

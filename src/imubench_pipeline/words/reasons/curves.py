@@ -129,21 +129,11 @@ def no_model_minimum(falls_to: float | None) -> str:
     return f"{text}still falls at {number_text(falls_to)} s, a ninth of the log"
 
 
-def white_level_of_model(decades: float) -> str:
-    return (
-        f"the Allan deviation has no slope of −1/2 over {number_text(decades, 2)} decades: N is "
-        "the white noise of the fitted model"
-    )
-
-
-def white_level_of_curve(first: float, last: float, times: Sequence[float]) -> str:
+def white_level_with_processes(times: Sequence[float]) -> str:
     listed = " and ".join(f"{number_text(time, 3)} s" for time in times)
     process = (
         "a process with a correlation time"
         if len(times) == 1
         else "processes with correlation times"
     )
-    return (
-        f"N is the level of the Allan deviation from {number_text(first, 3)} to "
-        f"{number_text(last, 3)} s and includes {process} of {listed}"
-    )
+    return f"N is the level of the Allan deviation beyond 1 s and includes {process} of {listed}"
