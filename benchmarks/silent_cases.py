@@ -939,7 +939,7 @@ def thermostat(rng: Rng) -> Log:
     period = samples / rng.uniform(3.0, 10.0)
     halves = 0.5 * period * (1.0 + rng.uniform(0.1, 0.3) * rng.standard_normal(40))
     ends = np.cumsum(np.maximum(halves, 0.1 * period)) - rng.uniform(0.0, period)
-    cycle = np.searchsorted(ends, np.arange(samples)) % 2.0
+    cycle = np.asarray(np.searchsorted(ends, np.arange(samples)) % 2, dtype=np.float64)
     course = sim.lagged(cycle, 1.0, period / rng.uniform(3.0, 10.0))
     size = between(rng, 1.0, 5.0) * noise.sigma / float(np.std(course))
     return _with_mean(rng, noise, samples, rate, size * course)

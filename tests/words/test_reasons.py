@@ -55,12 +55,6 @@ ESTIMATES = [
     of(estimates.drift_or_walk, "the 5 lowest", 5, "N"),
     of(estimates.smooth_drift, "f⁻⁴", "N", 9.1),
     of(estimates.few_frequencies, "Record a longer log", 5),
-    of(estimates.signal_or_walk, "about as well as a random walk", estimates.warm_up(300.0)),
-    of(estimates.pause_steps, "a step of the bias at a pause", 1),
-    of(estimates.pause_steps, "at 3 pauses", 3),
-    of(estimates.step_at, "at 123.4 s", 123.4),
-    of(estimates.warm_up, "300 s", 300.0),
-    of(estimates.periodic_drift, "period of 600 s", 600.0),
     of(estimates.curve_bias_unknown, "not determined", None),
     of(estimates.curve_bias_unknown, "short log", "short log"),
     of(estimates.band_excluded, "above 5 Hz", 5.0),
@@ -91,9 +85,8 @@ CURVES = [
     of(curves.time_at_bound, "not determined", estimates.correlation_bound(9.0, longest=True)),
     of(curves.no_model_minimum, "still falls at 4000 s", 4000.0),
     of(curves.no_model_minimum, "rises from its shortest", None),
-    of(curves.white_level_of_model, "0.7 decades", 0.7),
-    of(curves.white_level_of_curve, "a correlation time of 0.2 s", 0.3, 4.0, [0.2]),
-    of(curves.white_level_of_curve, "correlation times of 0.1 s and 0.2 s", 0.3, 4.0, [0.1, 0.2]),
+    of(curves.white_level_with_processes, "a correlation time of 0.2 s", [0.2]),
+    of(curves.white_level_with_processes, "correlation times of 0.1 s and 0.2 s", [0.1, 0.2]),
 ]
 
 SPECTRA = [
