@@ -198,14 +198,35 @@ def tables(paths: Iterable[str], rate: float) -> Iterator[Recording]:
         yield Recording(path, table.to_numpy(), rate, tuple(table.columns))
 
 
-def measured(samples: Array, rate: float) -> tuple[Measured, WhiteStretch | None]:
-    """Return the curve of a piece, 8 tau a decade up to a fifth of it, and its -1/2 stretch."""
+def white_level(curve: Measured, sizes: Array) -> float | None:
+    """Return the median of sigma sqrt(tau) on the first -1/2 stretch of a curve, or None.
+
+    It is 0.7 decade or longer, from clusters of 3 samples on, within 3 % of its median (or two
+    standard errors, at most 6 %), up to a standard error of 3 %.
+    """
+    level, within = curve.deviation * np.sqrt(curve.tau), np.clip(2.0 * curve.error, 0.03, 0.06)
+    for start in np.flatnonzero(sizes >= 3):
+        stop = start
+        while stop < len(sizes) and curve.error[stop] < 0.03:
+            part = level[start : stop + 1]
+            middle = np.median(part)
+            if not middle > 0.0 or np.any(np.abs(part / middle - 1.0) > within[start : stop + 1]):
+                break
+            stop += 1
+        if stop > start and sizes[stop - 1] >= 10.0**0.7 * sizes[start]:
+            return float(np.median(level[start:stop]))
+    return None
+
+
+def measured(samples: Array, rate: float) -> tuple[Measured, float | None]:
+    """Return the curve of a piece, 8 tau a decade up to a fifth of it, and its -1/2 level."""
     n = len(samples)
     sizes = np.unique(np.rint(10 ** np.arange(0.0, np.log10(n / 5), 1 / 8)).astype(int))
     curve = allan_variance(samples, rate, cluster_sizes=sizes)
     degrees = 1.5 * n / (2.0 * sizes) * (4.0 * sizes**2 / (4.0 * sizes**2 + 5.0)) - 1.0
     error = 0.5 * np.sqrt(2.0 / np.maximum(1.0, degrees))
-    return Measured(curve.tau, curve.deviation, error), find_white_stretch(curve)
+    piece = Measured(curve.tau, curve.deviation, error)
+    return piece, white_level(piece, curve.cluster_size.astype(np.float64))
 
 
 def pieces_of(recording: Recording, channel: str, pieces: int, method: Method) -> Iterator[Piece]:
@@ -219,7 +240,7 @@ def pieces_of(recording: Recording, channel: str, pieces: int, method: Method) -
     for i, part in enumerate(parts):
         estimates = imu.estimate(part[:, None], rate, channels=[channel], method=method)
         estimate = estimates[channel]
-        curve, stretch = curves[i]
+        curve, level = curves[i]
         longest = length / rate / 9.0
         yield Piece(
             recording.name,
@@ -228,7 +249,7 @@ def pieces_of(recording: Recording, channel: str, pieces: int, method: Method) -
             pieces,
             i,
             {name: figure_of(estimate, name) for name in PARAMETERS},
-            stretch.level if stretch else None,
+            level,
             longest,
             float(np.interp(longest, curve.tau, curve.deviation)),
             predictions(estimate, rate, curve, curves[i + 1][0]) if i + 1 < pieces else {},

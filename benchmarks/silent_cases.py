@@ -898,6 +898,53 @@ def two_warm_ups(rng: Rng) -> Log:
     return _drifting(rng, lambda t: np.exp(-t / slow) + share * np.exp(-t / fast))
 
 
+def look_up_table(rng: Rng) -> Log:
+    """N, B, T_B, and the residue of a temperature table: 2 to 15 teeth of 2 to 8 sigma.
+
+    The temperature settles, or follows a part of a day; a tooth ends where the table has an entry.
+    """
+    samples, rate = any_length(rng)
+    noise = any_process(rng, samples, rate)
+    t = np.arange(samples) / samples
+    if rng.random() < 0.5:
+        temperature = np.exp(-t / between(rng, 0.15, 0.6))
+    else:
+        temperature = np.sin(2.0 * np.pi * (rng.uniform(0.3, 1.5) * t + rng.random()))
+    entries = between(rng, 2.0, 15.0) * temperature / float(np.ptp(temperature)) + rng.random()
+    size = float(rng.choice([-1.0, 1.0])) * between(rng, 2.0, 8.0) * noise.sigma
+    return _with_mean(rng, noise, samples, rate, size * np.mod(entries, 1.0))
+
+
+def draughts(rng: Rng) -> Log:
+    """N, B, T_B, and 2 to 9 draughts of 3 to 10 sigma: fast to begin, T/200 to T/20 to settle."""
+    samples, rate = any_length(rng)
+    noise = any_process(rng, samples, rate)
+    settles = between(rng, 1 / 200, 1 / 20) * samples
+    sign, size = float(rng.choice([-1.0, 1.0])), between(rng, 3.0, 10.0) * noise.sigma
+    mean = np.zeros(samples)
+    for _ in range(rng.integers(2, 10)):
+        since = np.arange(samples) - rng.uniform(0.02, 0.95) * samples
+        pulse = np.exp(-since / settles) - np.exp(-since / (0.1 * settles))
+        mean += rng.uniform(0.3, 1.0) * np.where(since > 0.0, pulse, 0.0)
+    return _with_mean(rng, noise, samples, rate, sign * size * mean)
+
+
+def thermostat(rng: Rng) -> Log:
+    """N, B, T_B, and 3 to 10 cycles of a heating, 1 to 5 sigma: on and off, behind a lag.
+
+    Each half of a period differs by 10 to 30 %, so that the cycles are no line.
+    """
+    samples, rate = any_length(rng)
+    noise = any_process(rng, samples, rate)
+    period = samples / rng.uniform(3.0, 10.0)
+    halves = 0.5 * period * (1.0 + rng.uniform(0.1, 0.3) * rng.standard_normal(40))
+    ends = np.cumsum(np.maximum(halves, 0.1 * period)) - rng.uniform(0.0, period)
+    cycle = np.asarray(np.searchsorted(ends, np.arange(samples)) % 2, dtype=np.float64)
+    course = sim.lagged(cycle, 1.0, period / rng.uniform(3.0, 10.0))
+    size = between(rng, 1.0, 5.0) * noise.sigma / float(np.std(course))
+    return _with_mean(rng, noise, samples, rate, size * course)
+
+
 # What the noise does
 
 
@@ -1157,6 +1204,9 @@ HARD: Mapping[str, Case] = {
         linear_pieces,
         smooth_drift,
         two_warm_ups,
+        look_up_table,
+        draughts,
+        thermostat,
         growing_noise,
         bursts,
         heavy_tails,

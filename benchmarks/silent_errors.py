@@ -87,11 +87,8 @@ BEARS_ON: Mapping[str, frozenset[str]] = {
     "warm_up_drift": SLOW,
     "periodic_drift": SLOW,
     "telegraph_noise": SLOW,
-    "K_differs": frozenset({"K", "R"}),
-    "slow_noise_differs": SLOW,
     # Nor does a changing variance make a process.
     "noise_grows": frozenset({"N", "Q"}),
-    "noise_varies": frozenset({"N", "Q"}),
     # Of the unit, and not of the noise.
     "suspicious_unit": frozenset(),
     "gravity_norm": frozenset(),

@@ -169,12 +169,6 @@ CHANGED: Mapping[str, tuple[str, Change]] = {
             x + BASE.N * np.sqrt(RATE) * 0.46 * np.sqrt(t / t[-1]) * rng.standard_normal(len(t))
         ),
     ),
-    "walk on the second half": (
-        "slow_noise_differs",
-        lambda x, t, rng: (
-            x + np.cumsum((t > t[-1] / 2) * rng.standard_normal(len(t))) * 3e-5 / np.sqrt(RATE)
-        ),
-    ),
 }
 
 

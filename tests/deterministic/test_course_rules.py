@@ -7,47 +7,14 @@ import pytest
 
 from imubench_pipeline.estimators.deterministic.courses import (
     DeterministicSignals,
-    _compute_walk_leverage,
     _describe,
-    _find_change_point,
     _find_limits,
-    _place_steps,
 )
-from imubench_pipeline.estimators.deterministic.means import Means, Part, average_blocks
-from imubench_pipeline.estimators.deterministic.ordinates import Fit, Ordinates, average_covariance
+from imubench_pipeline.estimators.deterministic.means import Means, Part
+from imubench_pipeline.estimators.deterministic.ordinates import Ordinates
 from imubench_pipeline.estimators.deterministic.regressors import Regressor
 from imubench_pipeline.estimators.deterministic.search import SearchResult
 from tests.deterministic.logs import RATE
-
-
-@pytest.mark.parametrize("at", [1, 7, 30, 39])
-def test_the_first_sample_of_the_second_level_is_found_by_its_squares(at: int) -> None:
-    samples = np.random.default_rng(at).standard_normal(40) + 3.0 * (np.arange(40) >= at)
-    samples[[2, 9, 20]] = np.nan
-
-    def left(place: int) -> float:
-        halves = samples[:place], samples[place:]
-        if not all(np.isfinite(half).any() for half in halves):
-            return np.inf
-        return float(sum(np.nansum((half - np.nanmean(half)) ** 2) for half in halves))
-
-    squares = [left(place) for place in range(1, 40)]
-    assert left(_find_change_point(samples)) == pytest.approx(min(squares))
-
-
-@pytest.mark.parametrize(("size", "placed"), [(8.5, True), (7.5, False)])
-def test_a_step_is_placed_to_the_sample_from_eight_errors_of_a_block_on(
-    size: float, placed: bool
-) -> None:
-    rng = np.random.default_rng(1)
-    log = rng.standard_normal(40_000)
-    means = average_blocks([log], len(log), RATE)
-    white = np.sqrt(np.median(means.parts[0].power) / means.block)
-    log += size * white * (np.arange(40_000) >= 20_003)
-    fit = Ordinates(average_blocks([log], len(log), RATE)).fit([Regressor("step", 0, 2000.0)])
-    fit = replace(fit, sizes=np.array([size * white]))
-    (step,) = _place_steps(lambda: np.array_split(log, 7), means, fit)
-    assert (step.where != 2000.0) is placed
 
 
 def test_a_course_has_limits_where_the_likelihood_has_lost_half_of_chi_squared() -> None:
@@ -55,7 +22,7 @@ def test_a_course_has_limits_where_the_likelihood_has_lost_half_of_chi_squared()
     blocks = np.arange(n)
     rng = np.random.default_rng(3)
     values = rng.standard_normal(n) + 3.0 * np.exp(-blocks / 500.0)
-    ordinates = Ordinates(Means(10, RATE, (Part(0, values, np.ones(n), 0.0),)))
+    ordinates = Ordinates(Means(10, RATE, (Part(0, values, np.ones(n)),)))
     warm = Regressor("exponential", 0, 500.0)
     fit = replace(ordinates.fit([warm]), density=np.full(n - 1, ordinates.means.interval))
 
@@ -68,17 +35,6 @@ def test_a_course_has_limits_where_the_likelihood_has_lost_half_of_chi_squared()
     for end in (low, high):
         assert gain(500.0) - gain(end) > 3.84
         assert gain(500.0) - gain(500.0 + (end - 500.0) / 1.5) < 3.84
-    pause = Regressor("restart", 0, 100.0, 8.0)
-    assert _find_limits(ordinates, fit, pause) == (96.0, 104.0)
-
-
-def test_what_regressors_take_of_the_lowest_ordinates_they_take_of_a_walk() -> None:
-    nothing = np.empty(0)
-    density = np.array([1e4, 1e4, 1.0, 1.0, 1.0, 1.0, 1.0])
-    leverage = np.array([0.9, 0.3, 1.0, 1.0, 0.0, 0.0, 0.0])
-    # No noise is fitted: what is asked of the fit does not use it.
-    fit = Fit((), nothing, nothing, None, density, nothing, leverage, 0.0)  # type: ignore[arg-type]  # no noise
-    assert _compute_walk_leverage(fit) == pytest.approx(0.6, rel=1e-3)
 
 
 def test_a_course_is_told_in_seconds_from_the_first_sample() -> None:
@@ -89,21 +45,18 @@ def test_a_course_is_told_in_seconds_from_the_first_sample() -> None:
         Regressor("exponential", 0, 150.0),
         Regressor("sinusoid", 0, 0.005),
         Regressor("ramp", 0),
-        Regressor("restart", 0, 1200.0, 8.0),
     ]
-    sizes = np.array([8.0, 30.0, 3.0, 4.0, 1e-4, -6.0])
+    sizes = np.array([8.0, 30.0, 3.0, 4.0, 1e-4])
     rows = np.concatenate([one.means(n) for one in kinds])
     values = sizes @ rows + rng.standard_normal(n)
-    ordinates = Ordinates(Means(block, RATE, (Part(500, values, np.ones(n), 0.0),)))
+    ordinates = Ordinates(Means(block, RATE, (Part(500, values, np.ones(n)),)))
     fit = ordinates.fit(kinds)
-    searched = SearchResult(fit, fit, (1.0, 2.0, 3.0, 4.0, 5.0), False)
-    step, warm, drift, restart = _describe(ordinates, searched)
+    searched = SearchResult(fit, (1.0, 2.0, 3.0, 4.0), False)
+    step, warm, drift = _describe(ordinates, searched)
     interval, start = block / RATE, 500 / RATE
-    covariance = average_covariance(ordinates, fit)
-    assert [one.gain for one in (step, warm, drift, restart)] == [1.0, 2.0, 3.0, 5.0]
+    covariance = fit.covariance
+    assert [one.gain for one in (step, warm, drift)] == [1.0, 2.0, 3.0]
     assert step.start == step.end == pytest.approx(start + 700.25 * interval)
-    assert restart.start == pytest.approx(start + 1200.0 * interval)
-    assert restart.place_error == pytest.approx(4.0 * interval)
     assert (warm.start, warm.end) == pytest.approx((start, start + n * interval))
     assert warm.time == pytest.approx(150.0 * interval)
     assert drift.time == pytest.approx(interval / 0.005)
@@ -118,12 +71,11 @@ def test_a_course_is_told_in_seconds_from_the_first_sample() -> None:
         else:
             ends = (interval / high, interval / low)
             assert (one.time_lower, one.time_upper) == pytest.approx(ends)
-    assert (step.size, warm.size, restart.size) == pytest.approx(tuple(fit.sizes[[0, 1, 5]]))
+    assert (step.size, warm.size) == pytest.approx(tuple(fit.sizes[:2]))
     assert drift.size == pytest.approx(np.hypot(*fit.sizes[2:4]))
     # An interval is that of the covariance, and of the place where that was looked for.
-    for one, place in ((warm, 1), (restart, 5)):
-        assert one.size_upper - one.size == pytest.approx(1.96 * covariance[place, place] ** 0.5)
-        assert one.size - one.size_lower == pytest.approx(1.96 * covariance[place, place] ** 0.5)
+    assert warm.size_upper - warm.size == pytest.approx(1.96 * covariance[1, 1] ** 0.5)
+    assert warm.size - warm.size_lower == pytest.approx(1.96 * covariance[1, 1] ** 0.5)
     along = fit.sizes[2:4] / drift.size
     least = 1.96 * np.sqrt(along @ covariance[2:4, 2:4] @ along)
     spread = []
@@ -133,18 +85,15 @@ def test_a_course_is_told_in_seconds_from_the_first_sample() -> None:
     half = 0.5 * np.ptp([drift.size, *spread])
     assert drift.size_upper - drift.size == pytest.approx(np.hypot(least, half))
     # At samples: of its own part alone, a block's middle after half a block.
-    other = Part(500 + (n + 50) * block, np.zeros(200), np.ones(200), 0.0)
+    other = Part(500 + (n + 50) * block, np.zeros(200), np.ones(200))
     means = replace(ordinates.means, parts=(*ordinates.means.parts, other))
-    found = DeterministicSignals((step, warm, drift, restart), means, searched)
+    found = DeterministicSignals((step, warm, drift), means, searched)
     at = found.at(0, 25_000)
     assert not at[:500].any() and not at[other.start :].any()
     t = (np.arange(500, other.start) + 0.5 - 500) / block
     expected = fit.sizes[0] * (t >= 700.25) + fit.sizes[1] * np.exp(-t / 150.0)
     expected += fit.sizes[2:4] @ np.array([np.cos(0.01 * np.pi * t), np.sin(0.01 * np.pi * t)])
-    expected += fit.sizes[5] * (t >= 1200.0)
     np.testing.assert_allclose(at[500 : other.start], expected, atol=1e-9)
     np.testing.assert_allclose(found.at(1_234, 9_876), at[1_234:9_876])
     left = np.concatenate(list(found.subtract_from(np.array_split(np.ones(25_000), 9))))
     np.testing.assert_allclose(left, 1.0 - at)
-    rest = found.without().parts[0].mean
-    np.testing.assert_allclose(rest, values - np.delete(fit.sizes, 4) @ np.delete(rows, 4, axis=0))

@@ -131,13 +131,6 @@ def test_a_part_of_a_cycle_is_found_though_a_walk_would_hide_it() -> None:
     assert drift.size_lower < 40.0 * SIGMA < drift.size_upper
 
 
-def test_a_weak_part_of_a_cycle_rivals_the_walk_that_it_looks_like() -> None:
-    log = static_log(12, walk=0.0)
-    found = signals_in(log + 3.0 * SIGMA * np.sin(2.0 * np.pi * times(log) / 15_000.0))
-    assert found.signals == ()
-    assert "periodic drift" in (found.against_random_walk or "")
-
-
 def with_pauses(log: Array, size: float) -> Array:
     """Leave out 60 s at six places; the bias after each is another, by six draws of a size."""
     rng = np.random.default_rng(6)
@@ -149,30 +142,22 @@ def with_pauses(log: Array, size: float) -> Array:
 
 
 @pytest.mark.parametrize("seed", few([30], [31, 32, 33]))
-@pytest.mark.parametrize("size", few([3.0], [1.0, 20.0]))
-def test_another_bias_after_each_pause_is_no_random_walk(seed: int, size: float) -> None:
-    found = signals_in(with_pauses(static_log(seed, walk=0.0), size * SIGMA))
+def test_another_bias_after_each_pause_is_no_random_walk(seed: int) -> None:
+    found = signals_in(with_pauses(static_log(seed, walk=0.0), 20.0 * SIGMA))
     assert found.searched is not None
     K_left = found.searched.fit.noise.parameter("K")
     # Steps of 20 sigma look like 3.5e-5; a log of noise alone may show a little.
     alone = signals_in(static_log(seed, walk=0.0)).searched
     assert alone is not None
-    told = "pauses" in (found.against_random_walk or "")
-    assert told or K_left < 2.0 * alone.fit.noise.parameter("K") + 2e-6
-    if size >= 20.0:
-        assert {signal.kind for signal in found.signals} == {"bias_step"}
-        inside = [round((signal.start / 10_800 - 0.1) / 0.16, 1) % 1 for signal in found.signals]
-        assert inside == [0.0] * len(inside)
+    assert K_left < 2.0 * alone.fit.noise.parameter("K") + 2e-6
+    assert {signal.kind for signal in found.signals} == {"bias_step"}
+    inside = [round((signal.start / 10_800 - 0.1) / 0.16, 1) % 1 for signal in found.signals]
+    assert inside == [0.0] * len(inside)
 
 
 def test_a_walk_through_pauses_stays_one() -> None:
     for seed in (21, 22):
         found = signals_in(with_pauses(static_log(seed, walk=2e-5), 0.0))
-        assert found.against_random_walk is None
+        assert found.signals == ()
         assert found.searched is not None
         assert found.searched.fit.noise.parameter("K") > 1e-5
-
-
-def test_a_walk_that_is_well_seen_has_no_rival() -> None:
-    for seed in (20, 21):
-        assert signals_in(static_log(seed, walk=2e-5)).against_random_walk is None

@@ -102,7 +102,7 @@ def test_pieces_of_a_band_are_joined_by_their_power() -> None:
     assert band.amplitude**2 / 4.0 / STEP == pytest.approx(11 * 120.0, rel=0.05)
     # From the middle of the one to that of the other, and half of each.
     assert band.width == pytest.approx((25 + 11) * STEP, rel=0.02)
-    assert band.frequency_lower < 251 * STEP and band.frequency_upper > 274 * STEP
+    assert band.frequency_lower < (0.25 * 250 + 0.75 * 275) * STEP < band.frequency_upper
     assert band.amplitude_lower < band.amplitude < band.amplitude_upper
     apart = 30.0 * (np.abs(bins - 250) < 6) + 90.0 * (np.abs(bins - 300) < 6)
     assert len(find_lines([replace(expected(), density=1.0 + apart)], WHITE, RATE, 0.0)) == 2

@@ -18,8 +18,8 @@ TEXTS: list[tuple[FindingData, list[str]]] = [
     (Lines(2, 1, 17.0, 1e4), ["2 spectral lines and 1 noise band. The strongest is at 17 Hz"]),
     (StrongLine(0.567, 0.576), ["at 0.567 Hz adds 0.576 times the white-noise error over 1 s"]),
     (
-        TooManyLines(363, 12, 4, 0.0123, 1e-3),
-        ["363 sinusoids", "12 strongest", "The other 351", "1.23 %", "0.0573 °/s rms"],
+        TooManyLines(363, 16, 0.0123, 1e-3),
+        ["363 sinusoids", "16 strongest", "The other 347", "1.23 %", "0.0573 °/s rms"],
     ),
     (BandLimit(5.0), ["bends above 5 Hz", "state the bandwidth"]),
     (SlowNoiseMissing(0.1, 0.31), ["Up to 0.1 Hz", "0.31 times", "Switch off automatic zeroing"]),
@@ -37,4 +37,4 @@ def test_every_spectral_finding_has_a_text() -> None:
 
 
 def test_units_follow_the_channel() -> None:
-    assert "102 mg rms" in TooManyLines(40, 12, 4, 0.1, 1.0).text("accel_x")
+    assert "102 mg rms" in TooManyLines(40, 16, 0.1, 1.0).text("accel_x")

@@ -2,9 +2,9 @@
 
 They are detected in Hann-windowed Fourier spectra averaged over segments (P. D. Welch, IEEE Trans.
 Audio Electroacoust. 15, 1967). Under the model the density of a bin over its expectation is
-chi-squared with two degrees of freedom per segment. Of many lines, the weaker ones are merged:
-A^2 = sum A_i^2 and f^2 = A^2 / sum (A_i / f_i)^2 preserve the variance of the signal and of its
-integral.
+chi-squared with two degrees of freedom per segment. Of many lines, the weaker ones are merged to
+one: A^2 = sum A_i^2 and f^2 = A^2 / sum (A_i / f_i)^2 preserve the variance of the signal and of
+its integral.
 """
 
 from __future__ import annotations
@@ -46,9 +46,7 @@ _MAX_LINE_LEAKAGE = 0.3  # Into a bin of the likelihood, in standard errors of t
 # the cross terms of line and noise; and the minimum error.
 _POWER_ERROR_TERMS = (12.6, 35.0 / 18.0, 4e-3)
 _PLACE_ERROR_TERMS = (50.0, 5.0 / 18.0, 5e-3)
-MAX_SINGLE_LINES = 12  # Lines that are used individually if there are too many
-LINE_GROUPS = 4  # Groups of the weaker lines
-MAX_LINES = MAX_SINGLE_LINES + LINE_GROUPS  # Maximum number of lines that are used without grouping
+MAX_LINES = 16  # Lines that are used individually; the weaker ones together are one more
 
 
 @dataclass(frozen=True)
@@ -162,34 +160,18 @@ def _find_in_spectrum(
     significant = np.flatnonzero(chance[low:high] < FALSE_ALARM_PROBABILITY) + low
     if len(significant) == 0:
         return []
-    groups = np.split(significant, np.flatnonzero(np.diff(significant) > _LINE_HALF_WIDTH) + 1)
-    lines = [_estimate_line(spectrum, noise, standing, chance, group, rate) for group in groups]
-    return _merge_bands(lines)
-
-
-def _merge_bands(lines: list[Line]) -> list[Line]:
-    """Merge neighbouring pieces of a band of noise."""
-    merged = lines[:1]
-    for line in lines[1:]:
-        last = merged[-1]
-        near = _NEIGHBOUR_END * line.resolution + 0.5 * (last.width + line.width)
-        if last.narrow or line.narrow or line.frequency - last.frequency >= near:
-            merged.append(line)
-            continue
-        power = last.amplitude**2 + line.amplitude**2
-        share = last.amplitude**2 / power
-        merged[-1] = replace(
-            last if last.ratio > line.ratio else line,
-            frequency=share * last.frequency + (1.0 - share) * line.frequency,
-            frequency_lower=last.frequency_lower,
-            frequency_upper=line.frequency_upper,
-            amplitude=math.sqrt(power),
-            amplitude_lower=math.hypot(last.amplitude_lower, line.amplitude_lower),
-            amplitude_upper=math.hypot(last.amplitude_upper, line.amplitude_upper),
-            false_alarm=min(last.false_alarm, line.false_alarm),
-            width=line.frequency - last.frequency + 0.5 * (last.width + line.width),
-        )
-    return merged
+    lines: list[Line] = []
+    last = significant[:0]
+    for group in np.split(significant, np.flatnonzero(np.diff(significant) > _LINE_HALF_WIDTH) + 1):
+        line = _estimate_line(spectrum, noise, standing, chance, group, rate)
+        if lines and lines[-1].kind == line.kind == "band" and group[0] - last[-1] < _NEIGHBOUR_END:
+            # A band of noise may be above the threshold in pieces.
+            group = np.concatenate((last, group))
+            lines[-1] = _estimate_line(spectrum, noise, standing, chance, group, rate)
+        else:
+            lines.append(line)
+        last = group
+    return lines
 
 
 def _estimate_line(
@@ -271,40 +253,38 @@ def mask_lines(spectrum: Spectrum, lines: Sequence[Line], density: Array) -> NDA
 
 def select_sinusoids(lines: Sequence[Line]) -> list[dict[str, Parameter]]:
     """Return amplitude and frequency of the sinusoids among detected lines, sorted by frequency."""
-    narrow = [line for line in lines if line.narrow]
-    single = _find_single_lines(narrow) if len(narrow) > MAX_LINES else narrow
+    single, weaker = _separate_weaker(lines)
     sinusoids = []
     for line in single:
         A = Parameter(line.amplitude, lower=line.amplitude_lower, upper=line.amplitude_upper)
         f = Parameter(line.frequency, lower=line.frequency_lower, upper=line.frequency_upper)
         sinusoids.append({"amplitude": A, "frequency": f})
-    weaker = [line for line in narrow if line not in single]
     if weaker:
-        groups = np.array_split(np.arange(len(weaker)), LINE_GROUPS)
-        for group in groups:
-            members = [weaker[i] for i in group]
-            amplitude = math.hypot(*(line.amplitude for line in members))
-            low = math.hypot(*(line.amplitude_lower for line in members))
-            high = math.hypot(*(line.amplitude_upper for line in members))
-            turns = math.hypot(*(line.amplitude / line.frequency for line in members))
-            first, last = members[0].frequency, members[-1].frequency
-            reason = texts.grouped_lines(len(members), first, last)
-            A = Parameter(amplitude, reason=reason, lower=low, upper=high)
-            f = Parameter(amplitude / turns, reason=reason, lower=first, upper=last)
-            sinusoids.append({"amplitude": A, "frequency": f})
+        amplitude, low, high = (
+            math.hypot(*values)
+            for values in zip(
+                *((x.amplitude, x.amplitude_lower, x.amplitude_upper) for x in weaker), strict=True
+            )
+        )
+        turns = math.hypot(*(line.amplitude / line.frequency for line in weaker))
+        places = [line.frequency for line in weaker]
+        reason = texts.grouped_lines(len(weaker), min(places), max(places))
+        A = Parameter(amplitude, reason=reason, lower=low, upper=high)
+        f = Parameter(amplitude / turns, reason=reason, lower=min(places), upper=max(places))
+        sinusoids.append({"amplitude": A, "frequency": f})
     return sorted(sinusoids, key=lambda sinusoid: sinusoid["frequency"].value or 0.0)
 
 
-def _find_single_lines(lines: Sequence[Line]) -> list[Line]:
-    """Return the lines that are used individually where there are too many."""
-    return sorted(lines, key=lambda line: -line.amplitude)[:MAX_SINGLE_LINES]
+def _separate_weaker(lines: Sequence[Line]) -> tuple[list[Line], list[Line]]:
+    """Return the sinusoids that are used individually, and the weaker ones."""
+    narrow = sorted((line for line in lines if line.narrow), key=lambda line: -line.amplitude)
+    return narrow[:MAX_LINES], narrow[MAX_LINES:]
 
 
-def describe_grouping(channel: str, sinusoids: Sequence[Line]) -> Finding:
+def describe_grouping(channel: str, lines: Sequence[Line]) -> Finding:
     """Return the warning for a channel with more than `MAX_LINES` sinusoids."""
-    single = _find_single_lines(sinusoids)
-    rest = math.fsum(0.5 * line.amplitude**2 for line in sinusoids if line not in single)
-    share = rest / math.fsum(0.5 * line.amplitude**2 for line in sinusoids)
-    number = len(sinusoids)
-    data = TooManyLines(number, len(single), LINE_GROUPS, share, math.sqrt(rest))
+    single, weaker = _separate_weaker(lines)
+    rest, total = (sum(0.5 * x.amplitude**2 for x in group) for group in (weaker, lines))
+    number = len(lines)
+    data = TooManyLines(number, len(single), rest / total, math.sqrt(rest))
     return find(data, "warning", float(number), channel)

@@ -1,9 +1,9 @@
 """Missing samples drawn from their distribution, given the samples present and a noise model.
 
 A spectrum needs a complete log. A missing sample becomes white noise, plus the slow part of the
-noise, which a Kalman smoother interpolates from the block means on both sides (J. Durbin and S. J.
-Koopman, Biometrika 89, 2002). Fit and filling alternate (data augmentation: M. Tanner and W. Wong,
-J. Am. Stat. Assoc. 82, 1987).
+noise: a simulated path, moved to the block means by a smoothed difference (conditional simulation:
+J. Durbin and S. J. Koopman, Biometrika 89, 2002). Fit and filling alternate (data augmentation: M.
+Tanner and W. Wong, J. Am. Stat. Assoc. 82, 1987).
 """
 
 from __future__ import annotations
@@ -13,18 +13,17 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+from scipy.linalg import solveh_banded
+from scipy.signal import lfilter
 
 from imubench_pipeline.allan.phase import Span
 from imubench_pipeline.noise import NoiseModel
-from imubench_pipeline.noise.state_space import StateSpace
 from imubench_pipeline.typing import Array
 
 BLOCK_SAMPLES = 64  # Samples whose mean is one measurement of the slow part
-_WINDOW_BLOCKS = 4096
 _MAX_GAP_BLOCKS = 1024  # A longer gap splits the log: both sides are independent
-_DIFFUSE_RATIO = 1e4
+_MIN_DRIVE = 1e-9  # Of the slow part over a block, over the white noise of a mean: it is constant
 
 
 @dataclass(frozen=True)
@@ -109,34 +108,33 @@ def draw_slow_part(
     rate: float,
     rng: np.random.Generator,
 ) -> SlowPath:
-    """Draw the slow part of the noise, given the means of blocks in parts (`split_at_gaps`)."""
+    """Draw the slow part of the noise, given the means of blocks in parts (`split_at_gaps`).
+
+    The difference between the measured and the simulated means is smoothed as a random walk in
+    white noise. Across a gap it is a straight line, with the simulated path on it.
+    """
     interval = BLOCK_SAMPLES / rate
     white = max(model.N**2 * rate, 1e-300)
     places, values = [], []
     for start, stop in parts:
         chosen = means.within(start, stop)
         middle = 0.5 * (means.begin[chosen] + means.end[chosen] - 1)
+        count, n = means.count[chosen], len(middle)
+        path, drive = np.zeros(n), _MIN_DRIVE / BLOCK_SAMPLES
+        for term in model.realised(interval, max(n, 2) * interval):
+            if term.drive is None or term.drive.process is None:
+                continue
+            space = term.state_space(interval)
+            decay, step = float(space.transition[0, 0]), float(space.process_noise[0, 0])
+            noise = math.sqrt(step) * rng.standard_normal(n)
+            noise[0] = math.sqrt(float(space.initial_variance[0, 0])) * rng.standard_normal()
+            path += lfilter([1.0], [1.0, -decay], noise)
+            # Means do not tell the sample beside a mean of a process that is faster than a block.
+            drive += decay**2 * step / white
+        simulated = path + np.sqrt(white / np.maximum(count, 1)) * rng.standard_normal(n)
         ramp = model.R * middle / rate
-        mean, count = means.mean[chosen] - ramp, means.count[chosen]
-        spread = float(np.std(mean[count > 0])) + math.sqrt(white)
-        level = float(mean[count > 0].mean())
-        terms = [
-            term.state_space(interval)
-            for term in model.realised(interval, max(len(mean), 2) * interval)
-            if term.drive is not None and term.drive.process is not None
-        ]
-        # The level is constant, but unknown.
-        terms.append(StateSpace.scalar(1.0, 0.0, _DIFFUSE_RATIO * spread**2))
-        decay = np.array([space.transition[0, 0] for space in terms])
-        drive = np.array([space.process_noise[0, 0] for space in terms])
-        begin = np.array([space.initial_variance[0, 0] for space in terms])
-        # A random walk starts at the level.
-        normals = rng.standard_normal((len(mean), len(terms) + 1))
-        state = np.sqrt(np.append(begin[:-1], 0.0)) * rng.standard_normal(len(terms))
-        error = white / np.maximum(count, 1)
-        path = level + _draw_state_sum(
-            mean - level, count > 0, error, decay, drive, begin, state, normals
-        )
+        difference = means.mean[chosen] - ramp - simulated
+        path += _smooth(difference, count, drive)
         # The path is level from the last middle to the end of the part, which lies before a
         # jump: between this knot and the first of the next part there is no sample.
         place = np.concatenate(([start - 0.25], middle, [stop - 0.75]))
@@ -165,76 +163,15 @@ def fill_missing(
         yield complete
 
 
-@njit(cache=True)
-def _draw_state_sum(
-    mean: Array,
-    present: NDArray[np.bool_],
-    error: Array,
-    decay: Array,
-    drive: Array,
-    begin: Array,
-    state: Array,
-    normals: Array,
-) -> Array:
-    """Draw the sum of scalar states given measurements of it (Durbin and Koopman's smoother)."""
-    # The smoothed difference between the real and simulated measurements is added to a simulated
-    # path, in windows, each with a look ahead.
-    # Plain loops: expressions of arrays take four times as long to compile.
-    n, s = len(mean), len(decay)
-    simulated, difference, path = np.empty(n), np.zeros(n), np.empty(n)
-    for k in range(n):
-        simulated[k] = 0.0
-        for a in range(s):
-            simulated[k] += state[a]
-        if present[k]:
-            difference[k] = mean[k] - simulated[k] - math.sqrt(error[k]) * normals[k, s]
-        for a in range(s):
-            state[a] = decay[a] * state[a] + math.sqrt(drive[a]) * normals[k, a]
-    size = min(n, _WINDOW_BLOCKS + _MAX_GAP_BLOCKS)
-    means, gains = np.zeros((size + 1, s)), np.zeros((size, s))
-    spreads = np.zeros((size + 1, s, s))
-    innovations = np.empty(size)
-    total, back = np.empty(s), np.empty(s)
-    for a in range(s):
-        spreads[0, a, a] = begin[a]
-    for first in range(0, n, _WINDOW_BLOCKS):
-        last = min(n, first + _WINDOW_BLOCKS + _MAX_GAP_BLOCKS)
-        for k in range(first, last):
-            i = k - first
-            wrong, variance = difference[k], error[k]
-            for a in range(s):
-                wrong -= means[i, a]
-                total[a] = 0.0
-                for b in range(s):
-                    total[a] += spreads[i, a, b]
-                variance += total[a]
-            innovations[i] = wrong / variance
-            for a in range(s):
-                gains[i, a] = total[a] / variance if present[k] else 0.0
-            for a in range(s):
-                means[i + 1, a] = decay[a] * (means[i, a] + gains[i, a] * wrong)
-                for b in range(s):
-                    spread = spreads[i, a, b] - gains[i, a] * total[b]
-                    spreads[i + 1, a, b] = decay[a] * decay[b] * spread
-                spreads[i + 1, a, a] += drive[a]
-        back[:] = 0.0
-        for k in range(last - 1, first - 1, -1):
-            i = k - first
-            along = 0.0
-            for a in range(s):
-                back[a] *= decay[a]
-                along += gains[i, a] * back[a]
-            if present[k]:
-                # L = Phi (I - gain H): its transpose, and H / F times the innovation.
-                for a in range(s):
-                    back[a] += innovations[i] - along
-            if k < first + _WINDOW_BLOCKS:
-                path[k] = simulated[k]
-                for a in range(s):
-                    path[k] += means[i, a]
-                    for b in range(s):
-                        path[k] += spreads[i, a, b] * back[b]
-        # The next window begins with what was known where this one ends.
-        if first + _WINDOW_BLOCKS < last:
-            means[0], spreads[0] = means[_WINDOW_BLOCKS], spreads[_WINDOW_BLOCKS]
-    return path
+def _smooth(values: Array, precision: NDArray[np.int64], drive: float) -> Array:
+    """Return the mean of a random walk, given values with independent errors.
+
+    ``precision`` is 1 over their variance, 0 for a missing value; ``drive`` is the variance
+    of a step of the walk.
+    """
+    diagonal = precision + 2.0 / drive
+    diagonal[[0, -1]] -= 1.0 / drive
+    if len(values) == 1:
+        return values
+    beside = np.full(len(values), -1.0 / drive)
+    return np.asarray(solveh_banded(np.array([beside, diagonal]), precision * values))

@@ -11,32 +11,26 @@ import numpy as np
 
 from imubench_pipeline.allan.phase import Span
 from imubench_pipeline.estimators.deterministic.means import Means, average_blocks
-from imubench_pipeline.estimators.deterministic.ordinates import Fit, Ordinates, average_covariance
+from imubench_pipeline.estimators.deterministic.ordinates import Fit, Ordinates
 from imubench_pipeline.estimators.deterministic.regressors import Regressor
 from imubench_pipeline.estimators.deterministic.scores import MIN_CYCLES, Gain
 from imubench_pipeline.estimators.deterministic.search import (
     SearchResult,
-    move_regressors,
     search_signals,
 )
 from imubench_pipeline.estimators.estimate import SIGMAS
 from imubench_pipeline.typing import Array
-from imubench_pipeline.words.reasons import estimates as texts
 
 Kind = Literal["bias_step", "warm_up_drift", "periodic_drift"]
 
 _KIND_NAMES: dict[str, Kind] = {
     "step": "bias_step",
-    "restart": "bias_step",
     "exponential": "warm_up_drift",
     "sinusoid": "periodic_drift",
 }
-"""Pulses are single bad blocks, and ramps a term of the noise model: neither is removed."""
+"""Ramps are a term of the noise model, and are not removed."""
 
-_MIN_STEP_SIGMAS = 8.0  # in errors of a block; larger steps are placed to the sample
-_MAX_STEPS = 8  # more steps, when the search reaches its maximum of regressors, are telegraph noise
 _DELTA_LOG_LIKELIHOOD_95 = 1.92
-_MAX_WALK_LEVERAGE = 0.5  # fraction of the information on the random walk that signals may take
 
 
 @dataclass(frozen=True)
@@ -69,8 +63,11 @@ class DeterministicSignals:
     signals: tuple[DeterministicSignal, ...]
     means: Means | None  # the block means that were searched; None where the log is too short
     searched: SearchResult | None
-    telegraph: bool = False
-    """Whether there are too many steps to resolve; no signal is then removed."""
+
+    @property
+    def telegraph(self) -> bool:
+        """Whether there are too many steps to resolve; no signal is then removed."""
+        return self.searched is not None and self.searched.many
 
     def subtract_from(self, blocks: Iterable[Array]) -> Iterator[Array]:
         """Yield the blocks of a log, in order, SI, less the signals."""
@@ -97,52 +94,6 @@ class DeterministicSignals:
             total[low - start : high - start] += signal.amplitudes @ signal.regressor.at(places)
         return total
 
-    def without(self) -> Means:
-        """Return the block means less the signals; the log must have been searched."""
-        if self.means is None:
-            raise ValueError("the log is too short to be searched")
-        parts = []
-        for number, part in enumerate(self.means.parts):
-            mean = part.mean.copy()
-            for signal in self.signals:
-                if signal.regressor.part == number:
-                    mean -= signal.amplitudes @ signal.regressor.means(len(mean))
-            parts.append(replace(part, mean=mean))
-        return replace(self.means, parts=tuple(parts))
-
-    @property
-    def against_random_walk(self) -> str | None:
-        """Reason why random walk and deterministic signal are not distinguishable, or None."""
-        if self.searched is None or self.means is None or self.searched.many:
-            return None
-        rival = self.searched.rival
-        if rival is not None:
-            return texts.signal_or_walk(_describe_alternative(rival.signals, self.means))
-        if self.signals and _compute_walk_leverage(self.searched.fit) > _MAX_WALK_LEVERAGE:
-            return texts.SIGNALS_HIDE_WALK
-        return None
-
-
-def _describe_alternative(signals: Sequence[Regressor], means: Means) -> str:
-    regressor = signals[0]
-    if regressor.kind == "restart":
-        return texts.pause_steps(len(signals))
-    start = means.parts[regressor.part].start / means.rate
-    where = regressor.where * means.interval
-    if regressor.kind == "step":
-        return texts.step_at(start + where)
-    if regressor.kind == "exponential":
-        return texts.warm_up(where)
-    return texts.periodic_drift(means.interval / regressor.where)
-
-
-def _compute_walk_leverage(fit: Fit) -> float:
-    """Return the part of the information on a random walk that the regressors take."""
-    # The information on K is in the lowest ordinates, where the density rises as 1/f^2.
-    information = np.minimum(fit.density / np.median(fit.density), 1e300) - 1.0
-    slow = np.clip(information / (1.0 + information), 0.0, 1.0) ** 2
-    return float(np.sum(slow * fit.leverage) / max(float(np.sum(slow)), 1e-300))
-
 
 def find_deterministic_signals(
     blocks: Callable[[], Iterable[Array]],
@@ -164,20 +115,13 @@ def find_deterministic_signals(
         return DeterministicSignals((), None, None)
     searched = search_signals(ordinates)
     if searched.many:
-        steps = sum(x.kind in ("step", "restart") for x in searched.fit.regressors)
-        # Bursts of noise look like pulses, and have a finding of their own.
-        return DeterministicSignals((), means, searched, telegraph=steps > _MAX_STEPS)
-    if any(x.kind == "step" for x in searched.fit.regressors):
-        placed = _place_steps(blocks, means, searched.fit)
-        if placed != searched.fit.regressors:
-            searched = move_regressors(ordinates, searched, placed)
+        return DeterministicSignals((), means, searched)
     return DeterministicSignals(tuple(_describe(ordinates, searched)), means, searched)
 
 
 def _describe(ordinates: Ordinates, searched: SearchResult) -> Iterator[DeterministicSignal]:
     """Yield the signals with their sizes and intervals."""
     fit, means = searched.fit, ordinates.means
-    covariance = average_covariance(ordinates, fit)
     column = 0
     for regressor, gain in zip(fit.regressors, searched.gains, strict=True):
         own = slice(column, column + regressor.columns)
@@ -190,9 +134,9 @@ def _describe(ordinates: Ordinates, searched: SearchResult) -> Iterator[Determin
         end = start + len(part.mean) * means.interval
         size = _compute_size(amplitudes)
         along = amplitudes / size if len(amplitudes) > 1 else np.ones(1)
-        error = SIGMAS * math.sqrt(float(along @ covariance[own, own] @ along))
+        error = SIGMAS * math.sqrt(float(along @ fit.covariance[own, own] @ along))
         low, high = _find_limits(ordinates, fit, regressor)
-        if regressor.kind not in ("exponential", "restart"):
+        if regressor.kind != "exponential" and not regressor.length:
             # The place was selected to maximise the size; and the amplitude of less than one
             # period depends on the period.
             sizes = [size]
@@ -203,12 +147,12 @@ def _describe(ordinates: Ordinates, searched: SearchResult) -> Iterator[Determin
                 sizes.append(_compute_size(ordinates.solve(moved, fit.density)[0][own]))
             error = math.hypot(error, 0.5 * float(np.ptp(sizes)))
         place = start + regressor.where * means.interval
-        step = regressor.kind in ("step", "restart")
+        step = regressor.kind == "step"
         times: tuple[float | None, ...] = (None, None, None)
+        if not step:
+            times = tuple(means.interval * x for x in (regressor.where, low, high))
         if regressor.kind == "sinusoid":
             times = tuple(means.interval / f for f in (regressor.where, high, low))
-        elif not step:
-            times = tuple(means.interval * t for t in (regressor.where, low, high))
         yield DeterministicSignal(
             kind=_KIND_NAMES[regressor.kind],
             start=place if step else start,
@@ -228,7 +172,7 @@ def _describe(ordinates: Ordinates, searched: SearchResult) -> Iterator[Determin
 
 def _find_limits(ordinates: Ordinates, fit: Fit, regressor: Regressor) -> tuple[float, float]:
     """Return the 95 % profile likelihood limits of a place, time constant or frequency."""
-    if regressor.kind == "restart":
+    if regressor.length:
         half = 0.5 * regressor.length
         return regressor.where - half, regressor.where + half
     others = tuple(x for x in fit.regressors if x is not regressor)
@@ -240,71 +184,14 @@ def _find_limits(ordinates: Ordinates, fit: Fit, regressor: Regressor) -> tuple[
     limits = []
     for side in (-1.0, 1.0):
         away = unit[regressor.kind]
-        for _ in range(24):
-            moved = regressor.where + side * away
-            if not least < moved < n:
-                break
-            if best - gain.of(replace(regressor, where=moved)) > 2.0 * _DELTA_LOG_LIKELIHOOD_95:
+        while least < (end := regressor.where + side * away) < n:
+            if best - gain.of(replace(regressor, where=end)) > 2.0 * _DELTA_LOG_LIKELIHOOD_95:
                 break
             away *= 1.5
-        limits.append(min(max(regressor.where + side * away, least), float(n)))
+        limits.append(min(max(end, least), float(n)))
     return limits[0], limits[1]
 
 
 def _compute_size(amplitudes: Array) -> float:
     """Return the amplitude of a sinusoid, or the signed size of another signal."""
     return float(np.hypot(*amplitudes)) if len(amplitudes) > 1 else float(amplitudes[0])
-
-
-def _place_steps(
-    blocks: Callable[[], Iterable[Array]], means: Means, fit: Fit
-) -> tuple[Regressor, ...]:
-    """Return the regressors with large steps at the least-squares change point of the samples."""
-    size = means.block
-    wanted: dict[int, tuple[int, int, float]] = {}
-    column = 0
-    for i, regressor in enumerate(fit.regressors):
-        change = float(fit.sizes[column])
-        column += regressor.columns
-        if regressor.kind != "step" or size == 1:
-            continue
-        part = means.parts[regressor.part]
-        white = math.sqrt(float(np.nanmedian(part.power)) / size)
-        if abs(change) > _MIN_STEP_SIGMAS * white:
-            middle = part.start + round(regressor.where * size)
-            first = max(part.start, middle - 3 * size)
-            last = min(part.start + len(part.mean) * size, middle + 3 * size)
-            wanted[i] = (first, last, change)
-    if not wanted:
-        return fit.regressors
-    pieces: dict[int, list[Array]] = {i: [] for i in wanted}
-    reached = 0
-    for values in blocks():
-        for i, (first, last, _) in wanted.items():
-            low, high = max(first, reached), min(last, reached + len(values))
-            if low < high:
-                pieces[i].append(np.asarray(values[low - reached : high - reached], np.float64))
-        reached += len(values)
-    placed = list(fit.regressors)
-    for i, (first, _, _) in wanted.items():
-        samples = np.concatenate(pieces[i])
-        if np.isfinite(samples).sum() < 4:
-            continue
-        at = first + _find_change_point(samples)
-        part = means.parts[placed[i].part]
-        placed[i] = replace(placed[i], where=(at - part.start) / size)
-    # A step inside a block may be found as two, which coincide once placed.
-    return tuple(dict.fromkeys(placed))
-
-
-def _find_change_point(samples: Array) -> int:
-    """Return the least-squares change point: the index of the first sample of the second level."""
-    present = np.isfinite(samples)
-    values = np.where(present, samples - np.nanmean(samples), 0.0)
-    count = np.cumsum(present)
-    total = np.cumsum(values)
-    before, after = count[:-1], count[-1] - count[:-1]
-    left, right = total[:-1], total[-1] - total[:-1]
-    explained = left**2 / np.maximum(before, 1) + right**2 / np.maximum(after, 1)
-    explained[(before == 0) | (after == 0)] = -np.inf
-    return int(np.argmax(explained)) + 1

@@ -19,17 +19,13 @@ _MIN_BLOCK_SAMPLES = 10  # the mean is then below the low-pass cut-off of most s
 _MIN_BLOCKS = 512  # blocks of a short log, whose blocks have fewer samples
 _MIN_PART_BLOCKS = 64  # shorter parts are not analysed
 _SIGMA_OVER_MAD = 1.4826  # standard deviation over median absolute deviation of normal noise
+_MIN_PAUSE = 2.0  # s without samples, in which a sensor may have restarted
+_MAX_PAUSES = 48  # with more, samples are lost, and the sensor does not restart
 _MAX_GAP_FRACTION = 1 / 5  # fraction of a segment; a longer gap splits it
-_MIN_PAUSE = 2.0  # shortest gap, s, in which a sensor or its host can restart
-_MAX_PAUSES = 48
-
 _SECTIONS = 16
-
 _MIN_SECTION_BLOCKS = 16  # blocks that each section needs for the test of stationarity
-_MIN_TREND_SIGMAS = 4.5  # 14 degrees of freedom: false-alarm probability 1 in 2000
+_MIN_SIGMAS = 4.5  # of a trend, with 14 degrees of freedom: a false alarm in 2000 logs
 _MIN_RELATIVE_TREND = 0.02  # smallest relative change of N over the log that is reported
-_MIN_CHI_SQUARED = 45.0  # 15 degrees of freedom: false-alarm probability 1 in 10,000
-_MIN_RELATIVE_SPREAD = 0.05  # smallest reported relative standard deviation of N over sections
 
 
 @dataclass(frozen=True)
@@ -42,11 +38,8 @@ class Part:
     power: Array
     """(n,): half the mean squared difference of neighbouring samples in each block: the variance of
     white noise, (rad/s)² or (m/s²)². NaN where a block has few samples."""
-    kurtosis: float
-    """Excess kurtosis of samples that are independent: twice that of their differences."""
     pauses: tuple[tuple[float, float], ...] = ()
-    """Middle and length, in blocks, of the longest gaps in which the sensor may have restarted, in
-    order."""
+    """Middle and length, in blocks, of the gaps in which the sensor may have restarted."""
 
 
 @dataclass(frozen=True)
@@ -94,60 +87,38 @@ def average_blocks(
 
 
 def _compute_block_moments(values: Array) -> Array:
-    """Return mean, power and fourth moment of differences, fraction present, shape (4, rows)."""
-    size = values.shape[1]
-    if np.isfinite(values.sum()):
-        level = values[0, 0]
-        mean = (values - level).mean(axis=1) + level
-        squares = np.diff(values, axis=1)
-        squares *= squares
-        pairs = max(size - 1, 1)
-        power = squares.sum(axis=1) / (2.0 * pairs)
-        fourth = np.einsum("ij,ij->i", squares, squares) / pairs
-        return np.array([mean, power, fourth, np.ones(len(values))])
+    """Return mean, power and fraction present of each row, shape (3, rows)."""
     present = np.isfinite(values)
+    if present.all():
+        power = np.mean(np.diff(values, axis=1) ** 2, axis=1) if values.shape[1] > 1 else 0.0
+        parts = np.broadcast_arrays(values.mean(axis=1), 0.5 * power, 1.0)
+        return np.array(parts)
     count = present.sum(axis=1)
     mean = np.where(present, values, 0.0).sum(axis=1) / np.maximum(count, 1)
-    both = present[:, 1:] & present[:, :-1]
-    steps = np.where(both, np.diff(np.where(present, values, 0.0), axis=1), 0.0)
-    pairs = both.sum(axis=1)
-    squares = steps**2
-    pairs_or_nan = np.where(pairs > 0, np.maximum(pairs, 1), np.nan)
-    power = squares.sum(axis=1) / (2.0 * pairs_or_nan)
-    return np.array([mean, power, (squares**2).sum(axis=1) / pairs_or_nan, count / size])
+    squares = np.diff(values, axis=1) ** 2
+    pairs = np.isfinite(squares).sum(axis=1)
+    with np.errstate(invalid="ignore"):  # NaN without a pair
+        power = np.nansum(squares, axis=1) / (2.0 * pairs)
+    return np.array([mean, power, count / values.shape[1]])
 
 
 def _split_at_gaps(start: int, size: int, rows: Array, interval: float) -> list[Part]:
     """Split a segment at long gaps; interpolate short ones."""
-    mean, power, fourth, share = rows
+    mean, power, share = rows
     covered = np.flatnonzero(share >= 0.5)
-    if len(covered) < _MIN_PART_BLOCKS:
-        return []
-    longest = max(2.0, _MAX_GAP_FRACTION * len(mean))
-    cuts = np.flatnonzero(np.diff(covered) > longest)
+    cuts = np.flatnonzero(np.diff(covered) > max(2.0, _MAX_GAP_FRACTION * len(mean)))
     parts = []
-    for first, last in zip(
-        covered[np.concatenate(([0], cuts + 1))],
-        covered[np.append(cuts, len(covered) - 1)],
-        strict=True,
-    ):
-        span = slice(int(first), int(last) + 1)
-        if span.stop - span.start < _MIN_PART_BLOCKS:
-            continue
-        present = share[span] >= 0.5
-        usable = present & np.isfinite(fourth[span])
-        square = 2.0 * float(power[span][usable].mean()) if usable.any() else 0.0
-        kurtosis = 0.0
-        if square > 0.0:
-            kurtosis = 2.0 * (float(fourth[span][usable].mean()) / square**2 - 3.0)
-        edges = np.flatnonzero(np.diff((~present).astype(np.int8), prepend=0, append=0))
-        begin, end = edges[::2].astype(np.float64), edges[1::2].astype(np.float64)
-        pauses = np.flatnonzero((end - begin) * interval >= _MIN_PAUSE)
-        pauses = pauses[np.argsort(begin[pauses] - end[pauses], kind="stable")][:_MAX_PAUSES]
-        pauses.sort()
-        of_pauses = tuple(zip(0.5 * (begin + end)[pauses], (end - begin)[pauses], strict=True))
-        filled, powers = _fill_gaps(mean[span], present), np.where(present, power[span], np.nan)
-        parts.append(Part(start + span.start * size, filled, powers, kurtosis, of_pauses))
+    for blocks in np.split(covered, cuts + 1):
+        if len(blocks) and blocks[-1] - blocks[0] + 1 >= _MIN_PART_BLOCKS:
+            span = slice(int(blocks[0]), int(blocks[-1]) + 1)
+            present = share[span] >= 0.5
+            filled, powers = _fill_gaps(mean[span], present), np.where(present, power[span], np.nan)
+            edges = np.flatnonzero(np.diff((~present).astype(np.int8), prepend=0, append=0))
+            middle, length = edges.reshape(-1, 2).mean(axis=1), np.diff(edges)[::2]
+            long = length * interval >= _MIN_PAUSE
+            pauses = tuple(zip(middle[long].tolist(), length[long].tolist(), strict=True))
+            pauses = pauses if len(pauses) <= _MAX_PAUSES else ()
+            parts.append(Part(start + span.start * size, filled, powers, pauses))
     return parts
 
 
@@ -182,24 +153,14 @@ class Stationarity:
     trend: float
     trend_error: float
     """Relative change of the density N from beginning to end, and its standard error."""
-    spread: float  # relative standard deviation of N over sections, less its estimation error
-    chi_squared: float  # of the sections about their mean
     start: float
     end: float
     """Start and end of the analysed part, s."""
 
     @property
     def has_trend(self) -> bool:
-        """Whether N has a significant trend."""
-        return (
-            abs(self.trend) > _MIN_TREND_SIGMAS * self.trend_error
-            and abs(self.trend) > _MIN_RELATIVE_TREND
-        )
-
-    @property
-    def is_variable(self) -> bool:
-        """Whether N varies significantly between sections."""
-        return self.chi_squared > _MIN_CHI_SQUARED and self.spread > _MIN_RELATIVE_SPREAD
+        """Whether N has a significant trend that matters."""
+        return abs(self.trend) > max(_MIN_SIGMAS * self.trend_error, _MIN_RELATIVE_TREND)
 
 
 def assess_stationarity(means: Means) -> Stationarity | None:
@@ -212,33 +173,22 @@ def assess_stationarity(means: Means) -> Stationarity | None:
     if size < _MIN_SECTION_BLOCKS or means.block < 2:
         return None
     sections = part.power[: size * _SECTIONS].reshape(_SECTIONS, size)
-    finite = np.isfinite(sections)
-    if (finite.sum(axis=1) < _MIN_SECTION_BLOCKS // 2).any():
-        return None
-    count = finite.sum(axis=1)
-    power = np.nansum(sections, axis=1) / count
-    if not (power > 0.0).all():
+    count = np.isfinite(sections).sum(axis=1)
+    power = np.nansum(sections, axis=1) / np.maximum(count, 1)
+    if (count < _MIN_SECTION_BLOCKS // 2).any() or not (power > 0.0).all():
         return None
     # The error is from the scatter of the block powers: heavy tails and bursts increase both.
-    scatter = np.sqrt(np.nansum((sections - power[:, None]) ** 2, axis=1) / (count - 1) / count)
-    level = np.log(power)
-    error = scatter / power
+    error = np.nanstd(sections, axis=1, ddof=1) / np.sqrt(count) / power
     x = np.linspace(-0.5, 0.5, _SECTIONS) * (_SECTIONS - 1) / _SECTIONS
-    slope = float(x @ (level - level.mean()) / (x @ x))
+    level = np.log(power)
+    slope = float(x @ level / (x @ x))
     left = level - level.mean() - slope * x
-    residual = float(left @ left) / (_SECTIONS - 2)
-    slope_error = float(np.sqrt(max(residual, float(np.mean(error**2))) / (x @ x)))
-    weight = 1.0 / np.maximum(error, 1e-12) ** 2
-    middle = float(weight @ level / weight.sum())
-    chi_squared = float(weight @ (level - middle) ** 2)
-    beyond = max(float(np.var(level, ddof=1) - np.mean(error**2)), 0.0)
+    residual = max(float(left @ left) / (_SECTIONS - 2), float(np.mean(error**2)))
     start = part.start / means.rate
     return Stationarity(
         # N is the square root of the power.
         trend=float(np.expm1(0.5 * slope)),
-        trend_error=0.5 * slope_error * float(np.exp(0.5 * slope)),
-        spread=0.5 * float(np.sqrt(beyond)),
-        chi_squared=chi_squared,
+        trend_error=0.5 * float(np.sqrt(residual / (x @ x)) * np.exp(0.5 * slope)),
         start=start,
         end=start + size * _SECTIONS * means.interval,
     )

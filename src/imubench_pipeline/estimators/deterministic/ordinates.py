@@ -25,12 +25,6 @@ from imubench_pipeline.typing import Array
 NOISE_TERMS = Terms("NFK", 1)  # includes the models of logs without regressors
 _FIT_ROUNDS = 2
 _MIN_WEIGHT = 0.05  # weight of an ordinate that the regressors explain almost completely
-_WALK_GRID = np.concatenate(([0.0], np.geomspace(0.03, 100.0, 18)))
-"""Grid of K: root of the density ratio of random walk to other noise at the lowest frequency."""
-
-_FITTED_WALK_FACTORS = np.geomspace(0.6, 1.6, 9)  # grid of K, relative to the fitted K
-_MIN_OTHER_NOISE = 1e-3  # minimum fraction of the density that is not random walk
-_MIN_INDEPENDENT_VARIANCE = 1e-9  # ridge on the correlation matrix, against collinear regressors
 
 
 @dataclass(frozen=True)
@@ -178,69 +172,16 @@ class Ordinates:
     ) -> tuple[Array, Array, Array, Array]:
         """Return amplitudes, their covariance, the residual, and the leverage of each ordinate."""
         weight = self.weights(density)
-        owner = [r.part for r in regressors for _ in range(r.columns)]
-        columns = [row for r in regressors for row in self.columns(r)]
-        p = len(columns)
-        gram, target = np.zeros((p, p)), np.zeros(p)
-        weighted = []
-        for a in range(p):
-            of_part = self.part(owner[a])
-            weighted.append(columns[a] * weight[of_part])
-            target[a] = weighted[a] @ self.coefficient[of_part]
-            for b in range(a + 1):
-                if owner[b] == owner[a]:
-                    gram[a, b] = gram[b, a] = weighted[a] @ columns[b]
+        X = np.zeros((sum(r.columns for r in regressors), len(weight)))
+        row = 0
+        for regressor in regressors:
+            X[row : row + regressor.columns, self.part(regressor.part)] = self.columns(regressor)
+            row += regressor.columns
+        weighted = X * weight
+        gram = weighted @ X.T
         norm = np.sqrt(np.maximum(np.diag(gram), 1e-300))
-        scaled = gram / np.outer(norm, norm)
-        inverse = np.linalg.pinv(scaled, rcond=1e-10, hermitian=True)
+        inverse = np.linalg.pinv(gram / np.outer(norm, norm), rcond=1e-10, hermitian=True)
         covariance = inverse / np.outer(norm, norm)
-        sizes = covariance @ target
-        residual = self.coefficient.copy()
-        leverage = np.zeros_like(residual)
-        for number in set(owner):
-            of_part = self.part(number)
-            own = [a for a in range(p) if owner[a] == number]
-            X = np.array([columns[a] for a in own])
-            residual[of_part] -= sizes[own] @ X
-            solved = covariance[np.ix_(own, own)] @ X
-            leverage[of_part] = np.einsum("ak,ak->k", X, solved) * weight[of_part]
-        return sizes, covariance, residual, leverage
-
-
-def average_covariance(ordinates: Ordinates, fit: Fit) -> Array:
-    """Return the covariance of the amplitudes of a fit, (p, p), averaged over K.
-
-    A weak walk is often fitted as none, and the error of a step would be too small. The prior of K
-    is uniform, the weights are the restricted likelihood (REML; D. A. Harville, J. Am. Stat. Assoc.
-    72, 1977), and the other noise is fixed.
-    """
-    if not fit.regressors:
-        return fit.covariance
-    walk = 1.0 / (2.0 * np.pi * ordinates.frequency) ** 2
-    fitted = fit.noise.parameter("K") ** 2 * walk
-    rest = np.maximum(fit.density - fitted, _MIN_OTHER_NOISE * fit.density)
-    lowest = int(np.argmin(ordinates.frequency))
-    unit = walk * rest[lowest] / walk[lowest]
-    about = np.sqrt(fitted[lowest] / rest[lowest]) * _FITTED_WALK_FACTORS
-    walks = np.unique(np.concatenate((_WALK_GRID, about)))
-    likelihoods, sizes, covariances = [], [], []
-    for K in walks:
-        density = rest + K**2 * unit
-        size, covariance, residual, _ = ordinates.solve(fit.regressors, density)
-        integrated = 0.5 * _compute_log_determinant(covariance)
-        likelihoods.append(ordinates.log_likelihood(residual, density) + integrated)
-        sizes.append(size)
-        covariances.append(covariance)
-    weight = np.exp(np.array(likelihoods) - max(likelihoods)) * np.gradient(walks)
-    weight /= weight.sum()
-    away = np.array(sizes) - weight @ np.array(sizes)
-    within = np.einsum("w,wij->ij", weight, np.array(covariances))
-    return np.asarray(within + np.einsum("w,wi,wj->ij", weight, away, away))
-
-
-def _compute_log_determinant(covariance: Array) -> float:
-    """Return the log determinant of a covariance, finite also for collinear amplitudes."""
-    variance = np.maximum(np.diag(covariance), 1e-300)
-    correlation = covariance / np.sqrt(np.outer(variance, variance))
-    ridge = _MIN_INDEPENDENT_VARIANCE * np.eye(len(variance))
-    return float(np.sum(np.log(variance)) + np.linalg.slogdet(correlation + ridge)[1])
+        sizes = covariance @ (weighted @ self.coefficient)
+        leverage = np.einsum("ak,ak->k", weighted, covariance @ X)
+        return sizes, covariance, self.coefficient - sizes @ X, leverage

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from imubench_pipeline.words.findings.base import (
-    NONE,
     SLOW,
     WHITE,
     FindingData,
@@ -91,21 +90,6 @@ class TelegraphNoise(
         )
 
 
-class HeavyTails(FindingData, affects=NONE):
-    """Large samples are more frequent than in normal noise."""
-
-    kurtosis: float  # excess kurtosis
-    widening: float  # factor on the interval of N
-
-    def text(self, channel: str) -> str:
-        return (
-            f"The white noise of {channel_name(channel)} has heavier tails than a normal "
-            f"distribution: its excess kurtosis is {number_text(self.kurtosis, 3)}. The interval "
-            f"of N is {number_text(self.widening, 3)} times as wide for it. "
-            "Look for bursts and small outliers"
-        )
-
-
 class NoiseTrend(
     FindingData,
     code="noise_grows",
@@ -124,61 +108,3 @@ class NoiseTrend(
             f"{percent_text(abs(self.trend))} (± {percent_text(self.error, 2)}) over the log. "
             "N is its mean over the log. Look for a change of temperature or supply voltage"
         )
-
-
-class NoiseVaries(
-    FindingData, affects=WHITE, doubt="the white noise of {channels} varies over the log"
-):
-    """The white noise differs between parts of the log, without a trend."""
-
-    spread: float  # relative standard deviation of N between sixteenths of the log
-
-    def text(self, channel: str) -> str:
-        return (
-            f"The white noise of {channel_name(channel)} varies by {percent_text(self.spread)} "
-            "(one standard deviation) between sixteenths of the log, more than by chance. "
-            "N is its mean over the log. Look for vibration or interference"
-        )
-
-
-class RandomWalkChanges(
-    FindingData,
-    code="K_differs",
-    affects=frozenset({"K", "R"}),
-    doubt="the random walk of {channels} changes over the log",
-):
-    """The random walk differs between the halves of the log."""
-
-    middle: float  # end of the first half, s from the first sample
-    first: float
-    second: float  # K of each half over K of the log
-
-    def text(self, channel: str) -> str:
-        return _halves_text(f"K of {channel_name(channel)}", self.middle, self.first, self.second)
-
-
-class SlowNoiseChanges(
-    FindingData,
-    code="slow_noise_differs",
-    affects=SLOW,
-    doubt="the slow noise of {channels} changes over the log",
-):
-    """The slow noise differs between the halves of the log."""
-
-    middle: float  # end of the first half, s from the first sample
-    first: float
-    second: float  # amplitude of the slow noise of each half, relative to the log
-
-    def text(self, channel: str) -> str:
-        noise = f"The slow noise of {channel_name(channel)}"
-        return _halves_text(noise, self.middle, self.first, self.second)
-
-
-def _halves_text(noise: str, middle: float, first: float, second: float) -> str:
-    """Return the sentences about noise that differs between the halves of a log."""
-    return (
-        f"{noise} is {number_text(first, 3)} times its value over the whole log up to "
-        f"{number_text(middle, 5)} s, and {number_text(second, 3)} times afterwards. "
-        "The difference is significant: one noise process does not describe the log. "
-        "Look for a change of temperature or a motion; use the calmer half, or record again"
-    )

@@ -72,7 +72,6 @@ class TooManyLines(
 
     lines: int
     single: int  # number of lines that are used individually
-    groups: int  # number of lines into which the others are merged
     share: float  # power of the others over the power of all lines
     rms: float  # of the others, SI
 
@@ -80,8 +79,8 @@ class TooManyLines(
         return (
             f"{channel_name(channel)} has {self.lines} sinusoids, too many for a noise model. "
             f"Error budgets, simulations and filters use the {self.single} strongest individually. "
-            f"The other {self.lines - self.single} are merged into {self.groups} of the same "
-            f"power, {percent_text(self.share)} of the power of all lines "
+            f"The other {self.lines - self.single} are merged into one of the same power, "
+            f"{percent_text(self.share)} of the power of all lines "
             f"({value_text(self.rms, channel, 'signal')} rms). "
             "Look for motors, fans or converters nearby, or record without them"
         )

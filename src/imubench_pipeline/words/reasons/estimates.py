@@ -14,7 +14,6 @@ BIAS_MODELS_ALIKE = "models with a bias instability fit about as well: only the 
 FLICKER_WITHOUT_TIME = (
     "the bias instability of this model is flicker noise, which has no correlation time"
 )
-SIGNALS_HIDE_WALK = "the deterministic signals contain most of the information on a random walk"
 SHORT_LOG = "the log is too short"
 SENSITIVITY_WITH_ZERO = "the 95 % interval of the temperature sensitivity includes 0"
 NO_EFFECT_TO_LAG = "no effect of the temperature is shown that could lag"
@@ -67,28 +66,6 @@ def no_reference(symbol: str, status: Status, reason: str | None) -> str:
 
 def model_disfavoured(chosen: str, papers: str, delta_bic: float) -> str:
     return f"BIC prefers {chosen} to {papers} by {number_text(delta_bic, 3)}"
-
-
-def signal_or_walk(signal: str) -> str:
-    return f"{signal} explains the log about as well as a random walk"
-
-
-def pause_steps(number: int) -> str:
-    if number == 1:
-        return "a step of the bias at a pause of the log"
-    return f"a series of bias steps at {number} pauses of the log"
-
-
-def step_at(time: float) -> str:
-    return f"a step of the bias at {number_text(time, 5)} s"
-
-
-def warm_up(time: float) -> str:
-    return f"a warm-up with a time constant of {number_text(time, 3)} s"
-
-
-def periodic_drift(period: float) -> str:
-    return f"a periodic drift with a period of {number_text(period, 3)} s"
 
 
 def small_temperature_range(kelvin: float) -> str:
