@@ -1,6 +1,6 @@
 """How well estimates of real logs repeat: pieces of a recording against each other and the curve.
 
-python benchmarks/real_logs.py [--logs FOLDER] [--method likelihood] [--pieces 2 4] [--only NAME]
+python benchmarks/real_logs.py [--logs FOLDER] [--method robust] [--pieces 2 4] [--only NAME]
 python benchmarks/real_logs.py --rate 100 LOG.csv ...
 
 Each recording is cut into equal pieces, and each channel of each piece is estimated by the public
@@ -367,7 +367,7 @@ def main() -> int:
     parser.add_argument("tables", nargs="*", metavar="LOG")
     parser.add_argument("--rate", type=float, help="of each LOG, Hz")
     parser.add_argument("--logs", type=Path, default=LOGS, metavar="FOLDER")
-    parser.add_argument("--method", nargs="*", default=["likelihood"])
+    parser.add_argument("--method", nargs="*", default=["robust"])
     parser.add_argument("--pieces", type=int, nargs="*", default=[2, 4])
     parser.add_argument("--only", default="", metavar="NAME", help="part of a recording's name")
     parser.add_argument("--channels", nargs="*", default=CHANNELS)
