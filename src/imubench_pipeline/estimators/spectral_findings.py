@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
 
 import numpy as np
 from scipy.special import chdtr
 
+from imubench_pipeline.estimators.estimate import Estimate, Parameter
 from imubench_pipeline.estimators.frame import FitSelection
 from imubench_pipeline.estimators.lines import MAX_LINES, Line, describe_grouping
 from imubench_pipeline.estimators.spectrum import Spectrum
@@ -19,6 +21,7 @@ from imubench_pipeline.words.findings.spectrum import (
     SlowNoiseMissing,
     StrongLine,
 )
+from imubench_pipeline.words.reasons import estimates as texts
 
 _MIN_SINUSOID_RATIO = 0.5  # Integral of a sinusoid over the integral of white noise after 1 s
 _MAX_SLOW_FREQUENCY = 0.05  # Over the rate, of the test for missing slow noise
@@ -95,3 +98,19 @@ def find_missing_slow_noise(
     ratio = float(power[worst] / degrees[worst])
     highest = float(spectrum.upper[order[worst]])
     return find(SlowNoiseMissing(highest, ratio), "warning", ratio, channel)
+
+
+def withhold_slow_noise(estimate: Estimate) -> Estimate:
+    """Return an estimate of a log that lacks slow noise: K is unknown, and nothing is absent."""
+
+    def withhold(group: Mapping[str, Parameter]) -> dict[str, Parameter]:
+        return {
+            name: Parameter(None, "not_identified", texts.SLOW_NOISE_MISSING, fitted=one.value)
+            if name == "K" or (one.status == "absent" and name != "Q")
+            else one
+            for name, one in group.items()
+        }
+
+    return replace(
+        estimate, parameters=withhold(estimate.parameters), curve=withhold(estimate.curve)
+    )

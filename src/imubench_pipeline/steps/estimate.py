@@ -39,6 +39,7 @@ from imubench_pipeline.estimators.rows import (
 from imubench_pipeline.estimators.spectral_findings import (
     find_missing_slow_noise,
     spectral_findings,
+    withhold_slow_noise,
 )
 from imubench_pipeline.estimators.thermal.fit import (
     ThermalFit,
@@ -205,7 +206,9 @@ class _Channel:
         if not self.signals.signals:  # else what they explain is taken out
             white = fitted.estimates[0].parameters["N"].lower
             lack = find_missing_slow_noise(key.channel, fitted.spectrum, fitted.fitted, white)
-            into.add_findings(key, [lack] if lack else [])
+            if lack is not None:
+                into.add_findings(key, [lack])
+                estimates = {name: withhold_slow_noise(one) for name, one in estimates.items()}
         into.models += _model_rows(key, fitted)
         for line in fitted.lines:
             about = asdict(line)

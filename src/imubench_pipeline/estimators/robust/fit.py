@@ -458,7 +458,10 @@ def _limit_walk(points: _Points, fitted: _Fitted, draws: Array) -> Parameter:
     limits = points.search.find_limits(WALK, grid, points.variance, fitted.whitening)
     if curve.samples < _MIN_DURATION_OF_WALK * curve.rate:
         limits = 0.0, limits[1]
-    return _limit(fitted.model.K, np.append(draws, np.repeat(np.sqrt(limits), len(draws))), alone)
+    K = _limit(fitted.model.K, np.append(draws, np.repeat(np.sqrt(limits), len(draws))), alone)
+    if K.status == "absent":  # a high-pass, or means that were subtracted, may have removed it
+        K = replace(K, status="not_identified", reason=texts.MAY_BE_ABSENT)
+    return K
 
 
 def _group(drawn: Solutions) -> list[Models]:

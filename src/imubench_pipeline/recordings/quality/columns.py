@@ -252,6 +252,8 @@ def _find_bad_values(
         over_noise = steps.over_noise if math.isfinite(steps.over_noise) else None
         quantised = samples.Quantised(steps.step, over_noise, is_rounded=steps.hidden)
         yield find(quantised, "note", steps.step, channel)
+        if levels.is_truncated(column, steps.step):
+            yield find(samples.Truncated(steps.step), "warning", steps.step, channel)
     length, end = column.longest_run
     stuck = length > max(
         3.0 * levels.compute_longest_chance_run(column), settings.longest_stuck * rate

@@ -26,6 +26,8 @@ rounded to digits somewhat coarser than the register: some digits then have two 
 
 _MIN_PILED_SHARE = 0.005  # least share of the samples at a piled-up level
 _MIN_COMPARED_COUNT = 10  # so that few samples do not pile up by chance
+_MIN_COUNT_BESIDE_0 = 30  # Samples at each of the three levels on either side of 0
+_MIN_SIGNIFICANCE = 6.0  # Of the excess at level 0, in standard errors
 _MIN_MISSING_SAMPLES = 12.0
 """Expected samples beyond the last level above which their absence means saturation. Noise has none
 of them with a probability of exp(-12)."""
@@ -84,6 +86,23 @@ def find_piled_value(
     if share < _MIN_PILED_SHARE or counts[most] < least:
         return None
     return float(at[most]), float(share)
+
+
+def is_truncated(column: ColumnSummary, step: float) -> bool:
+    """Return whether values were truncated towards 0, which makes its level twice as wide.
+
+    The logarithms of the counts of a rounded normal distribution are a parabola. Truncation adds
+    ln 2 to the count at 0, or more, because the other levels are further away.
+    """
+    at, counts = _count_values(column)
+    level = np.rint(at / step).astype(np.int64)
+    near = [int(counts[level == k].sum()) for k in range(-3, 4)]
+    if min(near) < _MIN_COUNT_BESIDE_0:
+        return False
+    weights = np.array([0.5, -1.0, -0.5, 2.0, -0.5, -1.0, 0.5])
+    excess = float(weights @ np.log(near))
+    error = float(np.sqrt(weights**2 @ (1.0 / np.array(near))))
+    return math.log(2.0) < excess < 5.0 * math.log(2.0) and excess > _MIN_SIGNIFICANCE * error
 
 
 def _count_values(column: ColumnSummary) -> tuple[Array, NDArray[np.int64]]:

@@ -54,6 +54,19 @@ class Quantised(FindingData, affects=NONE):
         return text + (_ROUNDED if self.is_rounded else "")
 
 
+class Truncated(FindingData, affects=WHITE, doubt="truncated samples of {channels}"):
+    """The values were truncated towards 0 when they were converted to integers."""
+
+    step: float
+
+    def text(self, channel: str) -> str:
+        return (
+            f"{channel_name(channel)} was truncated towards 0 in steps of "
+            f"{_value_text(channel, self.step)}. The level 0 is twice as frequent as it should be, "
+            "and the noise is too small. Round to integers instead, and record again"
+        )
+
+
 class Coarse(FindingData, affects=ALL, doubt="coarse resolution of {channels}"):
     """The noise is rounding noise."""
 

@@ -9,6 +9,9 @@ from imubench_pipeline.words.estimates import STATUS_WORDS
 from imubench_pipeline.words.numbers import join_names, number_text, percent_text
 
 ABSENT = "the data do not support it"
+SLOW_NOISE_MISSING = (
+    "the slow noise was removed from the log, by a high-pass or by subtracted means"
+)
 ABSENT_BELOW = f"{ABSENT}; the upper limit is at 95 %"
 BIAS_MODELS_ALIKE = "models with a bias instability fit about as well: only the interval is given"
 FLICKER_WITHOUT_TIME = (
