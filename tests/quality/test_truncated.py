@@ -14,8 +14,8 @@ def judge(log: Array, step: float) -> bool:
     return is_truncated(column, step)
 
 
-@pytest.mark.parametrize("sigma", [0.9, 1.3, 2.0, 4.0])
-@pytest.mark.parametrize("mean", [-0.4, 0.0, 1.2])
+@pytest.mark.parametrize("sigma", [1.3, 2.0, 4.0])
+@pytest.mark.parametrize("mean", [-0.4, 0.0, 0.6])
 def test_truncation_is_found_and_rounding_is_not(
     sigma: float, mean: float, rng: np.random.Generator
 ) -> None:

@@ -27,7 +27,8 @@ rounded to digits somewhat coarser than the register: some digits then have two 
 _MIN_PILED_SHARE = 0.005  # least share of the samples at a piled-up level
 _MIN_COMPARED_COUNT = 10  # so that few samples do not pile up by chance
 _MIN_COUNT_BESIDE_0 = 30  # Samples at each of the three levels on either side of 0
-_MIN_SIGNIFICANCE = 6.0  # Of the excess at level 0, in standard errors
+_MIN_SIGNIFICANCE = 3.0  # Of the excess at level 0 in a piece, in standard errors
+_RANGE_OF_TRUNCATION = (1.04, 3.5)  # Of the excess: 2 ln 2 + 1.25 (step / sigma)^2 is expected
 _MIN_MISSING_SAMPLES = 12.0
 """Expected samples beyond the last level above which their absence means saturation. Noise has none
 of them with a probability of exp(-12)."""
@@ -92,17 +93,19 @@ def is_truncated(column: ColumnSummary, step: float) -> bool:
     """Return whether values were truncated towards 0, which makes its level twice as wide.
 
     The logarithms of the counts of a rounded normal distribution are a parabola. Truncation adds
-    ln 2 to the count at 0, or more, because the other levels are further away.
+    ln 2 to the count at 0, and moves the other levels away by half a step.
     """
-    at, counts = _count_values(column)
-    level = np.rint(at / step).astype(np.int64)
-    near = [int(counts[level == k].sum()) for k in range(-3, 4)]
-    if min(near) < _MIN_COUNT_BESIDE_0:
-        return False
     weights = np.array([0.5, -1.0, -0.5, 2.0, -0.5, -1.0, 0.5])
-    excess = float(weights @ np.log(near))
-    error = float(np.sqrt(weights**2 @ (1.0 / np.array(near))))
-    return math.log(2.0) < excess < 5.0 * math.log(2.0) and excess > _MIN_SIGNIFICANCE * error
+    excesses = []
+    for piece in column.excerpts():  # each alone: the mean may change between them
+        level = np.rint(piece.present / step)
+        near = np.array([np.count_nonzero(level == k) for k in range(-3, 4)])
+        if near.min() >= _MIN_COUNT_BESIDE_0:
+            error = float(np.sqrt(weights**2 @ (1.0 / near)))
+            excess = float(weights @ np.log(near))
+            excesses.append(excess if excess > _MIN_SIGNIFICANCE * error else 0.0)
+    low, high = _RANGE_OF_TRUNCATION
+    return bool(excesses) and low < float(np.median(excesses)) < high
 
 
 def _count_values(column: ColumnSummary) -> tuple[Array, NDArray[np.int64]]:
