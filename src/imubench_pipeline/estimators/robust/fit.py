@@ -378,7 +378,7 @@ def _make_estimate(points: _Points, fitted: _Fitted, drawn: Solutions) -> Estima
         "B": _limit(model.B, biases, widest=_MAX_DOUBTFUL_RATIO),
         "T_B": _limit(model.T_B, times) if model.T_B else Parameter(None, "absent", reasons.ABSENT),
         "K": _limit_walk(points, fitted, roots[:, WALK]),
-        "R": _limit(model.R, roots[:, RAMP]),
+        "R": _limit(model.R, roots[:, RAMP]) if model.R else _bound_ramp(points, model.K),
     }
     further = [
         {"B": _limit(process.B, roots[:, PROCESS]), "T_B": _limit(process.T_B, times)}
@@ -437,6 +437,15 @@ def _limit(
     if upper > MAX_LIMIT_RATIO * lower:
         return Parameter(value, "doubtful", reasons.wide_limits(upper / lower), lower, upper)
     return Parameter(value, "ok", None, lower, upper)
+
+
+def _bound_ramp(points: _Points, K: float) -> Parameter:
+    """Return R without a value, with a limit from the end of the curve and the slope of a walk."""
+    curve = points.curve
+    tau, error = curve.tau[-1], min(np.sqrt(2.0 / curve.edf[-1]), _MAX_RELATIVE_ERROR)
+    alone = np.sqrt(2.0 * points.variance[-1] * np.exp(1.96 * error)) / tau
+    by_walk = _MIN_RAMP * K * np.sqrt(1.2 * curve.rate / curve.samples)
+    return Parameter(None, "absent", reasons.ABSENT_BELOW, 0.0, float(max(alone, by_walk)))
 
 
 def _bound_white(points: _Points, used: NDArray[np.bool_]) -> Parameter:
