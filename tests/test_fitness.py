@@ -81,10 +81,10 @@ def test_a_log_of_which_nothing_is_found_is_fit() -> None:
 @pytest.mark.parametrize("name", sorted(code for code, kind in FINDINGS.items() if kind.unfit))
 def test_unfit_recording_is_excluded_unless_included(name: str) -> None:
     severity = "fatal" if name == "stuck" else "warning"
-    found = list(derive_doubts([finding("noise_grows"), finding(name, severity)], [], []))
+    found = list(derive_doubts([finding("truncated"), finding(name, severity)], [], []))
     row = verdict(found)
     assert (row.fitness, row.decides) == ("unfit", False)
-    assert row.doubts == marked(name, "noise_grows")
+    assert row.doubts == marked(name, "truncated")
     assert list_excluded([row]) == {("s", "a"): row.doubts}
     asked_for = verdict(found, ["s/a"])
     assert (asked_for.fitness, asked_for.decides) == ("unfit", True)

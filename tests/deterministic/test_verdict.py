@@ -41,12 +41,12 @@ def test_a_step_is_a_finding_and_a_row() -> None:
     assert set(row) == {column.name for column in TABLES["deterministic"]}
 
 
-def test_noise_that_grows_makes_n_doubtful() -> None:
+def test_noise_that_grows_is_a_note() -> None:
     log = static_log(3)
     of = verdict(log + 0.15 * times(log) / times(log)[-1] * (log - log.mean()))
     assert "noise_grows" in names(of)
     estimate = of.apply(Estimate("likelihood", {"N": Parameter(N), "K": Parameter(K)}))
-    assert estimate.parameters["N"].status == "doubtful"
+    assert estimate.parameters["N"].status == "ok"
     assert estimate.parameters["N"].value == N
     assert estimate.parameters["K"].status == "ok"
 

@@ -20,7 +20,7 @@ def figures(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
     return [{name: one for name, one in row.items() if name not in SAID} for row in rows]
 
 
-@pytest.mark.parametrize("code", ["noise_grows", "not_explained", "backtest_contradicts"])
+@pytest.mark.parametrize("code", ["truncated", "not_explained", "backtest_contradicts"])
 def test_a_doubt_leaves_every_figure(code: str) -> None:
     clean, _ = judge(SENSORS, ASKED)
     marks = marked("r", code, channels=("gyro_x",))

@@ -28,7 +28,7 @@ def test_a_doubt_is_a_sentence(code: str, channels: tuple[str, ...]) -> None:
         ("suspicious_unit", ("gyro_z",), "the unit of gyro z looks wrong"),
         ("suspicious_unit", (), "the unit of the data looks wrong"),
         ("motion", ("gyro_x",), "the sensor was moved"),
-        ("noise_grows", ("gyro_x",), "the white noise of gyro x changes over the log"),
+        ("truncated", ("gyro_x",), "truncated samples of gyro x"),
         ("channel_twice", ("gyro_x",), "gyro x is a copy of another channel"),
         ("channel_twice", ("gyro_x", "gyro_y"), "gyro x and gyro y are a copy of another channel"),
     ],

@@ -76,8 +76,7 @@ def assess_signals(channel: str, signals: DeterministicSignals) -> Verdict:
     steady = assess_stationarity(signals.means)
     if steady is not None and steady.has_trend:
         data = NoiseTrend(steady.trend, SIGMAS * steady.trend_error)
-        findings.append(find(data, "warning", steady.trend, channel, steady.start, steady.end))
-        caveats["N"] = ("doubtful", findings[-1].detail)
+        findings.append(find(data, "note", steady.trend, channel, steady.start, steady.end))
     if signals.telegraph:
         many = TelegraphNoise(MAX_REGRESSORS)
         findings.append(find(many, "warning", float(MAX_REGRESSORS), channel))

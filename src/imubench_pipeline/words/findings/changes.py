@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from imubench_pipeline.words.findings.base import (
+    NONE,
     SLOW,
-    WHITE,
     FindingData,
     channel_name,
     estimate_text,
@@ -90,12 +90,7 @@ class TelegraphNoise(
         )
 
 
-class NoiseTrend(
-    FindingData,
-    code="noise_grows",
-    affects=WHITE,
-    doubt="the white noise of {channels} changes over the log",
-):
+class NoiseTrend(FindingData, code="noise_grows", affects=NONE):
     """The white noise grows or falls steadily."""
 
     trend: float  # N at the end over N at the start, minus 1
@@ -106,5 +101,6 @@ class NoiseTrend(
         return (
             f"The white noise of {channel_name(channel)} {verb} by "
             f"{percent_text(abs(self.trend))} (± {percent_text(self.error, 2)}) over the log. "
-            "N is its mean over the log. Look for a change of temperature or supply voltage"
+            "N is its mean over the log, and its limits contain the change. "
+            "Look for a change of temperature or supply voltage"
         )
