@@ -71,6 +71,7 @@ def test_a_change_of_the_noise_widens_the_limits_of_n() -> None:
     assert before.upper is not None and before.lower is not None
     assert after.upper is not None and after.lower is not None
     assert before.upper / before.lower < 1.02
+    assert after.reason is not None and "parts of the log differ" in after.reason
     assert after.lower < 0.93 * GYRO.N * 1.02 and after.upper > 1.07 * GYRO.N * 0.98
 
 

@@ -21,7 +21,7 @@ of a spread.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, partial
 
@@ -136,8 +136,10 @@ def fit(
     by_walk = fitted_without.model.K * np.sqrt(1.2 * curve.rate / curve.samples)
     if fitted.model.R <= _MIN_RAMP * by_walk:
         points, fitted = without, fitted_without
-    draws = _draw(points, fitted, parts.select(inside), rng)
-    return _make_estimate(points, fitted, draws)
+    excesses = _estimate_excesses(points, fitted, parts.select(inside))
+    draws = _draw(points, fitted, excesses, rng)
+    estimate = _make_estimate(points, fitted, draws)
+    return replace(estimate, parameters=_state_changes(estimate.parameters, excesses))
 
 
 @dataclass(frozen=True)
@@ -308,7 +310,7 @@ def _whiten(covariance: Array, used: NDArray[np.bool_]) -> Array:
 
 
 def _draw(
-    points: _Points, fitted: _Fitted, parts: PartVariances, rng: np.random.Generator
+    points: _Points, fitted: _Fitted, excesses: Mapping[str, float], rng: np.random.Generator
 ) -> Solutions:
     """Return models drawn around the fitted one, spread by the excess between parts."""
     covariance = fitted.sampling + points.model_covariance(fitted.error)
@@ -319,14 +321,12 @@ def _draw(
     shift, scale = _chi_squared_logarithms(np.diag(covariance))
     spread = shift + (normal @ root.T) * scale
     drawn = points.search.solve(points.variance * np.exp(spread), fitted.whitening)
-    excess = _estimate_excesses(points, fitted, parts)
     spread = rng.standard_normal((_DRAWS // 2, 3))
     spread = rng.permutation(np.concatenate((spread, -spread)))
     factors = np.ones((_DRAWS, TERMS))
-    for column, terms in enumerate(((WHITE,), (FLICKER, PROCESS), (WALK, RAMP))):
-        for term in terms:
-            excess_error = min(np.sqrt(excess[terms[0]]), _MAX_EXCESS)
-            factors[:, term] = np.exp(2.0 * excess_error * spread[:, column])
+    for column, (symbol, terms) in enumerate(_TERMS_OF.items()):
+        factor = np.exp(2.0 * excesses[symbol] * spread[:, column])
+        factors[:, terms] = factor[:, None]
     step = np.log(points.search.times[1] / points.search.times[0])
     times = drawn.times * np.exp(step * rng.uniform(-0.5, 0.5, _DRAWS))  # between those tried
     return replace(drawn, squares=drawn.squares * factors, times=times)
@@ -343,26 +343,40 @@ def _chi_squared_logarithms(relative: Array) -> tuple[Array, Array]:
     return np.log(half) - digamma(half), np.sqrt(polygamma(1, half) * half)
 
 
-def _estimate_excesses(points: _Points, fitted: _Fitted, parts: PartVariances) -> dict[int, float]:
-    """Return the excess variance of the logarithms of N, B and K between parts of the log."""
+_TERMS_OF = {"N": [WHITE], "B": [FLICKER, PROCESS], "K": [WALK, RAMP]}
+
+
+def _estimate_excesses(
+    points: _Points, fitted: _Fitted, parts: PartVariances
+) -> Mapping[str, float]:
+    """Return the excess deviation of the logarithms of N, B and K between parts of the log."""
     curve, squares = points.curve, fitted.solution.squares[0]
     present = np.flatnonzero(squares)
     columns = points.search.design(float(fitted.solution.times[0]))[:, present]
     gain = np.zeros((TERMS, len(curve.tau)))
     gain[present] = np.linalg.pinv(fitted.whitening @ columns) @ fitted.whitening
-    model = fitted.model
-
-    covariance = cache(partial(points.covariance, model, fitted.expected))
-
-    excess = {}
-    for terms in ((WHITE,), (FLICKER, PROCESS), (WALK,)):
-        total = squares[list(terms)].sum()
+    covariance = cache(partial(points.covariance, fitted.model, fitted.expected))
+    excesses = {}
+    for symbol, terms in (("N", [WHITE]), ("B", [FLICKER, PROCESS]), ("K", [WALK])):
+        total = squares[terms].sum()
+        excess = 0.0
         if total > 0.0:
-            influence = gain[list(terms)].sum(axis=0) * fitted.expected / total / 2.0
-            excess[terms[0]] = estimate_excess(parts, curve, influence, covariance)
-        else:
-            excess[terms[0]] = 0.0
-    return excess
+            influence = gain[terms].sum(axis=0) * fitted.expected / total / 2.0
+            excess = estimate_excess(parts, curve, influence, covariance)
+        excesses[symbol] = min(float(np.sqrt(excess)), _MAX_EXCESS)
+    return excesses
+
+
+def _state_changes(
+    parameters: Mapping[str, Parameter], excesses: Mapping[str, float]
+) -> dict[str, Parameter]:
+    """Return parameters whose reason states how much they change during the log."""
+    return {
+        symbol: replace(one, reason=texts.changes_between_parts(excesses[symbol]))
+        if one.status == "ok" and excesses.get(symbol)
+        else one
+        for symbol, one in parameters.items()
+    }
 
 
 def _make_estimate(points: _Points, fitted: _Fitted, drawn: Solutions) -> Estimate:

@@ -21,6 +21,13 @@ MAY_BE_ABSENT = "the lower limit is 0: the term may be absent"
 MINIMUM_BEYOND = "some models that fit the log have no minimum within a ninth of it"
 
 
+def changes_between_parts(excess: float) -> str:
+    return (
+        f"the limits contain {percent_text(excess, 2)} (one standard deviation) by which parts of "
+        "the log differ beyond the sampling error"
+    )
+
+
 def few_points(points: int, longest: float, needed: int) -> str:
     """Return why a curve is too short; ``longest``: longest tau over the length of the log."""
     return (
