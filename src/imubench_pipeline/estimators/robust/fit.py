@@ -130,12 +130,16 @@ def fit(
     if not (curve.variance[inside] > 0).all():
         raise UnfitCurveError(texts.REPEATED_SAMPLES)
     points = _Points.of(curve, inside, lines)
+    fitted = _fit_points(points)
     without = replace(points, search=points.search.exclude(RAMP))
-    fitted, fitted_without = _fit_points(points), _fit_points(without)
-    # The mean slope of a random walk over a time T has the standard deviation K sqrt(1.2 / T).
-    by_walk = fitted_without.model.K * np.sqrt(1.2 * curve.rate / curve.samples)
-    if fitted.model.R <= _MIN_RAMP * by_walk:
-        points, fitted = without, fitted_without
+    if fitted.model.R == 0.0:
+        points = without
+    else:
+        fitted_without = _fit_points(without)
+        # The mean slope of a random walk over a time T has the standard deviation K sqrt(1.2 / T).
+        by_walk = fitted_without.model.K * np.sqrt(1.2 * curve.rate / curve.samples)
+        if fitted.model.R <= _MIN_RAMP * by_walk:
+            points, fitted = without, fitted_without
     excesses = _estimate_excesses(points, fitted, parts.select(inside))
     draws = _draw(points, fitted, excesses, rng)
     estimate = _make_estimate(points, fitted, draws)
