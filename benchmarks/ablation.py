@@ -45,7 +45,6 @@ RULES: Mapping[str, tuple[tuple[ModuleType, str, float], ...]] = {
     "correction for filter and rounding": ((fit, "_GAIN_OF_BEND", math.inf),),
     "bent points left out": ((fit, "_MAX_BEND", math.inf),),
     "ramp above the slope of a walk": ((fit, "_MIN_RAMP", 0.0),),
-    "gain of a ramp": ((active_sets, "_GAIN_OF_RAMP", 0.0),),
     "gain of a process": ((active_sets, "_GAIN_OF_PROCESS", 0.0),),
     "gain of flicker noise and a process": ((active_sets, "_GAIN_OF_BOTH", 0.0),),
     "gain of a walk without bias instability": ((active_sets, "_GAIN_WITHOUT_BIAS", 0.0),),

@@ -27,7 +27,6 @@ TERMS = 5
 
 _GAIN_OF_PROCESS = 4.0  # Decrease of the cost (chi-squared) that a correlation time must bring
 _GAIN_OF_BOTH = 8.0  # The same for flicker noise and a process together
-_GAIN_OF_RAMP = 2.0
 _GAIN_WITHOUT_BIAS = 3.0  # Of a walk or ramp without any bias instability: few sensors have none
 _MAX_PROFILE_LOSS = 3.84  # Of chi-squared at 95 % limits
 _RIDGE = 1e-12  # Relative, for collinear columns
@@ -128,8 +127,6 @@ def _required_gain(chosen: tuple[int, ...]) -> float:
     gain = 0.0
     if PROCESS in chosen:
         gain += _GAIN_OF_BOTH if FLICKER in chosen else _GAIN_OF_PROCESS
-    if RAMP in chosen:
-        gain += _GAIN_OF_RAMP
     if (WALK in chosen or RAMP in chosen) and FLICKER not in chosen and PROCESS not in chosen:
         gain += _GAIN_WITHOUT_BIAS
     return gain

@@ -69,6 +69,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="practical: deg/h, ug and their like; si: rad/s, m/s^2; default: practical",
     )
     parser.add_argument(
+        "-v", "--verbose", action="store_true", help="print all findings and parameters"
+    )
+    parser.add_argument(
         "-c",
         "--cores",
         type=make_number_type(1, MOST_WHOLE, "at least 1", int),
@@ -94,6 +97,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 def _run(arguments: argparse.Namespace, compiling: Compilation) -> int:
     from imubench_pipeline.model.recordings import FailureRow
+    from imubench_pipeline.report.log_screen import render_log_screen
     from imubench_pipeline.report.run_summary import list_failures
     from imubench_pipeline.report.show import show
     from imubench_pipeline.report.terminal import render_logs
@@ -114,7 +118,8 @@ def _run(arguments: argparse.Namespace, compiling: Compilation) -> int:
             raise CommandError(f"imubench analyse: {error}") from None
         analysis = Analysis(plan, compiling, arguments.cores, _say)
         tables = analysis.estimates()
-        show(lambda width: render_logs(tables, arguments.units, width))
+        render = render_logs if arguments.verbose else render_log_screen
+        show(lambda width: render(tables, arguments.units, width))
         if arguments.output is not None:
             _say("making the page and the figures: some seconds")
             printed = FailureRow.rows_of(tables["failures"])

@@ -1,0 +1,93 @@
+"""The screen of one log: events of several findings, tables of 80 columns, at most 40 lines."""
+
+from __future__ import annotations
+
+from io import StringIO
+from typing import Any
+
+import pytest
+from rich.console import Console
+
+from imubench_pipeline.model.estimates import ParameterRow
+from imubench_pipeline.model.recordings import FindingRow, RecordingRow
+from imubench_pipeline.report.log_screen import SHOWN, group_events, render_log_screen
+from imubench_pipeline.tables import build
+from imubench_pipeline.words.events import events_text
+
+CHANNELS = [f"{quantity}_{axis}" for quantity in ("gyro", "accel") for axis in "xyz"]
+SLOW = ("B", "K")
+
+
+def finding(code: str, channel: str | None, start: float | None = None, **more: Any) -> FindingRow:
+    about = {"severity": "warning", "affects": SLOW, "detail": f"{code} of {channel}. " * 12}
+    return FindingRow(
+        **{"sensor": "s", "recording": "r", **about, **more},
+        channel=channel,
+        finding=code,
+        start=start,
+        end=None if start is None else start + 1.0,
+    )
+
+
+def parameter(channel: str, symbol: str, **about: Any) -> ParameterRow:
+    key = {"sensor": "s", "recording": "r", "method": "robust", "model": "N+F", "component": 1}
+    return ParameterRow(
+        **key, channel=channel, parameter=symbol, recommended=True, unit="rad/s", **about
+    )
+
+
+def test_steps_of_all_axes_at_one_time_are_one_disturbance() -> None:
+    steps = [
+        finding("bias_step", channel, start, value=size)
+        for channel, start, size in (
+            ("accel_x", 2153.0, 0.017),
+            ("accel_y", 2154.0, 0.02),
+            ("accel_x", 2178.0, -0.03),
+            ("accel_x", 7000.0, 0.02),
+        )
+    ]
+    events = group_events(steps)
+    assert [len(event.findings) for event in events] == [3, 1]
+    text = events_text(events[0].findings)
+    assert text.startswith("Disturbed at 2153 to 2179 s: 3 bias steps of 1700 to 3100 µg")
+    assert "accel x and accel y" in text
+
+
+def test_findings_of_one_kind_are_one_event_and_fatal_ones_are_first() -> None:
+    rows = [finding("strong_line", channel) for channel in CHANNELS]
+    stuck = finding("stuck", "gyro_x", severity="fatal", affects=())
+    events = group_events([*rows, stuck])
+    assert [len(event.findings) for event in events] == [1, 6]
+    assert events_text(events[1].findings).startswith("Strong line on gyro x, gyro y")
+
+
+@pytest.mark.parametrize("width", [80, 120])
+def test_the_screen_of_six_axes_has_40_lines_of_80_columns(width: int) -> None:
+    parameters = [
+        parameter(channel, symbol, value=1.234e-4, lower=1.1e-4, upper=1.5e-4, status="ok")
+        for channel in CHANNELS
+        for symbol in SHOWN
+    ]
+    parameters[2] = parameter(CHANNELS[0], "K", upper=2e-4, status="not_identified")
+    parameters[1] = parameter(
+        CHANNELS[0], "B_curve", value=1e-4, lower=1e-5, upper=1e-3, status="doubtful"
+    )
+    kinds = ("strong_line", "knocks", "motion", "warm_up", "too_many_lines")
+    findings = [finding(kind, channel) for kind in kinds for channel in CHANNELS]
+    recording = RecordingRow(
+        sensor="s", device="d", recording="r", kind="static", simulated=True, status="ok",
+        rate=100.0, duration=3600.0, fitness="fit with doubts",
+    )  # fmt: skip
+    rows = {"recordings": [recording], "parameters": parameters, "findings": findings}
+    tables = {name: build(name, own) for name, own in rows.items()}
+    console = Console(width=width, record=True, file=StringIO())
+    for part in render_log_screen(tables, "practical", width):
+        console.print(part)
+    lines = console.export_text().splitlines()
+    assert len(lines) <= 40
+    assert max(map(len, lines)) <= width
+    assert lines[0] == "r: usable, with doubts; 60 min at 100 Hz, simulated"
+    (cells,) = (line.split() for line in lines if line.startswith("gyro_x"))
+    assert "?" in cells and "<" in cells
+    assert sum(line.startswith(("1. ", "2. ", "3. ", "4. ")) for line in lines) == 3
+    assert lines[-2].startswith("12 other findings")
