@@ -173,36 +173,25 @@ def add_curve_figures(
 
     model, longest = convert_noise_model(estimate.model), float(tau[-1])
     drawn = [select(candidate) for candidate in alike]
+    bias = Parameter(None, "absent", estimates.ABSENT)
     if any(alike[0].terms.biases):
-        bias = _estimate_bias(model, drawn, longest)
+        biased = [models for models in drawn if any(models.terms.biases)]
+        parts = [(compute_curve_bias(models, longest)[0], models.weight) for models in biased]
+        value = float(compute_curve_bias(model, longest)[0][0])
+        lower, upper = _compute_limits(parts, value)
+        bias = Parameter(value, "ok", None, lower, upper)
+        if value == 0.0:
+            bias = Parameter(None, "absent", estimates.ABSENT_BELOW, 0.0, upper)
     else:
         having = [c for c in alike if is_as_good(c, alike[0]) and any(c.terms.biases)]
         every = [select(c) for c in wider if any(c.terms.biases)] + [select(c) for c in having]
-        bias = _describe_weak_bias(every, bool(having), longest)
+        values = [compute_curve_bias(models, longest)[0] for models in every]
+        upper = max((float(np.quantile(value, 0.975)) for value in values), default=0.0)
+        if having:
+            bias = Parameter(None, "not_identified", estimates.BIAS_MODELS_ALIKE, 0.0, upper)
+        elif every:
+            bias = Parameter(None, "absent", estimates.ABSENT_BELOW, 0.0, upper)
     return replace(estimate, curve={"B_curve": bias} | estimate_lowest_point(model, drawn, tau))
-
-
-def _estimate_bias(model: Models, drawn: Sequence[Models], longest: float) -> Parameter:
-    """Return the bias instability of a curve, with limits from draws."""
-    biased = [models for models in drawn if any(models.terms.biases)]
-    parts = [(compute_curve_bias(models, longest)[0], models.weight) for models in biased]
-    value = float(compute_curve_bias(model, longest)[0][0])
-    lower, upper = _compute_limits(parts, value)
-    if value == 0.0:
-        return Parameter(None, "absent", estimates.ABSENT_BELOW, 0.0, upper)
-    return Parameter(value, "ok", None, lower, upper)
-
-
-def _describe_weak_bias(drawn: Sequence[Models], as_good: bool, longest: float) -> Parameter:
-    """Return the bias instability of a curve whose chosen model has none."""
-    if not drawn:
-        return Parameter(None, "absent", estimates.ABSENT)
-    upper = max(
-        float(np.quantile(compute_curve_bias(models, longest)[0], 0.975)) for models in drawn
-    )
-    if as_good:
-        return Parameter(None, "not_identified", estimates.BIAS_MODELS_ALIKE, 0.0, upper)
-    return Parameter(None, "absent", estimates.ABSENT_BELOW, 0.0, upper)
 
 
 def compute_curve_figures(model: NoiseModel, tau: Array) -> dict[str, Parameter]:
@@ -226,13 +215,10 @@ def estimate_lowest_point(
     weights = [models.weight for models in drawn]
     limits: list[tuple[float | None, float | None]] = [(None, None), (None, None)]
     if drawn:
+        columns = zip(*(point[:2] for point in points), strict=True)
         limits = [
-            _compute_limits(
-                list(zip([sigmas for sigmas, _, _ in points], weights, strict=True)), sigma
-            ),
-            _compute_limits(
-                list(zip([times for _, times, _ in points], weights, strict=True)), time
-            ),
+            _compute_limits(list(zip(column, weights, strict=True)), value)
+            for column, value in zip(columns, (sigma, time), strict=True)
         ]
     if not inside:
         falls = time > tau[0]

@@ -201,11 +201,6 @@ class _Gains:
         """Return the gain for white noise, without leakage."""
         return np.asarray(low_pass.white(self._within, self._rate).mean(axis=0))
 
-    def slow(self, low_pass: Filter) -> tuple[Array, Array]:
-        """Return the gains for flicker noise and for slower noise."""
-        at = self._mean, self._rate
-        return low_pass.flicker(*at), low_pass.slow(*at)
-
     def leakage(self, low_pass: Filter) -> Array:
         """Return the spectral leakage in bins of single samples, 0 in others."""
         leak = low_pass.leakage(self._mean, self._rate, self._length)
@@ -229,12 +224,13 @@ class _Fits:
         self._gains = _Gains(spectrum)
         self._bins = self._whittle.bins()
         self._penalty = 0.5 * math.log(len(spectrum.frequency))
+        flat = np.column_stack([np.ones(len(self._slow)), self._slow])
+        self._unfiltered = self._fit_powers(flat)[1]
 
     def may_bend(self) -> bool:
         """Return whether a filter at one of a few cut-offs has a better likelihood than none."""
-        alone = self._fit_powers(np.column_stack([np.ones(len(self._slow)), self._slow]))[1]
         return any(
-            self._fit(Filter(*each, cutoff)).cost < alone - 1.0
+            self._fit(Filter(*each, cutoff)).cost < self._unfiltered - 1.0
             for each in _MAX_CUTOFFS
             for cutoff in self._list_cutoffs(*each)[::3].tolist()
         )
@@ -255,13 +251,11 @@ class _Fits:
 
     def find_gain(self, trial: _Trial, models: Sequence[Terms]) -> float:
         """Return half the BIC of models without a filter, less the one with it."""
-        flat = np.column_stack([np.ones(len(self._slow)), self._slow])
-        unfiltered = [self._fit_powers(flat)[1]]
-        unfiltered += [
+        costs = [
             self._whittle.maximum(terms).cost + self._penalty * ("Q" in terms.linear)
             for terms in models
         ]
-        gain = min(unfiltered) - trial.cost - self._penalty * (1 + trial.with_floor)
+        gain = min(self._unfiltered, *costs) - trial.cost - self._penalty * (1 + trial.with_floor)
         fast = make_whittle(self.spectrum, 0.5 * self.rate, COARSE, shortest=3.0 / self.rate)
         process = min(fast.maximum(terms).cost for terms in _UNFILTERED_MODELS)
         # A process of a few samples is a filter of first order, if no white noise is visible.
@@ -330,9 +324,10 @@ class _Fits:
     def _make_columns(self, low_pass: Filter, with_floor: bool) -> Array:
         """Return the densities of the terms behind a filter as columns, white noise first."""
         white = self._gains.white(low_pass) + self._gains.leakage(low_pass) + self.rounded
-        flicker, slow = self._gains.slow(low_pass)
-        gains = np.hstack([flicker[:, None], np.tile(slow[:, None], self._slow.shape[1] - 1)])
-        columns = [white[:, None], self._slow * gains]
+        at = self.spectrum.frequency, self.rate
+        slow = self._slow * low_pass.slow(*at)[:, None]
+        slow[:, 0] = self._slow[:, 0] * low_pass.flicker(*at)
+        columns = [white[:, None], slow]
         return np.hstack(columns + [np.ones((len(white), 1))] * with_floor)
 
     def _fit(self, low_pass: Filter, with_floor: bool = False) -> _Trial:

@@ -14,10 +14,7 @@ from imubench_pipeline.estimators.deterministic.means import Means, average_bloc
 from imubench_pipeline.estimators.deterministic.ordinates import Fit, Ordinates
 from imubench_pipeline.estimators.deterministic.regressors import Regressor
 from imubench_pipeline.estimators.deterministic.scores import MIN_CYCLES, Gain
-from imubench_pipeline.estimators.deterministic.search import (
-    SearchResult,
-    search_signals,
-)
+from imubench_pipeline.estimators.deterministic.search import SearchResult, search_signals
 from imubench_pipeline.estimators.estimate import SIGMAS
 from imubench_pipeline.typing import Array
 

@@ -14,7 +14,6 @@ from functools import cached_property
 
 import numpy as np
 import scipy.fft
-from numpy.typing import NDArray
 
 from imubench_pipeline.estimators.deterministic.means import Means
 from imubench_pipeline.estimators.deterministic.regressors import Regressor
@@ -58,6 +57,8 @@ class Ordinates:
         )
         self.length = np.concatenate([np.full(n - 1, n * interval) for n in self.sizes])
         self.used = self.frequency <= (highest or math.inf)
+        order = np.argsort(self.frequency, kind="stable")
+        self._order = order[self.used[order]]
         self._columns: dict[Regressor, Array] = {}
 
     @property
@@ -75,19 +76,11 @@ class Ordinates:
             self._columns[regressor] = regressor.coefficients(self.sizes[regressor.part])
         return self._columns[regressor]
 
-    @cached_property
-    def _order(self) -> NDArray[np.int64]:
-        order = np.argsort(self.frequency, kind="stable")
-        return np.asarray(order[self.used[order]])
-
-    @cached_property
-    def _edges(self) -> NDArray[np.int64]:
-        return make_bin_edges(self.frequency[self._order])
-
     def spectrum(self, residual: Array, weight: Array) -> Spectrum:
         """Return the binned spectrum of coefficients, each counted with its ``weight``."""
-        order, edges, interval = self._order, self._edges, self.means.interval
+        order, interval = self._order, self.means.interval
         frequency, length = self.frequency[order], self.length[order]
+        edges = make_bin_edges(frequency)
         counts = np.diff(np.append(edges, len(order)))
         last = edges + counts - 1
         ordinates = np.add.reduceat(weight[order], edges)
@@ -121,30 +114,22 @@ class Ordinates:
         logarithm = np.log(self._whittle.density(noise))
         return np.exp(np.interp(np.log(self.frequency), np.log(bins), logarithm))
 
-    def fit(
-        self,
-        regressors: Sequence[Regressor],
-        start: Array | None = None,
-        terms: Terms = NOISE_TERMS,
-    ) -> Fit:
+    def fit(self, regressors: Sequence[Regressor], start: Array | None = None) -> Fit:
         """Fit noise and regressors together.
 
         ``start``, shape (k,), is the noise density for the weights of the first iteration.
         """
-        weight = np.ones_like(self.coefficient)
-        residual, leverage = self.coefficient, np.zeros_like(weight)
-        sizes, covariance = np.empty(0), np.empty((0, 0))
+        weight, residual = np.ones_like(self.coefficient), self.coefficient
         density = start
         for _ in range(_FIT_ROUNDS if regressors else 1):
-            if regressors and density is not None:
-                sizes, covariance, residual, leverage = self.solve(regressors, density)
+            if density is not None:
+                _, _, residual, leverage = self.solve(regressors, density)
                 weight = np.maximum(1.0 - leverage, _MIN_WEIGHT)
             whittle = self._whittle.of(self.spectrum(residual, weight))
-            noise = whittle.maximum(terms)
+            noise = whittle.maximum(NOISE_TERMS)
             density = self.density(noise)
         assert density is not None  # it was set in every round
-        if regressors:
-            sizes, covariance, residual, leverage = self.solve(regressors, density)
+        sizes, covariance, residual, leverage = self.solve(regressors, density)
         fitted = sizes, covariance, noise, density, residual, leverage
         return Fit(tuple(regressors), *fitted, self.log_likelihood(residual, density))
 

@@ -55,7 +55,12 @@ class Gain:
         self._size = ordinates.sizes[part]
         self.weight = ordinates.weights(density)[of_part]
         others = [row for x in regressors if x.part == part for row in ordinates.columns(x)]
-        self.basis = _orthonormalise(others, self.weight)
+        # A basis of them that is orthonormal in the weighted product, shape (q, k).
+        self.basis = np.empty((0, len(self.weight)))
+        if others:
+            root = np.sqrt(self.weight)
+            rows = np.linalg.qr((np.array(others) * root).T)[0].T
+            self.basis = rows / np.where(root > 0.0, root, 1.0)
         coefficient = ordinates.coefficient[of_part]
         self.residual = coefficient - (self.basis @ (self.weight * coefficient)) @ self.basis
 
@@ -111,7 +116,11 @@ def find_best_scores(
         if not smooth:
             gains, places = gain.of_steps()
             best = int(np.argmax(gains))
-            step = _put_into_pause(Regressor("step", part, best + 1.0), restarts)
+            step = Regressor("step", part, best + 1.0)
+            for x in restarts:  # a step in or beside a pause belongs to it
+                if x.part == part and abs(best + 1.0 - x.where) <= 0.5 * x.length + _PAUSE_MARGIN:
+                    step = x
+                    break
             yield Score(step, float(gains[best]), compute_threshold(chance, places))
         for kind, where, columns in _tabulate(n):
             gains = gain.of_columns(columns)
@@ -131,14 +140,6 @@ def list_restarts(means: Means) -> list[Regressor]:
     ]
 
 
-def _put_into_pause(step: Regressor, restarts: Sequence[Regressor]) -> Regressor:
-    """Return the restart that a step is in or beside, or else the step."""
-    for x in restarts:
-        if x.part == step.part and abs(step.where - x.where) <= 0.5 * x.length + _PAUSE_MARGIN:
-            return x
-    return step
-
-
 def compute_threshold(chance: float, places: float) -> float:
     """Return the threshold for the largest of the gains at a number of independent places.
 
@@ -146,15 +147,6 @@ def compute_threshold(chance: float, places: float) -> float:
     rate exp(-z^2 / 2), and the gain is z^2.
     """
     return 2.0 * math.log(max(places, 1.0) / chance)
-
-
-def _orthonormalise(columns: Sequence[Array], w: Array) -> Array:
-    """Return a basis of columns that is orthonormal in the weighted product, shape (q, k)."""
-    if not columns:
-        return np.empty((0, len(w)))
-    root = np.sqrt(w)
-    rows = np.linalg.qr((np.array(columns) * root).T)[0].T
-    return np.asarray(rows / np.where(root > 0.0, root, 1.0))
 
 
 @lru_cache(maxsize=8)

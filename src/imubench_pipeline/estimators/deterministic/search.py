@@ -43,7 +43,17 @@ def search_signals(ordinates: Ordinates) -> SearchResult:
     """Find the deterministic signals that noise does not explain."""
     fit = ordinates.fit(())
     while not _is_full(fit):
-        better = _add_best(ordinates, fit)
+        better: Fit | None = None
+        most = 0.0
+        for signals, threshold, density in _find_candidates(ordinates, fit):
+            regressors = (*fit.regressors, *signals)
+            if density is not fit.density:
+                # A strong signal with a slightly wrong frequency leaves a large residual.
+                regressors = polish(ordinates, regressors, len(regressors) - 1, density)
+            tried = ordinates.fit(regressors, fit.density)
+            gain = 2.0 * (tried.log_likelihood - fit.log_likelihood)
+            if gain - threshold > most:
+                better, most = tried, gain - threshold
         if better is None:
             break
         last = len(better.regressors) - 1
@@ -56,27 +66,17 @@ def search_signals(ordinates: Ordinates) -> SearchResult:
         for which in range(len(moved)):
             moved = polish(ordinates, moved, which, fit.density)
         fit = ordinates.fit(moved, fit.density)
-    return SearchResult(*_eliminate(ordinates, fit), False)
+    while True:  # remove regressors that others made unnecessary
+        rest = [leave_out(fit.regressors, which) for which in range(len(fit.regressors))]
+        fits = [ordinates.fit(others, fit.density) for others in rest]
+        gains = [2.0 * (fit.log_likelihood - without.log_likelihood) for without in fits]
+        if min(gains, default=np.inf) > _MIN_KEPT_GAIN:
+            return SearchResult(fit, tuple(gains), False)
+        fit = fits[int(np.argmin(gains))]
 
 
 def _is_full(fit: Fit) -> bool:
     return sum(not regressor.length for regressor in fit.regressors) >= MAX_REGRESSORS
-
-
-def _add_best(ordinates: Ordinates, fit: Fit) -> Fit | None:
-    """Return the fit with the best additional signal, or None if none is significant."""
-    best: Fit | None = None
-    most = 0.0
-    for signals, threshold, density in _find_candidates(ordinates, fit):
-        regressors = (*fit.regressors, *signals)
-        if density is not fit.density:
-            # A strong signal with a slightly wrong frequency leaves a large residual.
-            regressors = polish(ordinates, regressors, len(regressors) - 1, density)
-        tried = ordinates.fit(regressors, fit.density)
-        gain = 2.0 * (tried.log_likelihood - fit.log_likelihood)
-        if gain - threshold > most:
-            best, most = tried, gain - threshold
-    return best
 
 
 def _find_candidates(
@@ -120,14 +120,3 @@ def polish(
 def leave_out(regressors: Sequence[Regressor], left_out: int) -> tuple[Regressor, ...]:
     """Return all regressors but one."""
     return tuple(x for i, x in enumerate(regressors) if i != left_out)
-
-
-def _eliminate(ordinates: Ordinates, fit: Fit) -> tuple[Fit, tuple[float, ...]]:
-    """Remove regressors that others made unnecessary; return the gain of each of the rest."""
-    while True:
-        rest = [leave_out(fit.regressors, which) for which in range(len(fit.regressors))]
-        fits = [ordinates.fit(others, fit.density) for others in rest]
-        gains = [2.0 * (fit.log_likelihood - without.log_likelihood) for without in fits]
-        if min(gains, default=np.inf) > _MIN_KEPT_GAIN:
-            return fit, tuple(gains)
-        fit = fits[int(np.argmin(gains))]

@@ -1,4 +1,4 @@
-"""Findings from the deterministic signals of a channel, and caveats on its parameters."""
+"""Findings from the deterministic signals of a channel, and doubts about its parameters."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from imubench_pipeline.estimators.deterministic.courses import (
 )
 from imubench_pipeline.estimators.deterministic.means import assess_stationarity
 from imubench_pipeline.estimators.deterministic.search import MAX_REGRESSORS
-from imubench_pipeline.estimators.estimate import SIGMAS, Estimate, Parameter, Status
+from imubench_pipeline.estimators.estimate import CURVE, SIGMAS, Estimate, Parameter
 from imubench_pipeline.model.estimates import DeterministicRow
 from imubench_pipeline.tables.findings import Finding, find
 from imubench_pipeline.words.findings.base import FindingData
@@ -29,22 +29,19 @@ class Verdict:
     """Consequences of a nonstationary log for its estimates."""
 
     findings: tuple[Finding, ...]
-    caveats: Mapping[str, tuple[Status, str]]
-    """Status and reason of the unreliable parameters."""
+    doubt: str | None = None  # why the slow terms are doubtful
 
     def apply(self, estimate: Estimate) -> Estimate:
-        """Return an estimate with the caveats on the parameters that have a value."""
-        if not self.caveats:
+        """Return an estimate in which the values that depend on slow terms are doubtful."""
+        if self.doubt is None:
             return estimate
-        slow = [self.caveats[name] for name in ("B", "K") if name in self.caveats]
-        # The lowest point of the curve depends on its slow terms.
-        lowest = next((caveat for caveat in slow if caveat[0] == "doubtful"), None)
-        of_curve = {"B_curve": self.caveats.get("B"), "sigma_min": lowest, "tau_min": lowest}
 
         def of(parameters: Mapping[str, Parameter]) -> dict[str, Parameter]:
             return {
-                name: _add_caveat(parameter, of_curve.get(name, self.caveats.get(name)))
-                for name, parameter in parameters.items()
+                name: replace(each, status="doubtful", reason=self.doubt)
+                if name in ("B", "T_B", "K", *CURVE) and each.status in ("ok", "doubtful")
+                else each
+                for name, each in parameters.items()
             }
 
         return replace(
@@ -55,24 +52,11 @@ class Verdict:
         )
 
 
-def _add_caveat(parameter: Parameter, caveat: tuple[Status, str] | None) -> Parameter:
-    """Return a parameter with a caveat, if there is one and it has a value."""
-    if caveat is None or parameter.status not in ("ok", "doubtful"):
-        return parameter
-    status, reason = caveat
-    if status == "not_identified":
-        return replace(
-            parameter, value=None, status=status, reason=reason, fitted=parameter.in_model
-        )
-    return replace(parameter, status=status, reason=reason)
-
-
 def assess_signals(channel: str, signals: DeterministicSignals) -> Verdict:
-    """Return the findings of a channel, and the caveats on its parameters."""
+    """Return the findings of a channel, and the doubt about its slow terms."""
     if signals.means is None or signals.searched is None:
-        return Verdict((), {})
+        return Verdict(())
     findings = [_describe_signal(channel, signal) for signal in signals.signals]
-    caveats: dict[str, tuple[Status, str]] = {}
     steady = assess_stationarity(signals.means)
     if steady is not None and steady.has_trend:
         data = NoiseTrend(steady.trend, SIGMAS * steady.trend_error)
@@ -80,8 +64,8 @@ def assess_signals(channel: str, signals: DeterministicSignals) -> Verdict:
     if signals.telegraph:
         many = TelegraphNoise(MAX_REGRESSORS)
         findings.append(find(many, "warning", float(MAX_REGRESSORS), channel))
-        caveats |= {name: ("doubtful", findings[-1].detail) for name in ("B", "T_B", "K")}
-    return Verdict(tuple(findings), caveats)
+        return Verdict(tuple(findings), findings[-1].detail)
+    return Verdict(tuple(findings))
 
 
 def tabulate_signals(
