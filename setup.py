@@ -41,7 +41,7 @@ class WithProject(build_py):
         return {**super().get_output_mapping(), **shipped}
 
     def _plotting(self) -> str:
-        """Return where `report.plotting` looks for plotly.js in a wheel."""
+        """Return where `report.pages` looks for plotly.js in a wheel."""
         return str(Path(self.build_lib, "imubench_pipeline/report/static/plotly.min.js"))
 
     def _shipped(self) -> dict[str, str]:

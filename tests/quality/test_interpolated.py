@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 
 import imubench_pipeline as imu
-from imubench_pipeline.recordings.quality.interpolated import (
+from imubench_pipeline.recordings.quality.knocks import (
     detect_interpolation,
     mark_straight_lines,
 )

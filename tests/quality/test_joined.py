@@ -7,8 +7,7 @@ import pytest
 
 from imubench_pipeline.recordings.quality.columns import find_regular_repeats
 from imubench_pipeline.recordings.quality.joined import find_interleaved_samples
-from imubench_pipeline.recordings.quality.levels import detect_quantisation
-from imubench_pipeline.recordings.quality.register import find_hidden_step
+from imubench_pipeline.recordings.quality.levels import detect_quantisation, find_hidden_step
 from imubench_pipeline.recordings.quality.summary import (
     MAX_PIECES,
     PIECE_SIZE,

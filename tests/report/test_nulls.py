@@ -19,8 +19,8 @@ from rich.console import Console
 from imubench_pipeline.extensions.nightly import summary as nightly
 from imubench_pipeline.report import publish as publishing
 from imubench_pipeline.report import run_summary, terminal
-from imubench_pipeline.report.html import make_templates
 from imubench_pipeline.report.pages import list_pages
+from imubench_pipeline.report.publish import make_templates
 from imubench_pipeline.report.site import Page, Site
 from imubench_pipeline.tables import build, make_schema, write_arrow
 from imubench_pipeline.tables.schemas import OF_ONE_RECORDING, TABLES

@@ -4,7 +4,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from imubench_pipeline.report.thermal import describe_thermal, list_thermal_figures
+from imubench_pipeline.report.recording import describe_thermal, list_thermal_figures
 from imubench_pipeline.report.view import ChannelView, gather_recordings
 from tests.report.tables import DEGREE, HOUR, MODEL, Rows, joined, recording_rows
 

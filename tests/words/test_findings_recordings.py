@@ -9,7 +9,7 @@ from inspect import getmembers, isclass
 import pytest
 
 from imubench_pipeline.tables.findings import find
-from imubench_pipeline.words.findings import copies, files, samples, time_base
+from imubench_pipeline.words.findings import files, samples, time_base
 from imubench_pipeline.words.findings.base import FINDINGS, FindingData
 
 RATE = 0.017453292519943295
@@ -51,13 +51,13 @@ EXAMPLES: list[tuple[str, FindingData]] = [
     ("gyro_x", samples.NotStationary(3.0, 10.0, 20.0)),
     ("gyro_x", samples.Joined(("level", "noise", "steps"), 500.0, 1.5)),
     ("gyro_x", samples.Interleaved(("level",), 5.2, 1.03)),
-    ("gyro_y", copies.ChannelTwice("gyro_x", -9.80665)),
-    ("gyro_y", copies.ChannelTwice("gyro_x", 1.0)),
-    ("", copies.LogTwice(600.0, 1200.0, 0.0, 1, 0.5)),
-    ("gyro_x", copies.LogTwice(600.0, 1200.0, 0.0, 3, 0.5)),
-    ("gyro_x", copies.RepeatedStretch(1000.0, 1010.0, 400.1, 2)),
-    ("", copies.RecordingTwice("run_2", "run_1", ("gyro_x", "gyro_y"))),
-    ("gyro_x", copies.SharedNoise("gyro_y", -0.62)),
+    ("gyro_y", samples.ChannelTwice("gyro_x", -9.80665)),
+    ("gyro_y", samples.ChannelTwice("gyro_x", 1.0)),
+    ("", samples.LogTwice(600.0, 1200.0, 0.0, 1, 0.5)),
+    ("gyro_x", samples.LogTwice(600.0, 1200.0, 0.0, 3, 0.5)),
+    ("gyro_x", samples.RepeatedStretch(1000.0, 1010.0, 400.1, 2)),
+    ("", samples.RecordingTwice("run_2", "run_1", ("gyro_x", "gyro_y"))),
+    ("gyro_x", samples.SharedNoise("gyro_y", -0.62)),
     ("", time_base.RateChanges(0.4, 10.0, 20.0, 50.0, 100.0)),
     ("gyro_x", time_base.RateChanges(0.4, 10.0, 20.0, 50.0, 100.0)),
     ("", time_base.CoarseStamps(100.0, 50.0)),
@@ -115,7 +115,7 @@ EXAMPLES: list[tuple[str, FindingData]] = [
 
 
 def classes() -> Iterable[type[FindingData]]:
-    for module in (samples, copies, time_base, files):
+    for module in (samples, time_base, files):
         for _, one in getmembers(module, isclass):
             if one.__module__ == module.__name__ and issubclass(one, FindingData):
                 yield one

@@ -1,20 +1,27 @@
-"""Convert log files to Parquet in SI, with findings, in bounded memory."""
+"""Convert log files to Parquet in SI, one file per clock, with findings, in bounded memory."""
 
 from __future__ import annotations
 
 import shutil
 import tempfile
+from collections.abc import Iterator, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import suppress
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
 from functools import partial
 from pathlib import Path
 from threading import Event
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+from numpy.typing import NDArray
 
 from imubench_pipeline.model.recordings import RecordingRow
 from imubench_pipeline.readers import log_files, read
 from imubench_pipeline.readers.content import recognise_folder
-from imubench_pipeline.recordings import assembly, timebase
+from imubench_pipeline.recordings import timebase
 from imubench_pipeline.recordings.availability import check_opening, watch_log
 from imubench_pipeline.recordings.kept import AnalysedChannel, KeptFile, Quality, identify_files
 from imubench_pipeline.recordings.known_logs import KnownFile, identify_log_files, write_known
@@ -27,6 +34,7 @@ from imubench_pipeline.recordings.recording import (
     BESIDE,
     LogMetadata,
     LogNames,
+    LogWriter,
     SampleCounts,
     SourceFile,
     list_log_files,
@@ -41,7 +49,9 @@ from imubench_pipeline.settings.sensor import (
     LogFormat,
     RecordingNotes,
     UsedPart,
+    quantity_of,
 )
+from imubench_pipeline.tables import open_parquet, read_row_group
 from imubench_pipeline.tables.failures import Failure
 from imubench_pipeline.tables.findings import Finding, RecordingError, UnavailableError, find
 from imubench_pipeline.words.findings import files, samples
@@ -159,7 +169,7 @@ def _ingest(
     )
     written: list[tuple[Path, Path]] = []
     counts: dict[str, SampleCounts] = {}
-    for name, group in zip(assembly.name_parquet_files(parts, groups), groups, strict=True):
+    for name, group in zip(name_parquet_files(parts, groups), groups, strict=True):
         chosen, base = [parts[index] for index in group], bases[group[0]]
         holes, empty = _find_holes(chosen, base)
         about = describe(
@@ -172,8 +182,8 @@ def _ingest(
             holes=holes,
             empty=tuple(empty),
         )
-        assembled, repeated = assembly.assemble(chosen, base, settings, about, scratch / name)
-        counts |= assembly.count_samples(assembled, chosen, repeated)
+        assembled, repeated = assemble(chosen, base, settings, about, scratch / name)
+        counts |= count_samples(assembled, chosen, repeated)
         written.append((assembled, folder / name))
     about_log = partial(RecordingRow, started=started, power_cycled=notes.power_cycled)
     row = _complete_row(partial(about_log, **vars(names)), parts, bases)
@@ -234,7 +244,19 @@ def _findings(
         findings += [finding for finding in found if finding not in findings]
         findings += part.findings
         if static:  # a turn looks like a knock
-            findings += _list_left_out(part, base.rate, settings, scratch)
+            longest = round(settings.longest_knock * base.rate)
+            knocks = leave_out_disturbed(part, settings.knock, longest, scratch)
+            for channel, events in knocks.items():
+                worst = max(events, key=lambda knock: knock.size)
+                times = tuple(max(knock.first, 0) / base.rate for knock in events[:_MAX_TIMES])
+                begin, end = max(events[0].first, 0) / base.rate, events[-1].last / base.rate
+                number = part.knocks[channel]
+                knocked = files.Knocks(len(events), worst.size, times, number)
+                findings.append(find(knocked, "warning", number, channel, begin, end))
+            for channel, number in part.interpolated.items():
+                if number:
+                    straight = samples.Interpolated(number, number / part.columns[channel].present)
+                    findings.append(find(straight, "warning", number, channel))
     channels = {name: column for part in parts for name, column in part.columns.items()}
     findings += find_copied_channels({n: c for n, c in channels.items() if n not in BESIDE})
     whole = [part for part in parts if part.base is None]
@@ -270,25 +292,6 @@ def _gravity(parts: list[Part], bases: list[timebase.TimeBase]) -> GravityTurn |
         return None  # they have no clock in common
     blocks = [parts[place[name]].columns[name].blocks() for name in axes]
     return detect_gravity_turn(blocks, bases[place[axes[0]]].rate)
-
-
-def _list_left_out(
-    part: Part, rate: float, settings: QualitySettings, scratch: Path
-) -> list[Finding]:
-    longest = round(settings.longest_knock * rate)
-    findings = []
-    for channel, events in leave_out_disturbed(part, settings.knock, longest, scratch).items():
-        worst = max(events, key=lambda knock: knock.size)
-        times = tuple(max(knock.first, 0) / rate for knock in events[:_MAX_TIMES])
-        begin, end = max(events[0].first, 0) / rate, events[-1].last / rate
-        number = part.knocks[channel]
-        data = files.Knocks(len(events), worst.size, times, number)
-        findings.append(find(data, "warning", number, channel, begin, end))
-    for channel, number in part.interpolated.items():
-        if number:
-            share = number / part.columns[channel].present
-            findings.append(find(samples.Interpolated(number, share), "warning", number, channel))
-    return findings
 
 
 def _base(part: Part, log: LogFormat, settings: QualitySettings) -> timebase.TimeBase:
@@ -387,3 +390,104 @@ def _name_recording(plan: IngestPlan, sensor: str, recording: str) -> LogNames:
         kind=plan.kind,
         simulated=plan.simulated or bool(notes.simulated),
     )
+
+
+def name_parquet_files(parts: list[Part], groups: list[list[int]]) -> list[str]:
+    """Return the name of the Parquet file of each clock, from its quantity or its channels."""
+    if len(groups) == 1:
+        return ["log.parquet"]
+    contents = []
+    for group in groups:
+        columns = [name for index in group for name in parts[index].columns]
+        contents.append([name for name in columns if name not in BESIDE] or columns)
+    quantities = [sorted({quantity_of(name) for name in names}) for names in contents]
+    names = []
+    for channels, kinds in zip(contents, quantities, strict=True):
+        alone = len(kinds) == 1 and quantities.count(kinds) == 1
+        names.append(f"log.{kinds[0] if alone else '+'.join(channels)}.parquet")
+    return names
+
+
+def assemble(
+    parts: list[Part],
+    base: timebase.TimeBase,
+    settings: QualitySettings,
+    metadata: LogMetadata,
+    path: Path,
+) -> tuple[Path, dict[str, int]]:
+    """Write the columns of files that share a clock to ``path``, unless one can be used unchanged.
+
+    Return the path, and the samples of each column that are left out because they repeat a stamp.
+    """
+    for part in parts:
+        part.writer.finish(asdict(metadata))
+    if len(parts) == 1 and base.uniform:
+        return parts[0].data, {}
+    repeated: dict[str, int] = {}
+    names = [name for part in parts for name in part.columns]
+    columns = dict.fromkeys(names, pa.float64())
+    if not base.uniform:
+        sample = {"sample": pa.int64()} if base.stamped else {}
+        columns = {"time": pa.float64()} | sample | columns
+    blocks = _read_columns(parts)
+    with LogWriter(path, columns) as writer:
+        if base.uniform:
+            for block in blocks:
+                writer.write(block)
+        else:
+            first = None
+            places = timebase.locate_samples(base, parts[0].stamps, settings)
+            for block, stamps, points in zip(blocks, parts[0].stamps(), places, strict=True):
+                first = stamps[0] if first is None else first
+                block["time"] = stamps - first
+                if base.stamped:
+                    block["sample"] = points
+                keep = points >= 0
+                for name in names:
+                    left = int(np.isfinite(block[name][~keep]).sum())
+                    repeated[name] = repeated.get(name, 0) + left
+                writer.write({name: values[keep] for name, values in block.items()})
+        writer.finish(asdict(metadata))
+    return path, repeated
+
+
+def _read_columns(parts: list[Part]) -> Iterator[dict[str, NDArray[Any]]]:
+    """Yield the columns of several files side by side, a row group at a time."""
+    files = [open_parquet(part.data) for part in parts]
+    try:
+        for group in range(files[0].num_row_groups):
+            block: dict[str, NDArray[Any]] = {}
+            for file in files:
+                table = read_row_group(file, group)
+                block |= {name: table.column(name).to_numpy() for name in table.column_names}
+            yield block
+    finally:
+        for file in files:
+            file.close()
+
+
+def count_samples(
+    path: Path, parts: list[Part], repeated: Mapping[str, int]
+) -> dict[str, SampleCounts]:
+    """Return how many samples of each column are used and left out, by reason (see `assemble`)."""
+    file = pq.read_metadata(path)
+    used = dict.fromkeys(file.schema.names, 0)
+    for group in range(file.num_row_groups):
+        for index, name in enumerate(file.schema.names):
+            column = file.row_group(group).column(index)
+            used[name] += column.num_values - column.statistics.null_count
+    counts = {}
+    for part in parts:
+        for name, column in part.columns.items():
+            count = SampleCounts(
+                present=column.present,
+                used=used[name],
+                knocks=part.knocks.get(name, 0),
+                interpolated=part.interpolated.get(name, 0),
+                repeated=repeated.get(name, 0),
+            )
+            left_out = count.knocks + count.interpolated + count.repeated
+            if count.present != count.used + left_out:
+                raise RuntimeError(f"samples were lost or invented: {name} {count}")
+            counts[name] = count
+    return counts

@@ -58,7 +58,17 @@ def overview(folder: Path, sensor: str, recording: str, buckets: int | None = No
     for log in logs:
         key = Key(sensor, recording, log.channel)
         edges = bucket_edges(log.grid, buckets)
-        figures, drawn = _follow(log, edges)
+        stride = max(1.0, pq.read_metadata(log.path).num_rows / _DRAWN)
+        figures, picked, reached = no_figures(edges), [], 0
+        for values in log.blocks():
+            gather(values, reached, edges, figures)
+            reached += len(values)
+            present = values[~np.isnan(values)] if log.holes else values
+            # A sample out of so many, at distances that no oscillation has for its period.
+            number = np.arange(np.ceil(len(present) / stride))
+            at = (number + number * _GOLDEN_RATIO % 1.0) * stride
+            picked.append(present[at[at < len(present)].astype(np.int64)])
+        drawn = np.concatenate(picked)
         if len(drawn) == 0:
             continue
         times = edges / log.rate + kept.read_metadata(log.path).begins
@@ -85,23 +95,6 @@ def bucket_edges(grid: int, buckets: int) -> NDArray[np.int64]:
 def no_figures(edges: NDArray[np.int64]) -> Array:
     """Return least, largest, sum and number of no samples in each bucket, shape (b, 4)."""
     return np.tile([np.inf, -np.inf, 0.0, 0.0], (len(edges) - 1, 1))
-
-
-def _follow(log: kept.ChannelLog, edges: NDArray[np.int64]) -> tuple[Array, Array]:
-    """Return the figures of each bucket, shape (b, 4), and samples drawn from all of them."""
-    stride = max(1.0, pq.read_metadata(log.path).num_rows / _DRAWN)
-    figures = no_figures(edges)
-    drawn = []
-    reached = 0
-    for values in log.blocks():
-        gather(values, reached, edges, figures)
-        reached += len(values)
-        present = values[~np.isnan(values)] if log.holes else values
-        # A sample out of so many, at distances that no oscillation has for its period.
-        number = np.arange(np.ceil(len(present) / stride))
-        at = (number + number * _GOLDEN_RATIO % 1.0) * stride
-        drawn.append(present[at[at < len(present)].astype(np.int64)])
-    return figures, np.concatenate(drawn)
 
 
 def envelope_rows(key: Key, times: Array, figures: Array) -> Iterator[EnvelopeRow]:

@@ -15,11 +15,13 @@ from numpy.typing import NDArray
 
 from imubench_pipeline.readers import LogFile
 from imubench_pipeline.recordings.quality import levels
-from imubench_pipeline.recordings.quality.interpolated import (
+from imubench_pipeline.recordings.quality.knocks import (
+    Knock,
     detect_interpolation,
+    find_knocks,
+    find_outlier_blocks,
     mark_straight_lines,
 )
-from imubench_pipeline.recordings.quality.knocks import Knock, find_knocks, find_outlier_blocks
 from imubench_pipeline.recordings.quality.summary import ColumnSummary
 from imubench_pipeline.recordings.recording import BESIDE, ROW_GROUP, LogWriter
 from imubench_pipeline.recordings.timebase import TimeBase

@@ -125,7 +125,7 @@ def pack_compared_channel(view: ChannelView) -> ComparedChannel:
     parameters: dict[str, dict[str, list[list[object]]]] = {}
     for method in (view.recommended, "likelihood_gm"):
         if method in view.parameters:
-            # Value, limits and status of each component, with the digits of `report.html`.
+            # Value, limits and status of each component, with the digits of `report.publish`.
             parameters[method] = {
                 symbol: [[*map(_round, (r.value, r.lower, r.upper)), r.status] for r in rows]
                 for symbol in FOREST

@@ -200,7 +200,6 @@ def _bounded(lines: Iterable[str]) -> list[str]:
     return listed if more <= 1 else [*listed[:_MOST_LINES], f"  and {more} more"]
 
 
-_MAX_LINES = 10
 _MAX_NAMES = 5
 
 
@@ -227,9 +226,9 @@ def count_files(files: Sequence[FileRow]) -> Iterator[str]:
     parts = [f"{counts[name]} {name}" for name in get_args(FileStatus) if counts[name]]
     yield f"{counted(len(files), 'file')} in the drop zone = {' + '.join(parts)}"
     skipped = [row for row in files if row.status == "skipped"]
-    for row in skipped[:_MAX_LINES]:
+    for row in skipped[:_MOST_LINES]:
         yield escape_invisible(f"  skipped: {row.file}: {row.reason}")
-    if (more := len(skipped) - _MAX_LINES) > 0:
+    if (more := len(skipped) - _MOST_LINES) > 0:
         yield f"  and {more} more in tables/files.csv"
 
 

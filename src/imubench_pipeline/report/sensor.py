@@ -13,12 +13,11 @@ from imubench_pipeline.navigation.drift import SIGNIFICANCE_LEVEL
 from imubench_pipeline.report import meaning
 from imubench_pipeline.report.comparison import Comparison
 from imubench_pipeline.report.datasheets import compare_with_datasheet, format_repeatability
-from imubench_pipeline.report.decisions import explain_missing_rank
 from imubench_pipeline.report.palette import make_recording_styles
 from imubench_pipeline.report.payload import FOREST, pack_styles
 from imubench_pipeline.report.practical import format_temperature
 from imubench_pipeline.report.site import Page, Site
-from imubench_pipeline.report.start import summarise_recordings
+from imubench_pipeline.report.start import explain_missing_rank, summarise_recordings
 from imubench_pipeline.report.view import QUANTITY_NAMES, RecordingView
 from imubench_pipeline.settings.sensor import quantity_of
 from imubench_pipeline.words.estimates import symbol_text

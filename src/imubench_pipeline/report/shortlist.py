@@ -45,14 +45,14 @@ SHORTLIST = Entry(
 
 def format_shortlist_row(row: ShortlistRow) -> list[str]:
     """Return sensor, verdict, margins (best, worst, measured) and deciding limit, as texts."""
-    measured = _format_margin(row.measured_margin)
+    measured = number_text(row.measured_margin, 3)
     if row.measured_margin_of == "simulated logs":
         measured += " (simulated)"
     return [
         row.sensor,
         SHORTLIST_WORDS[row.verdict],
-        _format_margin(row.best_margin),
-        _format_margin(row.worst_margin) if row.best_margin is not None else "–",
+        number_text(row.best_margin, 3),
+        number_text(row.worst_margin, 3) if row.best_margin is not None else "–",
         measured,
         row.decides or "; ".join(row.reasons) or "; ".join(map(shortfall_text, row.shortfalls)),
     ]
@@ -64,7 +64,3 @@ def list_assumptions(rows: Sequence[ShortlistRow]) -> Iterator[str]:
         remarks = [*map(shortfall_text, row.shortfalls), *row.reasons, *row.assumed]
         if remarks:
             yield f"{row.sensor}: {'; '.join(remarks)}"
-
-
-def _format_margin(value: float | None) -> str:
-    return "–" if value is None else number_text(value, 3)

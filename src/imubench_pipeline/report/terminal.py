@@ -111,7 +111,15 @@ def render_logs(
     allan = AllanRow.rows_of(tables["allan"])
     for row in RecordingRow.rows_of(tables["recordings"]):
         findings, parameters = _of(row, every_finding), _of(row, every_parameter)
-        length = _length(row, parameters, _of(row, allan))
+        length = ""
+        if row.duration is not None:
+            rates = [line.cluster_size / line.tau for line in _of(row, allan)]
+            channels = len({line.channel for line in parameters})
+            length = f": {numbers.duration_text(row.duration)}"
+            length += f" at {numbers.rates_text(row.rate, rates)}"
+            length += f", {numbers.counted(channels, 'channel')}"
+            length += f", {text}" if (text := format_temperature(row)) else ""
+            length += ", simulated" * row.simulated
         yield Text(run_summary.fold_text(row.recording) + length, style="bold")
         if row.status != "ok":
             yield Text(
@@ -142,20 +150,6 @@ def _of(recording: RecordingRow, rows: Iterable[R]) -> list[R]:
     """Return the rows of a recording."""
     key = (recording.sensor, recording.recording)
     return [row for row in rows if (row.sensor, row.recording) == key]
-
-
-def _length(
-    row: RecordingRow, parameters: Sequence[ParameterRow], allan: Sequence[AllanRow]
-) -> str:
-    """Return length, rate and channels of a log."""
-    if row.duration is None:
-        return ""
-    channels = len({line.channel for line in parameters})
-    rates = [line.cluster_size / line.tau for line in allan]
-    words = [f"{numbers.duration_text(row.duration)} at {numbers.rates_text(row.rate, rates)}"]
-    words += [numbers.counted(channels, "channel")]
-    words += [text] if (text := format_temperature(row)) else []
-    return ": " + ", ".join(words) + ", simulated" * row.simulated
 
 
 def _of_log(row: FindingRow) -> str:

@@ -286,9 +286,25 @@ def _make_keys(tables: Mapping[str, pa.Table]) -> dict[Name, str]:
         table = tables[name]
         if not table.num_rows:
             continue
-        named = table.select(["sensor", "recording"]).append_column(
-            "rows", pa.array(_hash_rows(table))
-        )
+        rows = np.zeros(table.num_rows, dtype=np.uint64)
+        for column in table.columns:
+            rows *= _HASH_FACTOR
+            if pa.types.is_dictionary(column.type):
+                column = column.cast(pa.string())
+            elif pa.types.is_list(column.type):
+                column = pa.chunked_array(
+                    [[str(value) for value in column.to_pylist()]], pa.string()
+                )
+            if pa.types.is_string(column.type):
+                encoded = column.combine_chunks().dictionary_encode()
+                texts = np.array([*encoded.dictionary.to_pylist(), None], dtype=object)
+                rows += hash_array(texts, categorize=False)[
+                    encoded.indices.fill_null(-1).to_numpy()
+                ]
+            else:
+                # Integers with nulls would become floats, depending on other recordings.
+                rows += hash_array(np.asarray(column.cast(pa.float64()).to_numpy()))
+        named = table.select(["sensor", "recording"]).append_column("rows", pa.array(rows))
         for (sensor, recording), part in _divide(named, "sensor", "recording").items():
             digest = digests.setdefault((sensor, recording), hashlib.sha256())
             digest.update(f"{name} {part.num_rows}".encode() + part["rows"].to_numpy().tobytes())
@@ -297,25 +313,6 @@ def _make_keys(tables: Mapping[str, pa.Table]) -> dict[Name, str]:
 
 _HASH_FACTOR = np.uint64(0x9E3779B97F4A7C15)
 """Odd multiplier without a pattern, so that the digest depends on the order of the columns."""
-
-
-def _hash_rows(table: pa.Table) -> NDArray[np.uint64]:
-    """Return a digest of each row of a table."""
-    rows = np.zeros(table.num_rows, dtype=np.uint64)
-    for column in table.columns:
-        rows *= _HASH_FACTOR
-        if pa.types.is_dictionary(column.type):
-            column = column.cast(pa.string())
-        elif pa.types.is_list(column.type):
-            column = pa.chunked_array([[str(value) for value in column.to_pylist()]], pa.string())
-        if pa.types.is_string(column.type):
-            encoded = column.combine_chunks().dictionary_encode()
-            texts = np.array([*encoded.dictionary.to_pylist(), None], dtype=object)
-            rows += hash_array(texts, categorize=False)[encoded.indices.fill_null(-1).to_numpy()]
-        else:
-            # Integers with nulls would become floats, depending on other recordings.
-            rows += hash_array(np.asarray(column.cast(pa.float64()).to_numpy()))
-    return rows
 
 
 def _read_floats(part: pa.Table, *columns: str) -> dict[str, NDArray[np.float64]]:

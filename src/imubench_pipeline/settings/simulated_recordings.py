@@ -230,17 +230,14 @@ class Board(Surroundings):
         around = {key: getattr(self, key) for key in Surroundings.model_fields}
         for sensor in self.sensors:
             own = {key: getattr(sensor, key) for key in OfASensor.model_fields}
-            own["channels"] = {
-                key: self._explained(channel) for key, channel in sensor.channels.items()
-            }
+            own["channels"] = {}
+            for key, channel in sensor.channels.items():
+                figures = tuple(
+                    figure.model_copy(update={"why": figure.why or self.why.get(figure.figure)})
+                    for figure in channel.published
+                )
+                own["channels"][key] = channel.model_copy(update={"published": figures})
             yield SimulatedRecording(**own, **around, recording=f"sim_{name}", seed=self.seed)
-
-    def _explained(self, channel: SimulatedChannel) -> SimulatedChannel:
-        figures = tuple(
-            figure.model_copy(update={"why": figure.why or self.why.get(figure.figure)})
-            for figure in channel.published
-        )
-        return channel.model_copy(update={"published": figures})
 
 
 @dataclass(frozen=True)
@@ -262,12 +259,19 @@ def read_simulated(path: Path | None, sensors: Mapping[str, Sensor | ConfigError
         recordings.append(_found_from(entry, path, f"recordings.{number}."))
     boards: dict[str, Board] = {}
     for file in declared.boards:
-        if not (path.parent / file).is_file():
+        place = path.parent / file
+        if not place.is_file():
             raise ConfigError(
-                f"{path}: boards: {path.parent / file}: no such file; expected the file of a "
-                "board, named from the folder of the file that names it"
+                f"{path}: boards: {place}: no such file; expected the file of a board, named from "
+                "the folder of the file that names it"
             )
-        board = _board(path.parent / file, sensors)
+        board = read_settings(Board, place)
+        for number, sensor in enumerate(board.sensors):
+            _check(sensor, sensors, f"{place}: sensors.{number}")
+        names = [sensor.sensor for sensor in board.sensors]
+        if twice := next((name for name in names if names.count(name) > 1), None):
+            raise ConfigError(f"{place}: sensors: {twice} stands twice; expected each once")
+        board = _found_from(board, place)
         if file.stem in boards:
             raise ConfigError(f"{path}: boards: two are named {file.stem}; expected other names")
         if not re.match(_NAME_PATTERN, f"sim_{file.stem}"):
@@ -280,16 +284,6 @@ def read_simulated(path: Path | None, sensors: Mapping[str, Sensor | ConfigError
     if twice := next((name for name in names if names.count(name) > 1), None):
         raise ConfigError(f"{path}: {twice} is simulated twice; expected each once")
     return ToSimulate(recordings, boards)
-
-
-def _board(path: Path, sensors: Mapping[str, Sensor | ConfigError]) -> Board:
-    board = read_settings(Board, path)
-    for number, entry in enumerate(board.sensors):
-        _check(entry, sensors, f"{path}: sensors.{number}")
-    names = [entry.sensor for entry in board.sensors]
-    if twice := next((name for name in names if names.count(name) > 1), None):
-        raise ConfigError(f"{path}: sensors: {twice} stands twice; expected each once")
-    return _found_from(board, path)
 
 
 def _check(entry: OfASensor, sensors: Mapping[str, Sensor | ConfigError], key: str) -> None:

@@ -164,7 +164,18 @@ def _describe_fault(file: str, fault: Any, model: type[BaseModel]) -> str:
         re.sub(r"^(Value error|Assertion failed), ", "", fault["msg"]), str, _MAX_ERROR_LENGTH
     )
     if fault["type"] == "extra_forbidden":
-        known_keys = _list_known_keys(model, fault["loc"][:-1])
+        # List the keys that the schema of the model allows there.
+        schema = model.model_json_schema()
+        node: dict[str, Any] = schema
+        for part in fault["loc"][:-1]:
+            node = _resolve(schema, node)
+            if isinstance(part, int) and "properties" in node:
+                continue  # an element of a list that may also be given without the list
+            nested = node.get("properties", {}).get(part)
+            node = nested or node.get("items") or node.get("additionalProperties") or {}
+        node = _resolve(schema, node)
+        names = node.get("properties") or node.get("propertyNames", {}).get("enum") or {}
+        known_keys = sorted(names)
         close = difflib.get_close_matches(cut(fault["loc"][-1], str), known_keys, n=1)
         hint = f"did you mean {close[0]!r}? " if close else ""
         return f"{file}: {key}: unknown key; {hint}expected one of {', '.join(known_keys)}"
@@ -173,21 +184,6 @@ def _describe_fault(file: str, fault: Any, model: type[BaseModel]) -> str:
     if fault["type"] == "value_error" and isinstance(value, Mapping):
         return f"{file}: {key}: {message}"
     return f"{file}: {key}: found {cut(value)}; {message[0].lower()}{message[1:]}"
-
-
-def _list_known_keys(model: type[BaseModel], path: tuple[Any, ...]) -> list[str]:
-    """Return the keys that the schema of a model allows at a path."""
-    schema = model.model_json_schema()
-    node: dict[str, Any] = schema
-    for part in path:
-        node = _resolve(schema, node)
-        if isinstance(part, int) and "properties" in node:
-            continue  # an element of a list that may also be given without the list
-        nested = node.get("properties", {}).get(part)
-        node = nested or node.get("items") or node.get("additionalProperties") or {}
-    node = _resolve(schema, node)
-    names = node.get("properties") or node.get("propertyNames", {}).get("enum") or {}
-    return sorted(names)
 
 
 def _resolve(schema: dict[str, Any], node: dict[str, Any]) -> dict[str, Any]:

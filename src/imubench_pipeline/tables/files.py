@@ -281,5 +281,4 @@ def read_json(path: Path) -> Any:
 
 def write_json(data: object, path: Path) -> None:
     """Write JSON, atomically."""
-    with replace_file(path) as temporary:
-        temporary.write_text(json.dumps(data, indent=1, allow_nan=False) + "\n", encoding="utf-8")
+    write_content(json.dumps(data, indent=1, allow_nan=False) + "\n", path)

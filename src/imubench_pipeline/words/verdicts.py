@@ -19,7 +19,6 @@ from imubench_pipeline.model.verdicts import (
     Property,
     Share,
     Shortfall,
-    UnitFactor,
 )
 from imubench_pipeline.settings.printed import SENSORS
 from imubench_pipeline.settings.requirements import Requirement
@@ -169,7 +168,10 @@ def condition_text(condition: Condition) -> str:
         return f"it has a {name}" if owned else f"its {name} meets the requirement"
     _, *units = _NOUNS[condition.figure]
     unit = units[condition.subject == "accel"]
-    largest = _round_down(convert_from_si(condition.largest or 0.0, unit, _DIMENSIONS[unit]))
+    largest = convert_from_si(condition.largest or 0.0, unit, _DIMENSIONS[unit])
+    if largest:  # rounded down to three digits, to stay within the limit
+        step = Decimal(1).scaleb(Decimal(largest).adjusted() - 2)
+        largest = float(Decimal(largest).quantize(step, rounding=ROUND_DOWN))
     return f"its {subject_text(condition)} is below {largest:g} {unit} (1σ)"
 
 
@@ -183,14 +185,6 @@ def subject_text(condition: Condition) -> str:
 
 def _name_property(of: Property, subject: str) -> str:
     return _PROPERTIES[of][0].format(subject=SENSORS.get(subject, subject.replace("_", " ")))
-
-
-def _round_down(value: float) -> float:
-    """Return a number of at least 0, rounded down to three digits to stay within the limit."""
-    if not value:
-        return 0.0
-    step = Decimal(1).scaleb(Decimal(value).adjusted() - 2)
-    return float(Decimal(value).quantize(step, rounding=ROUND_DOWN))
 
 
 def shortfall_text(shortfall: Shortfall) -> str:
@@ -291,7 +285,17 @@ def corrected_text(row: RankingRow) -> str:
         outcome = _describe_outcome(row.corrected_verdict, row.corrected_margin)
         still = "still " * (row.logged_verdict == row.corrected_verdict)
         why = f" ({'; '.join(row.corrected_reasons)})" * bool(row.corrected_reasons)
-        parts.append(f"it {still}{outcome} if {_describe_units(row.corrected_units)}{why}")
+        named = []
+        for each in row.corrected_units:
+            name, factor = SENSORS[each.quantity], each.factor
+            for size, units in _UNIT_MISTAKES[each.quantity]:
+                if math.isclose(factor, size, rel_tol=1e-6):
+                    named.append(f"the {name} data are in {units}")
+                    break
+            else:
+                times, way = (1.0 / factor, "large") if factor < 1.0 else (factor, "small")
+                named.append(f"the {name} data are {number_text(times, 3)} times too {way}")
+        parts.append(f"it {still}{outcome} if {', and '.join(named)}{why}")
     return "; ".join(parts)
 
 
@@ -299,20 +303,6 @@ def _describe_outcome(verdict: Verdict, margin: float | None) -> str:
     if verdict == "not_enough_data":
         return "cannot be judged"
     return f"{VERDICT_WORDS[verdict]} (margin {number_text(margin, 3)})"
-
-
-def _describe_units(factors: Iterable[UnitFactor]) -> str:
-    named = []
-    for each in factors:
-        name, factor = SENSORS[each.quantity], each.factor
-        for size, units in _UNIT_MISTAKES[each.quantity]:
-            if math.isclose(factor, size, rel_tol=1e-6):
-                named.append(f"the {name} data are in {units}")
-                break
-        else:
-            times, way = (1.0 / factor, "large") if factor < 1.0 else (factor, "small")
-            named.append(f"the {name} data are {number_text(times, 3)} times too {way}")
-    return ", and ".join(named)
 
 
 def answer_text(
@@ -379,7 +369,16 @@ def list_others(rows: Iterable[RankingRow], names: Mapping[str, str]) -> list[st
 
 def next_step_text(step: NextStepRow) -> str:
     """Return a next step: ``Record 3 more units: this could settle 1 verdict``."""
-    return f"{_describe_action(step)}: {_describe_effect(step)}"
+    parts = []
+    looked_up = step.action == "find_figures"
+    changed = step.verdicts_strengthened if looked_up else step.verdicts_turned
+    if looked_up or changed:
+        parts.append(_EFFECTS[step.action].format(verdicts=counted(changed, "verdict")))
+    if step.verdicts_strengthened and not looked_up:
+        parts.append(f"give {counted(step.verdicts_strengthened, 'verdict')} stronger evidence")
+        if len(parts) == 1:
+            parts[0] = f"this would {parts[0]}"
+    return f"{_describe_action(step)}: {' and '.join(parts)}"
 
 
 def _describe_action(step: NextStepRow) -> str:
@@ -413,23 +412,6 @@ _EFFECTS: Mapping[Action, str] = {
     "add_specimens": "this could settle {verdicts}",
     "find_figures": "this would remove a condition from {verdicts}",
 }
-
-
-def _describe_effect(step: NextStepRow) -> str:
-    parts = []
-    if step.action == "find_figures":
-        parts.append(
-            _EFFECTS[step.action].format(verdicts=counted(step.verdicts_strengthened, "verdict"))
-        )
-    elif step.verdicts_turned:
-        parts.append(
-            _EFFECTS[step.action].format(verdicts=counted(step.verdicts_turned, "verdict"))
-        )
-    if step.verdicts_strengthened and step.action != "find_figures":
-        parts.append(f"give {counted(step.verdicts_strengthened, 'verdict')} stronger evidence")
-        if len(parts) == 1:
-            parts[0] = f"this would {parts[0]}"
-    return " and ".join(parts)
 
 
 def _round_up(seconds: float) -> str:

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from imubench_pipeline.extensions.fusion.tables import FusionRow, GradeRow, PublishedFigureRow
-from imubench_pipeline.report import thermal
+from imubench_pipeline.report import recording
 from imubench_pipeline.report.payload import pack_page
 from imubench_pipeline.report.site import Entry, Site
 from imubench_pipeline.report.view import QUANTITY_NAMES, ChannelView, RecordingView
@@ -207,7 +207,7 @@ def _make_boards_context(site: Site) -> Mapping[str, object]:
                     {
                         "view": channel,
                         "figures": board["sensors"][view.sensor].get(channel.channel),
-                        "answer": thermal.describe_thermal(channel, site.system),
+                        "answer": recording.describe_thermal(channel, site.system),
                         "lines": [make_published_line(row) for row in own],
                     }
                 )

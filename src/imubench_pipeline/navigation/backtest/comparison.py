@@ -51,7 +51,7 @@ from imubench_pipeline.settings.sensor import quantity_of
 from imubench_pipeline.tables.findings import find
 from imubench_pipeline.typing import Array
 from imubench_pipeline.units import SI_UNITS, parse_quantity
-from imubench_pipeline.words.findings.backtest import BacktestContradicts
+from imubench_pipeline.words.findings.spectrum import BacktestContradicts
 from imubench_pipeline.words.reasons import pools as texts
 
 _MIN_SCATTER_SHARE = 0.3

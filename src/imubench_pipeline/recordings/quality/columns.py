@@ -1,7 +1,7 @@
 """Check each column of a recording; return findings with a severity and a time.
 
-`estimate_excess_repeats` counts samples that equal their predecessor more often than a coarse
-register explains.
+Tests of stationarity use block means and standard deviations. Random walk and flicker noise are no
+findings: a step must be far larger than the others, and a first drift far above any later one.
 """
 
 from __future__ import annotations
@@ -15,8 +15,9 @@ from numba import njit
 from numpy.typing import NDArray
 
 from imubench_pipeline.model.states import Severity
-from imubench_pipeline.recordings.quality import copies, joined, levels, stationarity, summary
+from imubench_pipeline.recordings.quality import copies, joined, levels, summary
 from imubench_pipeline.recordings.quality.copies import find_shared_noise
+from imubench_pipeline.recordings.quality.summary import BlockStatistics, compute_finite_median
 from imubench_pipeline.recordings.recording import BESIDE
 from imubench_pipeline.settings.quality import QualitySettings
 from imubench_pipeline.settings.sensor import TEMPERATURE
@@ -150,17 +151,6 @@ def _count_phases(repeats: NDArray[np.int64], counts: NDArray[np.int64]) -> None
         counts[every, 0], counts[every, 1] = most, second
 
 
-def find_held_samples(channel: str, column: summary.ColumnSummary) -> Iterator[Finding]:
-    """Yield a finding if every n-th sample of a channel repeats its predecessor."""
-    if column.repeats < column.present / (2 * _MAX_PERIOD):
-        return
-    regular = find_regular_repeats(column.excerpts())
-    if regular is None:
-        return
-    data = samples.HeldSamples(regular.every, regular.share)
-    yield find(data, "warning", regular.every, channel)
-
-
 def check_columns(
     columns: Mapping[str, summary.ColumnSummary],
     rate: float,
@@ -194,11 +184,15 @@ def check_columns(
             if not _has_only_rounding(steps[channel], settings):
                 findings += joined.find_joined_logs(channel, column, rate)
                 findings += joined.find_interleaved_samples(channel, column)
-        regularly = list(find_held_samples(channel, column))
-        findings += regularly
+        held = None
+        if column.repeats >= column.present / (2 * _MAX_PERIOD):
+            held = find_regular_repeats(column.excerpts())
+        if held is not None:
+            periodic = samples.HeldSamples(held.every, held.share)
+            findings.append(find(periodic, "warning", held.every, channel))
         rounded = _is_rounding_dominant(steps[channel]) or _has_few_levels(steps[channel], settings)
         beyond, chance = estimate_excess_repeats(column)
-        if beyond > settings.repeated and not (regularly or rounded):
+        if beyond > settings.repeated and not (held or rounded):
             share = column.repeats / max(column.present - 1, 1)
             repeated = samples.RepeatedSamples(share, chance)
             findings.append(find(repeated, "warning", share, channel))
@@ -283,11 +277,11 @@ def _find_changes(
 ) -> Iterator[Finding]:
     """Yield findings about motion, steps of the mean, warm-up and changes of the noise."""
     blocks = column.blocks()
-    moves = stationarity.find_steps(blocks, settings.step)
+    moves = find_steps(blocks, settings.step)
     # On the edge between two values of a coarse register the spread is half a step, and the mean
     # of a block moves by up to one step.
     step_size = steps.step if steps is not None and _is_rounding_dominant(steps) else 0.0
-    for first, last in stationarity.find_motion(blocks, settings.motion, 0.75 * step_size):
+    for first, last in find_motion(blocks, settings.motion, 0.75 * step_size):
         if any(first - step.window <= step.sample <= last + step.window for step in moves):
             continue  # the spread is large because of the step
         begin, end, length = first / rate, last / rate, (last - first) / rate
@@ -297,13 +291,13 @@ def _find_changes(
             continue
         at = step.sample / rate
         yield find(samples.Step(step.size, at, step.sigmas), "warning", step.size, channel, at, at)
-    warm = stationarity.find_warm_up(blocks, settings.warm_up)
+    warm = find_warm_up(blocks, settings.warm_up)
     if warm is not None and abs(warm.drift) >= 1.5 * step_size:
         # Behind a coarse register the usual drift may be 0.
         usual = abs(warm.drift) / warm.usual if warm.usual > 0.0 else None
         data = samples.WarmUp(warm.drift, warm.end / rate, usual)
         yield find(data, "warning", warm.drift, channel, 0.0, warm.end / rate)
-    change = stationarity.find_variance_change(blocks)
+    change = find_variance_change(blocks)
     if change is None or _is_rounding_dominant(steps):
         return
     ratio, begin, end = change[0], change[1] / rate, change[2] / rate
@@ -324,3 +318,114 @@ def _has_few_levels(steps: levels.Quantisation | None, settings: QualitySettings
 def _has_only_rounding(steps: levels.Quantisation | None, settings: QualitySettings) -> bool:
     """Return whether a channel shows rounding noise only; then the finding ``coarse`` suffices."""
     return _is_rounding_dominant(steps) and _has_few_levels(steps, settings)
+
+
+_NUMBER_OF_PARTS = 20
+_MIN_BLOCKS_PER_PART = 8  # least number of blocks in a part; a shorter recording is not tested
+_MAX_MOTION_CREST_FACTOR = 6.0  # of extremes over deviation; a knock exceeds it
+_SD_OVER_MAD = 1.4826  # standard deviation over the median absolute deviation, of normal noise
+
+
+@dataclass(frozen=True)
+class Step:
+    """A sudden change of the mean."""
+
+    sample: int  # record of the step, to half a window
+    size: float  # SI
+    sigmas: float  # size over the robust standard deviation of all steps
+    window: int  # records of a window
+
+
+@dataclass(frozen=True)
+class WarmUp:
+    """A beginning that drifts."""
+
+    end: int  # record from which the drift is as small as in the rest
+    drift: float  # change of the mean during the warm-up, SI
+    usual: float  # median change over a part of the rest, SI
+
+
+def find_steps(blocks: BlockStatistics, sigmas: float) -> list[Step]:
+    """Find sudden changes of the mean by ``sigmas`` robust standard deviations of all steps."""
+    size = max(1, len(blocks.mean) // 400)
+    # Medians are robust to knocks. The means of blocks with few samples scatter too much.
+    mean = np.where(2 * blocks.count >= blocks.size, blocks.mean, np.nan)
+    grouped = mean[: len(mean) // size * size].reshape(-1, size)
+    means = np.array([compute_finite_median(group) for group in grouped])
+    if len(means) < 16:
+        return []
+    # Difference over two windows, so that a step inside a window counts in full.
+    away = means[2:] - means[:-2]
+    scale = _SD_OVER_MAD * compute_finite_median(np.abs(away - compute_finite_median(away)))
+    if not scale > 0.0:
+        return []
+    far = np.flatnonzero(np.abs(away) > sigmas * scale)
+    if len(far) == 0:
+        return []
+    moves = []
+    for group in np.split(far, np.flatnonzero(np.diff(far) > 3) + 1):
+        peak = group[np.argmax(np.abs(away[group]))]
+        # A step lasts; a change that reverses at once is a knock.
+        before = compute_finite_median(means[max(0, group[0] - 4) : group[0] + 1])
+        after = compute_finite_median(means[group[-1] + 2 : group[-1] + 7])
+        change = after - before
+        if abs(change) > 0.5 * abs(float(away[peak])):
+            sample = (int(peak) + 1) * size * blocks.size + size * blocks.size // 2
+            moves.append(Step(sample, change, abs(float(away[peak])) / scale, size * blocks.size))
+    return moves
+
+
+def find_warm_up(blocks: BlockStatistics, times: float) -> WarmUp | None:
+    """Find a beginning that drifts more than `times` the median drift of the later parts."""
+    size = len(blocks.mean) // _NUMBER_OF_PARTS
+    if size < _MIN_BLOCKS_PER_PART:
+        return None
+    drifts = np.empty(_NUMBER_OF_PARTS)
+    for k in range(_NUMBER_OF_PARTS):
+        part = blocks.mean[k * size : (k + 1) * size]
+        third = size // 3
+        drifts[k] = compute_finite_median(part[-third:]) - compute_finite_median(part[:third])
+    rest = np.abs(drifts[_NUMBER_OF_PARTS // 2 :])
+    usual, first = compute_finite_median(rest), float(drifts[0])
+    most = float(np.max(rest[np.isfinite(rest)], initial=0.0))
+    # Later parts of a coarse register may not drift at all; then there is no reference.
+    if not (usual > 0.0 and abs(first) > times * usual and abs(first) > 2.0 * most):
+        return None
+    calm = np.flatnonzero(np.abs(drifts) < 3.0 * usual)
+    end = int(calm[0]) if len(calm) else _NUMBER_OF_PARTS
+    drift = float(np.nansum(drifts[:end]))
+    return WarmUp(end * size * blocks.size, drift, usual)
+
+
+def find_variance_change(blocks: BlockStatistics) -> tuple[float, int, int] | None:
+    """Return the ratio of largest to smallest noise of a part, and the noisiest records."""
+    size = len(blocks.spread) // _NUMBER_OF_PARTS
+    if size < _MIN_BLOCKS_PER_PART:
+        return None
+    parts = blocks.spread[: size * _NUMBER_OF_PARTS].reshape(_NUMBER_OF_PARTS, size)
+    spreads = np.array([compute_finite_median(part) for part in parts])
+    calm = float(np.min(spreads[spreads > 0.0], initial=np.inf))
+    noisy = int(np.argmax(np.nan_to_num(spreads)))
+    if not np.isfinite(calm):
+        return None
+    records = size * blocks.size
+    return float(spreads[noisy]) / calm, noisy * records, (noisy + 1) * records
+
+
+def find_motion(blocks: BlockStatistics, times: float, least: float = 0.0) -> list[tuple[int, int]]:
+    """Return the parts (first, one past last record) with a large deviation that no knock explains.
+
+    ``times``, ``least``: lower limits of the standard deviation, over its median and in SI.
+    """
+    usual = compute_finite_median(blocks.spread)
+    if not usual > 0.0:
+        return []
+    reach = np.maximum(blocks.high - blocks.mean, blocks.mean - blocks.low)
+    shaken = np.flatnonzero(
+        (blocks.spread > max(times * usual, least))
+        & (reach < _MAX_MOTION_CREST_FACTOR * blocks.spread)
+    )
+    if len(shaken) == 0:
+        return []
+    groups = np.split(shaken, np.flatnonzero(np.diff(shaken) > 2) + 1)
+    return [(int(group[0]) * blocks.size, (int(group[-1]) + 1) * blocks.size) for group in groups]

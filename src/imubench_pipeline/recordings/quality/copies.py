@@ -22,7 +22,7 @@ from imubench_pipeline.recordings.quality.repeats import WINDOW, Stretch
 from imubench_pipeline.recordings.quality.summary import ColumnSummary, Excerpt, pair_common_samples
 from imubench_pipeline.tables.findings import Finding, find
 from imubench_pipeline.typing import Array
-from imubench_pipeline.words.findings import copies as words
+from imubench_pipeline.words.findings import samples as words
 from imubench_pipeline.words.findings.base import FindingData
 
 _MIN_NONZERO_INCREMENTS = 64  # least number of increments of a piece that are not 0
@@ -53,7 +53,18 @@ def find_copied_channels(columns: Mapping[str, ColumnSummary]) -> Iterator[Findi
     named: set[str] = set()
     for place, first in enumerate(names):
         for other in names[place + 1 :]:
-            factor = _find_copy_factor(pieces[first], pieces[other])
+            slopes, alike = [], []
+            for x, y, dx, dy in _pair_increments(pieces[first], pieces[other]):
+                xx, yy, xy = float(dx @ dx), float(dy @ dy), float(dx @ dy)
+                correlation = abs(xy) / (np.sqrt(xx) * np.sqrt(yy))
+                slopes.append(xy / xx)
+                copied = correlation > _MIN_COPY_CORRELATION
+                if not copied and correlation > _MIN_ROUNDED_COPY_CORRELATION:
+                    # The columns differ by no more than the steps of both.
+                    steps = _find_step(y) + abs(slopes[-1]) * _find_step(x)
+                    copied = np.ptp(y - slopes[-1] * x) <= 1.02 * steps
+                alike.append(bool(copied))
+            factor = None if not alike or 2 * sum(alike) <= len(alike) else float(np.median(slopes))
             if factor is None:
                 continue
             for channel, of, times in ((first, other, 1.0 / factor), (other, first, factor)):
@@ -61,24 +72,6 @@ def find_copied_channels(columns: Mapping[str, ColumnSummary]) -> Iterator[Findi
                     continue
                 named.add(channel)
                 yield find(words.ChannelTwice(of, times), "warning", times, channel)
-
-
-def _find_copy_factor(first: list[Excerpt], other: list[Excerpt]) -> float | None:
-    """Return the factor of one column to the other by most pieces; None if it is no copy."""
-    slopes, alike = [], []
-    for x, y, dx, dy in _pair_increments(first, other):
-        xx, yy, xy = float(dx @ dx), float(dy @ dy), float(dx @ dy)
-        correlation = abs(xy) / (np.sqrt(xx) * np.sqrt(yy))
-        slopes.append(xy / xx)
-        copied = correlation > _MIN_COPY_CORRELATION
-        if not copied and correlation > _MIN_ROUNDED_COPY_CORRELATION:
-            # The columns differ by no more than the steps of both.
-            steps = _find_step(y) + abs(slopes[-1]) * _find_step(x)
-            copied = np.ptp(y - slopes[-1] * x) <= 1.02 * steps
-        alike.append(bool(copied))
-    if not alike or 2 * sum(alike) <= len(alike):
-        return None
-    return float(np.median(slopes))
 
 
 def _pair_increments(

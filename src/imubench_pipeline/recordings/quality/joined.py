@@ -12,7 +12,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from imubench_pipeline.recordings.quality.register import find_hidden_step
+from imubench_pipeline.recordings.quality.levels import find_hidden_step
 from imubench_pipeline.recordings.quality.summary import PIECE_SIZE, ColumnSummary, Excerpt
 from imubench_pipeline.tables.findings import Finding, find
 from imubench_pipeline.typing import Array

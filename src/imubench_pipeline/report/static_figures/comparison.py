@@ -204,7 +204,21 @@ def draw_forest_figure(
     """Draw parameters of one channel across sensors, with 95 % limits, in a panel each."""
     symbols = [symbol] if isinstance(symbol, str) else list(symbol)
     looks = assign_sensor_styles(list(sensors))
-    blocks = _make_blocks(views, sensors)
+    # The height of the row of a sensor grows with its recordings, up to a page in all.
+    by_sensor = {sensor: [view for view in views if view.sensor == sensor] for sensor in sensors}
+    by_sensor = {sensor: own for sensor, own in by_sensor.items() if own}
+    slot = _SLOT_HEIGHT
+    while True:
+        heights = [max(_MIN_ROW_HEIGHT, slot * (len(each) + 0.5)) for each in by_sensor.values()]
+        if sum(heights) <= max(_MAX_HEIGHT, _MIN_ROW_HEIGHT * len(heights)):
+            break
+        slot *= 0.95
+    bottoms = np.cumsum(heights)
+    rows = zip(by_sensor.items(), heights, bottoms, strict=True)
+    blocks = [
+        _Block(sensor, own, float(bottom - height), float(bottom))
+        for (sensor, own), height, bottom in rows
+    ]
     total = blocks[-1].bottom
     name = style.name_channel(views[0].channel)
     figure = style.make_figure(
@@ -235,24 +249,6 @@ def draw_forest_figure(
     first.set_title(name, loc="left")
     style.draw_legend_below(figure, _make_legend(kinds))
     return style.fix_layout(figure)
-
-
-def _make_blocks(views: Sequence[ChannelView], sensors: Sequence[str]) -> list[_Block]:
-    """Return the rows of the sensors; their height grows with the recordings, up to a page."""
-    by_sensor = {sensor: [view for view in views if view.sensor == sensor] for sensor in sensors}
-    by_sensor = {sensor: own for sensor, own in by_sensor.items() if own}
-    slot = _SLOT_HEIGHT
-    while True:
-        heights = [max(_MIN_ROW_HEIGHT, slot * (len(each) + 0.5)) for each in by_sensor.values()]
-        if sum(heights) <= max(_MAX_HEIGHT, _MIN_ROW_HEIGHT * len(heights)):
-            break
-        slot *= 0.95
-    bottoms = np.cumsum(heights)
-    rows = zip(by_sensor.items(), heights, bottoms, strict=True)
-    return [
-        _Block(sensor, own, float(bottom - height), float(bottom))
-        for (sensor, own), height, bottom in rows
-    ]
 
 
 def _draw_panel(

@@ -1,9 +1,7 @@
 """Findings about recordings: their data, affected parameters and sentences."""
 
 from imubench_pipeline.words.findings import (
-    backtest,
     changes,
-    copies,
     files,
     plausibility,
     samples,
@@ -15,9 +13,7 @@ from imubench_pipeline.words.findings.base import FINDINGS, FindingData
 __all__ = [
     "FINDINGS",
     "FindingData",
-    "backtest",
     "changes",
-    "copies",
     "files",
     "plausibility",
     "samples",

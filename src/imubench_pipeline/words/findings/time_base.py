@@ -27,12 +27,6 @@ def _at(seconds: float) -> str:
     return f"{number_text(seconds, 5)} s"
 
 
-def _change_of_n(correct: float, used: float) -> str:
-    """Return the relative error of N if another rate is correct: N ∝ rate^(-1/2)."""
-    change = math.sqrt(used / correct) - 1.0
-    return f"{percent_text(abs(change), 2)} {'higher' if change > 0.0 else 'lower'}"
-
-
 class RateChanges(FindingData, affects=WHITE, doubt="the sampling rate changes"):
     """A part of a log has every n-th sample only."""
 
@@ -61,13 +55,15 @@ class CoarseStamps(FindingData, affects=_TIMED, doubt="the sampling rate is ambi
     other_rate: float  # rate if the stamps are not rounded, Hz
 
     def text(self, channel: str) -> str:
+        change = math.sqrt(self.rate / self.other_rate) - 1.0  # N is as the rate^(-1/2)
+        size = f"{percent_text(abs(change), 2)} {'higher' if change > 0.0 else 'lower'}"
         what, cause = "repeat", "records are written twice"
         if self.other_rate > self.rate:
             what, cause = "have double steps", "samples are lost"
         return (
             f"The time stamps {what} at regular distances: taken as rounded, at "
             f"{_rate_text(self.rate)}. If {cause} so regularly instead, the rate is "
-            f"{_rate_text(self.other_rate)}, and N is {_change_of_n(self.other_rate, self.rate)}. "
+            f"{_rate_text(self.other_rate)}, and N is {size}. "
             "State 'rate' in the sensor file"
         )
 
