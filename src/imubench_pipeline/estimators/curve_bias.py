@@ -161,7 +161,7 @@ def add_curve_figures(
     Values follow from the model of the estimate, intervals from the draws of all models that the
     log does not rule out, weighted by BIC. (By AIC, two processes of which the slower replaces the
     random walk weigh as much as the walk: limits would be twice as wide as needed.) ``alike`` are
-    the models that the log does not rule out, the chosen one first; ``wider`` those with one bias
+    the models that the log does not rule out, the chosen one first; ``wider`` models with one bias
     instability in addition, which limit an absent one; ``tau`` is from `make_averaging_times`.
     """
 
