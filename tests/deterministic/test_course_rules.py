@@ -11,8 +11,7 @@ from imubench_pipeline.estimators.deterministic.courses import (
     _find_limits,
 )
 from imubench_pipeline.estimators.deterministic.means import Means, Part
-from imubench_pipeline.estimators.deterministic.ordinates import Ordinates
-from imubench_pipeline.estimators.deterministic.regressors import Regressor
+from imubench_pipeline.estimators.deterministic.ordinates import Ordinates, Regressor
 from imubench_pipeline.estimators.deterministic.search import SearchResult
 from tests.deterministic.logs import RATE
 

@@ -5,8 +5,7 @@ import pytest
 import scipy.fft
 
 from imubench_pipeline.estimators.deterministic.means import Means, Part
-from imubench_pipeline.estimators.deterministic.ordinates import Ordinates
-from imubench_pipeline.estimators.deterministic.regressors import Regressor
+from imubench_pipeline.estimators.deterministic.ordinates import Ordinates, Regressor
 
 RATE, BLOCK = 100.0, 50
 INTERVAL = BLOCK / RATE

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from imubench_pipeline.estimators.deterministic.regressors import Regressor
+from imubench_pipeline.estimators.deterministic.ordinates import Regressor
 
 EVERY = [
     Regressor("step", 0, 20.25),

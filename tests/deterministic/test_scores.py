@@ -5,9 +5,8 @@ import pytest
 from scipy import stats
 
 from imubench_pipeline.estimators.deterministic.means import average_blocks
-from imubench_pipeline.estimators.deterministic.ordinates import Ordinates
-from imubench_pipeline.estimators.deterministic.regressors import Regressor
-from imubench_pipeline.estimators.deterministic.scores import (
+from imubench_pipeline.estimators.deterministic.ordinates import Ordinates, Regressor
+from imubench_pipeline.estimators.deterministic.search import (
     FALSE_ALARM_PROBABILITY,
     Gain,
     find_best_scores,

@@ -6,10 +6,8 @@ import numpy as np
 import pytest
 
 from imubench_pipeline.estimators.deterministic.means import Means, Part, average_blocks
-from imubench_pipeline.estimators.deterministic.ordinates import Ordinates
-from imubench_pipeline.estimators.deterministic.regressors import Regressor
-from imubench_pipeline.estimators.deterministic.scores import Gain
-from imubench_pipeline.estimators.deterministic.search import polish, search_signals
+from imubench_pipeline.estimators.deterministic.ordinates import Ordinates, Regressor
+from imubench_pipeline.estimators.deterministic.search import Gain, polish, search_signals
 from tests.deterministic.logs import RATE, SIGMA, static_log, times
 
 

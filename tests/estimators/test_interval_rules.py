@@ -163,9 +163,7 @@ def test_quantiles_of_a_mixture_are_those_of_all_draws_by_weight() -> None:
     assert compute_mixture_quantiles([(first, 1.0), (second, 0.0)], 0.999)[0] <= 100.0
     few = [(np.array([1.0, 2.0]), 1.0), (np.array([3.0]), 1.0)]
     assert compute_mixture_quantiles(few, 0.2, 0.4, 0.6, 1.0) == (1.0, 2.0, 3.0, 3.0)
-    low, high = compute_mixture_limits(
-        [(first, 1.0), (second, 1.0)], [(np.arange(401.0, 500.0), 1.0)]
-    )
+    low, high = compute_mixture_limits([(first, 1.0), (second, 1.0)], np.arange(401.0, 500.0))
     assert (low, high) == pytest.approx((5.0, 496.5), abs=1.5)
 
 

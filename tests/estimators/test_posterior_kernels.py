@@ -98,7 +98,8 @@ def test_the_mode_is_one_and_curves_as_is_said(whittle: Whittle, terms: Terms) -
 def test_what_is_proposed_has_the_covariance_of_the_fisher_information(whittle: Whittle) -> None:
     terms = Terms("NK", 1)
     target = _Target(whittle, maximum_of(terms))
-    mean, covariance = target.make_component(np.log(target.maximum.times), 1.0)
+    places = np.log(target.maximum.times)
+    mean, covariance = target._approximate_normal(target.log_fitted, places, 1.0, target.problem)
     at_mode = replace(maximum_of(terms), powers=np.exp(2.0 * mean[:3]))
     sensitivity = whittle.sensitivity(at_mode)
     information = sensitivity @ sensitivity.T

@@ -1,7 +1,14 @@
 """Terms of every kind in the registry, made from what each states of its parameters."""
 
-from imubench_pipeline.noise import TERMS, Deterministic, NoiseModel, Term, TermParameter
-from imubench_pipeline.noise.terms import Flicker, Sinusoid
+from imubench_pipeline.noise import (
+    TERMS,
+    Deterministic,
+    Flicker,
+    NoiseModel,
+    Sinusoid,
+    Term,
+    TermParameter,
+)
 
 
 def value(parameter: TermParameter, time: float, size: float = 0.3) -> float:

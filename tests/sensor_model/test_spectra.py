@@ -6,9 +6,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from mpmath import mp, mpf, workdps
 
-from imubench_pipeline.noise import NoiseModel, RandomWalk, Sinusoid, WhiteNoise
+from imubench_pipeline.noise import (
+    Flicker,
+    GaussMarkov,
+    NoiseModel,
+    RandomWalk,
+    Sinusoid,
+    WhiteNoise,
+)
 from imubench_pipeline.noise.low_pass import LowPass
-from imubench_pipeline.noise.terms import Flicker, GaussMarkov
 from imubench_pipeline.simulate.discretisation import (
     compute_filter_transition,
     compute_white_factor,

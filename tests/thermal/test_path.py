@@ -4,13 +4,11 @@ import numpy as np
 import pytest
 
 from imubench_pipeline.estimators.thermal.path import (
+    MAX_BLOCKS,
     TemperaturePath,
     _Spline,
-    estimate_temperature_path,
-)
-from imubench_pipeline.estimators.thermal.register import (
-    MAX_BLOCKS,
     estimate_resolution,
+    estimate_temperature_path,
     gather_readings,
 )
 from tests.conftest import few

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from imubench_pipeline.estimators.thermal.register import (
+from imubench_pipeline.estimators.thermal.path import (
     MAX_BLOCKS,
     estimate_resolution,
     gather_readings,

@@ -36,12 +36,8 @@ def noise_exponent(theta: Array, present: NDArray[np.integer[Any]] | None, n: in
 
     ``theta``, shape (m + 1,): cumulative sums of the samples at the edges of m clusters of n
     samples; ``present``: cumulative counts of samples there (None: no sample is missing). None if
-    there are fewer than 30 clusters.
-
-    References
-    ----------
-    W. Riley and C. Greenhall, "Power law noise identification using the lag 1
-    autocorrelation", EFTF 2004.
+    there are fewer than 30 clusters. (W. Riley and C. Greenhall, "Power law noise identification
+    using the lag 1 autocorrelation", EFTF 2004.)
     """
     theta = theta[: _MAX_CLUSTERS + 1]
     if present is None:
@@ -80,12 +76,9 @@ def equivalent_degrees(exponent: int, n: int, terms: int) -> float:
     """Return the equivalent degrees of freedom of a fully overlapping Allan variance.
 
     edf = M / (1 + 2 sum_k (1 - k/M) r_k^2), where r_k is the autocorrelation at lag k of the second
-    differences of power-law noise, and M = L - 2n + 1 is the number of these ``terms``.
-
-    References
-    ----------
-    C. Greenhall and W. Riley, "Uncertainty of stability variances based on finite
-    differences", PTTI 2003 (with tables instead of the long sums).
+    differences of power-law noise, and M = L - 2n + 1 is the number of these ``terms``. (C.
+    Greenhall and W. Riley, "Uncertainty of stability variances based on finite differences", PTTI
+    2003, with tables instead of the long sums.)
     """
     longest = min(terms - 1, 3 * n)
     if longest < 1:
@@ -187,12 +180,9 @@ def find_lower_quantile(weights: Array, chance: float) -> float:
 
     The relative error of the probability in the saddlepoint approximation is below a tenth, for
     probabilities below a third. The error of the quantile is below 1 % if more than three weights
-    are significant. The weights w_i >= 0, shape (m,), have any common factor.
-
-    References
-    ----------
-    R. Lugannani and S. Rice, "Saddle point approximation for the distribution of the sum of
-    independent random variables", Advances in Applied Probability 12, 1980.
+    are significant. The weights w_i >= 0, shape (m,), have any common factor. (R. Lugannani and S.
+    Rice, "Saddle point approximation for the distribution of the sum of independent random
+    variables", Adv. Appl. Probab. 12, 1980.)
     """
     w = weights / weights.sum()
 

@@ -55,44 +55,24 @@ size, and the actual size."""
 
 @dataclass(frozen=True, repr=False)
 class AllanCurve:
-    """An Allan variance over tau.
+    """An Allan variance over tau; the arrays have the shape (m,)."""
 
-    Attributes
-    ----------
-    tau : ndarray, shape (m,)
-        Cluster length in s: ``cluster_size / rate``, with the actual cluster size.
-    cluster_size : ndarray of int, shape (m,)
-        n, samples in a cluster.
-    variance : ndarray, shape (m,)
-        Allan variance in the squared unit of the samples.
-    edf : ndarray, shape (m,)
-        Equivalent degrees of freedom of each variance.
-    samples : int
-        L, samples in the log; by default twice the largest cluster.
-    exponent : ndarray of int, shape (m,)
-        Noise type: the power of frequency, 2 to -2, in the spectrum of fractional frequency (0:
-        white noise of the samples, -1: flicker, -2: random walk). By default 0.
-    averaged : ndarray, shape (m,)
-        Samples in a cluster, or their harmonic mean if samples are missing. The variance of white
-        noise is proportional to 1 / averaged.
-    edf_upper : ndarray, shape (m,)
-        Degrees of freedom of the upper limit, larger for few clusters. By default ``edf``.
-    edf_source : sequence of str
-        Source of the degrees of freedom: `POWER_LAW` or `FITTED`.
-    share : ndarray, shape (m,)
-        Share of the differences that are not lost to missing samples. By default 1.
-    """
-
-    tau: Array
-    cluster_size: NDArray[np.int64]
-    variance: Array
-    edf: Array
-    samples: int = 0
+    tau: Array  # cluster length, s: ``cluster_size / rate``, with the actual cluster size
+    cluster_size: NDArray[np.int64]  # n, samples in a cluster
+    variance: Array  # Allan variance in the squared unit of the samples
+    edf: Array  # equivalent degrees of freedom of each variance
+    samples: int = 0  # L, samples in the log; by default twice the largest cluster
     exponent: NDArray[np.int64] = field(default_factory=lambda: np.empty(0, dtype=np.int64))
+    """Noise type: the power of frequency, 2 to -2, in the spectrum of fractional frequency (0:
+    white noise of the samples, -1: flicker, -2: random walk). By default 0."""
     averaged: Array = field(default_factory=lambda: np.empty(0))
+    """Samples in a cluster, or their harmonic mean if samples are missing. The variance of white
+    noise is proportional to 1 / averaged."""
     edf_upper: Array = field(default_factory=lambda: np.empty(0))
-    edf_source: Sequence[str] = ()
+    """Degrees of freedom of the upper limit, larger for few clusters. By default ``edf``."""
+    edf_source: Sequence[str] = ()  # of the degrees of freedom: `POWER_LAW` or `FITTED`
     share: Array = field(default_factory=lambda: np.empty(0))
+    """Share of the differences that are not lost to missing samples. By default 1."""
 
     def __post_init__(self) -> None:
         if not self.samples:
@@ -124,18 +104,10 @@ class AllanCurve:
 
     def select(self, points: NDArray[np.bool_]) -> AllanCurve:
         """Return the curve at some of its points."""
-        return replace(
-            self,
-            tau=self.tau[points],
-            cluster_size=self.cluster_size[points],
-            variance=self.variance[points],
-            edf=self.edf[points],
-            exponent=self.exponent[points],
-            averaged=self.averaged[points],
-            edf_upper=self.edf_upper[points],
-            edf_source=[s for s, chosen in zip(self.edf_source, points, strict=True) if chosen],
-            share=self.share[points],
-        )
+        arrays = {name: each for name, each in vars(self).items() if isinstance(each, np.ndarray)}
+        columns: dict[str, Any] = {name: each[points] for name, each in arrays.items()}
+        sources = [s for s, chosen in zip(self.edf_source, points, strict=True) if chosen]
+        return replace(self, **columns, edf_source=sources)
 
     def up_to(self, part: float) -> Array:
         """Return the tau up to a part of the log, s."""

@@ -58,18 +58,9 @@ def read(curve: AllanCurve, *, longest: float = 1 / 9) -> Estimate:
     """Read the parameters from the slopes of an Allan deviation.
 
     N is the value at tau = 1 s of the fitted -1/2 line, K the value at 3 s of the fitted +1/2
-    line at the end of the curve, B the minimum over 0.664 and T_B the tau of the minimum over 1.89.
-
-    Parameters
-    ----------
-    curve : AllanCurve
-    longest : float
-        Longest tau that is read, as a part of the log: beyond, the curve is too uncertain.
-
-    Returns
-    -------
-    Estimate
-        Parameters in SI; ``not_shown`` with the reason where the curve has no such slope.
+    line at the end of the curve, B the minimum over 0.664 and T_B the tau of the minimum over 1.89,
+    in SI; ``not_shown`` with the reason where the curve has no such slope. ``longest`` is the
+    longest tau that is read, as a part of the log: beyond, the curve is too uncertain.
     """
     used = curve.cluster_size <= longest * curve.samples
     if not (curve.variance[used] > 0).all():
@@ -86,14 +77,11 @@ def read(curve: AllanCurve, *, longest: float = 1 / 9) -> Estimate:
         return not_shown("curve", texts.few_points(points_used, longest, _MIN_POINTS))
     bias, time = _read_minimum(points)
     N, K = _read_white(points, thinned), _read_walk(points)
-    lowest = {"sigma_min": bias, "tau_min": time}
+    sigma, tau = bias, time
     if bias.value is not None and time.value is not None:
-        lowest = {
-            "sigma_min": Parameter(bias.value * FLOOR),
-            "tau_min": Parameter(time.value * PEAK_TAU),
-        }
-    parameters = {"N": N, "B": bias, "T_B": time, "K": K}
-    return Estimate("curve", parameters, curve={"B_curve": bias} | lowest)
+        sigma, tau = Parameter(bias.value * FLOOR), Parameter(time.value * PEAK_TAU)
+    figures = {"B_curve": bias, "sigma_min": sigma, "tau_min": tau}
+    return Estimate("curve", {"N": N, "B": bias, "T_B": time, "K": K}, curve=figures)
 
 
 def _read_white(points: _Curve, thinned: Array) -> Parameter:

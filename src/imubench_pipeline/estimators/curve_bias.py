@@ -22,8 +22,13 @@ from imubench_pipeline.estimators.intervals import compute_mixture_limits, is_as
 from imubench_pipeline.estimators.model_choice import Candidate
 from imubench_pipeline.estimators.posterior import Posterior
 from imubench_pipeline.estimators.whittle import Terms
-from imubench_pipeline.noise import FLOOR, PEAK_TAU, GaussMarkov, NoiseModel
-from imubench_pipeline.noise.terms import evaluate_gauss_markov_shape
+from imubench_pipeline.noise import (
+    FLOOR,
+    PEAK_TAU,
+    GaussMarkov,
+    NoiseModel,
+    evaluate_gauss_markov_shape,
+)
 from imubench_pipeline.typing import Array
 from imubench_pipeline.words.reasons import curves, estimates
 
@@ -155,16 +160,9 @@ def add_curve_figures(
 
     Values follow from the model of the estimate, intervals from the draws of all models that the
     log does not rule out, weighted by BIC. (By AIC, two processes of which the slower replaces the
-    random walk weigh as much as the walk: limits would be twice as wide as needed.)
-
-    Parameters
-    ----------
-    alike : sequence of Candidate
-        The models that the log does not rule out, the chosen one first.
-    wider : sequence of Candidate
-        Models with one bias instability in addition: they limit an absent one.
-    tau : ndarray, shape (m,)
-        As returned by `make_averaging_times`.
+    random walk weigh as much as the walk: limits would be twice as wide as needed.) ``alike`` are
+    the models that the log does not rule out, the chosen one first; ``wider`` models with one bias
+    instability in addition, which limit an absent one; ``tau`` is from `make_averaging_times`.
     """
 
     def select(candidate: Candidate) -> Models:
@@ -241,5 +239,5 @@ def estimate_lowest_point(
 
 def _compute_limits(parts: Sequence[tuple[Array, float]], value: float) -> tuple[float, float]:
     """Return the 95 % limits of draws of several models; they include the limits of the first."""
-    lower, upper = compute_mixture_limits(parts, [(parts[0][0], 1.0)])
+    lower, upper = compute_mixture_limits(parts, parts[0][0])
     return min(lower, value), max(upper, value)

@@ -113,8 +113,8 @@ def find_cutoff(
     tried = fits.try_filters()
     if not tried:
         return absent
-    gains, low_pass = _Gains(spectrum), tried[0].low_pass
-    leaky = gains.leakage(low_pass) > _MAX_LEAKAGE_FRACTION * gains.white(low_pass)
+    allowed = _MAX_LEAKAGE_FRACTION * _compute_gain(spectrum, tried[0].low_pass)
+    leaky = _compute_leakage(spectrum, tried[0].low_pass) > allowed
     rounded = rounding / tried[0].N ** 2
     if (usable & ~leaky).sum() < MIN_BINS:
         return absent
@@ -137,11 +137,8 @@ def _describe_filter(spectrum: Spectrum, fits: _Fits, tried: Sequence[_Trial]) -
     """Return the best filter, with limits over all filters that the log does not exclude."""
     best, rate = tried[0], spectrum.rate
     # Trials with a floor count only if the best has one: with a floor no high cut-off is known.
-    alike = [
-        trial
-        for trial in tried
-        if trial.with_floor <= best.with_floor and trial.cost < best.cost + _MAX_DELTA
-    ]
+    comparable = [trial for trial in tried if trial.with_floor <= best.with_floor]
+    alike = [trial for trial in comparable if trial.cost < best.cost + _MAX_DELTA]
     ends = [end for trial in alike for end in (trial, *fits.find_limits(trial))]
     shown, cutoffs = best.low_pass.half_power(rate), [end.low_pass.half_power(rate) for end in ends]
     error = SIGMAS / math.sqrt(2.0 * float(fits.spectrum.ordinates.sum()))
@@ -163,7 +160,7 @@ def _describe_filter(spectrum: Spectrum, fits: _Fits, tried: Sequence[_Trial]) -
         reason = texts.unfiltered_noise(share, found.words, times)
         N = replace(N, status="doubtful", reason=reason, upper=N.upper * times)
     beside = fits.rounded + share
-    gain = _Gains(spectrum).white(best.low_pass) + beside
+    gain = _compute_gain(spectrum, best.low_pass) + beside
     return replace(
         found,
         N=N,
@@ -188,23 +185,17 @@ class _Trial:
     floor: float = 0.0  # density of the white noise after it, SI
 
 
-class _Gains:
-    """Power gains of filters in the bins of a spectrum."""
+def _compute_gain(spectrum: Spectrum, low_pass: Filter) -> Array:
+    """Return the power gain of a filter for white noise in the bins, without leakage."""
+    points = (np.arange(_POINTS_PER_BIN)[:, None] + 0.5) / _POINTS_PER_BIN
+    within = spectrum.lower + (spectrum.upper - spectrum.lower) * points
+    return np.asarray(low_pass.white(within, spectrum.rate).mean(axis=0))
 
-    def __init__(self, spectrum: Spectrum) -> None:
-        points = (np.arange(_POINTS_PER_BIN)[:, None] + 0.5) / _POINTS_PER_BIN
-        self._within = spectrum.lower + (spectrum.upper - spectrum.lower) * points
-        self._mean, self._rate = spectrum.frequency, spectrum.rate
-        self._length, self._single = spectrum.length, spectrum.block == 1
 
-    def white(self, low_pass: Filter) -> Array:
-        """Return the gain for white noise, without leakage."""
-        return np.asarray(low_pass.white(self._within, self._rate).mean(axis=0))
-
-    def leakage(self, low_pass: Filter) -> Array:
-        """Return the spectral leakage in bins of single samples, 0 in others."""
-        leak = low_pass.leakage(self._mean, self._rate, self._length)
-        return np.where(self._single, leak, 0.0)
+def _compute_leakage(spectrum: Spectrum, low_pass: Filter) -> Array:
+    """Return the spectral leakage in bins of single samples, 0 in others."""
+    leak = low_pass.leakage(spectrum.frequency, spectrum.rate, spectrum.length)
+    return np.where(spectrum.block == 1, leak, 0.0)
 
 
 class _Fits:
@@ -221,7 +212,6 @@ class _Fits:
         slow = [self._whittle.column("F"), self._whittle.column("K")]
         self._slow = np.column_stack(slow + [self._whittle.gauss_markov(time) for time in times])
         self.rounded, self._lowest = rounded, lowest  # density of rounding over N^2
-        self._gains = _Gains(spectrum)
         self._bins = self._whittle.bins()
         self._penalty = 0.5 * math.log(len(spectrum.frequency))
         flat = np.column_stack([np.ones(len(self._slow)), self._slow])
@@ -323,7 +313,8 @@ class _Fits:
 
     def _make_columns(self, low_pass: Filter, with_floor: bool) -> Array:
         """Return the densities of the terms behind a filter as columns, white noise first."""
-        white = self._gains.white(low_pass) + self._gains.leakage(low_pass) + self.rounded
+        white = _compute_gain(self.spectrum, low_pass) + _compute_leakage(self.spectrum, low_pass)
+        white += self.rounded
         at = self.spectrum.frequency, self.rate
         slow = self._slow * low_pass.slow(*at)[:, None]
         slow[:, 0] = self._slow[:, 0] * low_pass.flicker(*at)

@@ -88,33 +88,18 @@ SI_UNITS: dict[str, dict[str, str]] = {
 
 @dataclass(frozen=True)
 class Parameter:
-    """One estimated parameter.
+    """One estimated parameter."""
 
-    Attributes
-    ----------
-    value : float or None
-        SI; None where the status says why there is none.
-    status : str
-        ``ok``; ``doubtful``: something about the log or the fit says that the value may be wrong;
-        ``not_shown``: the curve does not show it; ``at_bound``: the fit ran into the end of its
-        search; ``not_identified``: the log cannot determine it; ``absent``: the model has no such
-        term.
-    reason : str or None
-    lower, upper : float or None
-        95 % limits, where the method gives them.
-    duration_needed : float or None
-        Length of a log that would determine the value to 10 %, s.
-    fitted : float or None
-        The value in the model of the log, where no value is given.
-    """
-
-    value: float | None
+    value: float | None  # SI; None where the status says why there is none
     status: Status = "ok"
+    """``ok``; ``doubtful``: something about the log or the fit says that the value may be wrong;
+    ``not_shown``: the curve does not show it; ``at_bound``: the fit ran into the end of its search;
+    ``not_identified``: the log cannot determine it; ``absent``: the model has no such term."""
     reason: str | None = None
-    lower: float | None = None
+    lower: float | None = None  # 95 % limits, where the method gives them
     upper: float | None = None
-    duration_needed: float | None = None
-    fitted: float | None = None
+    duration_needed: float | None = None  # length of a log that would give the value to 10 %, s
+    fitted: float | None = None  # the value in the model of the log, where no value is given
 
     @property
     def in_model(self) -> float | None:
@@ -174,29 +159,18 @@ class Estimate:
     """The parameters of one channel by one method.
 
     A value is ``ok`` only where its interval is narrow enough (`Parameter.checked`).
-
-    Attributes
-    ----------
-    method : str
-    parameters : mapping of str to Parameter
-        Q, N, B, T_B, K, R as far as the method knows them, and N_sensor where a low-pass or an
-        interpolation shows.
-    further : sequence of mapping
-        Components beyond the first: B and T_B of a second Gauss-Markov process.
-    lines : sequence of mapping
-        Amplitude and frequency of each sinusoid.
-    curve : mapping of str to Parameter
-        The figures of the curve, `CURVE`.
-    draws : JointDraws or None
-        Noise models drawn jointly from the posterior, without lines; None for other methods.
     """
 
     method: str
     parameters: Mapping[str, Parameter]
+    """Q, N, B, T_B, K, R as far as the method knows them, and N_sensor where a low-pass or an
+    interpolation shows."""
     further: Sequence[Mapping[str, Parameter]] = ()
-    lines: Sequence[Mapping[str, Parameter]] = ()
-    curve: Mapping[str, Parameter] = field(default_factory=dict)
+    """Components beyond the first: B and T_B of a second Gauss-Markov process."""
+    lines: Sequence[Mapping[str, Parameter]] = ()  # amplitude and frequency of each sinusoid
+    curve: Mapping[str, Parameter] = field(default_factory=dict)  # figures of the curve, `CURVE`
     draws: JointDraws | None = field(default=None, compare=False, repr=False)
+    """Noise models drawn jointly from the posterior, without lines; None for other methods."""
 
     def __post_init__(self) -> None:
         # The class is frozen.

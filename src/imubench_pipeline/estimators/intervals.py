@@ -124,24 +124,20 @@ def find_durations_needed(
         _compute_relative_errors(make_ideal_spectrum(rate, length, highest), maximum)
         for length in lengths.tolist()
     ]
-    return [
-        _find_crossing(np.log(lengths), np.log(column / TARGET_RELATIVE_ERROR))
-        for column in np.array(errors).T
-    ]
-
-
-def _find_crossing(log_lengths: Array, excess: Array) -> float | None:
-    """Return the length from which an excess stays at or below 0, interpolated; None: never."""
-    (above,) = np.nonzero(excess > 0.0)
-    if not len(above):
-        return float(np.exp(log_lengths[0]))
-    low = int(above[-1])
-    if low == len(excess) - 1:
-        return None
-    if not np.isfinite(excess[low]):
-        return float(np.exp(log_lengths[low + 1]))
-    part = excess[low] / (excess[low] - excess[low + 1])
-    return float(np.exp(log_lengths[low] + part * (log_lengths[low + 1] - log_lengths[low])))
+    logarithms, needed = np.log(lengths), list[float | None]()
+    for column in np.array(errors).T:
+        # The length from which the excess stays at or below 0, interpolated.
+        excess = np.log(column / TARGET_RELATIVE_ERROR)
+        low = int(np.flatnonzero(excess > 0.0).max(initial=-1))
+        if low == len(excess) - 1:
+            needed.append(None)
+            continue
+        reached = logarithms[low + 1]
+        if low >= 0 and np.isfinite(excess[low]):
+            part = excess[low] / (excess[low] - excess[low + 1])
+            reached = logarithms[low] + part * (reached - logarithms[low])
+        needed.append(float(np.exp(reached)))
+    return needed
 
 
 def _compute_relative_errors(spectrum: Spectrum, maximum: Maximum) -> Array:
@@ -155,7 +151,6 @@ class _UntabulatedWhittle(Whittle):
     """A likelihood that computes Gauss-Markov shapes on demand, without the table of shapes."""
 
     def gauss_markov(self, time: float) -> Array:
-        """Return the density of a Gauss-Markov process of B = 1 in each bin."""
         return self.shape_of.gauss_markov(time)
 
 
@@ -184,16 +179,12 @@ def add_upper_limits(
         if not having:
             continue
         upper = max(float(np.quantile(_draws_of(name, terms, draws), 0.975)) for terms in having)
-        good = [
-            other
-            for other in alike[1:]
-            if is_as_good(other, alike[0]) and name in list_parameter_names(other.terms)
-        ]
-        if not good:
-            parameters[name] = Parameter(None, "absent", texts.ABSENT_BELOW, 0.0, upper)
-            continue
-        reason = texts.models_alike([c.terms.name for c in good], alike[0].terms.name)
-        parameters[name] = Parameter(None, "not_identified", reason, 0.0, upper)
+        parameters[name] = Parameter(None, "absent", texts.ABSENT_BELOW, 0.0, upper)
+        as_good = [c.terms for c in alike[1:] if is_as_good(c, alike[0])]
+        good = [terms.name for terms in as_good if name in list_parameter_names(terms)]
+        if good:
+            reason = texts.models_alike(good, alike[0].terms.name)
+            parameters[name] = Parameter(None, "not_identified", reason, 0.0, upper)
     return replace(estimate, parameters=parameters)
 
 
@@ -223,15 +214,14 @@ def describe(
     maximum = chosen.maximum
     names = list_parameter_names(maximum.terms)
     values = [*np.sqrt(maximum.powers), *maximum.times] + [maximum.ramp] * maximum.terms.ramp
-    needed = find_durations_needed(
-        maximum, whittle.spectrum.rate, float(whittle.spectrum.duration), highest
-    )
+    spectrum = whittle.spectrum
+    needed = find_durations_needed(maximum, spectrum.rate, float(spectrum.duration), highest)
     described: dict[str, Parameter] = {}
     for i, (name, value) in enumerate(zip(names, values, strict=True)):
         # The interval of the chosen model lies inside: AIC, against a model that fits as well,
         # prefers a process as slow as a walk to the walk.
-        own = [(_draws_of(name, chosen.terms, draws), 1.0)]
-        lower, upper = compute_mixture_limits(_over_models(name, chosen, alike, draws), own)
+        own, over = _draws_of(name, chosen.terms, draws), _over_models(name, chosen, alike, draws)
+        lower, upper = compute_mixture_limits(over, own)
         if value == 0.0:
             described[name] = Parameter(None, "absent", texts.ABSENT_BELOW, 0.0, upper)
             continue
@@ -265,19 +255,16 @@ def _over_models(
     name: str, chosen: Candidate, alike: Sequence[Candidate], draws: dict[Terms, Posterior]
 ) -> list[tuple[Array, float]]:
     """Return the draws of a parameter in each model in which it means the same, with weights."""
-
-    def is_comparable(terms: Terms, other: Terms) -> bool:
-        if name not in list_parameter_names(other):
-            return False
+    parts, own = [], chosen.terms.biases
+    for candidate in alike:
+        biases = candidate.terms.biases
         # One bias instability is one level, flicker or not; of several each has its own.
-        single = name == "B" and sum(terms.biases) == sum(other.biases) == 1
-        return name[0] not in "BT" or terms.biases == other.biases or single
-
-    return [
-        (_draws_of(name, candidate.terms, draws), math.exp(0.5 * (chosen.aic - candidate.aic)))
-        for candidate in alike
-        if is_comparable(chosen.terms, candidate.terms)
-    ]
+        single = name == "B" and sum(own) == sum(biases) == 1
+        same = name[0] not in "BT" or own == biases or single
+        if same and name in list_parameter_names(candidate.terms):
+            weight = math.exp(0.5 * (chosen.aic - candidate.aic))
+            parts.append((_draws_of(name, candidate.terms, draws), weight))
+    return parts
 
 
 def compute_mixture_quantiles(
@@ -294,13 +281,10 @@ def compute_mixture_quantiles(
     return tuple(values[order[places]].tolist())
 
 
-def compute_mixture_limits(
-    parts: Sequence[tuple[Array, float]], own: Sequence[tuple[Array, float]]
-) -> tuple[float, float]:
+def compute_mixture_limits(parts: Sequence[tuple[Array, float]], own: Array) -> tuple[float, float]:
     """Return the 95 % limits of draws of several models; those of one of them lie inside."""
-    lower, upper = compute_mixture_quantiles(parts, 0.025, 0.975)
-    own_lower, own_upper = compute_mixture_quantiles(own, 0.025, 0.975)
-    return min(lower, own_lower), max(upper, own_upper)
+    both = [compute_mixture_quantiles(draws, 0.025, 0.975) for draws in (parts, [(own, 1.0)])]
+    return min(lower for lower, _ in both), max(upper for _, upper in both)
 
 
 def _draws_of(name: str, terms: Terms, draws: dict[Terms, Posterior]) -> Array:

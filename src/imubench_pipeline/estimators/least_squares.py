@@ -74,28 +74,14 @@ def fit(curve: AllanCurve, *, method: Method = "weighted", longest: float = 1 / 
       Its dimension differs from the cost: the bottom of the curve counts less, which makes little
       difference on these tau (`tests/papers/test_panel.py`).
 
-    Parameters
-    ----------
-    curve : AllanCurve
-    method : {"weighted", "paper"}
-    longest : float
-        Longest tau of the fit, as a part of the log. The shortest is where the curve begins to
-        follow a model of its longer tau: the sensor's own filter bends it before.
+    ``longest`` is the longest tau of the fit, as a part of the log. The shortest is where the curve
+    begins to follow a model of its longer tau: the sensor's own filter bends it before.
 
-    Returns
-    -------
-    Estimate
-        SI, with 95 % limits from the covariance of the Allan variances. ``absent``: the fit is
-        best without the term; ``at_bound``: T_B at the end of the search, which goes as far as
-        the process still peaks inside the tau used; ``not_identified``: the log cannot determine
-        the value, see `imubench_pipeline.estimators.least_squares.add_limits`.
-
-    Raises
-    ------
-    UnfitCurveError
-        If fewer than four points lie within ``longest``, or the Allan variance is 0 at one.
-    ValueError
-        If the method is not known.
+    The parameters are in SI, with 95 % limits from the covariance of the Allan variances.
+    ``absent``: the fit is best without the term; ``at_bound``: T_B at the end of the search, which
+    goes as far as the process still peaks inside the tau used; ``not_identified``: the log cannot
+    determine the value (`add_limits`). Raises UnfitCurveError if fewer than four points lie within
+    ``longest``, or the Allan variance is 0 at one; ValueError if the method is not known.
     """
     return add_limits(*_solved(curve, method, longest))
 
@@ -382,9 +368,8 @@ def fit_errors(
     ]
     scale = np.sqrt(np.maximum(np.array(whole) / curve.edf[used], 1.0))
     scale = scale / model.allan_variance(curve.tau[used], rate)
-    covariance = compute_variance_covariance(model, rate, curve.samples, sizes) * np.outer(
-        scale, scale
-    )
+    covariance = compute_variance_covariance(model, rate, curve.samples, sizes)
+    covariance = covariance * np.outer(scale, scale)
     return Errors(names, gain @ covariance @ gain.T)
 
 
@@ -492,27 +477,20 @@ def _estimate_lowest_point(
 ) -> dict[str, Parameter]:
     """Return the lowest point of the fitted curve, with limits from the errors of the fit."""
     tau = make_averaging_times(curve.rate, curve.samples / curve.rate)
-    best = convert_noise_model(model)
-    at = [getattr(model, name) for name in errors.names]
-    lowest = estimate_lowest_point(best, [], tau)
+    lowest = estimate_lowest_point(convert_noise_model(model), [], tau)
     finite = bool(np.isfinite(errors.covariance).all())
     if not finite or any(parameter.value is None for parameter in lowest.values()):
         return lowest
     ends = []
     for sign in (-1.0, 1.0):
-        moved = [
-            convert_noise_model(
-                replace(model, **{name: value * math.exp(sign * _LOG_PARAMETER_STEP)})
-            )
-            for name, value in zip(errors.names, at, strict=True)
-        ]
-        ends.append([find_lowest_point(models, tau)[:2] for models in moved])
+        factor = math.exp(sign * _LOG_PARAMETER_STEP)
+        moved = [replace(model, **{name: getattr(model, name) * factor}) for name in errors.names]
+        ends.append([find_lowest_point(convert_noise_model(each), tau)[:2] for each in moved])
     slopes = np.log(np.array(ends[1]) / np.array(ends[0]))[:, :, 0].T / (2.0 * _LOG_PARAMETER_STEP)
     described = {}
     for (name, parameter), slope in zip(lowest.items(), slopes, strict=True):
-        error = min(
-            math.sqrt(max(float(slope @ errors.covariance @ slope), 0.0)), _CLIP_RELATIVE_ERROR
-        )
+        variance = max(float(slope @ errors.covariance @ slope), 0.0)
+        error = min(math.sqrt(variance), _CLIP_RELATIVE_ERROR)
         if error > _MAX_RELATIVE_ERROR:
             reason = texts.large_error(name, error, _MAX_RELATIVE_ERROR)
             described[name] = Parameter(None, "not_identified", reason, fitted=parameter.value)

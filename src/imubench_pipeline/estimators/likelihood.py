@@ -86,8 +86,7 @@ class Likelihood:
     lines: Sequence[Line]
     band: Band | None  # the frequencies used
     spectrum: Spectrum
-    clear: NDArray[np.bool_]  # (b,): the bins without lines
-    used: NDArray[np.bool_]  # (b,): the subset below the end of the band, which is used
+    used: NDArray[np.bool_]  # (b,): the bins without lines, below the end of the band
     fitted: Array
     """(b,): density of the chosen model in each bin, its ramp included; NaN without a fit."""
     frame: FitSelection
@@ -108,34 +107,15 @@ def fit(
     resolution: float = 0.0,
     rng: np.random.Generator | None = None,
 ) -> Likelihood:
-    """Estimate the noise parameters of a log by their likelihood.
+    """Estimate the noise parameters of a log by their likelihood (P. Whittle, Ark. Mat. 2, 1953).
 
-    Parameters
-    ----------
-    samples : array_like, shape (L,)
-        The log on its uniform grid, rad/s or m/s²; NaN marks a missing sample.
-    rate : float
-        Hz.
-    segments : sequence of (int, int), optional
-        First and one-past-last sample of each part that no time relates to the others.
-    band : float, optional
-        Highest frequency to use, Hz; by default it is found from the spectrum.
-    bandwidth : float, optional
-        Stated cut-off of the sensor's own filter, Hz: it distinguishes a filter from a process.
-    resolution : float
-        Step of the register (LSB), SI, where the samples are rounded.
-    rng : numpy.random.Generator, optional
-        For the posterior draws, and for missing samples; by default always the same.
-
-    Raises
-    ------
-    ValueError
-        If the log has fewer than 16 samples.
-
-    References
-    ----------
-    P. Whittle, "Estimation and information in stationary time series", Arkiv för Matematik 2,
-    1953.
+    ``samples``, shape (L,), are the log on its uniform grid, rad/s or m/s², NaN where one is
+    missing; the rate is in Hz. ``segments`` are first and one-past-last sample of each part that no
+    time relates to the others; ``band`` is the highest frequency to use, Hz, by default found from
+    the spectrum; ``bandwidth`` the stated cut-off of the sensor's own filter, Hz: it distinguishes
+    a filter from a process; ``resolution`` the step of the register (LSB), SI, where the samples
+    are rounded; ``rng`` is for posterior draws and missing samples, by default always the same.
+    Raises ValueError if the log has fewer than 16 samples.
     """
     values = np.asarray(samples, dtype=np.float64)
     if len(values) < 16:
@@ -222,9 +202,7 @@ def fit_spectrum(
         unknown = dict.fromkeys(FAMILY, nothing), (), (), dict.fromkeys(CURVE, nothing)
         both = Estimate("likelihood", *unknown), not_shown("likelihood_gm", reason)
         nan = np.full(len(frame.used), np.nan)
-        return Likelihood(
-            both, (), frame.lines, None, spectrum, frame.clear, frame.used, nan, frame
-        )
+        return Likelihood(both, (), frame.lines, None, spectrum, frame.used, nan, frame)
     whittle = frame.whittle(spectrum)
     candidates = compare_models(whittle, quantization=frame.shows_quantization(spectrum.rate))
     chosen = candidates[0]
@@ -259,9 +237,8 @@ def fit_spectrum(
         lines=sinusoids,
         draws=of_papers.draw_jointly(),
     )
-    both, lines, band = (estimate, gauss_markov), frame.lines, frame.band
-    clear, used = frame.clear, frame.used
-    return Likelihood(both, candidates, lines, band, spectrum, clear, used, fitted, frame)
+    both, lines, used = (estimate, gauss_markov), frame.lines, frame.used
+    return Likelihood(both, candidates, lines, frame.band, spectrum, used, fitted, frame)
 
 
 def _cast_doubt(group: Mapping[str, Parameter], reason: str | None) -> dict[str, Parameter]:

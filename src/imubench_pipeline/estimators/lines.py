@@ -125,10 +125,8 @@ def _mark_alias(line: Line, lines: list[Line], block: int, rate: float) -> Line:
         # Block means attenuate both; the amplitude of a line is given without attenuation.
         seen = other.amplitude * _compute_block_gain(other.frequency, block, rate)
         amplitude = line.amplitude * _compute_block_gain(line.frequency, block, rate)
-        close = (
-            abs(abs(away) - line.frequency) < _LINE_HALF_WIDTH * line.resolution + 0.5 * line.width
-        )
-        if close and amplitude < 2.0 * seen:
+        reach = _LINE_HALF_WIDTH * line.resolution + 0.5 * line.width
+        if abs(abs(away) - line.frequency) < reach and amplitude < 2.0 * seen:
             return replace(line, kind="alias")
     return line
 
@@ -245,9 +243,8 @@ def mask_lines(spectrum: Spectrum, lines: Sequence[Line], density: Array) -> NDA
         reach = line.amplitude / (math.pi * np.sqrt(8.0 * allowed * spectrum.length))
         wide = 0.5 * line.resolution if line.narrow else 0.5 * line.width
         reach = np.maximum(reach, 1.0 / spectrum.length) + wide
-        clear &= (spectrum.upper < line.frequency - reach) | (
-            spectrum.lower > line.frequency + reach
-        )
+        first, last = line.frequency - reach, line.frequency + reach
+        clear &= (spectrum.upper < first) | (spectrum.lower > last)
     return clear
 
 
@@ -285,6 +282,5 @@ def describe_grouping(channel: str, lines: Sequence[Line]) -> Finding:
     """Return the warning for a channel with more than `MAX_LINES` sinusoids."""
     single, weaker = _separate_weaker(lines)
     rest, total = (sum(0.5 * x.amplitude**2 for x in group) for group in (weaker, lines))
-    number = len(lines)
-    data = TooManyLines(number, len(single), rest / total, math.sqrt(rest))
-    return find(data, "warning", float(number), channel)
+    data = TooManyLines(len(lines), len(single), rest / total, math.sqrt(rest))
+    return find(data, "warning", float(len(lines)), channel)

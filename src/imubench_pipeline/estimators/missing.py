@@ -134,7 +134,13 @@ def draw_slow_part(
         simulated = path + np.sqrt(white / np.maximum(count, 1)) * rng.standard_normal(n)
         ramp = model.R * middle / rate
         difference = means.mean[chosen] - ramp - simulated
-        path += _smooth(difference, count, drive)
+        # The mean of a random walk with steps of variance ``drive``, given the differences.
+        if n > 1:
+            diagonal = count + 2.0 / drive
+            diagonal[[0, -1]] -= 1.0 / drive
+            bands = np.array([np.full(n, -1.0 / drive), diagonal])
+            difference = solveh_banded(bands, count * difference)
+        path += difference
         # The path is level from the last middle to the end of the part, which lies before a
         # jump: between this knot and the first of the next part there is no sample.
         place = np.concatenate(([start - 0.25], middle, [stop - 0.75]))
@@ -161,17 +167,3 @@ def fill_missing(
             complete[missing] = path.at(reached + missing) + white
         reached += len(values)
         yield complete
-
-
-def _smooth(values: Array, precision: NDArray[np.int64], drive: float) -> Array:
-    """Return the mean of a random walk, given values with independent errors.
-
-    ``precision`` is 1 over their variance, 0 for a missing value; ``drive`` is the variance
-    of a step of the walk.
-    """
-    diagonal = precision + 2.0 / drive
-    diagonal[[0, -1]] -= 1.0 / drive
-    if len(values) == 1:
-        return values
-    beside = np.full(len(values), -1.0 / drive)
-    return np.asarray(solveh_banded(np.array([beside, diagonal]), precision * values))

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from functools import partial
 
 import numpy as np
 from scipy.special import erfc, polygamma, psi
@@ -119,7 +118,17 @@ def compare_models(whittle: Whittle, *, quantization: bool) -> list[Candidate]:
     """Return all candidates, with quantization noise if it is visible, sorted by BIC."""
     bins = len(whittle.spectrum.density)
     tried: dict[Terms, Maximum] = {}
-    bic = partial(_penalised_bic, bins=bins, longest=whittle.longest)
+
+    def bic(maximum: Maximum) -> float:
+        """Return the BIC of a fit, with a penalty for terms that few sensors have."""
+        terms, times = maximum.terms, maximum.times
+        slow = len(times) > 0 and times[-1] > WALK_LIKE_TIME_FRACTION * whittle.longest
+        # A ramp is fitted together with a random walk: if K is 0, the ramp replaces the walk.
+        replaced = terms.ramp and maximum.parameter("K") == 0.0
+        is_walk_like = ("K" not in terms.linear and slow) | replaced
+        score = 2.0 * maximum.cost + terms.parameters * math.log(bins)
+        score += BIC_PENALTY_UNIT_ROOT * is_walk_like
+        return score + BIC_PENALTY_RARE_TERM * (terms.ramp + ("Q" in terms.linear))
 
     def add(terms: Terms) -> None:
         if terms not in tried and terms.parameters < bins // 4:
@@ -146,32 +155,11 @@ def compare_models(whittle: Whittle, *, quantization: bool) -> list[Candidate]:
     candidates = []
     for i, maximum in enumerate(maxima):
         spectrum, density = whittle.spectrum, whittle.density(maximum)
-        goodness = assess_goodness_of_fit(
-            spectrum.ordinates,
-            whittle.data(maximum),
-            density,
-            spectrum.frequency,
-            maximum.terms.parameters,
-        )
+        measured = spectrum.ordinates, whittle.data(maximum), density, spectrum.frequency
+        goodness = assess_goodness_of_fit(*measured, maximum.terms.parameters)
         scores = float(bics[i]), float(aics[i]), float(weights[i]), float(akaike_weights[i])
         candidates.append(Candidate(maximum, *scores, goodness))
     return candidates
-
-
-def _penalised_bic(maximum: Maximum, bins: int, longest: float) -> float:
-    """Return the BIC of a fit, with a penalty for terms that few sensors have."""
-    terms, times = maximum.terms, maximum.times
-    slow = len(times) > 0 and times[-1] > WALK_LIKE_TIME_FRACTION * longest
-    is_walk_like = "K" not in terms.linear and slow
-    # A ramp is fitted together with a random walk: if K is 0, the ramp replaces the walk.
-    is_walk_like |= terms.ramp and maximum.parameter("K") == 0.0
-    rare_terms = terms.ramp + ("Q" in terms.linear)
-    return (
-        2.0 * maximum.cost
-        + terms.parameters * math.log(bins)
-        + BIC_PENALTY_UNIT_ROOT * is_walk_like
-        + BIC_PENALTY_RARE_TERM * rare_terms
-    )
 
 
 MIN_AKAIKE_WEIGHT = 0.05  # Candidates with a smaller Akaike weight do not enter the intervals

@@ -115,14 +115,10 @@ def sample_adaptively(
 ) -> Weighted:
     """Draw weighted points from a density until their effective sample size suffices.
 
+    Adaptive multiple importance sampling (J.-M. Cornuet et al., Scand. J. Stat. 39, 2012).
     ``log_density`` returns the logarithm of the density at points, shape (n, d), up to a constant,
     -inf where it is 0; ``first`` is the proposal of the first round; a round has ``size`` points, a
     power of 2, all have ``most``; ``wanted`` is the effective sample size.
-
-    References
-    ----------
-    J.-M. Cornuet, J.-M. Marin, A. Mira and C. P. Robert, "Adaptive multiple importance sampling",
-    Scandinavian Journal of Statistics 39, 2012.
     """
     mixtures, mixture = [first], first
     points = np.empty((0, first.means.shape[1]))
@@ -142,12 +138,9 @@ def sample_adaptively(
         for _ in range(_EM_STEPS):
             mixture = mixture.fitted(learnt)
         part = _FIRST_MIXTURE_WEIGHT
-        proposal = Mixture(
-            np.concatenate([(1.0 - part) * mixture.weights, part * first.weights]),
-            np.concatenate([mixture.means, first.means]),
-            np.concatenate([mixture.scales, first.scales]),
-        )
-        mixtures.append(proposal)
+        weights = np.concatenate([(1.0 - part) * mixture.weights, part * first.weights])
+        means = np.concatenate([mixture.means, first.means])
+        mixtures.append(Mixture(weights, means, np.concatenate([mixture.scales, first.scales])))
 
 
 def _get_degrees(dimensions: int) -> int:
@@ -244,7 +237,9 @@ class _Target:
 
     def first(self) -> Mixture:
         """Return a mixture about the best fit, with a component for each term that may be 0."""
-        components = [self.make_component(np.log(self.maximum.times), _MAX_SIGMA)]
+        places = np.log(self.maximum.times)
+        best = self._approximate_normal(self.log_fitted, places, _MAX_SIGMA, self.problem)
+        components = [best]
         if self.terms > 1:
             components += [self._make_weak_component(term) for term in range(self.terms)]
         means, scales = (np.array(part) for part in zip(*components, strict=True))
@@ -259,10 +254,6 @@ class _Target:
         means[:, : self.terms], slope[:, : self.terms] = z, np.tanh(z)
         scales *= slope[:, :, None] * slope[:, None, :]
         return Mixture(weights / weights.sum(), means, scales)
-
-    def make_component(self, places: Array, width: float) -> tuple[Array, Array]:
-        """Return mean and covariance of a normal component about correlation times."""
-        return self._approximate_normal(self.log_fitted, places, width, self.problem)
 
     def _make_weak_component(self, term: int) -> tuple[Array, Array]:
         """Return mean and covariance of a component in which one term is nearly 0."""

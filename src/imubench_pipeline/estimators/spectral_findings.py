@@ -111,6 +111,5 @@ def withhold_slow_noise(estimate: Estimate) -> Estimate:
             for name, one in group.items()
         }
 
-    return replace(
-        estimate, parameters=withhold(estimate.parameters), curve=withhold(estimate.curve)
-    )
+    parameters, curve = withhold(estimate.parameters), withhold(estimate.curve)
+    return replace(estimate, parameters=parameters, curve=curve)

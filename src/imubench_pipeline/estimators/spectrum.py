@@ -51,11 +51,8 @@ class Spectrum:
 
     def select(self, chosen: NDArray[np.bool_]) -> Spectrum:
         """Return the spectrum of chosen bins."""
-        columns: dict[str, Any] = {
-            name: column[chosen]
-            for name, column in vars(self).items()
-            if isinstance(column, np.ndarray)
-        }
+        arrays = {name: each for name, each in vars(self).items() if isinstance(each, np.ndarray)}
+        columns: dict[str, Any] = {name: each[chosen] for name, each in arrays.items()}
         return replace(self, **columns)
 
 
@@ -76,12 +73,8 @@ def compute_spectra(
 
     The blocks are the log in order, in SI, ``samples`` long together. Each segment (first and
     one-past-last sample; one by default) has its own transform of low frequencies. Raises
-    ValueError if a sample inside a segment is missing, or the log has fewer than 16 samples.
-
-    References
-    ----------
-    N. Ahmed, T. Natarajan and K. Rao, "Discrete cosine transform", IEEE Trans. Computers C-23,
-    1974; P. Whittle, "Estimation and information in stationary time series", 1953.
+    ValueError if a sample inside a segment is missing, or the log has fewer than 16 samples. (N.
+    Ahmed, T. Natarajan and K. Rao, "Discrete cosine transform", IEEE Trans. Comput. C-23, 1974.)
     """
     spans = list_spans(segments, samples)
     segment, block = _resolution(np.array([stop - start for start, stop in spans]))
@@ -111,11 +104,6 @@ def compute_spectra(
         mean=level + total / count,
     )
     return spectrum, [line for line in lines if line is not None]
-
-
-def choose_block_size(segments: Sequence[Span]) -> int:
-    """Return the samples in the blocks whose means give the low frequencies of a spectrum."""
-    return _resolution(np.array([stop - start for start, stop in segments]))[1]
 
 
 def _sum_segments(
@@ -224,10 +212,7 @@ def _high_bins(
     frequency = np.arange(n) * rate / (2.0 * n)
     first = int(np.searchsorted(frequency - 0.25 * rate / n, beyond - 1e-9 * beyond))
     edges = [first]
-    while True:
-        following = max(edges[-1] + 1, int(np.ceil(edges[-1] * WIDTH)))
-        if following >= n:
-            break
+    while (following := max(edges[-1] + 1, int(np.ceil(edges[-1] * WIDTH)))) < n:
         edges.append(following)
     starts = np.array(edges)
     counts = np.diff(np.append(starts, n))

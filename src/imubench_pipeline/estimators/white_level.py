@@ -15,7 +15,7 @@ import numpy as np
 from imubench_pipeline.estimators.estimate import BROADBAND_TIME
 from imubench_pipeline.estimators.posterior import Posterior
 from imubench_pipeline.estimators.whittle import Maximum, Terms, make_noise_model
-from imubench_pipeline.noise.terms import compute_driving_density
+from imubench_pipeline.noise import compute_driving_density
 from imubench_pipeline.typing import Array
 
 _MAX_PROCESS_SHARE = 0.06  # Of the Allan variance, up to which it has the slope of white noise

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import copy
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cache, cached_property
 from itertools import combinations
 
@@ -28,8 +28,7 @@ from imubench_pipeline.estimators.whittle_kernels import (
     interpolate_shape,
     profile_cost,
 )
-from imubench_pipeline.noise import GaussMarkov, NoiseModel
-from imubench_pipeline.noise.terms import compute_driving_density
+from imubench_pipeline.noise import GaussMarkov, NoiseModel, compute_driving_density
 from imubench_pipeline.noise.terms.gauss_markov import CORRELATION_TIMES
 from imubench_pipeline.typing import Array
 
@@ -198,25 +197,21 @@ class Maximum:
         return np.asarray(np.sqrt(self.process_powers))
 
 
-@dataclass
 class Whittle:
-    """The likelihood of one spectrum."""
+    """The likelihood of one spectrum.
 
-    spectrum: Spectrum  # the bins to use
-    shortest: float  # correlation time of a Gauss-Markov process that is searched, s
-    longest: float
-    shapes: int = SHAPES  # correlation times at which its shape is tabulated
-    scale: float = field(init=False)
-    columns: dict[str, Array] = field(init=False)
-    shape_of: Shapes = field(init=False)
-    times: Array = field(init=False)
+    The shape of a Gauss-Markov process is tabulated at ``shapes`` correlation times, from the
+    ``shortest`` to the ``longest`` that are searched, s.
+    """
 
-    def __post_init__(self) -> None:
-        self.shape_of = Shapes(self.spectrum)
-        self.scale = float(np.median(self.spectrum.density))
-        self.columns = {}
-        self.times = np.geomspace(self.shortest, self.longest, self.shapes)
-        self._nu = self.spectrum.ordinates
+    def __init__(
+        self, spectrum: Spectrum, shortest: float, longest: float, shapes: int = SHAPES
+    ) -> None:
+        self.spectrum, self.shortest, self.longest = spectrum, shortest, longest
+        self.shape_of, self._nu = Shapes(spectrum), spectrum.ordinates
+        self.scale = float(np.median(spectrum.density))
+        self.columns: dict[str, Array] = {}
+        self.times = np.geomspace(shortest, longest, shapes)
 
     @cached_property
     def table(self) -> Array:
@@ -260,7 +255,7 @@ class Whittle:
     def shape_table(self, unit: float = 1.0) -> ShapeTable:
         """Return the table of shapes in units of a density."""
         first = float(np.log(self.times[0]))
-        step = (float(np.log(self.times[-1])) - first) / (self.shapes - 1)
+        step = (float(np.log(self.times[-1])) - first) / (len(self.times) - 1)
         return ShapeTable(first, step, self.table - np.log(unit) if unit != 1.0 else self.table)
 
     def bins(self, ramp_unit: float = 1.0) -> Bins:

@@ -69,7 +69,14 @@ def choose(
         if everywhere and not estimated:
             present = sorted({device[recording] for recording, _, _ in everywhere})
             raise ExportError(f"no {quantity} of device {axis!r}; there are: {', '.join(present)}")
-    ranked = _rank_axes(estimated, horizon)
+    # The axes with white noise, sorted by their Allan deviation at the horizon.
+    ranked: list[tuple[float, _Estimated, Estimate]] = []
+    for key, part in estimated.items():
+        estimate = make_estimate(key[2], part)
+        if estimate.model.N > 0.0:
+            deviation = float(np.sqrt(estimate.model.allan_variance(np.array([horizon]))[0]))
+            ranked.append((deviation, key, estimate))
+    ranked.sort(key=lambda entry: entry[0])
     if not ranked:
         raise ExportError(f"no estimate of a {quantity} with white noise")
     place = len(ranked) // 2 if axis == MEDIAN else len(ranked) - 1
@@ -92,19 +99,6 @@ def choose(
     limit_of_absent_walk = K.upper if K is not None and K.in_model is None else None
     noise = AxisNoise(estimate.model, origin, notes, limit_of_absent_walk)
     return Choice(recording, channel, used, noise, deviation, len(ranked))
-
-
-def _rank_axes(
-    estimated: Mapping[_Estimated, Sequence[ParameterRow]], horizon: float
-) -> list[tuple[float, _Estimated, Estimate]]:
-    """Return the axes with white noise, sorted by their Allan deviation at the horizon."""
-    ranked = []
-    for key, rows in estimated.items():
-        estimate = make_estimate(key[2], rows)
-        if estimate.model.N > 0.0:
-            deviation = float(np.sqrt(estimate.model.allan_variance(np.array([horizon]))[0]))
-            ranked.append((deviation, key, estimate))
-    return sorted(ranked, key=lambda entry: entry[0])
 
 
 def _describe_other_axes(
@@ -130,12 +124,8 @@ def parameter_notes(estimate: Estimate) -> list[str]:
     notes = []
     for number, name, parameter in estimate.components():
         label = texts.component_label(name, number)
-        status, reason, lower, upper = (
-            parameter.status,
-            parameter.reason,
-            parameter.lower,
-            parameter.upper,
-        )
+        status, reason = parameter.status, parameter.reason
+        lower, upper = parameter.lower, parameter.upper
         limits = None if lower is None or upper is None else (lower, upper)
         if parameter.value is not None:
             if status == "at_bound":

@@ -34,9 +34,8 @@ def describe_model(
     statements.append(convention)
     units = {"gyro": "rad, s", "accel": "m, s"}
     estimated = {"gyro": imu.gyro, "accel": imu.accel}
-    statements += [
-        f"{texts.no_estimate(name)}." for name, axis in estimated.items() if axis is None
-    ]
+    missing = [name for name, axis in estimated.items() if axis is None]
+    statements += [f"{texts.no_estimate(name)}." for name in missing]
     for name, axis in imu.axes.items():
         statements.append(f"{name}: {axis.origin}.")
         terms = describe_terms((estimated[name] or axis).model.terms)

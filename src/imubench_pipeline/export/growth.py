@@ -1,14 +1,8 @@
 """Growth of the variance of integrated noise, from known initial states.
 
-A filter that knows the states of its noise model at time 0 predicts, without a measurement, the
-variance of the angle or velocity (the first integral of the noise) and of the position (the second
-integral of the noise of an accelerometer) at time t. Let h(s) be the impulse response from the
-driving white noise of density S to the noise, integrated once or twice. Then
-
-    Var(t) = S int_0^t h(s)^2 ds.
-
-For white noise this is N^2 t and N^2 t^3 / 3; for other terms see
-`noise.terms.Term.growth_from_known`.
+With h(s) the impulse response from the driving white noise of density S to the noise, integrated
+once (angle or velocity) or twice (position), Var(t) = S int_0^t h(s)^2 ds. For white noise this is
+N^2 t and N^2 t^3 / 3; for other terms see `noise.terms.base.Term.growth_from_known`.
 """
 
 from __future__ import annotations
@@ -27,21 +21,11 @@ _FLICKER_TAU_RATIO = 4.0
 
 @dataclass(frozen=True)
 class Growth:
-    """Variance of the integrals of the noise, each of shape (m,).
+    """Variance of the integrals of the noise, each of shape (m,)."""
 
-    Attributes
-    ----------
-    time : ndarray
-        Since the states were known, s.
-    first : ndarray
-        Of angle, rad^2, or velocity, (m/s)^2.
-    second : ndarray
-        Of the integral of angle, rad^2 s^2, or of velocity (position), m^2.
-    """
-
-    time: Array
-    first: Array
-    second: Array
+    time: Array  # since the states were known, s
+    first: Array  # of angle, rad^2, or velocity, (m/s)^2
+    second: Array  # of the integral of angle, rad^2 s^2, or of velocity (position), m^2
 
 
 def growth(model: NoiseModel, time: ArrayLike, rate: float) -> Growth:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 from imubench_pipeline.earth import STANDARD_GRAVITY
 from imubench_pipeline.model.estimates import TemperatureRow
@@ -187,16 +188,11 @@ class Imu:
 
 def inflate(model: NoiseModel, factor: float) -> NoiseModel:
     """Return a model with all densities and amplitudes times a factor; times stay."""
-    return NoiseModel(
-        Q=model.Q * factor,
-        N=model.N * factor,
-        B=model.B * factor,
-        T_B=model.T_B,
-        K=model.K * factor,
-        R=model.R * factor,
-        further=[term.scaled(factor) for term in model.further],
-        sinusoids=[line.scaled(factor) for line in model.sinusoids],
-    )
+    names = ("Q", "N", "B", "K", "R")
+    scaled: dict[str, Any] = {name: getattr(model, name) * factor for name in names}
+    further = [term.scaled(factor) for term in model.further]
+    lines = [line.scaled(factor) for line in model.sinusoids]
+    return replace(model, **scaled, further=further, sinusoids=lines)
 
 
 def compute_normal_gravity(latitude: float) -> float:

@@ -10,11 +10,9 @@ h << T_B this is K'^2 = S_B, its driving density.
 
 White noise is not changed. Quantization noise does not grow, and sinusoids are not noise: both are
 left out, and the file notes this. At other tau the two models differ. The file states the relative
-error at half and at twice the horizon, and the largest one below the horizon. For a horizon of
-60 s and a random walk, the Allan deviation of the MTi-7's gyro is off by -8 % at 30 s and +22 % at
-120 s, of the C102's accelerometer by -4 and +13 %, and of flicker noise, which no random walk
-approximates well, by -26 and +40 %. `imubench_pipeline.export.overbound` makes a model that is
-conservative at every tau.
+error at half and at twice the horizon, and the largest one below the horizon: for flicker noise,
+which no random walk approximates well, -26 and +40 %. `imubench_pipeline.export.overbound` makes a
+model that is conservative at every tau.
 """
 
 from __future__ import annotations
@@ -39,25 +37,14 @@ _ROLES_NOT_REPLACED = (Role.WHITE, Role.NOT_GROWING, Role.NO_NOISE)
 
 @dataclass(frozen=True)
 class Mapped:
-    """A replacement model that a program supports.
+    """A replacement model that a program supports."""
 
-    Attributes
-    ----------
-    model : NoiseModel
-        For the program: N, at most one B with T_B, and K.
-    words : sequence of str
-        Description of the replacement and its error.
-    half, twice : float
-        Relative error of the Allan deviation at half and at twice the horizon; 0: exact.
-    most : float
-        The relative error of largest magnitude at a tau up to the horizon.
-    """
-
-    model: NoiseModel
-    words: Sequence[str]
+    model: NoiseModel  # for the program: N, at most one B with T_B, and K
+    words: Sequence[str]  # description of the replacement and its error
     half: float = 0.0
     twice: float = 0.0
-    most: float = 0.0
+    """Relative error of the Allan deviation at half and at twice the horizon; 0: exact."""
+    most: float = 0.0  # the relative error of largest magnitude at a tau up to the horizon
 
 
 def as_walk(

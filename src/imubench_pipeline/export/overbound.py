@@ -16,26 +16,19 @@ that is stationary in time [1, 2].
 
 The confidence limits of a measured curve hold at each tau separately; the true curve leaves them
 somewhere in a fifth to a third of the logs. The limits used here hold simultaneously for the whole
-curve: the error probability at each tau is 5 % over the number of octaves of the curve (Bonferroni
-correction), since Allan variances an octave apart are nearly independent.
+curve (`simultaneous_upper`).
 
 Density and integrals are bounded by noise models that are drawn jointly from the posterior of the
 fit: their limits lie above 95 % of the models at all frequencies and times simultaneously. Without
 draws, the fitted density and integrals are widened by the factors of the measured curve, which is
-less reliable. The time scale is the same: the density at f is widened by the factor at
-tau = 0.37 / f, where the transfer function of the Allan variance has its maximum, and the integrals
-at t by the factor at tau = t. With this widening, on 100 simulated logs of 10 h of each of three
-sensors (``benchmarks/overbound.py``), the models lay above the true curve in 99 or 100 logs, and a
-filter with these models was overconfident in one at most. With the noise of the MTi-7's gyro their
-Allan variance was 1.18 (N+K) and 1.12 times the true one at its minimum, in the median. No random
-walk lies close above flicker noise: there it was 5.0 times, and 4.5 times come from the family.
+less reliable: the density at f by the factor at tau = 0.37 / f, the integrals at t by the factor at
+tau = t. On 100 simulated logs of 10 h of each of three sensors (``benchmarks/overbound.py``) the
+models then lay above the true curve in 99 or 100, and a filter was overconfident in one at most.
 
 A random walk cannot follow a Gauss-Markov process: beyond 2 T_B its Allan variance must lie ever
 further above that process, and below the band its density still rises. The excess of a family is
 therefore reported with the model. A model whose Allan deviation must be more than three times its
 limit is refused, and the error names the excess of the other families.
-
-`find_smallest` does the search.
 
 References
 ----------
@@ -48,7 +41,7 @@ NAVIGATION 68 (2), 2021.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Literal, get_args
 
@@ -83,7 +76,7 @@ _ROUNDING_MARGIN = 1e-9
 class Limits:
     """Lower limits of a model."""
 
-    kind: str  # name of the limited quantity, for texts
+    kind: str  # the limited quantity, for texts
     x: Array  # shape (m,); tau or time, s, or frequency, Hz
     value: Array  # shape (m,); lower limit there
     of_term: Callable[[Term], Array]  # contribution of a term to the limited quantity at `x`
@@ -205,43 +198,26 @@ _MAX_RATIO_AT_CONTACT = 1.01
 
 @dataclass(frozen=True)
 class Overbound:
-    """A model that lies above its limits.
-
-    Attributes
-    ----------
-    horizon, longest : float
-        s.
-    band : tuple of float
-        Lowest and highest frequency, Hz.
-    tau, ratio : ndarray, shape (m,)
-        Allan variance of the model over the measured one, at tau up to ``longest``.
-    at_minimum : float
-        ``ratio`` at the minimum of the measured curve.
-    touches : mapping of str to float
-        Tau, frequency or time where the model is closest to a limit, by kind of limit; only limits
-        that are within 1 %.
-    excess : (float, float)
-        Max. ratio of the model's Allan deviation to its limit, and its tau, s. It depends on the
-        family; a longer log does not reduce it.
-    passed_below : float or None
-        Frequency, Hz, below which the fitted density is above the density of the model; None: it
-        is not, down to a ten-thousandth of the lowest frequency of the band.
-    warning : str or None
-        Why the family does not suit the horizon, with the excess of the other families.
-    """
+    """A model that lies above its limits."""
 
     model: NoiseModel
     family: Family
-    horizon: float
-    longest: float
-    band: tuple[float, float]
-    tau: Array
-    ratio: Array
-    at_minimum: float
+    horizon: float  # s
+    longest: float  # tau, s
+    band: tuple[float, float]  # lowest and highest frequency, Hz
+    tau: Array  # (m,): up to ``longest``, s
+    ratio: Array  # (m,): Allan variance of the model over the measured one
+    at_minimum: float  # ``ratio`` at the minimum of the measured curve
     touches: dict[str, float]
+    """Tau, frequency or time where the model is within 1 % of a limit, by kind of limit."""
     excess: tuple[float, float]
+    """Max. ratio of the model's Allan deviation to its limit, and its tau, s. It depends on the
+    family; a longer log does not reduce it."""
     passed_below: float | None
+    """Frequency, Hz, below which the fitted density is above the density of the model; None: it is
+    not, down to a ten-thousandth of the lowest frequency of the band."""
     warning: str | None = None
+    """Why the family does not suit the horizon, with the excess of the other families."""
 
     @property
     def words(self) -> str:
@@ -283,38 +259,19 @@ def overbound(
 ) -> Overbound:
     """Return the smallest model that lies above a measured curve and its fit.
 
-    Parameters
-    ----------
-    curve : AllanCurve
-        Measured.
-    fitted : NoiseModel
-        Fitted to the same log. Ramps and lines have no density and do not grow like noise: they
-        count only by their part of the measured curve.
-    rate : float
-        Hz.
-    family : {"N+K", "N+GM", "N+GM+K"}
-        Terms that the model may have.
-    horizon : float
-        Longest time that the filter predicts without a measurement, s.
-    longest : float, optional
-        Longest tau, s; the horizon by default.
-    band : (float or None, float or None)
-        Lowest and highest frequency of the bounded density, Hz; by default a tenth of 1 / horizon,
-        and half the rate. Lower the upper end for a sensor that is filtered below half the rate.
-    confidence : float
-        Of the limits, simultaneously for all tau.
-    drawn : sequence of NoiseModel
-        Models drawn jointly from the posterior of the fit. Without them the fitted model is
-        widened by the factors of the measured curve.
-    most_excess : float
-        Max. ratio of the model's Allan deviation to its limit.
+    ``fitted`` is of the same log; its ramps and lines have no density and do not grow like noise:
+    they count only by their part of the measured curve. The rate is in Hz. ``family`` are the terms
+    that the model may have; ``horizon`` is the longest time that the filter predicts without a
+    measurement, s, and by default also ``longest``, the longest tau. ``band`` is the lowest and
+    highest frequency of the bounded density, Hz, by default a tenth of 1 / horizon, and half the
+    rate; lower its end for a sensor that is filtered below half the rate. ``confidence`` is of the
+    limits, simultaneously for all tau. ``drawn`` are models drawn jointly from the posterior of the
+    fit; without them the fitted model is widened by the factors of the measured curve.
+    ``most_excess`` is the max. ratio of the model's Allan deviation to its limit.
 
-    Raises
-    ------
-    ValueError
-        If the family is not known, no model of it lies above, or only one that is more than
-        ``most_excess`` times too large, the horizon is shorter than two samples, or the curve does
-        not reach ``longest``.
+    Raises ValueError if the family is not known, no model of it lies above, or only one that is
+    more than ``most_excess`` times too large, the horizon is shorter than two samples, or the curve
+    does not reach ``longest``.
     """
     reach = longest or horizon
     ends = (band[0] or _MIN_FREQUENCY_TIMES_HORIZON / horizon, band[1] or 0.5 * rate)
@@ -329,7 +286,15 @@ def overbound(
         unsuited = texts.walk_cannot_follow(shortest, _MAX_HORIZON_OVER_T_B * shortest)
     warning = None
     if excess[0] > most_excess or unsuited:
-        offer = _compare_families(limits, family, times, excess, unsuited, most_excess)
+        others = {
+            other: _find_excess(limits[0], find_smallest(limits, other, times))[0]
+            for other in FAMILIES
+            if other != family
+        }
+        allowed = min(excess[0], most_excess)
+        better = [(other, value) for other, value in others.items() if value < allowed]
+        least = min([excess[0], *others.values()])
+        offer = texts.families_compared(family, excess, unsuited, better, least)
         if excess[0] > most_excess:
             raise ValueError(f"{offer}. At most {most_excess:g} times is allowed")
         warning = offer
@@ -355,27 +320,6 @@ def _find_excess(limit: Limits, model: NoiseModel) -> tuple[float, float]:
     above = limit.ratio(model)
     worst = int(np.argmax(above))
     return math.sqrt(float(above[worst])), float(limit.x[worst])
-
-
-def _compare_families(
-    limits: Sequence[Limits],
-    family: Family,
-    times: tuple[float, float],
-    excess: tuple[float, float],
-    unsuited: str | None,
-    most_excess: float,
-) -> str:
-    """Describe the excess of a family, its reason, and the excess of the other families."""
-    others = {
-        other: _find_excess(limits[0], find_smallest(limits, other, times))[0]
-        for other in FAMILIES
-        if other != family
-    }
-    better = {
-        other: value for other, value in others.items() if value < min(excess[0], most_excess)
-    }
-    least = min([excess[0], *others.values()])
-    return texts.families_compared(family, excess, unsuited, [*better.items()], least)
 
 
 def limits_of(
@@ -405,7 +349,13 @@ def limits_of(
         return np.concatenate((model.psd(frequency, rate), grown.first, grown.second))
 
     if drawn:
-        wider = of_model(fitted) * _bound_draws(of_model(fitted), map(of_model, drawn), confidence)
+        # Factors that bound a share of the draws simultaneously at every point (sup-t band): the
+        # quantile of the maxima of log(draw / fit) over its root mean square at each point.
+        above = np.log(np.array([*map(of_model, drawn)]) / of_model(fitted))
+        spread = np.maximum(np.sqrt(np.mean(above**2, axis=0)), 1e-12)
+        furthest = (above / spread).max(axis=1)
+        bound = max(float(np.quantile(furthest, confidence)), 0.0)
+        wider = of_model(fitted) * np.exp(bound * spread)
     else:
         looked = np.concatenate((_ALLAN_PEAK_FREQUENCY / frequency, time, time))
         factors = np.interp(np.log(looked), np.log(curve.tau), upper / curve.variance)
@@ -418,16 +368,3 @@ def limits_of(
         Limits("first integral", time, first, lambda t: t.growth_from_known(time)[0]),
         Limits("second integral", time, second, lambda t: t.growth_from_known(time)[1]),
     ]
-
-
-def _bound_draws(fitted: Array, drawn: Iterable[Array], confidence: float) -> Array:
-    """Return factors on a fit that bound a share of the draws simultaneously at every point.
-
-    The logarithm of draw over fit is divided by its root mean square at each point. Each draw has
-    a maximum of this quotient over all points. The limit is the quantile of these maxima, as for a
-    simultaneous (sup-t) confidence band.
-    """
-    above = np.log(np.array([*drawn]) / fitted)
-    spread = np.maximum(np.sqrt(np.mean(above**2, axis=0)), 1e-12)
-    furthest = (above / spread).max(axis=1)
-    return np.exp(max(float(np.quantile(furthest, confidence)), 0.0) * spread)

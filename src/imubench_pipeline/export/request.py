@@ -42,39 +42,21 @@ NEEDED = ("recordings", "parameters", "allan", "temperature")
 
 @dataclass(frozen=True, kw_only=True)
 class Request:
-    """Options of an exported file.
-
-    Attributes
-    ----------
-    axis : str
-        ``worst``, ``median``, a device or a recording (`imubench_pipeline.export.choice`).
-    horizon : float
-        s.
-    because : str or None
-        Reason of the inflation, or of the use of recordings that are excluded from decisions.
-    overbound : bool
-        Export the smallest model that lies above the measured curve instead of the fitted one.
-    most_excess : float
-        Max. ratio of the Allan deviation of an overbound to its limit; a larger model is refused.
-    method : str or None
-        Estimation method; None: the recommended one.
-    latitude : float or None
-        For gravity, degrees; None: standard gravity.
-    rate : float or None
-        Of the samples that the program will get, Hz; None: the rate of the recording.
-    """
+    """Options of an exported file."""
 
     sensor: str
     target: str
-    axis: str = WORST
-    horizon: float = 60.0
+    axis: str = WORST  # ``worst``, ``median``, a device or a recording (`choice.choose`)
+    horizon: float = 60.0  # s
     inflation: float = 1.0
     because: str | None = None
-    overbound: bool = False
+    """Reason of the inflation, or of the use of recordings that are excluded from decisions."""
+    overbound: bool = False  # export the smallest model above the measured curve, not the fitted
     most_excess: float = MAX_EXCESS
-    method: str | None = None
-    latitude: float | None = None
-    rate: float | None = None
+    """Max. ratio of the Allan deviation of an overbound to its limit; a larger one is refused."""
+    method: str | None = None  # of estimation; None: the recommended one
+    latitude: float | None = None  # for gravity, degrees; None: standard gravity
+    rate: float | None = None  # of the program's samples, Hz; None: the rate of the recording
 
 
 def load(path: Path) -> dict[str, pa.Table]:
@@ -147,9 +129,8 @@ def build_imu(tables: Tables, request: Request, folder: Path | None = None) -> I
     if not axes:
         reasons = "; ".join(row.reason for row in recordings if row.reason)
         raise ExportError(f"{request.sensor}: no estimate; its recordings are left out: {reasons}")
-    gravity = (
-        STANDARD_GRAVITY if request.latitude is None else compute_normal_gravity(request.latitude)
-    )
+    latitude = request.latitude
+    gravity = STANDARD_GRAVITY if latitude is None else compute_normal_gravity(latitude)
     return Imu(
         sensor=request.sensor,
         rate=request.rate or max(rates),
@@ -178,9 +159,8 @@ def _select_deciding(
     ]
     if not apart:
         return rows, without
-    reasons = recordings_not_used(
-        [(recording, doubts_text(doubts)) for (_, recording), doubts in apart.items()]
-    )
+    doubted = [(recording, doubts_text(doubts)) for (_, recording), doubts in apart.items()]
+    reasons = recordings_not_used(doubted)
     if (request.because or "").strip():
         return rows, [texts.used_despite_doubts(reasons, request.because or ""), *without]
     deciding = [row for row in rows if (row.sensor, row.recording) not in apart]

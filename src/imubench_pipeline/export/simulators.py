@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 from imubench_pipeline.export.comments import (
     describe_model,
@@ -62,12 +61,8 @@ def write_gnss_ins_sim(imu: Imu) -> str:
         f'    "{key}": np.full(3, {float(f"{value:.9g}")!r}),  # {comment}\n'
         for key, value, comment in entries
     ]
-    return (
-        format_python_comments(about)
-        + "import numpy as np\n\nimu_err = {\n"
-        + "".join(lines)
-        + "}\n"
-    )
+    text = "import numpy as np\n\nimu_err = {\n" + "".join(lines) + "}\n"
+    return format_python_comments(about) + text
 
 
 def _stationary_deviation(model: NoiseModel) -> float:
@@ -87,12 +82,7 @@ _MAX_SAMPLES_PER_POLE = 5.0
 """Max. samples per pole; up to them the Allan deviation of flicker noise is within 11 %."""
 
 
-@dataclass(frozen=True)
-class _Parameters:
-    N: float
-    K: float
-    drive: float
-    coefficients: str
+_Parameters = tuple[float, float, float, str]  # N, K, the drive and the filter coefficients
 
 
 def write_matlab(imu: Imu) -> str:
@@ -135,13 +125,14 @@ def write_matlab(imu: Imu) -> str:
     }
     for name, figures in parameters.items():
         member, maker, unit = members[name]
+        N, K, drive, coefficients = figures
         lines = [
             ("'NoiseType'", "'single-sided'", "two-sided density, see above"),
-            ("'NoiseDensity'", _format_vector([figures.N] * 3), f"N, {unit}/sqrt(Hz)"),
-            ("'RandomWalk'", _format_vector([figures.K] * 3), f"K, {unit} sqrt(Hz)"),
-            ("'BiasInstability'", _format_vector([figures.drive] * 3), f"of the drive, {unit}"),
+            ("'NoiseDensity'", _format_vector([N] * 3), f"N, {unit}/sqrt(Hz)"),
+            ("'RandomWalk'", _format_vector([K] * 3), f"K, {unit} sqrt(Hz)"),
+            ("'BiasInstability'", _format_vector([drive] * 3), f"of the drive, {unit}"),
             *biases[name][0],
-            ("'BiasInstabilityCoefficients'", figures.coefficients, "of the filter"),
+            ("'BiasInstabilityCoefficients'", coefficients, "of the filter"),
         ]
         text += f"IMU.{member} = {maker}( ...\n"
         for i, (key, value, comment) in enumerate(lines):
@@ -185,16 +176,16 @@ def _map_parameters(axis: AxisNoise, imu: Imu) -> tuple[Mapped, _Parameters]:
         with_walk = as_process(rest, imu.horizon, imu.rate, walk=True)
         flicker = NoiseModel(N=model.N, B=model.B, K=model.K)
         mapped = Mapped(flicker, [words, *with_walk.words])
-        return mapped, _Parameters(model.N, model.K, model.B, f"fractalcoef({poles})")
+        return mapped, (model.N, model.K, model.B, f"fractalcoef({poles})")
     mapped = as_process(model, imu.horizon, imu.rate, walk=True)
     process = mapped.model
     if process.T_B is None or process.B == 0.0:
-        return mapped, _Parameters(process.N, process.K, 0.0, "fractalcoef(1)")
+        return mapped, (process.N, process.K, 0.0, "fractalcoef(1)")
     p = math.exp(-1.0 / (imu.rate * process.T_B))
     stationary = compute_driving_density(process.B, process.T_B) * process.T_B / 2.0
     drive = math.sqrt(-stationary * math.expm1(-2.0 / (imu.rate * process.T_B)))
     coefficients = f"struct('Numerator', 1, 'Denominator', [1, {-p:.17g}])"
-    return mapped, _Parameters(process.N, process.K, drive, coefficients)
+    return mapped, (process.N, process.K, drive, coefficients)
 
 
 def _format_vector(values: Sequence[float]) -> str:

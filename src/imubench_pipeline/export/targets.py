@@ -20,26 +20,15 @@ from imubench_pipeline.export.visual_inertial import (
 
 @dataclass(frozen=True)
 class Target:
-    """A program that a noise model can be exported to.
+    """A program that a noise model can be exported to."""
 
-    Attributes
-    ----------
-    name, program : str
-        Identifier in commands and settings, and the name for people.
-    file_name : str
-        The usual name of its file.
-    write : callable
-        Imu -> content of the file: str, or bytes. Raises ExportError if the program needs a
-        quantity without estimate, or a density above 0.
-    family : str
-        Terms that the program supports; an overbound for it has these.
-    """
-
-    name: str
-    program: str
-    file_name: str
+    name: str  # in commands and settings
+    program: str  # its name for people
+    file_name: str  # the usual name of its file
     write: Callable[[Imu], str | bytes]
-    family: Family
+    """Returns the content of the file; ExportError if the program needs a quantity without
+    estimate, or a density above 0."""
+    family: Family  # terms that the program supports; an overbound for it has these
 
 
 TARGETS: Mapping[str, Target] = {

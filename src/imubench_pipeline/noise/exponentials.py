@@ -28,11 +28,8 @@ def evaluate_phi(order: int, z: Array | ComplexArray) -> ComplexArray: ...
 def evaluate_phi(order: int, z: complex | Array | ComplexArray) -> complex | ComplexArray:
     """Return phi_k(z), the integral of (1 - s)^(k-1) / (k-1)! e^(z s) over s from 0 to 1.
 
-    phi_k(z) = z^-k (e^z - sum_{j<k} z^j / j!) = sum_n z^n / (n + k)!, k from 0.
-
-    References
-    ----------
-    M. Hochbruck and A. Ostermann, "Exponential integrators", Acta Numerica 19, 2010.
+    phi_k(z) = z^-k (e^z - sum_{j<k} z^j / j!) = sum_n z^n / (n + k)!, k from 0 (M. Hochbruck and A.
+    Ostermann, "Exponential integrators", Acta Numerica 19, 2010).
     """
     if isinstance(z, np.ndarray):
         small = np.abs(z) < _MAX_ARGUMENT_FOR_SERIES

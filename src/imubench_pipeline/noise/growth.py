@@ -6,14 +6,11 @@ The error of a channel at a time t after the start is
 
 with c = t^(m+1) / (m+1)! and m = 0 for the attitude from a gyro and the velocity from an
 accelerometer, 1 for the next integrals, 2 for the position from a gyro. The estimated bias is the
-mean over a static window of length W that ends at the start. So e weights the process by a kernel
-h(s): the weights of the integration on 0..t and -c/W on -W..0, and
-
-    sigma^2 = integral of S(f) |H(f)|^2 df over all f,
-
-with H the Fourier transform of h. H(0) = 0, so that this integral is finite also for flicker noise
-(1/f) and a random walk (1/f^2). Each term has it in closed form (`Term.growth`), with t the time, W
-the window and A the time since switch-on, from the densities of IEEE Std 952-2020.
+mean over a static window of length W that ends at the start. sigma^2 is the integral of S(f)
+|H(f)|^2 over all f, with H the Fourier transform of the weights of z: the weights of integration on
+0..t and -c/W on -W..0. H(0) = 0, so that it is finite also for flicker noise (1/f) and a random
+walk (1/f^2). Each term has it in closed form (`Term.growth`), with t the time, W the window and A
+the time since switch-on, from the densities of IEEE Std 952-2020.
 """
 
 from __future__ import annotations
@@ -29,15 +26,10 @@ class Calibrated:
     The mean of a gyro is its bias plus the Earth's rate, and the mean of an accelerometer its bias
     plus gravity times the tilt; both are removed. The sensor is assumed to have been on for some
     time. The error is 4 % smaller if flicker noise starts with a window as long as the motion, and
-    0.3 % smaller if it starts this time earlier.
-
-    Parameters
-    ----------
-    window : float
-        W, s; ValueError if it is not above 0.
+    0.3 % smaller if it starts this time earlier. Raises ValueError if W is not above 0.
     """
 
-    window: float
+    window: float  # W, s
 
     def __post_init__(self) -> None:
         if not (math.isfinite(self.window) and self.window > 0):
@@ -49,17 +41,12 @@ class Uncalibrated:
     """The bias of a sensor is not estimated: turn-on bias and the noise since switch-on remain.
 
     Flicker noise, random walk and ramp are 0 at switch-on. Gauss-Markov processes are stationary.
-
-    Parameters
-    ----------
-    bias : float or None
-        Turn-on bias, 1 sigma, rad/s or m/s^2; None: from the data of the sensor (`in_use`).
-    on_time : float
-        Time from switch-on to the start, s; ValueError if one is negative or not finite.
+    Raises ValueError if a figure is negative or not finite.
     """
 
     bias: float | None
-    on_time: float
+    """Turn-on bias, 1 sigma, rad/s or m/s^2; None: from the data of the sensor (`in_use`)."""
+    on_time: float  # time from switch-on to the start, s
 
     def __post_init__(self) -> None:
         for name in ("bias", "on_time"):

@@ -20,18 +20,11 @@ class LowPass:
     """A low-pass filter of unit gain at rest: v' = F v + b u, y = c v.
 
     It is a cascade of sections of first and second order, so that its states have the magnitude of
-    the signal at any cut-off frequency.
-
-    Parameters
-    ----------
-    cutoff : float
-        Frequency at which the power is halved (-3 dB), Hz; ValueError if not above 0.
-    order : int
-        1, or the order of the Butterworth filter; ValueError if not 1 to 10.
+    the signal at any cut-off frequency. Raises ValueError if a figure is out of its range.
     """
 
-    cutoff: float
-    order: int = 1
+    cutoff: float  # frequency at which the power is halved (-3 dB), Hz, above 0
+    order: int = 1  # 1, or the order of the Butterworth filter, to 10
 
     def __post_init__(self) -> None:
         if not (math.isfinite(self.cutoff) and self.cutoff > 0):

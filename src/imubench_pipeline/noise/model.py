@@ -11,18 +11,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from imubench_pipeline.noise.state_space import StateSpace
-from imubench_pipeline.noise.terms import (
-    PARAMETERS,
-    Deterministic,
-    Flicker,
-    GaussMarkov,
-    Quantization,
-    Ramp,
-    RandomWalk,
-    Sinusoid,
-    Term,
-    WhiteNoise,
-)
+from imubench_pipeline.noise.terms import PARAMETERS
+from imubench_pipeline.noise.terms.base import Deterministic, Term
+from imubench_pipeline.noise.terms.flicker import Flicker
+from imubench_pipeline.noise.terms.gauss_markov import GaussMarkov
+from imubench_pipeline.noise.terms.power_laws import Quantization, Ramp, RandomWalk, WhiteNoise
+from imubench_pipeline.noise.terms.sinusoid import Sinusoid
 from imubench_pipeline.typing import Array
 
 _MAX_FLICKER_TAU = 1e5  # default longest tau of a bank for flicker noise, s

@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 from imubench_pipeline.allan.confidence import match_lower_tail, match_variance
 from imubench_pipeline.allan.phase import Presence, Span, list_spans
 from imubench_pipeline.noise.model import NoiseModel
-from imubench_pipeline.noise.terms import Deterministic, Quantization
+from imubench_pipeline.noise.terms.base import Deterministic
+from imubench_pipeline.noise.terms.power_laws import Quantization
 from imubench_pipeline.typing import Array
 
 _LAGS_PER_CLUSTER = 32  # at which the covariance is evaluated; linear in between
@@ -53,13 +54,8 @@ def compute_degrees_of_freedom(
     ``sizes``, shape (m,), are n of each tau; no difference spans two segments. If samples are
     missing, ``presence`` says which, and ``share``, shape (m,), is the share of the differences
     that is not lost. The ramp and the lines of the model add to the Allan variance, but are not
-    noise.
-
-    References
-    ----------
-    C. Greenhall and W. Riley, "Uncertainty of stability variances based on finite differences",
-    PTTI 2003, for power laws; W. Satterthwaite, "An approximate distribution of estimates of
-    variance components", Biometrics Bulletin 2, 1946.
+    noise. (C. Greenhall and W. Riley, "Uncertainty of stability variances based on finite
+    differences", PTTI 2003, for power laws; W. Satterthwaite, Biometrics Bulletin 2, 1946.)
     """
     spans = list_spans(segments, samples)
     left = np.ones(len(sizes)) if share is None else share

@@ -58,10 +58,8 @@ class StateSpace:
     def of_either_sign(self) -> StateSpace:
         """Return the model with the mean of the first state replaced by its square as variance."""
         squares = np.diag([mean**2 for mean in self.initial_mean.tolist()])
-        variance = self.initial_variance + squares
-        return replace(
-            self, initial_mean=np.zeros_like(self.initial_mean), initial_variance=variance
-        )
+        mean, variance = np.zeros_like(self.initial_mean), self.initial_variance + squares
+        return replace(self, initial_mean=mean, initial_variance=variance)
 
 
 @dataclass(frozen=True)
@@ -71,12 +69,6 @@ class ContinuousSpace:
     transition: Array  # F, 1/s, (m, m)
     density: Array  # Q of w, (m, m)
     output: Array  # H, (m,)
-
-    @classmethod
-    def without_states(cls) -> ContinuousSpace:
-        """Return a model without states."""
-        none = np.zeros((0, 0))
-        return cls(none, none, np.zeros(0))
 
 
 def _build_block_diagonal(parts: Sequence[Array]) -> Array:

@@ -6,12 +6,10 @@ where p is the steady state of the filter for a unit input:
 
     dx = -x/T dt + dw,    de = (F e + p x/T) dt - p dw,    y = x + c e.
 
-e is small where x is slow. This avoids cancellation between a correlation time of days and a filter
-of milliseconds. The covariances are integrated over a short step by Gauss-Legendre quadrature,
-exact to rounding. They are then doubled to the sampling interval as triangular factors. No
-differences are formed, no exponential overflows, and the covariance cannot become indefinite.
-(The single-step method of Van Loan, 1978, has both problems if the filter is much faster than the
-sampling.)
+e is small where x is slow: there is no cancellation between a correlation time of days and a filter
+of milliseconds. The covariances are integrated over a short step by Gauss-Legendre quadrature, and
+doubled to the sampling interval as triangular factors: no exponential overflows, and no covariance
+becomes indefinite, as by the single-step method of Van Loan (1978).
 """
 
 from __future__ import annotations

@@ -23,25 +23,14 @@ SAMPLES_PER_BLOCK = 8 * SAMPLES_PER_CHUNK
 class ImuModel:
     """The axes of one sensor.
 
-    Parameters
-    ----------
-    axes : mapping of str to SensorModel
-        By channel, ``gyro_x`` to ``accel_z``, for the axes of the sensor.
-    misalignment : mapping of str to ndarray, shape (3, 3)
-        By quantity: response of the axes x, y, z (rows) to a unit rate or specific force along the
-        true x, y, z, without scale errors. The identity for a quantity that is not named.
-    temperature_step : float
-        Step of the register of temperature, K; 0: not rounded.
-
-    Raises
-    ------
-    ValueError
-        If a channel is not known, or a matrix is not of finite numbers, 3 by 3.
+    Raises ValueError if a channel is not known, or a matrix is not of finite numbers, 3 by 3.
     """
 
-    axes: Mapping[str, SensorModel]
+    axes: Mapping[str, SensorModel]  # by channel, ``gyro_x`` to ``accel_z``
     misalignment: Mapping[str, Array] = field(default_factory=dict)
-    temperature_step: float = 0.0
+    """By quantity, shape (3, 3): response of the axes x, y, z (rows) to a unit rate or specific
+    force along the true x, y, z, without scale errors. By default the identity."""
+    temperature_step: float = 0.0  # of the register of temperature, K; 0: not rounded
 
     def __post_init__(self) -> None:
         if unknown := [name for name in self.axes if name not in CHANNELS]:

@@ -10,10 +10,7 @@ the filter: it is the error -dq/dt, over a sampling interval, of a converter tha
 of angle or velocity. It differs from the rounding to the resolution (LSB) of a rate register, which
 is simulated as rounding to the nearest step. With noise of at least half a step, rounding adds
 LSB^2 / 12 to the variance of each sample; spectrum and Allan variance use this value. A sensor
-seldom has both: an estimate of N from a rounded log already contains the rounding.
-
-N before low-pass and rounding differs from N of a log (`in_the_log`): sampling aliases the noise
-above the Nyquist frequency, and a register adds LSB^2 / 12 per sample.
+seldom has both: an estimate of N from a rounded log already contains the rounding (`in_the_log`).
 """
 
 from __future__ import annotations
@@ -27,9 +24,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.optimize import nnls
 
-from imubench_pipeline.noise import NoiseModel
+from imubench_pipeline.noise import GaussMarkov, NoiseModel, Term, compute_bias_instability
 from imubench_pipeline.noise.low_pass import LowPass
-from imubench_pipeline.noise.terms import GaussMarkov, Term, compute_bias_instability
 from imubench_pipeline.noise.terms.base import drives_of
 from imubench_pipeline.simulate.discretisation import (
     compute_filter_transition,
@@ -227,28 +223,13 @@ class TemperatureDrift:
 
     drift = sensitivity (θ - reference) + quadratic (θ - reference)^2, where θ follows the
     temperature with a first-order lag: dθ/dt = (temperature - θ) / lag. There is no hysteresis.
-
-    Parameters
-    ----------
-    sensitivity : float
-        rad/s/K or m/s^2/K.
-    reference : float
-        Temperature of zero drift, °C.
-    quadratic : float
-        rad/s/K^2 or m/s^2/K^2.
-    lag : float
-        s; 0: none.
-
-    Raises
-    ------
-    ValueError
-        If a figure is not finite, or the lag is below 0.
+    Raises ValueError if a figure is not finite, or the lag is below 0.
     """
 
-    sensitivity: float
-    reference: float = 25.0
-    quadratic: float = 0.0
-    lag: float = 0.0
+    sensitivity: float  # rad/s/K or m/s^2/K
+    reference: float = 25.0  # temperature of zero drift, °C
+    quadratic: float = 0.0  # rad/s/K^2 or m/s^2/K^2
+    lag: float = 0.0  # s; 0: none
 
     def __post_init__(self) -> None:
         for name in ("sensitivity", "reference", "quadratic", "lag"):
@@ -262,34 +243,16 @@ class TemperatureDrift:
 class SensorModel:
     """One axis of a sensor.
 
-    Parameters
-    ----------
-    noise : NoiseModel
-        N is the density before the low-pass.
-    bias : float
-        Fixed bias, rad/s or m/s^2.
-    drift : TemperatureDrift, optional
-    low_pass : LowPass, optional
-    scale_error : float
-        Relative error of the scale factor.
-    resolution : float
-        Step of the register (LSB), rad/s or m/s^2; 0: not rounded.
-    full_scale : float, optional
-        Magnitude at which the output saturates, rad/s or m/s^2.
-
-    Raises
-    ------
-    ValueError
-        If a figure is out of its range, or a further term has no `Term.drive`.
+    Raises ValueError if a figure is out of its range, or a further term has no `Term.drive`.
     """
 
-    noise: NoiseModel = field(default_factory=NoiseModel)
-    bias: float = 0.0
+    noise: NoiseModel = field(default_factory=NoiseModel)  # N is the density before the low-pass
+    bias: float = 0.0  # fixed, rad/s or m/s^2
     drift: TemperatureDrift | None = None
     low_pass: LowPass | None = None
-    scale_error: float = 0.0
-    resolution: float = 0.0
-    full_scale: float | None = None
+    scale_error: float = 0.0  # relative error of the scale factor
+    resolution: float = 0.0  # step of the register (LSB), rad/s or m/s^2; 0: not rounded
+    full_scale: float | None = None  # magnitude at which the output saturates, rad/s or m/s^2
 
     def __post_init__(self) -> None:
         for name in ("bias", "scale_error"):

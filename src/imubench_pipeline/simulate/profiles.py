@@ -10,9 +10,10 @@ from __future__ import annotations
 import math
 import re
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import ExitStack
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -48,17 +49,9 @@ _EXPECTED_CSV = "commas between columns, points before decimals, and one line of
 
 
 class FileSeries:
-    """Columns over time in a file.
+    """Columns over time in a file: CSV with a line of names, or Parquet.
 
-    Parameters
-    ----------
-    path : Path
-        CSV with a line of names, or Parquet.
-
-    Raises
-    ------
-    ConfigError
-        If the file does not exist, cannot be read, or has no column ``time``.
+    Raises ConfigError if the file does not exist, cannot be read, or has no column ``time``.
     """
 
     def __init__(self, path: Path) -> None:
@@ -364,14 +357,8 @@ def make_profile(form: Form, name: str, folder: Path, opened: dict[Path, FileSer
 
 def _make_formula_profile(form: Formula, dimension: str, *, difference: bool = False) -> Profile:
     """Return a profile of a value, or of a difference, for which 5 degC and 5 K are the same."""
-    convert: Callable[[str, str], float] = parse_difference if difference else parse_quantity
-
-    def time(text: str) -> float:
-        return parse_quantity(text, "time")
-
-    def value(text: str) -> float:
-        return convert(text, dimension)
-
+    time = partial(parse_quantity, dimension="time")
+    value = partial(parse_difference if difference else parse_quantity, dimension=dimension)
     match form:
         case ConstantForm():
             return Constant(value(form.value))

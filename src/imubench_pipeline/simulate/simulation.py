@@ -19,7 +19,7 @@ from collections.abc import Callable, Iterator
 import numpy as np
 from numba import njit
 
-from imubench_pipeline.noise.terms import Term
+from imubench_pipeline.noise import Term
 from imubench_pipeline.simulate.discretisation import (
     compute_filter_transition,
     compute_stationary_distribution,
@@ -67,26 +67,16 @@ def run(
 ) -> None:
     """Write samples to a log, and update the states to the last sample.
 
-    Parameters
-    ----------
-    log : ndarray, shape (L,)
-        Written: output of the filter.
-    entering, temperature : ndarray, shape (L,)
-        Input at the samples without noise and drift, and °C (empty: no drift); linear in between.
-    normal : ndarray, shape (L, n + max(m, 1))
-        Normal deviates. The states do not use the row of the first sample of the log.
-    memory, x, e : ndarray, shapes (4,), (n,), (m,)
-        The states, changed in place.
-    decay, own, coupling, shared : ndarray, shapes (n,), (n,), (m, n), (m, n)
-        Matrices of the slow states.
-    transition, factor, output : ndarray, shapes (m, m), (m, m), (m,)
-        Matrices of the filter; its own noise is normal @ factor.
-    white : float
-        Standard deviation of white noise per sample, if there is no filter.
-    step, lag, lag_coupling, lagged_step : ndarray, shapes (m,), (2,), (m,), (m,)
-        `HeldInput`: for a unit change of the input; for 1 K and a drift of 1 SI unit per K.
-    drift : ndarray, shape (3,)
-        Sensitivity, SI/K, quadratic, SI/K², and reference, °C.
+    ``log``, shape (L,), is the output of the filter; ``entering`` and ``temperature``, shape (L,),
+    the input at the samples without noise and drift, and °C (empty: no drift), linear in between;
+    ``normal``, shape (L, n + max(m, 1)), normal deviates, whose first row the states do not use at
+    the first sample of the log. ``memory``, ``x`` and ``e``, shapes (4,), (n,) and (m,), are the
+    states, changed in place; ``decay``, ``own``, ``coupling`` and ``shared``, shapes (n,), (n,),
+    (m, n) and (m, n), the matrices of the slow states; ``transition``, ``factor`` and ``output``,
+    shapes (m, m), (m, m) and (m,), the matrices of the filter; its own noise is normal @ factor.
+    ``white`` is the standard deviation of white noise per sample, if there is no filter; ``step``,
+    ``lag``, ``lag_coupling`` and ``lagged_step``, shapes (m,), (2,), (m,) and (m,), are from
+    `HeldInput`; ``drift``, shape (3,), is sensitivity, SI/K, quadratic, SI/K², and reference, °C.
     """
     n, m = x.size, e.size
     before = np.empty(m)

@@ -46,8 +46,11 @@ from imubench_pipeline.estimators.thermal.fit import (
     add_temperature_effect,
     fit_temperature,
 )
-from imubench_pipeline.estimators.thermal.path import TemperaturePath, estimate_temperature_path
-from imubench_pipeline.estimators.thermal.register import estimate_resolution
+from imubench_pipeline.estimators.thermal.path import (
+    TemperaturePath,
+    estimate_resolution,
+    estimate_temperature_path,
+)
 from imubench_pipeline.model import estimates as model
 from imubench_pipeline.model.recordings import FindingRow
 from imubench_pipeline.noise.simulate import channel_rng

@@ -11,10 +11,13 @@ import numpy as np
 
 from imubench_pipeline.allan.phase import Span
 from imubench_pipeline.estimators.deterministic.means import Means, average_blocks
-from imubench_pipeline.estimators.deterministic.ordinates import Fit, Ordinates
-from imubench_pipeline.estimators.deterministic.regressors import Regressor
-from imubench_pipeline.estimators.deterministic.scores import MIN_CYCLES, Gain
-from imubench_pipeline.estimators.deterministic.search import SearchResult, search_signals
+from imubench_pipeline.estimators.deterministic.ordinates import Fit, Ordinates, Regressor
+from imubench_pipeline.estimators.deterministic.search import (
+    MIN_CYCLES,
+    Gain,
+    SearchResult,
+    search_signals,
+)
 from imubench_pipeline.estimators.estimate import SIGMAS
 from imubench_pipeline.typing import Array
 
@@ -138,9 +141,9 @@ def _describe(ordinates: Ordinates, searched: SearchResult) -> Iterator[Determin
             # period depends on the period.
             sizes = [size]
             for where in (low, high):
-                moved = tuple(
-                    replace(x, where=where) if x is regressor else x for x in fit.regressors
-                )
+                moved = [
+                    x if x is not regressor else replace(x, where=where) for x in fit.regressors
+                ]
                 sizes.append(_compute_size(ordinates.solve(moved, fit.density)[0][own]))
             error = math.hypot(error, 0.5 * float(np.ptp(sizes)))
         place = start + regressor.where * means.interval

@@ -2,7 +2,8 @@
 
 The coefficients c_k are independent with the variance S(omega_k) of the noise model, so that
 generalised least squares reduces to weighted sums. Removing regressors also removes noise from the
-lowest ordinates: an ordinate with leverage h_k counts as 1 - h_k of one.
+lowest ordinates: an ordinate with leverage h_k counts as 1 - h_k of one. Regressors are steps,
+exponentials, sinusoids and ramps at the block means of one part of a log; time is in blocks.
 """
 
 from __future__ import annotations
@@ -11,12 +12,12 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Literal
 
 import numpy as np
 import scipy.fft
 
 from imubench_pipeline.estimators.deterministic.means import Means
-from imubench_pipeline.estimators.deterministic.regressors import Regressor
 from imubench_pipeline.estimators.spectrum import Spectrum, make_bin_edges
 from imubench_pipeline.estimators.whittle import COARSE, Maximum, Terms, Whittle, make_whittle
 from imubench_pipeline.typing import Array
@@ -24,6 +25,54 @@ from imubench_pipeline.typing import Array
 NOISE_TERMS = Terms("NFK", 1)  # includes the models of logs without regressors
 _FIT_ROUNDS = 2
 _MIN_WEIGHT = 0.05  # weight of an ordinate that the regressors explain almost completely
+
+
+RegressorKind = Literal["step", "exponential", "sinusoid", "ramp"]
+
+
+@dataclass(frozen=True)
+class Regressor:
+    """A deterministic signal of unit amplitude in one part of a log."""
+
+    kind: RegressorKind
+    """``step``: 0 before its place, 1 from there on, a line over a gap; ``exponential``: 1 at
+    the start of the part; ``sinusoid``: a cosine and a sine; ``ramp``: slope 1 per block."""
+    part: int  # number of the part
+    where: float = 0.0
+    """Place of a step, time constant of an exponential, both in blocks; frequency of a sinusoid in
+    cycles per block."""
+    length: float = 0.0  # of the gap that a step is in, blocks
+
+    @property
+    def columns(self) -> int:
+        """Number of amplitudes."""
+        return 2 if self.kind == "sinusoid" else 1
+
+    def means(self, n: int) -> Array:
+        """Return its means in n blocks, shape (columns, n)."""
+        i = np.arange(n, dtype=np.float64)
+        if self.kind == "step":
+            first = self.where - 0.5 * self.length
+            return np.clip((i + 1.0 - first) / (self.length + 1.0), 0.0, 1.0)[None]
+        if self.kind == "exponential":
+            return -self.where * math.expm1(-1.0 / self.where) * self.at(i)
+        scale = np.sinc(self.where) if self.kind == "sinusoid" else 1.0
+        return np.asarray(scale * self.at(i + 0.5))
+
+    def coefficients(self, n: int) -> Array:
+        """Return its orthonormal DCT-II coefficients 1 ... n - 1, shape (columns, n - 1)."""
+        return np.asarray(scipy.fft.dct(self.means(n), type=2, norm="ortho", axis=1)[:, 1:])
+
+    def at(self, blocks: Array) -> Array:
+        """Return its values, shape (columns, s), at times in blocks from the start of its part."""
+        if self.kind == "step":
+            return (blocks >= self.where).astype(np.float64)[None]
+        if self.kind == "exponential":
+            return np.exp(-blocks / self.where)[None]
+        if self.kind == "ramp":
+            return blocks[None]
+        phase = 2.0 * np.pi * self.where * blocks
+        return np.array([np.cos(phase), np.sin(phase)])
 
 
 @dataclass(frozen=True)

@@ -5,10 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 
-from imubench_pipeline.estimators.deterministic.courses import (
-    DeterministicSignal,
-    DeterministicSignals,
-)
+from imubench_pipeline.estimators.deterministic.courses import DeterministicSignals
 from imubench_pipeline.estimators.deterministic.means import assess_stationarity
 from imubench_pipeline.estimators.deterministic.search import MAX_REGRESSORS
 from imubench_pipeline.estimators.estimate import CURVE, SIGMAS, Estimate, Parameter
@@ -56,7 +53,16 @@ def assess_signals(channel: str, signals: DeterministicSignals) -> Verdict:
     """Return the findings of a channel, and the doubt about its slow terms."""
     if signals.means is None or signals.searched is None:
         return Verdict(())
-    findings = [_describe_signal(channel, signal) for signal in signals.signals]
+    findings: list[Finding] = []
+    for signal in signals.signals:
+        size = (signal.size, signal.size_lower, signal.size_upper)
+        time = (signal.time or 0.0, signal.time_lower or 0.0, signal.time_upper or 0.0)
+        change: FindingData = BiasStep(*size, signal.start, signal.place_error or 0.0)
+        if signal.kind != "bias_step":
+            kind = WarmUpDrift if signal.kind == "warm_up_drift" else PeriodicDrift
+            change = kind(*size, *time)
+        place = channel, signal.start, signal.end
+        findings.append(find(change, "warning", signal.size, *place))
     steady = assess_stationarity(signals.means)
     if steady is not None and steady.has_trend:
         data = NoiseTrend(steady.trend, SIGMAS * steady.trend_error)
@@ -76,18 +82,3 @@ def tabulate_signals(
         columns = {**key, **vars(signal), "unit": unit}
         del columns["regressor"], columns["amplitudes"]
         yield DeterministicRow(**columns)
-
-
-def _describe_signal(channel: str, signal: DeterministicSignal) -> Finding:
-    size = (signal.size, signal.size_lower, signal.size_upper)
-    data: FindingData
-    if signal.kind == "bias_step":
-        data = BiasStep(*size, signal.start, signal.place_error or 0.0)
-    else:
-        assert signal.time is not None
-        assert signal.time_lower is not None
-        assert signal.time_upper is not None
-        time = (signal.time, signal.time_lower, signal.time_upper)
-        kind = WarmUpDrift if signal.kind == "warm_up_drift" else PeriodicDrift
-        data = kind(*size, *time)
-    return find(data, "warning", signal.size, channel, signal.start, signal.end)

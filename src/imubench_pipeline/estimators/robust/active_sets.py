@@ -16,8 +16,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from imubench_pipeline.noise import NoiseModel
-from imubench_pipeline.noise.terms import GaussMarkov
+from imubench_pipeline.noise import GaussMarkov, NoiseModel
 from imubench_pipeline.typing import Array
 
 WHITE, FLICKER, PROCESS, WALK, RAMP = range(5)

@@ -72,12 +72,9 @@ def fit_temperature(
     ``blocks`` are the log in order, in SI, NaN where a sample is missing; ``path`` is its
     temperature, in the same segments. The noise is used up to the frequency ``highest``, Hz, by
     default all. The square of the temperature is in the model if BIC favours it. The lag is at most
-    a twentieth of the longest segment, and half an hour.
-
-    References
-    ----------
-    A. C. Aitken, Proc. R. Soc. Edinburgh 55, 1935 (generalised least squares); H. D. Patterson and
-    R. Thompson, Biometrika 58, 1971 (restricted likelihood).
+    a twentieth of the longest segment, and half an hour. Generalised least squares: A. C. Aitken,
+    Proc. R. Soc. Edinburgh 55, 1935; restricted likelihood: H. D. Patterson and R. Thompson,
+    Biometrika 58, 1971.
     """
     means = average_blocks(blocks, samples, rate, path.segments)
     if not means.parts:
@@ -144,13 +141,15 @@ def _describe(
     covariance = posterior.covariance + moved[:p, :p]
     error = SIGMAS * np.sqrt(np.diag(covariance))
     lower, upper = effect.beta - error, effect.beta + error
-    confused = _explain_confusion(regression, effect)
+    columns = np.vstack([regression.columns(effect.lag, Shape()), regression.time])
+    information = (columns * regression.ordinates.weights(effect.density)) @ columns.T
+    shared = float(information[0, 1] ** 2 / (information[0, 0] * information[1, 1]))
+    confused = texts.temperature_like_ramp(shared) if shared > _MAX_RAMP_FRACTION else None
     of_temperature = slice(1 + effect.shape.quadratic)
     excluded = bool(((lower > 0.0) | (upper < 0.0))[of_temperature].any())
     compensated = excluded and confused is None and gained > 0.0
-    reason = confused or texts.SENSITIVITY_WITH_ZERO
-    if excluded and confused is None:
-        reason = texts.temperature_preferred(gained)
+    excluding = texts.temperature_preferred(gained) if excluded else texts.SENSITIVITY_WITH_ZERO
+    reason = confused or excluding
     if effect.shape.settling > 0.0:
         reason += f"; {texts.settling_excluded(effect.shape.settling)}"
     figures = [
@@ -201,14 +200,6 @@ def _limit_lag(value: float, posterior: Posterior, by_path: float, longest: floa
         reason = texts.interval_with_zero(at_limit=False)
         return Parameter(None, "not_identified", reason, lower, upper, fitted=value)
     return Parameter(value, "ok", None, lower, upper)
-
-
-def _explain_confusion(regression: Regression, effect: Effect) -> str | None:
-    """Return why temperature and time are not distinguishable, or None."""
-    columns = np.vstack([regression.columns(effect.lag, Shape()), regression.time])
-    information = (columns * regression.ordinates.weights(effect.density)) @ columns.T
-    shared = information[0, 1] ** 2 / (information[0, 0] * information[1, 1])
-    return texts.temperature_like_ramp(float(shared)) if shared > _MAX_RAMP_FRACTION else None
 
 
 def _limit_bias(value: float, error: float) -> Parameter:

@@ -13,6 +13,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -22,8 +23,115 @@ from scipy.linalg import LinAlgError, cho_solve_banded, cholesky_banded
 from scipy.optimize import minimize_scalar
 
 from imubench_pipeline.allan.phase import Span
-from imubench_pipeline.estimators.thermal.register import Readings, gather_readings
+from imubench_pipeline.estimators.missing import yield_present_samples
 from imubench_pipeline.typing import Array
+
+MAX_BLOCKS = 8192  # maximum number of blocks of a log (plus one per segment)
+_MAX_LEVELS = 1 << 16  # maximum number of distinct readings from which the resolution is estimated
+_MIN_READINGS_PER_LEVEL = 8.0  # minimum readings per level; fewer repetitions may be chance
+_MAX_DIVISOR = 256  # maximum number of steps in the smallest gap, where few levels were read
+_MAX_CHANCE = 1e-3  # maximum probability that levels are multiples of a step by chance
+_MAX_ROUNDING = 0.2  # maximum deviation of decimal readings from multiples of a step, in steps
+
+
+@dataclass(frozen=True)
+class Readings:
+    """The readings of a register in blocks that have at least one."""
+
+    centre: Array  # (k,): middle of each block, samples
+    count: NDArray[np.int64]  # (k,): readings present
+    mean: Array
+    low: Array
+    high: Array
+    """(k,): °C."""
+    step: float  # least significant bit of the register, °C; 0: unknown
+    parts: tuple[slice, ...]  # blocks of each segment
+
+
+def gather_readings(blocks: Iterable[Array], segments: Sequence[Span]) -> Readings:
+    """Return the block means of temperature readings, °C, NaN where missing, in one pass.
+
+    Raises ValueError if no reading is present.
+    """
+    width = max(1, -(-sum(stop - start for start, stop in segments) // MAX_BLOCKS))
+    begins = [np.arange(start, stop, width) for start, stop in segments]
+    begin = np.concatenate(begins)
+    end = np.concatenate(
+        [np.minimum(b + width, stop) for b, (_, stop) in zip(begins, segments, strict=True)]
+    )
+    total, count = np.zeros(len(begin)), np.zeros(len(begin), dtype=np.int64)
+    low, high = np.full(len(begin), np.inf), np.full(len(begin), -np.inf)
+    levels: Array = np.empty(0)
+    for place, chosen in yield_present_samples(blocks, begin, end):
+        edges = np.flatnonzero(np.diff(place, prepend=-1))
+        block = place[edges]
+        total[block] += np.add.reduceat(chosen, edges)
+        count[block] += np.diff(np.append(edges, len(chosen)))
+        low[block] = np.minimum(low[block], np.minimum.reduceat(chosen, edges))
+        high[block] = np.maximum(high[block], np.maximum.reduceat(chosen, edges))
+        if len(levels) <= _MAX_LEVELS:
+            levels = np.union1d(levels, chosen)
+    present = int(count.sum())
+    if present == 0:
+        raise ValueError("no temperature is present")
+    for first, last in pairwise(np.cumsum([0, *(len(part) for part in begins)])):
+        if not count[first:last].any():  # a segment without readings has no effect
+            total[first], count[first] = total.sum() / present, 1
+            low[first], high[first] = low.min(), high.max()
+    there = count > 0
+    stops = np.cumsum([0, *(len(part) for part in begins)])
+    kept = np.concatenate(([0], np.cumsum(there)))[stops]
+    parts = tuple(slice(int(a), int(b)) for a, b in pairwise(kept))
+    return Readings(
+        centre=((begin + end - 1) / 2.0)[there],
+        count=count[there],
+        mean=total[there] / count[there],
+        low=low[there],
+        high=high[there],
+        step=estimate_resolution(levels, present),
+        parts=parts,
+    )
+
+
+def estimate_resolution(levels: Array, present: int) -> float:
+    """Return the least significant bit of a register from its distinct readings, °C; 0: unknown.
+
+    It is the smallest gap between the levels, shape (n,), ascending, if all gaps are multiples of
+    it within decimal rounding, and enough of the readings ``present`` are repeated.
+    """
+    if len(levels) < 2 or present < _MIN_READINGS_PER_LEVEL * len(levels):
+        return 0.0
+    gaps = np.diff(levels)
+    smallest = float(gaps.min())
+    # Decimal rounding makes gaps of one step differ; their mean is unaffected.
+    step, first = float(np.mean(gaps[gaps < 1.75 * smallest])), float(levels[0])
+    for _ in range(2):
+        multiples = np.rint((levels - first) / step)
+        if multiples[-1] > multiples[0]:
+            step, first = (float(value) for value in np.polyfit(multiples, levels, 1))
+    if not math.isfinite(step):
+        return 0.0
+    missed = np.abs((levels - first) / step - multiples)
+    regular = float(np.quantile(missed, 0.99)) <= _MAX_ROUNDING
+    if regular and _compute_chance(gaps, step) < _MAX_CHANCE:
+        return step
+    if len(gaps) < 2:
+        return 0.0
+    # Few levels: the greatest step that divides all gaps, unless it may do so by chance.
+    for step in smallest / np.arange(2, _MAX_DIVISOR + 1):
+        if smallest / step * _compute_chance(gaps, float(step)) < _MAX_CHANCE:
+            return float(step)
+    return 0.0
+
+
+def _compute_chance(gaps: Array, step: float) -> float:
+    """Return the probability that the other gaps are as near to multiples of a step by chance."""
+    others = np.delete(gaps, int(gaps.argmin())) / step
+    if not len(others):
+        return 0.0
+    missed = float(np.quantile(np.abs(others - np.rint(others)), 0.99))
+    return min(2.0 * missed, 1.0) ** len(others)
+
 
 DRAWN_PATHS = 24  # paths drawn around the most likely one
 _LOG_DENSITIES = (-16.0, 4.0)  # of the walk, over the squared range of the readings
@@ -124,10 +232,9 @@ def estimate_temperature_path(
         spline.draw_errors(density, errors[:, part], rng)
         for spline, part in zip(splines, read.parts, strict=True)
     ]
+    draws = value + np.concatenate(drawn, axis=1)
     spans = tuple((int(start), int(stop)) for start, stop in segments)
-    return TemperaturePath(
-        read.centre, value, value + np.concatenate(drawn, axis=1), read.parts, spans
-    )
+    return TemperaturePath(read.centre, value, draws, read.parts, spans)
 
 
 def _measure(read: Readings, spread: float) -> tuple[Array, Array, NDArray[np.int64]]:
@@ -165,32 +272,22 @@ class _Spline:
 
     def __init__(self, centre: Array, measured: Array, variance: Array) -> None:
         self._measured, self._variance = measured, variance
-        step = np.diff(centre / float(np.median(np.diff(centre)))) if len(centre) > 1 else centre
+        scale = float(np.median(np.diff(centre))) if len(centre) > 1 else 1.0
+        step = np.diff(centre / scale)
         first, last = 1.0 / step[:-1], 1.0 / step[1:]
-        # (3, k - 2): the difference of two slopes.
-        self._rows = np.array([first, -(first + last), last]) if len(centre) > 2 else None
-        if self._rows is not None:
-            self._walk = 0.5 * (step[:-1] + step[1:])
-            self._bent = self._bend(measured)
+        # (k - 2,) each: the difference of two slopes; empty for one or two blocks.
+        self._rows = first, -(first + last), last
+        self._walk = 0.5 * (step[:-1] + step[1:])
+        self._bent = self._bend(measured)
 
     def _bend(self, values: Array) -> Array:
         """Return the second differences, shape (..., k - 2), of values, shape (..., k)."""
-        a, b, c = self._rows  # type: ignore[misc]  # only called where there are rows
+        a, b, c = self._rows
         return np.asarray(a * values[..., :-2] + b * values[..., 1:-1] + c * values[..., 2:])
-
-    def _spread(self, values: Array) -> Array:
-        """Return the transpose of `_bend`, from shape (..., k - 2) to (..., k)."""
-        a, b, c = self._rows  # type: ignore[misc]  # only called where there are rows
-        result = np.zeros((*values.shape[:-1], values.shape[-1] + 2))
-        result[..., :-2] += a * values
-        result[..., 1:-1] += b * values
-        result[..., 2:] += c * values
-        return result
 
     def _factor(self, density: float) -> Array:
         """Return the banded Cholesky factor of the covariance of the second differences."""
-        a, b, c = self._rows  # type: ignore[misc]  # only called where there are rows
-        v = self._variance
+        (a, b, c), v = self._rows, self._variance
         bands = np.zeros((3, len(a)))
         bands[0] = a**2 * v[:-2] + b**2 * v[1:-1] + c**2 * v[2:] + density * self._walk
         bands[1, :-1] = b[:-1] * a[1:] * v[1:-2] + c[:-1] * b[1:] * v[2:-1]
@@ -199,7 +296,7 @@ class _Spline:
 
     def cost(self, density: float) -> float:
         """Return -log of the likelihood of the second differences, up to a constant."""
-        if self._rows is None:
+        if not len(self._walk):
             return 0.0
         try:
             factor = self._factor(density)
@@ -208,23 +305,25 @@ class _Spline:
         solved = cho_solve_banded((factor, True), self._bent)
         return float(np.log(factor[0]).sum() + 0.5 * self._bent @ solved)
 
+    def _corrected(self, values: Array, bent: Array, density: float) -> Array:
+        """Return values less the errors that second differences ``bent`` show."""
+        if not len(self._walk):
+            return values
+        solved = cho_solve_banded((self._factor(density), True), bent.T).T
+        spread = np.zeros(values.shape)
+        for i, row in enumerate(self._rows):  # the transpose of `_bend`
+            spread[..., i : i + len(row)] += row * solved
+        return np.asarray(values - self._variance * spread)
+
     def smooth(self, density: float) -> Array:
         """Return the most likely path, shape (k,)."""
-        if self._rows is None:
-            return self._measured
-        solved = cho_solve_banded((self._factor(density), True), self._bent)
-        return np.asarray(self._measured - self._variance * self._spread(solved))
+        return self._corrected(self._measured, self._bent, density)
 
     def draw_errors(self, density: float, errors: Array, rng: np.random.Generator) -> Array:
         """Return errors of the path, shape (d, k), by ``errors`` of the readings and the walk."""
-        if self._rows is None:
-            return errors
-        walk = np.sqrt(density * self._walk) * rng.standard_normal(
-            (len(errors), errors.shape[1] - 2)
-        )
-        bent = walk + self._bend(errors)
-        solved = cho_solve_banded((self._factor(density), True), bent.T).T
-        return np.asarray(errors - self._variance * self._spread(solved))
+        normal = rng.standard_normal((len(errors), len(self._walk)))
+        bent = np.sqrt(density * self._walk) * normal + self._bend(errors)
+        return self._corrected(errors, bent, density)
 
 
 @njit(cache=True)

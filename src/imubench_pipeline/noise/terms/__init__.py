@@ -4,47 +4,11 @@ Models, fits, simulation, budgets, exports and pages take everything from here. 
 is a module here, and an entry of `TERMS`.
 """
 
-from imubench_pipeline.noise.terms.base import (
-    Deterministic,
-    Role,
-    Term,
-    TermParameter,
-    register_terms,
-)
+from imubench_pipeline.noise.terms.base import register_terms
 from imubench_pipeline.noise.terms.flicker import Flicker
-from imubench_pipeline.noise.terms.gauss_markov import (
-    FLOOR,
-    PEAK_TAU,
-    GaussMarkov,
-    compute_bias_instability,
-    compute_driving_density,
-    evaluate_gauss_markov_shape,
-    evaluate_sampled_shape,
-)
+from imubench_pipeline.noise.terms.gauss_markov import GaussMarkov
 from imubench_pipeline.noise.terms.power_laws import Quantization, Ramp, RandomWalk, WhiteNoise
 from imubench_pipeline.noise.terms.sinusoid import Sinusoid
-
-__all__ = [
-    "FLOOR",
-    "PARAMETERS",
-    "PEAK_TAU",
-    "TERMS",
-    "Deterministic",
-    "Flicker",
-    "GaussMarkov",
-    "Quantization",
-    "Ramp",
-    "RandomWalk",
-    "Role",
-    "Sinusoid",
-    "Term",
-    "TermParameter",
-    "WhiteNoise",
-    "compute_bias_instability",
-    "compute_driving_density",
-    "evaluate_gauss_markov_shape",
-    "evaluate_sampled_shape",
-]
 
 TERMS = register_terms(Quantization, WhiteNoise, Flicker, GaussMarkov, RandomWalk, Ramp, Sinusoid)
 """Every kind of noise term, in the order of a model's name."""

@@ -115,9 +115,8 @@ class GaussMarkov(Term):
 
     def continuous_space(self) -> ContinuousSpace:
         """F = -1/T_B, Q = S_B."""
-        return ContinuousSpace(
-            np.array([[-1.0 / self.T_B]]), np.array([[self.density]]), np.ones(1)
-        )
+        F, Q = np.array([[-1.0 / self.T_B]]), np.array([[self.density]])
+        return ContinuousSpace(F, Q, np.ones(1))
 
     @property
     def drive(self) -> Drive:
@@ -144,9 +143,8 @@ class GaussMarkov(Term):
             return self.density * (driven + (constant * remaining) ** 2 * self.T_B / 2.0)
         y = start.window / self.T_B
         # The losses are subtracted, not the retained parts, which would cancel for long T_B.
-        lost = math.factorial(order + 1) * x * evaluate_decay(order + 2, x) - y * evaluate_decay(
-            2, y
-        )
+        forward = math.factorial(order + 1) * x * evaluate_decay(order + 2, x)
+        lost = forward - y * evaluate_decay(2, y)
         in_window = start.window * integrate_squared_response(0, y)
         return self.density * (driven + constant**2 * (in_window + self.T_B * lost**2 / 2.0))
 

@@ -158,7 +158,7 @@ class WhiteNoise(Term):
 
     def continuous_space(self) -> ContinuousSpace:
         """No state: the density of the measurement is as in `drive`."""
-        return ContinuousSpace.without_states()
+        return ContinuousSpace(np.zeros((0, 0)), np.zeros((0, 0)), np.zeros(0))
 
     @property
     def drive(self) -> Drive:
@@ -329,9 +329,8 @@ class Ramp(Deterministic):
 
     def continuous_space(self) -> ContinuousSpace:
         """Give the states: the drift, and its rate."""
-        return ContinuousSpace(
-            np.array([[0.0, 1.0], [0.0, 0.0]]), np.zeros((2, 2)), np.array([1.0, 0.0])
-        )
+        F = np.array([[0.0, 1.0], [0.0, 0.0]])
+        return ContinuousSpace(F, np.zeros((2, 2)), np.array([1.0, 0.0]))
 
     def growth(self, order: int, time: float, start: SensorStart) -> float:
         """R^2 (t^(m+2) / (m+2)! + c W/2)^2, A in the place of W/2 where not calibrated."""

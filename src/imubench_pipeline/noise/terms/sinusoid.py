@@ -62,9 +62,8 @@ class Sinusoid(Deterministic):
     def continuous_space(self) -> ContinuousSpace:
         """Turn at 2 pi f_0."""
         speed = 2.0 * math.pi * self.frequency
-        return ContinuousSpace(
-            np.array([[0.0, speed], [-speed, 0.0]]), np.zeros((2, 2)), np.array([1.0, 0.0])
-        )
+        F = np.array([[0.0, speed], [-speed, 0.0]])
+        return ContinuousSpace(F, np.zeros((2, 2)), np.array([1.0, 0.0]))
 
     def start(self, rng: np.random.Generator, interval: float) -> Array:
         """Draw the phase; the amplitude is given."""
