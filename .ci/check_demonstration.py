@@ -13,7 +13,7 @@ truth = {
 }
 checked = 0
 for row in pq.read_table(tables / "parameters.parquet").to_pylist():
-    if row["method"] != "likelihood" or row["parameter"] != "N":
+    if not row["recommended"] or row["parameter"] != "N":
         continue
     error = row["value"] / truth[tuple(row[k] for k in key)] - 1
     print(f"{row['sensor']:12} {row['channel']:8} N {100 * error:+.3f} %")
