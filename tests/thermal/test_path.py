@@ -175,7 +175,7 @@ def test_a_level_between_jumps_is_known_as_its_cell_is_wide(step):
     path = path_of(np.round(truth / step) * step)
     middle = (path.sample % 2_000 > 500) & (path.sample % 2_000 < 1_500)
     assert np.abs(error_of(path, truth))[middle].max() <= 0.5 * step
-    # A jump makes the walk rough, and the error of a level larger than that of its rounding.
+    # A jump makes the walk rough, and the error of a level larger than its rounding error.
     assert 0.8 * step / np.sqrt(12.0) < np.median(path.deviation[middle]) < step
 
 

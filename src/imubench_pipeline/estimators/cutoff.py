@@ -35,7 +35,7 @@ _MAX_CUTOFFS: Mapping[tuple[Kind, int], float] = {
 """Filters that are tried, and their highest cut-off over the sampling rate.
 
 An analogue filter of higher order is an anti-aliasing filter; above the sampling rate its aliases
-equal those of a first-order filter with a lower cut-off. The shortest boxcar has two samples.
+equal the values of a first-order filter with a lower cut-off. The shortest boxcar has two samples.
 """
 
 MIN_PROCESS_SAMPLES = 10.0
