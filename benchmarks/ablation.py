@@ -104,7 +104,9 @@ def prepare_real(folder: Path) -> Iterator[list[Prepared]]:
 
 
 @cache
-def prepare(cases: tuple[str, ...], logs: int, folder: Path) -> tuple[list, list]:  # type: ignore[type-arg]  # of the two above
+def prepare(
+    cases: tuple[str, ...], logs: int, folder: Path
+) -> tuple[list[tuple[Mapping[str, Truth], Prepared]], list[list[Prepared]]]:
     """Return all curves; once for each process."""
     return list(prepare_simulated(cases, logs)), list(prepare_real(folder))
 

@@ -44,6 +44,7 @@ from scipy.stats import beta
 import imubench_pipeline as imu
 from imubench_pipeline.allan import AllanCurve, allan_variance
 from imubench_pipeline.earth import STANDARD_GRAVITY
+from imubench_pipeline.estimators.estimate import Parameter
 from imubench_pipeline.library.estimates import ChannelEstimate
 from imubench_pipeline.settings.config import Method
 from imubench_pipeline.typing import Array
@@ -256,7 +257,7 @@ def pieces_of(recording: Recording, channel: str, pieces: int, method: Method) -
         )
 
 
-def figure_of(estimate: ChannelEstimate, name: str) -> Figure:
+def figure_of(estimate: ChannelEstimate | Mapping[str, Parameter], name: str) -> Figure:
     """Return a parameter; without a value where the estimate does not know it."""
     try:
         parameter = estimate[name]

@@ -88,7 +88,7 @@ BEARS_ON: Mapping[str, frozenset[str]] = {
     "periodic_drift": SLOW,
     "telegraph_noise": SLOW,
     # Nor does a changing variance make a process.
-    "noise_grows": frozenset({"N", "Q"}),
+    "truncated": frozenset({"N", "Q"}),
     # Of the unit, and not of the noise.
     "suspicious_unit": frozenset(),
     "gravity_norm": frozenset(),

@@ -7,12 +7,13 @@ import pytest
 from scipy import stats
 
 from imubench_pipeline.estimators.cutoff import Cutoff
-from imubench_pipeline.estimators.estimate import Parameter
+from imubench_pipeline.estimators.estimate import Estimate, Parameter
 from imubench_pipeline.estimators.frame import Band, FitSelection
 from imubench_pipeline.estimators.intervals import make_ideal_spectrum
 from imubench_pipeline.estimators.spectral_findings import (
     find_missing_slow_noise,
     spectral_findings,
+    withhold_slow_noise,
 )
 from imubench_pipeline.tables.findings import Finding
 
@@ -85,3 +86,12 @@ def test_a_bend_like_that_of_no_known_filter_is_noted() -> None:
     (note,) = found(Parameter(None, "not_identified"))
     assert (note.finding, note.severity, note.value) == ("band_limit", "note", 5.0)
     assert note.detail.startswith("The spectrum of gyro x bends above 5 Hz")
+
+
+def test_a_log_without_slow_noise_gives_no_k_and_lacks_no_term() -> None:
+    known, absent = Parameter(1.0, lower=0.9, upper=1.1), Parameter(None, "absent", upper=0.1)
+    given = Estimate("robust", {"N": known, "K": known, "B": absent, "Q": absent})
+    found = withhold_slow_noise(given).parameters
+    assert (found["N"], found["Q"]) == (known, absent)
+    assert {found[name].status for name in ("K", "B")} == {"not_identified"}
+    assert (found["K"].value, found["K"].in_model, found["B"].upper) == (None, 1.0, None)

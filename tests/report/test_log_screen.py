@@ -79,14 +79,14 @@ def test_the_screen_of_six_axes_has_40_lines_of_80_columns(width: int) -> None:
         rate=100.0, duration=3600.0, fitness="fit with doubts",
     )  # fmt: skip
     rows = {"recordings": [recording], "parameters": parameters, "findings": findings}
-    tables = {name: build(name, own) for name, own in rows.items()}
+    tables = {name: build(name, own) for name, own in rows.items()} | {"allan": build("allan", [])}
     console = Console(width=width, record=True, file=StringIO())
     for part in render_log_screen(tables, "practical", width):
         console.print(part)
     lines = console.export_text().splitlines()
     assert len(lines) <= 40
     assert max(map(len, lines)) <= width
-    assert lines[0] == "r: usable, with doubts; 60 min at 100 Hz, simulated"
+    assert lines[0] == "r: usable, with doubts; 60 min at 100 Hz, 6 channels, simulated"
     (cells,) = (line.split() for line in lines if line.startswith("gyro_x"))
     assert "?" in cells and "<" in cells
     assert sum(line.startswith(("1. ", "2. ", "3. ", "4. ")) for line in lines) == 3

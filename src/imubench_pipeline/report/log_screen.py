@@ -11,17 +11,22 @@ import pyarrow as pa
 from rich.console import RenderableType
 from rich.text import Text
 
-from imubench_pipeline.model.estimates import ParameterRow
+from imubench_pipeline.model.estimates import AllanRow, ParameterRow
 from imubench_pipeline.model.recordings import FindingRow, RecordingRow
 from imubench_pipeline.report import run_summary
 from imubench_pipeline.report.practical import System, choose_page_unit
+from imubench_pipeline.report.terminal import (
+    TITLES,
+    describe_length,
+    explain_no_estimates,
+    select_of,
+)
 from imubench_pipeline.settings.sensor import quantity_of
 from imubench_pipeline.words.estimates import symbol_text
 from imubench_pipeline.words.events import events_text, state_text
 from imubench_pipeline.words.numbers import NO_VALUE, Unit, counted
 
 SHOWN = ("N", "B_curve", "K", "sigma_min")
-_TITLES = {"gyro": "Gyroscopes", "accel": "Accelerometers"}
 _MAX_EVENTS = 3
 _MAX_EVENT_LINES = 4
 _CHANNEL_WIDTH = 8
@@ -79,27 +84,24 @@ def render_log_screen(
 ) -> Iterator[RenderableType]:
     """Yield the screen of each of a few logs, at most 40 lines each for six axes."""
     every_finding = FindingRow.rows_of(tables["findings"])
-    parameters = [row for row in ParameterRow.rows_of(tables["parameters"]) if row.recommended]
+    every_parameter = ParameterRow.rows_of(tables["parameters"])
+    allan = AllanRow.rows_of(tables["allan"])
     for row in RecordingRow.rows_of(tables["recordings"]):
-        own = [each for each in every_finding if _key(each) == _key(row)]
-        events = group_events(run_summary.select_warnings(own))
-        yield Text(run_summary.fold_text(state_text(row)), style="bold")
+        findings = select_of(row, every_finding)
+        parameters = [each for each in select_of(row, every_parameter) if each.recommended]
+        length = describe_length(row, parameters, select_of(row, allan))
+        yield Text(run_summary.fold_text(state_text(row, length)), style="bold")
         if row.status != "ok":
             yield Text()
             continue
-        for quantity, title in _TITLES.items():
-            lines = [
-                line
-                for line in parameters
-                if _key(line) == _key(row) and quantity_of(line.channel) == quantity
-            ]
+        for quantity, title in TITLES.items():
+            lines = [line for line in parameters if quantity_of(line.channel) == quantity]
             if lines:
                 yield Text("\n".join(_tabulate(title, quantity, lines, system)) + "\n")
-        yield from _list_events(events, len(own), width)
-
-
-def _key(row: RecordingRow | FindingRow | ParameterRow) -> tuple[str, str | None]:
-    return row.sensor, row.recording
+        if not parameters:
+            yield explain_no_estimates(row)
+        events = group_events(run_summary.select_warnings(findings))
+        yield from _list_events(events, len(findings), width)
 
 
 def _tabulate(

@@ -36,7 +36,7 @@ About = Mapping[tuple[str, str], RecordingRow]
 """The row of the table ``recordings`` of each sensor and recording."""
 
 _NAME_FOLDS_AT, _GAP = 16, 2  # of tables, columns of the terminal
-_TITLES = {"gyro": "Gyroscopes", "accel": "Accelerometers"}
+TITLES = {"gyro": "Gyroscopes", "accel": "Accelerometers"}
 _STYLES: Mapping[Verdict, str] = {
     "meets": "green",
     "likely_meets": "green",
@@ -110,17 +110,10 @@ def render_logs(
     every_parameter = ParameterRow.rows_of(tables["parameters"])
     allan = AllanRow.rows_of(tables["allan"])
     for row in RecordingRow.rows_of(tables["recordings"]):
-        findings, parameters = _of(row, every_finding), _of(row, every_parameter)
-        length = ""
-        if row.duration is not None:
-            rates = [line.cluster_size / line.tau for line in _of(row, allan)]
-            channels = len({line.channel for line in parameters})
-            length = f": {numbers.duration_text(row.duration)}"
-            length += f" at {numbers.rates_text(row.rate, rates)}"
-            length += f", {numbers.counted(channels, 'channel')}"
-            length += f", {text}" if (text := format_temperature(row)) else ""
-            length += ", simulated" * row.simulated
-        yield Text(run_summary.fold_text(row.recording) + length, style="bold")
+        findings, parameters = select_of(row, every_finding), select_of(row, every_parameter)
+        length = describe_length(row, parameters, select_of(row, allan))
+        head = f"{run_summary.fold_text(row.recording)}: {length}".removesuffix(": ")
+        yield Text(head, style="bold")
         if row.status != "ok":
             yield Text(
                 f"  {row.status}: {run_summary.fold_text(row.reason or '', _LONGEST_FINDING)}\n"
@@ -130,7 +123,7 @@ def render_logs(
         yield from _listed("Warnings", map(_of_log, warnings))
         doubts = []
         warned = {(warning.channel, warning.finding) for warning in warnings}
-        for doubt in _of(row, every_doubt):
+        for doubt in select_of(row, every_doubt):
             if (doubt.channel, doubt.code) not in warned:
                 of = " ".join(filter(None, (doubt.channel, ", ".join(doubt.parameters)))) or "all"
                 doubts.append(f"{of}: {doubt.reason}")
@@ -141,12 +134,31 @@ def render_logs(
         recommended = [line for line in parameters if line.recommended]
         yield from _parameter_tables(recommended, "95 % intervals below", about, system, width)
         if not parameters:
-            why = "noise is not estimated for a turned sensor"
-            why = "no channel can be analysed" if row.kind == "static" else why
-            yield Text(f"  {row.kind.replace('_', ' ')}: {why}\n")
+            yield explain_no_estimates(row)
 
 
-def _of(recording: RecordingRow, rows: Iterable[R]) -> list[R]:
+def describe_length(
+    row: RecordingRow, parameters: Sequence[ParameterRow], allan: Sequence[AllanRow]
+) -> str:
+    """Return duration, rate, channels and temperature of a log; empty if it was not read."""
+    if row.duration is None:
+        return ""
+    rates = [line.cluster_size / line.tau for line in allan]
+    channels = len({line.channel for line in parameters})
+    words = [f"{numbers.duration_text(row.duration)} at {numbers.rates_text(row.rate, rates)}"]
+    words += [numbers.counted(channels, "channel")]
+    words += [text] if (text := format_temperature(row)) else []
+    return ", ".join(words) + ", simulated" * row.simulated
+
+
+def explain_no_estimates(row: RecordingRow) -> Text:
+    """Return why an analysed log has no parameters."""
+    why = "noise is not estimated for a turned sensor"
+    why = "no channel can be analysed" if row.kind == "static" else why
+    return Text(f"  {row.kind.replace('_', ' ')}: {why}\n")
+
+
+def select_of(recording: RecordingRow, rows: Iterable[R]) -> list[R]:
     """Return the rows of a recording."""
     key = (recording.sensor, recording.recording)
     return [row for row in rows if (row.sensor, row.recording) == key]
@@ -166,7 +178,7 @@ def _parameter_tables(
     rows: Sequence[ParameterRow], which: str, about: About, system: System, width: int
 ) -> Iterator[RenderableType]:
     """Yield a table for the gyroscopes, and one for the accelerometers."""
-    for quantity, title in _TITLES.items():
+    for quantity, title in TITLES.items():
         own = [row for row in rows if quantity_of(row.channel) == quantity]
         if own:
             heads, lines = _parameter_lines(quantity, own, about, system)

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from imubench_pipeline.model.recordings import FindingRow, RecordingRow
 from imubench_pipeline.model.states import Fitness
 from imubench_pipeline.words.findings.base import channel_name, unit_of
-from imubench_pipeline.words.numbers import counted, duration_text, join_names, number_text
+from imubench_pipeline.words.numbers import counted, join_names
 from imubench_pipeline.words.verdicts import doubts_text
 
 _STATES: Mapping[Fitness | None, str] = {
@@ -17,18 +17,14 @@ _STATES: Mapping[Fitness | None, str] = {
 }
 
 
-def state_text(row: RecordingRow) -> str:
-    """Return the state of a recording in a line: name, usable or not and why, length and rate."""
+def state_text(row: RecordingRow, length: str) -> str:
+    """Return the state of a recording in a line; ``length`` has duration, rate and channels."""
     if row.status != "ok":
         return f"{row.recording}: {row.status}: {row.reason or 'no reason is known'}"
-    text = f"{row.recording}: {_STATES.get(row.fitness, 'not judged')}"
+    state = _STATES.get(row.fitness, "not judged")
     if row.fitness == "unfit":
-        text += f": {doubts_text(row.doubts)}"
-    if row.duration is not None:
-        text += f"; {duration_text(row.duration)}"
-    if row.rate is not None:
-        text += f" at {number_text(row.rate)} Hz"
-    return text + ", simulated" * row.simulated
+        state += f": {doubts_text(row.doubts)}"
+    return f"{row.recording}: {state}; {length}".removesuffix("; ")
 
 
 def events_text(findings: Sequence[FindingRow]) -> str:

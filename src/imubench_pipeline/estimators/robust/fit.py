@@ -68,7 +68,6 @@ LONGEST = 1 / 6
 
 _MIN_POINTS = 6
 _DRAWS = 400
-_SHORTEST = BROADBAND_TIME
 _CORRELATION_TIMES = 80
 _MAX_MODEL_ERROR = 0.01  # Relative, of a variance
 _DECADES_OF_MODEL_ERROR = 0.4  # Over which errors of the model are correlated
@@ -87,7 +86,7 @@ _PROFILE_POINTS = 60
 _MIN_DURATION_OF_WALK = 600.0  # s; in less, a process of some seconds passes for a walk
 _TIMES_OF_MINIMUM = 120
 _MAX_DOUBTFUL_RATIO = 10.0  # Of the limits of a bias instability or lowest point with a value
-_MAX_WITHOUT = 0.025  # Share of draws without a floor
+_MAX_SHARE_WITHOUT_MINIMUM = 0.025  # Of the draws
 _MIN_DECREASE = 0.5  # of a residual that ends the search for the first point
 _MAX_EXCESS = 1.0  # Standard deviation of a logarithm between parts: nothing is identified beyond
 
@@ -104,11 +103,11 @@ def fit(
     Parameters
     ----------
     curve : AllanCurve
-        Without what is deterministic in the log.
+        Of m points, in (SI unit)^2 and s; without deterministic signals.
     parts : PartVariances
-        The variances of its parts.
+        At the same m points.
     lines : sequence of Sinusoid
-        The lines of its spectrum.
+        The lines of the spectrum; SI, Hz.
     rng : numpy.random.Generator
         Of the draws.
 
@@ -161,7 +160,7 @@ class _Points:
         curve = replace(curve, variance=curve.deviation**2)  # tables keep the deviation
         of_lines = NoiseModel(sinusoids=lines).allan_variance(curve.tau, curve.rate)
         rest = np.maximum(curve.variance - of_lines, (1.0 - _MAX_LINE_SHARE) * curve.variance)
-        shortest = min(max(_SHORTEST, 20.0 / curve.rate), curve.tau[-1] / 4.0)
+        shortest = min(max(BROADBAND_TIME, 20.0 / curve.rate), curve.tau[-1] / 4.0)
         times = np.geomspace(shortest, curve.tau[-1] / 2.0, _CORRELATION_TIMES)
         search = TermSearch(curve.tau, curve.rate, curve.averaged, times)
         return cls(curve, rest, _LINE_ERROR * of_lines / rest, search)
@@ -434,7 +433,7 @@ def _describe_lowest_point(
     sigma = np.where(falls, FLOOR * np.sqrt(squares[:, FLICKER]), sigma)
     floor = _limit(float(sigma[0]), sigma[1:], widest=_MAX_DOUBTFUL_RATIO)
     time = _limit(float(place[0]), place[1:])
-    if not inside[0] or np.mean(~inside[1:]) > _MAX_WITHOUT:
+    if not inside[0] or np.mean(~inside[1:]) > _MAX_SHARE_WITHOUT_MINIMUM:
         time = Parameter(None, "not_identified", texts.MINIMUM_BEYOND, time.lower, None)
     return {"sigma_min": floor, "tau_min": time}
 
