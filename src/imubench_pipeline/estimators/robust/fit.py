@@ -198,6 +198,7 @@ class _Fitted:
     whitening: Array  # (r, m)
     sampling: Array  # (m, m): covariance of the relative variances
     error: float  # relative, of the model
+    weights: Array
 
     @property
     def model(self) -> NoiseModel:
@@ -216,9 +217,9 @@ def _fit_points(points: _Points) -> _Fitted:
         sampling = points.covariance(solution.model(), expected, curve.samples)
         error = _estimate_model_error(points, used, expected, np.diag(sampling))
         covariance = sampling + points.model_covariance(error)
-        whitening = _whiten(covariance * np.outer(expected, expected), used)
-        solution, expected, whitening = _fit_whitened(points, whitening, start.bent)
-    return _Fitted(solution, used, expected, whitening, sampling, error)
+        weights = _whiten(covariance * np.outer(expected, expected), used)
+        solution, expected, whitening = _fit_whitened(points, weights, start.bent)
+    return _Fitted(solution, used, expected, whitening, sampling, error, weights)
 
 
 @dataclass(frozen=True)
@@ -323,7 +324,8 @@ def _draw(
     normal = np.concatenate((normal, -normal))
     shift, scale = _chi_squared_logarithms(np.diag(covariance))
     spread = shift + (normal @ root.T) * scale
-    drawn = points.search.solve(points.variance * np.exp(spread), fitted.whitening)
+    curves = points.variance * np.exp(spread)
+    drawn = _solve_draws(points, curves, fitted)
     spread = rng.standard_normal((_DRAWS // 2, 3))
     spread = rng.permutation(np.concatenate((spread, -spread)))
     factors = np.ones((_DRAWS, TERMS))
@@ -333,6 +335,18 @@ def _draw(
     step = np.log(points.search.times[1] / points.search.times[0])
     times = drawn.times * np.exp(step * rng.uniform(-0.5, 0.5, _DRAWS))  # between those tried
     return replace(drawn, squares=drawn.squares * factors, times=times)
+
+
+def _solve_draws(points: _Points, curves: Array, fitted: _Fitted) -> Solutions:
+    """Fit curves like the measured one, each with the correction if it needs it."""
+    weights = fitted.weights
+    image = weights @ points.curve.averaged**-2.0
+    free = weights - np.outer(image, image @ weights) / (image @ image)
+    drawn, bent = points.search.solve(curves, weights), points.search.solve(curves, free)
+    chosen = drawn.cost - bent.cost > _GAIN_OF_BEND
+    squares = np.where(chosen[:, None], bent.squares, drawn.squares)
+    times = np.where(chosen, bent.times, drawn.times)
+    return Solutions(squares, times, drawn.cost)
 
 
 def _chi_squared_logarithms(relative: Array) -> tuple[Array, Array]:
