@@ -198,7 +198,7 @@ class _Fitted:
     whitening: Array  # (r, m)
     sampling: Array  # (m, m): covariance of the relative variances
     error: float  # relative, of the model
-    weights: Array
+    weights: Array  # (r, m): the whitening before a correction of the short end
 
     @property
     def model(self) -> NoiseModel:
@@ -338,8 +338,10 @@ def _draw(
 
 
 def _solve_draws(points: _Points, curves: Array, fitted: _Fitted) -> Solutions:
-    """Fit curves like the measured one, each with the correction if it needs it."""
+    """Fit curves like the measured one; behind a filter, each chooses whether it is corrected."""
     weights = fitted.weights
+    if fitted.used[0] and fitted.whitening is weights:  # no sign of a filter
+        return points.search.solve(curves, weights)
     image = weights @ points.curve.averaged**-2.0
     free = weights - np.outer(image, image @ weights) / (image @ image)
     drawn, bent = points.search.solve(curves, weights), points.search.solve(curves, free)
