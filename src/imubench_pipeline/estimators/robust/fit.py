@@ -163,7 +163,8 @@ class _Points:
         shortest = min(max(BROADBAND_TIME, 20.0 / curve.rate), curve.tau[-1] / 4.0)
         times = np.geomspace(shortest, curve.tau[-1] / 2.0, _CORRELATION_TIMES)
         search = TermSearch(curve.tau, curve.rate, curve.averaged, times)
-        return cls(curve, rest, _LINE_ERROR * of_lines / rest, search)
+        line_error = np.minimum(_LINE_ERROR * of_lines / rest, _MAX_RELATIVE_ERROR)
+        return cls(curve, rest, line_error, search)
 
     def evaluate(self, solutions: Solutions) -> Array:
         """Return the variance of the first solution, shape (m,)."""
@@ -422,6 +423,14 @@ def _make_estimate(points: _Points, fitted: _Fitted, drawn: Solutions) -> Estima
     of_curve = np.concatenate([compute_curve_bias(each, end)[0] for each in _group(drawn)])
     figures = {"B_curve": _limit(value, of_curve, widest=_MAX_DOUBTFUL_RATIO)}
     figures |= _describe_lowest_point(points, fitted, drawn)
+    lowest = float(_bound_deviation(points)[fitted.used].min())
+    for table, name, bound in (
+        (parameters, "B", lowest / FLOOR),
+        (figures, "B_curve", lowest / FLOOR),
+        (figures, "sigma_min", lowest),
+    ):
+        if table[name].value is None and table[name].upper == 0.0:
+            table[name] = replace(table[name], upper=bound)
     return Estimate(
         "robust",
         parameters,
@@ -447,6 +456,7 @@ def _describe_lowest_point(
     # A curve that still falls at its end goes on to the level of its flicker noise.
     falls = ~inside & (slope <= _MIN_FLOOR_SLOPE)
     sigma = np.where(falls, FLOOR * np.sqrt(squares[:, FLICKER]), sigma)
+    sigma[~squares.any(axis=1)] = 0.0
     floor = _limit(float(sigma[0]), sigma[1:], widest=_MAX_DOUBTFUL_RATIO)
     time = _limit(float(place[0]), place[1:])
     if not inside[0] or np.mean(~inside[1:]) > _MAX_SHARE_WITHOUT_MINIMUM:
@@ -483,10 +493,14 @@ def _bound_ramp(points: _Points, K: float) -> Parameter:
 
 def _bound_white(points: _Points, used: NDArray[np.bool_]) -> Parameter:
     """Return N without a value, with the limit that the curve leaves for white noise."""
-    curve = points.curve
-    error = np.minimum(np.sqrt(2.0 / curve.edf), _MAX_RELATIVE_ERROR)
-    upper = np.sqrt(points.variance * curve.tau * np.exp(1.96 * error))[used].min()
+    upper = (_bound_deviation(points) * np.sqrt(points.curve.tau))[used].min()
     return Parameter(None, "not_identified", texts.MAY_BE_ABSENT, 0.0, float(upper))
+
+
+def _bound_deviation(points: _Points) -> Array:
+    """Return upper limits of the deviation, shape (m,)."""
+    error = np.minimum(np.sqrt(2.0 / points.curve.edf), _MAX_RELATIVE_ERROR)
+    return np.sqrt(points.variance * np.exp(1.96 * error))
 
 
 def _limit_walk(points: _Points, fitted: _Fitted, draws: Array) -> Parameter:

@@ -112,7 +112,7 @@ def estimate_excess(
     excesses = []
     for number in _DIVISIONS:
         variances = parts.divide(number)
-        there = np.isfinite(variances).all(axis=0) & (influence != 0.0)
+        there = (variances > 0.0).all(axis=0) & (influence != 0.0)
         there &= curve.cluster_size * _CLUSTERS_IN_PART * PARTS <= curve.samples
         if there.sum() < 2:
             continue
