@@ -4,8 +4,6 @@ A verdict applies to the whole 95 % interval of the measurement. If the interval
 the verdict is ``not sure``, and the reason names the possible ones.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import product

@@ -1,7 +1,5 @@
 """Derive the statistics that vendors print from the estimates of a recording."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace

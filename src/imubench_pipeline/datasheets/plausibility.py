@@ -7,8 +7,6 @@ Noise and means are compared with the printed figures, or with usual ones. The s
 compared with the range of the sensor, and a finding names the unit of time that would explain it.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Check printed and estimated figures for wrong units, against the figures of other sensors."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import asdict, dataclass, replace

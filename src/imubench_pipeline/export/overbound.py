@@ -38,8 +38,6 @@ and M. Joerger, "Overbounding the effect of uncertain Gauss-Markov noise in Kalm
 NAVIGATION 68 (2), 2021.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass

@@ -24,8 +24,6 @@ EKF2_PREDICT_US), src/modules/temperature_compensation/TemperatureCompensation.c
 Format".
 """
 
-from __future__ import annotations
-
 import math
 
 from imubench_pipeline.export.comments import describe_model, format_comments

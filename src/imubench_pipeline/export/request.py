@@ -1,7 +1,5 @@
 """Make the file of a program from the tables of a run."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path

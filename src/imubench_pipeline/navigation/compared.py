@@ -1,7 +1,5 @@
 """Channels that may represent their sensor, and the number of sensors that equals a better one."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace

@@ -4,8 +4,6 @@ The errors are as in `expected_errors`, at more times and windows. The variances
 models are computed at once: separate budgets would take a thousand times as long.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict

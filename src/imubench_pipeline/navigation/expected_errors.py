@@ -1,7 +1,5 @@
 """Expected navigation errors of a recording: rows of the table ``error_budget``."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial

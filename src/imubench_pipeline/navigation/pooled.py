@@ -20,8 +20,6 @@ W. Viechtbauer, Stat. Med. 26, 2007 (its limits); J. Hartung and G. Knapp, Stat.
 D. Jackson et al., Stat. Med. 36, 2017 (the interval); R. Barlow, arXiv:physics/0406120, 2004.
 """
 
-from __future__ import annotations
-
 import math
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence

@@ -11,8 +11,6 @@ G. Zou and A. Donner, "Construction of confidence limits about effect measures: 
 Statistics in Medicine 27, 2008 (eq. 2, and 3 for a ratio by logarithms).
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Compare the turn-on to turn-on spread of the fixed bias with the printed repeatability."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator, Mapping
 
 from imubench_pipeline.datasheets.comparable import read_repeatability_comparables

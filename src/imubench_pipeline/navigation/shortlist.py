@@ -8,8 +8,6 @@ B from its datasheets. If a figure is not known, neither is the worst case.
 Errors in use are from the datasheet; the best case excludes a calibrated turn-on bias.
 """
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence

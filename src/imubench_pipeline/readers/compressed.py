@@ -1,7 +1,5 @@
 """Read the bytes of a log that may be compressed or in an archive, recognised by content."""
 
-from __future__ import annotations
-
 import bz2
 import io
 import lzma

@@ -1,7 +1,5 @@
 """Convert one file of a recording to Parquet: read it, collect statistics, remove knocks."""
 
-from __future__ import annotations
-
 import contextlib
 import hashlib
 import math

@@ -4,8 +4,6 @@ The columns are the channels, ``temperature`` in °C, if needed ``time`` (s from
 and if samples are missing ``sample``, the position on the uniform grid. A null is a missing sample.
 """
 
-from __future__ import annotations
-
 import json
 import math
 from collections.abc import Iterable, Iterator, Mapping

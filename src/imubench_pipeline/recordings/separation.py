@@ -5,8 +5,6 @@ its numbers lie on a slower uniform grid than all records, or if all records tog
 grid. An axis with fewer numbers than another axis of its sensor has missing samples.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack

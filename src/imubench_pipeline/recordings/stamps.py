@@ -1,7 +1,5 @@
 """Put time stamps on a uniform grid, block by block."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 

@@ -5,8 +5,6 @@ that scatter by more than half a sampling interval, such as arrival times, give 
 the samples are then treated as consecutive, with a finding.
 """
 
-from __future__ import annotations
-
 import math
 from collections import Counter
 from collections.abc import Iterator

@@ -1,7 +1,5 @@
 """The command `imubench`."""
 
-from __future__ import annotations
-
 import argparse
 import io
 import json

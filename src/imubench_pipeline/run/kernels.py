@@ -4,8 +4,6 @@ Without this, processes of a first run compile the same kernels at the same time
 compilations of the demonstration.
 """
 
-from __future__ import annotations
-
 import fcntl
 import zlib
 from typing import IO, Any

@@ -1,7 +1,5 @@
 """Lock a folder of results: one run at a time, also after a killed run."""
 
-from __future__ import annotations
-
 import fcntl
 import json
 import os

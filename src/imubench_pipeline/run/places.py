@@ -1,7 +1,5 @@
 """Protected folders of a project: other commands must not write there."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Iterator
 from pathlib import Path

@@ -4,8 +4,6 @@ This is the interface of the package to the rules. A rule gets the settings on w
 JSON text, so that an edit of the settings reruns only the affected rules.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import re

@@ -4,8 +4,6 @@ This is a logger plugin of Snakemake (`snakemake_logger_plugin_imubench`): ``log
 profile. All that Snakemake says itself is in its log file, which is named at the end.
 """
 
-from __future__ import annotations
-
 import logging
 import sys
 import time

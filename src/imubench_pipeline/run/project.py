@@ -1,7 +1,5 @@
 """A folder of logs, which needs no checkout: `imubench init` makes it, `imubench run` runs it."""
 
-from __future__ import annotations
-
 import argparse
 import os
 import sys

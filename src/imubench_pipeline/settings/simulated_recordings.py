@@ -3,8 +3,6 @@
 An experiment has the settings of its notes, and the true values.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass

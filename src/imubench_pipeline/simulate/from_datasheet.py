@@ -1,7 +1,5 @@
 """Build the model of a sensor from its datasheet; missing figures are assumed and listed."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

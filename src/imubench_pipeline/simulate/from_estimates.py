@@ -1,7 +1,5 @@
 """Build the model of a sensor from the estimates of a run, which replace datasheet figures."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path

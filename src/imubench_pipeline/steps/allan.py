@@ -1,7 +1,5 @@
 """Compute the Allan variance of every channel of a recording, and read it back."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path

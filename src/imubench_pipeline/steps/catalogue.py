@@ -1,7 +1,5 @@
 """List the figures that vendors publish for the sensors of the catalogue."""
 
-from __future__ import annotations
-
 from dataclasses import asdict
 from pathlib import Path
 

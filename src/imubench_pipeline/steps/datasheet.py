@@ -1,7 +1,5 @@
 """Compare the estimates of a recording, and its fixed bias, with its sensor's datasheet."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import asdict
 from functools import partial

@@ -1,7 +1,5 @@
 """Compute the dead-reckoning errors of a recording by its noise, and compare them with its log."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterator, Mapping
 from pathlib import Path

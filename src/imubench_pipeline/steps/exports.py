@@ -1,7 +1,5 @@
 """The exports of a run: a folder per sensor with a file per program."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Draw the figures of all sensors for print."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterable
 from pathlib import Path

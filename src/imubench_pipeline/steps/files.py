@@ -1,7 +1,5 @@
 """Outcome of every file in the drop zone: analysed, rejected, failed, or skipped."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace

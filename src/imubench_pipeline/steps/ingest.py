@@ -1,7 +1,5 @@
 """Convert a recording to Parquet; an unusable one is recorded as rejected."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from imubench_pipeline.recordings.ingest import ingest_as_planned

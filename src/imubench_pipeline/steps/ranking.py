@@ -1,7 +1,5 @@
 """Rank the sensors for each requirement, and recommend next steps."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path

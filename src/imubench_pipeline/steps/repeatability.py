@@ -1,7 +1,5 @@
 """Compare the fixed biases of each device from one turn-on to the next with its datasheet."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from imubench_pipeline.model.estimates import FixedBiasRow

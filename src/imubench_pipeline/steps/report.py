@@ -1,7 +1,5 @@
 """Write the pages of the report whose data changed."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from imubench_pipeline.report.publish import make_site, publish

@@ -4,8 +4,6 @@ Engers (2021, figures 34, 35, 38, 39, 44 and 50) compares them by eye. The model
 read from the curve, the model after it is the estimate. Both pass the estimated low-pass.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import asdict

@@ -1,7 +1,5 @@
 """Tables of a sensor: the tables of its recordings, joined, assessed and compared."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The shortlist of a run or, without a run, of the catalogue."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterator, Mapping
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Write simulated recordings in the log format of their sensor."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack

@@ -1,7 +1,5 @@
 """Join the tables of all sensors."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 

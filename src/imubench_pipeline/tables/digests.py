@@ -1,7 +1,5 @@
 """Digests of files, and JSON files that end with a digest of themselves."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import os

@@ -18,8 +18,6 @@ References
 J. A. Hausman, "Specification tests in econometrics", Econometrica 46(6), 1978.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace

@@ -15,8 +15,6 @@ Each error is a figure of the sensor, a standard deviation, times a factor that 
 Causes are independent of each other and of the noise; a figure has no sign.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass

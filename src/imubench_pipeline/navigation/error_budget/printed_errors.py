@@ -5,8 +5,6 @@ larger end; a maximum as 3 sigma. (In data sheets of the catalogue with both, th
 3.5 times the typical figure.) A temperature coefficient from a log replaces the printed one.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Mapping
 

@@ -1,7 +1,5 @@
 """Uncertainty of an error budget from the uncertainty of the noise model."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 

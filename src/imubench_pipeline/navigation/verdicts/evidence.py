@@ -4,8 +4,6 @@ The evidence depends on the logs: their length, the number of specimens and axes
 the parameter that contributes most to the error.
 """
 
-from __future__ import annotations
-
 from collections import Counter
 from typing import Literal, get_args
 

@@ -1,7 +1,5 @@
 """Judge each sensor by each requirement, with the conditions of the verdict."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace

@@ -1,7 +1,5 @@
 """Recommend the next steps that would change or strengthen the most verdicts."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace

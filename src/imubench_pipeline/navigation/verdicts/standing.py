@@ -1,7 +1,5 @@
 """Compare the error of a sensor with each limit of a requirement, and find the deciding limit."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace

@@ -7,8 +7,6 @@ the column. Time columns, with ``unit: ns``: ``header.stamp``, the stamp of the 
 ``log_time``, the time at which the message was recorded.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Read the text of a log as UTF-8 in blocks of complete lines, and keep its records."""
 
-from __future__ import annotations
-
 import codecs
 import re
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence

@@ -1,7 +1,5 @@
 """Read time stamps of a text log: numbers, ISO 8601 or patterns, in one or two columns."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping, Sequence
 from contextlib import suppress

@@ -4,8 +4,6 @@ It uses the functions and settings of the rules, so that the numbers are the sam
 a recording are estimated and reconstructed in parallel, in forks of one process.
 """
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor

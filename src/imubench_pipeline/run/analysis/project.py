@@ -1,7 +1,5 @@
 """Make a temporary project of the logs of a command line: links to them, and sensor files."""
 
-from __future__ import annotations
-
 import shlex
 from collections import Counter
 from collections.abc import Mapping, Sequence

@@ -1,7 +1,5 @@
 """Verify that the results of runs are unchanged and consistent with each other."""
 
-from __future__ import annotations
-
 import json
 import os
 import shlex
