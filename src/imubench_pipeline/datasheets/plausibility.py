@@ -123,9 +123,16 @@ def expected(sensor: Sensor | None, quantity: str) -> Expected:
         if printed is None
         else (printed / _MAX_FACTOR_BELOW_PRINTED, printed * MAX_FACTOR_FROM_PRINTED)
     )
-    return Expected(
-        noise, *_find_max_offset(sensor), _find_max_bandwidth(sensor, quantity), printed
-    )
+    # Widest printed bandwidth, Hz
+    assert quantity in QUANTITIES
+    sheet = getattr(sensor.datasheet, quantity)
+    widest = [
+        convert_to_si(value, figure.unit, "frequency")
+        for figure in (sheet.printed("bandwidth") if sheet else ())
+        for axis in "xyz"
+        for value in _list_values(figure.on_axis(axis))
+    ]
+    return Expected(noise, *_find_max_offset(sensor), max(widest, default=None), printed)
 
 
 def _find_max_offset(sensor: Sensor) -> tuple[float, str | None]:
@@ -146,19 +153,6 @@ def _find_max_offset(sensor: Sensor) -> tuple[float, str | None]:
     if word is None:
         return _MAX_OFFSET, None
     return _MAX_OFFSET_OF_CLASS[word], word
-
-
-def _find_max_bandwidth(sensor: Sensor, quantity: str) -> float | None:
-    """Return the widest bandwidth that a sensor file prints, Hz."""
-    assert quantity in QUANTITIES
-    sheet = getattr(sensor.datasheet, quantity)
-    widest = [
-        convert_to_si(value, figure.unit, "frequency")
-        for figure in (sheet.printed("bandwidth") if sheet else ())
-        for axis in "xyz"
-        for value in _list_values(figure.on_axis(axis))
-    ]
-    return max(widest, default=None)
 
 
 def _list_values(printed: float | tuple[float, ...] | None) -> tuple[float, ...]:
@@ -196,26 +190,19 @@ def implausible_rates(
             by_rate.setdefault((rate, fastest), []).append(name)
     findings = []
     for (rate, fastest), names in by_rate.items():
-        factor = time_factor(rate, fastest)
+        sign = 1.0 if rate > fastest else -1.0
+        factor = min(
+            (factor**sign for factor in _TIME_UNIT_PENALTIES),
+            key=lambda factor: (
+                abs(math.log10(rate / factor / _USUAL_RATE))
+                + _TIME_UNIT_PENALTIES[round(factor**sign)]
+            ),
+        )
         statable = MIN_RATE_STATED <= rate < slowest
         data = RateImplausible(rate, slowest, fastest, factor, statable)
         channels = [None] if len(names) == len(rates) else names
         findings += [find(data, "warning", factor, channel) for channel in channels]
     return findings
-
-
-def time_factor(rate: float, fastest: float = _MAX_RATE) -> float:
-    """Return the factor for the time stamps that makes a rate, Hz, most likely.
-
-    ``fastest`` is the highest rate of the sensor, Hz.
-    """
-    sign = 1.0 if rate > fastest else -1.0
-    return min(
-        (factor**sign for factor in _TIME_UNIT_PENALTIES),
-        key=lambda factor: (
-            abs(math.log10(rate / factor / _USUAL_RATE)) + _TIME_UNIT_PENALTIES[round(factor**sign)]
-        ),
-    )
 
 
 def _compute_max_rate(bandwidth: float | None) -> float:

@@ -145,25 +145,21 @@ def _draft_sensor(log: Path, stated: Stated) -> Mapping[str, object]:
         open_keys += [f"{quantity_of(channel)} {key}" for key, one in columns if one == UNKNOWN]
     if open_keys:
         keys = list(dict.fromkeys(open_keys))
-        raise UnfilledError(_describe_missing_keys(log, keys))
+        # Describe the missing properties of a log, and how to state them
+        options = {
+            "rate": "--rate '100 Hz'",
+            "gyro unit": "--gyro-unit deg/s (or rad/s, dps, ...: see the logger's manual)",
+            "accel unit": "--accel-unit g (or m/s^2, mg, ...)",
+        }
+        lines = [f"{log}: the log does not say: {', '.join(keys)}"]
+        if all(key in options for key in keys):
+            lines += [f"  add {options[key]}" for key in keys]
+            lines.append("or write a sensor file once, for all logs of this sensor:")
+        else:
+            lines.append("its column names do not identify the channels; write a sensor file:")
+        command = shlex.join(["imubench", "inspect", str(log), "--output", "mine.yaml"])
+        lines.append(f"  {command}, fill it in, then --sensor mine.yaml")
+        raise UnfilledError("\n".join(lines))
     return parse(Sensor, draft.sensor(), f"drafted from {log}").model_dump(
         mode="json", exclude_unset=True
     )
-
-
-def _describe_missing_keys(log: Path, keys: Sequence[str]) -> str:
-    """Describe the missing properties of a log, and how to state them."""
-    options = {
-        "rate": "--rate '100 Hz'",
-        "gyro unit": "--gyro-unit deg/s (or rad/s, dps, ...: see the logger's manual)",
-        "accel unit": "--accel-unit g (or m/s^2, mg, ...)",
-    }
-    lines = [f"{log}: the log does not say: {', '.join(keys)}"]
-    if all(key in options for key in keys):
-        lines += [f"  add {options[key]}" for key in keys]
-        lines.append("or write a sensor file once, for all logs of this sensor:")
-    else:
-        lines.append("its column names do not identify the channels; write a sensor file:")
-    command = shlex.join(["imubench", "inspect", str(log), "--output", "mine.yaml"])
-    lines.append(f"  {command}, fill it in, then --sensor mine.yaml")
-    return "\n".join(lines)
