@@ -16,7 +16,7 @@ from imubench_pipeline.extensions.fusion.published_figures import yield_publishe
 from imubench_pipeline.model.estimates import TemperatureRow
 from imubench_pipeline.settings.printed import Datasheet
 from imubench_pipeline.steps.sensor_tables import list_true_parameters
-from imubench_pipeline.tables import build
+from imubench_pipeline.tables.files import build
 from imubench_pipeline.tables.keys import Key
 from tests.rows import typed
 

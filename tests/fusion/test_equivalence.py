@@ -16,7 +16,7 @@ from imubench_pipeline.navigation.compared import (
     compute_number_needed,
 )
 from imubench_pipeline.settings.config import FusionSettings
-from imubench_pipeline.tables import build
+from imubench_pipeline.tables.files import build
 from tests.fusion.boards import FLICKER
 from tests.report.tables import joined, recording_rows, rejected_rows
 

@@ -9,7 +9,7 @@ from imubench_pipeline.navigation.error_budget.printed_errors import collect_fig
 from imubench_pipeline.navigation.expected_errors import list_error_rows, list_requirement_questions
 from imubench_pipeline.settings.printed import Datasheet
 from imubench_pipeline.settings.requirements import Requirement
-from imubench_pipeline.tables import build
+from imubench_pipeline.tables.files import build
 from imubench_pipeline.units import convert_from_si
 from tests.ranking import ranking_rows
 

@@ -27,7 +27,7 @@ from imubench_pipeline.model.estimates import AllanRow, ParameterRow, Temperatur
 from imubench_pipeline.model.recordings import RecordingRow
 from imubench_pipeline.model.table import R
 from imubench_pipeline.recordings.fitness import list_excluded
-from imubench_pipeline.tables import find_tables, find_tables_folder, read
+from imubench_pipeline.tables.files import find_tables, find_tables_folder, read
 from imubench_pipeline.words.reasons import exports as texts
 from imubench_pipeline.words.reasons.pools import recordings_not_used
 from imubench_pipeline.words.verdicts import doubts_text

@@ -51,9 +51,9 @@ from imubench_pipeline.settings.sensor import (
     UsedPart,
     quantity_of,
 )
-from imubench_pipeline.tables import open_parquet, read_row_group
 from imubench_pipeline.tables.failures import Failure
 from imubench_pipeline.tables.findings import Finding, RecordingError, UnavailableError, find
+from imubench_pipeline.tables.parquet import open_parquet, read_row_group
 from imubench_pipeline.words.findings import files, samples
 
 _MAX_NAMES = 5

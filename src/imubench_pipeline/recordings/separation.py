@@ -20,8 +20,8 @@ from imubench_pipeline.recordings.recording import BESIDE
 from imubench_pipeline.recordings.timebase import TimeBase
 from imubench_pipeline.settings.quality import QualitySettings
 from imubench_pipeline.settings.sensor import quantity_of
-from imubench_pipeline.tables import open_parquet, read_row_group
 from imubench_pipeline.tables.findings import RecordingError, find
+from imubench_pipeline.tables.parquet import open_parquet, read_row_group
 from imubench_pipeline.typing import Array
 from imubench_pipeline.words.findings.time_base import OwnRate
 

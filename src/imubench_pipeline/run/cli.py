@@ -327,7 +327,7 @@ def _shortlist(options: argparse.Namespace) -> int:
     from imubench_pipeline.settings.shipped import list_folders
     from imubench_pipeline.settings.yaml_files import read_settings
     from imubench_pipeline.steps.shortlist import NEEDED, list_shortlist
-    from imubench_pipeline.tables import find_tables
+    from imubench_pipeline.tables.files import find_tables
 
     try:
         path = Path(options.requirement)

@@ -15,7 +15,7 @@ from imubench_pipeline.model.estimates import AllanRow
 from imubench_pipeline.recordings.kept import load_static_logs
 from imubench_pipeline.recordings.recording import ChannelLog
 from imubench_pipeline.settings.config import AllanSettings
-from imubench_pipeline.tables import read
+from imubench_pipeline.tables.files import read
 from imubench_pipeline.tables.findings import Finding, find
 from imubench_pipeline.tables.keys import Key, split_table
 from imubench_pipeline.words.findings.samples import TooShort

@@ -15,7 +15,7 @@ from imubench_pipeline.model.estimates import FixedBiasRow, TemperatureRow
 from imubench_pipeline.recordings.kept import Quality
 from imubench_pipeline.settings.printed import Datasheet
 from imubench_pipeline.steps.allan import read_curves
-from imubench_pipeline.tables import read
+from imubench_pipeline.tables.files import read
 
 
 def compare_with_datasheet(

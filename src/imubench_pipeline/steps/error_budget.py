@@ -19,7 +19,7 @@ from imubench_pipeline.recordings.kept import Quality, load_static_logs
 from imubench_pipeline.settings.config import ErrorBudgetSettings, FusionSettings
 from imubench_pipeline.settings.printed import Datasheet
 from imubench_pipeline.settings.requirements import validate_requirements
-from imubench_pipeline.tables import read
+from imubench_pipeline.tables.files import read
 from imubench_pipeline.units import parse_quantity
 
 

@@ -8,7 +8,7 @@ from typing import Any
 
 from imubench_pipeline.model.recordings import FailureRow, FileRow, RecordingRow
 from imubench_pipeline.model.states import FileStatus, RecordingStatus
-from imubench_pipeline.tables import read, write_each
+from imubench_pipeline.tables.files import read, write_each
 from imubench_pipeline.words.reasons import simulations as texts
 
 NEEDED = ("recordings", "failures")

@@ -4,7 +4,7 @@ from pathlib import Path
 
 from imubench_pipeline.recordings.ingest import ingest_as_planned
 from imubench_pipeline.recordings.overview import overview
-from imubench_pipeline.tables import write_each
+from imubench_pipeline.tables.files import write_each
 
 
 def write_recording(source: Path, settings: str, sensor: str, recording: str, folder: Path) -> None:

@@ -7,7 +7,7 @@ from imubench_pipeline.model.recordings import RecordingRow
 from imubench_pipeline.navigation.repeatability import repeatability_rows
 from imubench_pipeline.settings.config import DatasheetSettings
 from imubench_pipeline.settings.sensor import sensors_of
-from imubench_pipeline.tables import read, write_each
+from imubench_pipeline.tables.files import read, write_each
 
 
 def write_repeatability(

@@ -21,7 +21,7 @@ from imubench_pipeline.recordings.kept import load_static_logs
 from imubench_pipeline.recordings.recording import ChannelLog
 from imubench_pipeline.simulate.model import SensorModel, TemperatureDrift, before_the_filter
 from imubench_pipeline.simulate.simulation import Signal, simulate_blocks
-from imubench_pipeline.tables import read
+from imubench_pipeline.tables.files import read
 from imubench_pipeline.tables.keys import Key
 from imubench_pipeline.typing import Array
 

@@ -27,7 +27,7 @@ from imubench_pipeline.recordings.fitness import attach_doubts, list_excluded
 from imubench_pipeline.settings.config import FusionSettings
 from imubench_pipeline.settings.printed import Datasheet
 from imubench_pipeline.settings.sensor import Sensor, sensors_of
-from imubench_pipeline.tables import build, read, write_arrow
+from imubench_pipeline.tables.files import build, read, write_arrow
 from imubench_pipeline.units import parse_quantity
 
 PARAMETER_OF_STATISTIC = {"N": "N", "adev_minimum": "sigma_min"}  # of a printed figure

@@ -31,8 +31,8 @@ from imubench_pipeline.steps.ingest import write_recording
 from imubench_pipeline.steps.reconstruct import ReconstructionRows, reconstruct_recording
 from imubench_pipeline.steps.sensor_tables import join_tables
 from imubench_pipeline.steps.tables import join_all_tables
-from imubench_pipeline.tables import build, write, write_arrow, write_each
 from imubench_pipeline.tables.failures import Failure, describe_error, write_empty
+from imubench_pipeline.tables.files import build, write, write_arrow, write_each
 from imubench_pipeline.tables.schemas import OF_ONE_RECORDING, TABLES
 
 T = TypeVar("T")

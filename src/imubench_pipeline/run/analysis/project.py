@@ -13,7 +13,7 @@ from imubench_pipeline.recordings.drop_zone import get_recording_name, get_senso
 from imubench_pipeline.settings.sensor import CHANNELS, Sensor, quantity_of
 from imubench_pipeline.settings.validation import ConfigError, parse
 from imubench_pipeline.settings.yaml_files import list_files, read_settings
-from imubench_pipeline.tables import write_json
+from imubench_pipeline.tables.files import write_json
 from imubench_pipeline.tables.findings import RecordingError
 
 INSPECTED_S, INSPECTED_BYTES = 10.0, 1 << 29  # for the inspection of a log, s and bytes
