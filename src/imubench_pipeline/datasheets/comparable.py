@@ -6,8 +6,6 @@ deviation, 0.664 B with a plateau. A temperature coefficient can be compared wit
 a static log; a total or an rms over temperature cannot.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
@@ -71,7 +69,7 @@ class PrintedAxis:
     axis: str
 
     @classmethod
-    def of(cls, datasheet: Datasheet, channel: str) -> PrintedAxis:
+    def of(cls, datasheet: Datasheet, channel: str) -> "PrintedAxis":
         """Return the datasheet figures of a channel, such as ``gyro_x``."""
         quantity, axis = channel.split("_")
         sheet = getattr(datasheet, quantity) or QuantityDatasheet()

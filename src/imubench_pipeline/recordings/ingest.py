@@ -1,7 +1,5 @@
 """Convert log files to Parquet in SI, one file per clock, with findings, in bounded memory."""
 
-from __future__ import annotations
-
 import shutil
 import tempfile
 from collections.abc import Iterator, Mapping

@@ -1,7 +1,5 @@
 """Load ingested samples; refuse altered ones."""
 
-from __future__ import annotations
-
 import hashlib
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass
@@ -64,7 +62,7 @@ class Quality:
         return {name: channel.grid for name, channel in self.channels.items()}
 
     @classmethod
-    def read(cls, path: Path) -> Quality:
+    def read(cls, path: Path) -> "Quality":
         """Read the file that `write` wrote; raise RecordingError if it is damaged."""
         try:
             return _make_adapter().validate_python(read_sealed_json(path))

@@ -5,8 +5,6 @@ nobody can set), and a few blocks of a file. It reads a whole file only if its s
 its stamps have changed. The ingest reads whole files, and is repeated as soon as they have changed.
 """
 
-from __future__ import annotations
-
 import contextlib
 import hashlib
 import io
@@ -50,7 +48,7 @@ class KnownFile:
     other numbers each time: then only the content of a file of moderate size is compared."""
 
     @classmethod
-    def of(cls, path: Path, is_stopped: Callable[[], bool] = lambda: False) -> KnownFile:
+    def of(cls, path: Path, is_stopped: Callable[[], bool] = lambda: False) -> "KnownFile":
         """Read a file, which may be missing; `is_stopped` ends the reading of a large one."""
         try:
             begin = time.time_ns()
@@ -65,7 +63,7 @@ class KnownFile:
         stamps = _stamps(before) if old else None
         return cls(before.st_size, digest, stamps, inode=before.st_ino)
 
-    def distrusted(self) -> KnownFile:
+    def distrusted(self) -> "KnownFile":
         """Return the file without digest and stamps, so that it counts as changed."""
         return replace(self, sha256=None, stamps=None)
 

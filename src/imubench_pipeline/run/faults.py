@@ -1,7 +1,5 @@
 """Records of steps that failed for one recording or sensor, in the folder ``faults``."""
 
-from __future__ import annotations
-
 import contextlib
 import os
 from collections.abc import Iterator
@@ -98,7 +96,7 @@ class Faults:
     def _path(self, of: Of) -> Path:
         return self._folder / f"{name_place(*of)}.json"
 
-    def _records(self) -> Iterator[tuple[Of, _Record]]:
+    def _records(self) -> "Iterator[tuple[Of, _Record]]":
         for path in sorted(self._folder.glob("*/**/*.json")):
             with contextlib.suppress(OSError, ValueError):  # one that was cut off
                 record = _Record.model_validate(read_sealed_json(path))

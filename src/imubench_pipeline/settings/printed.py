@@ -6,8 +6,6 @@ Engers (2021, eq. 6-8) give the random walk in °/√h as 1/60 of a two-sided de
 60 only changes the unit.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Collection, Mapping
 from typing import Annotated, Any, Literal
@@ -147,7 +145,7 @@ class PrintedFigure(Strict):
     )
 
     @model_validator(mode="after")
-    def _consistent(self) -> PrintedFigure:
+    def _consistent(self) -> "PrintedFigure":
         if self.value is None:
             return self
         if self.unit is None:
@@ -347,7 +345,7 @@ class Datasheet(Strict):
     )
 
     @model_validator(mode="after")
-    def _units(self) -> Datasheet:
+    def _units(self) -> "Datasheet":
         for quantity in FIGURE_DIMENSIONS:
             sheet: QuantityDatasheet | None = getattr(self, quantity)
             for name in QuantityDatasheet.model_fields if sheet else ():

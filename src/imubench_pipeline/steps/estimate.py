@@ -1,7 +1,5 @@
 """The estimates of one channel by every method, as rows of the tables."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable, Container, Iterable, Iterator
 from dataclasses import asdict, dataclass, field, replace

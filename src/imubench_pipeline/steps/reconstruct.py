@@ -1,7 +1,5 @@
 """Reconstruction of a log from an estimate, and its agreement with the measured curve."""
 
-from __future__ import annotations
-
 from collections.abc import Container
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path

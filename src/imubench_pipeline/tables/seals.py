@@ -3,8 +3,6 @@
 An intact file may still be the wrong one, for example from another recording or a backup.
 """
 
-from __future__ import annotations
-
 import hashlib
 import json
 from collections.abc import Iterable, Iterator, Mapping
@@ -41,7 +39,7 @@ class SealedFile:
     changed: int
 
     @classmethod
-    def of(cls, path: Path) -> SealedFile:
+    def of(cls, path: Path) -> "SealedFile":
         """Read a file."""
         about = path.stat()
         return cls(about.st_size, compute_digest(path), about.st_mtime_ns)

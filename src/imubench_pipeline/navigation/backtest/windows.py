@@ -4,8 +4,6 @@ A window is at rest for a time W, whose mean is the bias. It then moves for a ti
 log less the bias is integrated m + 1 times (`error_budget.growth`). Windows begin one block apart.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass

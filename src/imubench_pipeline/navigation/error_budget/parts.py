@@ -3,8 +3,6 @@
 `Largest` gives the largest value of a figure that is not known, or that a calibration can reduce.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
@@ -95,7 +93,7 @@ class Largest:
     biases: tuple[Contribution, ...] = ()  # printed biases, if the total exceeds the limit
 
     @classmethod
-    def of(cls, budget: Budget, limit: float | None, upper: float) -> Largest:
+    def of(cls, budget: Budget, limit: float | None, upper: float) -> "Largest":
         """Return the remaining budget under a limit, SI; ``upper``: upper limit of the total."""
         if limit is None:
             return cls(0.0)

@@ -1,7 +1,5 @@
 """Find the time column and its unit, from its name or else from its stamps."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 

@@ -1,7 +1,5 @@
 """Read delimited text: find the layout of a log, then read it with pyarrow in large blocks."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator, Mapping
 from pathlib import Path
@@ -209,7 +207,7 @@ class CsvFile(LogFile):
     def _explained(
         self,
         error: pa.ArrowException,
-        fault: _WrongWidth,
+        fault: "_WrongWidth",
         layout: TextLayout,
         time: text_stamps.TextTime | None,
     ) -> RecordingError:
