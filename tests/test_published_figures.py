@@ -8,8 +8,7 @@ import numpy as np
 import pyarrow as pa
 import pytest
 
-from imubench_pipeline.datasheets.deltas import bias_deltas, deltas
-from imubench_pipeline.datasheets.measured import compute_sensitivity
+from imubench_pipeline.datasheets.deltas import bias_deltas, compute_sensitivity, deltas
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
 from imubench_pipeline.estimators.rows import make_parameter_rows
 from imubench_pipeline.extensions.fusion.published_figures import yield_published_figures

@@ -1,13 +1,11 @@
 """The file of one sensor: the format of its logs, and its datasheet."""
 
-from __future__ import annotations
-
 import json
 import re
 from collections.abc import Iterable, Mapping
 from functools import cache
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Literal, Self
 
 from pydantic import Field, JsonValue, model_validator
 
@@ -79,7 +77,7 @@ class ColumnSource(Strict):
     offset: float = Field(0.0, description="counts or volts at zero: scale * (raw - offset)")
 
     @model_validator(mode="after")
-    def _from_one(self) -> ColumnSource:
+    def _from_one(self) -> Self:
         if isinstance(self.column, int) and self.column < 1:
             raise ValueError(f"column {self.column}: columns are counted from 1")
         if self.scale == 0:
@@ -122,7 +120,7 @@ class TimeSource(Strict):
     )
 
     @model_validator(mode="after")
-    def _one_way(self) -> TimeSource:
+    def _one_way(self) -> Self:
         if (self.unit is None) == (self.format is None):
             raise ValueError(
                 "expected either 'unit' (s, ms, us, ns, samples) or 'format' (iso8601)"
@@ -209,7 +207,7 @@ class LogFormat(Strict):
     )
 
     @model_validator(mode="after")
-    def _consistent(self) -> LogFormat:
+    def _consistent(self) -> Self:
         if self.rate is None and self.time is None:
             raise ValueError("expected 'rate' (such as 100 Hz) or 'time': neither is there")
         if self.time is not None and self.time.unit == "samples" and self.rate is None:
@@ -279,7 +277,7 @@ class UsedPart(Strict):
     end: float | None = None
 
     @model_validator(mode="after")
-    def _ordered(self) -> UsedPart:
+    def _ordered(self) -> Self:
         if self.end is not None and self.end <= self.start:
             raise ValueError(f"end {self.end} s is not after start {self.start} s")
         return self
@@ -306,7 +304,7 @@ class RecordingNotes(WithBlocks):
     log: dict[str, JsonValue] = Field(default=dict(), description="merged over the sensor's log")
 
     @model_validator(mode="after")
-    def _one_kind(self) -> RecordingNotes:
+    def _one_kind(self) -> Self:
         stated = stated_experiments(self)
         if len(stated) > 1:
             raise ValueError(

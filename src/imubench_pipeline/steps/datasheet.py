@@ -7,8 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from imubench_pipeline.datasheets.comparable import SENSITIVITY, read_comparables
-from imubench_pipeline.datasheets.deltas import bias_deltas, curve_rms, deltas
-from imubench_pipeline.datasheets.measured import compute_sensitivity
+from imubench_pipeline.datasheets.deltas import bias_deltas, compute_sensitivity, curve_rms, deltas
 from imubench_pipeline.estimators.rows import read_estimates
 from imubench_pipeline.model.comparisons import DatasheetCurveRow, DatasheetRow
 from imubench_pipeline.model.estimates import FixedBiasRow, TemperatureRow

@@ -11,12 +11,12 @@ from imubench_pipeline.model.comparisons import NextStepRow
 from imubench_pipeline.model.states import Action
 from imubench_pipeline.model.verdicts import Condition, DoubtMark
 from imubench_pipeline.navigation.verdicts.basis import Basis, Key
-from imubench_pipeline.navigation.verdicts.evidence import (
+from imubench_pipeline.navigation.verdicts.judgement import (
     MAX_TIME_SHARE,
     WEAKNESS_REASONS,
+    Judgement,
     find_longest_time,
 )
-from imubench_pipeline.navigation.verdicts.judgement import Judgement
 from imubench_pipeline.navigation.verdicts.specimens import Expected
 from imubench_pipeline.navigation.verdicts.standing import Standing
 from imubench_pipeline.words.verdicts import next_step_text
