@@ -122,18 +122,7 @@ class Results:
                     f"expected it made of the {others[0]} that is there, found it made of another"
                 )
                 yield self._fault(first, words, place)
-        for folder in _SEALED_FOLDERS:
-            for path in sorted((self.folder / folder).rglob("*")):
-                place = path.relative_to(self.folder)
-                own = any(place.match(f"recordings/*/*/{name}") for name in (KNOWN, _SAMPLE_FILES))
-                declared = own or path.is_dir() or place.as_posix() in self._left
-                if not declared and sealing.is_visible(place):
-                    yield self._stray(place.as_posix())
-        # The latest, and the state.
-        for path in sorted((self.folder / sealing.NIGHTS).glob("[ls]*.*")):
-            name = path.relative_to(self.folder).as_posix()
-            if name not in self._left:
-                yield self._fault(name, _NO_SEAL, sealing.NIGHTS + "/")
+        yield from self._unsealed()
         yield from self._strange_rows()
         for path in find_unfinished(self.folder):
             place = path.relative_to(self.folder).as_posix()
@@ -204,6 +193,21 @@ class Results:
                 current.add(place)
                 todo += [by[name] for name in self.seals[place].inputs if name in by]
         return sorted(current)
+
+    def _unsealed(self) -> Iterator[Fault]:
+        """Yield the files that no known step has written."""
+        for folder in _SEALED_FOLDERS:
+            for path in sorted((self.folder / folder).rglob("*")):
+                place = path.relative_to(self.folder)
+                own = any(place.match(f"recordings/*/*/{name}") for name in (KNOWN, _SAMPLE_FILES))
+                declared = own or path.is_dir() or place.as_posix() in self._left
+                if not declared and sealing.is_visible(place):
+                    yield self._stray(place.as_posix())
+        # The latest, and the state.
+        for path in sorted((self.folder / sealing.NIGHTS).glob("[ls]*.*")):
+            name = path.relative_to(self.folder).as_posix()
+            if name not in self._left:
+                yield self._fault(name, _NO_SEAL, sealing.NIGHTS + "/")
 
     def _strange_rows(self) -> Iterator[Fault]:
         """Yield the tables with recordings that were not compared."""
