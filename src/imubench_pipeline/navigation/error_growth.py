@@ -16,10 +16,11 @@ from imubench_pipeline.earth import STANDARD_GRAVITY
 from imubench_pipeline.estimators.estimate import Estimate
 from imubench_pipeline.model.estimates import ErrorGrowthRow
 from imubench_pipeline.navigation import expected_errors
-from imubench_pipeline.navigation.error_budget import Figures, Uncalibrated, draw_models
 from imubench_pipeline.navigation.error_budget.budget import ACCEL_ORDER, GYRO_ORDER
+from imubench_pipeline.navigation.error_budget.in_use import Figures
+from imubench_pipeline.navigation.error_budget.uncertainty import draw_models
 from imubench_pipeline.noise import NoiseModel
-from imubench_pipeline.noise.growth import Calibrated
+from imubench_pipeline.noise.growth import Calibrated, Uncalibrated
 from imubench_pipeline.noise.model import sum_over_terms
 from imubench_pipeline.noise.simulate import channel_rng
 from imubench_pipeline.settings.requirements import DIMENSIONS

@@ -10,25 +10,23 @@ import numpy as np
 
 from imubench_pipeline.estimators.estimate import Estimate
 from imubench_pipeline.model.comparisons import ErrorBudgetRow
-from imubench_pipeline.navigation.error_budget import (
+from imubench_pipeline.navigation.error_budget.budget import Start, budget, time_until
+from imubench_pipeline.navigation.error_budget.gyrocompass import Gyrocompass
+from imubench_pipeline.navigation.error_budget.in_use import (
     NO_FIGURES,
     NO_USE,
-    Budget,
     Figure,
     Figures,
-    Gyrocompass,
-    Quantity,
-    Start,
-    Uncalibrated,
     Use,
-    budget,
+)
+from imubench_pipeline.navigation.error_budget.parts import Budget, Largest, Quantity
+from imubench_pipeline.navigation.error_budget.uncertainty import (
     compute_chance_within,
     compute_interval,
     draw_models,
-    time_until,
 )
-from imubench_pipeline.navigation.error_budget.parts import Largest
 from imubench_pipeline.noise import NoiseModel
+from imubench_pipeline.noise.growth import Uncalibrated
 from imubench_pipeline.noise.simulate import channel_rng
 from imubench_pipeline.settings.requirements import DIMENSIONS, Axis, Error, Requirement
 from imubench_pipeline.settings.sensor import quantity_of

@@ -38,8 +38,8 @@ from imubench_pipeline.navigation.backtest.windows import (
     choose_window,
     compute_window_errors,
 )
-from imubench_pipeline.navigation.error_budget import draw_models
 from imubench_pipeline.navigation.error_budget.budget import of_sensor
+from imubench_pipeline.navigation.error_budget.uncertainty import draw_models
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.growth import Calibrated
 from imubench_pipeline.noise.simulate import channel_rng
