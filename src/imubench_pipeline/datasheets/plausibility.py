@@ -23,14 +23,7 @@ from imubench_pipeline.recordings.quality.rotation import GravityTurn
 from imubench_pipeline.settings.sensor import QUANTITIES, Sensor, quantity_of
 from imubench_pipeline.tables.findings import Finding, find
 from imubench_pipeline.units import convert_to_si, find_conversion
-from imubench_pipeline.words.findings.plausibility import (
-    AxisUnlike,
-    GravityNorm,
-    NoiseUnlikeDatasheet,
-    RateImplausible,
-    SuspiciousUnit,
-    Turning,
-)
+from imubench_pipeline.words.findings import plausibility as texts
 
 _MAX_FACTOR_BELOW_PRINTED = 2.5
 """Maximum usual factor below a printed noise density. `levels.density_of` is not lowered by a
@@ -199,7 +192,7 @@ def implausible_rates(
             ),
         )
         statable = MIN_RATE_STATED <= rate < slowest
-        data = RateImplausible(rate, slowest, fastest, factor, statable)
+        data = texts.RateImplausible(rate, slowest, fastest, factor, statable)
         channels = [None] if len(names) == len(rates) else names
         findings += [find(data, "warning", factor, channel) for channel in channels]
     return findings
@@ -281,11 +274,11 @@ def _check_gravity(channels: Mapping[str, Level]) -> Iterator[Finding]:
     unit = units.pop()
     for other, factor in mistakes(unit, "accel") if not units else ():
         if abs(norm * factor / STANDARD_GRAVITY - 1.0) <= _GRAVITY_TOLERANCE:
-            data = SuspiciousUnit(unit, other, factor, gravity=norm)
+            data = texts.SuspiciousUnit(unit, other, factor, gravity=norm)
             for name in axes:
                 yield find(data, "warning", factor, name)
             return
-    yield find(GravityNorm(norm, removed=norm < 0.05 * STANDARD_GRAVITY), "warning", norm)
+    yield find(texts.GravityNorm(norm, removed=norm < 0.05 * STANDARD_GRAVITY), "warning", norm)
 
 
 def _check_noise(channels: Mapping[str, Level], of: Mapping[str, Expected]) -> Iterator[Finding]:
@@ -309,7 +302,7 @@ def _check_noise(channels: Mapping[str, Level], of: Mapping[str, Expected]) -> I
                 low * factor <= _MAX_EXPLAINED_FACTOR * usual[1]
                 and high * factor >= usual[0] / _MAX_EXPLAINED_FACTOR
             ):
-                data = SuspiciousUnit(
+                data = texts.SuspiciousUnit(
                     level.unit,
                     unit,
                     factor,
@@ -348,7 +341,7 @@ def _compare_noise(
             if far or not untimed:  # a wrong rate affects all channels: report it once
                 untimed = untimed or not timed
                 of_channel = name if timed or far else None
-                unlike = NoiseUnlikeDatasheet(name, shown, printed, stated_rate)
+                unlike = texts.NoiseUnlikeDatasheet(name, shown, printed, stated_rate)
                 yield find(unlike, "warning", shown / printed, of_channel)
             continue
         others = [f"{quantity}_{axis}" for axis in "xyz" if f"{quantity}_{axis}" != name]
@@ -360,7 +353,7 @@ def _compare_noise(
                 for unit, factor in mistakes(level.unit, quantity)
                 if 1.0 / _MAX_EXPLAINED_AXIS_RATIO < ratio * factor < _MAX_EXPLAINED_AXIS_RATIO
             )
-            data = AxisUnlike(tuple(others), ratio, shown, level.unit, next(explained, None))
+            data = texts.AxisUnlike(tuple(others), ratio, shown, level.unit, next(explained, None))
             yield find(data, "warning", ratio, name)
 
 
@@ -385,7 +378,7 @@ def _check_mean_rates(means: Mapping[str, float], usual: Expected) -> Iterator[F
     """Yield a finding for each gyro whose mean exceeds the largest offset."""
     for name, mean in means.items():
         if abs(mean) > usual.offset:
-            data = Turning(mean, largest=usual.offset, offset_of=usual.offset_of)
+            data = texts.Turning(mean, largest=usual.offset, offset_of=usual.offset_of)
             yield find(data, "warning", mean, name)
 
 
@@ -403,5 +396,5 @@ def _check_gravity_turn(
     together = abs(along / rate - 1.0) < _MAX_RATE_DISAGREEMENT
     if gravity.swept < _MIN_TURN_OF_GRAVITY and not together:
         return
-    data = Turning(rate, swept=gravity.swept, gyro_rate=along if together else None)
+    data = texts.Turning(rate, swept=gravity.swept, gyro_rate=along if together else None)
     yield find(data, "warning", rate)

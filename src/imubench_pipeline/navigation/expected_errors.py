@@ -10,21 +10,10 @@ import numpy as np
 
 from imubench_pipeline.estimators.estimate import Estimate
 from imubench_pipeline.model.comparisons import ErrorBudgetRow
+from imubench_pipeline.navigation.error_budget import in_use, uncertainty
 from imubench_pipeline.navigation.error_budget.budget import Start, budget, time_until
 from imubench_pipeline.navigation.error_budget.gyrocompass import Gyrocompass
-from imubench_pipeline.navigation.error_budget.in_use import (
-    NO_FIGURES,
-    NO_USE,
-    Figure,
-    Figures,
-    Use,
-)
 from imubench_pipeline.navigation.error_budget.parts import Budget, Largest, Quantity
-from imubench_pipeline.navigation.error_budget.uncertainty import (
-    compute_chance_within,
-    compute_interval,
-    draw_models,
-)
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.growth import Uncalibrated
 from imubench_pipeline.noise.simulate import channel_rng
@@ -33,7 +22,7 @@ from imubench_pipeline.settings.sensor import quantity_of
 from imubench_pipeline.units import SI_UNITS, parse_difference, parse_quantity
 from imubench_pipeline.words.reasons import budgets as texts
 
-NO_FIGURES_OF_CHANNELS: Mapping[str, Figures] = MappingProxyType({})
+NO_FIGURES_OF_CHANNELS: Mapping[str, in_use.Figures] = MappingProxyType({})
 
 
 @dataclass(frozen=True)
@@ -41,7 +30,7 @@ class AxisErrors:
     """Error sources of one axis: its noise, and figures of the errors in use."""
 
     model: NoiseModel = field(default_factory=NoiseModel)
-    figures: Figures = field(default_factory=dict)
+    figures: in_use.Figures = field(default_factory=dict)
 
 
 _NO_AXIS_ERRORS = AxisErrors()
@@ -59,7 +48,7 @@ class Question:
     axis: Axis  # which axis of the sensor is used
     latitude: float | None = None  # rad; for ``north``
     limit: float | None = None  # largest standard deviation that fulfils the requirement, SI
-    use: Use = NO_USE  # motion, temperature and vibration
+    use: in_use.Use = in_use.NO_USE  # motion, temperature and vibration
 
     @property
     def needs(self) -> tuple[str, ...]:
@@ -95,7 +84,7 @@ class Question:
         assert self.latitude is not None  # checked with the requirement
         stated = self.start.gyro.bias if isinstance(self.start.gyro, Uncalibrated) else None
         # North-finding at arbitrary times removes the bias by turning the gyro.
-        figures = gyro.figures if self.requirement is not None else NO_FIGURES
+        figures = gyro.figures if self.requirement is not None else in_use.NO_FIGURES
         return Gyrocompass(gyro=gyro.model, latitude=self.latitude, bias=stated, figures=figures)
 
 
@@ -146,7 +135,7 @@ def list_requirement_questions(name: str, requirement: Requirement) -> Iterator[
             requirement.axis,
             None if latitude is None else parse_quantity(latitude, "angle"),
             limit.size / requirement.sigmas,
-            Use(over=limit.seconds, **use),
+            in_use.Use(over=limit.seconds, **use),
         )
 
 
@@ -157,7 +146,7 @@ def list_error_rows(
     *,
     draws: int,
     seed: int,
-    figures: Mapping[str, Figures] = NO_FIGURES_OF_CHANNELS,
+    figures: Mapping[str, in_use.Figures] = NO_FIGURES_OF_CHANNELS,
 ) -> Iterator[ErrorBudgetRow]:
     """Yield the rows of the table ``error_budget`` of a recording.
 
@@ -170,7 +159,7 @@ def list_error_rows(
 
     def drawn_of(channel: str) -> list[AxisErrors]:
         stream = partial(channel_rng, seed, repr(estimates[channel].model), channel)
-        models = draw_models(estimates[channel], draws, stream("budget"))
+        models = uncertainty.draw_models(estimates[channel], draws, stream("budget"))
         of_use = _draw_figures(axes[channel].figures, draws, stream("temperature of the budget"))
         return [AxisErrors(*pair) for pair in zip(models, of_use, strict=True)]
 
@@ -205,7 +194,7 @@ def list_error_rows(
         nominal = question.answer(*pair)
         budgets = [question.answer(*axes_drawn) for axes_drawn in zip(*many, strict=True)]
         asked = replace(asked, gyro=chosen["gyro"], accel=chosen["accel"])
-        lower, upper = compute_interval(budgets)
+        lower, upper = uncertainty.compute_interval(budgets)
         # Draws of an absent term are above 0: extend the limits to the value.
         lower, upper = min(lower, nominal.total), max(upper, nominal.total)
         used = [channel for channel in chosen.values() if channel]
@@ -231,7 +220,7 @@ def list_error_rows(
             lower=lower,
             upper=upper,
             drawn="one by one" if apart else "jointly",
-            within=question.limit and compute_chance_within(question.limit, budgets),
+            within=question.limit and uncertainty.compute_chance_within(question.limit, budgets),
             reasons=reasons,
             reached_after=question.reached(*pair),
         )
@@ -243,11 +232,11 @@ def list_error_rows(
 
 
 def collect_axis_errors(
-    estimates: Mapping[str, Estimate], figures: Mapping[str, Figures]
+    estimates: Mapping[str, Estimate], figures: Mapping[str, in_use.Figures]
 ) -> dict[str, AxisErrors]:
     """Return the error sources of the axes with a noise model: the noise of others is not 0."""
     return {
-        channel: AxisErrors(estimate.model, figures.get(channel, NO_FIGURES))
+        channel: AxisErrors(estimate.model, figures.get(channel, in_use.NO_FIGURES))
         for channel, estimate in estimates.items()
         if estimate.model.terms
     }
@@ -276,7 +265,9 @@ def _list_channels(quantity: str, channels: Iterable[str]) -> list[str]:
     return [channel for channel in channels if quantity_of(channel) == quantity]
 
 
-def _draw_figures(figures: Figures, draws: int, rng: np.random.Generator) -> list[Figures]:
+def _draw_figures(
+    figures: in_use.Figures, draws: int, rng: np.random.Generator
+) -> list[in_use.Figures]:
     """Return draws of the figures of an axis, from the spread of measured sensors."""
     spread = {
         cause: figure
@@ -287,7 +278,7 @@ def _draw_figures(figures: Figures, draws: int, rng: np.random.Generator) -> lis
         return [figures] * draws
     normal = rng.standard_normal((draws, len(spread)))
 
-    def moved(figure: Figure, number: float) -> Figure:
+    def moved(figure: in_use.Figure, number: float) -> in_use.Figure:
         return replace(figure, sigma=abs((figure.sigma or 0.0) + figure.spread * float(number)))
 
     return [

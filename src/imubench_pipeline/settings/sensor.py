@@ -10,14 +10,7 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, JsonValue, model_validator
 
 from imubench_pipeline.registry import blocks
-from imubench_pipeline.settings.experiments import (
-    AT_REST,
-    Kind,
-    WithBlocks,
-    kind_of,
-    stated_experiments,
-    with_blocks,
-)
+from imubench_pipeline.settings import experiments
 from imubench_pipeline.settings.printed import Datasheet
 from imubench_pipeline.settings.quality import QualitySettings
 from imubench_pipeline.settings.shipped import CATALOGUE, list_folders
@@ -283,8 +276,8 @@ class UsedPart(Strict):
         return self
 
 
-@with_blocks("notes")
-class RecordingNotes(WithBlocks):
+@experiments.with_blocks("notes")
+class RecordingNotes(experiments.WithBlocks):
     """Contents of ``<recording>.yaml`` beside a log."""
 
     device: Text | None = Field(None, description="serial number; default: the recording's name")
@@ -305,7 +298,7 @@ class RecordingNotes(WithBlocks):
 
     @model_validator(mode="after")
     def _one_kind(self) -> Self:
-        stated = stated_experiments(self)
+        stated = experiments.stated_experiments(self)
         if len(stated) > 1:
             raise ValueError(
                 f"found {' and '.join(stated)}; expected one of them: a recording is of one kind"
@@ -313,14 +306,14 @@ class RecordingNotes(WithBlocks):
         return self
 
     @property
-    def kind(self) -> Kind:
+    def kind(self) -> experiments.Kind:
         """Experiment of the recording, as stated in its notes."""
-        return kind_of(stated_experiments(self))
+        return experiments.kind_of(experiments.stated_experiments(self))
 
     def check_gyro(self, log: LogFormat) -> None:
         """Raise ValueError, with the key, if the log lacks the gyro or a need of an experiment."""
         channels = [str(name) for name in log.channels]
-        for key, experiment in stated_experiments(self).items():
+        for key, experiment in experiments.stated_experiments(self).items():
             try:
                 experiment.moved_gyro(channels, column=log.table_rate is not None)
             except ValueError as error:
@@ -358,7 +351,7 @@ def merged_log(sensor: Sensor, notes: RecordingNotes, file: str) -> LogFormat:
 class IngestPlan(Strict):
     """Settings of the ingest of a recording; without ``log``, the reason why it cannot be read."""
 
-    kind: Kind = AT_REST
+    kind: experiments.Kind = experiments.AT_REST
     simulated: bool = False
     notes: RecordingNotes | None = None
     log: LogFormat | None = None

@@ -30,14 +30,7 @@ from imubench_pipeline.estimators.estimate import Estimate
 from imubench_pipeline.model.estimates import BacktestRow, DeterministicRow
 from imubench_pipeline.model.recordings import FindingRow
 from imubench_pipeline.model.states import BacktestVerdict
-from imubench_pipeline.navigation.backtest.windows import (
-    Spread,
-    Window,
-    WindowCovariance,
-    average_blocks,
-    choose_window,
-    compute_window_errors,
-)
+from imubench_pipeline.navigation.backtest import windows
 from imubench_pipeline.navigation.error_budget.budget import of_sensor
 from imubench_pipeline.navigation.error_budget.uncertainty import draw_models
 from imubench_pipeline.noise import NoiseModel
@@ -100,7 +93,7 @@ class DeadReckoning:
 
 
 def _limit_mean_square(
-    spreads: Sequence[Spread], found: float, *, efficient: bool
+    spreads: Sequence[windows.Spread], found: float, *, efficient: bool
 ) -> tuple[float, float, float]:
     """Return the limits of the mean square of 95 % of all logs, and the p-value of the found one.
 
@@ -130,7 +123,7 @@ def _limit_mean_square(
 def _compare(
     about: BacktestRow,
     asked: DeadReckoning,
-    cut: Window,
+    cut: windows.Window,
     means: Sequence[Array],
     model: NoiseModel,
     drawn: Sequence[NoiseModel],
@@ -145,8 +138,8 @@ def _compare(
     """
     predicted = asked.sigma(model)
     lower, upper = np.quantile([asked.sigma(candidate) for candidate in drawn], [0.025, 0.975])
-    covariance = WindowCovariance(cut, asked.order, asked.factor)
-    errors = compute_window_errors(means, covariance.weights, covariance.lags)
+    covariance = windows.WindowCovariance(cut, asked.order, asked.factor)
+    errors = windows.compute_window_errors(means, covariance.weights, covariance.lags)
     span, needed = asked.rest + asked.time, asked.duration_needed
     about = replace(
         about,
@@ -280,12 +273,12 @@ def _test_channel(
             )
             listed.append((about, asked))
     cuts = {
-        asked: choose_window(asked.rest, asked.time, log.rate)
+        asked: windows.choose_window(asked.rest, asked.time, log.rate)
         for _, asked in listed
         if isinstance(asked, DeadReckoning)
     }
     lengths = {cut.block for cut in cuts.values() if cut}
-    means = average_blocks(log.blocks(), log.segments, log.rate, lengths)
+    means = windows.average_blocks(log.blocks(), log.segments, log.rate, lengths)
     drawn = draw_models(
         estimate, draws, channel_rng(seed, repr(estimate.model), channel, "backtest")
     )
