@@ -178,7 +178,10 @@ def implausible_rates(
     slowest = MIN_RATE if stated is None else MIN_RATE_STATED
     by_rate: dict[tuple[float, float], list[str]] = {}
     for name, rate in rates.items():
-        fastest = _compute_max_rate(bandwidths[name])
+        fastest, bandwidth = _MAX_RATE, bandwidths[name]
+        if bandwidth is not None:
+            fastest = max(_MAX_RATE, _MAX_SAMPLING_RATE_PER_BANDWIDTH * bandwidth)
+            fastest = min(fastest, _MAX_LOG_RATE_PER_BANDWIDTH * bandwidth)
         if not slowest <= rate <= fastest:
             by_rate.setdefault((rate, fastest), []).append(name)
     findings = []
@@ -196,16 +199,6 @@ def implausible_rates(
         channels = [None] if len(names) == len(rates) else names
         findings += [find(data, "warning", factor, channel) for channel in channels]
     return findings
-
-
-def _compute_max_rate(bandwidth: float | None) -> float:
-    """Return the highest rate of a log of a sensor, Hz."""
-    if bandwidth is None:
-        return _MAX_RATE
-    return min(
-        max(_MAX_RATE, _MAX_SAMPLING_RATE_PER_BANDWIDTH * bandwidth),
-        _MAX_LOG_RATE_PER_BANDWIDTH * bandwidth,
-    )
 
 
 def implausible(
@@ -239,9 +232,13 @@ def implausible(
             for name, level in channels.items()
             if quantity_of(name) == "gyro"
         }
-        findings += [*_check_mean_rates(means, of["gyro"])] or [
-            *_check_gravity_turn(means, gravity)
+        largest, source = of["gyro"].offset, of["gyro"].offset_of
+        turning = [
+            find(texts.Turning(mean, largest=largest, offset_of=source), "warning", mean, name)
+            for name, mean in means.items()
+            if abs(mean) > largest
         ]
+        findings += turning or _check_gravity_turn(means, gravity)
     return findings
 
 
@@ -372,14 +369,6 @@ def _compute_axis_ratio(level: Level, others: Sequence[Level]) -> float | None:
     if _MIN_SUSPICIOUS_AXIS_RATIO * high < least:
         return high / min(highs)
     return None
-
-
-def _check_mean_rates(means: Mapping[str, float], usual: Expected) -> Iterator[Finding]:
-    """Yield a finding for each gyro whose mean exceeds the largest offset."""
-    for name, mean in means.items():
-        if abs(mean) > usual.offset:
-            data = texts.Turning(mean, largest=usual.offset, offset_of=usual.offset_of)
-            yield find(data, "warning", mean, name)
 
 
 def _check_gravity_turn(

@@ -5,7 +5,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import asdict, dataclass, replace
 from statistics import median
 
-from imubench_pipeline.datasheets.comparable import Comparable, read_comparables
+from imubench_pipeline.datasheets.comparable import read_comparables
 from imubench_pipeline.model.estimates import ParameterRow
 from imubench_pipeline.model.recordings import FindingRow
 from imubench_pipeline.settings.sensor import QUANTITIES, Sensor, quantity_of
@@ -74,15 +74,11 @@ def printed_figures(sensor: Sensor, quantity: str) -> dict[str, float]:
             values = [
                 value
                 for row, value in with_value
-                if row.statistic == statistic and _has_single_value(row)
+                if row.statistic == statistic and row.figure and row.figure.kind != "range"
             ]
             if values:
                 figures.setdefault(figure, values[0])
     return figures
-
-
-def _has_single_value(row: Comparable) -> bool:
-    return row.figure is not None and row.figure.kind != "range"
 
 
 def suspicious(

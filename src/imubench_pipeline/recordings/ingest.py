@@ -349,7 +349,10 @@ def ingest_as_planned(
             ingested = ingest(source, plan.log, notes, plan.quality, folder, names)
         sources = ingested.sources or {}
         if not is_same():  # the samples and the digest may be from two logs
-            sources = {name: file.distrusted() for name, file in sources.items()}
+            # Without digest and stamps they count as changed.
+            sources = {
+                name: replace(file, sha256=None, stamps=None) for name, file in sources.items()
+            }
     except RecordingError as error:
         remove_kept(folder)
         row = RecordingRow(

@@ -63,10 +63,6 @@ class KnownFile:
         stamps = _stamps(before) if old else None
         return cls(before.st_size, digest, stamps, inode=before.st_ino)
 
-    def distrusted(self) -> "KnownFile":
-        """Return the file without digest and stamps, so that it counts as changed."""
-        return replace(self, sha256=None, stamps=None)
-
 
 def read_known(folder: Path) -> dict[str, KnownFile] | None:
     """Read the file identities of the last ingest of a recording; None if there are none."""

@@ -12,18 +12,9 @@ from imubench_pipeline.settings.yaml_files import read_settings
 from imubench_pipeline.tables.outputs import Place
 
 _CONFIG_FILE = Path("config/config.yaml")
-_RESULT_FOLDERS = (  # folders in the results that runs write
-    "exports",
-    "faults",
-    "logs",
-    "nightly",
-    "recordings",
-    "report",
-    "seals",
-    "sensors",
-    "simulated",
-    "tables",
-)
+_RESULT_FOLDERS = ("exports", "faults", "logs", "nightly", "recordings", "report", "seals",
+                   "sensors", "simulated", "tables")  # fmt: skip
+"""Folders in the results that runs write."""
 
 _WORKFLOW_PARTS = ("Snakefile", "workflow", "profiles", "src", "tests", "pyproject.toml")
 
