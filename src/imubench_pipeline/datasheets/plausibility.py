@@ -57,8 +57,7 @@ _TIME_UNIT_PENALTIES: Mapping[float, float] = {60.0: 1.0, 1e3: 0.0, 1e6: 0.0, 1e
 """Usual rate, Hz; and ratios of two units of time, each with a penalty in decades from the usual
 rate. Minutes have a penalty, since a sensor file cannot state them."""
 
-_GRAVITY_TOLERANCE = 0.15
-"""Maximum error of the mean acceleration, as a fraction of gravity."""
+_GRAVITY_TOLERANCE = 0.15  # maximum error of the mean acceleration, as a fraction of gravity
 
 _SUSPICIOUS_NOISE_FACTOR = 2.5
 """Noise is suspicious beyond this factor outside the usual range: above 10 times or below 0.16
@@ -70,15 +69,13 @@ _MAX_EXPLAINED_FACTOR = 1.5
 _MIN_SUSPICIOUS_AXIS_RATIO = 4.0
 """Minimum ratio of the noise of one axis to both others, either way, for a finding."""
 
-_MAX_RATIO_OF_OTHER_AXES = 2.5
-"""Maximum ratio of the noise of those two to each other."""
+_MAX_RATIO_OF_OTHER_AXES = 2.5  # maximum ratio of the noise of those two to each other
 
 _MAX_FACTOR_WITHOUT_STAMPS = 2.5
 """Maximum ratio to the printed noise, either way, if the rate is not known from time stamps. N is
 proportional to the root of the rate: a stated rate that is 10 times wrong changes N 3.2 times."""
 
-_MAX_EXPLAINED_AXIS_RATIO = 1.5
-"""Maximum ratio of its noise to theirs in the suggested unit."""
+_MAX_EXPLAINED_AXIS_RATIO = 1.5  # maximum ratio of its noise to theirs in the suggested unit
 
 _LOGGER_UNITS: Mapping[str, Sequence[str]] = {
     "gyro": ("rad/s", "deg/s", "mdeg/s", "mrad/s", "deg/h"),
@@ -314,14 +311,10 @@ def _check_noise(channels: Mapping[str, Level], of: Mapping[str, Expected]) -> I
 def _compare_noise(
     channels: Mapping[str, Level], of: Mapping[str, Expected], doubted: Collection[str | None]
 ) -> Iterator[Finding]:
-    """Yield a finding for each channel whose noise differs from the datasheet or the other axes.
-
-    Causes are a wrong scale or range, another sensor, or one axis in another unit. ``doubted``
-    channels are skipped: another unit already explains them.
-    """
+    """Yield a finding for each channel whose noise is unlike the datasheet or the other axes."""
     untimed = False
     for name, level in channels.items():
-        if name in doubted:
+        if name in doubted:  # another unit explains it
             continue
         quantity = quantity_of(name)
         low, high = level.density

@@ -359,11 +359,9 @@ def _group_records(
     row_stamp: NDArray[np.int64],
     times: NDArray[np.int64],
 ) -> int:
-    """Fill records; return the number of complete ones.
-
-    ``state``: the first column of the log, which begins a record, and whether a record is open.
-    """
+    """Fill records; return the number of complete ones."""
     count = 0
+    # `state`: the first column of the log, which begins a record, and whether a record is open
     for i in range(columns.size):
         column = columns[i]
         if state[0] < 0:

@@ -209,10 +209,7 @@ def digest_blocks(path: Path) -> str:
 
 
 def _digest(path: Path, size: int, is_stopped: Callable[[], bool]) -> str | None:
-    """Return the SHA-256 of the first `size` bytes of a file; None where it was stopped.
-
-    A file of the kernel may never end. Of a long hole in a large sparse file, only the end counts.
-    """
+    """Return the SHA-256 of the first `size` bytes, of long holes only the end; None if stopped."""
     digest, is_large = hashlib.sha256(), size > MAX_DIGESTED_SIZE
     is_sparse = is_large and 512 * path.stat().st_blocks < size - MAX_DIGESTED_SIZE
     with closing(FileWithoutHoles(path)) if is_sparse else _opened(path) as file:

@@ -309,10 +309,7 @@ def _write_parts(part: Part, clocks: list[_Clock], records: _Records, scratch: P
 
 
 def _carry(values: Array, chosen: NDArray[np.bool_], waiting: float) -> tuple[Array, float]:
-    """Return the latest reading since the previous chosen record, for each chosen record.
-
-    ``waiting``: reading after the last chosen record of the block before; of this one, if second.
-    """
+    """Return for each chosen record the latest reading since the one before, and the one left."""
     there = np.where(np.isfinite(values), np.arange(len(values)), -1)
     latest = np.maximum.accumulate(there)
     records = np.flatnonzero(chosen)

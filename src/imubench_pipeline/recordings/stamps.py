@@ -97,10 +97,7 @@ def _take_forward_steps(block: Array) -> Array:
 
 
 def _are_regular(chosen: NDArray[np.bool_]) -> bool:
-    """Return whether the chosen steps have regular distances throughout a block, as by rounding.
-
-    Losses give random distances; a lower rate in a part of the block gives one in that part only.
-    """
+    """Return whether chosen steps have regular distances in the whole block, unlike losses."""
     places = np.flatnonzero(chosen)
     if len(places) < 10:
         return False

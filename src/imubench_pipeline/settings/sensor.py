@@ -33,14 +33,11 @@ QUANTITIES: dict[str, str] = {"gyro": "angular_rate", "accel": "acceleration"}
 CHANNELS: tuple[str, ...] = tuple(f"{q}_{axis}" for q in QUANTITIES for axis in "xyz")
 """Every channel: one axis of one quantity."""
 
-TEMPERATURE = "temperature"
-"""Name of the temperature column of a recording."""
+TEMPERATURE = "temperature"  # name of the temperature column of a recording
 
-POSITION = "position"
-"""Name of the column with the position of a turned sensor."""
+POSITION = "position"  # name of the column with the position of a turned sensor
 
-TABLE_RATE = "table_rate"
-"""Name of the column with the rate of the rate table."""
+TABLE_RATE = "table_rate"  # name of the column with the rate of the rate table
 
 Channel = Literal["gyro_x", "gyro_y", "gyro_z", "accel_x", "accel_y", "accel_z"]
 
@@ -154,8 +151,7 @@ Reader = Literal["csv", "vectornav", "ubx", "rosbag", "matlab", "numpy", "arrow"
 """The formats of log files; each is declared in a module of this name in ``readers/formats``."""
 
 
-_MIN_RATE, _MAX_RATE = 1e-6, 1e9
-"""Range of valid sampling rates, Hz."""
+_MIN_RATE, _MAX_RATE = 1e-6, 1e9  # range of valid sampling rates, Hz
 
 
 class LogFormat(Strict):

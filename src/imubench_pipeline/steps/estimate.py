@@ -256,10 +256,7 @@ class _Channel:
         )
 
     def _fit_temperature(self, into: Estimation) -> ThermalFit:
-        """Return the temperature effect of the channel.
-
-        Temperature explains a warm-up, so deterministic signals remain in the log.
-        """
+        """Return the temperature effect; a warm-up, which it explains, remains in the log."""
         log = self.log
         if log.path not in into.paths:
             of_clock = f"{log.path.name} {average_blocks(log.temperatures())!r}"

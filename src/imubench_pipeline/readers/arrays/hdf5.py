@@ -231,11 +231,7 @@ _MAX_MEMORY = 1 << 29
 
 @lru_cache(maxsize=4)
 def _read_variable_length_texts(path: str, *_: int) -> dict[str, str]:
-    """Return the units of a file by data set; empty if they cannot be read.
-
-    The library may crash or hang on damaged texts: another process reads them, and stops at a long
-    one.
-    """
+    """Return the units by data set, read by a process, as damaged texts may crash the library."""
     units: dict[str, str] = {}
 
     def visit(name: str, item: h5py.HLObject) -> str | None:

@@ -53,10 +53,8 @@ class CsvFile(LogFile):
             [line.decode("utf-8", "replace") for line in lines]
             for lines in (layout.preamble, layout.skipped)
         )
-        self.rate, self.started = (
-            header.find_stated_rate(preamble),
-            header.find_stated_start(preamble),
-        )
+        self.rate = header.find_stated_rate(preamble)
+        self.started = header.find_stated_start(preamble)
         self.simulated = header.is_simulated([*preamble, *skipped])
         time = None if self.log.time is None else text_stamps.TextTime(self, layout)
         beside, _ = find_unit_line(layout)
