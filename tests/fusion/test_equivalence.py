@@ -10,7 +10,7 @@ from imubench_pipeline.extensions.fusion.equivalence import equivalence_rows
 from imubench_pipeline.extensions.fusion.fusion import yield_fusion_rows
 from imubench_pipeline.extensions.fusion.prediction import fused_allan
 from imubench_pipeline.extensions.fusion.weights import equal
-from imubench_pipeline.navigation.compared import (
+from imubench_pipeline.navigation.ratios import (
     ComparedChannel,
     TemperaturePart,
     compute_number_needed,

@@ -153,7 +153,7 @@ def list_error_rows(
     ``names`` are ``sensor`` and ``recording``; ``estimates`` the recommended one of each channel;
     ``draws`` the number of noise models that are drawn from each, for the interval of a total.
     Each channel has its own random stream of the seed. ``figures`` belong to the errors in use,
-    by channel (`printed_errors.in_use`).
+    by channel (`in_use.collect_figures_in_use`).
     """
     axes = collect_axis_errors(estimates, figures)
 

@@ -19,9 +19,12 @@ from imubench_pipeline.model.comparisons import RankingRow, ShortlistRow
 from imubench_pipeline.model.estimates import ParameterRow
 from imubench_pipeline.model.recordings import RecordingRow
 from imubench_pipeline.model.verdicts import Shortfall
-from imubench_pipeline.navigation.error_budget.in_use import BIAS_CAUSES, Figure
+from imubench_pipeline.navigation.error_budget.in_use import (
+    BIAS_CAUSES,
+    Figure,
+    read_datasheet_figures,
+)
 from imubench_pipeline.navigation.error_budget.in_use import Figures as InUse
-from imubench_pipeline.navigation.error_budget.printed_errors import read_datasheet_figures
 from imubench_pipeline.navigation.expected_errors import (
     AxisErrors,
     Question,

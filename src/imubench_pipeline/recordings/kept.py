@@ -19,10 +19,10 @@ from imubench_pipeline.recordings.recording import (
     open_channel_logs,
     was_at_rest,
 )
-from imubench_pipeline.tables.digests import compute_digest, read_sealed_json, write_sealed_json
 from imubench_pipeline.tables.failures import Failure
 from imubench_pipeline.tables.findings import RecordingError
 from imubench_pipeline.tables.parquet import read_footer
+from imubench_pipeline.tables.seals import compute_digest, read_sealed_json, write_sealed_json
 
 
 @dataclass(frozen=True, kw_only=True)

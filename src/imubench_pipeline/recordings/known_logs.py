@@ -20,7 +20,7 @@ from pydantic import TypeAdapter
 from imubench_pipeline.readers import log_files
 from imubench_pipeline.readers.holes import FileWithoutHoles
 from imubench_pipeline.recordings.drop_zone import Recording
-from imubench_pipeline.tables import digests
+from imubench_pipeline.tables import seals
 
 KNOWN = "log.json"  # the file of the evidence, beside `quality.json`
 MAX_DIGESTED_SIZE = 1 << 26
@@ -67,7 +67,7 @@ class KnownFile:
 def read_known(folder: Path) -> dict[str, KnownFile] | None:
     """Read the file identities of the last ingest of a recording; None if there are none."""
     with contextlib.suppress(OSError, ValueError, TypeError, KeyError):
-        files = digests.read_sealed_json(folder / KNOWN)["files"]
+        files = seals.read_sealed_json(folder / KNOWN)["files"]
         return TypeAdapter(dict[str, KnownFile]).validate_python(files)
     return None
 
@@ -86,7 +86,7 @@ def write_known(
             for name, file in (absent | dict(files)).items()
         }
     rows = {name: asdict(file) for name, file in sorted(files.items())}
-    digests.write_sealed_json({"files": rows}, folder / KNOWN)
+    seals.write_sealed_json({"files": rows}, folder / KNOWN)
 
 
 def identify_log_files(
@@ -222,7 +222,7 @@ def _digest(path: Path, size: int, is_stopped: Callable[[], bool]) -> str | None
 
 
 def _opened(path: Path) -> io.FileIO:
-    return open(path, "rb", buffering=0, opener=digests.open_without_waiting)
+    return open(path, "rb", buffering=0, opener=seals.open_without_waiting)
 
 
 def _places(source: Path) -> dict[str, Path]:

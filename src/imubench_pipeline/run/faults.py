@@ -10,10 +10,9 @@ from pydantic import BaseModel
 
 from imubench_pipeline.recordings.kept import Quality
 from imubench_pipeline.report.run_summary import fold_text
-from imubench_pipeline.tables.digests import read_sealed_json, write_sealed_json
 from imubench_pipeline.tables.failures import Cause, Failure
 from imubench_pipeline.tables.findings import RecordingError
-from imubench_pipeline.tables.seals import name_place
+from imubench_pipeline.tables.seals import name_place, read_sealed_json, write_sealed_json
 
 Of = tuple[str, str, str | None]  # step, sensor and recording; None: a step of the whole sensor
 TOLD = "IMUBENCH_FAILURES_TOLD"  # environment variable: the caller reports the failures itself

@@ -31,8 +31,8 @@ from imubench_pipeline.settings.requirements import Requirement, read_requiremen
 from imubench_pipeline.settings.shipped import find_own_folder, list_folders
 from imubench_pipeline.settings.validation import ConfigError, UnavailableSettingsError, parse
 from imubench_pipeline.settings.yaml_files import read_yaml
-from imubench_pipeline.tables.digests import compute_digest
 from imubench_pipeline.tables.provenance import digest_sources
+from imubench_pipeline.tables.seals import compute_digest
 from imubench_pipeline.units import parse_quantity
 
 _INGEST_OUTPUTS = ("quality.json", "envelope.parquet", "histogram.parquet")

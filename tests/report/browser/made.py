@@ -26,7 +26,6 @@ from imubench_pipeline.estimators.rows import make_parameter_rows
 from imubench_pipeline.extensions.fusion.fusion import NEEDED, yield_fusion_rows
 from imubench_pipeline.model.estimates import FixedBiasRow, ParameterRow
 from imubench_pipeline.model.recordings import RecordingRow
-from imubench_pipeline.navigation.compared import ComparedChannel
 from imubench_pipeline.navigation.drift import drift_rows
 from imubench_pipeline.navigation.error_growth import list_growth_rows
 from imubench_pipeline.navigation.expected_errors import (
@@ -35,7 +34,7 @@ from imubench_pipeline.navigation.expected_errors import (
     list_standard_questions,
 )
 from imubench_pipeline.navigation.pooled import list_pooled_rows
-from imubench_pipeline.navigation.ratios import list_deviation_rows
+from imubench_pipeline.navigation.ratios import ComparedChannel, list_deviation_rows
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.simulate import channel_rng, simulate
 from imubench_pipeline.recordings.overview import overview

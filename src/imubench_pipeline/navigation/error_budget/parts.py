@@ -11,8 +11,12 @@ from typing import Literal
 from imubench_pipeline.model.comparisons import ErrorBudgetRow
 from imubench_pipeline.model.states import Cause, Measured, SourcePath
 from imubench_pipeline.model.verdicts import ErrorSource
-from imubench_pipeline.navigation.error_budget.in_use import Figure, Figures, needed
-from imubench_pipeline.navigation.error_budget.printed_errors import DATASHEET_KEY_OF_CAUSE
+from imubench_pipeline.navigation.error_budget.in_use import (
+    DATASHEET_KEY_OF_CAUSE,
+    Figure,
+    Figures,
+    needed,
+)
 from imubench_pipeline.noise.terms.base import Term
 from imubench_pipeline.settings.printed import FIGURE_DIMENSIONS
 from imubench_pipeline.units import SI_UNITS
