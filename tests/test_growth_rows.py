@@ -7,8 +7,11 @@ import pytest
 
 from imubench_pipeline.estimators.estimate import Estimate, JointDraws, Parameter
 from imubench_pipeline.model.estimates import ErrorGrowthRow
-from imubench_pipeline.navigation.error_growth import list_growth_rows
-from imubench_pipeline.navigation.expected_errors import list_error_rows, list_standard_questions
+from imubench_pipeline.navigation.expected_errors import (
+    list_error_rows,
+    list_growth_rows,
+    list_standard_questions,
+)
 from imubench_pipeline.navigation.ratios import (
     ComparedChannel,
     compare_deviations,

@@ -100,10 +100,8 @@ def suspicious(
         typical = usual.get((quantity, figure))
         if typical is None:
             continue
-        least, most = (
-            typical.least / _MAX_FACTOR_BEYOND_CATALOGUE,
-            typical.most * _MAX_FACTOR_BEYOND_CATALOGUE,
-        )
+        least = typical.least / _MAX_FACTOR_BEYOND_CATALOGUE
+        most = typical.most * _MAX_FACTOR_BEYOND_CATALOGUE
         if own := (printed or {}).get(figure):
             least, most = own / MAX_FACTOR_FROM_PRINTED, own * MAX_FACTOR_FROM_PRINTED
             if least <= value <= most:

@@ -25,7 +25,7 @@ from imubench_pipeline.run import formats_command as formats
 from imubench_pipeline.run import project
 from imubench_pipeline.run import simulate_command as simulation
 from imubench_pipeline.run.analysis import command as analysis
-from imubench_pipeline.run.places import find_protected_places
+from imubench_pipeline.run.project import find_protected_places
 from imubench_pipeline.run.verification import command as verification
 from imubench_pipeline.settings import command_line
 from imubench_pipeline.settings.config import Run, read_config

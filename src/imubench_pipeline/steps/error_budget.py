@@ -12,7 +12,7 @@ from imubench_pipeline.model.table import TableRow
 from imubench_pipeline.navigation import expected_errors
 from imubench_pipeline.navigation.backtest.comparison import list_backtest_rows
 from imubench_pipeline.navigation.error_budget.in_use import collect_figures_in_use
-from imubench_pipeline.navigation.error_growth import list_growth_rows
+from imubench_pipeline.navigation.expected_errors import list_growth_rows
 from imubench_pipeline.navigation.ratios import ComparedChannel, list_deviation_rows
 from imubench_pipeline.recordings.kept import Quality, load_static_logs
 from imubench_pipeline.settings.config import ErrorBudgetSettings, FusionSettings

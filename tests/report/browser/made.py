@@ -27,9 +27,9 @@ from imubench_pipeline.extensions.fusion.fusion import NEEDED, yield_fusion_rows
 from imubench_pipeline.model.estimates import FixedBiasRow, ParameterRow
 from imubench_pipeline.model.recordings import RecordingRow
 from imubench_pipeline.navigation.drift import drift_rows
-from imubench_pipeline.navigation.error_growth import list_growth_rows
 from imubench_pipeline.navigation.expected_errors import (
     list_error_rows,
+    list_growth_rows,
     list_requirement_questions,
     list_standard_questions,
 )
