@@ -1,4 +1,4 @@
-"""Expected navigation errors of a recording: rows of the table ``error_budget``."""
+"""Expected navigation errors of a recording, and their growth: rows of two tables."""
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -14,7 +14,6 @@ from imubench_pipeline.earth import STANDARD_GRAVITY
 from imubench_pipeline.estimators.estimate import Estimate
 from imubench_pipeline.model.comparisons import ErrorBudgetRow
 from imubench_pipeline.model.estimates import ErrorGrowthRow
-from imubench_pipeline.navigation import expected_errors
 from imubench_pipeline.navigation.error_budget import in_use, uncertainty
 from imubench_pipeline.navigation.error_budget.budget import (
     ACCEL_ORDER,
@@ -24,9 +23,7 @@ from imubench_pipeline.navigation.error_budget.budget import (
     time_until,
 )
 from imubench_pipeline.navigation.error_budget.gyrocompass import Gyrocompass
-from imubench_pipeline.navigation.error_budget.in_use import Figures
 from imubench_pipeline.navigation.error_budget.parts import Budget, Largest, Quantity
-from imubench_pipeline.navigation.error_budget.uncertainty import draw_models
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.growth import Calibrated, Uncalibrated
 from imubench_pipeline.noise.model import sum_over_terms
@@ -320,20 +317,20 @@ def list_growth_rows(
     window: float,
     draws: int,
     seed: int,
-    figures: Mapping[str, Figures] = expected_errors.NO_FIGURES_OF_CHANNELS,
+    figures: Mapping[str, in_use.Figures] = NO_FIGURES_OF_CHANNELS,
 ) -> Iterator[ErrorGrowthRow]:
     """Yield the rows of the table ``error_growth`` of a recording.
 
     They are for its worst axes, and if it has several, for each letter alone. ``times`` and
     ``window``, s, are used in addition to the default times; the others are as in
-    `expected_errors.error_rows`.
+    `list_error_rows`.
     """
-    axes = expected_errors.collect_axis_errors(estimates, figures)
+    axes = collect_axis_errors(estimates, figures)
 
     @cache
     def models(channel: str) -> Sequence[NoiseModel]:
         stream = channel_rng(seed, repr(estimates[channel].model), channel, "budget")
-        return draw_models(estimates[channel], draws, stream)
+        return uncertainty.draw_models(estimates[channel], draws, stream)
 
     @cache
     def grown(channel: str, order: int, time: float, start: Calibrated | Uncalibrated) -> Array:
@@ -359,17 +356,15 @@ def list_growth_rows(
     for letter in letters if len(letters) > 1 else []:
         answerers[letter] = {name: errors for name, errors in axes.items() if name[-1] == letter}
     for axis, at_rest in product(answerers, sorted({*_STANDARD_WINDOWS, window})):
-        for question in expected_errors.list_standard_questions(
+        for question in list_standard_questions(
             sorted({*_STANDARD_TIMES, *times}), at_rest, 0.0, ["worst"]
         ):
             if question.error == "north":
                 continue
-            chosen = expected_errors.select_channels(question, answerers[axis])
+            chosen = select_channels(question, answerers[axis])
             if chosen is None:
                 continue
-            budget = question.answer(
-                *(axes[c] if c else expected_errors.AxisErrors() for c in chosen.values())
-            )
+            budget = question.answer(*(axes[c] if c else AxisErrors() for c in chosen.values()))
             gyro, accel = chosen["gyro"], chosen["accel"]
             assert gyro is not None  # every error needs one
             drawn = noise(question.error, question.time, Calibrated(at_rest), gyro, accel)
