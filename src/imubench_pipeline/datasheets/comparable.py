@@ -204,12 +204,6 @@ def read_bias_comparables(datasheet: Datasheet, channel: str) -> Iterator[Compar
         yield from axis.read(name, like, axis.si(name))
 
 
-def read_repeatability_comparables(datasheet: Datasheet, channel: str) -> Iterator[Comparable]:
-    """Yield the printed turn-on to turn-on repeatability of the bias of a channel, SI."""
-    axis, name = PrintedAxis.of(datasheet, channel), "bias_repeatability"
-    yield from axis.read(name, Comparable(name, "spread", None), axis.si(name))
-
-
 def _read_densities(axis: PrintedAxis) -> Iterator[Comparable]:
     dimensions = FIGURE_DIMENSIONS[axis.quantity]["noise_density"]
     figures = axis.sheet.printed("noise_density")

@@ -41,11 +41,6 @@ class Interval:
     regular distances are records written twice; None if there are none. Rounded stamps cause the
     same pattern, and ``mean`` assumes rounding."""
 
-    @property
-    def has_repeats(self) -> bool:
-        """Whether stamps repeat at regular distances, since the rate exceeds their resolution."""
-        return self.other is not None and self.other > self.mean
-
 
 def estimate_interval(stamps: Stamps) -> Interval | None:
     """Return the interval between samples; None if the stamps do not advance."""

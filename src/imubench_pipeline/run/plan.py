@@ -482,9 +482,6 @@ def _check_places(run: Run) -> None:
 
 def to_json(value: object) -> str:
     """Return a value as JSON, in which Snakemake finds no wildcard: a name may have braces."""
-    text = json.dumps(value, sort_keys=True, ensure_ascii=False, default=_dump_model)
+    dump = partial(BaseModel.model_dump, mode="json")
+    text = json.dumps(value, sort_keys=True, ensure_ascii=False, default=dump)
     return _BRACE_BEFORE_WORD.sub(r"\\u007b", text)
-
-
-def _dump_model(model: BaseModel) -> dict[str, Any]:
-    return model.model_dump(mode="json")

@@ -1,7 +1,5 @@
 """The process that forks for each step of the workflow; started by `run.processes`."""
 
-from __future__ import annotations
-
 import fcntl
 import gc
 import importlib
@@ -97,7 +95,7 @@ _CHILD_SIGNALS = {signal.SIGCHLD}
 _STOP_SIGNALS = {signal.SIGHUP, signal.SIGINT, signal.SIGTERM, getattr(signal, "SIGIO", None)}
 """Signals that end a step because the run ends."""
 
-_running: dict[int, tuple[Connection[Any, Any], str]] = {}  # connection and step of each fork
+_running: dict[int, tuple["Connection[Any, Any]", str]] = {}  # connection and step of each fork
 
 
 def _reap(signal_number: int, frame: FrameType | None) -> None:
@@ -142,7 +140,7 @@ def _nothing() -> None:
     """Make numba load the common parts of all compiled functions."""
 
 
-def _run(connection: Connection[Any, Any], job: Job, *, imported: bool) -> None:
+def _run(connection: "Connection[Any, Any]", job: Job, *, imported: bool) -> None:
     """Run a script in this fork, report its outcome, and exit."""
     outcome: dict[str, float] | StepError = StepError(f"{job.name}.py failed")
     try:

@@ -287,13 +287,8 @@ FIGURE_DIMENSIONS: dict[str, dict[str, tuple[str, ...]]] = {
 SENSORS: Mapping[str, str] = {"gyro": "gyro", "accel": "accelerometer"}  # what measures it
 
 IN_USE = (
-    "offset",
-    "bias_repeatability",
-    "temperature_coefficient",
-    "scale_factor_error",
-    "nonlinearity",
-    "g_sensitivity",
-    "vibration_rectification",
+    *("offset", "bias_repeatability", "temperature_coefficient", "scale_factor_error"),
+    *("nonlinearity", "g_sensitivity", "vibration_rectification"),
 )
 """Figures of errors that come in use and are in no static log."""
 
