@@ -233,11 +233,6 @@ class Conditions:
         return (*figures, *self.unknown)
 
 
-def is_condition(row: ErrorBudgetRow) -> bool:
-    """Return whether meeting a limit depends on the figure of a source."""
-    return row.largest_unit is not None and row.source in FIGURES
-
-
 def select_known_errors(rows: Iterable[ErrorBudgetRow]) -> list[tuple[ErrorBudgetRow, float]]:
     """Return the rows with a figure, each with its standard deviation."""
     return [(row, row.sigma) for row in rows if row.sigma is not None]

@@ -97,9 +97,7 @@ def _limit_mean_square(
 ) -> tuple[float, float, float]:
     """Return the limits of the mean square of 95 % of all logs, and the p-value of the found one.
 
-    They assume that the model is right. There is one spread for each drawn model, at least one. The
-    limits and the found mean square are in rad^2, (m/s)^2 or m^2.
-
+    They assume that the model is right; there is one spread for each drawn model, at least one.
     ``efficient``: the models are drawn jointly from a likelihood (an efficient estimate); else the
     uncertainty of the model is assumed to be independent of the scatter, and adds to it. The
     p-value is the probability of the found mean square or a larger one. It has the uncertainty in
@@ -132,9 +130,8 @@ def _compare(
 ) -> BacktestRow:
     """Return a row with the errors of a log, compared with the prediction of its noise model.
 
-    ``cut`` is the window for the times at rest and in motion; ``means`` are the block means of each
-    segment of the log, NaN where samples are missing. The model has at least one term; ``drawn``
-    are models from the estimate of the log, and ``efficient`` is as in `_limit_mean_square`.
+    ``cut``: window at rest and in motion; ``means``: block means of each segment, NaN where samples
+    are missing; ``drawn``: models from the estimate; ``efficient``: see `_limit_mean_square`.
     """
     predicted = asked.sigma(model)
     lower, upper = np.quantile([asked.sigma(candidate) for candidate in drawn], [0.025, 0.975])
