@@ -37,8 +37,8 @@ def compute_number_needed(own: ArrayLike, common: ArrayLike, wanted: ArrayLike) 
     """Return the number of sensors of one kind whose mean has a given Allan variance.
 
     The mean of n sensors has ``own / n + common``. n is not rounded, may be below 1, and is
-    infinite if no number is enough. The Allan variances of the independent and of the common part,
-    and the wanted one, array_like, are in (rad/s)^2 or (m/s^2)^2.
+    infinite if no number is enough. Allan variances of the independent and of the common part, and
+    the wanted one, all of shape (n,) or scalars, are in (rad/s)^2 or (m/s^2)^2.
     """
     own, common, wanted = np.broadcast_arrays(own, common, wanted)
     room = np.asarray(wanted - common, dtype=np.float64)
