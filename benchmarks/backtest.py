@@ -42,7 +42,7 @@ from imubench_pipeline.recordings.recording import LogWriter, open_channel_logs
 from imubench_pipeline.settings.config import ErrorBudgetSettings, EstimateSettings
 from imubench_pipeline.settings.requirements import read_requirements
 from imubench_pipeline.steps.estimate import Estimation, estimate_channel
-from imubench_pipeline.tables import build, read, write
+from imubench_pipeline.tables.files import build, read, write
 from imubench_pipeline.tables.keys import Key
 
 Array = NDArray[np.float64]

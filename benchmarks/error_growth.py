@@ -25,7 +25,8 @@ from numpy.typing import NDArray
 from scipy.signal import fftconvolve
 
 from imubench_pipeline.earth import STANDARD_GRAVITY
-from imubench_pipeline.navigation.error_budget import Levelled, Quantity, Start, budget
+from imubench_pipeline.navigation.error_budget.budget import Levelled, Start, budget
+from imubench_pipeline.navigation.error_budget.parts import Quantity
 from imubench_pipeline.noise import NoiseModel, Sinusoid
 from imubench_pipeline.noise.simulate import simulate
 

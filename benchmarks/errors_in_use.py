@@ -25,7 +25,8 @@ from numpy.typing import NDArray
 
 from imubench_pipeline.earth import STANDARD_GRAVITY
 from imubench_pipeline.model.states import Cause
-from imubench_pipeline.navigation.error_budget import NO_FIGURES, Figure, Start, Use, budget
+from imubench_pipeline.navigation.error_budget.budget import Start, budget
+from imubench_pipeline.navigation.error_budget.in_use import NO_FIGURES, Figure, Use
 from imubench_pipeline.navigation.error_budget.parts import Quantity
 from imubench_pipeline.noise import NoiseModel
 

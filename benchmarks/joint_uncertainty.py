@@ -51,7 +51,7 @@ from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.recordings.recording import LogWriter, open_channel_logs
 from imubench_pipeline.settings.config import ErrorBudgetSettings, EstimateSettings
 from imubench_pipeline.steps.estimate import Estimation, estimate_channel
-from imubench_pipeline.tables import write
+from imubench_pipeline.tables.files import write
 from imubench_pipeline.tables.keys import Key
 from imubench_pipeline.units import parse_quantity
 

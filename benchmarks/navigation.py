@@ -54,8 +54,9 @@ from imubench_pipeline.extensions.aided.trajectories import (
     simulate_trajectory,
 )
 from imubench_pipeline.model.table import TableRow
-from imubench_pipeline.navigation.error_budget import Start, Uncalibrated, budget
+from imubench_pipeline.navigation.error_budget.budget import Start, budget
 from imubench_pipeline.noise import GaussMarkov, NoiseModel
+from imubench_pipeline.noise.growth import Uncalibrated
 from imubench_pipeline.run.plan import Plan
 from imubench_pipeline.settings.sensor import CHANNELS
 from imubench_pipeline.simulate.model import SensorModel

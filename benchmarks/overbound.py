@@ -34,7 +34,7 @@ from imubench_pipeline.allan import AllanCurve, allan_variance, cluster_sizes
 from imubench_pipeline.estimators.likelihood import fit
 from imubench_pipeline.export.growth import growth
 from imubench_pipeline.export.overbound import Family, overbound, simultaneous_upper
-from imubench_pipeline.navigation.error_budget import draw_models
+from imubench_pipeline.navigation.error_budget.uncertainty import draw_models
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.simulate import simulate
 from model_choice import fractional_noise

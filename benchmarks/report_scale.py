@@ -31,7 +31,7 @@ from imubench_pipeline.navigation.drift import drift_rows
 from imubench_pipeline.report.compare import KEPT as COMPARED
 from imubench_pipeline.report.publish import make_site, publish
 from imubench_pipeline.report.static_figures.files import draw_comparison
-from imubench_pipeline.tables import build, read, write_arrow
+from imubench_pipeline.tables.files import build, read, write_arrow
 from imubench_pipeline.tables.schemas import OF_ONE_RECORDING, TABLES
 from resident import peak_memory
 

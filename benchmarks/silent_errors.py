@@ -61,7 +61,7 @@ from scipy.stats import beta
 
 from imubench_pipeline.recordings.kept import Quality
 from imubench_pipeline.run.plan import Plan
-from imubench_pipeline.tables import read
+from imubench_pipeline.tables.files import read
 from silent_cases import CASES, CLEAN, FILTERED, NOTHING, Log, Truth
 from workflow_steps import OneRecording
 

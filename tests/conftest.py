@@ -21,7 +21,7 @@ from hypothesis import settings
 from xdist.scheduler import LoadScopeScheduling
 
 from imubench_pipeline.estimators import posterior
-from imubench_pipeline.run.kernels import compile_once
+from imubench_pipeline.run.step_server import compile_once
 from imubench_pipeline.settings.sensor import Sensor, read_sensors
 from tests.scheduling import ByUnit, place
 

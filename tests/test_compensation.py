@@ -15,7 +15,7 @@ from imubench_pipeline.settings.config import EstimateSettings, Run, read_run
 from imubench_pipeline.settings.validation import ConfigError
 from imubench_pipeline.steps.allan import read_compensated_curves
 from imubench_pipeline.steps.estimate import Estimation, estimate_channel
-from imubench_pipeline.tables import build, write
+from imubench_pipeline.tables.files import build, write
 from imubench_pipeline.tables.keys import Key
 from tests.kept import curve_of, kept
 

@@ -9,8 +9,14 @@ import yaml
 
 from imubench_pipeline.allan import AllanCurve
 from imubench_pipeline.datasheets.comparable import read_comparables
-from imubench_pipeline.datasheets.deltas import Delta, bias_deltas, curve_rms, deltas
-from imubench_pipeline.datasheets.measured import compute_fixed_bias, compute_sensitivity
+from imubench_pipeline.datasheets.deltas import (
+    Delta,
+    bias_deltas,
+    compute_fixed_bias,
+    compute_sensitivity,
+    curve_rms,
+    deltas,
+)
 from imubench_pipeline.estimators import curve as reading
 from imubench_pipeline.estimators.curve_bias import compute_curve_figures
 from imubench_pipeline.estimators.estimate import Estimate, Parameter

@@ -14,21 +14,12 @@ from scipy.integrate import simpson, solve_ivp
 from imubench_pipeline.earth import EARTH_RATE
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
 from imubench_pipeline.model.verdicts import ErrorSource
-from imubench_pipeline.navigation.error_budget import (
-    Budget,
-    Calibrated,
-    Contribution,
-    Gyrocompass,
-    Levelled,
-    Quantity,
-    Start,
-    Uncalibrated,
-    budget,
-    compute_interval,
-    draw_models,
-    time_until,
-)
+from imubench_pipeline.navigation.error_budget.budget import Levelled, Start, budget, time_until
+from imubench_pipeline.navigation.error_budget.gyrocompass import Gyrocompass
+from imubench_pipeline.navigation.error_budget.parts import Budget, Contribution, Quantity
+from imubench_pipeline.navigation.error_budget.uncertainty import compute_interval, draw_models
 from imubench_pipeline.noise import GaussMarkov, NoiseModel, Sinusoid
+from imubench_pipeline.noise.growth import Calibrated, Uncalibrated
 from imubench_pipeline.words.verdicts import source_text
 
 Array = NDArray[np.float64]

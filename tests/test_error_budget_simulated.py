@@ -9,22 +9,16 @@ from numpy.typing import NDArray
 from scipy.signal import fftconvolve
 
 from imubench_pipeline.earth import EARTH_RATE
-from imubench_pipeline.navigation.error_budget import (
-    Calibrated,
-    Gyrocompass,
-    Levelled,
-    Quantity,
-    Start,
-    Uncalibrated,
-    budget,
-)
+from imubench_pipeline.navigation.error_budget.budget import Levelled, Start, budget
+from imubench_pipeline.navigation.error_budget.gyrocompass import Gyrocompass
+from imubench_pipeline.navigation.error_budget.parts import Quantity
 from imubench_pipeline.noise import (
     GaussMarkov,
     NoiseModel,
     Sinusoid,
     Term,
 )
-from imubench_pipeline.noise.growth import SensorStart
+from imubench_pipeline.noise.growth import Calibrated, SensorStart, Uncalibrated
 from imubench_pipeline.noise.simulate import simulate
 from tests.conftest import few
 from tests.noise.examples import EXAMPLES, model_of, named

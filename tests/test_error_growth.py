@@ -12,7 +12,6 @@ from numpy.polynomial.legendre import leggauss
 from numpy.typing import NDArray
 from scipy.integrate import dblquad
 
-from imubench_pipeline.navigation.error_budget import Calibrated, Uncalibrated
 from imubench_pipeline.noise import (
     Flicker,
     GaussMarkov,
@@ -24,7 +23,7 @@ from imubench_pipeline.noise import (
     Term,
     WhiteNoise,
 )
-from imubench_pipeline.noise.growth import SensorStart
+from imubench_pipeline.noise.growth import Calibrated, SensorStart, Uncalibrated
 from tests.noise.examples import NOISES, named
 
 Array = NDArray[np.float64]

@@ -13,27 +13,20 @@ from scipy.integrate import quad
 from imubench_pipeline.earth import EARTH_RATE
 from imubench_pipeline.model.estimates import TemperatureRow
 from imubench_pipeline.model.states import Cause
-from imubench_pipeline.navigation.error_budget import (
-    Contribution,
-    Figure,
-    Gyrocompass,
-    Start,
-    Use,
-    budget,
-    time_until,
-)
+from imubench_pipeline.navigation.error_budget.budget import Start, budget, time_until
+from imubench_pipeline.navigation.error_budget.gyrocompass import Gyrocompass
 from imubench_pipeline.navigation.error_budget.in_use import (
+    DATASHEET_KEY_OF_CAUSE,
+    Figure,
+    Use,
+    collect_figures_in_use,
     levers,
     of_pulse,
     of_rise,
     of_squared_rise,
-)
-from imubench_pipeline.navigation.error_budget.parts import Quantity
-from imubench_pipeline.navigation.error_budget.printed_errors import (
-    DATASHEET_KEY_OF_CAUSE,
-    collect_figures_in_use,
     read_datasheet_figures,
 )
+from imubench_pipeline.navigation.error_budget.parts import Contribution, Quantity
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.growth import Calibrated, Uncalibrated
 from imubench_pipeline.settings.printed import IN_USE, Datasheet

@@ -15,7 +15,7 @@ from imubench_pipeline.noise.simulate import channel_rng, simulate
 from imubench_pipeline.recordings.recording import ChannelLog
 from imubench_pipeline.settings.config import EstimateSettings, Method
 from imubench_pipeline.steps.estimate import Estimation, estimate_channel, estimate_register_step
-from imubench_pipeline.tables import build, write
+from imubench_pipeline.tables.files import build, write
 from imubench_pipeline.tables.keys import Key
 from tests.conftest import few
 from tests.kept import curve_of, kept

@@ -5,7 +5,6 @@ from pathlib import Path
 import pytest
 
 from imubench_pipeline.run.faults import TOLD, Faults
-from imubench_pipeline.tables import build, read, write
 from imubench_pipeline.tables.failures import (
     Failure,
     mark_failures,
@@ -13,6 +12,7 @@ from imubench_pipeline.tables.failures import (
     read_with_failures,
     write_empty,
 )
+from imubench_pipeline.tables.files import build, read, write
 from imubench_pipeline.tables.schemas import PARTS_OF, TABLES
 
 FAILURE = Failure("s", "a", "estimate", "error", "the step estimate failed: ValueError: no")

@@ -23,7 +23,7 @@ from imubench_pipeline.recordings.fitness import (
     mask_excluded,
 )
 from imubench_pipeline.settings.requirements import Requirement
-from imubench_pipeline.tables import build
+from imubench_pipeline.tables.files import build
 from imubench_pipeline.words.findings import FINDINGS
 from tests.ranking import ranking_rows
 from tests.rows import typed

@@ -7,10 +7,16 @@ import pytest
 
 from imubench_pipeline.estimators.estimate import Estimate, JointDraws, Parameter
 from imubench_pipeline.model.estimates import ErrorGrowthRow
-from imubench_pipeline.navigation.compared import ComparedChannel
-from imubench_pipeline.navigation.error_growth import list_growth_rows
-from imubench_pipeline.navigation.expected_errors import list_error_rows, list_standard_questions
-from imubench_pipeline.navigation.ratios import compare_deviations, list_deviation_rows
+from imubench_pipeline.navigation.expected_errors import (
+    list_error_rows,
+    list_growth_rows,
+    list_standard_questions,
+)
+from imubench_pipeline.navigation.ratios import (
+    ComparedChannel,
+    compare_deviations,
+    list_deviation_rows,
+)
 from imubench_pipeline.words.verdicts import source_text
 
 NAMES = {"sensor": "alpha", "recording": "night"}

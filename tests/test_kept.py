@@ -15,8 +15,8 @@ from imubench_pipeline.recordings.recording import LogNames
 from imubench_pipeline.run.faults import Faults
 from imubench_pipeline.settings.quality import QualitySettings
 from imubench_pipeline.settings.sensor import LogFormat, RecordingNotes
-from imubench_pipeline.tables import TableError, read, write
 from imubench_pipeline.tables.failures import Failure, read_failure
+from imubench_pipeline.tables.files import TableError, read, write
 from imubench_pipeline.tables.findings import RecordingError
 
 LOG = LogFormat.model_validate(

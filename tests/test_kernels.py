@@ -21,7 +21,7 @@ PROGRAM = """
 import sys
 import kernel
 from numba.core import event
-from imubench_pipeline.run.kernels import compile_once
+from imubench_pipeline.run.step_server import compile_once
 
 compiled = []
 

@@ -38,7 +38,7 @@ from imubench_pipeline.run import recovery
 from imubench_pipeline.run.lock import Lock, TakenError, read_note
 from imubench_pipeline.run.plan import Plan
 from imubench_pipeline.settings.validation import ConfigError
-from imubench_pipeline.tables import replace_file, write
+from imubench_pipeline.tables.files import replace_file, write
 from tests.test_configuration import SENSOR
 
 NOW = datetime(2026, 10, 20, 1, 30, tzinfo=UTC)

@@ -12,7 +12,7 @@ from imubench_pipeline.report.pages import list_pages
 from imubench_pipeline.report.publish import make_site
 from imubench_pipeline.run.plan import Plan
 from imubench_pipeline.settings.validation import ConfigError
-from imubench_pipeline.tables import build
+from imubench_pipeline.tables.files import build
 from imubench_pipeline.tables.schemas import TABLES
 from tests.test_configuration import SENSOR
 

@@ -8,15 +8,14 @@ import numpy as np
 import pyarrow as pa
 import pytest
 
-from imubench_pipeline.datasheets.deltas import bias_deltas, deltas
-from imubench_pipeline.datasheets.measured import compute_sensitivity
+from imubench_pipeline.datasheets.deltas import bias_deltas, compute_sensitivity, deltas
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
 from imubench_pipeline.estimators.rows import make_parameter_rows
 from imubench_pipeline.extensions.fusion.published_figures import yield_published_figures
 from imubench_pipeline.model.estimates import TemperatureRow
 from imubench_pipeline.settings.printed import Datasheet
 from imubench_pipeline.steps.sensor_tables import list_true_parameters
-from imubench_pipeline.tables import build
+from imubench_pipeline.tables.files import build
 from imubench_pipeline.tables.keys import Key
 from tests.rows import typed
 

@@ -17,7 +17,7 @@ from imubench_pipeline.settings.config import AllanSettings, ReconstructionSetti
 from imubench_pipeline.steps.allan import yield_allan_rows
 from imubench_pipeline.steps.estimate import estimate_recording
 from imubench_pipeline.steps.reconstruct import reconstruct, reconstruct_recording
-from imubench_pipeline.tables import build, write
+from imubench_pipeline.tables.files import build, write
 from imubench_pipeline.tables.keys import Key
 
 MODEL = NoiseModel(N=1e-3, B=2e-3, T_B=10.0, K=1e-4)

@@ -11,7 +11,7 @@ from imubench_pipeline.model.recordings import RecordingRow
 from imubench_pipeline.navigation.repeatability import repeatability_rows
 from imubench_pipeline.settings.sensor import Sensor
 from imubench_pipeline.settings.validation import parse
-from imubench_pipeline.tables import build
+from imubench_pipeline.tables.files import build
 from tests.rows import typed
 from tests.test_configuration import SENSOR
 

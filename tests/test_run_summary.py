@@ -14,7 +14,7 @@ from imubench_pipeline.report.run_summary import (
     list_warnings,
     summarise_run,
 )
-from imubench_pipeline.tables import write
+from imubench_pipeline.tables.files import write
 
 
 def recording(sensor: str, name: str = "run", **values: object) -> dict[str, Any]:

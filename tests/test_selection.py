@@ -13,7 +13,7 @@ from imubench_pipeline.navigation.expected_errors import (
     list_standard_questions,
 )
 from imubench_pipeline.settings.requirements import Requirement
-from imubench_pipeline.tables import build
+from imubench_pipeline.tables.files import build
 from imubench_pipeline.words.verdicts import source_text
 from tests.ranking import ranking_rows
 

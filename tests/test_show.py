@@ -10,7 +10,7 @@ from imubench_pipeline.model.verdicts import UnitFactor
 from imubench_pipeline.report.show import show
 from imubench_pipeline.report.terminal import render_logs
 from imubench_pipeline.run.cli import main
-from imubench_pipeline.tables import build, write
+from imubench_pipeline.tables.files import build, write
 
 DEGREE = 3.141592653589793 / 180
 N = DEGREE / 60  # 1 °/√h

@@ -10,7 +10,7 @@ from imubench_pipeline.estimators.estimate import Estimate, Parameter
 from imubench_pipeline.extensions.calibration.experiment import Experiment
 from imubench_pipeline.extensions.calibration.kalman import RateFilter
 from imubench_pipeline.extensions.calibration.least_squares import LeastSquares
-from imubench_pipeline.navigation.error_budget import draw_models
+from imubench_pipeline.navigation.error_budget.uncertainty import draw_models
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.sigma_range import drawn_from_covariance, sigma_range
 from tests.conftest import few

@@ -20,7 +20,7 @@ from imubench_pipeline.recordings.fitness import doubt_simulated_recordings, jud
 from imubench_pipeline.run.cli import main
 from imubench_pipeline.settings.sensor import LogFormat
 from imubench_pipeline.steps.tables import join_all_tables
-from imubench_pipeline.tables import build, write_arrow
+from imubench_pipeline.tables.files import build, write_arrow
 from tests.workflow.project import put_sensor
 
 CHANNELS = {"gyro_x": {"column": "gyro_x", "unit": "rad/s"}}

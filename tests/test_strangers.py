@@ -25,7 +25,7 @@ from imubench_pipeline.run.plan import Plan
 from imubench_pipeline.settings.sensor import RecordingNotes, Sensor
 from imubench_pipeline.settings.validation import ConfigError, parse
 from imubench_pipeline.settings.yaml_files import read_yaml
-from imubench_pipeline.tables import write
+from imubench_pipeline.tables.files import write
 from tests.workflow.project import put_log, put_sensor
 
 STAMPED = {

@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from imubench_pipeline.tables import build, read, write_arrow
+from imubench_pipeline.tables.files import build, read, write_arrow
 from imubench_pipeline.tables.texts import escape_cell, escape_invisible
 
 FORMULAS = ("=", "+", "-", "@", "\uff1d", "\uff0b", "\uff0d", "\uff20")

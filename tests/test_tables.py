@@ -12,7 +12,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from imubench_pipeline.model.verdicts import DoubtMark, Share
-from imubench_pipeline.tables import (
+from imubench_pipeline.tables.files import (
     TableError,
     build,
     make_folder,
@@ -23,8 +23,8 @@ from imubench_pipeline.tables import (
     write_content,
     write_json,
 )
-from imubench_pipeline.tables.digests import read_sealed_json
 from imubench_pipeline.tables.schemas import OF_ONE_RECORDING, TABLES
+from imubench_pipeline.tables.seals import read_sealed_json
 
 SCORE = {"sensor": "s", "recording": "r", "channel": "gyro_x", "method": "curve", "rms": 1.0}
 

@@ -23,7 +23,7 @@ from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.simulate import simulate
 from imubench_pipeline.recordings.kept import Quality
 from imubench_pipeline.settings.sensor import CHANNELS, Sensor, quantity_of
-from imubench_pipeline.tables import build, write
+from imubench_pipeline.tables.files import build, write
 from imubench_pipeline.tables.keys import Key
 from tests.kept import kept
 from tests.rows import typed

@@ -14,7 +14,7 @@ from imubench_pipeline.navigation.selection import rank_sensors
 from imubench_pipeline.navigation.verdicts.basis import Basis
 from imubench_pipeline.navigation.verdicts.judgement import judge_sensors
 from imubench_pipeline.settings.requirements import Limit, Requirement, Trajectory
-from imubench_pipeline.tables import build
+from imubench_pipeline.tables.files import build
 from tests.report.tables import recording_rows
 from tests.report.test_navigated import navigation_row
 

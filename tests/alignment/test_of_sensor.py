@@ -21,7 +21,7 @@ from imubench_pipeline.extensions.earth_rate.outlook import (
 )
 from imubench_pipeline.extensions.earth_rate.settings import EarthRateSettings
 from imubench_pipeline.noise import NoiseModel
-from imubench_pipeline.tables import build, write
+from imubench_pipeline.tables.files import build, write
 from imubench_pipeline.tables.keys import Key
 from tests.earth_rate.recordings import put
 

@@ -18,7 +18,7 @@ from imubench_pipeline.recordings.kept import Quality, identify_files
 from imubench_pipeline.recordings.recording import list_log_files
 from imubench_pipeline.settings.simulated_recordings import SimulatedRecording
 from imubench_pipeline.steps.simulate import _blocks
-from imubench_pipeline.tables import build
+from imubench_pipeline.tables.files import build
 from tests.conftest import catalogue
 from tests.kept import kept
 from tests.rows import typed

@@ -10,9 +10,9 @@ from imubench_pipeline.navigation.backtest.windows import (
     choose_window,
     compute_window_errors,
 )
-from imubench_pipeline.navigation.error_budget import Calibrated
 from imubench_pipeline.navigation.error_budget.budget import of_sensor
 from imubench_pipeline.noise import GaussMarkov, NoiseModel, RandomWalk, Sinusoid
+from imubench_pipeline.noise.growth import Calibrated
 
 
 def test_white_noise_has_its_closed_form() -> None:

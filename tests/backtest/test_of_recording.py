@@ -16,7 +16,7 @@ from imubench_pipeline.navigation.expected_errors import list_error_rows, list_r
 from imubench_pipeline.recordings.fitness import derive_doubts, judge_recordings
 from imubench_pipeline.recordings.recording import ChannelLog, LogWriter, open_channel_logs
 from imubench_pipeline.settings.requirements import Requirement
-from imubench_pipeline.tables import build
+from imubench_pipeline.tables.files import build
 from tests.ranking import ranking_rows
 from tests.rows import typed
 

@@ -9,7 +9,7 @@ import pytest
 from imubench_pipeline.earth import EARTH_RATE
 from imubench_pipeline.extensions.calibration.tables import CALIBRATED
 from imubench_pipeline.noise import NoiseModel
-from imubench_pipeline.tables import build
+from imubench_pipeline.tables.files import build
 from tests.calibration.recordings import (
     BIAS,
     DEGREES,

@@ -10,7 +10,7 @@ import pytest
 import imubench_pipeline as imu
 from imubench_pipeline.library.logs import Log
 from imubench_pipeline.report.terminal import render_logs
-from imubench_pipeline.tables import build
+from imubench_pipeline.tables.files import build
 from tests.chain.logs import Table, analysed, checked, noise, project
 from tests.conftest import few
 

@@ -15,7 +15,7 @@ from imubench_pipeline.model.recordings import RecordingRow
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.recordings.kept import Quality, identify_files
 from imubench_pipeline.recordings.recording import LogWriter, list_log_files
-from imubench_pipeline.tables import write
+from imubench_pipeline.tables.files import write
 from imubench_pipeline.tables.keys import Key
 from tests.earth_rate.runs import PAPER, RATE, turned
 from tests.rows import typed

@@ -15,7 +15,7 @@ from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.recordings.kept import Quality, identify_files
 from imubench_pipeline.recordings.recording import list_log_files
 from imubench_pipeline.steps.noise_source import take_static_noise
-from imubench_pipeline.tables import build
+from imubench_pipeline.tables.files import build
 from tests.earth_rate.recordings import (
     EVERY_30,
     PRINTED,

@@ -16,7 +16,7 @@ from imubench_pipeline.extensions.earth_rate.bound import (
 from imubench_pipeline.extensions.earth_rate.outlook import Outlook, prediction_rows
 from imubench_pipeline.extensions.earth_rate.pairs import by_pairs
 from imubench_pipeline.extensions.earth_rate.simulation import PAPER_MODEL, design_paper_run
-from imubench_pipeline.navigation.error_budget import Gyrocompass
+from imubench_pipeline.navigation.error_budget.gyrocompass import Gyrocompass
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.tables.keys import Key
 from tests.earth_rate.brute import MODELS

@@ -16,7 +16,7 @@ from imubench_pipeline.extensions.earth_rate.bound import (
 )
 from imubench_pipeline.extensions.earth_rate.published import compute_sigma_ranges
 from imubench_pipeline.noise import NoiseModel
-from imubench_pipeline.tables import write
+from imubench_pipeline.tables.files import write
 from imubench_pipeline.tables.keys import Key
 from tests.earth_rate.recordings import put, put_at_rest, run, turned_log
 from tests.earth_rate.runs import PAPER

@@ -8,7 +8,8 @@ from imubench_pipeline.estimators.likelihood import fit
 from imubench_pipeline.estimators.model_choice import Candidate, Goodness
 from imubench_pipeline.estimators.posterior import Posterior, compute_draw_weight, draw_jointly
 from imubench_pipeline.estimators.whittle import Maximum, Terms
-from imubench_pipeline.navigation.error_budget import Start, budget, draw_models
+from imubench_pipeline.navigation.error_budget.budget import Start, budget
+from imubench_pipeline.navigation.error_budget.uncertainty import draw_models
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.simulate import simulate
 

@@ -19,7 +19,7 @@ from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.run.cli import main
 from imubench_pipeline.settings.config import ExportSettings
 from imubench_pipeline.steps.exports import make_exports
-from imubench_pipeline.tables import build, write, write_arrow
+from imubench_pipeline.tables.files import build, write, write_arrow
 from imubench_pipeline.tables.keys import Key
 from tests.conftest import few
 from tests.export.sensors import ACCEL, GYRO

@@ -10,13 +10,13 @@ from imubench_pipeline.extensions.fusion.equivalence import equivalence_rows
 from imubench_pipeline.extensions.fusion.fusion import yield_fusion_rows
 from imubench_pipeline.extensions.fusion.prediction import fused_allan
 from imubench_pipeline.extensions.fusion.weights import equal
-from imubench_pipeline.navigation.compared import (
+from imubench_pipeline.navigation.ratios import (
     ComparedChannel,
     TemperaturePart,
     compute_number_needed,
 )
 from imubench_pipeline.settings.config import FusionSettings
-from imubench_pipeline.tables import build
+from imubench_pipeline.tables.files import build
 from tests.fusion.boards import FLICKER
 from tests.report.tables import joined, recording_rows, rejected_rows
 

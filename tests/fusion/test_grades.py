@@ -7,9 +7,9 @@ import pytest
 
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
 from imubench_pipeline.extensions.fusion.fusion import Grade, yield_grade_rows
-from imubench_pipeline.navigation.compared import ComparedChannel
+from imubench_pipeline.navigation.ratios import ComparedChannel
 from imubench_pipeline.settings.printed import Datasheet
-from imubench_pipeline.tables import build
+from imubench_pipeline.tables.files import build
 from tests.conftest import catalogue
 
 HOUR = math.pi / 180.0 / 3600.0

@@ -41,8 +41,8 @@ from imubench_pipeline.settings.simulated_recordings import read_simulated
 from imubench_pipeline.settings.validation import ConfigError, parse
 from imubench_pipeline.settings.yaml_files import read_yaml
 from imubench_pipeline.simulate.models import read_model_file
-from imubench_pipeline.tables import TableError, read, write
 from imubench_pipeline.tables.failures import Failure, read_failure
+from imubench_pipeline.tables.files import TableError, read, write
 from imubench_pipeline.tables.findings import RecordingError
 from imubench_pipeline.units import SI_UNITS, UnitError, find_conversion, parse_quantity
 from tests.conftest import PROJECT

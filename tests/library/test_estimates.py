@@ -12,7 +12,7 @@ from imubench_pipeline.run.plan import Plan
 from imubench_pipeline.settings.config import AllanSettings
 from imubench_pipeline.steps.allan import yield_allan_rows
 from imubench_pipeline.steps.estimate import estimate_recording
-from imubench_pipeline.tables import write
+from imubench_pipeline.tables.files import write
 from tests.library.conftest import ACCEL, GYRO, RATE
 
 

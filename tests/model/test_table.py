@@ -10,7 +10,7 @@ import pytest
 
 from imubench_pipeline.model.estimates import ParameterRow, ScoreRow
 from imubench_pipeline.model.table import Column, SensorRow, TableRow, columns_of, names_of, table
-from imubench_pipeline.tables import build, make_schema
+from imubench_pipeline.tables.files import build, make_schema
 from imubench_pipeline.tables.schemas import ROWS, TABLES
 from tests.test_architecture import PACKAGE
 

@@ -12,7 +12,7 @@ import yaml
 from imubench_pipeline.estimators.estimate import FAMILY, SI_UNITS
 from imubench_pipeline.estimators.model_choice import CANDIDATE_MODELS
 from imubench_pipeline.model.states import NoiseSource
-from imubench_pipeline.navigation.verdicts.evidence import PARAMETERS_OF_SOURCE
+from imubench_pipeline.navigation.verdicts.judgement import PARAMETERS_OF_SOURCE
 from imubench_pipeline.noise import (
     PARAMETERS,
     TERMS,

@@ -6,7 +6,7 @@ import pytest
 
 from imubench_pipeline.extensions.papers.papers import judge, make_published_rows
 from imubench_pipeline.extensions.papers.printed import Evidence, Result, parse_number, read_papers
-from imubench_pipeline.tables import build
+from imubench_pipeline.tables.files import build
 from tests.conftest import PROJECT
 
 RUN = Evidence()

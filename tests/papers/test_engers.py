@@ -12,7 +12,7 @@ from imubench_pipeline.extensions.papers.papers import make_rows
 from imubench_pipeline.extensions.papers.printed import Evidence, read_paper
 from imubench_pipeline.extensions.papers.tables import PublishedRow
 from imubench_pipeline.settings.simulated_recordings import read_simulated
-from imubench_pipeline.tables import build
+from imubench_pipeline.tables.files import build
 from tests.conftest import PROJECT, catalogue
 
 SENSORS = catalogue()

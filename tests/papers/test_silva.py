@@ -11,7 +11,7 @@ from imubench_pipeline.extensions.earth_rate.simulation import PAPER_MINUTES
 from imubench_pipeline.extensions.papers import silva
 from imubench_pipeline.extensions.papers.papers import make_rows
 from imubench_pipeline.extensions.papers.printed import Evidence, read_paper
-from imubench_pipeline.tables import build
+from imubench_pipeline.tables.files import build
 from tests.conftest import few
 
 ROWS = {(row["place"], row["quantity"]): row for row in make_rows(read_paper("silva"), Evidence())}

@@ -30,7 +30,7 @@ from imubench_pipeline.model.recordings import RecordingRow
 from imubench_pipeline.recordings.fitness import list_excluded
 from imubench_pipeline.recordings.kept import Quality
 from imubench_pipeline.run.plan import Plan
-from imubench_pipeline.tables import read
+from imubench_pipeline.tables.files import read
 
 PROJECT = Path(__file__).parents[2]
 LOG = Path("logs/adis16405/imu1.csv.gz")  # in the folder of real logs

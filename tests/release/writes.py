@@ -40,7 +40,7 @@ import numpy as np
 import yaml
 
 from imubench_pipeline.run.processes import Job, Processes, StepError
-from imubench_pipeline.tables.digests import read_sealed_json
+from imubench_pipeline.tables.seals import read_sealed_json
 from tests.calibration.recordings import STEPS, UP, on_table
 from tests.earth_rate.runs import RATE, TURN, turned
 from tests.release.small import FaultError, Undisturbed, left_over, small_project, visible

@@ -34,7 +34,7 @@ from imubench_pipeline.report.publish import make_site
 from imubench_pipeline.report.site import Site
 from imubench_pipeline.settings.config import FusionSettings
 from imubench_pipeline.settings.requirements import Requirement
-from imubench_pipeline.tables import build, write, write_arrow
+from imubench_pipeline.tables.files import build, write, write_arrow
 from imubench_pipeline.tables.keys import Key
 from imubench_pipeline.tables.schemas import OF_ONE_RECORDING, TABLES
 

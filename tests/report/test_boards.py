@@ -11,7 +11,7 @@ from imubench_pipeline.extensions.fusion.tables import PublishedFigureRow
 from imubench_pipeline.report.pages import list_pages
 from imubench_pipeline.report.publish import publish
 from imubench_pipeline.report.site import Site
-from imubench_pipeline.tables import build
+from imubench_pipeline.tables.files import build
 from tests.report.pages import Read, read_pages, sound_pages
 from tests.report.tables import DEGREE, HOUR, Rows, joined, recording_rows, rejected_rows, site
 

@@ -8,7 +8,7 @@ import pytest
 from imubench_pipeline.report.compare import COMPARE, KEPT
 from imubench_pipeline.report.publish import publish
 from imubench_pipeline.settings.requirements import Requirement
-from imubench_pipeline.tables import write
+from imubench_pipeline.tables.files import write
 from tests.report.browser.made import publish_some
 from tests.report.pages import read_pages
 from tests.report.tables import ROBOT, joined, recording_rows, rejected_rows, site

@@ -12,7 +12,7 @@ from imubench_pipeline.report.datasheets import (
     make_coverage_tables,
 )
 from imubench_pipeline.report.view import RecordingView, gather_recordings
-from imubench_pipeline.tables import build
+from imubench_pipeline.tables.files import build
 from tests.report.tables import DEGREE, HOUR, Rows, joined, recording_rows
 
 FIGURE = {"statistic": "N", "quantity": "N", "printed": 0.3, "unit": "deg/sqrt(h)", "kind": "typ",

@@ -23,7 +23,7 @@ from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.report.pages import list_pages
 from imubench_pipeline.report.publish import publish, render_one_file
 from imubench_pipeline.report.site import Site
-from imubench_pipeline.tables import build
+from imubench_pipeline.tables.files import build
 from tests.earth_rate.recordings import EVERY_30, put, put_at_rest, run, turned_log
 from tests.earth_rate.runs import PAPER, turned
 from tests.report.pages import Read, read_pages, sound_pages

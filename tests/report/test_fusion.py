@@ -12,7 +12,7 @@ from imubench_pipeline.extensions.fusion.page import (
 )
 from imubench_pipeline.extensions.fusion.tables import FusionRow, GradeRow
 from imubench_pipeline.report.publish import publish
-from imubench_pipeline.tables import build
+from imubench_pipeline.tables.files import build
 from tests.report.tables import joined, recording_rows, site
 
 ROW = {"quantity": "gyro", "tau": 10.0, "sensor": "a", "recording": "r", "channel": "gyro_x",

@@ -32,7 +32,8 @@ from imubench_pipeline.model.states import (
     ShortlistVerdict,
     Verdict,
 )
-from imubench_pipeline.navigation.error_budget import Gyrocompass, Start, budget
+from imubench_pipeline.navigation.error_budget.budget import Start, budget
+from imubench_pipeline.navigation.error_budget.gyrocompass import Gyrocompass
 from imubench_pipeline.noise import FLOOR, GaussMarkov, NoiseModel
 from imubench_pipeline.report import glossary as module
 from imubench_pipeline.report.datasheets import DEPENDS

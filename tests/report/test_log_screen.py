@@ -11,7 +11,7 @@ from rich.console import Console
 from imubench_pipeline.model.estimates import ParameterRow
 from imubench_pipeline.model.recordings import FindingRow, RecordingRow
 from imubench_pipeline.report.log_screen import SHOWN, group_events, render_log_screen
-from imubench_pipeline.tables import build
+from imubench_pipeline.tables.files import build
 from imubench_pipeline.words.events import events_text
 
 CHANNELS = [f"{quantity}_{axis}" for quantity in ("gyro", "accel") for axis in "xyz"]

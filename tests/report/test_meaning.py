@@ -21,7 +21,7 @@ from imubench_pipeline.report.meaning import (
     make_budget_tables,
 )
 from imubench_pipeline.settings.requirements import Requirement
-from imubench_pipeline.tables import build
+from imubench_pipeline.tables.files import build
 from tests.ranking import ranking_rows
 from tests.report.tables import ROBOT
 

@@ -18,7 +18,7 @@ from imubench_pipeline.extensions.aided.page import (
 from imubench_pipeline.extensions.aided.tables import NavigationRow
 from imubench_pipeline.model.verdicts import DoubtMark
 from imubench_pipeline.settings.config import Method
-from imubench_pipeline.tables import build
+from imubench_pipeline.tables.files import build
 from tests.report.browser.made import publish_some
 from tests.report.pages import unfolded
 from tests.report.tables import joined, recording_rows, site

@@ -22,7 +22,7 @@ from imubench_pipeline.report import run_summary, terminal
 from imubench_pipeline.report.pages import list_pages
 from imubench_pipeline.report.publish import make_templates
 from imubench_pipeline.report.site import Page, Site
-from imubench_pipeline.tables import build, make_schema, write_arrow
+from imubench_pipeline.tables.files import build, make_schema, write_arrow
 from imubench_pipeline.tables.schemas import OF_ONE_RECORDING, TABLES
 from tests.report import (
     test_boards,

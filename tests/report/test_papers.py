@@ -8,7 +8,7 @@ import pytest
 from imubench_pipeline.report.pages import list_pages
 from imubench_pipeline.report.publish import publish
 from imubench_pipeline.run.cli import main
-from imubench_pipeline.tables import build, write
+from imubench_pipeline.tables.files import build, write
 from tests.report.browser.made import publish_some
 from tests.report.pages import Read, sound_pages
 from tests.report.tables import joined, recording_rows, site

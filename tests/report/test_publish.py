@@ -23,7 +23,7 @@ from imubench_pipeline.report.pages import ENTRIES, list_pages
 from imubench_pipeline.report.publish import load_site, publish, render_one_file
 from imubench_pipeline.report.site import Site
 from imubench_pipeline.report.start import START
-from imubench_pipeline.tables import build
+from imubench_pipeline.tables.files import build
 from imubench_pipeline.tables.schemas import OF_ONE_RECORDING, TABLES
 from tests.conftest import few
 from tests.report.pages import Read, lost_links, read_pages

@@ -7,7 +7,7 @@ import pytest
 
 from imubench_pipeline.model.verdicts import Shortfall
 from imubench_pipeline.report.publish import publish
-from imubench_pipeline.tables import build
+from imubench_pipeline.tables.files import build
 from tests.report.pages import Read, sound_pages
 from tests.report.tables import HOUR, ROBOT, joined, recording_rows, site
 

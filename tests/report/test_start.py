@@ -10,7 +10,7 @@ from imubench_pipeline.model.comparisons import RankingRow
 from imubench_pipeline.model.verdicts import Condition, DoubtMark, UnitFactor
 from imubench_pipeline.report import start
 from imubench_pipeline.report.meaning import format_rankings
-from imubench_pipeline.tables import build
+from imubench_pipeline.tables.files import build
 from tests.report.tables import ROBOT
 
 NAMES = {name: name.upper() for name in "abc"}

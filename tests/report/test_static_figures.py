@@ -38,7 +38,7 @@ from imubench_pipeline.report.static_figures.files import (
 )
 from imubench_pipeline.report.view import ChannelView, gather_recordings
 from imubench_pipeline.run.cli import main
-from imubench_pipeline.tables import write
+from imubench_pipeline.tables.files import write
 from imubench_pipeline.tables.keys import Key
 from imubench_pipeline.tables.schemas import TABLES
 from tests.conftest import few

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from imubench_pipeline.model.comparisons import ErrorBudgetRow
 from imubench_pipeline.report.view import ChannelView, RecordingView, gather_recordings
-from imubench_pipeline.tables import build, read, write_arrow
+from imubench_pipeline.tables.files import build, read, write_arrow
 from imubench_pipeline.tables.schemas import ROWS, TABLES
 from tests.conftest import few
 from tests.report.tables import (

@@ -21,7 +21,7 @@ from imubench_pipeline.settings.quality import QualitySettings
 from imubench_pipeline.settings.sensor import RecordingNotes, merged_log
 from imubench_pipeline.settings.validation import parse
 from imubench_pipeline.settings.yaml_files import read_yaml
-from imubench_pipeline.tables import write, write_arrow
+from imubench_pipeline.tables.files import write, write_arrow
 from imubench_pipeline.tables.keys import Key
 from tests.conftest import PROJECT, catalogue, few
 from tests.report.tables import HOUR, joined, recording_rows

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from imubench_pipeline.run.cli import main
-from imubench_pipeline.tables import build, write_arrow
+from imubench_pipeline.tables.files import build, write_arrow
 
 ASKED = """
 title: A robot

@@ -22,7 +22,7 @@ from imubench_pipeline.noise.growth import Uncalibrated
 from imubench_pipeline.settings.requirements import Requirement
 from imubench_pipeline.settings.sensor import Sensor
 from imubench_pipeline.settings.validation import parse
-from imubench_pipeline.tables import build
+from imubench_pipeline.tables.files import build
 from tests.conftest import catalogue
 from tests.rows import typed
 from tests.test_configuration import SENSOR

@@ -5,11 +5,11 @@ from typing import Any
 import pytest
 
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
-from imubench_pipeline.navigation.error_budget.printed_errors import collect_figures_in_use
+from imubench_pipeline.navigation.error_budget.in_use import collect_figures_in_use
 from imubench_pipeline.navigation.expected_errors import list_error_rows, list_requirement_questions
 from imubench_pipeline.settings.printed import Datasheet
 from imubench_pipeline.settings.requirements import Requirement
-from imubench_pipeline.tables import build
+from imubench_pipeline.tables.files import build
 from imubench_pipeline.units import convert_from_si
 from tests.ranking import ranking_rows
 

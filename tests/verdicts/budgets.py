@@ -13,7 +13,7 @@ from imubench_pipeline.navigation.verdicts.basis import Basis
 from imubench_pipeline.navigation.verdicts.judgement import judge_sensors
 from imubench_pipeline.navigation.verdicts.next_steps import list_next_step_rows
 from imubench_pipeline.settings.requirements import Requirement
-from imubench_pipeline.tables import build
+from imubench_pipeline.tables.files import build
 from tests.rows import typed
 from tests.test_selection import white
 

@@ -3,7 +3,7 @@
 import pytest
 
 from imubench_pipeline.model.comparisons import RankingRow
-from imubench_pipeline.tables import build
+from imubench_pipeline.tables.files import build
 from imubench_pipeline.words.verdicts import doubts_text, used_doubts_text
 from tests.verdicts.budgets import HEADING, Rows, about, gyro, judge, marked
 

@@ -4,7 +4,7 @@ from typing import Any
 import pytest
 
 from imubench_pipeline.model.comparisons import RankingRow
-from imubench_pipeline.tables import build
+from imubench_pipeline.tables.files import build
 from imubench_pipeline.words.verdicts import corrected_text
 from tests.test_selection import white
 from tests.verdicts.budgets import HEADING, about, doubt, gyro, judge, marked, requirement

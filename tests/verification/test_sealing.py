@@ -11,7 +11,6 @@ from typing import Any
 import pytest
 
 from imubench_pipeline.run.sealing import digest_settings, find_unsound_jobs
-from imubench_pipeline.tables.digests import read_sealed_json, write_sealed_json
 from imubench_pipeline.tables.seals import (
     Seal,
     SealedFile,
@@ -19,6 +18,8 @@ from imubench_pipeline.tables.seals import (
     list_places,
     name_seal_file,
     read_seal,
+    read_sealed_json,
+    write_sealed_json,
 )
 from tests.verification.finished import Finished
 

@@ -16,9 +16,14 @@ from hypothesis import strategies as st
 
 from imubench_pipeline.run.cli import main
 from imubench_pipeline.run.verification.results import Results
-from imubench_pipeline.tables import read, write_arrow
-from imubench_pipeline.tables.digests import read_sealed_json, write_sealed_json
-from imubench_pipeline.tables.seals import SealedFile, name_seal_file, read_seal
+from imubench_pipeline.tables.files import read, write_arrow
+from imubench_pipeline.tables.seals import (
+    SealedFile,
+    name_seal_file,
+    read_seal,
+    read_sealed_json,
+    write_sealed_json,
+)
 from tests.conftest import few
 from tests.verification.finished import Finished
 

@@ -18,7 +18,7 @@ from imubench_pipeline.model.verdicts import (
     Shortfall,
     UnitFactor,
 )
-from imubench_pipeline.navigation.verdicts.evidence import WEAKNESS_REASONS
+from imubench_pipeline.navigation.verdicts.judgement import WEAKNESS_REASONS
 from imubench_pipeline.words.verdicts import (
     SHORT_VERDICTS,
     SHORTLIST_WORDS,

@@ -4,7 +4,7 @@ from pathlib import Path
 
 from imubench_pipeline.settings.config import AllanSettings
 from imubench_pipeline.steps.allan import yield_allan_rows
-from imubench_pipeline.tables import write
+from imubench_pipeline.tables.files import write
 
 if __name__ == "__main__":
     names = snakemake.wildcards

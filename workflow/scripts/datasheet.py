@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from imubench_pipeline.steps.datasheet import compare_with_datasheet
-from imubench_pipeline.tables import write_each
+from imubench_pipeline.tables.files import write_each
 
 if __name__ == "__main__":
     names = snakemake.wildcards

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from imubench_pipeline.steps.error_budget import compute_error_tables
-from imubench_pipeline.tables import write_each
+from imubench_pipeline.tables.files import write_each
 
 if __name__ == "__main__":
     names = snakemake.wildcards

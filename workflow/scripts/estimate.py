@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from imubench_pipeline.steps.estimate import estimate_recording
-from imubench_pipeline.tables import write_each
+from imubench_pipeline.tables.files import write_each
 
 if __name__ == "__main__":
     names = snakemake.wildcards

@@ -4,7 +4,7 @@ from pathlib import Path
 
 from imubench_pipeline.settings.config import ReconstructionSettings
 from imubench_pipeline.steps.reconstruct import reconstruct_recording
-from imubench_pipeline.tables import write_each
+from imubench_pipeline.tables.files import write_each
 
 if __name__ == "__main__":
     settings = ReconstructionSettings.model_validate_json(snakemake.params.settings)

@@ -4,7 +4,7 @@ from pathlib import Path
 
 from imubench_pipeline.settings.config import ReconstructionSettings
 from imubench_pipeline.steps.samples_of_models import simulate_samples_of_models
-from imubench_pipeline.tables import write
+from imubench_pipeline.tables.files import write
 
 if __name__ == "__main__":
     names = snakemake.wildcards

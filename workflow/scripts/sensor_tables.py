@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from imubench_pipeline.steps.sensor_tables import join_tables
-from imubench_pipeline.tables import write_arrow
+from imubench_pipeline.tables.files import write_arrow
 
 if __name__ == "__main__":
     parts = {name: [Path(path) for path in paths] for name, paths in snakemake.input.items()}

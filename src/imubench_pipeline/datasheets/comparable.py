@@ -6,8 +6,6 @@ deviation, 0.664 B with a plateau. A temperature coefficient can be compared wit
 a static log; a total or an rms over temperature cannot.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
@@ -71,7 +69,7 @@ class PrintedAxis:
     axis: str
 
     @classmethod
-    def of(cls, datasheet: Datasheet, channel: str) -> PrintedAxis:
+    def of(cls, datasheet: Datasheet, channel: str) -> "PrintedAxis":
         """Return the datasheet figures of a channel, such as ``gyro_x``."""
         quantity, axis = channel.split("_")
         sheet = getattr(datasheet, quantity) or QuantityDatasheet()
@@ -204,12 +202,6 @@ def read_bias_comparables(datasheet: Datasheet, channel: str) -> Iterator[Compar
     for name, obstacle in texts.ONE_LOG_OBSTACLES.items():
         like = Comparable(name, "mean", None, obstacle=obstacle)
         yield from axis.read(name, like, axis.si(name))
-
-
-def read_repeatability_comparables(datasheet: Datasheet, channel: str) -> Iterator[Comparable]:
-    """Yield the printed turn-on to turn-on repeatability of the bias of a channel, SI."""
-    axis, name = PrintedAxis.of(datasheet, channel), "bias_repeatability"
-    yield from axis.read(name, Comparable(name, "spread", None), axis.si(name))
 
 
 def _read_densities(axis: PrintedAxis) -> Iterator[Comparable]:

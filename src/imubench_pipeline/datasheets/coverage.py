@@ -1,7 +1,5 @@
 """List the figures that vendors publish, and the figures that users must measure."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass

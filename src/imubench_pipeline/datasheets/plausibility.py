@@ -7,8 +7,6 @@ Noise and means are compared with the printed figures, or with usual ones. The s
 compared with the range of the sensor, and a finding names the unit of time that would explain it.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -25,14 +23,7 @@ from imubench_pipeline.recordings.quality.rotation import GravityTurn
 from imubench_pipeline.settings.sensor import QUANTITIES, Sensor, quantity_of
 from imubench_pipeline.tables.findings import Finding, find
 from imubench_pipeline.units import convert_to_si, find_conversion
-from imubench_pipeline.words.findings.plausibility import (
-    AxisUnlike,
-    GravityNorm,
-    NoiseUnlikeDatasheet,
-    RateImplausible,
-    SuspiciousUnit,
-    Turning,
-)
+from imubench_pipeline.words.findings import plausibility as texts
 
 _MAX_FACTOR_BELOW_PRINTED = 2.5
 """Maximum usual factor below a printed noise density. `levels.density_of` is not lowered by a
@@ -66,8 +57,7 @@ _TIME_UNIT_PENALTIES: Mapping[float, float] = {60.0: 1.0, 1e3: 0.0, 1e6: 0.0, 1e
 """Usual rate, Hz; and ratios of two units of time, each with a penalty in decades from the usual
 rate. Minutes have a penalty, since a sensor file cannot state them."""
 
-_GRAVITY_TOLERANCE = 0.15
-"""Maximum error of the mean acceleration, as a fraction of gravity."""
+_GRAVITY_TOLERANCE = 0.15  # maximum error of the mean acceleration, as a fraction of gravity
 
 _SUSPICIOUS_NOISE_FACTOR = 2.5
 """Noise is suspicious beyond this factor outside the usual range: above 10 times or below 0.16
@@ -79,15 +69,13 @@ _MAX_EXPLAINED_FACTOR = 1.5
 _MIN_SUSPICIOUS_AXIS_RATIO = 4.0
 """Minimum ratio of the noise of one axis to both others, either way, for a finding."""
 
-_MAX_RATIO_OF_OTHER_AXES = 2.5
-"""Maximum ratio of the noise of those two to each other."""
+_MAX_RATIO_OF_OTHER_AXES = 2.5  # maximum ratio of the noise of those two to each other
 
 _MAX_FACTOR_WITHOUT_STAMPS = 2.5
 """Maximum ratio to the printed noise, either way, if the rate is not known from time stamps. N is
 proportional to the root of the rate: a stated rate that is 10 times wrong changes N 3.2 times."""
 
-_MAX_EXPLAINED_AXIS_RATIO = 1.5
-"""Maximum ratio of its noise to theirs in the suggested unit."""
+_MAX_EXPLAINED_AXIS_RATIO = 1.5  # maximum ratio of its noise to theirs in the suggested unit
 
 _LOGGER_UNITS: Mapping[str, Sequence[str]] = {
     "gyro": ("rad/s", "deg/s", "mdeg/s", "mrad/s", "deg/h"),
@@ -125,9 +113,16 @@ def expected(sensor: Sensor | None, quantity: str) -> Expected:
         if printed is None
         else (printed / _MAX_FACTOR_BELOW_PRINTED, printed * MAX_FACTOR_FROM_PRINTED)
     )
-    return Expected(
-        noise, *_find_max_offset(sensor), _find_max_bandwidth(sensor, quantity), printed
-    )
+    # Widest printed bandwidth, Hz
+    assert quantity in QUANTITIES
+    sheet = getattr(sensor.datasheet, quantity)
+    widest = [
+        convert_to_si(value, figure.unit, "frequency")
+        for figure in (sheet.printed("bandwidth") if sheet else ())
+        for axis in "xyz"
+        for value in _list_values(figure.on_axis(axis))
+    ]
+    return Expected(noise, *_find_max_offset(sensor), max(widest, default=None), printed)
 
 
 def _find_max_offset(sensor: Sensor) -> tuple[float, str | None]:
@@ -148,19 +143,6 @@ def _find_max_offset(sensor: Sensor) -> tuple[float, str | None]:
     if word is None:
         return _MAX_OFFSET, None
     return _MAX_OFFSET_OF_CLASS[word], word
-
-
-def _find_max_bandwidth(sensor: Sensor, quantity: str) -> float | None:
-    """Return the widest bandwidth that a sensor file prints, Hz."""
-    assert quantity in QUANTITIES
-    sheet = getattr(sensor.datasheet, quantity)
-    widest = [
-        convert_to_si(value, figure.unit, "frequency")
-        for figure in (sheet.printed("bandwidth") if sheet else ())
-        for axis in "xyz"
-        for value in _list_values(figure.on_axis(axis))
-    ]
-    return max(widest, default=None)
 
 
 def _list_values(printed: float | tuple[float, ...] | None) -> tuple[float, ...]:
@@ -193,41 +175,27 @@ def implausible_rates(
     slowest = MIN_RATE if stated is None else MIN_RATE_STATED
     by_rate: dict[tuple[float, float], list[str]] = {}
     for name, rate in rates.items():
-        fastest = _compute_max_rate(bandwidths[name])
+        fastest, bandwidth = _MAX_RATE, bandwidths[name]
+        if bandwidth is not None:
+            fastest = max(_MAX_RATE, _MAX_SAMPLING_RATE_PER_BANDWIDTH * bandwidth)
+            fastest = min(fastest, _MAX_LOG_RATE_PER_BANDWIDTH * bandwidth)
         if not slowest <= rate <= fastest:
             by_rate.setdefault((rate, fastest), []).append(name)
     findings = []
     for (rate, fastest), names in by_rate.items():
-        factor = time_factor(rate, fastest)
+        sign = 1.0 if rate > fastest else -1.0
+        factor = min(
+            (factor**sign for factor in _TIME_UNIT_PENALTIES),
+            key=lambda factor: (
+                abs(math.log10(rate / factor / _USUAL_RATE))
+                + _TIME_UNIT_PENALTIES[round(factor**sign)]
+            ),
+        )
         statable = MIN_RATE_STATED <= rate < slowest
-        data = RateImplausible(rate, slowest, fastest, factor, statable)
+        data = texts.RateImplausible(rate, slowest, fastest, factor, statable)
         channels = [None] if len(names) == len(rates) else names
         findings += [find(data, "warning", factor, channel) for channel in channels]
     return findings
-
-
-def time_factor(rate: float, fastest: float = _MAX_RATE) -> float:
-    """Return the factor for the time stamps that makes a rate, Hz, most likely.
-
-    ``fastest`` is the highest rate of the sensor, Hz.
-    """
-    sign = 1.0 if rate > fastest else -1.0
-    return min(
-        (factor**sign for factor in _TIME_UNIT_PENALTIES),
-        key=lambda factor: (
-            abs(math.log10(rate / factor / _USUAL_RATE)) + _TIME_UNIT_PENALTIES[round(factor**sign)]
-        ),
-    )
-
-
-def _compute_max_rate(bandwidth: float | None) -> float:
-    """Return the highest rate of a log of a sensor, Hz."""
-    if bandwidth is None:
-        return _MAX_RATE
-    return min(
-        max(_MAX_RATE, _MAX_SAMPLING_RATE_PER_BANDWIDTH * bandwidth),
-        _MAX_LOG_RATE_PER_BANDWIDTH * bandwidth,
-    )
 
 
 def implausible(
@@ -261,9 +229,13 @@ def implausible(
             for name, level in channels.items()
             if quantity_of(name) == "gyro"
         }
-        findings += [*_check_mean_rates(means, of["gyro"])] or [
-            *_check_gravity_turn(means, gravity)
+        largest, source = of["gyro"].offset, of["gyro"].offset_of
+        turning = [
+            find(texts.Turning(mean, largest=largest, offset_of=source), "warning", mean, name)
+            for name, mean in means.items()
+            if abs(mean) > largest
         ]
+        findings += turning or _check_gravity_turn(means, gravity)
     return findings
 
 
@@ -296,11 +268,11 @@ def _check_gravity(channels: Mapping[str, Level]) -> Iterator[Finding]:
     unit = units.pop()
     for other, factor in mistakes(unit, "accel") if not units else ():
         if abs(norm * factor / STANDARD_GRAVITY - 1.0) <= _GRAVITY_TOLERANCE:
-            data = SuspiciousUnit(unit, other, factor, gravity=norm)
+            data = texts.SuspiciousUnit(unit, other, factor, gravity=norm)
             for name in axes:
                 yield find(data, "warning", factor, name)
             return
-    yield find(GravityNorm(norm, removed=norm < 0.05 * STANDARD_GRAVITY), "warning", norm)
+    yield find(texts.GravityNorm(norm, removed=norm < 0.05 * STANDARD_GRAVITY), "warning", norm)
 
 
 def _check_noise(channels: Mapping[str, Level], of: Mapping[str, Expected]) -> Iterator[Finding]:
@@ -324,7 +296,7 @@ def _check_noise(channels: Mapping[str, Level], of: Mapping[str, Expected]) -> I
                 low * factor <= _MAX_EXPLAINED_FACTOR * usual[1]
                 and high * factor >= usual[0] / _MAX_EXPLAINED_FACTOR
             ):
-                data = SuspiciousUnit(
+                data = texts.SuspiciousUnit(
                     level.unit,
                     unit,
                     factor,
@@ -339,14 +311,10 @@ def _check_noise(channels: Mapping[str, Level], of: Mapping[str, Expected]) -> I
 def _compare_noise(
     channels: Mapping[str, Level], of: Mapping[str, Expected], doubted: Collection[str | None]
 ) -> Iterator[Finding]:
-    """Yield a finding for each channel whose noise differs from the datasheet or the other axes.
-
-    Causes are a wrong scale or range, another sensor, or one axis in another unit. ``doubted``
-    channels are skipped: another unit already explains them.
-    """
+    """Yield a finding for each channel whose noise is unlike the datasheet or the other axes."""
     untimed = False
     for name, level in channels.items():
-        if name in doubted:
+        if name in doubted:  # another unit explains it
             continue
         quantity = quantity_of(name)
         low, high = level.density
@@ -363,7 +331,7 @@ def _compare_noise(
             if far or not untimed:  # a wrong rate affects all channels: report it once
                 untimed = untimed or not timed
                 of_channel = name if timed or far else None
-                unlike = NoiseUnlikeDatasheet(name, shown, printed, stated_rate)
+                unlike = texts.NoiseUnlikeDatasheet(name, shown, printed, stated_rate)
                 yield find(unlike, "warning", shown / printed, of_channel)
             continue
         others = [f"{quantity}_{axis}" for axis in "xyz" if f"{quantity}_{axis}" != name]
@@ -375,7 +343,7 @@ def _compare_noise(
                 for unit, factor in mistakes(level.unit, quantity)
                 if 1.0 / _MAX_EXPLAINED_AXIS_RATIO < ratio * factor < _MAX_EXPLAINED_AXIS_RATIO
             )
-            data = AxisUnlike(tuple(others), ratio, shown, level.unit, next(explained, None))
+            data = texts.AxisUnlike(tuple(others), ratio, shown, level.unit, next(explained, None))
             yield find(data, "warning", ratio, name)
 
 
@@ -396,14 +364,6 @@ def _compute_axis_ratio(level: Level, others: Sequence[Level]) -> float | None:
     return None
 
 
-def _check_mean_rates(means: Mapping[str, float], usual: Expected) -> Iterator[Finding]:
-    """Yield a finding for each gyro whose mean exceeds the largest offset."""
-    for name, mean in means.items():
-        if abs(mean) > usual.offset:
-            data = Turning(mean, largest=usual.offset, offset_of=usual.offset_of)
-            yield find(data, "warning", mean, name)
-
-
 def _check_gravity_turn(
     means: Mapping[str, float], gravity: GravityTurn | None
 ) -> Iterator[Finding]:
@@ -418,5 +378,5 @@ def _check_gravity_turn(
     together = abs(along / rate - 1.0) < _MAX_RATE_DISAGREEMENT
     if gravity.swept < _MIN_TURN_OF_GRAVITY and not together:
         return
-    data = Turning(rate, swept=gravity.swept, gyro_rate=along if together else None)
+    data = texts.Turning(rate, swept=gravity.swept, gyro_rate=along if together else None)
     yield find(data, "warning", rate)

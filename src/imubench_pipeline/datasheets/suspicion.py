@@ -1,13 +1,11 @@
 """Check printed and estimated figures for wrong units, against the figures of other sensors."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import asdict, dataclass, replace
 from statistics import median
 
-from imubench_pipeline.datasheets.comparable import Comparable, read_comparables
+from imubench_pipeline.datasheets.comparable import read_comparables
 from imubench_pipeline.model.estimates import ParameterRow
 from imubench_pipeline.model.recordings import FindingRow
 from imubench_pipeline.settings.sensor import QUANTITIES, Sensor, quantity_of
@@ -76,15 +74,11 @@ def printed_figures(sensor: Sensor, quantity: str) -> dict[str, float]:
             values = [
                 value
                 for row, value in with_value
-                if row.statistic == statistic and _has_single_value(row)
+                if row.statistic == statistic and row.figure and row.figure.kind != "range"
             ]
             if values:
                 figures.setdefault(figure, values[0])
     return figures
-
-
-def _has_single_value(row: Comparable) -> bool:
-    return row.figure is not None and row.figure.kind != "range"
 
 
 def suspicious(
@@ -106,10 +100,8 @@ def suspicious(
         typical = usual.get((quantity, figure))
         if typical is None:
             continue
-        least, most = (
-            typical.least / _MAX_FACTOR_BEYOND_CATALOGUE,
-            typical.most * _MAX_FACTOR_BEYOND_CATALOGUE,
-        )
+        least = typical.least / _MAX_FACTOR_BEYOND_CATALOGUE
+        most = typical.most * _MAX_FACTOR_BEYOND_CATALOGUE
         if own := (printed or {}).get(figure):
             least, most = own / MAX_FACTOR_FROM_PRINTED, own * MAX_FACTOR_FROM_PRINTED
             if least <= value <= most:

@@ -21,7 +21,7 @@ from imubench_pipeline.estimators.estimate import (
 )
 from imubench_pipeline.model.estimates import AllanRow, DrawRow, ParameterRow
 from imubench_pipeline.settings.sensor import quantity_of
-from imubench_pipeline.tables import read
+from imubench_pipeline.tables.files import read
 from imubench_pipeline.tables.keys import Key, split_table
 
 

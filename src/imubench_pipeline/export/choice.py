@@ -1,7 +1,5 @@
 """Choose the axis that represents a sensor: the worst, the median, or the worst of a device."""
 
-from __future__ import annotations
-
 import math
 from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence

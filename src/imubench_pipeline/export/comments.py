@@ -1,7 +1,5 @@
 """Header comments of exported files: source of the numbers, and their convention."""
 
-from __future__ import annotations
-
 import re
 import textwrap
 from collections.abc import Mapping, Sequence

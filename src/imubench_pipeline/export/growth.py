@@ -5,8 +5,6 @@ once (angle or velocity) or twice (position), Var(t) = S int_0^t h(s)^2 ds. For 
 N^2 t and N^2 t^3 / 3; for other terms see `noise.terms.base.Term.growth_from_known`.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

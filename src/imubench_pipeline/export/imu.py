@@ -1,7 +1,5 @@
 """Noise and temperature effect of an inertial sensor, as exports to other programs take them."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace

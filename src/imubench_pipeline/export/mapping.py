@@ -15,8 +15,6 @@ which no random walk approximates well, -26 and +40 %. `imubench_pipeline.export
 model that is conservative at every tau.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace

@@ -13,8 +13,6 @@ and in discrete time, exact for the rate,
 with mean x0 and covariance P0 of the first x. Quantization noise has no continuous form.
 """
 
-from __future__ import annotations
-
 import io
 import json
 from collections.abc import Sequence

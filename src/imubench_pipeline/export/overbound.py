@@ -38,8 +38,6 @@ and M. Joerger, "Overbounding the effect of uncertain Gauss-Markov noise in Kalm
 NAVIGATION 68 (2), 2021.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -48,16 +46,9 @@ from typing import Literal, get_args
 import numpy as np
 from scipy.optimize import linprog, minimize_scalar
 
+from imubench_pipeline import noise
 from imubench_pipeline.allan import AllanCurve
 from imubench_pipeline.export.growth import growth
-from imubench_pipeline.noise import (
-    GaussMarkov,
-    NoiseModel,
-    RandomWalk,
-    Term,
-    WhiteNoise,
-    compute_bias_instability,
-)
 from imubench_pipeline.typing import Array
 from imubench_pipeline.words.reasons import exports as texts
 
@@ -79,16 +70,16 @@ class Limits:
     kind: str  # the limited quantity, for texts
     x: Array  # shape (m,); tau or time, s, or frequency, Hz
     value: Array  # shape (m,); lower limit there
-    of_term: Callable[[Term], Array]  # contribution of a term to the limited quantity at `x`
+    of_term: Callable[[noise.Term], Array]  # contribution of a term to the limited quantity at `x`
 
-    def ratio(self, model: NoiseModel) -> Array:
+    def ratio(self, model: noise.NoiseModel) -> Array:
         """Return the ratio of a model to its limit, shape (m,)."""
         return np.asarray(np.sum([self.of_term(term) for term in model.terms], axis=0) / self.value)
 
 
 def find_smallest(
     limits: Sequence[Limits], family: Family, times: tuple[float, float]
-) -> NoiseModel:
+) -> noise.NoiseModel:
     """Return the smallest model of a family that lies above limits, by linear programs.
 
     For a given T_B all limits are linear in the densities N^2, S_B and K^2. Linear programs are
@@ -105,7 +96,7 @@ def find_smallest(
     if family not in FAMILIES:
         raise ValueError(f"family {family!r} is not known, expected one of {', '.join(FAMILIES)}")
     walks = family.endswith("K")
-    fixed: list[Term] = [WhiteNoise(1.0)] + [RandomWalk(1.0)] * walks
+    fixed: list[noise.Term] = [noise.WhiteNoise(1.0)] + [noise.RandomWalk(1.0)] * walks
     if "GM" not in family:
         cost, powers = _minimise_mean_log_ratio(limits, fixed)
         T_B = None
@@ -115,7 +106,7 @@ def find_smallest(
         def solved(log_time: float) -> tuple[float, Array]:
             time = math.exp(log_time)
             return _minimise_mean_log_ratio(
-                limits, [*fixed, GaussMarkov(compute_bias_instability(1.0, time), time)]
+                limits, [*fixed, noise.GaussMarkov(noise.compute_bias_instability(1.0, time), time)]
             )
 
         costs = [solved(float(x))[0] for x in tried]
@@ -128,13 +119,13 @@ def find_smallest(
     if not math.isfinite(cost):
         raise ValueError(f"no model {family} lies above the limits")
     powers = powers * (1.0 + _ROUNDING_MARGIN)
-    B = compute_bias_instability(float(powers[-1]), T_B) if T_B else 0.0
+    B = noise.compute_bias_instability(float(powers[-1]), T_B) if T_B else 0.0
     K = math.sqrt(powers[1]) if walks else 0.0
-    return NoiseModel(N=math.sqrt(powers[0]), B=B, T_B=T_B if B > 0.0 else None, K=K)
+    return noise.NoiseModel(N=math.sqrt(powers[0]), B=B, T_B=T_B if B > 0.0 else None, K=K)
 
 
 def _minimise_mean_log_ratio(
-    limits: Sequence[Limits], terms: Sequence[Term]
+    limits: Sequence[Limits], terms: Sequence[noise.Term]
 ) -> tuple[float, Array]:
     """Minimise the mean log ratio of Allan variance to limit; return it, and the densities.
 
@@ -200,7 +191,7 @@ _MAX_RATIO_AT_CONTACT = 1.01
 class Overbound:
     """A model that lies above its limits."""
 
-    model: NoiseModel
+    model: noise.NoiseModel
     family: Family
     horizon: float  # s
     longest: float  # tau, s
@@ -246,7 +237,7 @@ def simultaneous_upper(curve: AllanCurve, longest: float, confidence: float = 0.
 
 def overbound(
     curve: AllanCurve,
-    fitted: NoiseModel,
+    fitted: noise.NoiseModel,
     rate: float,
     *,
     family: Family = "N+K",
@@ -254,7 +245,7 @@ def overbound(
     longest: float | None = None,
     band: tuple[float | None, float | None] = (None, None),
     confidence: float = 0.95,
-    drawn: Sequence[NoiseModel] = (),
+    drawn: Sequence[noise.NoiseModel] = (),
     most_excess: float = MAX_EXCESS,
 ) -> Overbound:
     """Return the smallest model that lies above a measured curve and its fit.
@@ -315,7 +306,7 @@ def overbound(
     )
 
 
-def _find_excess(limit: Limits, model: NoiseModel) -> tuple[float, float]:
+def _find_excess(limit: Limits, model: noise.NoiseModel) -> tuple[float, float]:
     """Return the max. ratio of a model's Allan deviation to a limit, and its tau, s."""
     above = limit.ratio(model)
     worst = int(np.argmax(above))
@@ -324,13 +315,13 @@ def _find_excess(limit: Limits, model: NoiseModel) -> tuple[float, float]:
 
 def limits_of(
     curve: AllanCurve,
-    fitted: NoiseModel,
+    fitted: noise.NoiseModel,
     rate: float,
     horizon: float,
     longest: float,
     band: tuple[float, float],
     confidence: float = 0.95,
-    drawn: Sequence[NoiseModel] = (),
+    drawn: Sequence[noise.NoiseModel] = (),
 ) -> list[Limits]:
     """Return the limits on Allan variance, density and two integrals (see `overbound`)."""
     if not 2.0 / rate < horizon:
@@ -344,7 +335,7 @@ def limits_of(
     frequency = np.geomspace(*band, count_points(*band, _POINTS_A_DECADE))
     time = np.geomspace(1.0 / rate, horizon, count_points(1.0 / rate, horizon, _POINTS_A_DECADE))
 
-    def of_model(model: NoiseModel) -> Array:
+    def of_model(model: noise.NoiseModel) -> Array:
         grown = growth(model, time, rate)
         return np.concatenate((model.psd(frequency, rate), grown.first, grown.second))
 

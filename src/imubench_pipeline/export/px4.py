@@ -24,8 +24,6 @@ EKF2_PREDICT_US), src/modules/temperature_compensation/TemperatureCompensation.c
 Format".
 """
 
-from __future__ import annotations
-
 import math
 
 from imubench_pipeline.export.comments import describe_model, format_comments
@@ -33,8 +31,7 @@ from imubench_pipeline.export.imu import AXES, ExportError, Imu
 from imubench_pipeline.export.visual_inertial import map_to_walks
 from imubench_pipeline.words.reasons import exports as texts
 
-DEFAULT_PERIOD = 10_000
-"""Default of EKF2_PREDICT_US, us."""
+DEFAULT_PERIOD = 10_000  # default of EKF2_PREDICT_US, us
 
 _PERIOD_RANGE = (1_000, 20_000)
 _PARAMETER_RANGES = {

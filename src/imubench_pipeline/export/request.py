@@ -1,7 +1,5 @@
 """Make the file of a program from the tables of a run."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -13,15 +11,8 @@ import pyarrow.compute as pc
 from imubench_pipeline.allan import AllanCurve
 from imubench_pipeline.earth import STANDARD_GRAVITY
 from imubench_pipeline.estimators.rows import read_draws
+from imubench_pipeline.export import imu
 from imubench_pipeline.export.choice import WORST, Choice, choose
-from imubench_pipeline.export.imu import (
-    AxisNoise,
-    ExportError,
-    Imu,
-    TemperatureEffect,
-    compute_normal_gravity,
-    find_temperature_effect,
-)
 from imubench_pipeline.export.mapping import describe_terms
 from imubench_pipeline.export.overbound import FAMILIES, MAX_EXCESS, Family, overbound
 from imubench_pipeline.export.targets import TARGETS
@@ -29,7 +20,7 @@ from imubench_pipeline.model.estimates import AllanRow, ParameterRow, Temperatur
 from imubench_pipeline.model.recordings import RecordingRow
 from imubench_pipeline.model.table import R
 from imubench_pipeline.recordings.fitness import list_excluded
-from imubench_pipeline.tables import find_tables, find_tables_folder, read
+from imubench_pipeline.tables.files import find_tables, find_tables_folder, read
 from imubench_pipeline.words.reasons import exports as texts
 from imubench_pipeline.words.reasons.pools import recordings_not_used
 from imubench_pipeline.words.verdicts import doubts_text
@@ -68,7 +59,7 @@ def load(path: Path) -> dict[str, pa.Table]:
         paths = find_tables(path, NEEDED)
         return {name: read(name, [table]) for name, table in paths.items()}
     except (OSError, ValueError) as error:
-        raise ExportError(str(error)) from error
+        raise imu.ExportError(str(error)) from error
 
 
 def recordings_of(path: Path) -> Path:
@@ -84,23 +75,23 @@ def make_content(tables: Tables, request: Request, recordings: Path | None = Non
     known, or the target does not support the estimates.
     """
     if request.target not in TARGETS:
-        raise ExportError(
+        raise imu.ExportError(
             f"target {request.target!r} is not known; there are: {', '.join(TARGETS)}"
         )
     return TARGETS[request.target].write(build_imu(tables, request, recordings))
 
 
-def build_imu(tables: Tables, request: Request, folder: Path | None = None) -> Imu:
+def build_imu(tables: Tables, request: Request, folder: Path | None = None) -> imu.Imu:
     """Return the noise of the sensor of a request (see `make_content`)."""
     recordings = _select_rows(RecordingRow, tables, sensor=request.sensor)
     if not recordings:
         sensors = sorted(set(tables["recordings"]["sensor"].to_pylist()))
-        raise ExportError(f"no sensor {request.sensor!r}; there are: {', '.join(sensors)}")
+        raise imu.ExportError(f"no sensor {request.sensor!r}; there are: {', '.join(sensors)}")
     by_name = {row.recording: row for row in recordings}
     rows, cautions = _select_deciding(tables, request, recordings)
-    axes: dict[str, AxisNoise] = {}
+    axes: dict[str, imu.AxisNoise] = {}
     rates: list[float] = []
-    effects: dict[str, TemperatureEffect] = {}
+    effects: dict[str, imu.TemperatureEffect] = {}
     simulated = False
     for quantity in ("gyro", "accel"):
         if not any(row.channel.startswith(f"{quantity}_") for row in rows):
@@ -118,20 +109,22 @@ def build_imu(tables: Tables, request: Request, folder: Path | None = None) -> I
             cautions.append(texts.recording_in_doubt(choice.recording, doubts_text(about.doubts)))
         simulated = simulated or about.simulated
         if about.rate is None:
-            raise ExportError(f"{choice.recording}: its rate is not known; state it (--rate)")
+            raise imu.ExportError(f"{choice.recording}: its rate is not known; state it (--rate)")
         rates.append(float(f"{about.rate:.9g}"))  # time stamps are not more accurate
         axes[quantity] = choice.axis
         place = {"sensor": request.sensor, "recording": choice.recording}
         warmed = _select_rows(TemperatureRow, tables, **place)
-        effects[quantity] = find_temperature_effect(warmed, about, quantity, request.horizon)
+        effects[quantity] = imu.find_temperature_effect(warmed, about, quantity, request.horizon)
         if request.overbound:
             axes[quantity] = _bound_axis(tables, choice, request, about.rate, folder)
     if not axes:
         reasons = "; ".join(row.reason for row in recordings if row.reason)
-        raise ExportError(f"{request.sensor}: no estimate; its recordings are left out: {reasons}")
+        raise imu.ExportError(
+            f"{request.sensor}: no estimate; its recordings are left out: {reasons}"
+        )
     latitude = request.latitude
-    gravity = STANDARD_GRAVITY if latitude is None else compute_normal_gravity(latitude)
-    return Imu(
+    gravity = STANDARD_GRAVITY if latitude is None else imu.compute_normal_gravity(latitude)
+    return imu.Imu(
         sensor=request.sensor,
         rate=request.rate or max(rates),
         gyro=axes.get("gyro"),
@@ -165,7 +158,7 @@ def _select_deciding(
         return rows, [texts.used_despite_doubts(reasons, request.because or ""), *without]
     deciding = [row for row in rows if (row.sensor, row.recording) not in apart]
     if rows and not deciding:
-        raise ExportError(
+        raise imu.ExportError(
             f"{request.sensor}: {reasons}; look at the findings, or say why it may be used all the "
             "same (--because; exports: because; decide: include)"
         )
@@ -174,7 +167,7 @@ def _select_deciding(
 
 def _bound_axis(
     tables: Tables, choice: Choice, request: Request, rate: float, folder: Path | None
-) -> AxisNoise:
+) -> imu.AxisNoise:
     """Return the smallest model above the measured curve of the chosen axis."""
     family = TARGETS[request.target].family
     drawn = None
@@ -196,7 +189,7 @@ def _bound_axis(
         )
     except ValueError as error:
         larger = _list_larger_programs(family)
-        raise ExportError(
+        raise imu.ExportError(
             f"{choice.channel} of {choice.recording}: {'; '.join([str(error), *larger])}; or "
             f"take a horizon shorter than {request.horizon:g} s, or the fitted model without "
             "overbound, or allow a larger excess"
@@ -221,7 +214,7 @@ def _list_larger_programs(family: Family) -> list[str]:
 def curve_of(rows: Sequence[AllanRow]) -> AllanCurve:
     """Return the curve of one channel from rows of ``allan``; ExportError without any."""
     if not rows:
-        raise ExportError("the channel has no Allan variance")
+        raise imu.ExportError("the channel has no Allan variance")
     return AllanCurve(
         tau=np.array([row.tau for row in rows]),
         cluster_size=np.array([row.cluster_size for row in rows], dtype=np.int64),

@@ -1,7 +1,5 @@
 """Programs that simulate a sensor: gnss-ins-sim and MATLAB."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 

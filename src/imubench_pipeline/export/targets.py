@@ -1,7 +1,5 @@
 """The programs that a noise model can be exported to."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 

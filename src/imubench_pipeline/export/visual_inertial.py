@@ -4,8 +4,6 @@ Kalibr, OpenVINS, Basalt and ORB-SLAM3 take densities that are continuous in tim
 all above 0; VINS-Fusion takes standard deviations of samples.
 """
 
-from __future__ import annotations
-
 import json
 import math
 

@@ -11,8 +11,12 @@ from imubench_pipeline.estimators.estimate import COMPARED, SI_UNITS
 from imubench_pipeline.library.estimates import ChannelEstimate, Estimates, estimate
 from imubench_pipeline.library.logs import Log
 from imubench_pipeline.library.shown import Shown, Summary, cut
-from imubench_pipeline.navigation.compared import ComparedChannel
-from imubench_pipeline.navigation.ratios import Ratio, compare_deviations, compare_parameters
+from imubench_pipeline.navigation.ratios import (
+    ComparedChannel,
+    Ratio,
+    compare_deviations,
+    compare_parameters,
+)
 from imubench_pipeline.report.practical import choose_page_unit
 from imubench_pipeline.settings.config import FusionSettings, Method
 from imubench_pipeline.settings.sensor import quantity_of

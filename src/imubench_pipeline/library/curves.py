@@ -29,17 +29,8 @@ if TYPE_CHECKING:
 
 Overlap = Literal["full", "octave"]
 _SUMMARY_HEADS = ("channel", "tau", "from", "to", "at the shortest", "lowest", "at tau")
-_TABLE_COLUMNS = (
-    "tau",
-    "adev",
-    "lower",
-    "upper",
-    "edf",
-    "cluster_size",
-    "averaged",
-    "exponent",
-    "share",
-)
+_TABLE_COLUMNS = ("tau", "adev", "lower", "upper", "edf", "cluster_size", "averaged", "exponent",
+                  "share")  # fmt: skip
 
 
 @dataclass(frozen=True, repr=False)

@@ -5,8 +5,6 @@ columns (``gyro_x [deg/s]``), in ``attrs``, or as an argument. A unit is never g
 values.
 """
 
-from __future__ import annotations
-
 import re
 import sys
 from collections.abc import Iterator, Mapping, Sequence

@@ -1,7 +1,5 @@
 """Summaries of results for notebooks and terminals: a title, a small table, remarks."""
 
-from __future__ import annotations
-
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass

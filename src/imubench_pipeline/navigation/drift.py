@@ -21,8 +21,6 @@ G. Hahn, J. Am. Stat. Assoc. 64, 1969 (the interval); R. DerSimonian and R. Kack
 Trials 28, 2007; F. Satterthwaite, Biometrics Bull. 2, 1946; O. Dunn, J. Am. Stat. Assoc. 56, 1961.
 """
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Iterable, Iterator, Sequence

@@ -1,43 +1,40 @@
-"""Expected navigation errors of a recording: rows of the table ``error_budget``."""
+"""Expected navigation errors of a recording, and their growth: rows of two tables."""
 
-from __future__ import annotations
-
+import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
-from functools import partial
+from dataclasses import asdict, dataclass, field, replace
+from functools import cache, partial
+from itertools import product
 from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 
+from imubench_pipeline.earth import STANDARD_GRAVITY
 from imubench_pipeline.estimators.estimate import Estimate
 from imubench_pipeline.model.comparisons import ErrorBudgetRow
-from imubench_pipeline.navigation.error_budget import (
-    NO_FIGURES,
-    NO_USE,
-    Budget,
-    Figure,
-    Figures,
-    Gyrocompass,
-    Quantity,
+from imubench_pipeline.model.estimates import ErrorGrowthRow
+from imubench_pipeline.navigation.error_budget import in_use, uncertainty
+from imubench_pipeline.navigation.error_budget.budget import (
+    ACCEL_ORDER,
+    GYRO_ORDER,
     Start,
-    Uncalibrated,
-    Use,
     budget,
-    compute_chance_within,
-    compute_interval,
-    draw_models,
     time_until,
 )
-from imubench_pipeline.navigation.error_budget.parts import Largest
+from imubench_pipeline.navigation.error_budget.gyrocompass import Gyrocompass
+from imubench_pipeline.navigation.error_budget.parts import Budget, Largest, Quantity
 from imubench_pipeline.noise import NoiseModel
+from imubench_pipeline.noise.growth import Calibrated, Uncalibrated
+from imubench_pipeline.noise.model import sum_over_terms
 from imubench_pipeline.noise.simulate import channel_rng
 from imubench_pipeline.settings.requirements import DIMENSIONS, Axis, Error, Requirement
 from imubench_pipeline.settings.sensor import quantity_of
+from imubench_pipeline.typing import Array
 from imubench_pipeline.units import SI_UNITS, parse_difference, parse_quantity
 from imubench_pipeline.words.reasons import budgets as texts
 
-NO_FIGURES_OF_CHANNELS: Mapping[str, Figures] = MappingProxyType({})
+NO_FIGURES_OF_CHANNELS: Mapping[str, in_use.Figures] = MappingProxyType({})
 
 
 @dataclass(frozen=True)
@@ -45,7 +42,7 @@ class AxisErrors:
     """Error sources of one axis: its noise, and figures of the errors in use."""
 
     model: NoiseModel = field(default_factory=NoiseModel)
-    figures: Figures = field(default_factory=dict)
+    figures: in_use.Figures = field(default_factory=dict)
 
 
 _NO_AXIS_ERRORS = AxisErrors()
@@ -63,7 +60,7 @@ class Question:
     axis: Axis  # which axis of the sensor is used
     latitude: float | None = None  # rad; for ``north``
     limit: float | None = None  # largest standard deviation that fulfils the requirement, SI
-    use: Use = NO_USE  # motion, temperature and vibration
+    use: in_use.Use = in_use.NO_USE  # motion, temperature and vibration
 
     @property
     def needs(self) -> tuple[str, ...]:
@@ -99,7 +96,7 @@ class Question:
         assert self.latitude is not None  # checked with the requirement
         stated = self.start.gyro.bias if isinstance(self.start.gyro, Uncalibrated) else None
         # North-finding at arbitrary times removes the bias by turning the gyro.
-        figures = gyro.figures if self.requirement is not None else NO_FIGURES
+        figures = gyro.figures if self.requirement is not None else in_use.NO_FIGURES
         return Gyrocompass(gyro=gyro.model, latitude=self.latitude, bias=stated, figures=figures)
 
 
@@ -150,7 +147,7 @@ def list_requirement_questions(name: str, requirement: Requirement) -> Iterator[
             requirement.axis,
             None if latitude is None else parse_quantity(latitude, "angle"),
             limit.size / requirement.sigmas,
-            Use(over=limit.seconds, **use),
+            in_use.Use(over=limit.seconds, **use),
         )
 
 
@@ -161,20 +158,20 @@ def list_error_rows(
     *,
     draws: int,
     seed: int,
-    figures: Mapping[str, Figures] = NO_FIGURES_OF_CHANNELS,
+    figures: Mapping[str, in_use.Figures] = NO_FIGURES_OF_CHANNELS,
 ) -> Iterator[ErrorBudgetRow]:
     """Yield the rows of the table ``error_budget`` of a recording.
 
     ``names`` are ``sensor`` and ``recording``; ``estimates`` the recommended one of each channel;
     ``draws`` the number of noise models that are drawn from each, for the interval of a total.
     Each channel has its own random stream of the seed. ``figures`` belong to the errors in use,
-    by channel (`printed_errors.in_use`).
+    by channel (`in_use.collect_figures_in_use`).
     """
     axes = collect_axis_errors(estimates, figures)
 
     def drawn_of(channel: str) -> list[AxisErrors]:
         stream = partial(channel_rng, seed, repr(estimates[channel].model), channel)
-        models = draw_models(estimates[channel], draws, stream("budget"))
+        models = uncertainty.draw_models(estimates[channel], draws, stream("budget"))
         of_use = _draw_figures(axes[channel].figures, draws, stream("temperature of the budget"))
         return [AxisErrors(*pair) for pair in zip(models, of_use, strict=True)]
 
@@ -209,7 +206,7 @@ def list_error_rows(
         nominal = question.answer(*pair)
         budgets = [question.answer(*axes_drawn) for axes_drawn in zip(*many, strict=True)]
         asked = replace(asked, gyro=chosen["gyro"], accel=chosen["accel"])
-        lower, upper = compute_interval(budgets)
+        lower, upper = uncertainty.compute_interval(budgets)
         # Draws of an absent term are above 0: extend the limits to the value.
         lower, upper = min(lower, nominal.total), max(upper, nominal.total)
         used = [channel for channel in chosen.values() if channel]
@@ -235,7 +232,7 @@ def list_error_rows(
             lower=lower,
             upper=upper,
             drawn="one by one" if apart else "jointly",
-            within=question.limit and compute_chance_within(question.limit, budgets),
+            within=question.limit and uncertainty.compute_chance_within(question.limit, budgets),
             reasons=reasons,
             reached_after=question.reached(*pair),
         )
@@ -247,11 +244,11 @@ def list_error_rows(
 
 
 def collect_axis_errors(
-    estimates: Mapping[str, Estimate], figures: Mapping[str, Figures]
+    estimates: Mapping[str, Estimate], figures: Mapping[str, in_use.Figures]
 ) -> dict[str, AxisErrors]:
     """Return the error sources of the axes with a noise model: the noise of others is not 0."""
     return {
-        channel: AxisErrors(estimate.model, figures.get(channel, NO_FIGURES))
+        channel: AxisErrors(estimate.model, figures.get(channel, in_use.NO_FIGURES))
         for channel, estimate in estimates.items()
         if estimate.model.terms
     }
@@ -280,7 +277,9 @@ def _list_channels(quantity: str, channels: Iterable[str]) -> list[str]:
     return [channel for channel in channels if quantity_of(channel) == quantity]
 
 
-def _draw_figures(figures: Figures, draws: int, rng: np.random.Generator) -> list[Figures]:
+def _draw_figures(
+    figures: in_use.Figures, draws: int, rng: np.random.Generator
+) -> list[in_use.Figures]:
     """Return draws of the figures of an axis, from the spread of measured sensors."""
     spread = {
         cause: figure
@@ -291,7 +290,7 @@ def _draw_figures(figures: Figures, draws: int, rng: np.random.Generator) -> lis
         return [figures] * draws
     normal = rng.standard_normal((draws, len(spread)))
 
-    def moved(figure: Figure, number: float) -> Figure:
+    def moved(figure: in_use.Figure, number: float) -> in_use.Figure:
         return replace(figure, sigma=abs((figure.sigma or 0.0) + figure.spread * float(number)))
 
     return [
@@ -303,3 +302,90 @@ def _draw_figures(figures: Figures, draws: int, rng: np.random.Generator) -> lis
 def _find_reason(estimate: Estimate) -> str | None:
     reasons = (parameter.reason for parameter in estimate.parameters.values())
     return next((reason for reason in reasons if reason), None)
+
+
+_STANDARD_TIMES = (1.0, 2.0, 5.0, 10.0, 20.0, 30.0, 60.0, 120.0, 300.0, 600.0)
+_STANDARD_WINDOWS = (10.0, 30.0, 60.0, 120.0, 300.0, 600.0)
+_TAIL_PROBABILITY = 0.025  # probability beyond each 95 % limit
+
+
+def list_growth_rows(
+    names: Mapping[str, str],
+    estimates: Mapping[str, Estimate],
+    *,
+    times: Iterable[float],
+    window: float,
+    draws: int,
+    seed: int,
+    figures: Mapping[str, in_use.Figures] = NO_FIGURES_OF_CHANNELS,
+) -> Iterator[ErrorGrowthRow]:
+    """Yield the rows of the table ``error_growth`` of a recording.
+
+    They are for its worst axes, and if it has several, for each letter alone. ``times`` and
+    ``window``, s, are used in addition to the default times; the others are as in
+    `list_error_rows`.
+    """
+    axes = collect_axis_errors(estimates, figures)
+
+    @cache
+    def models(channel: str) -> Sequence[NoiseModel]:
+        stream = channel_rng(seed, repr(estimates[channel].model), channel, "budget")
+        return uncertainty.draw_models(estimates[channel], draws, stream)
+
+    @cache
+    def grown(channel: str, order: int, time: float, start: Calibrated | Uncalibrated) -> Array:
+        return sum_over_terms(
+            models(channel), lambda term: np.asarray(term.growth(order, time, start))
+        )
+
+    def noise(error: str, time: float, start: Calibrated, gyro: str, accel: str | None) -> Array:
+        """Return the variances of an error from noise, shape (draws,)."""
+        order = GYRO_ORDER[error]  # type: ignore[index]  # north is not asked for
+        gravity = STANDARD_GRAVITY if order else 1.0
+        total = gravity**2 * grown(gyro, order, time, start)
+        if error in ACCEL_ORDER and accel:
+            total = total + grown(accel, ACCEL_ORDER[error], time, start)
+        if error == "attitude" and accel:
+            at_rest = grown(accel, 0, start.window, Uncalibrated(bias=0.0, on_time=0.0))
+            total = total + at_rest / (start.window * STANDARD_GRAVITY) ** 2
+        return total
+
+    # The candidate channels for the worst axes, and for each axis alone.
+    answerers = {"worst": axes}
+    letters = sorted({channel[-1] for channel in axes})
+    for letter in letters if len(letters) > 1 else []:
+        answerers[letter] = {name: errors for name, errors in axes.items() if name[-1] == letter}
+    for axis, at_rest in product(answerers, sorted({*_STANDARD_WINDOWS, window})):
+        for question in list_standard_questions(
+            sorted({*_STANDARD_TIMES, *times}), at_rest, 0.0, ["worst"]
+        ):
+            if question.error == "north":
+                continue
+            chosen = select_channels(question, answerers[axis])
+            if chosen is None:
+                continue
+            budget = question.answer(*(axes[c] if c else AxisErrors() for c in chosen.values()))
+            gyro, accel = chosen["gyro"], chosen["accel"]
+            assert gyro is not None  # every error needs one
+            drawn = noise(question.error, question.time, Calibrated(at_rest), gyro, accel)
+            row = partial(
+                ErrorGrowthRow,
+                sensor=names["sensor"],
+                recording=names["recording"],
+                axis=axis,
+                gyro=gyro,
+                accel=accel,
+                window=at_rest,
+                error=question.error,
+                time=question.time,
+                unit=SI_UNITS[DIMENSIONS[question.error]],
+            )
+            sure = math.fsum(
+                part.sigma**2 for part in budget.contributions if not part.source.is_noise
+            )
+            ends = np.quantile(np.sqrt(drawn + sure), [_TAIL_PROBABILITY, 1.0 - _TAIL_PROBABILITY])
+            # Draws of an absent term are above 0: extend the limits to the value.
+            lower, upper = min(float(ends[0]), budget.total), max(float(ends[1]), budget.total)
+            yield row(source="total", sigma=budget.total, lower=lower, upper=upper)
+            for part in sorted(budget.contributions, key=lambda one: -one.sigma):
+                yield row(**asdict(part.source), sigma=part.sigma)

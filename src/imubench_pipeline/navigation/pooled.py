@@ -20,8 +20,6 @@ W. Viechtbauer, Stat. Med. 26, 2007 (its limits); J. Hartung and G. Knapp, Stat.
 D. Jackson et al., Stat. Med. 36, 2017 (the interval); R. Barlow, arXiv:physics/0406120, 2004.
 """
 
-from __future__ import annotations
-
 import math
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -360,11 +358,8 @@ def _make_bias_row(
 
 
 def _describe_device_effects(pairs: Iterable[tuple[float | None, str]], several: bool) -> list[str]:
-    """Return how the spread between devices compares with repeats, if it can be tested.
-
-    The test of equal device means is a one-way analysis of variance (Fisher 1925). Recordings have
-    equal weights: their errors are part of the spread within a device.
-    """
+    """Return how the spread between devices compares with repeats, if it can be tested."""
+    # One-way analysis of variance (Fisher 1925), with equal weights of the recordings.
     groups: dict[str, list[float]] = {}
     for value, device in pairs:
         if value is not None and math.isfinite(value):

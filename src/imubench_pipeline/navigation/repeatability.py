@@ -1,10 +1,8 @@
 """Compare the turn-on to turn-on spread of the fixed bias with the printed repeatability."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator, Mapping
 
-from imubench_pipeline.datasheets.comparable import read_repeatability_comparables
+from imubench_pipeline.datasheets.comparable import Comparable, PrintedAxis
 from imubench_pipeline.datasheets.deltas import compare
 from imubench_pipeline.estimators.estimate import Parameter
 from imubench_pipeline.model.comparisons import RepeatabilityRow
@@ -49,7 +47,8 @@ def repeatability_rows(
             bias = estimate_turn_on_bias(value for _, value in several)
             limits = bias.spread_lower, bias.spread_upper
             spread = Parameter(bias.spread, "ok", None, *limits)
-        for entry in read_repeatability_comparables(sensors[sensor].datasheet, channel):
+        axis, name = PrintedAxis.of(sensors[sensor].datasheet, channel), "bias_repeatability"
+        for entry in axis.read(name, Comparable(name, "spread", None), axis.si(name)):
             found = compare(entry, spread, tolerance)
             reasons = found.reasons
             if entry.value is not None:

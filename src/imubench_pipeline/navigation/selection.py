@@ -1,7 +1,5 @@
 """Rank the sensors for each requirement: rows of the table ``ranking``."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 
 from imubench_pipeline.model.comparisons import RankingRow

@@ -8,8 +8,6 @@ B from its datasheets. If a figure is not known, neither is the worst case.
 Errors in use are from the datasheet; the best case excludes a calibrated turn-on bias.
 """
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -21,9 +19,12 @@ from imubench_pipeline.model.comparisons import RankingRow, ShortlistRow
 from imubench_pipeline.model.estimates import ParameterRow
 from imubench_pipeline.model.recordings import RecordingRow
 from imubench_pipeline.model.verdicts import Shortfall
-from imubench_pipeline.navigation.error_budget.in_use import BIAS_CAUSES, Figure
+from imubench_pipeline.navigation.error_budget.in_use import (
+    BIAS_CAUSES,
+    Figure,
+    read_datasheet_figures,
+)
 from imubench_pipeline.navigation.error_budget.in_use import Figures as InUse
-from imubench_pipeline.navigation.error_budget.printed_errors import read_datasheet_figures
 from imubench_pipeline.navigation.expected_errors import (
     AxisErrors,
     Question,

@@ -5,8 +5,6 @@ limit is just reached. If the printed turn-on bias alone exceeds a limit, the se
 if calibrated to within the remaining error budget.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Literal, get_args
@@ -203,7 +201,7 @@ class Conditions:
     figures: Mapping[tuple[str, Figure], float]
 
     @classmethod
-    def of(cls, must: Must, has: Abilities, conditions: Iterable[ErrorBudgetRow]) -> Conditions:
+    def of(cls, must: Must, has: Abilities, conditions: Iterable[ErrorBudgetRow]) -> "Conditions":
         """Return the conditions of the verdict on a sensor.
 
         ``must`` are the hard requirements, ``has`` the properties of the sensor. ``conditions`` are
@@ -233,11 +231,6 @@ class Conditions:
             for (quantity, figure), largest in self.figures.items()
         )
         return (*figures, *self.unknown)
-
-
-def is_condition(row: ErrorBudgetRow) -> bool:
-    """Return whether meeting a limit depends on the figure of a source."""
-    return row.largest_unit is not None and row.source in FIGURES
 
 
 def select_known_errors(rows: Iterable[ErrorBudgetRow]) -> list[tuple[ErrorBudgetRow, float]]:

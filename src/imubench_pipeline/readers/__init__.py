@@ -1,7 +1,5 @@
 """Read log files of all formats (`formats`) as batches of SI samples, in bounded memory."""
 
-from __future__ import annotations
-
 import errno
 import os
 import unicodedata

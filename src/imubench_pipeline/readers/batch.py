@@ -1,7 +1,5 @@
 """Interface of the readers: batches of SI samples, and findings on omitted data."""
 
-from __future__ import annotations
-
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
@@ -46,7 +44,7 @@ class Batch:
     def __len__(self) -> int:
         return len(next(iter(self.columns.values())))
 
-    def after(self, records: int) -> Batch:
+    def after(self, records: int) -> "Batch":
         """Return the batch without its first records."""
         time = None if self.time is None else self.time[records:]
         return Batch(time, {name: values[records:] for name, values in self.columns.items()})

@@ -1,7 +1,5 @@
 """Enforce limits of memory and time on library calls with untrusted files."""
 
-from __future__ import annotations
-
 import math
 import os
 import pickle

@@ -1,7 +1,5 @@
 """Read the bytes of a log that may be compressed or in an archive, recognised by content."""
 
-from __future__ import annotations
-
 import bz2
 import io
 import lzma
@@ -32,10 +30,7 @@ _READ_BLOCK = 1 << 16
 
 
 class _CompressedParts:
-    """The decompressed bytes of one or several consecutive compressed parts; zeros may follow each.
-
-    Nearly empty parts are limited: the libraries skip millions of them. ``new``: a decompressor.
-    """
+    """The decompressed bytes of consecutive parts; refuses millions of nearly empty ones."""
 
     def __init__(self, file: FileWithoutHoles, new: Callable[[], Any]) -> None:
         self._file = file
@@ -203,10 +198,7 @@ class Bytes:
 
 
 class _DeflatedMember:
-    """A deflated file in an archive; unlike the library, it returns all data of a truncated one.
-
-    ``file`` is at the first byte of the data; the checksum of ``info`` is None if it is unknown.
-    """
+    """A deflated file in an archive; unlike the library, it returns all data of a truncated one."""
 
     def __init__(self, file: IO[bytes], info: zipfile.ZipInfo) -> None:
         self._file = file

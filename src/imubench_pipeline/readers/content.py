@@ -1,7 +1,5 @@
 """Recognise the format of a file by its content, never by its name."""
 
-from __future__ import annotations
-
 from contextlib import closing
 from itertools import chain
 from pathlib import Path

@@ -1,7 +1,5 @@
 """List the tables and columns of an unknown log, from the beginning of its files."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace

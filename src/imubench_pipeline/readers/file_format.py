@@ -1,7 +1,5 @@
 """Declaration of a format of log files, and description of the contents of a file."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -42,7 +40,7 @@ class Code(NamedTuple):
     """The code that reads the files of a format."""
 
     log_file: type[LogFile]  # reads one file, or one topic of it
-    tables: Callable[[Path, FileFormat], list[LogTable]]
+    tables: "Callable[[Path, FileFormat], list[LogTable]]"
     """Returns the tables of a file from its path and format; reads its beginning only. Raises
     `RecordingError` if there is no table."""
 
@@ -75,7 +73,7 @@ class FileFormat:
         except ExtraError as error:
             raise RecordingError(str(error)) from None
 
-    def tables(self, path: Path) -> list[LogTable]:
+    def tables(self, path: Path) -> "list[LogTable]":
         """Return the tables of a log, from its beginning; RecordingError if it cannot be read."""
         return self.load().tables(path, self)
 
@@ -100,7 +98,7 @@ class LogColumn:
     @classmethod
     def of_numbers(
         cls, source: str, label: str, values: NDArray[Any], unit: str | None = None
-    ) -> LogColumn:
+    ) -> "LogColumn":
         """Return a column of numbers."""
         return cls(source, label, "number", format_first_numbers(values), values, unit)
 

@@ -4,8 +4,6 @@ A logger that reserves space leaves zeros after the log when it loses its power.
 not store them: such a hole is found and skipped without reading it.
 """
 
-from __future__ import annotations
-
 import errno
 import os
 import re

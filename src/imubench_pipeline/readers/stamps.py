@@ -1,7 +1,5 @@
 """Convert numeric stamps: s since the first one, its date, and unwrapping of counters."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import dataclass

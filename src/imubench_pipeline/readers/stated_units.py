@@ -1,7 +1,5 @@
 """Find the units that logs state, and compare them with the sensor file."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import dataclass
 

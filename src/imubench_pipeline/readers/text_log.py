@@ -1,7 +1,5 @@
 """Write simulated logs as text, in the format of the logger of their sensor."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping
 from contextlib import AbstractContextManager
 from pathlib import Path

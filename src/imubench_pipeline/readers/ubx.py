@@ -14,8 +14,6 @@ ESF-MEAS writes gyro and accelerometer in separate messages, some ms apart. One 
 record, with the stamp of the first.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from datetime import datetime, timedelta
@@ -93,7 +91,7 @@ class UbxFile(LogFile):
         self._report(kind, words, frames, rows)
 
     def _batch(
-        self, words: Words, clock: _Clock, records: _RecordGrouper, ended: bool
+        self, words: "Words", clock: "_Clock", records: "_RecordGrouper", ended: bool
     ) -> Iterator[Batch]:
         columns, values, tags, places = words.drained()
         table, stamps = records.grouped(columns, values, clock.stamps(tags, places), ended)
@@ -164,14 +162,14 @@ class UbxFile(LogFile):
             "receiver, or mend 'column' in the sensor file"
         )
 
-    def _is_clear(self, frames: Frames, words: dict[bytes, Words]) -> bool:
+    def _is_clear(self, frames: Frames, words: "dict[bytes, Words]") -> bool:
         """Return whether the log read so far is enough to choose the message."""
         for of_kind in words.values():
             of_kind.drained()
         present = any(of_kind.present for of_kind in words.values())
         return frames.read > _MIN_PROBED_BYTES and present
 
-    def _report(self, kind: bytes, words: Words, frames: Frames, rows: int) -> None:
+    def _report(self, kind: bytes, words: "Words", frames: Frames, rows: int) -> None:
         name = KINDS[kind]
         absent = [column for column in self._columns() if not words.seen[COLUMNS[column][0]]]
         if rows == 0 or absent:
@@ -359,11 +357,9 @@ def _group_records(
     row_stamp: NDArray[np.int64],
     times: NDArray[np.int64],
 ) -> int:
-    """Fill records; return the number of complete ones.
-
-    ``state``: the first column of the log, which begins a record, and whether a record is open.
-    """
+    """Fill records; return the number of complete ones."""
     count = 0
+    # `state`: the first column of the log, which begins a record, and whether a record is open
     for i in range(columns.size):
         column = columns[i]
         if state[0] < 0:

@@ -1,7 +1,5 @@
 """Extract UBX messages from the bytes of a u-blox receiver, and verify their checksums."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Iterator
 

@@ -11,8 +11,6 @@ VNISL and VNISE are estimates of a filter, not measurements, and VNDTV has incre
 skipped.
 """
 
-from __future__ import annotations
-
 import re
 from binascii import crc_hqx
 from collections import Counter

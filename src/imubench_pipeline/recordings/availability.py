@@ -4,8 +4,6 @@ An error of a log rejects it until it changes. The state of the system may chang
 the ingest fails without a verdict, and the next run tries again.
 """
 
-from __future__ import annotations
-
 import errno
 from collections.abc import Callable, Collection, Iterator
 from contextlib import contextmanager

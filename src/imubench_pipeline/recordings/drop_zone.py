@@ -1,7 +1,5 @@
 """The files in the drop zone: each belongs to a recording, or is skipped for a stated reason."""
 
-from __future__ import annotations
-
 import errno
 import os
 import re

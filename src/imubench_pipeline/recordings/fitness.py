@@ -4,8 +4,6 @@ A doubt is *unfit* if the figures may not be the noise of a sensor at rest in th
 no such sensor is sold. Other doubts are reported with the figures.
 """
 
-from __future__ import annotations
-
 import math
 from collections import defaultdict
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence

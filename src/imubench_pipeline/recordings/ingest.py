@@ -1,7 +1,5 @@
 """Convert log files to Parquet in SI, one file per clock, with findings, in bounded memory."""
 
-from __future__ import annotations
-
 import shutil
 import tempfile
 from collections.abc import Iterator, Mapping
@@ -51,9 +49,9 @@ from imubench_pipeline.settings.sensor import (
     UsedPart,
     quantity_of,
 )
-from imubench_pipeline.tables import open_parquet, read_row_group
 from imubench_pipeline.tables.failures import Failure
 from imubench_pipeline.tables.findings import Finding, RecordingError, UnavailableError, find
+from imubench_pipeline.tables.parquet import open_parquet, read_row_group
 from imubench_pipeline.words.findings import files, samples
 
 _MAX_NAMES = 5
@@ -351,7 +349,10 @@ def ingest_as_planned(
             ingested = ingest(source, plan.log, notes, plan.quality, folder, names)
         sources = ingested.sources or {}
         if not is_same():  # the samples and the digest may be from two logs
-            sources = {name: file.distrusted() for name, file in sources.items()}
+            # Without digest and stamps they count as changed.
+            sources = {
+                name: replace(file, sha256=None, stamps=None) for name, file in sources.items()
+            }
     except RecordingError as error:
         remove_kept(folder)
         row = RecordingRow(

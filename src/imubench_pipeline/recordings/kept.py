@@ -1,7 +1,5 @@
 """Load ingested samples; refuse altered ones."""
 
-from __future__ import annotations
-
 import hashlib
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass
@@ -21,10 +19,10 @@ from imubench_pipeline.recordings.recording import (
     open_channel_logs,
     was_at_rest,
 )
-from imubench_pipeline.tables.digests import compute_digest, read_sealed_json, write_sealed_json
 from imubench_pipeline.tables.failures import Failure
 from imubench_pipeline.tables.findings import RecordingError
 from imubench_pipeline.tables.parquet import read_footer
+from imubench_pipeline.tables.seals import compute_digest, read_sealed_json, write_sealed_json
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -64,7 +62,7 @@ class Quality:
         return {name: channel.grid for name, channel in self.channels.items()}
 
     @classmethod
-    def read(cls, path: Path) -> Quality:
+    def read(cls, path: Path) -> "Quality":
         """Read the file that `write` wrote; raise RecordingError if it is damaged."""
         try:
             return _make_adapter().validate_python(read_sealed_json(path))

@@ -5,8 +5,6 @@ nobody can set), and a few blocks of a file. It reads a whole file only if its s
 its stamps have changed. The ingest reads whole files, and is repeated as soon as they have changed.
 """
 
-from __future__ import annotations
-
 import contextlib
 import hashlib
 import io
@@ -22,7 +20,7 @@ from pydantic import TypeAdapter
 from imubench_pipeline.readers import log_files
 from imubench_pipeline.readers.holes import FileWithoutHoles
 from imubench_pipeline.recordings.drop_zone import Recording
-from imubench_pipeline.tables import digests
+from imubench_pipeline.tables import seals
 
 KNOWN = "log.json"  # the file of the evidence, beside `quality.json`
 MAX_DIGESTED_SIZE = 1 << 26
@@ -50,7 +48,7 @@ class KnownFile:
     other numbers each time: then only the content of a file of moderate size is compared."""
 
     @classmethod
-    def of(cls, path: Path, is_stopped: Callable[[], bool] = lambda: False) -> KnownFile:
+    def of(cls, path: Path, is_stopped: Callable[[], bool] = lambda: False) -> "KnownFile":
         """Read a file, which may be missing; `is_stopped` ends the reading of a large one."""
         try:
             begin = time.time_ns()
@@ -65,15 +63,11 @@ class KnownFile:
         stamps = _stamps(before) if old else None
         return cls(before.st_size, digest, stamps, inode=before.st_ino)
 
-    def distrusted(self) -> KnownFile:
-        """Return the file without digest and stamps, so that it counts as changed."""
-        return replace(self, sha256=None, stamps=None)
-
 
 def read_known(folder: Path) -> dict[str, KnownFile] | None:
     """Read the file identities of the last ingest of a recording; None if there are none."""
     with contextlib.suppress(OSError, ValueError, TypeError, KeyError):
-        files = digests.read_sealed_json(folder / KNOWN)["files"]
+        files = seals.read_sealed_json(folder / KNOWN)["files"]
         return TypeAdapter(dict[str, KnownFile]).validate_python(files)
     return None
 
@@ -92,7 +86,7 @@ def write_known(
             for name, file in (absent | dict(files)).items()
         }
     rows = {name: asdict(file) for name, file in sorted(files.items())}
-    digests.write_sealed_json({"files": rows}, folder / KNOWN)
+    seals.write_sealed_json({"files": rows}, folder / KNOWN)
 
 
 def identify_log_files(
@@ -215,10 +209,7 @@ def digest_blocks(path: Path) -> str:
 
 
 def _digest(path: Path, size: int, is_stopped: Callable[[], bool]) -> str | None:
-    """Return the SHA-256 of the first `size` bytes of a file; None where it was stopped.
-
-    A file of the kernel may never end. Of a long hole in a large sparse file, only the end counts.
-    """
+    """Return the SHA-256 of the first `size` bytes, of long holes only the end; None if stopped."""
     digest, is_large = hashlib.sha256(), size > MAX_DIGESTED_SIZE
     is_sparse = is_large and 512 * path.stat().st_blocks < size - MAX_DIGESTED_SIZE
     with closing(FileWithoutHoles(path)) if is_sparse else _opened(path) as file:
@@ -231,7 +222,7 @@ def _digest(path: Path, size: int, is_stopped: Callable[[], bool]) -> str | None
 
 
 def _opened(path: Path) -> io.FileIO:
-    return open(path, "rb", buffering=0, opener=digests.open_without_waiting)
+    return open(path, "rb", buffering=0, opener=seals.open_without_waiting)
 
 
 def _places(source: Path) -> dict[str, Path]:

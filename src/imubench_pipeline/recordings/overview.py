@@ -4,8 +4,6 @@ Each channel is read twice, in bounded memory. Times are on the uniform grid, fr
 of the file on: holes have their length, pauses between segments have none.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path

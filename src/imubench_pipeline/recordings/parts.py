@@ -1,7 +1,5 @@
 """Convert one file of a recording to Parquet: read it, collect statistics, remove knocks."""
 
-from __future__ import annotations
-
 import contextlib
 import hashlib
 import math
@@ -26,8 +24,8 @@ from imubench_pipeline.recordings.quality.summary import ColumnSummary
 from imubench_pipeline.recordings.recording import BESIDE, ROW_GROUP, LogWriter
 from imubench_pipeline.recordings.timebase import TimeBase
 from imubench_pipeline.settings.sensor import UsedPart
-from imubench_pipeline.tables import open_parquet, read_row_group
 from imubench_pipeline.tables.findings import Finding, RecordingError
+from imubench_pipeline.tables.parquet import open_parquet, read_row_group
 from imubench_pipeline.typing import Array
 from imubench_pipeline.words.findings.files import NotUsed
 

@@ -4,8 +4,6 @@ The columns are the channels, ``temperature`` in °C, if needed ``time`` (s from
 and if samples are missing ``sample``, the position on the uniform grid. A null is a missing sample.
 """
 
-from __future__ import annotations
-
 import json
 import math
 from collections.abc import Iterable, Iterator, Mapping
@@ -23,8 +21,8 @@ from pydantic import TypeAdapter
 from imubench_pipeline.readers.arrays.arrow import METADATA
 from imubench_pipeline.settings.experiments import AT_REST
 from imubench_pipeline.settings.sensor import POSITION, TABLE_RATE, TEMPERATURE
-from imubench_pipeline.tables import open_parquet, read_row_group
 from imubench_pipeline.tables.findings import RecordingError
+from imubench_pipeline.tables.parquet import open_parquet, read_row_group
 from imubench_pipeline.typing import Array
 
 ROW_GROUP = 1 << 20  # rows of a row group

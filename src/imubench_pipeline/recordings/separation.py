@@ -5,8 +5,6 @@ its numbers lie on a slower uniform grid than all records, or if all records tog
 grid. An axis with fewer numbers than another axis of its sensor has missing samples.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack
@@ -22,8 +20,8 @@ from imubench_pipeline.recordings.recording import BESIDE
 from imubench_pipeline.recordings.timebase import TimeBase
 from imubench_pipeline.settings.quality import QualitySettings
 from imubench_pipeline.settings.sensor import quantity_of
-from imubench_pipeline.tables import open_parquet, read_row_group
 from imubench_pipeline.tables.findings import RecordingError, find
+from imubench_pipeline.tables.parquet import open_parquet, read_row_group
 from imubench_pipeline.typing import Array
 from imubench_pipeline.words.findings.time_base import OwnRate
 
@@ -311,10 +309,7 @@ def _write_parts(part: Part, clocks: list[_Clock], records: _Records, scratch: P
 
 
 def _carry(values: Array, chosen: NDArray[np.bool_], waiting: float) -> tuple[Array, float]:
-    """Return the latest reading since the previous chosen record, for each chosen record.
-
-    ``waiting``: reading after the last chosen record of the block before; of this one, if second.
-    """
+    """Return for each chosen record the latest reading since the one before, and the one left."""
     there = np.where(np.isfinite(values), np.arange(len(values)), -1)
     latest = np.maximum.accumulate(there)
     records = np.flatnonzero(chosen)

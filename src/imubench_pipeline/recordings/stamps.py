@@ -1,7 +1,5 @@
 """Put time stamps on a uniform grid, block by block."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 
@@ -42,11 +40,6 @@ class Interval:
     """Mean, s, if double steps at regular distances are lost samples, or if repeated stamps at
     regular distances are records written twice; None if there are none. Rounded stamps cause the
     same pattern, and ``mean`` assumes rounding."""
-
-    @property
-    def has_repeats(self) -> bool:
-        """Whether stamps repeat at regular distances, since the rate exceeds their resolution."""
-        return self.other is not None and self.other > self.mean
 
 
 def estimate_interval(stamps: Stamps) -> Interval | None:
@@ -99,10 +92,7 @@ def _take_forward_steps(block: Array) -> Array:
 
 
 def _are_regular(chosen: NDArray[np.bool_]) -> bool:
-    """Return whether the chosen steps have regular distances throughout a block, as by rounding.
-
-    Losses give random distances; a lower rate in a part of the block gives one in that part only.
-    """
+    """Return whether chosen steps have regular distances in the whole block, unlike losses."""
     places = np.flatnonzero(chosen)
     if len(places) < 10:
         return False

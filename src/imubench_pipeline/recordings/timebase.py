@@ -5,8 +5,6 @@ that scatter by more than half a sampling interval, such as arrival times, give 
 the samples are then treated as consecutive, with a finding.
 """
 
-from __future__ import annotations
-
 import math
 from collections import Counter
 from collections.abc import Iterator
@@ -114,7 +112,9 @@ def fit_time_base(
     complete = stated is not None and abs(mean * stated - 1.0) <= _MAX_RATE_ERROR_WITHOUT_LOSSES
     bursts |= complete and known is None and track.grid > 2 * track.rows
     shared = track.duplicates > tracking.MIN_SHARED_STAMPS * track.rows
-    if typical.has_repeats and interval == typical.mean:
+    # Stamps repeat at regular distances where the rate exceeds their resolution.
+    repeated = typical.other is not None and typical.other > typical.mean
+    if repeated and interval == typical.mean:
         base = _assume_consecutive(stamps, track, stated, settings)
         if stated:
             return base

@@ -24,7 +24,7 @@ from imubench_pipeline.report.practical import choose_unit, format_temperature, 
 from imubench_pipeline.report.site import Entry, Site
 from imubench_pipeline.report.view import RecordingView
 from imubench_pipeline.settings.requirements import DIMENSIONS, Requirement
-from imubench_pipeline.tables import read
+from imubench_pipeline.tables.files import read
 from imubench_pipeline.units import parse_quantity
 from imubench_pipeline.words.numbers import duration_text, number_text
 from imubench_pipeline.words.verdicts import source_kind_text, source_text

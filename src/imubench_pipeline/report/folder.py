@@ -6,7 +6,7 @@ import json
 from collections.abc import Mapping
 from pathlib import Path
 
-from imubench_pipeline.tables import write_content
+from imubench_pipeline.tables.files import write_content
 
 KEYS = "pages.json"
 """File with the digests of the pages."""

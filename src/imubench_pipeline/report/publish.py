@@ -30,8 +30,8 @@ from imubench_pipeline.report.practical import System, choose_page_unit, list_pa
 from imubench_pipeline.report.run_summary import fold_text
 from imubench_pipeline.report.search import make_search_index
 from imubench_pipeline.report.site import Page, Site
-from imubench_pipeline.tables import read, read_json, write_content
 from imubench_pipeline.tables.failures import describe_error
+from imubench_pipeline.tables.files import read, read_json, write_content
 from imubench_pipeline.tables.provenance import digest_sources
 from imubench_pipeline.tables.schemas import OF_ONE_RECORDING, TABLES
 from imubench_pipeline.words.estimates import STATUS_WORDS, status_text, symbol_text

@@ -33,7 +33,7 @@ from imubench_pipeline.report.parameters import make_methods_table
 from imubench_pipeline.report.practical import System, choose_page_unit, format_temperature
 from imubench_pipeline.report.site import Page, RecordingPage, Site, make_command
 from imubench_pipeline.report.view import ChannelView, RecordingView
-from imubench_pipeline.tables import read
+from imubench_pipeline.tables.files import read
 from imubench_pipeline.tables.findings import RecordingError
 from imubench_pipeline.words.estimates import model_text, precision_text, symbol_text
 from imubench_pipeline.words.numbers import (

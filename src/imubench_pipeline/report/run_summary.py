@@ -14,7 +14,7 @@ from imubench_pipeline.model.states import FileStatus
 from imubench_pipeline.recordings.drop_zone import account_for, find_logs
 from imubench_pipeline.recordings.known_logs import is_changed
 from imubench_pipeline.report.folder import find_drop_zone, read_failed_pages
-from imubench_pipeline.tables import read
+from imubench_pipeline.tables.files import read
 from imubench_pipeline.tables.findings import LEFT_OUT
 from imubench_pipeline.tables.texts import escape_invisible
 from imubench_pipeline.words.numbers import counted, join_names

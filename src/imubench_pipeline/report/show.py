@@ -49,7 +49,7 @@ def run(arguments: argparse.Namespace) -> int:
     from rich.text import Text
 
     from imubench_pipeline.report.terminal import render_comparison
-    from imubench_pipeline.tables import find_tables_folder
+    from imubench_pipeline.tables.files import find_tables_folder
 
     tables = _load(arguments.results)
     _check(tables["ranking"], "requirement", arguments.requirement)
@@ -97,7 +97,7 @@ def show(parts: Callable[[int], Iterable[RenderableType]], width: int | None = N
 
 
 def _load(results: Path) -> dict[str, pa.Table]:
-    from imubench_pipeline.tables import TableError, find_tables, read
+    from imubench_pipeline.tables.files import TableError, find_tables, read
 
     try:
         paths = find_tables(results, _NEEDED_TABLES)

@@ -1,7 +1,5 @@
 """`imubench check`: check new logs; no estimation, no stored results."""
 
-from __future__ import annotations
-
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The command `imubench`."""
 
-from __future__ import annotations
-
 import argparse
 import io
 import json
@@ -27,7 +25,7 @@ from imubench_pipeline.run import formats_command as formats
 from imubench_pipeline.run import project
 from imubench_pipeline.run import simulate_command as simulation
 from imubench_pipeline.run.analysis import command as analysis
-from imubench_pipeline.run.places import find_protected_places
+from imubench_pipeline.run.project import find_protected_places
 from imubench_pipeline.run.verification import command as verification
 from imubench_pipeline.settings import command_line
 from imubench_pipeline.settings.config import Run, read_config
@@ -329,7 +327,7 @@ def _shortlist(options: argparse.Namespace) -> int:
     from imubench_pipeline.settings.shipped import list_folders
     from imubench_pipeline.settings.yaml_files import read_settings
     from imubench_pipeline.steps.shortlist import NEEDED, list_shortlist
-    from imubench_pipeline.tables import find_tables
+    from imubench_pipeline.tables.files import find_tables
 
     try:
         path = Path(options.requirement)

@@ -1,7 +1,5 @@
 """Records of steps that failed for one recording or sensor, in the folder ``faults``."""
 
-from __future__ import annotations
-
 import contextlib
 import os
 from collections.abc import Iterator
@@ -12,10 +10,9 @@ from pydantic import BaseModel
 
 from imubench_pipeline.recordings.kept import Quality
 from imubench_pipeline.report.run_summary import fold_text
-from imubench_pipeline.tables.digests import read_sealed_json, write_sealed_json
 from imubench_pipeline.tables.failures import Cause, Failure
 from imubench_pipeline.tables.findings import RecordingError
-from imubench_pipeline.tables.seals import name_place
+from imubench_pipeline.tables.seals import name_place, read_sealed_json, write_sealed_json
 
 Of = tuple[str, str, str | None]  # step, sensor and recording; None: a step of the whole sensor
 TOLD = "IMUBENCH_FAILURES_TOLD"  # environment variable: the caller reports the failures itself
@@ -98,7 +95,7 @@ class Faults:
     def _path(self, of: Of) -> Path:
         return self._folder / f"{name_place(*of)}.json"
 
-    def _records(self) -> Iterator[tuple[Of, _Record]]:
+    def _records(self) -> "Iterator[tuple[Of, _Record]]":
         for path in sorted(self._folder.glob("*/**/*.json")):
             with contextlib.suppress(OSError, ValueError):  # one that was cut off
                 record = _Record.model_validate(read_sealed_json(path))

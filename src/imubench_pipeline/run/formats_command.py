@@ -1,7 +1,5 @@
 """`imubench formats`: list the supported log formats and export programs."""
 
-from __future__ import annotations
-
 import argparse
 from collections.abc import Iterator, Sequence
 

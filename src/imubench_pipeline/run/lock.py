@@ -1,7 +1,5 @@
 """Lock a folder of results: one run at a time, also after a killed run."""
 
-from __future__ import annotations
-
 import fcntl
 import json
 import os
@@ -18,7 +16,7 @@ from typing import Any
 import psutil
 
 from imubench_pipeline.run.recovery import was_restarted
-from imubench_pipeline.tables import read_json
+from imubench_pipeline.tables.files import read_json
 
 INHERITED = "IMUBENCH_LOCK"  # environment variable: descriptor of a lock that the caller holds
 _RETRY_INTERVAL = 0.5  # s between two attempts

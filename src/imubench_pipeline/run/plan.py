@@ -4,8 +4,6 @@ This is the interface of the package to the rules. A rule gets the settings on w
 JSON text, so that an edit of the settings reruns only the affected rules.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import re
@@ -33,8 +31,8 @@ from imubench_pipeline.settings.requirements import Requirement, read_requiremen
 from imubench_pipeline.settings.shipped import find_own_folder, list_folders
 from imubench_pipeline.settings.validation import ConfigError, UnavailableSettingsError, parse
 from imubench_pipeline.settings.yaml_files import read_yaml
-from imubench_pipeline.tables.digests import compute_digest
 from imubench_pipeline.tables.provenance import digest_sources
+from imubench_pipeline.tables.seals import compute_digest
 from imubench_pipeline.units import parse_quantity
 
 _INGEST_OUTPUTS = ("quality.json", "envelope.parquet", "histogram.parquet")
@@ -484,9 +482,6 @@ def _check_places(run: Run) -> None:
 
 def to_json(value: object) -> str:
     """Return a value as JSON, in which Snakemake finds no wildcard: a name may have braces."""
-    text = json.dumps(value, sort_keys=True, ensure_ascii=False, default=_dump_model)
+    dump = partial(BaseModel.model_dump, mode="json")
+    text = json.dumps(value, sort_keys=True, ensure_ascii=False, default=dump)
     return _BRACE_BEFORE_WORD.sub(r"\\u007b", text)
-
-
-def _dump_model(model: BaseModel) -> dict[str, Any]:
-    return model.model_dump(mode="json")

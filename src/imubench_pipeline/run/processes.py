@@ -4,8 +4,6 @@ For a short log, a step computes for a tenth of a second, but its imports take a
 lives as long as the run, and forks for each step: see `imubench_pipeline.run.step_server`.
 """
 
-from __future__ import annotations
-
 import atexit
 import json
 import os
@@ -95,7 +93,7 @@ class Processes:
                 requests.close()
                 process.wait()
 
-    def _hand_over(self, connection: Connection[Any, Any]) -> None:
+    def _hand_over(self, connection: "Connection[Any, Any]") -> None:
         with self._lock:
             # One dead process may have been killed; a second one is a fault.
             for _ in range(2):
@@ -113,7 +111,7 @@ class Processes:
 
 
 def _request(
-    connection: Connection[Any, Any], job: Job, seconds: float | None
+    connection: "Connection[Any, Any]", job: Job, seconds: float | None
 ) -> dict[str, float] | StepError:
     """Return the cost of a step, or its error."""
     try:

@@ -4,8 +4,6 @@ This is a logger plugin of Snakemake (`snakemake_logger_plugin_imubench`): ``log
 profile. All that Snakemake says itself is in its log file, which is named at the end.
 """
 
-from __future__ import annotations
-
 import logging
 import sys
 import time
@@ -28,13 +26,8 @@ from imubench_pipeline.report.run_summary import fold_text
 OURS: Mapping[str, Any] = {"imubench": True}  # shown unchanged: `logger.info(text, extra=OURS)`
 
 _EVENTS_OF_PROGRESS_LINE = {
-    LogEvent.JOB_INFO,
-    LogEvent.JOB_STARTED,
-    LogEvent.JOB_FINISHED,
-    LogEvent.PROGRESS,
-    LogEvent.RUN_INFO,
-    LogEvent.SHELLCMD,
-    LogEvent.RESOURCES_INFO,
+    *(LogEvent.JOB_INFO, LogEvent.JOB_STARTED, LogEvent.JOB_FINISHED, LogEvent.PROGRESS),
+    *(LogEvent.RUN_INFO, LogEvent.SHELLCMD, LogEvent.RESOURCES_INFO),
 }
 _LOG_FILE_PREFIX = "Complete log"
 _BAR_WIDTH = 16

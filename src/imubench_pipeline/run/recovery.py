@@ -4,8 +4,6 @@ Snakemake reruns interrupted steps (``--rerun-incomplete``). This module handles
 run, temporary files, and files that were not yet on the disk when the machine stopped.
 """
 
-from __future__ import annotations
-
 import contextlib
 import glob
 import os

@@ -4,8 +4,6 @@ The costs in the rules were measured with logs of up to 60 million samples (docs
 this module adds a margin. A job has one core for any log: no step uses more.
 """
 
-from __future__ import annotations
-
 import json
 import math
 from collections.abc import Callable, Mapping

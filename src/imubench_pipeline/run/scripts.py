@@ -1,7 +1,5 @@
 """Run the scripts of the rules; a failure of one recording does not end the run."""
 
-from __future__ import annotations
-
 import sys
 from dataclasses import replace
 from inspect import signature

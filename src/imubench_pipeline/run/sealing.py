@@ -1,7 +1,5 @@
 """Seal the outputs of steps, and find outputs that must be made again."""
 
-from __future__ import annotations
-
 import contextlib
 import hashlib
 import json

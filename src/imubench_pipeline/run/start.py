@@ -1,7 +1,5 @@
 """Entry point of `imubench`: check the platform before imports that it may lack."""
 
-from __future__ import annotations
-
 import os
 import signal
 import sys

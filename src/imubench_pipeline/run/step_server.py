@@ -1,7 +1,5 @@
 """The process that forks for each step of the workflow; started by `run.processes`."""
 
-from __future__ import annotations
-
 import fcntl
 import gc
 import importlib
@@ -13,23 +11,58 @@ import signal
 import socket
 import sys
 import traceback
+import zlib
 from contextlib import suppress
 from multiprocessing.connection import Connection
 from pathlib import Path
 from tempfile import TemporaryFile
 from types import FrameType
-from typing import Any
+from typing import IO, Any
 
 from numba import njit
+from numba.core.caching import FunctionCache
 
 from imubench_pipeline.readers.bounded import limit_memory
 from imubench_pipeline.recordings.availability import OF_RESULTS
 from imubench_pipeline.report.run_summary import fold_text
-from imubench_pipeline.run.kernels import compile_once
 from imubench_pipeline.run.processes import Job, StepError
 from imubench_pipeline.run.sealing import seal_outputs
 from imubench_pipeline.tables.failures import describe_error
 from imubench_pipeline.tables.findings import UnavailableError
+
+
+def compile_once(locks: IO[bytes]) -> None:
+    """Make this process and its forks wait for kernels that another process compiles.
+
+    Else a third of all compilations of a first run are of a kernel that another process compiles.
+    `locks`: a file open for writing, never closed, the same for all processes. Each kernel locks
+    the byte of the hash of its name; the system unlocks it when the process ends.
+    """
+    load, save = FunctionCache.load_overload, FunctionCache.save_overload
+
+    def load_or_lock(kernel: FunctionCache, signature: Any, context: Any) -> Any:
+        found = load(kernel, signature, context)
+        if found is None:
+            # Callers wait for the kernels that they call, never the reverse: no deadlock.
+            fcntl.lockf(locks, fcntl.LOCK_EX, 1, _compute_lock_offset(kernel))
+            found = load(kernel, signature, context)  # the other process may have cached it
+            if found is not None:
+                fcntl.lockf(locks, fcntl.LOCK_UN, 1, _compute_lock_offset(kernel))
+        return found
+
+    def save_and_unlock(kernel: FunctionCache, signature: Any, compiled: Any) -> None:
+        try:
+            save(kernel, signature, compiled)
+        finally:
+            fcntl.lockf(locks, fcntl.LOCK_UN, 1, _compute_lock_offset(kernel))
+
+    FunctionCache.load_overload, FunctionCache.save_overload = load_or_lock, save_and_unlock
+
+
+def _compute_lock_offset(kernel: FunctionCache) -> int:
+    function = kernel._py_func
+    return zlib.crc32(f"{function.__module__}.{function.__qualname__}".encode())
+
 
 _MAX_ERROR_LENGTH = 300  # max. length of an error in one line, characters.
 
@@ -62,7 +95,7 @@ _CHILD_SIGNALS = {signal.SIGCHLD}
 _STOP_SIGNALS = {signal.SIGHUP, signal.SIGINT, signal.SIGTERM, getattr(signal, "SIGIO", None)}
 """Signals that end a step because the run ends."""
 
-_running: dict[int, tuple[Connection[Any, Any], str]] = {}  # connection and step of each fork
+_running: dict[int, tuple["Connection[Any, Any]", str]] = {}  # connection and step of each fork
 
 
 def _reap(signal_number: int, frame: FrameType | None) -> None:
@@ -107,7 +140,7 @@ def _nothing() -> None:
     """Make numba load the common parts of all compiled functions."""
 
 
-def _run(connection: Connection[Any, Any], job: Job, *, imported: bool) -> None:
+def _run(connection: "Connection[Any, Any]", job: Job, *, imported: bool) -> None:
     """Run a script in this fork, report its outcome, and exit."""
     outcome: dict[str, float] | StepError = StepError(f"{job.name}.py failed")
     try:

@@ -1,7 +1,5 @@
 """Types of command-line options. All commands import this module, so it imports nothing slow."""
 
-from __future__ import annotations
-
 import argparse
 import math
 import reprlib

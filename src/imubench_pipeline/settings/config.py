@@ -1,7 +1,5 @@
 """The configuration of one run."""
 
-from __future__ import annotations
-
 import json
 import re
 from collections.abc import Mapping

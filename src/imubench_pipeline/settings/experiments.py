@@ -17,8 +17,7 @@ if TYPE_CHECKING:
 Kind = str
 """Experiment with a sensor during a recording: ``static``, or the key of its block of notes."""
 
-AT_REST: Kind = "static"
-"""Nothing: it was at rest all the time."""
+AT_REST: Kind = "static"  # nothing: it was at rest all the time
 
 Gyro = Literal["gyro_x", "gyro_y", "gyro_z"]
 _Block = TypeVar("_Block", bound=BaseModel)
@@ -59,8 +58,7 @@ def with_blocks(place: Place) -> Callable[[type[_Model]], type[_Model]]:
 class Experiment(Strict):
     """Experiment, or attitude, of a sensor during a recording, as stated in its notes."""
 
-    is_static: ClassVar[bool] = False
-    """Whether the sensor was at rest all the time."""
+    is_static: ClassVar[bool] = False  # whether the sensor was at rest all the time
 
     @abstractmethod
     def moved_gyro(self, channels: Sequence[str], *, column: bool) -> str | None:

@@ -1,7 +1,5 @@
 """Optional dependencies of the package, as extras."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Literal

@@ -6,8 +6,6 @@ Engers (2021, eq. 6-8) give the random walk in °/√h as 1/60 of a two-sided de
 60 only changes the unit.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Collection, Mapping
 from typing import Annotated, Any, Literal
@@ -147,7 +145,7 @@ class PrintedFigure(Strict):
     )
 
     @model_validator(mode="after")
-    def _consistent(self) -> PrintedFigure:
+    def _consistent(self) -> "PrintedFigure":
         if self.value is None:
             return self
         if self.unit is None:
@@ -289,13 +287,8 @@ FIGURE_DIMENSIONS: dict[str, dict[str, tuple[str, ...]]] = {
 SENSORS: Mapping[str, str] = {"gyro": "gyro", "accel": "accelerometer"}  # what measures it
 
 IN_USE = (
-    "offset",
-    "bias_repeatability",
-    "temperature_coefficient",
-    "scale_factor_error",
-    "nonlinearity",
-    "g_sensitivity",
-    "vibration_rectification",
+    *("offset", "bias_repeatability", "temperature_coefficient", "scale_factor_error"),
+    *("nonlinearity", "g_sensitivity", "vibration_rectification"),
 )
 """Figures of errors that come in use and are in no static log."""
 
@@ -347,7 +340,7 @@ class Datasheet(Strict):
     )
 
     @model_validator(mode="after")
-    def _units(self) -> Datasheet:
+    def _units(self) -> "Datasheet":
         for quantity in FIGURE_DIMENSIONS:
             sheet: QuantityDatasheet | None = getattr(self, quantity)
             for name in QuantityDatasheet.model_fields if sheet else ():

@@ -8,8 +8,6 @@
 `profiles` converts figures to SI. Nothing is computed here: every configuration loads this module.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -41,7 +39,7 @@ class StepsForm(Strict):
     values: tuple[Text, ...] = Field(min_length=1)
 
     @model_validator(mode="after")
-    def _ordered(self) -> StepsForm:
+    def _ordered(self) -> "StepsForm":
         if len(self.times) != len(self.values):
             raise ValueError(
                 f"{len(self.times)} times and {len(self.values)} values; expected as many"
@@ -62,7 +60,7 @@ class DayCycleForm(Strict):
     highest: Text = Field("0 s", description="time of the highest value")
 
     @model_validator(mode="after")
-    def _times(self) -> DayCycleForm:
+    def _times(self) -> "DayCycleForm":
         _check_time(self.period, "period")
         _check_time(self.highest)
         return self
@@ -78,7 +76,7 @@ class WarmUpForm(Strict):
     begin: Text = "0 s"
 
     @model_validator(mode="after")
-    def _times(self) -> WarmUpForm:
+    def _times(self) -> "WarmUpForm":
         _check_time(self.time_constant, "time_constant")
         _check_time(self.begin)
         return self

@@ -1,7 +1,5 @@
 """Thresholds of the findings about recordings."""
 
-from __future__ import annotations
-
 from pydantic import Field
 
 from imubench_pipeline.settings.validation import Strict

@@ -1,12 +1,10 @@
 """Requirements of an application: limits of the errors of dead reckoning after a time."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from statistics import NormalDist
-from typing import Annotated, Literal
+from typing import Annotated, Literal, Self
 
 from pydantic import AfterValidator, Field, model_validator
 
@@ -78,13 +76,13 @@ class Limit(Strict):
     at_most: Text = Field(description="with its unit, such as 1 deg or 5 m")
 
     @model_validator(mode="after")
-    def _size_is_right(self) -> Limit:
+    def _size_is_right(self) -> Self:
         if self.size <= 0:
             raise ValueError(f"at_most is {self.at_most}; expected more than zero")
         return self
 
     @model_validator(mode="after")
-    def _one_time(self) -> Limit:
+    def _one_time(self) -> Self:
         if (self.after is None) == (self.outage is None):
             raise ValueError("expected either 'after' or 'outage', such as 30 s")
         if (self.outage is None) != (self.trajectory is None):
@@ -144,7 +142,7 @@ class TurnOn(Strict):
     on_time: Time = Field("60 s", description="since the sensor was switched on")
 
     @model_validator(mode="after")
-    def _units(self) -> TurnOn:
+    def _units(self) -> Self:
         if self.gyro is not None:
             parse_quantity(self.gyro, "angular_rate")
         if self.accel is not None:
@@ -219,7 +217,7 @@ class Requirement(Strict):
     )
 
     @model_validator(mode="after")
-    def _whole(self) -> Requirement:
+    def _whole(self) -> Self:
         if self.static_window is not None and self.turn_on is not None:
             raise ValueError("expected either 'static_window' or 'turn_on'")
         if self.by_dead_reckoning and self.static_window is None and self.turn_on is None:

@@ -1,25 +1,16 @@
 """The file of one sensor: the format of its logs, and its datasheet."""
 
-from __future__ import annotations
-
 import json
 import re
 from collections.abc import Iterable, Mapping
 from functools import cache
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Literal, Self
 
 from pydantic import Field, JsonValue, model_validator
 
 from imubench_pipeline.registry import blocks
-from imubench_pipeline.settings.experiments import (
-    AT_REST,
-    Kind,
-    WithBlocks,
-    kind_of,
-    stated_experiments,
-    with_blocks,
-)
+from imubench_pipeline.settings import experiments
 from imubench_pipeline.settings.printed import Datasheet
 from imubench_pipeline.settings.quality import QualitySettings
 from imubench_pipeline.settings.shipped import CATALOGUE, list_folders
@@ -42,14 +33,11 @@ QUANTITIES: dict[str, str] = {"gyro": "angular_rate", "accel": "acceleration"}
 CHANNELS: tuple[str, ...] = tuple(f"{q}_{axis}" for q in QUANTITIES for axis in "xyz")
 """Every channel: one axis of one quantity."""
 
-TEMPERATURE = "temperature"
-"""Name of the temperature column of a recording."""
+TEMPERATURE = "temperature"  # name of the temperature column of a recording
 
-POSITION = "position"
-"""Name of the column with the position of a turned sensor."""
+POSITION = "position"  # name of the column with the position of a turned sensor
 
-TABLE_RATE = "table_rate"
-"""Name of the column with the rate of the rate table."""
+TABLE_RATE = "table_rate"  # name of the column with the rate of the rate table
 
 Channel = Literal["gyro_x", "gyro_y", "gyro_z", "accel_x", "accel_y", "accel_z"]
 
@@ -79,7 +67,7 @@ class ColumnSource(Strict):
     offset: float = Field(0.0, description="counts or volts at zero: scale * (raw - offset)")
 
     @model_validator(mode="after")
-    def _from_one(self) -> ColumnSource:
+    def _from_one(self) -> Self:
         if isinstance(self.column, int) and self.column < 1:
             raise ValueError(f"column {self.column}: columns are counted from 1")
         if self.scale == 0:
@@ -122,7 +110,7 @@ class TimeSource(Strict):
     )
 
     @model_validator(mode="after")
-    def _one_way(self) -> TimeSource:
+    def _one_way(self) -> Self:
         if (self.unit is None) == (self.format is None):
             raise ValueError(
                 "expected either 'unit' (s, ms, us, ns, samples) or 'format' (iso8601)"
@@ -163,8 +151,7 @@ Reader = Literal["csv", "vectornav", "ubx", "rosbag", "matlab", "numpy", "arrow"
 """The formats of log files; each is declared in a module of this name in ``readers/formats``."""
 
 
-_MIN_RATE, _MAX_RATE = 1e-6, 1e9
-"""Range of valid sampling rates, Hz."""
+_MIN_RATE, _MAX_RATE = 1e-6, 1e9  # range of valid sampling rates, Hz
 
 
 class LogFormat(Strict):
@@ -209,7 +196,7 @@ class LogFormat(Strict):
     )
 
     @model_validator(mode="after")
-    def _consistent(self) -> LogFormat:
+    def _consistent(self) -> Self:
         if self.rate is None and self.time is None:
             raise ValueError("expected 'rate' (such as 100 Hz) or 'time': neither is there")
         if self.time is not None and self.time.unit == "samples" and self.rate is None:
@@ -279,14 +266,14 @@ class UsedPart(Strict):
     end: float | None = None
 
     @model_validator(mode="after")
-    def _ordered(self) -> UsedPart:
+    def _ordered(self) -> Self:
         if self.end is not None and self.end <= self.start:
             raise ValueError(f"end {self.end} s is not after start {self.start} s")
         return self
 
 
-@with_blocks("notes")
-class RecordingNotes(WithBlocks):
+@experiments.with_blocks("notes")
+class RecordingNotes(experiments.WithBlocks):
     """Contents of ``<recording>.yaml`` beside a log."""
 
     device: Text | None = Field(None, description="serial number; default: the recording's name")
@@ -306,8 +293,8 @@ class RecordingNotes(WithBlocks):
     log: dict[str, JsonValue] = Field(default=dict(), description="merged over the sensor's log")
 
     @model_validator(mode="after")
-    def _one_kind(self) -> RecordingNotes:
-        stated = stated_experiments(self)
+    def _one_kind(self) -> Self:
+        stated = experiments.stated_experiments(self)
         if len(stated) > 1:
             raise ValueError(
                 f"found {' and '.join(stated)}; expected one of them: a recording is of one kind"
@@ -315,14 +302,14 @@ class RecordingNotes(WithBlocks):
         return self
 
     @property
-    def kind(self) -> Kind:
+    def kind(self) -> experiments.Kind:
         """Experiment of the recording, as stated in its notes."""
-        return kind_of(stated_experiments(self))
+        return experiments.kind_of(experiments.stated_experiments(self))
 
     def check_gyro(self, log: LogFormat) -> None:
         """Raise ValueError, with the key, if the log lacks the gyro or a need of an experiment."""
         channels = [str(name) for name in log.channels]
-        for key, experiment in stated_experiments(self).items():
+        for key, experiment in experiments.stated_experiments(self).items():
             try:
                 experiment.moved_gyro(channels, column=log.table_rate is not None)
             except ValueError as error:
@@ -360,7 +347,7 @@ def merged_log(sensor: Sensor, notes: RecordingNotes, file: str) -> LogFormat:
 class IngestPlan(Strict):
     """Settings of the ingest of a recording; without ``log``, the reason why it cannot be read."""
 
-    kind: Kind = AT_REST
+    kind: experiments.Kind = experiments.AT_REST
     simulated: bool = False
     notes: RecordingNotes | None = None
     log: LogFormat | None = None

@@ -3,8 +3,6 @@
 A checkout has them at its root, a wheel in the package.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Literal

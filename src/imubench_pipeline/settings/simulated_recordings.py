@@ -3,8 +3,6 @@
 An experiment has the settings of its notes, and the true values.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -340,15 +338,8 @@ def layout(recording: SimulatedRecording, log: LogFormat) -> LogFormat:
         temperature = log.temperature or _free_column(list(channels.values()), log.time)
     # Where the sensor's logs are read with a stated rate, this one is read with its own.
     rate = None if log.rate is None else recording.rate
-    return log.model_copy(
-        update={
-            "channels": channels,
-            "temperature": temperature,
-            "position": None,
-            "table_rate": None,
-            "rate": rate,
-        }
-    )
+    own = {"channels": channels, "temperature": temperature, "rate": rate}
+    return log.model_copy(update=own | {"position": None, "table_rate": None})
 
 
 def _free_column(channels: Sequence[ColumnSource], time: TimeSource | None) -> ColumnSource:

@@ -10,8 +10,6 @@ axes:
 Nothing is computed here: every configuration loads this module.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Annotated, Self
 

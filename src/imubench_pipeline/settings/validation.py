@@ -1,7 +1,5 @@
 """Validate settings with typed models; errors state the fault and the correction."""
 
-from __future__ import annotations
-
 import difflib
 import re
 import reprlib

@@ -12,8 +12,6 @@ doubled to the sampling interval as triangular factors: no exponential overflows
 becomes indefinite, as by the single-step method of Van Loan (1978).
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

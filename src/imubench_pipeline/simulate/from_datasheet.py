@@ -1,7 +1,5 @@
 """Build the model of a sensor from its datasheet; missing figures are assumed and listed."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np
@@ -141,10 +139,7 @@ class _Printed:
         self._origin.assume(topic, f"{self._quantity}: {text}")
 
     def _single(self, name: str, topic: Topic, label: str) -> float | None:
-        """Return a figure with a single value, in SI; None if none is printed.
-
-        The inverse of a figure in steps a unit is returned: the step.
-        """
+        """Return a figure with a single value, in SI; of steps a unit, the step; None without."""
         for figure in self._typical(name):
             value = figure.on_axis(self._axis)
             if isinstance(value, float) and figure.unit is not None:

@@ -1,7 +1,5 @@
 """Build the model of a sensor from the estimates of a run, which replace datasheet figures."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -18,7 +16,7 @@ from imubench_pipeline.settings.validation import ConfigError
 from imubench_pipeline.simulate.imu import ImuModel
 from imubench_pipeline.simulate.model import SensorModel, TemperatureDrift, before_the_filter
 from imubench_pipeline.simulate.models import Origin, Remark, Topic
-from imubench_pipeline.tables import find_tables, find_tables_folder, read
+from imubench_pipeline.tables.files import find_tables, find_tables_folder, read
 from imubench_pipeline.words.reasons import simulations as texts
 
 _NEEDED_TABLES = ("recordings", "parameters", "fixed_bias", "temperature", "low_pass")

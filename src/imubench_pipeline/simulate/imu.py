@@ -1,7 +1,5 @@
 """Simulate several axes with common motion and temperature, in parallel."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field

@@ -13,8 +13,6 @@ LSB^2 / 12 to the variance of each sample; spectrum and Allan variance use this 
 seldom has both: an estimate of N from a rounded log already contains the rounding (`in_the_log`).
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
@@ -149,7 +147,7 @@ class _Cluster:
     both: Array
     total: Array
 
-    def then(self, later: _Cluster) -> _Cluster:
+    def then(self, later: "_Cluster") -> "_Cluster":
         """Return the concatenation of this cluster and the next one."""
         after = later.transition
         carried = np.einsum("nij,nj->ni", self.state, later.sums)

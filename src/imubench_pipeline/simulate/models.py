@@ -1,7 +1,5 @@
 """Sensor models from settings, their provenance, and the true values of their parameters."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path

@@ -5,8 +5,6 @@ are in memory. The name of a column is its quantity, with the unit in brackets: 
 ``temperature [degC]``, ``gyro_z [deg/s]``. Without a unit it is in SI, and temperature in °C.
 """
 
-from __future__ import annotations
-
 import math
 import re
 from abc import ABC, abstractmethod

@@ -1,7 +1,5 @@
 """Simulate samples of noise models; rate and duration may have units."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Protocol, overload
 

@@ -11,8 +11,6 @@ random walk is 0 at the first sample, and the filter state is consistent with it
 recursion of one axis is compiled (`run`).
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterator
 

@@ -5,8 +5,6 @@ delimiter of the sensor file if it names columns of one text file, otherwise the
 of Parquet. The notes, ``<log>.yaml``, contain the log format where it differs from the sensor file.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """Compute the Allan variance of every channel of a recording, and read it back."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -17,7 +15,7 @@ from imubench_pipeline.model.estimates import AllanRow
 from imubench_pipeline.recordings.kept import load_static_logs
 from imubench_pipeline.recordings.recording import ChannelLog
 from imubench_pipeline.settings.config import AllanSettings
-from imubench_pipeline.tables import read
+from imubench_pipeline.tables.files import read
 from imubench_pipeline.tables.findings import Finding, find
 from imubench_pipeline.tables.keys import Key, split_table
 from imubench_pipeline.words.findings.samples import TooShort

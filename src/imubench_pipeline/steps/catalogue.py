@@ -1,13 +1,11 @@
 """List the figures that vendors publish for the sensors of the catalogue."""
 
-from __future__ import annotations
-
 from dataclasses import asdict
 from pathlib import Path
 
 from imubench_pipeline.datasheets.coverage import by_vendor, coverage
 from imubench_pipeline.settings.sensor import sensors_of
-from imubench_pipeline.tables import write_each
+from imubench_pipeline.tables.files import write_each
 
 
 def write_coverage(catalogue: str, outputs: list[Path]) -> None:

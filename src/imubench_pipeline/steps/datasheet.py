@@ -1,7 +1,5 @@
 """Compare the estimates of a recording, and its fixed bias, with its sensor's datasheet."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import asdict
 from functools import partial
@@ -9,15 +7,14 @@ from pathlib import Path
 from typing import Any
 
 from imubench_pipeline.datasheets.comparable import SENSITIVITY, read_comparables
-from imubench_pipeline.datasheets.deltas import bias_deltas, curve_rms, deltas
-from imubench_pipeline.datasheets.measured import compute_sensitivity
+from imubench_pipeline.datasheets.deltas import bias_deltas, compute_sensitivity, curve_rms, deltas
 from imubench_pipeline.estimators.rows import read_estimates
 from imubench_pipeline.model.comparisons import DatasheetCurveRow, DatasheetRow
 from imubench_pipeline.model.estimates import FixedBiasRow, TemperatureRow
 from imubench_pipeline.recordings.kept import Quality
 from imubench_pipeline.settings.printed import Datasheet
 from imubench_pipeline.steps.allan import read_curves
-from imubench_pipeline.tables import read
+from imubench_pipeline.tables.files import read
 
 
 def compare_with_datasheet(

@@ -1,7 +1,5 @@
 """Compute the dead-reckoning errors of a recording by its noise, and compare them with its log."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterator, Mapping
 from pathlib import Path
@@ -13,15 +11,14 @@ from imubench_pipeline.model.estimates import DeterministicRow, DrawnDeviationRo
 from imubench_pipeline.model.table import TableRow
 from imubench_pipeline.navigation import expected_errors
 from imubench_pipeline.navigation.backtest.comparison import list_backtest_rows
-from imubench_pipeline.navigation.compared import ComparedChannel
-from imubench_pipeline.navigation.error_budget.printed_errors import collect_figures_in_use
-from imubench_pipeline.navigation.error_growth import list_growth_rows
-from imubench_pipeline.navigation.ratios import list_deviation_rows
+from imubench_pipeline.navigation.error_budget.in_use import collect_figures_in_use
+from imubench_pipeline.navigation.expected_errors import list_growth_rows
+from imubench_pipeline.navigation.ratios import ComparedChannel, list_deviation_rows
 from imubench_pipeline.recordings.kept import Quality, load_static_logs
 from imubench_pipeline.settings.config import ErrorBudgetSettings, FusionSettings
 from imubench_pipeline.settings.printed import Datasheet
 from imubench_pipeline.settings.requirements import validate_requirements
-from imubench_pipeline.tables import read
+from imubench_pipeline.tables.files import read
 from imubench_pipeline.units import parse_quantity
 
 

@@ -1,7 +1,5 @@
 """The estimates of one channel by every method, as rows of the tables."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable, Container, Iterable, Iterator
 from dataclasses import asdict, dataclass, field, replace
@@ -14,7 +12,7 @@ import numpy as np
 from imubench_pipeline.allan import AllanCurve, of_blocks
 from imubench_pipeline.allan.phase import NO_GAPS, count_presence
 from imubench_pipeline.estimators import curve as reading
-from imubench_pipeline.estimators import least_squares, likelihood
+from imubench_pipeline.estimators import least_squares, likelihood, rows
 from imubench_pipeline.estimators.agreement import doubt_contradicted, yield_disagreements
 from imubench_pipeline.estimators.curve_limits import add_fitted_limits
 from imubench_pipeline.estimators.deterministic.courses import find_deterministic_signals
@@ -30,12 +28,6 @@ from imubench_pipeline.estimators.likelihood import Likelihood
 from imubench_pipeline.estimators.lines import select_sinusoids
 from imubench_pipeline.estimators.robust import fit as robust
 from imubench_pipeline.estimators.robust.parts import compute_part_variances
-from imubench_pipeline.estimators.rows import (
-    make_allan_rows,
-    make_curve_points,
-    make_draw_rows,
-    make_parameter_rows,
-)
 from imubench_pipeline.estimators.spectral_findings import (
     find_missing_slow_noise,
     spectral_findings,
@@ -113,7 +105,7 @@ def estimate_channel(
     if _LIKELIHOOD_METHODS & set(settings.methods):
         estimates |= channel.by_likelihood(into)
     else:
-        into.allan += make_allan_rows(key, curve)
+        into.allan += rows.make_allan_rows(key, curve)
     into.add_findings(key, yield_disagreements(key.channel, estimates))
     best = next(method for method in _METHODS_BY_PREFERENCE if method in settings.methods)
     reference = estimates.get("robust", estimates.get("likelihood"))
@@ -129,8 +121,8 @@ def estimate_channel(
             if method != "compensated":
                 estimate = verdict.apply(estimate)
             into.estimates.setdefault(key.channel, {})[method] = estimate
-            into.parameters += make_parameter_rows(key, estimate, recommended=method == best)
-            into.draws += make_draw_rows(key, estimate)
+            into.parameters += rows.make_parameter_rows(key, estimate, recommended=method == best)
+            into.draws += rows.make_draw_rows(key, estimate)
     if channel.fitted is not None:
         recommended = into.estimates[key.channel].get(best)
         N = recommended.parameters["N"].value if recommended else None
@@ -205,7 +197,7 @@ class _Channel:
             estimates["compensated"] = replace(best, method="compensated")
 
         limited = partial(add_fitted_limits, segments=log.segments, presence=self._presence)
-        into.allan += make_allan_rows(key, limited(self.curve, fitted))
+        into.allan += rows.make_allan_rows(key, limited(self.curve, fitted))
         if not self.signals.signals:  # else what they explain is taken out
             white = fitted.estimates[0].parameters["N"].lower
             lack = find_missing_slow_noise(key.channel, fitted.spectrum, fitted.fitted, white)
@@ -222,7 +214,7 @@ class _Channel:
         if warm is not None:
             into.temperature += _temperature_rows(key, warm)
             if warm.compensated:
-                points = make_curve_points(limited(left, without))
+                points = rows.make_curve_points(limited(left, without))
                 for point, effect in zip(points, added.deviation, strict=True):
                     row = model.CompensatedAllanRow(
                         **asdict(key), **vars(point), temperature=float(effect)
@@ -264,10 +256,7 @@ class _Channel:
         )
 
     def _fit_temperature(self, into: Estimation) -> ThermalFit:
-        """Return the temperature effect of the channel.
-
-        Temperature explains a warm-up, so deterministic signals remain in the log.
-        """
+        """Return the temperature effect; a warm-up, which it explains, remains in the log."""
         log = self.log
         if log.path not in into.paths:
             of_clock = f"{log.path.name} {average_blocks(log.temperatures())!r}"
@@ -429,5 +418,5 @@ def estimate_recording(
                 name: Parameter(read[name]) if name in read else unread for name in PARAMETERS
             }
             estimate = Estimate("authors", figures)
-            into.parameters += make_parameter_rows(key, estimate, recommended=False)
+            into.parameters += rows.make_parameter_rows(key, estimate, recommended=False)
     return into

@@ -1,7 +1,5 @@
 """The exports of a run: a folder per sensor with a file per program."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -9,7 +7,7 @@ from imubench_pipeline.export.imu import ExportError
 from imubench_pipeline.export.request import Request, Tables, load, make_content, recordings_of
 from imubench_pipeline.export.targets import TARGETS
 from imubench_pipeline.settings.config import ExportSettings
-from imubench_pipeline.tables import make_folder, write_content
+from imubench_pipeline.tables.files import make_folder, write_content
 from imubench_pipeline.tables.texts import escape_invisible
 from imubench_pipeline.units import parse_quantity
 

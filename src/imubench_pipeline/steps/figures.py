@@ -1,13 +1,11 @@
 """Draw the figures of all sensors for print."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterable
 from pathlib import Path
 
 from imubench_pipeline.report.static_figures.files import draw_comparison
-from imubench_pipeline.tables import make_folder, read
+from imubench_pipeline.tables.files import make_folder, read
 
 
 def write_figures(tables: Iterable[Path], settings: str, figures: Path) -> None:

@@ -1,7 +1,5 @@
 """Outcome of every file in the drop zone: analysed, rejected, failed, or skipped."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
@@ -10,7 +8,7 @@ from typing import Any
 
 from imubench_pipeline.model.recordings import FailureRow, FileRow, RecordingRow
 from imubench_pipeline.model.states import FileStatus, RecordingStatus
-from imubench_pipeline.tables import read, write_each
+from imubench_pipeline.tables.files import read, write_each
 from imubench_pipeline.words.reasons import simulations as texts
 
 NEEDED = ("recordings", "failures")

@@ -1,12 +1,10 @@
 """Convert a recording to Parquet; an unusable one is recorded as rejected."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from imubench_pipeline.recordings.ingest import ingest_as_planned
 from imubench_pipeline.recordings.overview import overview
-from imubench_pipeline.tables import write_each
+from imubench_pipeline.tables.files import write_each
 
 
 def write_recording(source: Path, settings: str, sensor: str, recording: str, folder: Path) -> None:

@@ -4,8 +4,6 @@ The log of a turned gyro does not show its noise. The model is of the longest st
 the same sensor, and device if possible, or else of the typical figures of its datasheet.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path

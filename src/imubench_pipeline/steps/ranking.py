@@ -1,7 +1,5 @@
 """Rank the sensors for each requirement, and recommend next steps."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
@@ -18,7 +16,7 @@ from imubench_pipeline.navigation.verdicts.judgement import judge_sensors
 from imubench_pipeline.navigation.verdicts.next_steps import list_next_step_rows
 from imubench_pipeline.registry import Hook
 from imubench_pipeline.settings.requirements import Requirement, validate_requirements
-from imubench_pipeline.tables import read, write_each
+from imubench_pipeline.tables.files import read, write_each
 
 OtherErrors = Callable[
     [pa.Table, Sequence[RecordingRow], Mapping[str, Requirement]], Iterable[ErrorBudgetRow]

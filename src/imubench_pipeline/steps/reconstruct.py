@@ -1,7 +1,5 @@
 """Reconstruction of a log from an estimate, and its agreement with the measured curve."""
 
-from __future__ import annotations
-
 from collections.abc import Container
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
@@ -20,7 +18,7 @@ from imubench_pipeline.recordings.kept import Quality
 from imubench_pipeline.recordings.recording import LogWriter
 from imubench_pipeline.settings.config import ReconstructionSettings
 from imubench_pipeline.steps.allan import read_compensated_curves, read_curves
-from imubench_pipeline.tables import replace_file
+from imubench_pipeline.tables.files import replace_file
 from imubench_pipeline.tables.keys import Key
 from imubench_pipeline.words.reasons import simulations as texts
 

@@ -1,7 +1,5 @@
 """Compare the fixed biases of each device from one turn-on to the next with its datasheet."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from imubench_pipeline.model.estimates import FixedBiasRow
@@ -9,7 +7,7 @@ from imubench_pipeline.model.recordings import RecordingRow
 from imubench_pipeline.navigation.repeatability import repeatability_rows
 from imubench_pipeline.settings.config import DatasheetSettings
 from imubench_pipeline.settings.sensor import sensors_of
-from imubench_pipeline.tables import read, write_each
+from imubench_pipeline.tables.files import read, write_each
 
 
 def write_repeatability(

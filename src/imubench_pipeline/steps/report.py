@@ -1,11 +1,9 @@
 """Write the pages of the report whose data changed."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from imubench_pipeline.report.publish import make_site, publish
-from imubench_pipeline.tables import read
+from imubench_pipeline.tables.files import read
 
 
 def write_report(tables: list[Path], settings: str, start_page: Path) -> None:

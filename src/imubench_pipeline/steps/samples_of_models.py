@@ -4,8 +4,6 @@ Engers (2021, figures 34, 35, 38, 39, 44 and 50) compares them by eye. The model
 read from the curve, the model after it is the estimate. Both pass the estimated low-pass.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import asdict
@@ -23,7 +21,7 @@ from imubench_pipeline.recordings.kept import load_static_logs
 from imubench_pipeline.recordings.recording import ChannelLog
 from imubench_pipeline.simulate.model import SensorModel, TemperatureDrift, before_the_filter
 from imubench_pipeline.simulate.simulation import Signal, simulate_blocks
-from imubench_pipeline.tables import read
+from imubench_pipeline.tables.files import read
 from imubench_pipeline.tables.keys import Key
 from imubench_pipeline.typing import Array
 

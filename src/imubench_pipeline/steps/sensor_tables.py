@@ -1,7 +1,5 @@
 """Tables of a sensor: the tables of its recordings, joined, assessed and compared."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
@@ -23,12 +21,12 @@ from imubench_pipeline.registry import Hook
 from imubench_pipeline.settings.sensor import Sensor, sensors_of
 from imubench_pipeline.settings.simulated_recordings import SimulatedRecording
 from imubench_pipeline.simulate.models import SIMULATIONS, list_true_figures
-from imubench_pipeline.tables import build
 from imubench_pipeline.tables.failures import (
     mark_failures,
     read_with_failures,
     remove_recordings,
 )
+from imubench_pipeline.tables.files import build
 from imubench_pipeline.units import parse_quantity
 
 SensorTable = Callable[

@@ -1,7 +1,5 @@
 """The shortlist of a run or, without a run, of the catalogue."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
@@ -18,7 +16,7 @@ from imubench_pipeline.navigation.shortlist import (
 )
 from imubench_pipeline.settings.requirements import Requirement, validate_requirements
 from imubench_pipeline.settings.sensor import Sensor, sensors_of
-from imubench_pipeline.tables import read, write_each
+from imubench_pipeline.tables.files import read, write_each
 
 NEEDED = ("recordings", "parameters", "ranking")  # the tables of a run that the step reads
 

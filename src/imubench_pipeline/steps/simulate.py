@@ -1,7 +1,5 @@
 """Write simulated recordings in the log format of their sensor."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack
@@ -19,7 +17,7 @@ from imubench_pipeline.settings.validation import ConfigError
 from imubench_pipeline.simulate.imu import simulate_imu
 from imubench_pipeline.simulate.models import SIMULATIONS, make_imu_model
 from imubench_pipeline.simulate.profiles import Profile, profiles_of
-from imubench_pipeline.tables import make_folder
+from imubench_pipeline.tables.files import make_folder
 from imubench_pipeline.units import parse_quantity
 
 Motion = Callable[[SimulatedRecording, float], Mapping[str, Profile]]

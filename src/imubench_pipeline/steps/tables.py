@@ -1,7 +1,5 @@
 """Join the tables of all sensors."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
@@ -9,8 +7,8 @@ import pyarrow as pa
 
 from imubench_pipeline.model.recordings import DoubtRow, RecordingRow
 from imubench_pipeline.recordings.fitness import WITH_DOUBTS, attach_doubts, exclude_simulated
-from imubench_pipeline.tables import build
 from imubench_pipeline.tables.failures import Failure, mark_failures, read_with_failures
+from imubench_pipeline.tables.files import build
 
 
 def join_all_tables(parts: Mapping[str, Sequence[Path]]) -> dict[str, pa.Table]:

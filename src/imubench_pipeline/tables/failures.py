@@ -4,8 +4,6 @@ A step that raises, is killed twice or exceeds its time leaves empty outputs wit
 their metadata (the ingest in ``quality.json``), which the following steps pass on.
 """
 
-from __future__ import annotations
-
 import contextlib
 import json
 import os

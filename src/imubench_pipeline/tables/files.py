@@ -1,7 +1,5 @@
 """Reading and writing tables: checked against their schemas, atomically."""
 
-from __future__ import annotations
-
 import contextlib
 import json
 import math

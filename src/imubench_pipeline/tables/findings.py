@@ -1,7 +1,5 @@
 """Findings about recordings, and the errors that reject them."""
 
-from __future__ import annotations
-
 import json
 import re
 from dataclasses import asdict, dataclass, fields

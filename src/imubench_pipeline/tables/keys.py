@@ -1,7 +1,5 @@
 """Key columns of a channel in tables, and grouping of rows by them."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

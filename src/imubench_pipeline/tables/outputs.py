@@ -7,8 +7,6 @@ Inputs and the places of a project (`Place`) are never overwritten; only command
 belongs there add new files.
 """
 
-from __future__ import annotations
-
 import argparse
 import errno
 import os
@@ -141,7 +139,7 @@ class OutputFile(Output):
         with self.replacing() as temporary:
             temporary.write_bytes(content.encode() if isinstance(content, str) else content)
 
-    def beside(self, path: Path) -> OutputFile:
+    def beside(self, path: Path) -> "OutputFile":
         """Return a second file of the same output."""
         return replace(self, path=path)
 

@@ -3,8 +3,6 @@
 Parquet has checksums of pages only, not of the footer.
 """
 
-from __future__ import annotations
-
 import hashlib
 import re
 import struct

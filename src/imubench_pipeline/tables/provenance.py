@@ -1,7 +1,5 @@
 """Digest of the code that computes a result."""
 
-from __future__ import annotations
-
 import hashlib
 import re
 from contextlib import suppress

@@ -1,7 +1,5 @@
 """The columns of every table, with type, unit and meaning, and groups of tables."""
 
-from __future__ import annotations
-
 from types import ModuleType
 
 from imubench_pipeline.model import comparisons, estimates, recordings

@@ -4,8 +4,6 @@ A spreadsheet takes a cell that begins with ``=``, ``+``, ``-`` or ``@``, also a
 for a formula, quoted or not. An apostrophe before it marks it as text.
 """
 
-from __future__ import annotations
-
 import json
 import re
 

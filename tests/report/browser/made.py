@@ -26,16 +26,15 @@ from imubench_pipeline.estimators.rows import make_parameter_rows
 from imubench_pipeline.extensions.fusion.fusion import NEEDED, yield_fusion_rows
 from imubench_pipeline.model.estimates import FixedBiasRow, ParameterRow
 from imubench_pipeline.model.recordings import RecordingRow
-from imubench_pipeline.navigation.compared import ComparedChannel
 from imubench_pipeline.navigation.drift import drift_rows
-from imubench_pipeline.navigation.error_growth import list_growth_rows
 from imubench_pipeline.navigation.expected_errors import (
     list_error_rows,
+    list_growth_rows,
     list_requirement_questions,
     list_standard_questions,
 )
 from imubench_pipeline.navigation.pooled import list_pooled_rows
-from imubench_pipeline.navigation.ratios import list_deviation_rows
+from imubench_pipeline.navigation.ratios import ComparedChannel, list_deviation_rows
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.simulate import channel_rng, simulate
 from imubench_pipeline.recordings.overview import overview
@@ -46,7 +45,7 @@ from imubench_pipeline.report.site import Site
 from imubench_pipeline.settings.config import FusionSettings, Run
 from imubench_pipeline.settings.requirements import Requirement
 from imubench_pipeline.settings.sensor import Sensor, quantity_of
-from imubench_pipeline.tables import build, write
+from imubench_pipeline.tables.files import build, write
 from imubench_pipeline.tables.findings import Finding
 from imubench_pipeline.tables.keys import Key
 from imubench_pipeline.tables.schemas import OF_ONE_RECORDING, TABLES

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from imubench_pipeline.tables import write
+from imubench_pipeline.tables.files import write
 from tests.conftest import few
 from tests.report.browser.accessibility import hindrances
 from tests.report.browser.made import publish_some

@@ -60,7 +60,7 @@ from imubench_pipeline.simulate.from_datasheet import from_datasheet
 from imubench_pipeline.simulate.model import SensorModel, before_the_filter, in_the_log
 from imubench_pipeline.simulate.models import make_imu_model
 from imubench_pipeline.steps.noise_source import find_static_recordings
-from imubench_pipeline.tables import read
+from imubench_pipeline.tables.files import read
 from imubench_pipeline.typing import Array
 from imubench_pipeline.units import parse_difference, parse_quantity
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from imubench_pipeline.extensions.fusion.board import divided
 from imubench_pipeline.extensions.fusion.tables import FusionRow
-from imubench_pipeline.navigation.compared import ComparedChannel, compute_number_needed
+from imubench_pipeline.navigation.ratios import ComparedChannel, compute_number_needed
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.simulate import channel_rng
 from imubench_pipeline.typing import Array

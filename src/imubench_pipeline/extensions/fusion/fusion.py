@@ -20,14 +20,14 @@ from imubench_pipeline.extensions.fusion.tables import RECORDINGS_OF_A_PAIR, Fus
 from imubench_pipeline.model.estimates import CompensatedAllanRow, ParameterRow, TemperatureRow
 from imubench_pipeline.model.recordings import RecordingRow
 from imubench_pipeline.model.table import ChannelRow, TableRow
-from imubench_pipeline.navigation.compared import ComparedChannel, TemperaturePart
-from imubench_pipeline.navigation.error_budget.printed_errors import SIGMAS
+from imubench_pipeline.navigation.error_budget.in_use import SIGMAS
+from imubench_pipeline.navigation.ratios import ComparedChannel, TemperaturePart
 from imubench_pipeline.navigation.shortlist import parse_price_class
 from imubench_pipeline.recordings.fitness import attach_doubts, list_excluded
 from imubench_pipeline.settings.config import FusionSettings
 from imubench_pipeline.settings.printed import Datasheet
 from imubench_pipeline.settings.sensor import Sensor, sensors_of
-from imubench_pipeline.tables import build, read, write_arrow
+from imubench_pipeline.tables.files import build, read, write_arrow
 from imubench_pipeline.units import parse_quantity
 
 PARAMETER_OF_STATISTIC = {"N": "N", "adev_minimum": "sigma_min"}  # of a printed figure

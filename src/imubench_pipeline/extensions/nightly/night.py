@@ -47,7 +47,7 @@ from imubench_pipeline.run.project import find_snakefile
 from imubench_pipeline.run.recovery import end_group
 from imubench_pipeline.settings.config import read_config, read_run
 from imubench_pipeline.settings.validation import ConfigError
-from imubench_pipeline.tables import write_content, write_json
+from imubench_pipeline.tables.files import write_content, write_json
 from imubench_pipeline.tables.seals import name_night_place, seal_files
 
 _MAX_STOP_TIME = 60.0  # s; for Snakemake to stop its steps

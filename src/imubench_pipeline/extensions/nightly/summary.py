@@ -23,8 +23,8 @@ from imubench_pipeline.report.run_summary import (
     list_failures,
     select_warnings,
 )
-from imubench_pipeline.tables import read
-from imubench_pipeline.tables.digests import read_sealed_json, write_sealed_json
+from imubench_pipeline.tables.files import read
+from imubench_pipeline.tables.seals import read_sealed_json, write_sealed_json
 from imubench_pipeline.words.numbers import Unit
 
 

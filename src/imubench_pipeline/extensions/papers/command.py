@@ -48,7 +48,7 @@ def run(arguments: argparse.Namespace) -> int:
         rows = list(make_rows_without_run())
         expected = "without the results of a run: only lines that need no log"
     else:
-        from imubench_pipeline.tables import find_tables, read
+        from imubench_pipeline.tables.files import find_tables, read
 
         try:
             path = find_tables(arguments.results, ["published"])["published"]

@@ -20,7 +20,8 @@ from imubench_pipeline.extensions.papers.printed import (
     read_paper,
 )
 from imubench_pipeline.model.estimates import ParameterRow, ScoreRow
-from imubench_pipeline.navigation.error_budget import Quantity, Start, budget
+from imubench_pipeline.navigation.error_budget.budget import Start, budget
+from imubench_pipeline.navigation.error_budget.parts import Quantity
 from imubench_pipeline.noise import (
     FLOOR,
     PEAK_TAU,

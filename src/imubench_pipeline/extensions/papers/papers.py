@@ -33,7 +33,7 @@ from imubench_pipeline.extensions.papers.printed import (
 )
 from imubench_pipeline.extensions.papers.tables import AccuracyRow, PublishedRow
 from imubench_pipeline.noise.simulate import channel_rng, simulate
-from imubench_pipeline.tables import build, read, write_arrow
+from imubench_pipeline.tables.files import build, read, write_arrow
 
 LOGS = 100  # enough to separate ratios of 1.1 and 1.5; `benchmarks/accuracy.py` has more
 

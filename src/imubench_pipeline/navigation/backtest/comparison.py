@@ -18,8 +18,6 @@ References
 J. A. Hausman, "Specification tests in econometrics", Econometrica 46(6), 1978.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -32,16 +30,9 @@ from imubench_pipeline.estimators.estimate import Estimate
 from imubench_pipeline.model.estimates import BacktestRow, DeterministicRow
 from imubench_pipeline.model.recordings import FindingRow
 from imubench_pipeline.model.states import BacktestVerdict
-from imubench_pipeline.navigation.backtest.windows import (
-    Spread,
-    Window,
-    WindowCovariance,
-    average_blocks,
-    choose_window,
-    compute_window_errors,
-)
-from imubench_pipeline.navigation.error_budget import draw_models
+from imubench_pipeline.navigation.backtest import windows
 from imubench_pipeline.navigation.error_budget.budget import of_sensor
+from imubench_pipeline.navigation.error_budget.uncertainty import draw_models
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.growth import Calibrated
 from imubench_pipeline.noise.simulate import channel_rng
@@ -102,13 +93,11 @@ class DeadReckoning:
 
 
 def _limit_mean_square(
-    spreads: Sequence[Spread], found: float, *, efficient: bool
+    spreads: Sequence[windows.Spread], found: float, *, efficient: bool
 ) -> tuple[float, float, float]:
     """Return the limits of the mean square of 95 % of all logs, and the p-value of the found one.
 
-    They assume that the model is right. There is one spread for each drawn model, at least one. The
-    limits and the found mean square are in rad^2, (m/s)^2 or m^2.
-
+    They assume that the model is right; there is one spread for each drawn model, at least one.
     ``efficient``: the models are drawn jointly from a likelihood (an efficient estimate); else the
     uncertainty of the model is assumed to be independent of the scatter, and adds to it. The
     p-value is the probability of the found mean square or a larger one. It has the uncertainty in
@@ -132,7 +121,7 @@ def _limit_mean_square(
 def _compare(
     about: BacktestRow,
     asked: DeadReckoning,
-    cut: Window,
+    cut: windows.Window,
     means: Sequence[Array],
     model: NoiseModel,
     drawn: Sequence[NoiseModel],
@@ -141,14 +130,13 @@ def _compare(
 ) -> BacktestRow:
     """Return a row with the errors of a log, compared with the prediction of its noise model.
 
-    ``cut`` is the window for the times at rest and in motion; ``means`` are the block means of each
-    segment of the log, NaN where samples are missing. The model has at least one term; ``drawn``
-    are models from the estimate of the log, and ``efficient`` is as in `_limit_mean_square`.
+    ``cut``: window at rest and in motion; ``means``: block means of each segment, NaN where samples
+    are missing; ``drawn``: models from the estimate; ``efficient``: see `_limit_mean_square`.
     """
     predicted = asked.sigma(model)
     lower, upper = np.quantile([asked.sigma(candidate) for candidate in drawn], [0.025, 0.975])
-    covariance = WindowCovariance(cut, asked.order, asked.factor)
-    errors = compute_window_errors(means, covariance.weights, covariance.lags)
+    covariance = windows.WindowCovariance(cut, asked.order, asked.factor)
+    errors = windows.compute_window_errors(means, covariance.weights, covariance.lags)
     span, needed = asked.rest + asked.time, asked.duration_needed
     about = replace(
         about,
@@ -282,12 +270,12 @@ def _test_channel(
             )
             listed.append((about, asked))
     cuts = {
-        asked: choose_window(asked.rest, asked.time, log.rate)
+        asked: windows.choose_window(asked.rest, asked.time, log.rate)
         for _, asked in listed
         if isinstance(asked, DeadReckoning)
     }
     lengths = {cut.block for cut in cuts.values() if cut}
-    means = average_blocks(log.blocks(), log.segments, log.rate, lengths)
+    means = windows.average_blocks(log.blocks(), log.segments, log.rate, lengths)
     drawn = draw_models(
         estimate, draws, channel_rng(seed, repr(estimate.model), channel, "backtest")
     )

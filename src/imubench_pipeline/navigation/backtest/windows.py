@@ -4,8 +4,6 @@ A window is at rest for a time W, whose mean is the bias. It then moves for a ti
 log less the bias is integrated m + 1 times (`error_budget.growth`). Windows begin one block apart.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -164,24 +162,8 @@ def average_blocks(
     if not edges:
         return {}
     every = np.unique(np.concatenate([one for each in edges.values() for one in each]))
-    sums, present = _sum_parts(parts, every)
-
-    def compute_means(of_segment: NDArray[np.int64]) -> Array:
-        places = np.searchsorted(every, of_segment)
-        counts, size = np.diff(present[places]), np.diff(of_segment)
-        means = np.full(len(size), np.nan)
-        enough = (counts >= MIN_PRESENT_SHARE * size) & (counts > 0)
-        np.divide(np.diff(sums[places]), counts, out=means, where=enough)
-        return means
-
-    return {length: list(map(compute_means, each)) for length, each in edges.items()}
-
-
-def _sum_parts(
-    parts: Iterable[NDArray[np.floating[Any]]], edges: NDArray[np.int64]
-) -> tuple[Array, NDArray[np.int64]]:
-    """Return the sum, and the number, of the samples before each edge."""
-    sums, present = np.zeros(len(edges)), np.zeros(len(edges), dtype=np.int64)
+    # Sum and number of the samples before each edge
+    sums, present = np.zeros(len(every)), np.zeros(len(every), dtype=np.int64)
     reached, total, count = 0, 0.0, 0
     level: float | None = None
     for part in parts:
@@ -192,8 +174,8 @@ def _sum_parts(
         gaps = np.isnan(values)
         holes = bool(gaps.any())
         running = np.cumsum(np.where(gaps, 0.0, values) if holes else values)
-        first, last = np.searchsorted(edges, [reached + 1, reached + len(part) + 1])
-        places = edges[first:last] - reached - 1
+        first, last = np.searchsorted(every, [reached + 1, reached + len(part) + 1])
+        places = every[first:last] - reached - 1
         sums[first:last] = total + running[places]
         if holes:
             counted = np.cumsum(~gaps)
@@ -203,7 +185,16 @@ def _sum_parts(
             present[first:last] = count + places + 1
             count += len(part)
         reached, total = reached + len(part), total + float(running[-1])
-    return sums, present
+
+    def compute_means(of_segment: NDArray[np.int64]) -> Array:
+        places = np.searchsorted(every, of_segment)
+        counts, size = np.diff(present[places]), np.diff(of_segment)
+        means = np.full(len(size), np.nan)
+        enough = (counts >= MIN_PRESENT_SHARE * size) & (counts > 0)
+        np.divide(np.diff(sums[places]), counts, out=means, where=enough)
+        return means
+
+    return {length: list(map(compute_means, each)) for length, each in edges.items()}
 
 
 MAX_CORRELATED_SPANS = 4

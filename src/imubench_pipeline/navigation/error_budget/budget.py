@@ -12,8 +12,6 @@ All budgets here assume:
 - independent sensors with independent noise terms, and deterministic terms of random sign.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -84,7 +82,7 @@ class Start:
     @classmethod
     def calibrated(
         cls, window: float, *, tilt: Levelled | float | None = None, heading: float = 0.0
-    ) -> Start:
+    ) -> "Start":
         """Return a start with both biases from one static window, s; levelled by default."""
         sensor = Calibrated(window)
         levelled = Levelled() if tilt is None else tilt
@@ -99,7 +97,7 @@ class Start:
         on_time: float,
         tilt: float = 0.0,
         heading: float = 0.0,
-    ) -> Start:
+    ) -> "Start":
         """Return a start with turn-on biases of a given sigma, rad/s and m/s^2, and no window.
 
         None: a bias is taken from the figures of the sensor.

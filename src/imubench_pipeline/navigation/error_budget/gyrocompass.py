@@ -5,8 +5,6 @@ dw / (w_ie cos(latitude)). Neglected are the levelling error (tan(latitude) time
 north) and large angles.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field

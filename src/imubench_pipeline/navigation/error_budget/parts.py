@@ -3,8 +3,6 @@
 `Largest` gives the largest value of a figure that is not known, or that a calibration can reduce.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
@@ -13,8 +11,12 @@ from typing import Literal
 from imubench_pipeline.model.comparisons import ErrorBudgetRow
 from imubench_pipeline.model.states import Cause, Measured, SourcePath
 from imubench_pipeline.model.verdicts import ErrorSource
-from imubench_pipeline.navigation.error_budget.in_use import Figure, Figures, needed
-from imubench_pipeline.navigation.error_budget.printed_errors import DATASHEET_KEY_OF_CAUSE
+from imubench_pipeline.navigation.error_budget.in_use import (
+    DATASHEET_KEY_OF_CAUSE,
+    Figure,
+    Figures,
+    needed,
+)
 from imubench_pipeline.noise.terms.base import Term
 from imubench_pipeline.settings.printed import FIGURE_DIMENSIONS
 from imubench_pipeline.units import SI_UNITS
@@ -95,7 +97,7 @@ class Largest:
     biases: tuple[Contribution, ...] = ()  # printed biases, if the total exceeds the limit
 
     @classmethod
-    def of(cls, budget: Budget, limit: float | None, upper: float) -> Largest:
+    def of(cls, budget: Budget, limit: float | None, upper: float) -> "Largest":
         """Return the remaining budget under a limit, SI; ``upper``: upper limit of the total."""
         if limit is None:
             return cls(0.0)

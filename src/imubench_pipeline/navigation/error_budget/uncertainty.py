@@ -1,7 +1,5 @@
 """Uncertainty of an error budget from the uncertainty of the noise model."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 
@@ -9,8 +7,8 @@ import numpy as np
 from scipy.special import ndtr
 
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
+from imubench_pipeline.navigation.error_budget.in_use import SIGMAS
 from imubench_pipeline.navigation.error_budget.parts import Budget
-from imubench_pipeline.navigation.error_budget.printed_errors import SIGMAS
 from imubench_pipeline.noise import GaussMarkov, NoiseModel, Sinusoid
 
 

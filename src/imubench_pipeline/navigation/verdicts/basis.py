@@ -1,7 +1,5 @@
 """Collect the properties of recordings, other than their errors, that verdicts depend on."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -37,7 +35,7 @@ class Basis:
         doubts: Iterable[DoubtRow] = (),
         parameters: Iterable[ParameterRow] = (),
         backtests: Iterable[BacktestRow] = (),
-    ) -> Basis:
+    ) -> "Basis":
         """Return the basis from the rows of a run; only recommended parameters are used."""
         about = {_make_key(row): row for row in recordings}
         doubted: dict[Key, list[DoubtRow]] = {}

@@ -1,7 +1,5 @@
 """Recommend the next steps that would change or strengthen the most verdicts."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -13,12 +11,12 @@ from imubench_pipeline.model.comparisons import NextStepRow
 from imubench_pipeline.model.states import Action
 from imubench_pipeline.model.verdicts import Condition, DoubtMark
 from imubench_pipeline.navigation.verdicts.basis import Basis, Key
-from imubench_pipeline.navigation.verdicts.evidence import (
+from imubench_pipeline.navigation.verdicts.judgement import (
     MAX_TIME_SHARE,
     WEAKNESS_REASONS,
+    Judgement,
     find_longest_time,
 )
-from imubench_pipeline.navigation.verdicts.judgement import Judgement
 from imubench_pipeline.navigation.verdicts.specimens import Expected
 from imubench_pipeline.navigation.verdicts.standing import Standing
 from imubench_pipeline.words.verdicts import next_step_text

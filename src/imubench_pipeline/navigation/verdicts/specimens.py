@@ -16,8 +16,6 @@ G. Hahn and W. Meeker, "Statistical Intervals", Wiley 1991; J. Higgins, S. Thomp
 D. Spiegelhalter, J. R. Stat. Soc. A 172, 2009.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Compare the error of a sensor with each limit of a requirement, and find the deciding limit."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -145,7 +143,9 @@ def list_standings(
         ]
         answer, sigma = figures[distances.index(min(distances))]
         own = [row for row in parts if row.source != "total" and row.recording == answer.recording]
-        conditions = tuple(row for row in own if suitability.is_condition(row))
+        # Figures of sources on which meeting the limit depends
+        asked = [row for row in own if row.largest_unit is not None]
+        conditions = tuple(row for row in asked if row.source in suitability.FIGURES)
         standing = Standing(answer, with_figure, prediction, conditions=conditions)
         sources = suitability.select_known_errors(own)
         if sources and sigma > 0.0:

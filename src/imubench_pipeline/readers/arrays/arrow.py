@@ -5,8 +5,6 @@ timestamps is time with ``format: iso8601``. Large compressed record batches are
 they are unpacked as a whole.
 """
 
-from __future__ import annotations
-
 import json
 import struct
 from abc import abstractmethod
@@ -216,7 +214,7 @@ class _FlatTable:
         place = self._place(field)
         return 0 if place is None else int(struct.unpack_from("<B", self._data, place)[0])
 
-    def table(self, field: int) -> _FlatTable | None:
+    def table(self, field: int) -> "_FlatTable | None":
         place = self._place(field)
         if place is None:
             return None

@@ -12,8 +12,6 @@
 A number as the column of time is a column of the same array.
 """
 
-from __future__ import annotations
-
 import re
 from abc import abstractmethod
 from collections import Counter

@@ -4,8 +4,6 @@
 records, or a data set in the group that ``variable`` names. HDF5 has no dates of its own.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import ExitStack
@@ -47,7 +45,7 @@ class Hdf5File(ArrayFile):
         return list_data_sets(stack.enter_context(h5py.File(self.path, "r")))
 
 
-def list_data_sets(file: h5py.File, time_axis: int = 0, passed_over: str = "\0") -> list[DataSet]:
+def list_data_sets(file: h5py.File, time_axis: int = 0, passed_over: str = "\0") -> "list[DataSet]":
     """Return the data sets of a file by name; only hard links are followed.
 
     ``passed_over``: prefix of root names that are not data. Raises `UnusableError` beyond the
@@ -233,11 +231,7 @@ _MAX_MEMORY = 1 << 29
 
 @lru_cache(maxsize=4)
 def _read_variable_length_texts(path: str, *_: int) -> dict[str, str]:
-    """Return the units of a file by data set; empty if they cannot be read.
-
-    The library may crash or hang on damaged texts: another process reads them, and stops at a long
-    one.
-    """
+    """Return the units by data set, read by a process, as damaged texts may crash the library."""
     units: dict[str, str] = {}
 
     def visit(name: str, item: h5py.HLObject) -> str | None:

@@ -5,8 +5,6 @@ variable that is a vector. ``variable`` names the matrix; a field of a structure
 Tables, timetables and cells are not arrays: save ``table2array`` of them.
 """
 
-from __future__ import annotations
-
 import io
 import math
 import struct

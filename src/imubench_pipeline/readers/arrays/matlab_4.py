@@ -5,8 +5,6 @@ name), the name with a terminating zero, and the numbers, column by column. The 
 the type are the byte order, 0, the type of the numbers and the kind of the variable.
 """
 
-from __future__ import annotations
-
 import re
 import struct
 from dataclasses import dataclass

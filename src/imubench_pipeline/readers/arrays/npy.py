@@ -5,8 +5,6 @@ Dates (datetime64) are time stamps with ``format: iso8601``. Arrays of Python ob
 unpickling them would execute code in the file.
 """
 
-from __future__ import annotations
-
 import io
 import math
 import struct

@@ -1,7 +1,5 @@
 """Tables of columns in the array formats, read in blocks of records."""
 
-from __future__ import annotations
-
 import io
 import math
 from collections.abc import Callable, Iterator, Sequence

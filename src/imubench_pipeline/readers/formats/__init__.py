@@ -5,8 +5,6 @@ names are as in `imubench_pipeline.settings.sensor.Reader`: a module without a n
 name without a module, fails the import of this one.
 """
 
-from __future__ import annotations
-
 import pkgutil
 from collections.abc import Mapping
 from importlib import import_module

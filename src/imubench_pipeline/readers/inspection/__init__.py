@@ -1,7 +1,5 @@
 """Inspect a log and draft a sensor file for it: `imubench inspect`."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -40,7 +38,7 @@ class Inspection:
     listing: str  # the contents as text
     block: str  # the sensor file as YAML
     draft: Draft  # the sensor file as values
-    proof: Proof  # result of reading the first records with it
+    proof: "Proof"  # result of reading the first records with it
 
     @property
     def complete(self) -> bool:

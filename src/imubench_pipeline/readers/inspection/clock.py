@@ -1,7 +1,5 @@
 """Find the time column and its unit, from its name or else from its stamps."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -105,7 +103,14 @@ def _recognise_number(column: LogColumn, table: LogTable) -> Clock | None:
     words = split_label(column.label)
     joined = "".join(words)
     if joined.endswith(_XSENS_TICKS):
-        return _recognise_xsens_ticks(column)
+        # The clock of Xsens: 0.1 ms in motion trackers, 1 us in wearables
+        step = estimate_step(column.values)
+        in_microseconds = step is not None and step > 8000
+        of_ticks, scale = ("us", None) if in_microseconds else ("ms", 0.1)
+        source = Source(column=_get_source(column), unit=of_ticks, scale=scale, wraps=1 << 32)
+        rate = "" if step is None else f", {(1e6 if in_microseconds else 1e4) / step:.5g} Hz"
+        tick = "1 us" if in_microseconds else "0.1 ms"
+        return Clock(column, Entry(source, f"ticks of {tick}{rate}"), False, (0, 0))
     source = Source(column=_get_source(column))
     if joined == _XSENS_PACKETS or (
         not _TIME_WORDS.intersection(words) and _COUNTER_WORDS.intersection(words)
@@ -151,17 +156,6 @@ def _recognise_counter(column: LogColumn, of_16_bits: bool) -> Clock | None:
         comment = "a count of samples; 'wraps' is guessed from the highest one"
     source = Source(column=_get_source(column), unit="samples", scale=scale, wraps=wraps)
     return Clock(column, Entry(source, comment), True, (1, 3))
-
-
-def _recognise_xsens_ticks(column: LogColumn) -> Clock:
-    """Return the tick clock of Xsens: 0.1 ms in motion trackers, 1 us in wearables."""
-    step = estimate_step(column.values)
-    in_microseconds = step is not None and step > 8000
-    unit, scale = ("us", None) if in_microseconds else ("ms", 0.1)
-    source = Source(column=_get_source(column), unit=unit, scale=scale, wraps=1 << 32)
-    rate = "" if step is None else f", {(1e6 if in_microseconds else 1e4) / step:.5g} Hz"
-    tick = "1 us" if in_microseconds else "0.1 ms"
-    return Clock(column, Entry(source, f"ticks of {tick}{rate}"), False, (0, 0))
 
 
 def _guess_unit(values: NDArray[np.float64], rate: float | None) -> tuple[str, str]:

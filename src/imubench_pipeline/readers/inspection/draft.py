@@ -1,7 +1,5 @@
 """Drafted sensor file: entries with comments on their origin, and their YAML."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Generic, TypeVar
@@ -72,7 +70,7 @@ class Draft:
         """Return the complete sensor file as values."""
         return {"vendor": self.vendor.value, "model": self.model.value, "log": self.log()}
 
-    def with_units(self, unit_of: Callable[[str, str | None], str | None]) -> Draft:
+    def with_units(self, unit_of: Callable[[str, str | None], str | None]) -> "Draft":
         """Return a draft with the units of ``unit_of(key, unit)``; None leaves a unit."""
 
         def change(key: str, entry: Entry[Source]) -> Entry[Source]:

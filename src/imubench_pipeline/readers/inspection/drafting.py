@@ -1,7 +1,5 @@
 """Recognise, group and choose the columns of a log, and draft its sensor file."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace

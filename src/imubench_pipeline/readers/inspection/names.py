@@ -1,7 +1,5 @@
 """Interpret the name of a column: quantity, axis, and whether the sensor measures it."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import dataclass
 from typing import Literal

@@ -7,10 +7,8 @@ the column. Time columns, with ``unit: ns``: ``header.stamp``, the stamp of the 
 ``log_time``, the time at which the message was recorded.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from functools import partial
 from itertools import islice
@@ -136,12 +134,9 @@ class RosbagFile(LogFile):
                 f"{self.path.name}: {time.column} is {time.unit or time.format} in the sensor "
                 "file; a ROS bag gives ns; expected 'unit: ns' of 'time'"
             )
-        source = open_bag(self.path)
-        try:
+        with closing(open_bag(self.path)) as source:
             topic, kind = self._topic(source)
             yield from self._read(source, topic, LAYOUTS[kind])
-        finally:
-            source.close()
 
     def _read(self, source: Source, topic: str, layout: Layout) -> Iterator[Batch]:
         sound = damaged = 0
@@ -309,18 +304,14 @@ _MAX_SLOW_MESSAGES = 20  # largest number of messages of a slow topic that are e
 
 def list_topics(path: Path, file_format: formats.FileFormat) -> list[formats.LogTable]:
     """Return a table for each topic; raise `RecordingError` if there is none."""
-    source = open_bag(path)
-    try:
-        with explain_errors(path):
-            topics, counts = source.topics(), source.counts()
-            if not topics:
-                raise RecordingError(f"{path.name}: the bag has no topic; expected sensor_msgs/Imu")
-            return [
-                _describe_topic(file_format, source, topic, kind, counts.get(topic))
-                for topic, kind in sorted(topics.items())
-            ]
-    finally:
-        source.close()
+    with closing(open_bag(path)) as source, explain_errors(path):
+        topics, counts = source.topics(), source.counts()
+        if not topics:
+            raise RecordingError(f"{path.name}: the bag has no topic; expected sensor_msgs/Imu")
+        return [
+            _describe_topic(file_format, source, topic, kind, counts.get(topic))
+            for topic, kind in sorted(topics.items())
+        ]
 
 
 def _describe_topic(

@@ -4,8 +4,6 @@ The index of a bag has an entry for every message, so it grows with the recordin
 was not closed has no index. Reading the chunks in order needs no index and little memory.
 """
 
-from __future__ import annotations
-
 import bz2
 import os
 import struct

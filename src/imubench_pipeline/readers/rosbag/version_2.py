@@ -1,7 +1,5 @@
 """Read ROS 2 bags with the library, with limits on the sizes that are unpacked."""
 
-from __future__ import annotations
-
 import heapq
 import sqlite3
 from collections import Counter

@@ -1,7 +1,5 @@
 """Split the lines of a text log into cells; recognise numbers, dates and missing values."""
 
-from __future__ import annotations
-
 import csv
 import re
 from collections.abc import Sequence

@@ -1,7 +1,5 @@
 """Read the text of a log as UTF-8 in blocks of complete lines, and keep its records."""
 
-from __future__ import annotations
-
 import codecs
 import re
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
@@ -29,10 +27,7 @@ _BYTE_ORDER_MARKS: Mapping[bytes, str] = {
 
 
 class _Text:
-    """The decompressed bytes of a text log, in an encoding that contains ASCII.
-
-    Lines end in line feeds; runs of zeros are reduced to one. ``letter``: bytes of one in the file.
-    """
+    """The text of a log as UTF-8, with line feeds, and runs of zeros reduced to one zero."""
 
     def __init__(self, path: Path, skipped: int, most: int | None) -> None:
         self.bytes = open_bytes(path)
@@ -46,6 +41,7 @@ class _Text:
             self._decoder = (
                 codecs.getincrementaldecoder(encoding)(errors="replace") if encoding else None
             )
+            # Bytes of a letter in the file
             self.letter = len("\0".encode(encoding)) if encoding else 1
             text = self._utf_8(begin.removeprefix(mark))
             self._returns = b"\n" not in text and b"\r" in text[:-1]

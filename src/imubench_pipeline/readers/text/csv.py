@@ -1,7 +1,5 @@
 """Read delimited text: find the layout of a log, then read it with pyarrow in large blocks."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator, Mapping
 from pathlib import Path
@@ -55,10 +53,8 @@ class CsvFile(LogFile):
             [line.decode("utf-8", "replace") for line in lines]
             for lines in (layout.preamble, layout.skipped)
         )
-        self.rate, self.started = (
-            header.find_stated_rate(preamble),
-            header.find_stated_start(preamble),
-        )
+        self.rate = header.find_stated_rate(preamble)
+        self.started = header.find_stated_start(preamble)
         self.simulated = header.is_simulated([*preamble, *skipped])
         time = None if self.log.time is None else text_stamps.TextTime(self, layout)
         beside, _ = find_unit_line(layout)
@@ -209,7 +205,7 @@ class CsvFile(LogFile):
     def _explained(
         self,
         error: pa.ArrowException,
-        fault: _WrongWidth,
+        fault: "_WrongWidth",
         layout: TextLayout,
         time: text_stamps.TextTime | None,
     ) -> RecordingError:

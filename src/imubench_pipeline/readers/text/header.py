@@ -1,7 +1,5 @@
 """Interpret the lines before the first record of a text log: names, units, statements."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterable, Sequence
 

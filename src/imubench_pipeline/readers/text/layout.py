@@ -3,8 +3,6 @@
 Everything is detected from the first lines; statements of the sensor file are used unchanged.
 """
 
-from __future__ import annotations
-
 import re
 from collections import Counter, deque
 from collections.abc import Iterable, Sequence

@@ -1,7 +1,5 @@
 """Read time stamps of a text log: numbers, ISO 8601 or patterns, in one or two columns."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
@@ -86,12 +84,8 @@ class TextStamps:
         return time, sound
 
     def _counted(self, time: NDArray[np.int64], leap: NDArray[np.bool_]) -> NDArray[np.int64]:
-        """Return stamps that advance through leap seconds.
-
-        Second 60 is read as second 0 of the next minute. If second 0 follows and repeats this time,
-        a second is added; if 60 is only due to rounding, the next stamp is later, and nothing is
-        added.
-        """
+        """Return stamps that advance through leap seconds."""
+        # Second 60 is read as second 0 of the next minute; it counts if that second is repeated.
         if not len(time):
             return time
         last, in_leap = self._last

@@ -15,7 +15,7 @@ import pyarrow.compute as pc
 from imubench_pipeline.model.recordings import RecordingRow
 from imubench_pipeline.settings.command_line import CommandError
 from imubench_pipeline.settings.extras import require_extra
-from imubench_pipeline.tables import find_tables, find_tables_folder, read
+from imubench_pipeline.tables.files import find_tables, find_tables_folder, read
 from imubench_pipeline.tables.outputs import OutputFolder, add_output
 from imubench_pipeline.tables.schemas import TABLES
 

@@ -20,7 +20,7 @@ from imubench_pipeline.report.static_figures.comparison import (
 )
 from imubench_pipeline.report.static_figures.style import set_style
 from imubench_pipeline.report.view import ChannelView, gather_recordings
-from imubench_pipeline.tables import make_schema, replace_file
+from imubench_pipeline.tables.files import make_schema, replace_file
 from imubench_pipeline.tables.schemas import BY_RECORDING
 
 Make = Callable[[], Figure | None]

@@ -4,8 +4,6 @@ It uses the functions and settings of the rules, so that the numbers are the sam
 a recording are estimated and reconstructed in parallel, in forks of one process.
 """
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
@@ -33,8 +31,8 @@ from imubench_pipeline.steps.ingest import write_recording
 from imubench_pipeline.steps.reconstruct import ReconstructionRows, reconstruct_recording
 from imubench_pipeline.steps.sensor_tables import join_tables
 from imubench_pipeline.steps.tables import join_all_tables
-from imubench_pipeline.tables import build, write, write_arrow, write_each
 from imubench_pipeline.tables.failures import Failure, describe_error, write_empty
+from imubench_pipeline.tables.files import build, write, write_arrow, write_each
 from imubench_pipeline.tables.schemas import OF_ONE_RECORDING, TABLES
 
 T = TypeVar("T")

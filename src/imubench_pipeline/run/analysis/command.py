@@ -140,7 +140,7 @@ def _write(plan: Plan, tables: Mapping[str, pa.Table], arguments: argparse.Names
     """Write the page, the figures and the tables."""
     from imubench_pipeline.report.publish import make_site, render_one_file
     from imubench_pipeline.report.static_figures.files import list_drawings
-    from imubench_pipeline.tables import write_arrow, write_content
+    from imubench_pipeline.tables.files import write_arrow, write_content
 
     output: OutputFolder = arguments.output
     # For a single log there are no intervals to compare.

@@ -1,7 +1,5 @@
 """Compile kernels at the first use in a separate process, in parallel with imports and reading."""
 
-from __future__ import annotations
-
 import threading
 from collections.abc import Callable
 from contextlib import AbstractContextManager, suppress

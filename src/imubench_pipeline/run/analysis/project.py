@@ -1,7 +1,5 @@
 """Make a temporary project of the logs of a command line: links to them, and sensor files."""
 
-from __future__ import annotations
-
 import shlex
 from collections import Counter
 from collections.abc import Mapping, Sequence
@@ -15,7 +13,7 @@ from imubench_pipeline.recordings.drop_zone import get_recording_name, get_senso
 from imubench_pipeline.settings.sensor import CHANNELS, Sensor, quantity_of
 from imubench_pipeline.settings.validation import ConfigError, parse
 from imubench_pipeline.settings.yaml_files import list_files, read_settings
-from imubench_pipeline.tables import write_json
+from imubench_pipeline.tables.files import write_json
 from imubench_pipeline.tables.findings import RecordingError
 
 INSPECTED_S, INSPECTED_BYTES = 10.0, 1 << 29  # for the inspection of a log, s and bytes
@@ -147,25 +145,21 @@ def _draft_sensor(log: Path, stated: Stated) -> Mapping[str, object]:
         open_keys += [f"{quantity_of(channel)} {key}" for key, one in columns if one == UNKNOWN]
     if open_keys:
         keys = list(dict.fromkeys(open_keys))
-        raise UnfilledError(_describe_missing_keys(log, keys))
+        # Describe the missing properties of a log, and how to state them
+        options = {
+            "rate": "--rate '100 Hz'",
+            "gyro unit": "--gyro-unit deg/s (or rad/s, dps, ...: see the logger's manual)",
+            "accel unit": "--accel-unit g (or m/s^2, mg, ...)",
+        }
+        lines = [f"{log}: the log does not say: {', '.join(keys)}"]
+        if all(key in options for key in keys):
+            lines += [f"  add {options[key]}" for key in keys]
+            lines.append("or write a sensor file once, for all logs of this sensor:")
+        else:
+            lines.append("its column names do not identify the channels; write a sensor file:")
+        command = shlex.join(["imubench", "inspect", str(log), "--output", "mine.yaml"])
+        lines.append(f"  {command}, fill it in, then --sensor mine.yaml")
+        raise UnfilledError("\n".join(lines))
     return parse(Sensor, draft.sensor(), f"drafted from {log}").model_dump(
         mode="json", exclude_unset=True
     )
-
-
-def _describe_missing_keys(log: Path, keys: Sequence[str]) -> str:
-    """Describe the missing properties of a log, and how to state them."""
-    options = {
-        "rate": "--rate '100 Hz'",
-        "gyro unit": "--gyro-unit deg/s (or rad/s, dps, ...: see the logger's manual)",
-        "accel unit": "--accel-unit g (or m/s^2, mg, ...)",
-    }
-    lines = [f"{log}: the log does not say: {', '.join(keys)}"]
-    if all(key in options for key in keys):
-        lines += [f"  add {options[key]}" for key in keys]
-        lines.append("or write a sensor file once, for all logs of this sensor:")
-    else:
-        lines.append("its column names do not identify the channels; write a sensor file:")
-    command = shlex.join(["imubench", "inspect", str(log), "--output", "mine.yaml"])
-    lines.append(f"  {command}, fill it in, then --sensor mine.yaml")
-    return "\n".join(lines)

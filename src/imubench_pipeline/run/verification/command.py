@@ -1,7 +1,5 @@
 """The command `imubench verify`: verify that the outputs of runs are unchanged."""
 
-from __future__ import annotations
-
 import argparse
 import sys
 import time

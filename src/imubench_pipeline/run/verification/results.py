@@ -1,7 +1,5 @@
 """Verify that the results of runs are unchanged and consistent with each other."""
 
-from __future__ import annotations
-
 import json
 import os
 import shlex
@@ -16,11 +14,11 @@ from imubench_pipeline.recordings.kept import Quality
 from imubench_pipeline.recordings.known_logs import KNOWN
 from imubench_pipeline.run.project import has_snakefile
 from imubench_pipeline.run.recovery import find_unfinished
-from imubench_pipeline.tables import read
 from imubench_pipeline.tables import seals as sealing
-from imubench_pipeline.tables.digests import read_sealed_json
+from imubench_pipeline.tables.files import read
 from imubench_pipeline.tables.findings import RecordingError
 from imubench_pipeline.tables.schemas import OF_ONE_RECORDING, TABLES
+from imubench_pipeline.tables.seals import read_sealed_json
 
 _SEALED_FOLDERS = ("recordings", "sensors", "tables", "simulated", "report", "exports")
 """Folders in which every file has a seal, except files with their own digest."""

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from imubench_pipeline.extensions.calibration.calibration import make_calibration_tables
-from imubench_pipeline.tables import write
+from imubench_pipeline.tables.files import write
 
 if __name__ == "__main__":
     names = snakemake.wildcards

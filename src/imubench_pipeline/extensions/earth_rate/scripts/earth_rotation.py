@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from imubench_pipeline.extensions.earth_rate.earth_rotation import make_earth_rate_tables
-from imubench_pipeline.tables import write
+from imubench_pipeline.tables.files import write
 
 if __name__ == "__main__":
     names = snakemake.wildcards

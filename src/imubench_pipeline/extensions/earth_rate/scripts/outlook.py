@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from imubench_pipeline.extensions.earth_rate.outlook import make_outlook_tables
-from imubench_pipeline.tables import write
+from imubench_pipeline.tables.files import write
 
 if __name__ == "__main__":
     found = make_outlook_tables(
