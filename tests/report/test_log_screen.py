@@ -58,7 +58,7 @@ def test_findings_of_one_kind_are_one_event_and_fatal_ones_are_first() -> None:
     stuck = finding("stuck", "gyro_x", severity="fatal", affects=())
     events = group_events([*rows, stuck])
     assert [len(event.findings) for event in events] == [1, 6]
-    assert events_text(events[1].findings).startswith("Strong line on gyro x, gyro y")
+    assert events_text(events[1].findings).startswith("A vibration of gyro x, gyro y")
 
 
 @pytest.mark.parametrize("width", [80, 120])
@@ -72,7 +72,7 @@ def test_the_screen_of_six_axes_has_40_lines_of_80_columns(width: int) -> None:
     parameters[1] = parameter(
         CHANNELS[0], "B_curve", value=1e-4, lower=1e-5, upper=1e-3, status="doubtful"
     )
-    kinds = ("strong_line", "knocks", "motion", "warm_up", "too_many_lines")
+    kinds = ("strong_line", "knocks", "not_stationary", "warm_up", "too_many_lines")
     findings = [finding(kind, channel) for kind in kinds for channel in CHANNELS]
     recording = RecordingRow(
         sensor="s", device="d", recording="r", kind="static", simulated=True, status="ok",

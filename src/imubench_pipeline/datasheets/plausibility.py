@@ -24,6 +24,7 @@ from imubench_pipeline.settings.sensor import QUANTITIES, Sensor, quantity_of
 from imubench_pipeline.tables.findings import Finding, find
 from imubench_pipeline.units import convert_to_si, find_conversion
 from imubench_pipeline.words.findings import plausibility as texts
+from imubench_pipeline.words.findings.samples import Motion
 
 _MAX_FACTOR_BELOW_PRINTED = 2.5
 """Maximum usual factor below a printed noise density. `levels.density_of` is not lowered by a
@@ -47,6 +48,9 @@ MIN_RATE, MIN_RATE_STATED, _MAX_RATE = 1.05, 0.105, 1e4
 """Limits of the sampling rate of any log, Hz. Stamps in ms that are read as s give at most 1 Hz for
 a log of 1 kHz, and 0.1 Hz for one of 100 Hz. A slower log is plausible if its rate is stated."""
 
+MIN_RATE_OF_NOISE = 25.0
+"""Hz. Usual sensors have a bandwidth of 10 Hz or more: slower samples may fold noise into N."""
+
 _MAX_LOG_RATE_PER_BANDWIDTH = 100.0
 _MAX_SAMPLING_RATE_PER_BANDWIDTH = 10.0
 """Maximum rate of a log, and of a sensor, over the printed bandwidth. The sensors of the shipped
@@ -62,6 +66,11 @@ _GRAVITY_TOLERANCE = 0.15  # maximum error of the mean acceleration, as a fracti
 _SUSPICIOUS_NOISE_FACTOR = 2.5
 """Noise is suspicious beyond this factor outside the usual range: above 10 times or below 0.16
 times the printed figure, or for a gyro without one, above 0.15 °/s/√Hz or below 2e-4."""
+
+_USUAL_OFFSET = math.radians(5.0)
+_SUSPICIOUS_NOISE_WITH_MEAN, _SUSPICIOUS_PRODUCT = 1.6, 6.0
+"""Noise of a gyro is suspicious also beyond a smaller factor above its usual range, if the product
+with the factor of its mean above 5 °/s is large: 12 for degrees that are called radians."""
 
 _MAX_EXPLAINED_FACTOR = 1.5
 """Maximum factor outside the usual range for noise in the suggested unit."""
@@ -204,11 +213,13 @@ def implausible(
     sensor: Sensor | None,
     *,
     static: bool = True,
+    moved: bool = False,
 ) -> list[Finding]:
     """Return the findings that contradict a static sensor with data in the stated units.
 
     They are based on the levels of each channel, on the rotation of gravity relative to the sensor,
-    and on the sensor file. ``static``: the sensor should be at rest.
+    and on the sensor file. ``static``: the sensor should be at rest. ``moved``: it was not, so that
+    neither noise nor mean says anything about units.
     """
     of = {quantity: expected(sensor, quantity) for quantity in QUANTITIES}
     rates = {name: level.rate for name, level in channels.items()}
@@ -217,7 +228,13 @@ def implausible(
         {name: of[quantity_of(name)].bandwidth for name in channels},
         sensor.log.rate_hz if sensor else None,
     )
-    if not findings:  # else the density has a wrong unit of time
+    slow = {name: rate for name, rate in rates.items() if rate < MIN_RATE_OF_NOISE}
+    if slow and not findings:
+        least, channel = min(slow.values()), None if len(slow) == len(rates) else min(slow)
+        findings.append(find(texts.SlowSampling(least), "note", least, channel))
+    if moved:
+        return findings
+    if not any(f.finding == texts.RateImplausible.code for f in findings):
         findings += _check_noise(channels, of)
         findings += _compare_noise(channels, of, {f.channel for f in findings})
     if gravity is None or gravity.swept < _MIN_TURN_OF_GRAVITY:  # its mean is not gravity then
@@ -242,7 +259,8 @@ def implausible(
 def implausible_of(quality: Quality, sensor: Sensor | None) -> list[FindingRow]:
     """Return the finding rows about data that are implausible for a static sensor."""
     about, static = quality.recording, quality.recording.kind == "static"
-    findings = implausible(quality.channels, quality.gravity, sensor, static=static)
+    moved = any(finding.finding == Motion.code for finding in quality.findings)
+    findings = implausible(quality.channels, quality.gravity, sensor, static=static, moved=moved)
     return [finding.row(about.sensor, about.recording) for finding in findings]
 
 
@@ -278,13 +296,18 @@ def _check_gravity(channels: Mapping[str, Level]) -> Iterator[Finding]:
 def _check_noise(channels: Mapping[str, Level], of: Mapping[str, Expected]) -> Iterator[Finding]:
     """Yield a finding for each channel whose noise is usual only in another unit."""
     weighed = {f"accel_{axis}" for axis in "xyz"} <= channels.keys()
+    means = [level.mean for name, level in channels.items() if quantity_of(name) == "gyro"]
     for name, level in channels.items():
         quantity = quantity_of(name)
         usual = of[quantity].noise
         if usual is None or (quantity == "accel" and weighed):
             continue  # gravity is the better test
         low, high = level.density
-        if low > _SUSPICIOUS_NOISE_FACTOR * usual[1]:
+        mean = math.hypot(*means) if quantity == "gyro" else 0.0
+        above = low / usual[1]
+        together = above > _SUSPICIOUS_NOISE_WITH_MEAN and mean > _USUAL_OFFSET
+        together &= above * mean / _USUAL_OFFSET > _SUSPICIOUS_PRODUCT
+        if above > _SUSPICIOUS_NOISE_FACTOR or together:
             shown = low
         elif high is not None and high < usual[0] / _SUSPICIOUS_NOISE_FACTOR:
             shown = high
@@ -303,6 +326,7 @@ def _check_noise(channels: Mapping[str, Level], of: Mapping[str, Expected]) -> I
                     noise=shown,
                     usual=usual,
                     printed=of[quantity].printed is not None,
+                    mean=mean if together else None,
                 )
                 yield find(data, "warning", factor, name)
                 break

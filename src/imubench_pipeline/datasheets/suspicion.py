@@ -10,9 +10,14 @@ from imubench_pipeline.model.estimates import ParameterRow
 from imubench_pipeline.model.recordings import FindingRow
 from imubench_pipeline.settings.sensor import QUANTITIES, Sensor, quantity_of
 from imubench_pipeline.tables.findings import find
-from imubench_pipeline.words.findings.plausibility import UNIT_MISTAKES, UnusualFigure
+from imubench_pipeline.words.findings.plausibility import (
+    UNIT_MISTAKES,
+    ImpossibleNoise,
+    UnusualFigure,
+)
 
 _SUSPICIOUS_FACTOR = 20.0
+_IMPOSSIBLE_FACTOR = 1e4  # below the least of a catalogue: seismometers have a thousandth of it
 _MIN_SENSORS = 5
 MAX_FACTOR_FROM_PRINTED = 4.0
 """Maximum usual ratio of a figure to the printed one, either way: low-pass filters, a bad specimen
@@ -133,6 +138,11 @@ def unusual_rows(
             continue
         quantity, sensor = quantity_of(row.channel), sensors.get(row.sensor)
         printed = printed_figures(sensor, quantity) if sensor else None
+        typical = usual.get((quantity, "N"))
+        if figure == "N" and typical and value < typical.least / _IMPOSSIBLE_FACTOR:
+            impossible = ImpossibleNoise(value, typical.least, typical.sensors)
+            yield find(impossible, "warning", value, row.channel).row(row.sensor, row.recording)
+            continue
         for data in suspicious(quantity, {figure: value}, usual, printed):
             estimate = replace(data, lower=row.lower, upper=row.upper, estimated=True)
             yield find(estimate, "warning", value, row.channel).row(row.sensor, row.recording)

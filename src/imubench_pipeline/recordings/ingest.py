@@ -17,6 +17,7 @@ import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
 from imubench_pipeline.model.recordings import RecordingRow
+from imubench_pipeline.model.states import Severity
 from imubench_pipeline.readers import log_files, read
 from imubench_pipeline.readers.content import recognise_folder
 from imubench_pipeline.recordings import timebase
@@ -27,6 +28,7 @@ from imubench_pipeline.recordings.parts import Part, leave_out_disturbed, read_p
 from imubench_pipeline.recordings.quality.columns import check_columns
 from imubench_pipeline.recordings.quality.copies import find_copied_channels
 from imubench_pipeline.recordings.quality.levels import summarise_level
+from imubench_pipeline.recordings.quality.rest import find_still_spans
 from imubench_pipeline.recordings.quality.rotation import GravityTurn, detect_gravity_turn
 from imubench_pipeline.recordings.recording import (
     BESIDE,
@@ -56,6 +58,7 @@ from imubench_pipeline.words.findings import files, samples
 
 _MAX_NAMES = 5
 _MAX_TIMES = 5  # of knocks that are listed
+_MAX_HARMLESS_SHARE = 0.01  # of samples that are left out with knocks
 
 
 @dataclass(frozen=True)
@@ -98,12 +101,12 @@ def ingest(
     sources = beside.submit(identify_log_files, source, rejected.is_set)
     try:
         whole = _ingest(source, log, notes, settings, folder, scratch, names, sources)
-        end = max((f.end or 0.0 for f in whole.findings if f.finding == "warm_up"), default=0.0)
-        if not (settings.trim_warm_up and end):
+        chosen = _choose_part(whole, notes.use, settings)
+        if chosen is None:
             return whole
-        later = notes.model_copy(update={"use": UsedPart(start=end, end=notes.use.end)})
-        trimmed = _ingest(source, log, later, settings, folder, scratch, names, sources)
-        note = find(files.WarmUpTrimmed(end), "note", end, start=0.0, end=end)
+        part, note = chosen
+        fewer = notes.model_copy(update={"use": part})
+        trimmed = _ingest(source, log, fewer, settings, folder, scratch, names, sources)
         return replace(trimmed, findings=[note, *trimmed.findings])
     except BaseException:
         rejected.set()
@@ -111,6 +114,25 @@ def ingest(
     finally:
         beside.shutdown()
         shutil.rmtree(scratch)
+
+
+def _choose_part(
+    whole: Ingested, use: UsedPart, settings: QualitySettings
+) -> tuple[UsedPart, Finding] | None:
+    """Return the part of a log that the settings ask for, and a note; None: all of it."""
+    if settings.at_rest:
+        moved = [(f.start or 0.0, f.end or 0.0) for f in whole.findings if f.finding == "motion"]
+        end = use.start + (whole.row.duration or 0.0)
+        still = find_still_spans(moved, use.start, end)
+        if moved and still:
+            start, stop = max(still, key=lambda span: span[1] - span[0])
+            note = find(files.PartAtRest(start, stop), "note", stop - start, None, start, stop)
+            return UsedPart(start=start, end=stop), note
+    end = max((f.end or 0.0 for f in whole.findings if f.finding == "warm_up"), default=0.0)
+    if settings.trim_warm_up and end:
+        note = find(files.WarmUpTrimmed(end), "note", end, start=0.0, end=end)
+        return UsedPart(start=end, end=use.end), note
+    return None
 
 
 def remove_kept(folder: Path) -> None:
@@ -250,7 +272,9 @@ def _findings(
                 begin, end = max(events[0].first, 0) / base.rate, events[-1].last / base.rate
                 number = part.knocks[channel]
                 knocked = files.Knocks(len(events), worst.size, times, number)
-                findings.append(find(knocked, "warning", number, channel, begin, end))
+                few = number < _MAX_HARMLESS_SHARE * part.columns[channel].present
+                severity: Severity = "note" if few else "warning"
+                findings.append(find(knocked, severity, number, channel, begin, end))
             for channel, number in part.interpolated.items():
                 if number:
                     straight = samples.Interpolated(number, number / part.columns[channel].present)

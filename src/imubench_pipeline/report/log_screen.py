@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -13,6 +14,7 @@ from rich.text import Text
 
 from imubench_pipeline.model.estimates import AllanRow, ParameterRow
 from imubench_pipeline.model.recordings import FindingRow, RecordingRow
+from imubench_pipeline.recordings.quality.rest import find_still_spans
 from imubench_pipeline.report import run_summary
 from imubench_pipeline.report.practical import System, choose_page_unit
 from imubench_pipeline.report.terminal import (
@@ -22,17 +24,34 @@ from imubench_pipeline.report.terminal import (
     select_of,
 )
 from imubench_pipeline.settings.sensor import quantity_of
+from imubench_pipeline.tables.findings import LEFT_OUT
 from imubench_pipeline.words.estimates import symbol_text
-from imubench_pipeline.words.events import events_text, state_text
-from imubench_pipeline.words.numbers import NO_VALUE, Unit, counted
+from imubench_pipeline.words.events import (
+    events_text,
+    longer_log_text,
+    motion_text,
+    read_data,
+    reason_text,
+    state_text,
+)
+from imubench_pipeline.words.findings import FINDINGS
+from imubench_pipeline.words.numbers import NO_VALUE, Unit, counted, join_names
 
 SHOWN = ("N", "B_curve", "K", "sigma_min")
 _MAX_EVENTS = 3
 _MAX_EVENT_LINES = 4
 _CHANNEL_WIDTH = 8
 _CELL_WIDTH = 18
+_MAX_WIDTH = 80
 _SUDDEN = ("bias_step", "step")
 _MAX_PAUSE = 30.0  # s, between findings of one disturbance
+_MAX_MOVED_SHARE = 0.05  # of a log whose parameters are shown
+_REMOVED = ("bias_step", "warm_up_drift", "periodic_drift")
+_NOTES = ("slow_sampling", "band_limit", "noise_grows")  # listed after all warnings
+_SHARE_UNTIL_IDENTIFIED = 0.02
+"""Of the length that gives ± 10 %: until the limits have a ratio of 4, errors fall as its root."""
+
+_MAX_EFFECT = 3.0  # of the logarithm of a factor
 
 
 @dataclass(frozen=True)
@@ -46,28 +65,53 @@ class Event:
         """The channels concerned."""
         return tuple(dict.fromkeys(row.channel for row in self.findings if row.channel))
 
-    @property
-    def affects(self) -> frozenset[str]:
-        """The parameters with doubtful estimates."""
-        return frozenset(name for row in self.findings for name in row.affects)
+    def factors(self) -> dict[str, float] | None:
+        """Return by which parameters would change without its removal; None: not measured."""
+        largest: dict[str, float] = {}
+        measured = False
+        for row in self.findings:
+            own = getattr(read_data(row), "factors", None)
+            measured |= own is not None
+            for name, factor in (own or {}).items():
+                if _effect(factor) > _effect(largest.get(name, 1.0)):
+                    largest[name] = factor
+        return largest if measured else None
 
-    def rank(self) -> tuple[bool, int, int]:
-        """Return the place of the event: fatal ones first, then by affected figures."""
-        fatal = any(row.severity == "fatal" for row in self.findings)
-        return fatal, len(self.affects) * max(len(self.channels), 1), len(self.findings)
+    def score(self) -> float:
+        """Return the importance: first what forbids the use, then by effect and channels."""
+        if any(row.severity == "fatal" for row in self.findings):
+            return 1000.0
+        if any(FINDINGS[row.finding].unfit for row in self.findings):
+            return 100.0
+        channels = max(len(self.channels), 1)
+        if all(row.severity == "note" for row in self.findings):
+            return 1e-3 * channels if self.findings[0].finding in _NOTES else 0.0
+        factors = self.factors()
+        if factors is None:
+            affected = any(row.affects for row in self.findings)
+            return channels if affected else 0.01 * channels
+        return 0.1 + channels * max(map(_effect, factors.values()), default=0.0)
+
+
+def _effect(factor: float) -> float:
+    return min(abs(math.log(factor)), _MAX_EFFECT) if factor > 0.0 else _MAX_EFFECT
 
 
 def group_events(findings: Iterable[FindingRow]) -> list[Event]:
-    """Return the events of a recording, the most important first.
+    """Return the events of a recording that matter, the most important first.
 
     Sudden findings of all channels are one disturbance if less than 30 s lie between them. Other
-    findings are one event if they are of the same kind.
+    findings are one event if they are of the same kind. Notes are listed last, and signals without
+    an effect are left out.
     """
     sudden: list[FindingRow] = []
     groups: dict[str, list[FindingRow]] = defaultdict(list)
     for row in findings:
         timed = row.finding in _SUDDEN and row.start is not None
-        (sudden if timed else groups[row.finding]).append(row)
+        if not timed:
+            groups[f"{row.finding} {row.severity}"].append(row)
+        elif row.severity != "note":
+            sudden.append(row)
     disturbances: list[list[FindingRow]] = []
     end = -float("inf")
     for row in sorted(sudden, key=lambda row: row.start or 0.0):
@@ -76,13 +120,14 @@ def group_events(findings: Iterable[FindingRow]) -> list[Event]:
         disturbances[-1].append(row)
         end = max(end, row.end or row.start or 0.0)
     events = [Event(tuple(group)) for group in (*groups.values(), *disturbances)]
-    return sorted(events, key=Event.rank, reverse=True)
+    return sorted((one for one in events if one.score() > 0.0), key=Event.score, reverse=True)
 
 
 def render_log_screen(
     tables: Mapping[str, pa.Table], system: System, width: int
 ) -> Iterator[RenderableType]:
     """Yield the screen of each of a few logs, at most 40 lines each for six axes."""
+    width = min(width, _MAX_WIDTH)
     every_finding = FindingRow.rows_of(tables["findings"])
     every_parameter = ParameterRow.rows_of(tables["parameters"])
     allan = AllanRow.rows_of(tables["allan"])
@@ -90,34 +135,70 @@ def render_log_screen(
         findings = select_of(row, every_finding)
         parameters = [each for each in select_of(row, every_parameter) if each.recommended]
         length = describe_length(row, parameters, select_of(row, allan))
-        yield Text(run_summary.fold_text(state_text(row, length)), style="bold")
+        yield Text(_fold(state_text(row, length), width, 6), style="bold")
         if row.status != "ok":
             yield Text()
             continue
-        for quantity, title in TITLES.items():
-            lines = [line for line in parameters if quantity_of(line.channel) == quantity]
-            if lines:
-                yield Text("\n".join(_tabulate(title, quantity, lines, system)) + "\n")
-        if not parameters:
-            yield explain_no_estimates(row)
-        events = group_events(run_summary.select_warnings(findings))
-        yield from _list_events(events, len(findings), width)
+        motion = [each for each in findings if each.finding == "motion"]
+        moved = [(each.start or 0.0, each.end or 0.0) for each in motion]
+        rest = find_still_spans(moved, 0.0, row.duration or 0.0)
+        if motion:
+            channels = list(dict.fromkeys(each.channel for each in motion if each.channel))
+            yield Text(_fold(motion_text(channels, _merge(moved), rest), width, 6))
+        elif reason := reason_text(row):
+            yield Text(_fold(reason, width, 2))
+        at_rest = sum(stop - start for start, stop in rest)
+        shown = not motion or at_rest > (1.0 - _MAX_MOVED_SHARE) * (row.duration or 0.0)
+        if shown:
+            for quantity, title in TITLES.items():
+                lines = [line for line in parameters if quantity_of(line.channel) == quantity]
+                if lines:
+                    yield Text("\n".join(_tabulate(title, quantity, lines, system, row)))
+            if not parameters:
+                yield explain_no_estimates(row)
+        others = [each for each in findings if each.finding not in (*LEFT_OUT, "motion")]
+        yield from _list_events(others, system, width, _MAX_EVENTS if shown else 0)
+
+
+def _merge(spans: Iterable[tuple[float, float]]) -> list[tuple[float, float]]:
+    """Return spans in order, with those that touch joined."""
+    merged: list[tuple[float, float]] = []
+    for start, stop in sorted(spans):
+        if merged and start <= merged[-1][1]:
+            merged[-1] = merged[-1][0], max(stop, merged[-1][1])
+        else:
+            merged.append((start, stop))
+    return merged
+
+
+def _fold(text: str, width: int, lines: int, indent: str = "") -> str:
+    """Return a text in at most so many lines."""
+    text = run_summary.fold_text(text, 1000)
+    return "\n".join(wrap(text, width, subsequent_indent=indent, max_lines=lines, placeholder=" …"))
 
 
 def _tabulate(
-    title: str, quantity: str, rows: Sequence[ParameterRow], system: System
+    title: str, quantity: str, rows: Sequence[ParameterRow], system: System, about: RecordingRow
 ) -> Iterator[str]:
     """Yield the lines of a table: a value for each axis, its 95 % interval below."""
     units = {symbol: choose_page_unit(quantity, symbol, system) for symbol in SHOWN}
     yield f"{title}: 95 % intervals below; ?: doubtful; <: upper limit"
     yield _line("", (f"{symbol_text(symbol)}, {units[symbol].sign}" for symbol in SHOWN))
     by_channel: dict[str, dict[str, ParameterRow]] = defaultdict(dict)
+    needed: dict[str, list[float]] = defaultdict(list)
     for row in rows:
         by_channel[row.channel].setdefault(row.parameter, row)
+        time = _SHARE_UNTIL_IDENTIFIED * (row.duration_needed or 0.0)
+        if row.parameter in SHOWN and row.value is None and time > (about.duration or 0.0):
+            needed[symbol_text(row.parameter)].append(time)
     for channel, own in by_channel.items():
         cells = [_cell(own.get(symbol), units[symbol]) for symbol in SHOWN]
         yield _line(channel, (value for value, _ in cells))
-        yield _line("", (interval for _, interval in cells))
+        if any(interval for _, interval in cells):
+            yield _line("", (interval for _, interval in cells))
+    if needed:
+        times = {symbol: (min(own), max(own)) for symbol, own in needed.items()}
+        yield _fold(longer_log_text(times), _MAX_WIDTH, 2)
 
 
 def _line(name: str, cells: Iterable[str]) -> str:
@@ -137,19 +218,18 @@ def _cell(row: ParameterRow | None, unit: Unit) -> tuple[str, str]:
     return f"< {unit.text(row.upper, unit.digits(None, None, row.upper))}", ""
 
 
-def _list_events(events: Sequence[Event], findings: int, width: int) -> Iterator[Text]:
+def _list_events(
+    findings: Sequence[FindingRow], system: System, width: int, most: int
+) -> Iterator[Text]:
     """Yield the most important events, and the number of the others."""
-    for number, event in enumerate(events[:_MAX_EVENTS], start=1):
-        text = run_summary.fold_text(events_text(event.findings), 400)
-        lines = wrap(
-            f"{number}. {text}",
-            width,
-            subsequent_indent="   ",
-            max_lines=_MAX_EVENT_LINES,
-            placeholder=" …",
-        )
-        yield Text("\n".join(lines))
-    shown = sum(len(event.findings) for event in events[:_MAX_EVENTS])
-    if findings > shown:
-        yield Text(f"{counted(findings - shown, 'other finding')} and all parameters: --verbose")
-    yield Text()
+    events = group_events(findings)[:most]
+    for number, event in enumerate(events, start=1):
+        text = f"{number}. {events_text(event.findings, system, event.factors())}"
+        yield Text(_fold(text, width, _MAX_EVENT_LINES, "   "))
+    shown = sum(len(event.findings) for event in events)
+    removed = sum(row.severity == "note" and row.finding in _REMOVED for row in findings)
+    counts = [f"{counted(removed, 'signal')} removed without effect on a parameter"] * (removed > 0)
+    if others := len(findings) - shown - removed:
+        counts.append(counted(others, "other finding"))
+    rest = f"{join_names(counts)}; all" if counts else "All"
+    yield Text(_fold(f"{rest} findings and parameters: --verbose", width, 2) + "\n")

@@ -46,6 +46,9 @@ class QualitySettings(Strict):
         8.0, gt=1, description="times the usual drift from which the beginning is a warm-up"
     )
     trim_warm_up: bool = Field(False, description="leave the warm-up out of the analysis")
+    at_rest: bool = Field(
+        False, description="analyse the longest part at rest of a log in which the sensor was moved"
+    )
     variance_ratio: float = Field(
         1.5,
         gt=1,

@@ -1,7 +1,7 @@
 """The estimates of one channel by every method, as rows of the tables."""
 
 import json
-from collections.abc import Callable, Container, Iterable, Iterator
+from collections.abc import Callable, Container, Iterable, Iterator, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from functools import partial
 from pathlib import Path
@@ -16,7 +16,11 @@ from imubench_pipeline.estimators import least_squares, likelihood, rows
 from imubench_pipeline.estimators.agreement import doubt_contradicted, yield_disagreements
 from imubench_pipeline.estimators.curve_limits import add_fitted_limits
 from imubench_pipeline.estimators.deterministic.courses import find_deterministic_signals
-from imubench_pipeline.estimators.deterministic.verdict import assess_signals, tabulate_signals
+from imubench_pipeline.estimators.deterministic.verdict import (
+    assess_signals,
+    state_effects,
+    tabulate_signals,
+)
 from imubench_pipeline.estimators.estimate import (
     PARAMETERS,
     SI_UNITS,
@@ -45,6 +49,7 @@ from imubench_pipeline.estimators.thermal.path import (
 )
 from imubench_pipeline.model import estimates as model
 from imubench_pipeline.model.recordings import FindingRow
+from imubench_pipeline.noise import Sinusoid
 from imubench_pipeline.noise.simulate import channel_rng
 from imubench_pipeline.recordings.kept import load_static_logs
 from imubench_pipeline.recordings.recording import ChannelLog, average_blocks
@@ -98,7 +103,7 @@ def estimate_channel(
     `curve`: with limits by the identified power laws; `bandwidth`: known cut-off of the sensor, Hz.
     """
     channel = _Channel(key, log, curve, settings, bandwidth)
-    verdict = assess_signals(key.channel, channel.signals)
+    verdict = assess_signals(key.channel, channel.signals, has_temperature=bool(log.temperature))
     into.deterministic += tabulate_signals(asdict(key), channel.unit, channel.signals)
     into.add_findings(key, verdict.findings)
     estimates = channel.by_curve()
@@ -222,6 +227,21 @@ class _Channel:
                     into.allan_compensated.append(row)
         return estimates
 
+    def state_effects(
+        self, findings: Sequence[Finding], estimate: Estimate | None
+    ) -> Sequence[Finding]:
+        """Return findings with the effect of the removal of the signals on the parameters."""
+        if estimate is None or self.fitted is None or not self.signals.signals:
+            return findings
+        try:
+            without = robust.fit_values(self.curve, self._noise_lines(self.fitted))
+        except least_squares.UnfitCurveError:
+            return findings
+        return state_effects(findings, estimate, without, self.mean)
+
+    def _noise_lines(self, fitted: Likelihood) -> list[Sinusoid]:
+        return [line.term for line in fitted.lines if line.kind != "alias"]
+
     def _fit_robustly(
         self, blocks: Callable[[], Iterator[Array]], curve: AllanCurve, fitted: Likelihood
     ) -> Estimate:
@@ -234,9 +254,10 @@ class _Channel:
             gaps=there.gaps if there else NO_GAPS,
             segments=log.segments,
         )
-        lines = [line.term for line in fitted.lines if line.kind != "alias"]
         try:
-            estimate = robust.fit(curve, parts, lines, rng=self._stream("robust"))
+            estimate = robust.fit(
+                curve, parts, self._noise_lines(fitted), rng=self._stream("robust")
+            )
         except least_squares.UnfitCurveError as error:
             return not_shown("robust", str(error))
         return replace(estimate, lines=select_sinusoids(fitted.lines))

@@ -106,6 +106,7 @@ def join_tables(
     return mark_failures(joined, failures)
 
 
+_EXPLAINING = ("motion", "suspicious_unit", "slow_sampling", "turning")
 _KIND_OF_FINDING = {"step": "bias_step", "warm_up": "warm_up_drift"}
 """Kind in ``deterministic``, with a size, of findings that the ingest also reports."""
 
@@ -133,7 +134,22 @@ def collect_findings(
     found = list(of_logs)
     for quality in qualities:
         found += implausible_of(quality, sensors.get(quality.recording.sensor))
-    return [*found, *of_estimates, *unusual_rows(estimated, sensors, usual)]
+    return [*found, *of_estimates, *unusual_rows(_judged(estimated, found), sensors, usual)]
+
+
+def _judged(
+    estimated: Iterable[model.ParameterRow], findings: Iterable[FindingRow]
+) -> Iterator[model.ParameterRow]:
+    """Yield the figures whose size is not explained by motion, units or slow sampling."""
+    explained = {
+        (f.sensor, f.recording, None if f.finding in _EXPLAINING else f.channel)
+        for f in findings
+        if f.finding in (*_EXPLAINING, "suspicious_unit")
+    }
+    for row in estimated:
+        place = row.sensor, row.recording
+        if not {(*place, row.channel), (*place, None)} & explained:
+            yield row
 
 
 def drop_duplicate_findings(

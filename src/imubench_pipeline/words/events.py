@@ -2,19 +2,24 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping, Sequence
 
 from imubench_pipeline.model.recordings import FindingRow, RecordingRow
 from imubench_pipeline.model.states import Fitness
-from imubench_pipeline.words.findings.base import channel_name, unit_of
-from imubench_pipeline.words.numbers import counted, join_names
-from imubench_pipeline.words.verdicts import doubts_text
+from imubench_pipeline.words.findings import FINDINGS, FindingData
+from imubench_pipeline.words.findings.base import System, channel_name, unit_of, units_of
+from imubench_pipeline.words.findings.changes import removal_text
+from imubench_pipeline.words.numbers import counted, duration_text, join_names, number_text
+from imubench_pipeline.words.verdicts import doubt_text, doubts_text
 
 _STATES: Mapping[Fitness | None, str] = {
     "fit": "usable",
     "fit with doubts": "usable, with doubts",
-    "unfit": "not usable",
+    "unfit": "not used",
 }
+_MAX_SPANS = 4
+Span = tuple[float, float]
 
 
 def state_text(row: RecordingRow, length: str) -> str:
@@ -22,20 +27,73 @@ def state_text(row: RecordingRow, length: str) -> str:
     if row.status != "ok":
         return f"{row.recording}: {row.status}: {row.reason or 'no reason is known'}"
     state = _STATES.get(row.fitness, "not judged")
-    if row.fitness == "unfit":
-        state += f": {doubts_text(row.doubts)}"
     return f"{row.recording}: {state}; {length}".removesuffix("; ")
 
 
-def events_text(findings: Sequence[FindingRow]) -> str:
-    """Return an event in sentences: a single finding as it is, several in one sentence."""
-    first = findings[0]
+def reason_text(row: RecordingRow) -> str:
+    """Return why a recording is not used, or doubted; empty if it is neither."""
+    return doubts_text(row.doubts, most=2)
+
+
+def motion_text(channels: Sequence[str], moved: Sequence[Span], still: Sequence[Span]) -> str:
+    """Return that the sensor was not at rest, its rests, and how to use them."""
+    names = join_names([channel_name(channel) for channel in channels])
+    where = f"the sensor was moved ({names}) at {_spans_text(moved)}"
+    if not still:
+        return (
+            f"Not at rest: {where}, all of the log. Record it again, with the sensor on a heavy "
+            "table. If it lay still, its unit is wrong"
+        )
+    return (
+        f"Not at rest: {where}. At rest: {_spans_text(still)}. Analyse the longest rest with "
+        "--at-rest"
+    )
+
+
+def _spans_text(spans: Sequence[Span]) -> str:
+    shown = [f"{number_text(a)} to {number_text(b)} s" for a, b in spans[:_MAX_SPANS]]
+    more = len(spans) - len(shown)
+    return join_names([*shown, f"{more} more"] if more else shown)
+
+
+def longer_log_text(times: Mapping[str, tuple[float, float]]) -> str:
+    """Return how long logs would determine parameters; ``times``: least and most by symbol, s."""
+    parts = []
+    for symbol, (least, most) in times.items():
+        low, high = duration_text(least, 1), duration_text(most, 1)
+        parts.append(f"{symbol} needs {low}" + f" to {high}" * (low != high))
+    return f"{join_names(parts)} of data, or more"
+
+
+def read_data(row: FindingRow) -> FindingData | None:
+    """Return the data of a finding; None if it has none."""
+    return FINDINGS[row.finding](**json.loads(row.data)) if row.data else None
+
+
+def finding_text(row: FindingRow, system: System) -> str:
+    """Return a finding in sentences, in practical or SI units."""
+    if system == "practical" or (data := read_data(row)) is None:
+        return row.detail
+    with units_of(system):
+        return data.text(row.channel or "")
+
+
+def events_text(
+    findings: Sequence[FindingRow],
+    system: System = "practical",
+    factors: Mapping[str, float] | None = None,
+) -> str:
+    """Return an event in sentences: a single finding as it is, several in one sentence.
+
+    ``factors``: by which parameters would change without the removal of the event.
+    """
+    first = max(findings, key=lambda row: abs(row.value or 0.0))
     if len(findings) == 1:
-        return first.detail
-    names = list(dict.fromkeys(channel_name(row.channel) for row in findings if row.channel))
+        return finding_text(first, system)
+    names = list(dict.fromkeys(row.channel for row in findings if row.channel))
     if first.finding != "bias_step":
-        kind = first.finding.replace("_", " ").capitalize()
-        return f"{kind} on {join_names(names)}. {first.detail}"
+        doubt = doubt_text(first.finding, names)
+        return f"{doubt[:1].upper()}{doubt[1:]}. {finding_text(first, system)}"
     starts = [row.start for row in findings if row.start is not None]
     ends = [row.end for row in findings if row.end is not None]
     when = f"{min(starts):.0f} s"
@@ -43,7 +101,8 @@ def events_text(findings: Sequence[FindingRow]) -> str:
         when = f"{min(starts):.0f} to {max(ends):.0f} s"
     sizes = []
     for quantity in dict.fromkeys((row.channel or "").partition("_")[0] for row in findings):
-        unit = unit_of(quantity, "level")
+        with units_of(system):
+            unit = unit_of(quantity, "level")
         own = [
             abs(row.value)
             for row in findings
@@ -51,8 +110,18 @@ def events_text(findings: Sequence[FindingRow]) -> str:
         ]
         low, high = unit.text(min(own), 2), unit.text(max(own), 2)
         sizes.append(f"{low} to {high} {unit.sign}" if low != high else f"{low} {unit.sign}")
+    returned = ", which return" * _do_steps_return(findings)
     return (
         f"Disturbed at {when}: {counted(len(findings), 'bias step')} of {join_names(sizes)} "
-        f"({join_names(names)}). They are removed from the noise. Look for a touched table, a "
-        "supply that changes, or a loose connection"
+        f"({join_names([channel_name(name) for name in names])}){returned}. They are removed from "
+        f"the noise{removal_text(factors)}. Look for a touched table, a supply that changes, or a "
+        "loose connection"
     )
+
+
+def _do_steps_return(findings: Sequence[FindingRow]) -> bool:
+    """Return whether the steps of each channel add up to less than half of the largest."""
+    sizes: dict[str | None, list[float]] = {}
+    for row in findings:
+        sizes.setdefault(row.channel, []).append(row.value or 0.0)
+    return all(len(own) > 1 and abs(sum(own)) < 0.5 * max(map(abs, own)) for own in sizes.values())

@@ -96,14 +96,14 @@ def _find_first_digit(value: float) -> int:
     return math.floor(math.log10(value) + 1e-9)
 
 
-def duration_text(seconds: float | None) -> str:
+def duration_text(seconds: float | None, digits: int = 3) -> str:
     """Return a time in a suitable unit; `NO_VALUE` if there is none."""
     if seconds is None:
         return NO_VALUE
     for size, name in ((86400.0, "days"), (3600.0, "h"), (60.0, "min")):
         if seconds >= 2.0 * size:
-            return f"{number_text(seconds / size, 3)} {name}"
-    return f"{number_text(seconds, 3)} s"
+            return f"{number_text(seconds / size, digits)} {name}"
+    return f"{number_text(seconds, digits)} s"
 
 
 def rates_text(rate: float | None, of_channels: Iterable[float]) -> str:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+import json
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 
 from imubench_pipeline.estimators.deterministic.courses import DeterministicSignals
@@ -11,7 +12,7 @@ from imubench_pipeline.estimators.deterministic.search import MAX_REGRESSORS
 from imubench_pipeline.estimators.estimate import CURVE, SIGMAS, Estimate, Parameter
 from imubench_pipeline.model.estimates import DeterministicRow
 from imubench_pipeline.tables.findings import Finding, find
-from imubench_pipeline.words.findings.base import FindingData
+from imubench_pipeline.words.findings.base import SLOW, WHITE, FindingData
 from imubench_pipeline.words.findings.changes import (
     BiasStep,
     NoiseTrend,
@@ -19,6 +20,9 @@ from imubench_pipeline.words.findings.changes import (
     TelegraphNoise,
     WarmUpDrift,
 )
+
+_KINDS = {kind.code: kind for kind in (BiasStep, WarmUpDrift, PeriodicDrift)}
+_MIN_EFFECT = 0.1  # of the interval of a value, or of the mean
 
 
 @dataclass(frozen=True)
@@ -49,7 +53,9 @@ class Verdict:
         )
 
 
-def assess_signals(channel: str, signals: DeterministicSignals) -> Verdict:
+def assess_signals(
+    channel: str, signals: DeterministicSignals, *, has_temperature: bool = False
+) -> Verdict:
     """Return the findings of a channel, and the doubt about its slow terms."""
     if signals.means is None or signals.searched is None:
         return Verdict(())
@@ -58,9 +64,11 @@ def assess_signals(channel: str, signals: DeterministicSignals) -> Verdict:
         size = (signal.size, signal.size_lower, signal.size_upper)
         time = (signal.time or 0.0, signal.time_lower or 0.0, signal.time_upper or 0.0)
         change: FindingData = BiasStep(*size, signal.start, signal.place_error or 0.0)
-        if signal.kind != "bias_step":
-            kind = WarmUpDrift if signal.kind == "warm_up_drift" else PeriodicDrift
-            change = kind(*size, *time)
+        if signal.kind == "warm_up_drift":
+            change = WarmUpDrift(*size, *time)
+        elif signal.kind == "periodic_drift":
+            cycles = (signal.end - signal.start) / time[0]
+            change = PeriodicDrift(*size, *time, cycles=cycles, has_temperature=has_temperature)
         place = channel, signal.start, signal.end
         findings.append(find(change, "warning", signal.size, *place))
     steady = assess_stationarity(signals.means)
@@ -72,6 +80,52 @@ def assess_signals(channel: str, signals: DeterministicSignals) -> Verdict:
         findings.append(find(many, "warning", float(MAX_REGRESSORS), channel))
         return Verdict(tuple(findings), findings[-1].detail)
     return Verdict(tuple(findings))
+
+
+def state_effects(
+    findings: Iterable[Finding],
+    estimate: Estimate,
+    without: Mapping[str, float],
+    mean: float,
+) -> tuple[Finding, ...]:
+    """Return findings that state how parameters would change without the removal of signals.
+
+    A signal that changes no value by more than a tenth of its interval casts no doubt. ``without``:
+    values of `imubench_pipeline.estimators.robust.fit.fit_values` from the log with all signals;
+    ``mean``: of the log, SI.
+    """
+    known = {**estimate.parameters, **estimate.curve}
+    factors = {}
+    for name in sorted(SLOW | WHITE):
+        factor = _change_factor(known.get(name), without.get(name))
+        if factor is not None:
+            factors[name] = factor
+    stated = []
+    for finding in findings:
+        kind = _KINDS.get(finding.finding)
+        if kind is not None and finding.data is not None:
+            data = replace(kind(**json.loads(finding.data)), factors=factors)
+            of_bias = finding.finding != PeriodicDrift.code and (
+                abs(finding.value) > _MIN_EFFECT * abs(mean)
+            )
+            affects = (*factors, "bias") if of_bias else tuple(factors)
+            place = finding.channel, finding.start, finding.end
+            own = find(data, "warning" if affects else "note", finding.value, *place)
+            finding = replace(own, affects=tuple(sorted(affects)))
+        stated.append(finding)
+    return tuple(stated)
+
+
+def _change_factor(parameter: Parameter | None, without: float | None) -> float | None:
+    """Return the value without the removal over the estimate, if it differs by a tenth of it."""
+    if parameter is None or without is None or parameter.upper is None:
+        return None
+    if parameter.value is None:
+        beyond = without > (1.0 + _MIN_EFFECT) * parameter.upper > 0.0
+        return without / parameter.upper if beyond else None
+    width = parameter.upper - (parameter.lower or 0.0)
+    beyond = abs(without - parameter.value) > _MIN_EFFECT * width
+    return without / parameter.value if beyond else None
 
 
 def tabulate_signals(

@@ -123,6 +123,41 @@ def fit(
     UnfitCurveError
         If fewer than six points lie within a sixth of the log, or the variance is 0 at one.
     """
+    inside, points, fitted = _fit_curve(curve, lines)
+    excesses = _estimate_excesses(points, fitted, parts.select(inside))
+    draws = _draw(points, fitted, excesses, rng)
+    estimate = _make_estimate(points, fitted, draws)
+    duration = curve.samples / curve.rate
+    parameters = _state_changes(estimate.parameters, excesses)
+    return replace(
+        estimate,
+        parameters={symbol: _add_length(one, duration) for symbol, one in parameters.items()},
+        curve={name: _add_length(one, duration) for name, one in estimate.curve.items()},
+    )
+
+
+def fit_values(curve: AllanCurve, lines: Sequence[Sinusoid] = ()) -> dict[str, float]:
+    """Return the values alone of `fit`, SI, by parameter: 0 where a term is absent.
+
+    Raises
+    ------
+    UnfitCurveError
+        As `fit`.
+    """
+    _, points, fitted = _fit_curve(curve, lines)
+    model, solution = fitted.model, fitted.solution
+    end = float(points.curve.tau[-1])
+    level = np.log(np.maximum(points.evaluate(solution), np.finfo(np.float64).tiny))
+    lowest = locate_minimum(level[None], points.curve.tau)[0][0]
+    bias = compute_curve_bias(convert_noise_model(model), end)[0][0]
+    values = {"N": model.N, "B": model.B, "T_B": model.T_B or 0.0, "K": model.K, "R": model.R}
+    return values | {"B_curve": float(bias), "sigma_min": float(lowest)}
+
+
+def _fit_curve(
+    curve: AllanCurve, lines: Sequence[Sinusoid]
+) -> tuple[NDArray[np.bool_], _Points, _Fitted]:
+    """Return which points are within a sixth of the log, these points, and the best model."""
     inside = curve.cluster_size <= LONGEST * curve.samples
     if inside.sum() < _MIN_POINTS:
         raise UnfitCurveError(texts.few_points(int(inside.sum()), LONGEST, _MIN_POINTS))
@@ -139,10 +174,7 @@ def fit(
         by_walk = fitted_without.model.K * np.sqrt(1.2 * curve.rate / curve.samples)
         if fitted.model.R <= _MIN_RAMP * by_walk:
             points, fitted = without, fitted_without
-    excesses = _estimate_excesses(points, fitted, parts.select(inside))
-    draws = _draw(points, fitted, excesses, rng)
-    estimate = _make_estimate(points, fitted, draws)
-    return replace(estimate, parameters=_state_changes(estimate.parameters, excesses))
+    return inside, points, fitted
 
 
 @dataclass(frozen=True)
@@ -200,6 +232,7 @@ class _Fitted:
     sampling: Array  # (m, m): covariance of the relative variances
     error: float  # relative, of the model
     weights: Array  # (r, m): the whitening before a correction of the short end
+    filtered: bool  # whether a correction is considered
 
     @property
     def model(self) -> NoiseModel:
@@ -214,13 +247,40 @@ def _fit_points(points: _Points) -> _Fitted:
     solution, expected, used = start.solution, start.expected, start.used
     error, whitening = _MAX_MODEL_ERROR, np.empty((0, 0))
     sampling = np.empty((0, 0))
-    for _ in range(_ROUNDS):
+    bent = start.bent
+    for turn in range(_ROUNDS):
         sampling = points.covariance(solution.model(), expected, curve.samples)
         error = _estimate_model_error(points, used, expected, np.diag(sampling))
         covariance = sampling + points.model_covariance(error)
         weights = _whiten(covariance * np.outer(expected, expected), used)
-        solution, expected, whitening = _fit_whitened(points, weights, start.bent)
-    return _Fitted(solution, used, expected, whitening, sampling, error, weights)
+        if turn == _ROUNDS - 1 and (bent or not used[0]):
+            one = points.variance[None]
+            _, chosen = _choose_correction(points, one, weights, points.search.solve(one, weights))
+            bent = bool(chosen[0])
+        solution, expected, whitening = _fit_whitened(points, weights, bent)
+    filtered = start.bent or not used[0]
+    return _Fitted(solution, used, expected, whitening, sampling, error, weights, filtered)
+
+
+def _choose_correction(
+    points: _Points, curves: Array, weights: Array, plain: Solutions
+) -> tuple[Solutions, NDArray[np.bool_]]:
+    """Return the fits to curves with the correction of the short end, and which are better.
+
+    ``plain``: the fits without.
+    """
+    column = points.curve.averaged**-2.0
+    image = weights @ column
+    free = weights - np.outer(image, image @ weights) / (image @ image)
+    bent = points.search.solve(curves, free)
+    of_bent = [
+        points.search.design(T) @ squares
+        for T, squares in zip(bent.times.tolist(), bent.squares, strict=True)
+    ]
+    size = (curves - of_bent) @ weights.T @ image / (image @ image)
+    first = int(np.flatnonzero(weights.any(axis=0))[0])
+    small = size * column[first] > -_MAX_CORRECTION * curves[:, first]
+    return bent, (plain.cost - bent.cost > _GAIN_OF_BEND) & small
 
 
 @dataclass(frozen=True)
@@ -326,7 +386,11 @@ def _draw(
     shift, scale = _chi_squared_logarithms(np.diag(covariance))
     spread = shift + (normal @ root.T) * scale
     curves = points.variance * np.exp(spread)
-    drawn = _solve_draws(points, curves, fitted)
+    drawn = points.search.solve(curves, fitted.weights)
+    if fitted.filtered:
+        bent, chosen = _choose_correction(points, curves, fitted.weights, drawn)
+        squares = np.where(chosen[:, None], bent.squares, drawn.squares)
+        drawn = replace(drawn, squares=squares, times=np.where(chosen, bent.times, drawn.times))
     spread = rng.standard_normal((_DRAWS // 2, 3))
     spread = rng.permutation(np.concatenate((spread, -spread)))
     factors = np.ones((_DRAWS, TERMS))
@@ -336,20 +400,6 @@ def _draw(
     step = np.log(points.search.times[1] / points.search.times[0])
     times = drawn.times * np.exp(step * rng.uniform(-0.5, 0.5, _DRAWS))  # between those tried
     return replace(drawn, squares=drawn.squares * factors, times=times)
-
-
-def _solve_draws(points: _Points, curves: Array, fitted: _Fitted) -> Solutions:
-    """Fit curves like the measured one; behind a filter, each chooses whether it is corrected."""
-    weights = fitted.weights
-    if fitted.used[0] and fitted.whitening is weights:  # no sign of a filter
-        return points.search.solve(curves, weights)
-    image = weights @ points.curve.averaged**-2.0
-    free = weights - np.outer(image, image @ weights) / (image @ image)
-    drawn, bent = points.search.solve(curves, weights), points.search.solve(curves, free)
-    chosen = drawn.cost - bent.cost > _GAIN_OF_BEND
-    squares = np.where(chosen[:, None], bent.squares, drawn.squares)
-    times = np.where(chosen, bent.times, drawn.times)
-    return Solutions(squares, times, drawn.cost)
 
 
 def _chi_squared_logarithms(relative: Array) -> tuple[Array, Array]:
@@ -397,6 +447,15 @@ def _state_changes(
         else one
         for symbol, one in parameters.items()
     }
+
+
+def _add_length(parameter: Parameter, duration: float) -> Parameter:
+    """Return a parameter with the log length that would give it to 10 %, if it has no value."""
+    value, upper = parameter.fitted, parameter.upper
+    if parameter.status != "not_identified" or not value or upper is None:
+        return parameter
+    half = (upper / value - 1.0) / 0.1  # its 95 % interval falls as the root of the length
+    return replace(parameter, duration_needed=duration * max(half, 1.0) ** 2)
 
 
 def _make_estimate(points: _Points, fitted: _Fitted, drawn: Solutions) -> Estimate:

@@ -17,10 +17,11 @@ from numpy.typing import NDArray
 from imubench_pipeline.model.states import Severity
 from imubench_pipeline.recordings.quality import copies, joined, levels, summary
 from imubench_pipeline.recordings.quality.copies import find_shared_noise
+from imubench_pipeline.recordings.quality.rest import find_motion
 from imubench_pipeline.recordings.quality.summary import BlockStatistics, compute_finite_median
 from imubench_pipeline.recordings.recording import BESIDE
 from imubench_pipeline.settings.quality import QualitySettings
-from imubench_pipeline.settings.sensor import TEMPERATURE
+from imubench_pipeline.settings.sensor import TEMPERATURE, quantity_of
 from imubench_pipeline.tables.findings import Finding, find
 from imubench_pipeline.words.findings import samples
 
@@ -190,7 +191,7 @@ def check_columns(
         if held is not None:
             periodic = samples.HeldSamples(held.every, held.share)
             findings.append(find(periodic, "warning", held.every, channel))
-        rounded = _is_rounding_dominant(steps[channel]) or _has_few_levels(steps[channel], settings)
+        rounded = _is_rounding_dominant(steps[channel])
         beyond, chance = estimate_excess_repeats(column)
         if beyond > settings.repeated and not (held or rounded):
             share = column.repeats / max(column.present - 1, 1)
@@ -239,7 +240,7 @@ def _find_bad_values(
     settings: QualitySettings,
 ) -> Iterator[Finding]:
     """Yield findings about quantisation, and about stuck, saturated or too frequent values."""
-    if steps is not None and _has_few_levels(steps, settings):
+    if steps is not None and _has_only_rounding(steps, settings):
         coarse = samples.Coarse(steps.levels, steps.step, settings.fewest_levels, steps.hidden)
         yield find(coarse, "warning", steps.levels, channel)
     elif steps is not None and steps.over_noise > settings.step_over_noise:
@@ -281,16 +282,24 @@ def _find_changes(
     # On the edge between two values of a coarse register the spread is half a step, and the mean
     # of a block moves by up to one step.
     step_size = steps.step if steps is not None and _is_rounding_dominant(steps) else 0.0
-    for first, last in find_motion(blocks, settings.motion, 0.75 * step_size):
-        if any(first - step.window <= step.sample <= last + step.window for step in moves):
+    quantity = quantity_of(channel)
+    moved = find_motion(column, quantity, rate, settings.motion, 0.75 * step_size)
+    spans = []
+    for first, last in moved:
+        near = (first - step.window <= step.sample <= last + step.window for step in moves)
+        if last - first <= _MAX_BLOCKS_OF_STEP * blocks.size and any(near):
             continue  # the spread is large because of the step
         begin, end, length = first / rate, last / rate, (last - first) / rate
         yield find(samples.Motion(begin, end), "warning", length, channel, begin, end)
+        spans.append((first - blocks.size, last + blocks.size))
     for step in moves:
-        if abs(step.size) < 1.5 * step_size:
+        in_motion = any(first <= step.sample <= last for first, last in spans)
+        if in_motion or abs(step.size) < 1.5 * step_size:
             continue
         at = step.sample / rate
         yield find(samples.Step(step.size, at, step.sigmas), "warning", step.size, channel, at, at)
+    if spans:  # which explain drifts and changes of the noise
+        return
     warm = find_warm_up(blocks, settings.warm_up)
     if warm is not None and abs(warm.drift) >= 1.5 * step_size:
         # Behind a coarse register the usual drift may be 0.
@@ -310,19 +319,16 @@ def _is_rounding_dominant(steps: levels.Quantisation | None) -> bool:
     return steps is not None and steps.over_noise > _MIN_STEP_WHERE_ROUNDING_DOMINATES
 
 
-def _has_few_levels(steps: levels.Quantisation | None, settings: QualitySettings) -> bool:
-    """Return whether a channel has so few levels that rounding dominates its noise."""
-    return steps is not None and round(steps.levels) < settings.fewest_levels
-
-
 def _has_only_rounding(steps: levels.Quantisation | None, settings: QualitySettings) -> bool:
     """Return whether a channel shows rounding noise only; then the finding ``coarse`` suffices."""
-    return _is_rounding_dominant(steps) and _has_few_levels(steps, settings)
+    if steps is None or not _is_rounding_dominant(steps):
+        return False
+    return round(steps.levels) < settings.fewest_levels
 
 
 _NUMBER_OF_PARTS = 20
 _MIN_BLOCKS_PER_PART = 8  # least number of blocks in a part; a shorter recording is not tested
-_MAX_MOTION_CREST_FACTOR = 6.0  # of extremes over deviation; a knock exceeds it
+_MAX_BLOCKS_OF_STEP = 3  # in which a step makes the spread large
 _SD_OVER_MAD = 1.4826  # standard deviation over the median absolute deviation, of normal noise
 
 
@@ -410,22 +416,3 @@ def find_variance_change(blocks: BlockStatistics) -> tuple[float, int, int] | No
         return None
     records = size * blocks.size
     return float(spreads[noisy]) / calm, noisy * records, (noisy + 1) * records
-
-
-def find_motion(blocks: BlockStatistics, times: float, least: float = 0.0) -> list[tuple[int, int]]:
-    """Return the parts (first, one past last record) with a large deviation that no knock explains.
-
-    ``times``, ``least``: lower limits of the standard deviation, over its median and in SI.
-    """
-    usual = compute_finite_median(blocks.spread)
-    if not usual > 0.0:
-        return []
-    reach = np.maximum(blocks.high - blocks.mean, blocks.mean - blocks.low)
-    shaken = np.flatnonzero(
-        (blocks.spread > max(times * usual, least))
-        & (reach < _MAX_MOTION_CREST_FACTOR * blocks.spread)
-    )
-    if len(shaken) == 0:
-        return []
-    groups = np.split(shaken, np.flatnonzero(np.diff(shaken) > 2) + 1)
-    return [(int(group[0]) * blocks.size, (int(group[-1]) + 1) * blocks.size) for group in groups]

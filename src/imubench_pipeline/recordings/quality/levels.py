@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.stats import norm
 
 from imubench_pipeline.recordings.quality.summary import (
     ColumnSummary,
@@ -269,6 +270,23 @@ def bound_noise_density(column: ColumnSummary, rate: float) -> tuple[float, floa
     return min(spread, slow), max(spread, slow, least_bit / math.sqrt(12.0 * rate))
 
 
+def _is_end_of_range(column: ColumnSummary, limit: float, noise: float) -> bool:
+    """Return whether the samples at an extreme belong to the distribution of the others.
+
+    A saturated sensor stays at the limit, or comes from the levels just inside: of normal noise
+    with a share p beyond z sigma, those within one sigma are Q(z - 1) / p - 1 times as many.
+    """
+    values = np.concatenate([piece.present for piece in column.excerpts()])
+    there = values == limit
+    number = int(there.sum())
+    if 4 * np.count_nonzero(there[1:] & there[:-1]) > number:
+        return True
+    inside = np.count_nonzero(np.abs(values - limit) <= noise) - number
+    share = number / len(values)
+    expected = norm.sf(norm.isf(share) - 1.0) / share - 1.0
+    return bool(2 * inside > expected * number)
+
+
 def compute_longest_chance_run(column: ColumnSummary) -> float:
     """Return the longest run of one value that may occur by chance, in samples."""
     share = min(column.repeats / max(column.present - 1, 1), 0.999)
@@ -301,7 +319,10 @@ def _is_cut_off(column: ColumnSummary, steps: Quantisation | None, side: str, nu
         return True
     at, counts = _count_values(column)
     last, following = (0, 1) if side == "lowest" else (-1, -2)
-    if len(at) < 2 or at[last] != (column.low if side == "lowest" else column.high):
+    limit = column.low if side == "lowest" else column.high
+    if len(at) < 2 or at[last] != limit:
         return True
+    if not _is_end_of_range(column, limit, estimate_noise(column)):
+        return False
     beyond = number * counts[last] / counts[following] * math.exp(-(steps.over_noise**2))
     return bool(beyond > _MIN_MISSING_SAMPLES)

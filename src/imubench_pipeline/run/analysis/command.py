@@ -48,6 +48,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--rate", metavar="FREQUENCY", help="of a log without stamps, as '100 Hz'")
     parser.add_argument("--gyro-unit", metavar="UNIT", help="unit, if the log does not state it")
     parser.add_argument("--accel-unit", metavar="UNIT", help="unit, if the log does not state it")
+    parser.add_argument(
+        "--at-rest",
+        action="store_true",
+        help="analyse the longest part of each log in which the sensor was not moved",
+    )
     add_output(
         parser,
         "--output",
@@ -113,7 +118,12 @@ def _run(arguments: argparse.Namespace, compiling: Compilation) -> int:
             stated = Stated(arguments.rate, arguments.gyro_unit, arguments.accel_unit)
             catalogue = list_folders(Run().sensors, "sensors")
             paths = lay_out(arguments.logs, arguments.sensor, stated, catalogue, Path(folder))
-            plan = Plan({**read_config(arguments.config), **paths})
+            config = {**read_config(arguments.config), **paths}
+            quality = config.get("quality")
+            if arguments.at_rest:
+                own = quality if isinstance(quality, dict) else {}
+                config["quality"] = {**own, "at_rest": True}
+            plan = Plan(config)
         except ConfigError as error:
             raise CommandError(f"imubench analyse: {error}") from None
         analysis = Analysis(plan, compiling, arguments.cores, _say)

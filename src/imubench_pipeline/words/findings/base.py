@@ -13,7 +13,9 @@ The check that finds it passes the data to `imubench_pipeline.tables.findings.fi
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from contextvars import ContextVar
 from dataclasses import dataclass
 from functools import cache
 from typing import ClassVar, Literal, dataclass_transform
@@ -94,6 +96,15 @@ def channel_name(channel: str) -> str:
 Kind = Literal["signal", "level", "density"]
 """What is shown: samples and their mean, the level of slow noise and bias, or white noise."""
 
+System = Literal["practical", "si"]
+_system: ContextVar[System] = ContextVar("system", default="practical")
+
+_SI_SIGNS: Mapping[str, str] = {
+    "angular_rate": "rad/s",
+    "gyro_density": "rad/s/√Hz",
+    "acceleration": "m/s²",
+    "accel_density": "m/s²/√Hz",
+}
 _UNITS: Mapping[tuple[str, Kind], tuple[str, str]] = {
     ("gyro", "signal"): ("°/s", "angular_rate"),
     ("gyro", "level"): ("°/h", "angular_rate"),
@@ -104,10 +115,26 @@ _UNITS: Mapping[tuple[str, Kind], tuple[str, str]] = {
 }
 
 
-@cache
+@contextmanager
+def units_of(system: System) -> Iterator[None]:
+    """Make the sentences of this thread use practical or SI units."""
+    token = _system.set(system)
+    try:
+        yield
+    finally:
+        _system.reset(token)
+
+
 def unit_of(channel: str, kind: Kind) -> Unit:
     """Return the unit in which values of a channel, or of ``gyro`` or ``accel``, are shown."""
-    sign, dimension = _UNITS[channel.partition("_")[0], kind]
+    return _unit_of(channel.partition("_")[0], kind, _system.get())
+
+
+@cache
+def _unit_of(quantity: str, kind: Kind, system: System) -> Unit:
+    sign, dimension = _UNITS[quantity, kind]
+    if system == "si":
+        return Unit(_SI_SIGNS[dimension], 1.0)
     return Unit(sign, convert_from_si(1.0, sign, dimension))
 
 

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
+from imubench_pipeline.words.estimates import symbol_text
 from imubench_pipeline.words.findings.base import (
     NONE,
     SLOW,
@@ -10,9 +13,31 @@ from imubench_pipeline.words.findings.base import (
     estimate_text,
     unit_of,
 )
-from imubench_pipeline.words.numbers import Unit, number_text, percent_text
+from imubench_pipeline.words.numbers import Unit, join_names, number_text, percent_text
 
 _SECONDS = Unit("s", 1.0)
+_MAX_PRINTED_FACTOR = 1000.0
+_MIN_CYCLES = 1.5  # in a log, of a drift that is called periodic
+
+
+def removal_text(factors: Mapping[str, float] | None) -> str:
+    """Return how parameters would change without the removal of a signal."""
+    if factors is None:
+        return ""
+    if not factors:
+        return ", which changes no parameter by more than a tenth of its interval"
+    parts = [
+        f"{symbol_text(name)} would be "
+        + (
+            "absent"
+            if factor == 0.0
+            else f"more than {number_text(_MAX_PRINTED_FACTOR)} times as large"
+            if factor > _MAX_PRINTED_FACTOR
+            else f"{number_text(factor, 2)} times as large"
+        )
+        for name, factor in factors.items()
+    ]
+    return f"; otherwise {join_names(parts)}"
 
 
 class BiasStep(FindingData, affects=SLOW | {"bias"}, doubt="the bias of {channels} steps"):
@@ -23,12 +48,15 @@ class BiasStep(FindingData, affects=SLOW | {"bias"}, doubt="the bias of {channel
     size_upper: float  # with 95 % limits, SI
     time: float  # s from the first sample
     time_error: float  # half width of the 95 % interval of the time, s
+    factors: dict[str, float] | None = None
+    """Of the parameters that change without the removal of all signals; None: not known."""
 
     def text(self, channel: str) -> str:
         size = estimate_text(self.size, self.size_lower, self.size_upper, unit_of(channel, "level"))
         return (
             f"The bias of {channel_name(channel)} steps by {size} at {number_text(self.time, 6)} s "
-            f"(± {number_text(self.time_error, 2)} s). The step is removed from the noise. "
+            f"(± {number_text(self.time_error, 2)} s). The step is removed from the noise"
+            f"{removal_text(self.factors)}. "
             "Look for a motion, a new range or a sudden change of temperature"
         )
 
@@ -44,13 +72,16 @@ class WarmUpDrift(
     time: float
     time_lower: float
     time_upper: float  # time constant, with 95 % limits, s
+    factors: dict[str, float] | None = None
+    """Of the parameters that change without the removal of all signals; None: not known."""
 
     def text(self, channel: str) -> str:
         size = estimate_text(self.size, self.size_lower, self.size_upper, unit_of(channel, "level"))
         time = estimate_text(self.time, self.time_lower, self.time_upper, _SECONDS)
         return (
             f"The bias of {channel_name(channel)} starts {size} from its final value. It settles "
-            f"with a time constant of {time}. The drift is removed from the noise. "
+            f"with a time constant of {time}. The drift is removed from the noise"
+            f"{removal_text(self.factors)}. "
             "Let the sensor warm up before recording"
         )
 
@@ -64,14 +95,24 @@ class PeriodicDrift(FindingData, affects=SLOW, doubt="the bias of {channels} osc
     time: float
     time_lower: float
     time_upper: float  # period, with 95 % limits, s
+    factors: dict[str, float] | None = None
+    """Of the parameters that change without the removal of all signals; None: not known."""
+    cycles: float | None = None  # in the log
+    has_temperature: bool = False  # whether the log has readings of the temperature
 
     def text(self, channel: str) -> str:
         size = estimate_text(self.size, self.size_lower, self.size_upper, unit_of(channel, "level"))
         time = estimate_text(self.time, self.time_lower, self.time_upper, _SECONDS)
+        if self.cycles is not None and self.cycles < _MIN_CYCLES:
+            motion = f"drifts slowly, like a part of a wave with an amplitude of {size}"
+        else:
+            motion = f"oscillates with an amplitude of {size} and a period of {time}"
+        advice = "Record at a steady temperature, or with readings of it"
+        if self.has_temperature:
+            advice = "Compare with the temperature, and with the method compensated"
         return (
-            f"The bias of {channel_name(channel)} oscillates with an amplitude of {size}. "
-            f"Its period is {time}. The oscillation is removed from the noise. "
-            "Record at a steady temperature, or with readings of it"
+            f"The bias of {channel_name(channel)} {motion}. It is removed from the noise"
+            f"{removal_text(self.factors)}. {advice}"
         )
 
 

@@ -48,6 +48,19 @@ class WarmUpTrimmed(FindingData, affects=NONE):
         )
 
 
+class PartAtRest(FindingData, affects=NONE):
+    """The longest part at rest, which is analysed alone."""
+
+    start: float
+    end: float
+
+    def text(self, channel: str) -> str:
+        return (
+            "The sensor was moved. Its longest rest is analysed alone, "
+            f"{number_text(self.start, 5)} to {number_text(self.end, 5)} s (quality.at_rest)"
+        )
+
+
 class ShortRecording(FindingData, affects=SLOW, doubt="the recording is short"):
     """A recording that is too short for slow noise."""
 

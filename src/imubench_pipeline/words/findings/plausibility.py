@@ -10,6 +10,7 @@ from imubench_pipeline.earth import STANDARD_GRAVITY
 from imubench_pipeline.settings.printed import SENSORS
 from imubench_pipeline.words.findings.base import (
     ALL,
+    NONE,
     POWERS_OF_TIME,
     POWERS_OF_UNIT,
     FindingData,
@@ -53,6 +54,37 @@ class RateImplausible(
         return text
 
 
+class SlowSampling(FindingData, affects=NONE):
+    """Samples so slow that noise of higher frequencies may be folded into N."""
+
+    rate: float  # Hz
+
+    def text(self, channel: str) -> str:
+        return (
+            f"The log has {number_text(self.rate)} samples a second, and most sensors are faster. "
+            "If samples were skipped and not averaged, noise of higher frequencies is folded into "
+            "N, which is then larger than the N of a data sheet. Log faster, or average before"
+        )
+
+
+class ImpossibleNoise(
+    FindingData, affects=ALL, unfit=True, doubt="the noise of {channels} is impossibly small"
+):
+    """Less noise than physics allows for any sensor of this kind."""
+
+    noise: float  # SI
+    least: float  # of known sensors, SI
+    sensors: int  # number of those sensors
+
+    def text(self, channel: str) -> str:
+        return (
+            f"The noise of {channel_name(channel)} is {value_text(self.noise, channel, 'density')},"
+            f" {number_text(self.least / self.noise, 2)} times below the least of {self.sensors} "
+            "sensors. No sensor is so quiet: the axis is dead, or its values were filled in or "
+            "computed. Check the column"
+        )
+
+
 class SuspiciousUnit(
     FindingData,
     affects=_OF_UNIT,
@@ -69,6 +101,7 @@ class SuspiciousUnit(
     noise: float | None = None  # white noise, SI, if it shows the mistake
     usual: tuple[float, float] | None = None  # usual limits of the white noise, SI
     printed: bool = False  # whether they are from the data sheet of the sensor, and not of any
+    mean: float | None = None  # rate of all gyros, rad/s, if it is unusual too
 
     def text(self, channel: str) -> str:
         name = channel_name(channel)
@@ -81,6 +114,8 @@ class SuspiciousUnit(
             assert self.usual is not None
             unit = unit_of(channel, "density")
             seen = f"its noise is {unit.text(self.noise)} {unit.sign}"
+            if self.mean is not None:
+                seen += f", and the mean rate {value_text(self.mean, channel, 'signal')}"
             limits = " to ".join(unit.text(limit) for limit in self.usual)
             usual = f"expected {limits} {'by its data sheet' if self.printed else 'for any gyro'}"
             mended = f"{unit.text(self.noise * self.factor)} {unit.sign}"

@@ -5,26 +5,27 @@ from __future__ import annotations
 from math import ceil
 from typing import Literal
 
-from imubench_pipeline.settings.sensor import QUANTITIES, TEMPERATURE, quantity_of
-from imubench_pipeline.units import convert_from_si
-from imubench_pipeline.words.findings.base import ALL, NONE, SLOW, WHITE, FindingData, channel_name
+from imubench_pipeline.settings.sensor import TEMPERATURE
+from imubench_pipeline.words.findings.base import (
+    ALL,
+    NONE,
+    SLOW,
+    WHITE,
+    FindingData,
+    channel_name,
+    value_text,
+)
 from imubench_pipeline.words.numbers import counted, join_names, number_text, percent_text
 
 Change = Literal["level", "noise", "steps"]
 """A property of the samples that changes where another sensor begins."""
 
 _CHANGES: dict[str, str] = {"level": "level", "noise": "noise", "steps": "resolution"}
-_UNITS = {"gyro": ("deg/s", "°/s"), "accel": ("mg", "mg")}
-"""Unit in which values of each quantity are printed, and its sign."""
-
 _ROUNDED = ". The values were rounded again afterwards"
 
 
 def _value_text(channel: str, value: float) -> str:
-    """Return a value of a channel, SI, in the unit of its quantity."""
-    quantity = quantity_of(channel)
-    unit, sign = _UNITS[quantity]
-    return f"{number_text(convert_from_si(value, unit, QUANTITIES[quantity]), 3)} {sign}"
+    return value_text(value, channel, "signal")
 
 
 def _at(seconds: float) -> str:
@@ -254,15 +255,15 @@ class PiledUp(FindingData, affects=ALL, doubt="one value is too frequent in {cha
 
 
 class Motion(FindingData, affects=ALL, unfit=True, doubt="the sensor was moved"):
-    """The sensor was shaken."""
+    """The sensor was moved."""
 
     start: float
     end: float
 
     def text(self, channel: str) -> str:
         return (
-            f"{channel_name(channel)} was shaken from {_at(self.start)} to {_at(self.end)}. Leave "
-            "this part out: 'use:' in the notes beside the log"
+            f"{channel_name(channel)} shows motion from {_at(self.start)} to {_at(self.end)}. "
+            "Leave it out: 'use:' in the notes beside the log, or quality.at_rest in the settings"
         )
 
 

@@ -1,0 +1,109 @@
+"""Find the parts of a log in which the sensor was moved.
+
+A sensor that is moved has slow and large signals. At rest the deviation of means of 0.1 to 3 s is
+far smaller than of single samples: also behind a low-pass filter, or in a wrong unit.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+
+import numpy as np
+
+from imubench_pipeline.recordings.quality.summary import (
+    BlockStatistics,
+    ColumnSummary,
+    compute_finite_median,
+)
+from imubench_pipeline.typing import Array
+
+_MAX_CREST_FACTOR = 6.0  # of extremes over deviation; a knock exceeds it
+_CALM_QUANTILE = 0.2  # of the deviations of blocks: at rest, if the log is at rest for a fifth
+_MIN_TURN = math.radians(5.0)  # change of the mean of a gyro that is a rotation, rad/s
+_AVERAGES = np.geomspace(0.1, 3.0, 7)  # s
+_MIN_DEVIATION = {"gyro": math.radians(0.5), "accel": 0.2}
+"""SI, of means of 0.1 to 3 s. Gyros at rest have at most 0.2 °/s."""
+
+_MIN_SLOW_NOISE = 100.0
+"""Ratio of the noise densities of such means and of single samples: 600 and more in logs of a
+sensor in a hand, 1 to 2.5 in 40 channels of real logs at rest."""
+
+_MIN_CLUSTERS = 8
+_WINDOW, _MIN_WINDOW = 5.0, 256  # s and samples that are judged together
+_MAX_MOVING_SHARE = 0.8  # of windows; beyond, no part is at rest
+
+
+def find_still_spans(
+    moved: Iterable[tuple[float, float]], begin: float, end: float
+) -> list[tuple[float, float]]:
+    """Return the spans at rest between the spans in which any axis was moved, all in s."""
+    spans, reached = [], begin
+    for start, stop in sorted(moved):
+        if start > reached:
+            spans.append((reached, start))
+        reached = max(reached, stop)
+    return [*spans, (reached, end)] if end > reached else spans
+
+
+def find_motion(
+    column: ColumnSummary, quantity: str, rate: float, times: float, least: float = 0.0
+) -> list[tuple[int, int]]:
+    """Return the parts (first, one past last record) in which the sensor was moved.
+
+    ``times``, ``least``: lower limits of the deviation, over its value at rest and in SI. A knock
+    is no motion.
+    """
+    if _moves_throughout(column, quantity, rate):
+        return [(0, column.present + column.missing)]
+    blocks = column.blocks()
+    calm = _calm_deviation(blocks)
+    if not calm > 0.0:
+        return []
+    reach = np.maximum(blocks.high - blocks.mean, blocks.mean - blocks.low)
+    moving = (blocks.spread > max(times * calm, least)) & (
+        reach < _MAX_CREST_FACTOR * blocks.spread
+    )
+    if quantity == "gyro":
+        still = blocks.spread < times * calm
+        moving |= np.abs(blocks.mean - compute_finite_median(blocks.mean[still])) > _MIN_TURN
+    places = np.flatnonzero(moving)
+    if len(places) == 0:
+        return []
+    groups = np.split(places, np.flatnonzero(np.diff(places) > 2) + 1)
+    return [(int(group[0]) * blocks.size, (int(group[-1]) + 1) * blocks.size) for group in groups]
+
+
+def _calm_deviation(blocks: BlockStatistics) -> float:
+    """Return the deviation of calm blocks; coarse registers may have none in many blocks."""
+    spread = blocks.spread[np.isfinite(blocks.spread)]
+    if len(spread) == 0:
+        return 0.0
+    return float(np.quantile(spread, _CALM_QUANTILE)) or float(np.median(spread))
+
+
+def _moves_throughout(column: ColumnSummary, quantity: str, rate: float) -> bool:
+    """Return whether most of the log has the slow signals of a sensor in motion."""
+    size = max(round(_WINDOW * rate), _MIN_WINDOW)
+    moving = [
+        _has_slow_signals(samples, rate, _MIN_DEVIATION[quantity])
+        for piece in column.excerpts()
+        for samples in np.array_split(piece.present, max(len(piece.present) // size, 1))
+    ]
+    return sum(moving) > _MAX_MOVING_SHARE * len(moving)
+
+
+def _has_slow_signals(samples: Array, rate: float, least: float) -> bool:
+    """Return whether means of 0.1 to 3 s deviate more than ``least``, and far more than noise."""
+    if len(samples) < 2:
+        return False
+    single = float(np.mean(np.diff(samples) ** 2))
+    for size in np.unique(np.rint(_AVERAGES * rate).astype(int)):
+        clusters = len(samples) // max(size, 1)
+        if size < 2 or clusters < _MIN_CLUSTERS:
+            continue
+        means = samples[: clusters * size].reshape(clusters, size).mean(axis=1)
+        squares = float(np.mean(np.diff(means) ** 2))
+        if squares > 2.0 * least**2 and squares * size > _MIN_SLOW_NOISE * single:
+            return True
+    return False
