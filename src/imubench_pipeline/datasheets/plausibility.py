@@ -296,18 +296,19 @@ def _check_gravity(channels: Mapping[str, Level]) -> Iterator[Finding]:
 def _check_noise(channels: Mapping[str, Level], of: Mapping[str, Expected]) -> Iterator[Finding]:
     """Yield a finding for each channel whose noise is usual only in another unit."""
     weighed = {f"accel_{axis}" for axis in "xyz"} <= channels.keys()
-    means = [level.mean for name, level in channels.items() if quantity_of(name) == "gyro"]
+    gyros = [level for name, level in channels.items() if quantity_of(name) == "gyro"]
+    mean = math.hypot(*(level.mean for level in gyros))
+    quietest = min((level.density[0] for level in gyros), default=0.0)
     for name, level in channels.items():
         quantity = quantity_of(name)
         usual = of[quantity].noise
         if usual is None or (quantity == "accel" and weighed):
             continue  # gravity is the better test
         low, high = level.density
-        mean = math.hypot(*means) if quantity == "gyro" else 0.0
-        above = low / usual[1]
-        together = above > _SUSPICIOUS_NOISE_WITH_MEAN and mean > _USUAL_OFFSET
-        together &= above * mean / _USUAL_OFFSET > _SUSPICIOUS_PRODUCT
-        if above > _SUSPICIOUS_NOISE_FACTOR or together:
+        least = quietest / usual[1]  # a wrong unit concerns all axes
+        together = quantity == "gyro" and least > _SUSPICIOUS_NOISE_WITH_MEAN
+        together &= mean > _USUAL_OFFSET and least * mean / _USUAL_OFFSET > _SUSPICIOUS_PRODUCT
+        if low > _SUSPICIOUS_NOISE_FACTOR * usual[1] or together:
             shown = low
         elif high is not None and high < usual[0] / _SUSPICIOUS_NOISE_FACTOR:
             shown = high

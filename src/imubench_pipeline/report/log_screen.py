@@ -150,6 +150,7 @@ def render_log_screen(
         at_rest = sum(stop - start for start, stop in rest)
         shown = not motion or at_rest > (1.0 - _MAX_MOVED_SHARE) * (row.duration or 0.0)
         if shown:
+            yield Text("95 % intervals are below the values; ?: doubtful; <: upper limit")
             for quantity, title in TITLES.items():
                 lines = [line for line in parameters if quantity_of(line.channel) == quantity]
                 if lines:
@@ -182,8 +183,7 @@ def _tabulate(
 ) -> Iterator[str]:
     """Yield the lines of a table: a value for each axis, its 95 % interval below."""
     units = {symbol: choose_page_unit(quantity, symbol, system) for symbol in SHOWN}
-    yield f"{title}: 95 % intervals below; ?: doubtful; <: upper limit"
-    yield _line("", (f"{symbol_text(symbol)}, {units[symbol].sign}" for symbol in SHOWN))
+    yield _line(title, (f"{symbol_text(symbol)}, {units[symbol].sign}" for symbol in SHOWN))
     by_channel: dict[str, dict[str, ParameterRow]] = defaultdict(dict)
     needed: dict[str, list[float]] = defaultdict(list)
     for row in rows:
@@ -202,7 +202,11 @@ def _tabulate(
 
 
 def _line(name: str, cells: Iterable[str]) -> str:
-    return f"{name:<{_CHANNEL_WIDTH}}" + "".join(f"{cell:>{_CELL_WIDTH}}" for cell in cells)
+    """Return a line; a long name takes the space of the first cell."""
+    text = f"{name:<{_CHANNEL_WIDTH}}"
+    for number, cell in enumerate(cells, start=1):
+        text += f"{cell:>{_CHANNEL_WIDTH + number * _CELL_WIDTH - len(text)}}"
+    return text
 
 
 def _cell(row: ParameterRow | None, unit: Unit) -> tuple[str, str]:

@@ -105,12 +105,12 @@ def estimate_channel(
     channel = _Channel(key, log, curve, settings, bandwidth)
     verdict = assess_signals(key.channel, channel.signals, has_temperature=bool(log.temperature))
     into.deterministic += tabulate_signals(asdict(key), channel.unit, channel.signals)
-    into.add_findings(key, verdict.findings)
     estimates = channel.by_curve()
     if _LIKELIHOOD_METHODS & set(settings.methods):
         estimates |= channel.by_likelihood(into)
     else:
         into.allan += rows.make_allan_rows(key, curve)
+    into.add_findings(key, channel.state_effects(verdict.findings, estimates.get("robust")))
     into.add_findings(key, yield_disagreements(key.channel, estimates))
     best = next(method for method in _METHODS_BY_PREFERENCE if method in settings.methods)
     reference = estimates.get("robust", estimates.get("likelihood"))

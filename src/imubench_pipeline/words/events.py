@@ -8,10 +8,10 @@ from collections.abc import Mapping, Sequence
 from imubench_pipeline.model.recordings import FindingRow, RecordingRow
 from imubench_pipeline.model.states import Fitness
 from imubench_pipeline.words.findings import FINDINGS, FindingData
-from imubench_pipeline.words.findings.base import System, channel_name, unit_of, units_of
+from imubench_pipeline.words.findings.base import System, channels_text, unit_of, units_of
 from imubench_pipeline.words.findings.changes import removal_text
 from imubench_pipeline.words.numbers import counted, duration_text, join_names, number_text
-from imubench_pipeline.words.verdicts import doubt_text, doubts_text
+from imubench_pipeline.words.verdicts import doubts_text
 
 _STATES: Mapping[Fitness | None, str] = {
     "fit": "usable",
@@ -31,14 +31,13 @@ def state_text(row: RecordingRow, length: str) -> str:
 
 
 def reason_text(row: RecordingRow) -> str:
-    """Return why a recording is not used, or doubted; empty if it is neither."""
-    return doubts_text(row.doubts, most=2)
+    """Return why a recording is not used; empty if it is used."""
+    return doubts_text(row.doubts, most=2) if row.fitness == "unfit" else ""
 
 
 def motion_text(channels: Sequence[str], moved: Sequence[Span], still: Sequence[Span]) -> str:
     """Return that the sensor was not at rest, its rests, and how to use them."""
-    names = join_names([channel_name(channel) for channel in channels])
-    where = f"the sensor was moved ({names}) at {_spans_text(moved)}"
+    where = f"the sensor was moved ({channels_text(channels)}) at {_spans_text(moved)}"
     if not still:
         return (
             f"Not at rest: {where}, all of the log. Record it again, with the sensor on a heavy "
@@ -92,8 +91,9 @@ def events_text(
         return finding_text(first, system)
     names = list(dict.fromkeys(row.channel for row in findings if row.channel))
     if first.finding != "bias_step":
-        doubt = doubt_text(first.finding, names)
-        return f"{doubt[:1].upper()}{doubt[1:]}. {finding_text(first, system)}"
+        where = channels_text(names)
+        text = finding_text(first, system)
+        return f"{where[:1].upper()}{where[1:]}. {text}" if where else text
     starts = [row.start for row in findings if row.start is not None]
     ends = [row.end for row in findings if row.end is not None]
     when = f"{min(starts):.0f} s"
@@ -113,7 +113,7 @@ def events_text(
     returned = ", which return" * _do_steps_return(findings)
     return (
         f"Disturbed at {when}: {counted(len(findings), 'bias step')} of {join_names(sizes)} "
-        f"({join_names([channel_name(name) for name in names])}){returned}. They are removed from "
+        f"({channels_text(names)}){returned}. They are removed from "
         f"the noise{removal_text(factors)}. Look for a touched table, a supply that changes, or a "
         "loose connection"
     )

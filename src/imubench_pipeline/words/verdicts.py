@@ -25,6 +25,7 @@ from imubench_pipeline.settings.requirements import Requirement
 from imubench_pipeline.settings.validation import Strict
 from imubench_pipeline.units import convert_from_si
 from imubench_pipeline.words.findings import FINDINGS
+from imubench_pipeline.words.findings.base import channels_text
 from imubench_pipeline.words.numbers import (
     counted,
     duration_text,
@@ -44,7 +45,7 @@ _TEXTS: Mapping[str, str] = {
 
 def doubt_text(code: str, channels: Sequence[str] = ()) -> str:
     """Return a doubt in words: ``the unit of gyro z looks wrong``."""
-    where = join_names([channel.replace("_", " ") for channel in channels])
+    where = channels_text(channels)
     text = _TEXTS.get(code) or FINDINGS[code].doubt
     return text.format(channels=where or "the data", are="is" if len(channels) == 1 else "are")
 

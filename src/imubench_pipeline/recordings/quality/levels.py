@@ -270,18 +270,19 @@ def bound_noise_density(column: ColumnSummary, rate: float) -> tuple[float, floa
     return min(spread, slow), max(spread, slow, least_bit / math.sqrt(12.0 * rate))
 
 
-def _is_end_of_range(column: ColumnSummary, limit: float, noise: float) -> bool:
+def _is_end_of_range(column: ColumnSummary, limit: float, window: float) -> bool:
     """Return whether the samples at an extreme belong to the distribution of the others.
 
     A saturated sensor stays at the limit, or comes from the levels just inside: of normal noise
-    with a share p beyond z sigma, those within one sigma are Q(z - 1) / p - 1 times as many.
+    with a share p beyond z sigma, those within a ``window`` of one sigma are Q(z - 1) / p - 1 times
+    as many.
     """
     values = np.concatenate([piece.present for piece in column.excerpts()])
     there = values == limit
     number = int(there.sum())
     if 4 * np.count_nonzero(there[1:] & there[:-1]) > number:
         return True
-    inside = np.count_nonzero(np.abs(values - limit) <= noise) - number
+    inside = np.count_nonzero(np.abs(values - limit) <= 1.001 * window) - number
     share = number / len(values)
     expected = norm.sf(norm.isf(share) - 1.0) / share - 1.0
     return bool(2 * inside > expected * number)
@@ -322,7 +323,8 @@ def _is_cut_off(column: ColumnSummary, steps: Quantisation | None, side: str, nu
     limit = column.low if side == "lowest" else column.high
     if len(at) < 2 or at[last] != limit:
         return True
-    if not _is_end_of_range(column, limit, estimate_noise(column)):
+    window = math.ceil(1.0 / steps.over_noise) * steps.step
+    if not _is_end_of_range(column, limit, window):
         return False
     beyond = number * counts[last] / counts[following] * math.exp(-(steps.over_noise**2))
     return bool(beyond > _MIN_MISSING_SAMPLES)

@@ -66,7 +66,8 @@ def find_motion(
     )
     if quantity == "gyro":
         still = blocks.spread < times * calm
-        moving |= np.abs(blocks.mean - compute_finite_median(blocks.mean[still])) > _MIN_TURN
+        turned = np.abs(blocks.mean - compute_finite_median(blocks.mean[still]))
+        moving |= turned > max(_MIN_TURN, times * calm)
     places = np.flatnonzero(moving)
     if len(places) == 0:
         return []

@@ -13,7 +13,7 @@ The check that finds it passes the data to `imubench_pipeline.tables.findings.fi
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass
@@ -21,7 +21,7 @@ from functools import cache
 from typing import ClassVar, Literal, dataclass_transform
 
 from imubench_pipeline.units import convert_from_si
-from imubench_pipeline.words.numbers import Unit
+from imubench_pipeline.words.numbers import Unit, join_names
 
 SLOW = frozenset({"B", "B_curve", "sigma_min", "tau_min", "T_B", "K", "R"})
 """Parameters of slow noise."""
@@ -91,6 +91,15 @@ class FindingData:
 def channel_name(channel: str) -> str:
     """Return a channel in words: ``gyro x``."""
     return channel.replace("_", " ")
+
+
+def channels_text(channels: Sequence[str]) -> str:
+    """Return channels in words, by quantity: ``gyro x and accel x, y and z``."""
+    axes: dict[str, list[str]] = {}
+    for channel in sorted(set(channels), key=lambda name: (name[:1] != "g", name)):
+        quantity, _, axis = channel.partition("_")
+        axes.setdefault(quantity, []).append(axis)
+    return join_names([f"{name} {join_names(own)}".strip() for name, own in axes.items()])
 
 
 Kind = Literal["signal", "level", "density"]

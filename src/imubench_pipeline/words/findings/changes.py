@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 
 from imubench_pipeline.words.estimates import symbol_text
@@ -16,28 +17,33 @@ from imubench_pipeline.words.findings.base import (
 from imubench_pipeline.words.numbers import Unit, join_names, number_text, percent_text
 
 _SECONDS = Unit("s", 1.0)
-_MAX_PRINTED_FACTOR = 1000.0
+_SHOWN = ("N", "B_curve", "K", "sigma_min")  # parameters whose change is stated
+_MAX_SHOWN = 2
+_MIN_SHOWN_CHANGE = 0.05
+_MAX_PRINTED_FACTOR = 100.0
 _MIN_CYCLES = 1.5  # in a log, of a drift that is called periodic
 
 
 def removal_text(factors: Mapping[str, float] | None) -> str:
-    """Return how parameters would change without the removal of a signal."""
+    """Return how the most changed parameters would differ without the removal of a signal."""
     if factors is None:
         return ""
-    if not factors:
-        return ", which changes no parameter by more than a tenth of its interval"
+    clear = {name: factor for name, factor in factors.items() if name in _SHOWN}
+    largest = sorted(clear, key=lambda name: -abs(math.log(max(clear[name], 1e-9))))
     parts = [
-        f"{symbol_text(name)} would be "
-        + (
-            "absent"
-            if factor == 0.0
-            else f"more than {number_text(_MAX_PRINTED_FACTOR)} times as large"
-            if factor > _MAX_PRINTED_FACTOR
-            else f"{number_text(factor, 2)} times as large"
-        )
-        for name, factor in factors.items()
+        f"{symbol_text(name)} would be {_times_text(clear[name])}"
+        for name in largest[:_MAX_SHOWN]
+        if abs(clear[name] - 1.0) >= _MIN_SHOWN_CHANGE
     ]
-    return f"; otherwise {join_names(parts)}"
+    if not parts:
+        return ", with little effect on any parameter"
+    return f"; otherwise {join_names(parts)} as large"
+
+
+def _times_text(factor: float) -> str:
+    if factor > _MAX_PRINTED_FACTOR:
+        return f"over {number_text(_MAX_PRINTED_FACTOR)} times"
+    return f"{number_text(factor, 2)} times"
 
 
 class BiasStep(FindingData, affects=SLOW | {"bias"}, doubt="the bias of {channels} steps"):
@@ -55,7 +61,7 @@ class BiasStep(FindingData, affects=SLOW | {"bias"}, doubt="the bias of {channel
         size = estimate_text(self.size, self.size_lower, self.size_upper, unit_of(channel, "level"))
         return (
             f"The bias of {channel_name(channel)} steps by {size} at {number_text(self.time, 6)} s "
-            f"(± {number_text(self.time_error, 2)} s). The step is removed from the noise"
+            f"(± {number_text(self.time_error, 2)} s). It is removed from the noise"
             f"{removal_text(self.factors)}. "
             "Look for a motion, a new range or a sudden change of temperature"
         )
@@ -80,7 +86,7 @@ class WarmUpDrift(
         time = estimate_text(self.time, self.time_lower, self.time_upper, _SECONDS)
         return (
             f"The bias of {channel_name(channel)} starts {size} from its final value. It settles "
-            f"with a time constant of {time}. The drift is removed from the noise"
+            f"with a time constant of {time}. It is removed from the noise"
             f"{removal_text(self.factors)}. "
             "Let the sensor warm up before recording"
         )
