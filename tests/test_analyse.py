@@ -147,7 +147,7 @@ def test_parameters_doubts_and_rejections_are_printed(
     assert "good: usable; 50 s at 100 Hz, 2 channels\n" in said
     assert "rejected: bad.csv, line 3, column 'ax': found 'x'" in said
     assert "Gyroscopes" in said and "°/√h" in said and " to " in said
-    assert "1 other finding and all parameters: --verbose" in said
+    assert "1 other finding; all findings and parameters: --verbose" in said
 
 
 # Every day pages are made of one log, in tests/workflow/test_failures.py, and figures in the

@@ -1,3 +1,4 @@
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -98,7 +99,7 @@ def run(*arguments: object) -> int:
 
 
 def shown(capsys: pytest.CaptureFixture[str], *arguments: object) -> str:
-    assert run(*arguments) == 0
+    assert run(*arguments, "--all") == 0
     return capsys.readouterr().out
 
 
@@ -127,6 +128,18 @@ def test_what_was_compared_comes_first(results: Path, capsys: pytest.CaptureFixt
         "good/run gyro_x (suspicious unit): is it in degrees? is it"
     )
     assert "twice" not in text and "a note" not in text
+
+
+def test_the_overview_has_ten_lines_and_names_the_way_to_all_others(
+    results: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run(results) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert len(lines) <= 10
+    assert lines[0].endswith("1 simulated, not measured; 1 warning in 1 of them")
+    assert lines[1].startswith("robot: good") and lines[2].startswith("drone: made (simulated)")
+    assert [line.split(":")[0] for line in lines[3:6]] == ["Next"] * 3
+    assert lines[6] == "Every ranking, warning and parameter: --all"
 
 
 def test_terminal_shows_weak_evidence_corrected_verdicts_and_next_steps(
@@ -220,8 +233,8 @@ def test_a_terminal_gets_colours_unless_it_wants_none(
     monkeypatch.setenv("TERM", "xterm")
     text = shown(capsys, results)
     assert "\x1b[32mmeets the limits" in text
-    (warning,) = (line for line in text.splitlines() if "suspicious" in line)
-    assert warning.endswith("…") and len(warning) <= 80
+    assert "suspicious" in text
+    assert max(map(cell_len, re.sub("\x1b\\[[0-9;]*m", "", text).splitlines()[:-1])) <= 80
     monkeypatch.setenv("NO_COLOR", "1")
     assert "\x1b[3" not in shown(capsys, results)
 

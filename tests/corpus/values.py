@@ -68,9 +68,15 @@ ENTRIES = [
     ),
     Entry(
         "axis in coarse steps",
-        file(lambda: gyro(np.round(NOISE / 1e-3) * 1e-3)),
+        file(lambda: gyro(np.round(NOISE / 2e-3) * 2e-3)),
         STAMPED,
         kept(LONG, "coarse"),
+    ),
+    Entry(
+        "axis in steps of one sigma",
+        file(lambda: gyro(np.round(NOISE / 1e-3) * 1e-3)),
+        STAMPED,
+        kept(LONG, "quantised"),
     ),
     Entry(
         "axis in visible steps",

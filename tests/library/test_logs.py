@@ -1,6 +1,7 @@
 """Logs that are read as the workflow reads them."""
 
 import gc
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -26,8 +27,12 @@ def test_a_log_is_in_si_on_its_grid(log, drop_zone: Path) -> None:
         log["gyro_y"]
 
 
-def test_a_log_is_shown_and_given_as_a_table(log) -> None:
+def test_a_log_is_shown_and_given_as_a_table(log, monkeypatch: pytest.MonkeyPatch) -> None:
+    assert "2 findings in all" in repr(log) and "warning" not in repr(log)
+    knocks = [replace(one, severity="warning") for one in log.findings if one.finding == "knocks"]
+    monkeypatch.setattr(log, "findings", tuple(knocks))
     assert "warning: knocks: gyro x has 1 knock," in repr(log) and len(repr(log)) < 1000
+    monkeypatch.undo()
     assert "<td>accel_z</td>" in log._repr_html_()
     table = log.to_pandas()
     assert list(table.columns) == ["gyro_x [rad/s]", "accel_z [m/s^2]"]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+from dataclasses import asdict
 from io import StringIO
 from typing import Any
 
@@ -13,6 +15,7 @@ from imubench_pipeline.model.recordings import FindingRow, RecordingRow
 from imubench_pipeline.report.log_screen import SHOWN, group_events, render_log_screen
 from imubench_pipeline.tables.files import build
 from imubench_pipeline.words.events import events_text
+from imubench_pipeline.words.findings.changes import BiasStep
 
 CHANNELS = [f"{quantity}_{axis}" for quantity in ("gyro", "accel") for axis in "xyz"]
 SLOW = ("B", "K")
@@ -50,7 +53,7 @@ def test_steps_of_all_axes_at_one_time_are_one_disturbance() -> None:
     assert [len(event.findings) for event in events] == [3, 1]
     text = events_text(events[0].findings)
     assert text.startswith("Disturbed at 2153 to 2179 s: 3 bias steps of 1700 to 3100 µg")
-    assert "accel x and accel y" in text
+    assert "(accel x and y)" in text
 
 
 def test_findings_of_one_kind_are_one_event_and_fatal_ones_are_first() -> None:
@@ -58,7 +61,7 @@ def test_findings_of_one_kind_are_one_event_and_fatal_ones_are_first() -> None:
     stuck = finding("stuck", "gyro_x", severity="fatal", affects=())
     events = group_events([*rows, stuck])
     assert [len(event.findings) for event in events] == [1, 6]
-    assert events_text(events[1].findings).startswith("A vibration of gyro x, gyro y")
+    assert events_text(events[1].findings).startswith("Gyro x, y and z and accel x, y and z. ")
 
 
 @pytest.mark.parametrize("width", [80, 120])
@@ -91,3 +94,36 @@ def test_the_screen_of_six_axes_has_40_lines_of_80_columns(width: int) -> None:
     assert "?" in cells and "<" in cells
     assert sum(line.startswith(("1. ", "2. ", "3. ", "4. ")) for line in lines) == 3
     assert lines[-2].startswith("12 other findings")
+
+
+def test_a_log_in_motion_says_so_first_and_shows_no_parameters() -> None:
+    moved = [finding("motion", "gyro_x", 10.0), finding("motion", "accel_y", 10.5)]
+    recording = RecordingRow(
+        sensor="s", device="d", recording="r", kind="static", simulated=True, status="ok",
+        rate=100.0, duration=20.0, fitness="unfit",
+    )  # fmt: skip
+    rows = {
+        "recordings": [recording],
+        "parameters": [parameter("gyro_x", "N", value=1e-4, status="ok")],
+        "findings": moved,
+    }
+    tables = {name: build(name, own) for name, own in rows.items()} | {"allan": build("allan", [])}
+    lines = "\n".join(str(part) for part in render_log_screen(tables, "practical", 80)).splitlines()
+    assert lines[1].startswith("Not at rest: the sensor was moved (gyro x and accel y) at 10 to")
+    assert "At rest: 0 to 10 s and 11.5 to 20 s." in " ".join(lines)
+    assert not any(line.startswith("gyro_x") for line in lines)
+
+
+def test_an_event_states_what_changes_without_its_removal() -> None:
+    def step(channel: str, factors: dict[str, float], severity: str) -> FindingRow:
+        data = BiasStep(1e-3, 9e-4, 1.1e-3, 50.0, 1.0, factors)
+        about = {"detail": data.text(channel), "data": json.dumps(asdict(data)), "value": 1e-3}
+        return finding("bias_step", channel, 50.0, severity=severity, **about)
+
+    strong, none = step("accel_x", {"K": 3.0, "N": 1.0004}, "warning"), step("accel_y", {}, "note")
+    (event,) = group_events([strong, none])
+    assert event.findings == (strong,)
+    text = events_text(event.findings, "practical", event.factors())
+    assert "otherwise K would be 3 times as large" in text and "N would" not in text
+    assert "102 µg" in text
+    assert "0.001 m/s²" in events_text(event.findings, "si", event.factors())

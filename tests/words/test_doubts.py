@@ -30,7 +30,7 @@ def test_a_doubt_is_a_sentence(code: str, channels: tuple[str, ...]) -> None:
         ("motion", ("gyro_x",), "the sensor was moved"),
         ("truncated", ("gyro_x",), "truncated samples of gyro x"),
         ("channel_twice", ("gyro_x",), "gyro x is a copy of another channel"),
-        ("channel_twice", ("gyro_x", "gyro_y"), "gyro x and gyro y are a copy of another channel"),
+        ("channel_twice", ("gyro_x", "gyro_y"), "gyro x and y are a copy of another channel"),
     ],
 )
 def test_a_doubt_names_its_channels(code: str, channels: tuple[str, ...], text: str) -> None:

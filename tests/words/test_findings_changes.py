@@ -34,9 +34,17 @@ TEXTS: list[tuple[FindingData, list[str]]] = [
         PeriodicDrift(*SIZE, *TIME),
         [
             "amplitude of 30 °/h (95 %: 28 to 32 °/h)",
-            "period is 600 s (95 %: 520 to 690 s)",
-            "removed",
+            "period of 600 s (95 %: 520 to 690 s)",
+            "removed from the noise. Record at a steady",
         ],
+    ),
+    (
+        PeriodicDrift(*SIZE, *TIME, factors={}, cycles=0.6, has_temperature=True),
+        ["drifts slowly, like a part of a wave", "with little effect", "the method compensated"],
+    ),
+    (
+        BiasStep(*SIZE, 400.0, 2.0, factors={"K": 3.2, "N": 1.01, "B_curve": 250.0, "R": 9.0}),
+        ["otherwise B (curve) would be over 100 times and K would be 3.2 times as large"],
     ),
     (TelegraphNoise(12), ["at least 12 times", "B, T_B and K are doubtful"]),
     (NoiseTrend(-0.262, 0.05), ["falls by 26.2 % (± 5 %)", "N is its mean over the log"]),

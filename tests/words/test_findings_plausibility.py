@@ -9,8 +9,10 @@ from imubench_pipeline.words.findings.base import ALL, FindingData
 from imubench_pipeline.words.findings.plausibility import (
     AxisUnlike,
     GravityNorm,
+    ImpossibleNoise,
     NoiseUnlikeDatasheet,
     RateImplausible,
+    SlowSampling,
     SuspiciousUnit,
     Turning,
     UnusualFigure,
@@ -46,6 +48,8 @@ TEXTS: list[tuple[FindingData, list[str]]] = [
         SuspiciousUnit("g", "m/s^2", 1.0 / 9.80665, gravity=96.17),
         ["mean acceleration is 96.17 m/s²; expected 9.807", "it is 9.807 m/s²", "correct 'unit'"],
     ),
+    (SlowSampling(1.0), ["sampled at 1 Hz", "folded into N"]),
+    (ImpossibleNoise(1e-11, 4e-4, 22), ["5.73×10⁻¹⁰ °/s/√Hz, 4×10⁷ times below", "dead"]),
     (GravityNorm(12.31, removed=False), ["12.31 m/s²; expected 9.807", "Check unit, scale"]),
     (GravityNorm(0.1, removed=True), ["subtracted already", "raw data"]),
     (

@@ -79,6 +79,7 @@ EXAMPLES: list[tuple[str, FindingData]] = [
     ("", files.Rejected("a.csv: the file is empty")),
     ("", files.Failed("MemoryError: no memory")),
     ("", files.WarmUpTrimmed(600.0)),
+    ("", files.PartAtRest(30.0, 600.0)),
     ("", files.ShortRecording(900.0)),
     ("gyro_x", files.Knocks(1, 430.2, (599.92,), 14)),
     ("gyro_x", files.Knocks(7, 430.2, (1.0, 2.0, 3.0, 4.0, 5.5), 140)),

@@ -8,16 +8,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import cache
-from typing import Literal
 
 from imubench_pipeline.estimators.estimate import DIMENSIONS
 from imubench_pipeline.model.comparisons import DatasheetRow, RepeatabilityRow
 from imubench_pipeline.model.recordings import RecordingRow
 from imubench_pipeline.settings.sensor import QUANTITIES
 from imubench_pipeline.units import find_conversion
+from imubench_pipeline.words.findings.base import System as System
 from imubench_pipeline.words.numbers import NO_VALUE, Unit, number_text
-
-System = Literal["practical", "si"]
 
 
 def _make_signs(

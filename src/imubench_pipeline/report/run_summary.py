@@ -22,7 +22,7 @@ from imubench_pipeline.words.verdicts import answer_text
 
 _NEEDED = ("recordings", "findings", "ranking", "failures")
 _MOST_LINES = 10
-_MOST_LETTERS = 200
+_MOST_LETTERS, _MOST_LETTERS_OF_ANSWER = 200, 1000
 
 _FAILED = re.compile(r"^Error in rule (\w+):\n((?:    .*\n)*)", re.MULTILINE)
 """A step that failed, as Snakemake writes it into its log."""
@@ -183,7 +183,7 @@ def list_best_sensors(
         if ranked and ranked[0].tied_with:
             others = join_names([names.get(each, each) for each in ranked[0].tied_with])
             text += f" The difference from {others} is not significant."
-        yield fold_text(f"{name}: {text}")
+        yield fold_text(f"{name}: {text}", _MOST_LETTERS_OF_ANSWER)
 
 
 def fold_text(text: str, longest: int = _MOST_LETTERS) -> str:

@@ -23,6 +23,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of the command to its parser."""
     parser.add_argument("results", type=Path, help="folder of the results of a run")
     parser.add_argument(
+        "--all",
+        action="store_true",
+        help="every warning, ranking and parameter, as with the three options below",
+    )
+    parser.add_argument(
         "--requirement",
         metavar="NAME",
         help="the ranking for only this requirement, with every limit",
@@ -48,7 +53,7 @@ def run(arguments: argparse.Namespace) -> int:
     # Loaded here, so that other commands answer at once.
     from rich.text import Text
 
-    from imubench_pipeline.report.terminal import render_comparison
+    from imubench_pipeline.report.terminal import render_comparison, render_overview
     from imubench_pipeline.tables.files import find_tables_folder
 
     tables = _load(arguments.results)
@@ -56,15 +61,21 @@ def run(arguments: argparse.Namespace) -> int:
     _check(tables["parameters"], "channel", arguments.channel)
     _check(tables["parameters"], "method", arguments.method)
 
+    chosen = any((arguments.requirement, arguments.channel, arguments.method))
+
     def shown(width: int) -> Iterator[RenderableType]:
-        yield from render_comparison(
-            tables,
-            requirement=arguments.requirement,
-            channel=arguments.channel,
-            method=arguments.method,
-            system=arguments.units,
-            width=width,
-        )
+        if arguments.all or chosen:
+            yield from render_comparison(
+                tables,
+                requirement=arguments.requirement,
+                channel=arguments.channel,
+                method=arguments.method,
+                system=arguments.units,
+                width=width,
+            )
+        else:
+            yield from render_overview(tables)
+            yield Text("Every ranking, warning and parameter: --all")
         page = find_tables_folder(arguments.results).parent / "report/index.html"
         no_page = f"No report at {page}; `snakemake -c2` makes it"
         text = f"Report: {page}" if page.is_file() else no_page

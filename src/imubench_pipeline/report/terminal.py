@@ -27,6 +27,7 @@ from imubench_pipeline.settings.requirements import Requirement
 from imubench_pipeline.settings.sensor import quantity_of
 from imubench_pipeline.words import numbers
 from imubench_pipeline.words.estimates import STATUS_WORDS, symbol_text
+from imubench_pipeline.words.events import finding_text
 from imubench_pipeline.words.findings.base import WHITE
 from imubench_pipeline.words.verdicts import used_doubts_text
 
@@ -46,8 +47,8 @@ _STYLES: Mapping[Verdict, str] = {
     "excluded": "dim",
 }
 _MAX_AFFECTED = 3  # parameters that are named in a warning
-_LONGEST_FINDING = 400
-_STEPS = 3
+_LONGEST_FINDING, _LONGEST_VERDICT = 400, 2000
+_STEPS, _MAX_ANSWERS = 3, 4
 _BESIDE = 34  # columns of the remarks below a verdict
 
 
@@ -68,27 +69,17 @@ def render_comparison(
     """
     recordings = RecordingRow.rows_of(tables["recordings"])
     about = {(row.sensor, row.recording): row for row in recordings}
-    rejected, failed = (
-        sum(row.status == status for row in recordings) for status in ("rejected", "failed")
-    )
-    simulated = sum(row.simulated for row in recordings)
-    yield Text(
-        f"Recordings: {len(recordings)} of {len({row.sensor for row in recordings})} sensors; "
-        f"{len(recordings) - rejected - failed} analysed, {rejected} rejected"
-        + f", {failed} failed" * bool(failed)
-        + f"; {simulated} simulated, not measured\n"
-    )
+    yield Text(f"{_count_recordings(recordings)}\n")
     yield from _listed("Failed", run_summary.list_failures(FailureRow.rows_of(tables["failures"])))
     yield from _listed("Rejected", run_summary.list_rejections(recordings))
     findings = FindingRow.rows_of(tables["findings"])
     warnings = []
     for row in run_summary.select_warnings(findings):
         place = " ".join(filter(None, (f"{row.sensor}/{row.recording}", row.channel)))
-        warnings.append(f"{place} ({row.finding.replace('_', ' ')}): {row.detail}")
-    yield from _listed("Warnings", warnings, cut=True)
-    steps = NextStepRow.rows_of(tables["next_steps"].slice(0, _STEPS))
-    texts = (f"{row.sensor}: {row.text} ({', '.join(row.requirements)})" for row in steps)
-    yield from _listed("What to do next", texts)
+        text = finding_text(row, system)
+        warnings.append(f"{place} ({row.finding.replace('_', ' ')}): {text}")
+    yield from _listed("Warnings", warnings)
+    yield from _listed("What to do next", _list_next_steps(tables["next_steps"]))
     ranking = RankingRow.rows_of(tables["ranking"])
     yield from _ranking_tables(ranking, requirement, about, system, width)
     chosen = [
@@ -99,6 +90,41 @@ def render_comparison(
     ]
     which = f"method {method}" if method else "the recommended method"
     yield from _parameter_tables(chosen, f"{which}, with 95 % intervals", about, system, width)
+
+
+def render_overview(tables: Mapping[str, pa.Table]) -> Iterator[RenderableType]:
+    """Yield what was compared, the best sensor for each requirement, and what to do next."""
+    recordings = RecordingRow.rows_of(tables["recordings"])
+    warnings = list(run_summary.select_warnings(FindingRow.rows_of(tables["findings"])))
+    warned = len({(row.sensor, row.recording) for row in warnings})
+    text = _count_recordings(recordings)
+    if warnings:
+        text += f"; {numbers.counted(len(warnings), 'warning')} in {warned} of them"
+    yield Text(text)
+    best = list(run_summary.list_best_sensors(RankingRow.rows_of(tables["ranking"]), recordings))
+    yield from map(Text, best[:_MAX_ANSWERS])
+    if len(best) > _MAX_ANSWERS:
+        yield Text(f"and {numbers.counted(len(best) - _MAX_ANSWERS, 'more requirement')}")
+    for line in _list_next_steps(tables["next_steps"]):
+        yield Text(f"Next: {run_summary.fold_text(line)}")
+
+
+def _count_recordings(recordings: Sequence[RecordingRow]) -> str:
+    rejected, failed = (
+        sum(row.status == status for row in recordings) for status in ("rejected", "failed")
+    )
+    simulated = sum(row.simulated for row in recordings)
+    return (
+        f"Recordings: {len(recordings)} of {len({row.sensor for row in recordings})} sensors; "
+        f"{len(recordings) - rejected - failed} analysed, {rejected} rejected"
+        + f", {failed} failed" * bool(failed)
+        + f"; {simulated} simulated, not measured"
+    )
+
+
+def _list_next_steps(table: pa.Table) -> Iterator[str]:
+    for row in NextStepRow.rows_of(table.slice(0, _STEPS)):
+        yield f"{row.sensor}: {row.text} ({', '.join(row.requirements)})"
 
 
 def render_logs(
@@ -120,7 +146,7 @@ def render_logs(
             )
             continue
         warnings = list(run_summary.select_warnings(findings))
-        yield from _listed("Warnings", map(_of_log, warnings))
+        yield from _listed("Warnings", (_of_log(row, system) for row in warnings))
         doubts = []
         warned = {(warning.channel, warning.finding) for warning in warnings}
         for doubt in select_of(row, every_doubt):
@@ -129,7 +155,7 @@ def render_logs(
                 doubts.append(f"{of}: {doubt.reason}")
         yield from _listed("In doubt", doubts)
         notes = [line for line in findings if line.severity == "note"]
-        yield from _listed("Notes", map(_of_log, notes), cut=True)
+        yield from _listed("Notes", (_of_log(row, system) for row in notes))
         about = {(row.sensor, row.recording): row}
         recommended = [line for line in parameters if line.recommended]
         yield from _parameter_tables(recommended, "95 % intervals below", about, system, width)
@@ -164,14 +190,14 @@ def select_of(recording: RecordingRow, rows: Iterable[R]) -> list[R]:
     return [row for row in rows if (row.sensor, row.recording) == key]
 
 
-def _of_log(row: FindingRow) -> str:
+def _of_log(row: FindingRow, system: System) -> str:
     name = row.finding.replace("_", " ")
     if 0 < len(row.affects) <= _MAX_AFFECTED:
         name += f", affects {', '.join(row.affects)}"
     elif row.affects and WHITE.isdisjoint(row.affects):
         name += ", affects slow noise"
     place = f"{row.channel} ({name})" if row.channel else name
-    return f"{place}: {row.detail}"
+    return f"{place}: {finding_text(row, system)}"
 
 
 def _parameter_tables(
@@ -194,14 +220,13 @@ def _parameter_tables(
             yield Text()
 
 
-def _listed(title: str, lines: Iterable[str], *, cut: bool = False) -> Iterator[Text]:
-    """Yield the lines, cut at the edge of the terminal or wrapped."""
+def _listed(title: str, lines: Iterable[str]) -> Iterator[Text]:
     listed = list(lines)
     if listed:
         yield Text(f"{title}: {len(listed)}", style="bold")
         for line in listed:
             text = run_summary.fold_text(line, _LONGEST_FINDING)
-            yield Text(f"  {text}", no_wrap=cut, overflow="ellipsis")
+            yield Text(f"  {text}")
         yield Text()
 
 
@@ -234,7 +259,7 @@ def _ranking_lines(group: Group, *, every: bool) -> Iterator[list[str | Text]]:
     if row.tied_with:
         sensor += "\n" + run_summary.fold_text(f"similar to {', '.join(row.tied_with)}")
     style = "yellow" if row.conditions else _STYLES[row.verdict]
-    verdict = Text(run_summary.fold_text(group.stated), style=style)
+    verdict = Text(run_summary.fold_text(group.stated, _LONGEST_VERDICT), style=style)
     if group.weak:
         verdict.stylize("dim")
     # A doubt that makes the evidence weak is printed there.

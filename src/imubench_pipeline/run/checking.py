@@ -5,6 +5,8 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from imubench_pipeline.datasheets.plausibility import implausible_of
+from imubench_pipeline.estimators.deterministic.courses import find_deterministic_signals
+from imubench_pipeline.estimators.deterministic.verdict import assess_signals
 from imubench_pipeline.estimators.frame import select_for_fit
 from imubench_pipeline.estimators.spectral_findings import spectral_findings
 from imubench_pipeline.estimators.spectrum import compute_spectra
@@ -54,14 +56,17 @@ def _check_recording(plan: Plan, recording: Recording, folder: Path) -> Quality:
 def findings_of_channel(
     channel: str, log: ChannelLog, bandwidth: float | None, settings: AllanSettings
 ) -> list[Finding]:
-    """Return findings on lines and the end of the band of a channel; `bandwidth` in Hz."""
-    if log.holes:
-        # Filling gaps needs a model, which only the estimation has.
-        return (
-            []
-            if len(compute_channel_curve(log, settings).tau)
-            else [report_too_sparse(channel, log)]
-        )
-    spectrum, line_spectra = compute_spectra(log.blocks(), log.grid, log.rate, log.segments)
-    frame = select_for_fit(spectrum, line_spectra, bandwidth=bandwidth)
-    return spectral_findings(channel, frame, None)
+    """Return findings on drifts, steps, lines and the end of the band; `bandwidth` in Hz."""
+    if log.holes and not len(compute_channel_curve(log, settings).tau):
+        return [report_too_sparse(channel, log)]
+    highest = 0.5 * bandwidth if bandwidth else None
+    signals = find_deterministic_signals(
+        log.blocks, log.grid, log.rate, segments=log.segments, highest=highest
+    )
+    about = assess_signals(channel, signals, has_temperature=bool(log.temperature))
+    findings = list(about.findings)
+    if not log.holes:  # filling gaps needs a model, which only the estimation has
+        spectrum, line_spectra = compute_spectra(log.blocks(), log.grid, log.rate, log.segments)
+        frame = select_for_fit(spectrum, line_spectra, bandwidth=bandwidth)
+        findings += spectral_findings(channel, frame, None)
+    return findings

@@ -61,14 +61,12 @@ def find_motion(
     if not calm > 0.0:
         return []
     reach = np.maximum(blocks.high - blocks.mean, blocks.mean - blocks.low)
-    moving = (blocks.spread > max(times * calm, least)) & (
-        reach < _MAX_CREST_FACTOR * blocks.spread
-    )
+    moving = blocks.spread > max(times * calm, least)
     if quantity == "gyro":
         still = blocks.spread < times * calm
         turned = np.abs(blocks.mean - compute_finite_median(blocks.mean[still]))
         moving |= turned > max(_MIN_TURN, times * calm)
-    places = np.flatnonzero(moving)
+    places = np.flatnonzero(moving & (reach < _MAX_CREST_FACTOR * blocks.spread))
     if len(places) == 0:
         return []
     groups = np.split(places, np.flatnonzero(np.diff(places) > 2) + 1)
