@@ -34,7 +34,7 @@ TEXTS: list[tuple[FindingData, list[str]]] = [
         PeriodicDrift(*SIZE, *TIME),
         [
             "amplitude of 30 °/h (95 %: 28 to 32 °/h)",
-            "period of 600 s (95 %: 520 to 690 s)",
+            "period is 600 s (95 %: 520 to 690 s)",
             "removed from the noise. Record at a steady",
         ],
     ),

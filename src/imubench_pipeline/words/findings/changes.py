@@ -112,7 +112,7 @@ class PeriodicDrift(FindingData, affects=SLOW, doubt="the bias of {channels} osc
         if self.cycles is not None and self.cycles < _MIN_CYCLES:
             motion = f"drifts slowly, like a part of a wave with an amplitude of {size}"
         else:
-            motion = f"oscillates with an amplitude of {size} and a period of {time}"
+            motion = f"oscillates with an amplitude of {size}. Its period is {time}"
         advice = "Record at a steady temperature, or with readings of it"
         if self.has_temperature:
             advice = "Compare with the temperature, and with the method compensated"
