@@ -62,8 +62,8 @@ class SlowSampling(FindingData, affects=NONE):
     def text(self, channel: str) -> str:
         return (
             f"The log is sampled at {number_text(self.rate)} Hz, and most sensors are faster. "
-            "If samples were skipped and not averaged, noise of higher frequencies is folded into N. "
-            "N is then larger than on a data sheet. Log faster, or average before"
+            "If samples were skipped and not averaged, noise of higher frequencies is folded into "
+            "N. N is then larger than on a data sheet. Log faster, or average before"
         )
 
 
