@@ -47,6 +47,7 @@ _DIMENSIONS: dict[str, tuple[str, str]] = {
     "gyro_sensitivity": ("LSB/(rad/s)", "LSB/(deg/s)"),
     "accel_sensitivity": ("LSB/(m/s^2)", "LSB/g or LSB/mg"),
     "ratio": ("1", "% or ppm"),
+    "ratio_temperature_coefficient": ("1/K", "%/K or ppm/K"),
     "mass": ("kg", "g or kg"),
     "power": ("W", "W or mW"),
 }

@@ -139,6 +139,9 @@ class PrintedFigure(Strict):
         "datasheet lists the options of the logged sensors",
     )
     condition: Text | None = Field(None, description="temperature, supply and the like, as printed")
+    place: Text | None = Field(
+        None, description="where it was read in the document, or sought: page, table or section"
+    )
     evidence: Text | None = Field(None, description="source of the figure or its sidedness")
     source: Literal["primary", "secondary"] | None = Field(
         None, description="null: from the datasheet"
@@ -233,9 +236,16 @@ class QuantityDatasheet(Strict):
     scale_factor_error: Figures = Field(
         None, description="± of the scale factor or sensitivity, as % or ppm of itself"
     )
+    scale_factor_temperature: Figures = Field(
+        None, description="change of the scale factor per kelvin, as % or ppm of itself"
+    )
     nonlinearity: Figures = Field(
         None, description="departure from the straight line, as % or ppm of full scale"
     )
+    misalignment: Figures = Field(
+        None, description="± of the angle between axes, or of an axis to the housing"
+    )
+    cross_axis: Figures = Field(None, description="signal of another axis, as % of it")
     g_sensitivity: Figures = Field(None, description="of a gyro's offset to acceleration")
     vibration_rectification: Figures = Field(
         None, description="change of the mean in vibration, per square of its rms acceleration"
@@ -270,6 +280,9 @@ def _dimensions(quantity: str, plain: str) -> dict[str, tuple[str, ...]]:
         "correlation_time": ("time",),
         "temperature_coefficient": (f"{quantity}_temperature_coefficient",),
         "scale_factor_error": ("ratio",),
+        "scale_factor_temperature": ("ratio_temperature_coefficient",),
+        "misalignment": ("angle",),
+        "cross_axis": ("ratio",),
         "nonlinearity": ("ratio",),
         "vibration_rectification": (f"{quantity}_vibration_coefficient",),
         "sensitivity": (f"{quantity}_step", f"{quantity}_sensitivity"),
@@ -324,6 +337,7 @@ class Datasheet(Strict):
     """A datasheet of a sensor."""
 
     document: Text | None = None
+    missing: Text | None = Field(None, description="a document that was not to be had")
     revision: Text | None = Field(None, description="of the document, with its date")
     source: Literal["primary", "secondary"] | None = Field(
         None,

@@ -232,12 +232,25 @@ def _check_unit(unit: str, dimension: str, key: str) -> None:
         raise ValueError(f"{key}: {error}") from error
 
 
+Grade = Literal["consumer", "industrial", "tactical", "navigation"]
+Technology = Literal[
+    "silicon MEMS", "quartz MEMS", "FOG", "RLG", "HRG", "DTG", "servo accelerometer"
+]
+
+
 class Sensor(Strict):
     """One IMU model: its logs, its demands on a vehicle, and its datasheet."""
 
     vendor: Text
     model: Text
-    price_class: Text | None = None
+    aliases: tuple[Text, ...] = Field(
+        (), description="products that contain it, and other names, such as RealSense D435i"
+    )
+    grade: Grade | None = Field(None, description="class of the sensor, by which limits are made")
+    technology: tuple[Technology, ...] = Field(
+        (), description="of gyro and accelerometer, or one for both"
+    )
+    price_class: Text | None = Field(None, description="its price in words")
     sold: bool = Field(
         True,
         description="false: the sensor is not for sale, such as a simulated board of several; it "
