@@ -87,7 +87,7 @@ def coverage(sensors: Mapping[str, Sensor]) -> list[Coverage]:
                 quantity=quantity,
                 figure=figure,
                 published=published,
-                as_printed=tuple(map(_format_figure, printed)),
+                as_printed=tuple(map(format_figure, printed)),
                 document=f"{datasheet.document}{revision}" if datasheet.document else None,
                 source=" and ".join(filter(None, sources)) or datasheet.source,
             )
@@ -120,7 +120,7 @@ def by_vendor(rows: Iterable[Coverage]) -> list[VendorCoverage]:
     ]
 
 
-def _format_figure(figure: PrintedFigure) -> str:
+def format_figure(figure: PrintedFigure) -> str:
     """Return value, unit, kind and qualifiers of a figure."""
     value, numbers = figure.value, ""
     if isinstance(value, dict):

@@ -23,6 +23,7 @@ from imubench_pipeline.report import show
 from imubench_pipeline.report.static_figures import command as figures
 from imubench_pipeline.run import formats_command as formats
 from imubench_pipeline.run import project
+from imubench_pipeline.run import sensors_command as sensors
 from imubench_pipeline.run import simulate_command as simulation
 from imubench_pipeline.run.analysis import command as analysis
 from imubench_pipeline.run.project import find_protected_places
@@ -451,6 +452,12 @@ COMMANDS = {
         _add_shortlist,
         _shortlist,
         ("said", "", command_line.NO_RESULTS),
+    ),
+    "sensors": command_line.Command(
+        "list the catalogue of sensors, or show the figures of one",
+        sensors.add_arguments,
+        sensors.run,
+        ("shown", "", "no such sensor"),
     ),
     "report": command_line.Command(
         "write the report again, elsewhere or in one file",

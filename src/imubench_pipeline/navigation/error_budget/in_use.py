@@ -20,6 +20,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 
+from imubench_pipeline.datasheets.class_limits import SIGMAS_OF_KIND
 from imubench_pipeline.datasheets.comparable import Comparable, PrintedAxis
 from imubench_pipeline.model.estimates import TemperatureRow
 from imubench_pipeline.model.states import Cause, Measured, Origin
@@ -172,14 +173,14 @@ DATASHEET_KEY_OF_CAUSE: Mapping[Cause, str] = {
 }
 """Datasheet key of the figure for each cause."""
 
-_SIGMA_CONVENTIONS: Mapping[str, tuple[float, str]] = {
-    "1sigma": (1.0, texts.PRINTED_SIGMA),
-    "typ": (1.0, texts.TYPICAL_AS_SIGMA),
-    "derived": (1.0, texts.TYPICAL_AS_SIGMA),
-    "range": (math.sqrt(3.0), texts.RANGE_AS_UNIFORM),
-    "max": (3.0, texts.MAXIMUM_AS_SIGMAS),
+_CONVENTIONS: Mapping[str, str] = {
+    "1sigma": texts.PRINTED_SIGMA,
+    "typ": texts.TYPICAL_AS_SIGMA,
+    "derived": texts.TYPICAL_AS_SIGMA,
+    "range": texts.RANGE_AS_UNIFORM,
+    "max": texts.MAXIMUM_AS_SIGMAS,
 }
-"""By kind, in order of preference: number of sigmas of a figure, and description."""
+"""How a figure was converted to a standard deviation, by its kind."""
 
 SIGMAS = 1.96  # half the width of a 95 % interval
 
@@ -203,17 +204,16 @@ def read_datasheet_figures(datasheet: Datasheet, channel: str) -> dict[Cause, Fi
         for row in rows:
             if row.figure and row.value is not None:
                 by_kind.setdefault(row.figure.kind, []).append(row.value)
-        kind = next((kind for kind in _SIGMA_CONVENTIONS if kind in by_kind), None)
+        kind = next((kind for kind in SIGMAS_OF_KIND if kind in by_kind), None)
         if kind is None:
             obstacle = next((row.obstacle for row in rows if row.obstacle), None)
             figures[cause] = Figure(reason=obstacle or axis.unpublished(like, name).reason)
         else:
-            sigmas, convention = _SIGMA_CONVENTIONS[kind]
             figures[cause] = Figure(
-                sigma=max(by_kind[kind]) / sigmas,
+                sigma=max(by_kind[kind]) / SIGMAS_OF_KIND[kind],
                 origin="datasheet",
                 kind=kind,
-                convention=convention,
+                convention=_CONVENTIONS[kind],
             )
     return figures
 
