@@ -144,7 +144,7 @@ def test_parameters_doubts_and_rejections_are_printed(
     status = main(["analyse", *logs, "--sensor", str(sensor), "--config", str(config)])
     said = capsys.readouterr().out
     assert status == 1
-    assert "good: usable; 50 s at 100 Hz, 2 channels\n" in said
+    assert "good: at rest; usable; 50 s at 100 Hz, 2 channels\n" in said
     assert "rejected: bad.csv, line 3, column 'ax': found 'x'" in said
     assert "Gyroscopes" in said and "°/√h" in said and " to " in said
     assert "1 other finding; all findings and parameters: --verbose" in said

@@ -17,6 +17,7 @@ from imubench_pipeline.tables.findings import Finding, find
 from imubench_pipeline.typing import Array
 from imubench_pipeline.words.findings.spectrum import (
     BandLimit,
+    Filtered,
     Lines,
     SlowNoiseMissing,
     StrongLine,
@@ -38,6 +39,9 @@ def spectral_findings(channel: str, frame: FitSelection, white: float | None) ->
     findings = describe_lines(channel, frame.lines, white)
     if low_pass is not None and low_pass.N is not None and low_pass.N.value is None:
         findings.append(find(BandLimit(highest), "note", highest, channel))
+    elif low_pass is not None and low_pass.kind is not None and low_pass.frequency.in_model:
+        cutoff = low_pass.frequency.in_model
+        findings.append(find(Filtered(cutoff), "note", cutoff, channel))
     return findings
 
 

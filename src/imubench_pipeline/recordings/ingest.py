@@ -58,6 +58,7 @@ from imubench_pipeline.words.findings import files, samples
 
 _MAX_NAMES = 5
 _MAX_TIMES = 5  # of knocks that are listed
+_MAX_HARMLESS_STRAIGHT = 1e-3  # of samples on straight lines, which are left out
 _MAX_HARMLESS_SHARE = 0.01  # of samples that are left out with knocks
 
 
@@ -277,8 +278,10 @@ def _findings(
                 findings.append(find(knocked, severity, number, channel, begin, end))
             for channel, number in part.interpolated.items():
                 if number:
-                    straight = samples.Interpolated(number, number / part.columns[channel].present)
-                    findings.append(find(straight, "warning", number, channel))
+                    share = number / part.columns[channel].present
+                    straight = samples.Interpolated(number, share)
+                    grade: Severity = "note" if share < _MAX_HARMLESS_STRAIGHT else "warning"
+                    findings.append(find(straight, grade, number, channel))
     channels = {name: column for part in parts for name, column in part.columns.items()}
     findings += find_copied_channels({n: c for n, c in channels.items() if n not in BESIDE})
     whole = [part for part in parts if part.base is None]

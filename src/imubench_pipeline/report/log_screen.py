@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
+import re
 from collections import defaultdict
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from textwrap import wrap
 
@@ -45,9 +46,12 @@ _CELL_WIDTH = 18
 _MAX_WIDTH = 80
 _SUDDEN = ("bias_step", "step")
 _MAX_PAUSE = 30.0  # s, between findings of one disturbance
-_MAX_MOVED_SHARE = 0.05  # of a log whose parameters are shown
 _REMOVED = ("bias_step", "warm_up_drift", "periodic_drift")
-_NOTES = ("slow_sampling", "band_limit", "noise_grows")  # listed after all warnings
+_NOTES = ("slow_sampling", "missing_samples", "lines", "filtered", "noise_grows")
+"""Notes that are listed after all warnings, in this order."""
+
+_MIN_LINE = 20.0  # density of a spectral line that is listed, over the noise floor
+_MAX_WAIT = 30.0  # length of a log that is advised for a value, over the present one
 _SHARE_UNTIL_IDENTIFIED = 0.02
 """Of the length that gives ± 10 %: until the limits have a ratio of 4, errors fall as its root."""
 
@@ -77,6 +81,10 @@ class Event:
                     largest[name] = factor
         return largest if measured else None
 
+    def casts_doubt(self) -> bool:
+        """Return whether any value is doubtful for it."""
+        return any(row.severity != "note" and row.affects for row in self.findings)
+
     def score(self) -> float:
         """Return the importance: first what forbids the use, then by effect and channels."""
         if any(row.severity == "fatal" for row in self.findings):
@@ -85,12 +93,20 @@ class Event:
             return 100.0
         channels = max(len(self.channels), 1)
         if all(row.severity == "note" for row in self.findings):
-            return 1e-3 * channels if self.findings[0].finding in _NOTES else 0.0
+            return _score_note(self.findings)
         factors = self.factors()
         if factors is None:
             affected = any(row.affects for row in self.findings)
             return channels if affected else 0.01 * channels
         return 0.1 + channels * max(map(_effect, factors.values()), default=0.0)
+
+
+def _score_note(findings: Sequence[FindingRow]) -> float:
+    code = findings[0].finding
+    strong = max(getattr(read_data(row), "ratio", _MIN_LINE) for row in findings)
+    if code not in _NOTES or (code == "lines" and strong < _MIN_LINE):
+        return 0.0
+    return 1e-3 * (len(_NOTES) - _NOTES.index(code))
 
 
 def _effect(factor: float) -> float:
@@ -135,30 +151,43 @@ def render_log_screen(
         findings = select_of(row, every_finding)
         parameters = [each for each in select_of(row, every_parameter) if each.recommended]
         length = describe_length(row, parameters, select_of(row, allan))
-        yield Text(_fold(state_text(row, length), width, 6), style="bold")
+        others = [each for each in findings if each.finding not in (*LEFT_OUT, "motion")]
+        motion = [each for each in findings if each.finding == "motion"]
+        events = [] if motion else group_events(others)[:_MAX_EVENTS]
+        doubting = [n for n, event in enumerate(events, start=1) if event.casts_doubt()]
+        state = state_text(row, length, doubting, moved=bool(motion))
+        yield Text(_fold(state, width, 6), style="bold")
         if row.status != "ok":
             yield Text()
             continue
-        motion = [each for each in findings if each.finding == "motion"]
-        moved = [(each.start or 0.0, each.end or 0.0) for each in motion]
-        rest = find_still_spans(moved, 0.0, row.duration or 0.0)
         if motion:
-            channels = list(dict.fromkeys(each.channel for each in motion if each.channel))
+            moved = [(each.start or 0.0, each.end or 0.0) for each in motion]
+            rest = find_still_spans(moved, 0.0, row.duration or 0.0)
+            channels = [each.channel for each in motion if each.channel]
             yield Text(_fold(motion_text(channels, _merge(moved), rest), width, 6))
         elif reason := reason_text(row):
             yield Text(_fold(reason, width, 2))
-        at_rest = sum(stop - start for start, stop in rest)
-        shown = not motion or at_rest > (1.0 - _MAX_MOVED_SHARE) * (row.duration or 0.0)
-        if shown:
+        if not parameters:
+            yield explain_no_estimates(row)
+        elif not motion:
             yield Text("95 % intervals are below the values; ?: doubtful; <: upper limit")
+            doubted = _list_doubted(others)
             for quantity, title in TITLES.items():
                 lines = [line for line in parameters if quantity_of(line.channel) == quantity]
                 if lines:
-                    yield Text("\n".join(_tabulate(title, quantity, lines, system, row)))
-            if not parameters:
-                yield explain_no_estimates(row)
-        others = [each for each in findings if each.finding not in (*LEFT_OUT, "motion")]
-        yield from _list_events(others, system, width, _MAX_EVENTS if shown else 0)
+                    table = _tabulate(title, quantity, lines, system, row.duration or 0.0, doubted)
+                    yield Text("\n".join(table))
+        yield from _list_events(events, others, system, width)
+
+
+def _list_doubted(findings: Iterable[FindingRow]) -> set[tuple[str, str]]:
+    """Return channel and parameter of values in doubt by findings without a measured effect."""
+    return {
+        (row.channel, name)
+        for row in findings
+        if row.channel and row.severity != "note" and row.finding not in _REMOVED
+        for name in row.affects
+    }
 
 
 def _merge(spans: Iterable[tuple[float, float]]) -> list[tuple[float, float]]:
@@ -179,7 +208,12 @@ def _fold(text: str, width: int, lines: int, indent: str = "") -> str:
 
 
 def _tabulate(
-    title: str, quantity: str, rows: Sequence[ParameterRow], system: System, about: RecordingRow
+    title: str,
+    quantity: str,
+    rows: Sequence[ParameterRow],
+    system: System,
+    duration: float,
+    doubted: Collection[tuple[str, str]],
 ) -> Iterator[str]:
     """Yield the lines of a table: a value for each axis, its 95 % interval below."""
     units = {symbol: choose_page_unit(quantity, symbol, system) for symbol in SHOWN}
@@ -189,10 +223,13 @@ def _tabulate(
     for row in rows:
         by_channel[row.channel].setdefault(row.parameter, row)
         time = _SHARE_UNTIL_IDENTIFIED * (row.duration_needed or 0.0)
-        if row.parameter in SHOWN and row.value is None and time > (about.duration or 0.0):
+        if row.parameter in SHOWN and row.value is None and 1.0 < time / duration < _MAX_WAIT:
             needed[symbol_text(row.parameter)].append(time)
     for channel, own in by_channel.items():
-        cells = [_cell(own.get(symbol), units[symbol]) for symbol in SHOWN]
+        cells = [
+            _cell(own.get(symbol), units[symbol], doubted=(channel, symbol) in doubted)
+            for symbol in SHOWN
+        ]
         yield _line(channel, (value for value, _ in cells))
         if any(interval for _, interval in cells):
             yield _line("", (interval for _, interval in cells))
@@ -209,13 +246,13 @@ def _line(name: str, cells: Iterable[str]) -> str:
     return text
 
 
-def _cell(row: ParameterRow | None, unit: Unit) -> tuple[str, str]:
+def _cell(row: ParameterRow | None, unit: Unit, *, doubted: bool) -> tuple[str, str]:
     """Return a value, or a bound, and the interval."""
     if row is None:
         return NO_VALUE, ""
     value, interval = unit.estimate_texts(row.value, row.lower, row.upper)
     if row.value is not None:
-        mark = " ?" * (row.status != "ok")
+        mark = " ?" * (doubted or row.status != "ok")
         return value + mark, "" if interval == NO_VALUE else interval
     if row.upper is None:
         return NO_VALUE, ""
@@ -223,13 +260,12 @@ def _cell(row: ParameterRow | None, unit: Unit) -> tuple[str, str]:
 
 
 def _list_events(
-    findings: Sequence[FindingRow], system: System, width: int, most: int
+    events: Sequence[Event], findings: Sequence[FindingRow], system: System, width: int
 ) -> Iterator[Text]:
-    """Yield the most important events, and the number of the others."""
-    events = group_events(findings)[:most]
+    """Yield the most important events, and the number of the other findings."""
     for number, event in enumerate(events, start=1):
         text = f"{number}. {events_text(event.findings, system, event.factors())}"
-        yield Text(_fold(text, width, _MAX_EVENT_LINES, "   "))
+        yield Text(_fold(_shorten(text, width), width, _MAX_EVENT_LINES, "   "))
     shown = sum(len(event.findings) for event in events)
     removed = sum(row.severity == "note" and row.finding in _REMOVED for row in findings)
     counts = [f"{counted(removed, 'signal')} removed without effect on a parameter"] * (removed > 0)
@@ -237,3 +273,11 @@ def _list_events(
         counts.append(counted(others, "other finding"))
     rest = f"{join_names(counts)}; all" if counts else "All"
     yield Text(_fold(f"{rest} findings and parameters: --verbose", width, 2) + "\n")
+
+
+def _shorten(text: str, width: int) -> str:
+    """Return a text without sentences before the last one, which is what to do, until it fits."""
+    sentences = re.split(r"(?<=\D\.) (?=[A-Z])", text)
+    while len(sentences) > 2 and len(wrap(" ".join(sentences), width - 3)) > _MAX_EVENT_LINES:
+        del sentences[-2]
+    return " ".join(sentences)

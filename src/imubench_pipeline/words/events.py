@@ -22,12 +22,20 @@ _MAX_SPANS = 4
 Span = tuple[float, float]
 
 
-def state_text(row: RecordingRow, length: str) -> str:
-    """Return the state of a recording in a line; ``length`` has duration, rate and channels."""
+def state_text(
+    row: RecordingRow, length: str, events: Sequence[int] = (), moved: bool = False
+) -> str:
+    """Return the state of a recording in a line.
+
+    ``length`` has duration, rate and channels; ``events`` are the numbers of those that cast doubt.
+    """
     if row.status != "ok":
         return f"{row.recording}: {row.status}: {row.reason or 'no reason is known'}"
     state = _STATES.get(row.fitness, "not judged")
-    return f"{row.recording}: {state}; {length}".removesuffix("; ")
+    if row.fitness == "fit with doubts" and events:
+        state += f" ({', '.join(map(str, events))})"
+    rest = "" if moved or row.kind != "static" else "at rest; "
+    return f"{row.recording}: {rest}{state}; {length}".removesuffix("; ")
 
 
 def reason_text(row: RecordingRow) -> str:
@@ -41,7 +49,7 @@ def motion_text(channels: Sequence[str], moved: Sequence[Span], still: Sequence[
     if not still:
         return (
             f"Not at rest: {where}, all of the log. Record it again, with the sensor on a heavy "
-            "table. If it lay still, its unit is wrong"
+            "table"
         )
     return (
         f"Not at rest: {where}. At rest: {_spans_text(still)}. Analyse the longest rest with "
@@ -60,8 +68,8 @@ def longer_log_text(times: Mapping[str, tuple[float, float]]) -> str:
     parts = []
     for symbol, (least, most) in times.items():
         low, high = duration_text(least, 1), duration_text(most, 1)
-        parts.append(f"{symbol} needs {low}" + f" to {high}" * (low != high))
-    return f"{join_names(parts)} of data, or more"
+        parts.append(f"{symbol} from {low}" + f" to {high}" * (low != high))
+    return f"Logs for a value: {join_names(parts)}, or more"
 
 
 def read_data(row: FindingRow) -> FindingData | None:

@@ -20,7 +20,9 @@ from imubench_pipeline.typing import Array
 
 _MAX_CREST_FACTOR = 6.0  # of extremes over deviation; a knock exceeds it
 _CALM_QUANTILE = 0.2  # of the deviations of blocks: at rest, if the log is at rest for a fifth
-_MIN_TURN = math.radians(5.0)  # change of the mean of a gyro that is a rotation, rad/s
+_MIN_CHANGE = {"gyro": math.radians(2.0), "accel": 0.5}
+"""SI, change of the mean that is a rotation, or another attitude: warm-ups are smaller."""
+
 _AVERAGES = np.geomspace(0.1, 3.0, 7)  # s
 _MIN_DEVIATION = {"gyro": math.radians(0.5), "accel": 0.2}
 """SI, of means of 0.1 to 3 s. Gyros at rest have at most 0.2 °/s."""
@@ -62,10 +64,9 @@ def find_motion(
         return []
     reach = np.maximum(blocks.high - blocks.mean, blocks.mean - blocks.low)
     moving = blocks.spread > max(times * calm, least)
-    if quantity == "gyro":
-        still = blocks.spread < times * calm
-        turned = np.abs(blocks.mean - compute_finite_median(blocks.mean[still]))
-        moving |= turned > max(_MIN_TURN, times * calm)
+    still = blocks.spread < times * calm
+    turned = np.abs(blocks.mean - compute_finite_median(blocks.mean[still]))
+    moving |= turned > max(_MIN_CHANGE[quantity], times * calm)
     places = np.flatnonzero(moving & (reach < _MAX_CREST_FACTOR * blocks.spread))
     if len(places) == 0:
         return []

@@ -440,5 +440,5 @@ class SharedNoise(FindingData, affects=ALL, doubt="correlated noise of {channels
             f"The noise of {channel_name(channel)} and {channel_name(self.other)} is correlated "
             f"({number_text(self.correlation, 2)}). It comes from a vibration, from the supply, or "
             "from a column that was computed from several axes. Fusion and pooling treat axes as "
-            "independent"
+            "independent. Look for vibration, and check the columns"
         )

@@ -86,6 +86,19 @@ class TooManyLines(
         )
 
 
+class Filtered(FindingData, affects=NONE):
+    """The noise is filtered above a frequency."""
+
+    cutoff: float  # Hz
+
+    def text(self, channel: str) -> str:
+        return (
+            f"The noise of {channel_name(channel)} is filtered above {number_text(self.cutoff, 3)} "
+            "Hz, as by a low-pass of the sensor. The Allan deviation bends at its short end. N is "
+            "of the noise before the filter"
+        )
+
+
 class BandLimit(FindingData, affects=NONE):
     """The fit uses only frequencies below a limit."""
 
