@@ -68,8 +68,8 @@ def longer_log_text(times: Mapping[str, tuple[float, float]]) -> str:
     parts = []
     for symbol, (least, most) in times.items():
         low, high = duration_text(least, 1), duration_text(most, 1)
-        parts.append(f"{symbol} from {low}" + f" to {high}" * (low != high))
-    return f"Logs for a value: {join_names(parts)}, or more"
+        parts.append(f"{symbol} {low}" + f" to {high}" * (low != high))
+    return f"Data needed: {join_names(parts)}, or more"
 
 
 def read_data(row: FindingRow) -> FindingData | None:
