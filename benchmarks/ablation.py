@@ -47,7 +47,6 @@ RULES: Mapping[str, tuple[tuple[ModuleType, str, float], ...]] = {
     "ramp above the slope of a walk": ((fit, "_MIN_RAMP", 0.0),),
     "gain of a process": ((active_sets, "_GAIN_OF_PROCESS", 0.0),),
     "gain of flicker noise and a process": ((active_sets, "_GAIN_OF_BOTH", 0.0),),
-    "gain of a walk without bias instability": ((active_sets, "_GAIN_WITHOUT_BIAS", 0.0),),
     "profile of K": ((active_sets, "_MAX_PROFILE_LOSS", 0.0),),
     "10 minutes for K": ((fit, "_MIN_DURATION_OF_WALK", 0.0),),
     "error of the model": ((fit, "_MAX_MODEL_ERROR", 1e-9),),

@@ -26,7 +26,6 @@ TERMS = 5
 
 _GAIN_OF_PROCESS = 4.0  # Decrease of the cost (chi-squared) that a correlation time must bring
 _GAIN_OF_BOTH = 8.0  # The same for flicker noise and a process together
-_GAIN_WITHOUT_BIAS = 3.0  # Of a walk or ramp without any bias instability: few sensors have none
 _MAX_PROFILE_LOSS = 3.84  # Of chi-squared at 95 % limits
 _RIDGE = 1e-12  # Relative, for collinear columns
 
@@ -123,12 +122,9 @@ class TermSearch:
 
 def _required_gain(chosen: tuple[int, ...]) -> float:
     """Return the decrease of chi-squared that a set of terms must bring beside the simplest."""
-    gain = 0.0
-    if PROCESS in chosen:
-        gain += _GAIN_OF_BOTH if FLICKER in chosen else _GAIN_OF_PROCESS
-    if (WALK in chosen or RAMP in chosen) and FLICKER not in chosen and PROCESS not in chosen:
-        gain += _GAIN_WITHOUT_BIAS
-    return gain
+    if PROCESS not in chosen:
+        return 0.0
+    return _GAIN_OF_BOTH if FLICKER in chosen else _GAIN_OF_PROCESS
 
 
 @njit(cache=True)
