@@ -40,6 +40,7 @@ OUTPUTS = {
     ("report", "one_file"): ["results", "--one-file", "{}"],
     ("report", "output"): ["results", "--output", "{}"],
     ("figures", "output"): ["results", "--kind", "theory", "--format", "svg", "--output", "{}"],
+    ("sensors", "class_limits"): ["--class-limits", "{}"],
     ("simulate", "out"): ["bno055", "--duration", "1 s", "--out", "{}"],
 }
 """Every option that names an output, and the arguments of its command."""
@@ -53,6 +54,7 @@ INPUTS = {
     "show": {"results"},
     "papers": {"results"},
     "shortlist": {"sensors", "requirements", "results"},
+    "sensors": {"sensors"},
     "report": {"results"},
     "figures": {"results"},
     "simulate": {"motion", "results", "sensors"},

@@ -88,7 +88,7 @@ def test_parquet_is_a_kept_recording(tmp_path: Path) -> None:
     assert read_metadata(path).simulated
     about = json.loads(pq.read_metadata(path).metadata[METADATA])
     assert about["simulation"]["seed"] == 7
-    assert "rms" in json.dumps(about["simulation"]["figures"])
+    assert "N 0.014 deg/s/sqrt(Hz)" in json.dumps(about["simulation"]["figures"])
     assert pq.read_schema(path).names == ["gyro_x", "gyro_y", "gyro_z", "temperature"]
     kept = open_channel_logs(tmp_path)
     assert kept["gyro_x"].grid == 6000 and kept["gyro_x"].segments == ((0, 6000),)
@@ -199,7 +199,7 @@ def test_drift_and_cut_off_are_those_of_the_run(tmp_path: Path, capsys) -> None:
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        (["nosuch", "--hours", "1"], "no such sensor file; there are: adis16405"),
+        (["nosuch", "--hours", "1"], "no such sensor file; there are: 3dm_cv7"),
         (["bno055", "--hours", "0"], "--hours 0: 0 s at 100 Hz are 0 samples; expected 1 to"),
         (["bno055", "--hours", "-0.5"], "--hours -0.5: -1800 s at 100 Hz are -180000 samples"),
         (["bno055", "--hours", "nan"], "--hours nan: expected a length of 1 to"),
@@ -217,7 +217,7 @@ def test_drift_and_cut_off_are_those_of_the_run(tmp_path: Path, capsys) -> None:
             "found gyro_x twice; expected each channel once",
         ),
         (["bno055", "--hours", "1", "--channels", "accel_x"], "no figures of accel_x"),
-        (["ln_200", "--hours", "1"], "prints no noise"),
+        (["vn_110", "--hours", "1", "--rate", "100 Hz"], "prints no noise"),
         (["no.yaml", "--hours", "1"], "no.yaml: no such file"),
         (["bno055", "--hours", "1", "--results", "nowhere"], "no table recordings"),
     ],

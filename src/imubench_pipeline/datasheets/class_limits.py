@@ -18,7 +18,7 @@ from typing import get_args
 import numpy as np
 
 from imubench_pipeline.datasheets.comparable import Comparable, PrintedAxis, read_comparables
-from imubench_pipeline.settings.printed import FIGURE_DIMENSIONS
+from imubench_pipeline.settings.printed import FIGURE_DIMENSIONS, Datasheet, QuantityDatasheet
 from imubench_pipeline.settings.sensor import QUANTITIES, Grade, Sensor
 from imubench_pipeline.units import SI_UNITS, convert_to_si
 
@@ -105,7 +105,7 @@ def read_sigma(sensor: Sensor, quantity: str, figure: str) -> float | None:
 
 def _list_sigmas(sensor: Sensor, channel: str, figure: str) -> Iterator[float]:
     """Yield the standard deviations of a figure of a channel, SI."""
-    datasheet = sensor.datasheet
+    datasheet = _with_options(sensor.datasheet)
     axis = PrintedAxis.of(datasheet, channel)
     if figure in ("N", "B"):
         statistic = {"N": "N", "B": "adev_minimum"}[figure]
@@ -123,6 +123,19 @@ def _list_sigmas(sensor: Sensor, channel: str, figure: str) -> Iterator[float]:
             rms = _sigmas_of(_read(axis, "temperature_rms"))
             own = [s * math.sqrt(12.0) / span for s in rms]
     yield from own
+
+
+def _with_options(datasheet: Datasheet) -> Datasheet:
+    """Return a datasheet with the options of the logged sensor, or else with all."""
+    sheets = (datasheet.gyro, datasheet.accel)
+    printed = [
+        figure.option
+        for sheet in sheets
+        for name in (QuantityDatasheet.model_fields if sheet else ())
+        for figure in (sheet.printed(name) if sheet else ())
+        if figure.option is not None
+    ]
+    return datasheet if datasheet.options else datasheet.model_copy(update={"options": printed})
 
 
 def _read(axis: PrintedAxis, name: str) -> list[Comparable]:

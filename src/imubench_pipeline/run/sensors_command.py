@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from imubench_pipeline.report.show import show
 from imubench_pipeline.settings.command_line import CommandError
+from imubench_pipeline.tables.outputs import add_output
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
@@ -39,10 +40,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default="practical",
         help="of N and B in the list: deg/h, ug and their like, or rad/s and m/s^2",
     )
-    parser.add_argument(
+    add_output(
+        parser,
         "--class-limits",
-        type=Path,
-        metavar="FILE",
         help="write the limits of each class, from all sensors, into this CSV file",
     )
 
@@ -54,13 +54,12 @@ def run(arguments: argparse.Namespace) -> int:
     from imubench_pipeline.settings.config import Run
     from imubench_pipeline.settings.sensor import read_sensors
     from imubench_pipeline.settings.shipped import list_folders
-    from imubench_pipeline.tables.files import write_content
 
     sensors = read_sensors(list_folders(arguments.sensors or Run().sensors, "sensors"))
     if arguments.class_limits:
         limits = derive_class_limits(sensors)
-        write_content(write_class_limits(limits), arguments.class_limits)
-        print(f"{arguments.class_limits}: {len(limits)} limits of {len(sensors)} sensors")
+        arguments.class_limits.write(write_class_limits(limits))
+        print(f"{len(limits)} limits of {len(sensors)} sensors")
         return 0
     found = find_sensors(sensors, arguments.text)
     if not found:
