@@ -173,7 +173,7 @@ def placed(listed: list[PrintedFigure]) -> set[tuple[str | None, float]]:
 
 @pytest.mark.parametrize("name", FILES.values())
 def test_no_figure_is_invented(shared: Path, name: str) -> None:
-    """Every number stands in the facts of that quantity, or names the place of its document."""
+    """Every number is in the facts of its quantity, or names its place in the document."""
     entry = facts(shared)[name]
     for quantity, key, figure in figures(CATALOGUE[name]):
         if figure.place or figure.evidence:
