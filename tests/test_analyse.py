@@ -172,7 +172,7 @@ def test_a_step_that_fails_leaves_its_log_out_and_no_number_waits_for_the_pages(
         put_log(path, 1, samples=2000)
         only = [line.partition(",")[0] for line in path.read_text().splitlines()]
         path.write_text("\n".join(only))  # of a gyro: each channel more is eight figures more
-    steps = {"unread": "write_recording", "unrebuilt": "reconstruction_rows"}
+    steps = {"unread": "write_recording", "unrebuilt": "reconstruct_recording"}
     for name, step in steps.items():
         monkeypatch.setattr(chain, step, failing(getattr(chain, step), name))
     printed: list[str] = []

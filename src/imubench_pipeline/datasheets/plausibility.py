@@ -233,7 +233,8 @@ def implausible(
         least, channel = min(slow.values()), None if len(slow) == len(rates) else min(slow)
         findings.append(find(texts.SlowSampling(least), "note", least, channel))
     if moved:
-        return findings
+        rates_of_gyros = {n: one.mean for n, one in channels.items() if quantity_of(n) == "gyro"}
+        return [*findings, *_check_gravity_turn(rates_of_gyros, gravity)]
     if not any(f.finding == texts.RateImplausible.code for f in findings):
         findings += _check_noise(channels, of)
         findings += _compare_noise(channels, of, {f.channel for f in findings})

@@ -149,6 +149,7 @@ _MIN_COMPARED_COUNT = 10  # so that few samples do not pile up by chance
 _MIN_COUNT_BESIDE_0 = 30  # Samples at each of the three levels on either side of 0
 _MIN_SIGNIFICANCE = 3.0  # Of the excess at level 0 in a piece, in standard errors
 _RANGE_OF_TRUNCATION = (1.04, 3.5)  # Of the excess: 2 ln 2 + 1.25 (step / sigma)^2 is expected
+_MAX_STEP_OF_SATURATION = 1.5  # over the noise
 _MIN_MISSING_SAMPLES = 12.0
 """Expected samples beyond the last level above which their absence means saturation. Noise has none
 of them with a probability of exp(-12)."""
@@ -300,7 +301,7 @@ def find_saturation(
     column: ColumnSummary, steps: Quantisation | None, share: float
 ) -> tuple[str, int] | None:
     """Return the saturated extreme of a column and its samples, at least the ``share``; or None."""
-    if steps is not None and steps.levels < 10:
+    if steps is not None and steps.over_noise > _MAX_STEP_OF_SATURATION:
         return None  # with so few levels an extreme is frequent in any case
     for side, number in zip(("lowest", "highest"), column.at_extremes, strict=True):
         # Normal noise has a few samples at its last level with any step.
