@@ -190,8 +190,8 @@ def test_a_step_that_fails_leaves_its_log_out_and_no_number_waits_for_the_pages(
     status = main(["analyse", *logs, *UNITS, "--config", str(config), "--output", str(made)])
     assert status == 1
     (numbers,) = printed
-    assert "whole: 20 s at 100 Hz, 1 channel\n" in numbers and "°/√h" in numbers
-    assert "unrebuilt: 20 s at 100 Hz, 1 channel\n" in numbers
+    assert "whole: at rest; usable; 20 s at 100 Hz, 1 channel\n" in numbers and "°/√h" in numbers
+    assert "unrebuilt: at rest; usable; 20 s at 100 Hz, 1 channel\n" in numbers
     assert "failed: the step ingest failed: RuntimeError: no such luck" in numbers
     said = capsys.readouterr()
     assert said.out == f"{made}/report.html: open it in a browser\n"

@@ -226,7 +226,7 @@ def implausible(
     findings = implausible_rates(
         rates,
         {name: of[quantity_of(name)].bandwidth for name in channels},
-        sensor.log.rate_hz if sensor else None,
+        _find_stated_rate(sensor, rates),
     )
     slow = {name: rate for name, rate in rates.items() if rate < MIN_RATE_OF_NOISE}
     if slow and not findings:
@@ -255,6 +255,15 @@ def implausible(
         ]
         findings += turning or _check_gravity_turn(means, gravity)
     return findings
+
+
+def _find_stated_rate(sensor: Sensor | None, rates: Mapping[str, float]) -> float | None:
+    """Return the rate in the sensor file, Hz; dates and times of day have no unit to mistake."""
+    if sensor is None:
+        return None
+    time = sensor.log.time
+    dated = time is not None and time.format is not None
+    return sensor.log.rate_hz or (min(rates.values(), default=None) if dated else None)
 
 
 def implausible_of(quality: Quality, sensor: Sensor | None) -> list[FindingRow]:
