@@ -253,6 +253,8 @@ def _cell(row: ParameterRow | None, unit: Unit, *, doubted: bool) -> tuple[str, 
     value, interval = unit.estimate_texts(row.value, row.lower, row.upper)
     if row.value is not None:
         mark = " ?" * (doubted or row.status != "ok")
+        if len(interval) >= _CELL_WIDTH:
+            interval = interval.replace(" to ", "–")
         return value + mark, "" if interval == NO_VALUE else interval
     if row.upper is None:
         return NO_VALUE, ""
