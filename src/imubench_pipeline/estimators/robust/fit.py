@@ -137,7 +137,19 @@ def fit(
 
 
 def fit_values(curve: AllanCurve, lines: Sequence[Sinusoid] = ()) -> dict[str, float]:
-    """Return the values alone of `fit`, SI, by parameter: 0 where a term is absent.
+    """Return only the values of `fit`, without limits: 0 where a term is absent.
+
+    Parameters
+    ----------
+    curve : AllanCurve
+        Of m points, in (SI unit)^2 and s, with or without deterministic signals.
+    lines : sequence of Sinusoid
+        The lines of the spectrum; SI, Hz.
+
+    Returns
+    -------
+    dict of str to float
+        By parameter, SI and s.
 
     Raises
     ------

@@ -49,14 +49,14 @@ class WarmUpTrimmed(FindingData, affects=NONE):
 
 
 class PartAtRest(FindingData, affects=NONE):
-    """The longest part at rest, which is analysed alone."""
+    """Only the longest part at rest is analysed."""
 
     start: float
     end: float
 
     def text(self, channel: str) -> str:
         return (
-            "The sensor was moved. Its longest rest is analysed alone, "
+            "The sensor was moved. Only its longest rest is analysed, "
             f"{number_text(self.start, 5)} to {number_text(self.end, 5)} s (quality.at_rest)"
         )
 
