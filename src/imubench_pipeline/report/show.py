@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from imubench_pipeline.settings.command_line import CommandError, make_number_type
+from imubench_pipeline.settings.command_line import CommandError, add_units, make_number_type
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -34,12 +34,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--channel", help="parameters of only this channel, such as gyro_x")
     parser.add_argument("--method", help="method of the parameters; default: the recommended one")
-    parser.add_argument(
-        "--units",
-        choices=("practical", "si"),
-        default="practical",
-        help="practical: deg/h, ug and their like; si: rad/s, m/s^2; default: practical",
-    )
+    add_units(parser)
     parser.add_argument(
         "--width",
         type=_parse_width,

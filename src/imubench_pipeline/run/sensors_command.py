@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from imubench_pipeline.report.show import show
-from imubench_pipeline.settings.command_line import CommandError
+from imubench_pipeline.settings.command_line import CommandError, add_units
 from imubench_pipeline.tables.outputs import add_output
 
 if TYPE_CHECKING:
@@ -34,12 +34,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="FOLDER",
         help="of the sensor files; default: the catalogue of the package and config/sensors",
     )
-    parser.add_argument(
-        "--units",
-        choices=("practical", "si"),
-        default="practical",
-        help="of N and B in the list: deg/h, ug and their like, or rad/s and m/s^2",
-    )
+    add_units(parser)
     add_output(
         parser,
         "--class-limits",

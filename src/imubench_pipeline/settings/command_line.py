@@ -17,6 +17,16 @@ def parse_path(text: str) -> Path:
     return Path(text)
 
 
+def add_units(parser: argparse.ArgumentParser) -> None:
+    """Add the option that chooses between practical and SI units."""
+    parser.add_argument(
+        "--units",
+        choices=("practical", "si"),
+        default="practical",
+        help="practical: deg/h, ug and their like; si: rad/s, m/s^2; default: practical",
+    )
+
+
 def parse_seconds(text: str) -> float:
     """Return a time in s from a text with or without unit."""
     from imubench_pipeline.units import UnitError, parse_quantity

@@ -13,7 +13,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from imubench_pipeline.model.recordings import RecordingRow
-from imubench_pipeline.settings.command_line import CommandError
+from imubench_pipeline.settings.command_line import CommandError, add_units
 from imubench_pipeline.settings.extras import require_extra
 from imubench_pipeline.tables.files import find_tables, find_tables_folder, read
 from imubench_pipeline.tables.outputs import OutputFolder, add_output
@@ -58,9 +58,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="FORMAT,...",
         help="svg, pdf; default: both",
     )
-    parser.add_argument(
-        "--units", choices=("practical", "si"), default="practical", help="default: practical"
-    )
+    add_units(parser)
     add_output(parser, "--output", OutputFolder, metavar="FOLDER", help="default: RESULTS/figures")
 
 

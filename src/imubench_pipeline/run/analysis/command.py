@@ -14,7 +14,12 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from imubench_pipeline.settings.command_line import MOST_WHOLE, CommandError, make_number_type
+from imubench_pipeline.settings.command_line import (
+    MOST_WHOLE,
+    CommandError,
+    add_units,
+    make_number_type,
+)
 from imubench_pipeline.settings.extras import require_extra
 from imubench_pipeline.tables.outputs import OutputFolder, add_output
 
@@ -67,12 +72,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="FILE",
         help="settings of the estimates; default: config/config.yaml, if it is there",
     )
-    parser.add_argument(
-        "--units",
-        choices=("practical", "si"),
-        default="practical",
-        help="practical: deg/h, ug and their like; si: rad/s, m/s^2; default: practical",
-    )
+    add_units(parser)
     parser.add_argument(
         "-v", "--verbose", action="store_true", help="print all findings and parameters"
     )
