@@ -42,7 +42,9 @@ def test_the_truth_is_in_the_intervals(estimates) -> None:
         (accel["B"], ACCEL.B),
     ):  # fmt: skip
         assert parameter.lower < truth < parameter.upper
-    assert estimates.models["gyro_x"].name == "N+K" and accel.model.name == "N+F"
+    # the fit may add a small part, without a value
+    assert estimates.models["gyro_x"].name in ("N+K", "N+F+K") and gyro["B"].value is None
+    assert accel.model.name == "N+F"
     with pytest.raises(ValueError, match="models of gyro_x, accel_z; expected"):
         _ = estimates.model
     with pytest.raises(KeyError, match="no parameter 'ARW'; robust has"):

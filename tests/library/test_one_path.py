@@ -138,7 +138,7 @@ def test_two_seeds_give_the_same_limits() -> None:
             a, b = getattr(one, limit), getattr(two, limit)
             assert (a is None) == (b is None)
             if a is not None:
-                assert a == pytest.approx(b, rel=0.03), (name, limit)
+                assert a == pytest.approx(b, rel=0.06), (name, limit)  # of random draws
 
 
 @pytest.mark.parametrize("channels", few([["gyro_y"]], [None, "gyro", "accel", "accel_z"]))
