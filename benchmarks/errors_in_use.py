@@ -48,7 +48,6 @@ USE = Use(
 )
 GYRO: Mapping[Cause, float] = {
     "turn_on_bias": 5e-3,
-    "repeatability": 2e-3,
     "temperature": 1e-5,
     "temperature_squared": 4e-7,
     "scale_factor": 2e-3,
@@ -58,7 +57,6 @@ GYRO: Mapping[Cause, float] = {
 }
 ACCEL: Mapping[Cause, float] = {
     "turn_on_bias": 0.2,
-    "repeatability": 0.05,
     "temperature": 2e-3,
     "temperature_squared": 5e-5,
     "scale_factor": 5e-3,

@@ -1,9 +1,13 @@
-"""Limits of a class of sensors: what its members print, for those that are silent.
+"""Figures of a sensor as one standard deviation, and limits of its class where it prints none.
 
-A figure counts as one standard deviation, as in error budgets: typical ones as printed, a maximum
-as three, and the end of a range as the root of three. A total over the temperature range bounds the
-coefficient: it is reached over half of the range. An rms over the range is the coefficient times
-the range over the root of 12.
+A document may make several statements about a figure: typical and maximum, at 25 degC and over the
+range, an offset and its repeatability. The statement with the least standard deviation counts, so
+that a further figure never makes a sensor worse, and none that is left out makes it better. A
+typical figure is one standard deviation, a maximum three, and the end of a range the root of three.
+A total over the temperature range bounds the coefficient: it is reached over half of the range. An
+rms over the range is the coefficient times the range over the root of 12.
+
+A sensor that prints no figure counts as the worst of its class (`find_limit`).
 """
 
 import csv
@@ -11,13 +15,15 @@ import io
 import math
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, fields
+from functools import cache
 from pathlib import Path
 from statistics import median
-from typing import get_args
+from typing import cast, get_args
 
 import numpy as np
 
 from imubench_pipeline.datasheets.comparable import Comparable, PrintedAxis, read_comparables
+from imubench_pipeline.model.states import Cause
 from imubench_pipeline.settings.printed import FIGURE_DIMENSIONS, Datasheet, QuantityDatasheet
 from imubench_pipeline.settings.sensor import QUANTITIES, Grade, Sensor
 from imubench_pipeline.units import SI_UNITS, convert_to_si
@@ -25,14 +31,27 @@ from imubench_pipeline.units import SI_UNITS, convert_to_si
 FILE = Path(__file__).with_name("class_limits.csv")
 """The limits of the shipped catalogue."""
 
-FIGURES = (
-    *("N", "B", "rate_random_walk", "offset", "bias_repeatability", "temperature_coefficient"),
-    *("scale_factor_error", "scale_factor_temperature", "nonlinearity", "misalignment"),
-    *("cross_axis", "g_sensitivity", "vibration_rectification"),
-)
-"""Figures that have limits. B is the minimum of the Allan deviation, as vendors print it."""
+STATEMENTS: Mapping[Cause, tuple[str, ...]] = {
+    "turn_on_bias": ("offset", "bias_repeatability"),
+    "temperature": ("temperature_coefficient", "temperature_total", "temperature_rms"),
+    "scale_factor": ("scale_factor_error",),
+    "scale_factor_temperature": ("scale_factor_temperature",),
+    "nonlinearity": ("nonlinearity",),
+    "misalignment": ("misalignment", "cross_axis"),
+    "g_sensitivity": ("g_sensitivity",),
+    "vibration_rectification": ("vibration_rectification",),
+}
+"""Keys of a datasheet that state a figure which static logs do not show, the usual one first."""
 
-_USUAL_RANGE = 125.0  # K, from -40 to 85 degC
+_NOISE: Mapping[str, str] = {"N": "N", "B": "adev_minimum", "K": "K"}
+"""Statistic of each noise figure. B is the minimum of the Allan deviation, as vendors print it."""
+
+FIGURES: tuple[str, ...] = (*_NOISE, *STATEMENTS)
+"""Figures that have limits."""
+
+_GRADES: tuple[str, ...] = get_args(Grade)
+_MIN_SENSORS = 3  # a class with fewer is not taken to be better than the next better class
+_UNKNOWN_RANGE = 50.0  # K; less than any sensor of the catalogue has, so that silence does not help
 SIGMAS_OF_KIND: Mapping[str, float] = {
     "1sigma": 1.0,
     "typ": 1.0,
@@ -53,17 +72,18 @@ class ClassLimit:
     quantity: str  # ``gyro`` or ``accel``
     figure: str  # of `FIGURES`
     unit: str
-    sensors: int  # number that print the figure
+    # best, median, worst: of the sensors that print the figure
+    best: float
     median: float
     worst: float
     spread: float | None  # standard deviation of the logarithm; None: of one sensor
-    names: tuple[str, ...]  # these sensors
+    sensors: Mapping[str, float]  # the figure of each of them
 
 
 def derive_class_limits(sensors: Mapping[str, Sensor]) -> list[ClassLimit]:
     """Return the limits of each class from the figures of its sensors, in a fixed order."""
     limits = []
-    for grade in get_args(Grade):
+    for grade in _GRADES:
         members = {name: one for name, one in sensors.items() if one.grade == grade and one.sold}
         for quantity in QUANTITIES:
             for figure in FIGURES:
@@ -78,51 +98,113 @@ def derive_class_limits(sensors: Mapping[str, Sensor]) -> list[ClassLimit]:
 
 
 def _summarise(grade: str, quantity: str, figure: str, values: Mapping[str, float]) -> ClassLimit:
-    logarithms = np.log(list(values.values()))
+    rounded = {name: float(f"{value:.4g}") for name, value in values.items()}
+    logarithms = np.log(list(rounded.values()))
     return ClassLimit(
         grade=grade,
         quantity=quantity,
         figure=figure,
         unit=_unit_of(quantity, figure),
-        sensors=len(values),
-        median=median(values.values()),
-        worst=max(values.values()),
+        best=min(rounded.values()),
+        median=median(rounded.values()),
+        worst=max(rounded.values()),
         spread=float(np.std(logarithms, ddof=1)) if len(values) > 1 else None,
-        names=tuple(values),
+        sensors=rounded,
     )
 
 
+@cache
+def _load_shipped() -> dict[tuple[str, str, str], ClassLimit]:
+    return {(one.grade, one.quantity, one.figure): one for one in read_class_limits()}
+
+
+def find_limit(grade: str | None, quantity: str, figure: str) -> ClassLimit:
+    """Return the shipped limit of a figure for a class; a sensor without a grade is a consumer one.
+
+    A class with fewer than three sensors is not taken to be better than the next better class: its
+    worst figure is the worst of both. Where neither prints the figure, the next class below counts.
+    Raises a KeyError if no sensor of the catalogue prints it.
+    """
+    shipped, place = _load_shipped(), _GRADES.index(grade or _GRADES[0])
+
+    def find_first(grades: Iterable[str]) -> ClassLimit | None:
+        found = (shipped.get((each, quantity, figure)) for each in grades)
+        return next((limit for limit in found if limit), None)
+
+    own, better = find_first(_GRADES[place : place + 1]), find_first(_GRADES[place + 1 :])
+    if own is None:
+        limit = find_first(reversed(_GRADES[:place])) or better
+        if limit is None:
+            raise KeyError(f"no sensor of the catalogue prints {figure} of the {quantity}")
+        return limit
+    if len(own.sensors) >= _MIN_SENSORS or better is None or better.worst <= own.worst:
+        return own
+    return _summarise(own.grade, quantity, figure, {**better.sensors, **own.sensors})
+
+
+def count_sensors_within(quantity: str, figure: str, largest: float) -> tuple[int, int]:
+    """Return how many sensors of the catalogue print at most ``largest``, SI, and how many any."""
+    values = [
+        value
+        for (_, of, name), limit in _load_shipped().items()
+        if (of, name) == (quantity, figure)
+        for value in limit.sensors.values()
+    ]
+    return sum(value <= largest for value in values), len(values)
+
+
 def read_sigma(sensor: Sensor, quantity: str, figure: str) -> float | None:
-    """Return a printed figure as one standard deviation of the worst axis, SI; None: none."""
+    """Return a printed figure as one standard deviation of the worst axis, SI.
+
+    The noise figures are as printed, typical or maximum. None if an axis has no such figure.
+    """
     if getattr(sensor.datasheet, quantity) is None:
         return None
-    if figure not in ("N", "B") and figure not in FIGURE_DIMENSIONS[quantity]:
-        return None
-    axes = [f"{quantity}_{axis}" for axis in "xyz"]
-    values = [value for axis in axes for value in _list_sigmas(sensor, axis, figure)]
-    return max(values, default=None)
+    axes = [_read_axis(sensor, f"{quantity}_{axis}", figure) for axis in "xyz"]
+    known = [value for value in axes if value is not None]
+    return max(known) if len(known) == len(axes) else None
 
 
-def _list_sigmas(sensor: Sensor, channel: str, figure: str) -> Iterator[float]:
-    """Yield the standard deviations of a figure of a channel, SI."""
+def _read_axis(sensor: Sensor, channel: str, figure: str) -> float | None:
+    """Return the least statement on an axis, SI; of options that are not chosen, the worst one."""
+    by_option: dict[str | None, list[float]] = {}
+    for option, value in _list_statements(sensor, channel, figure):
+        by_option.setdefault(option, []).append(value)
+    if None in by_option:
+        return min(by_option[None])
+    return max(map(min, by_option.values()), default=None)
+
+
+def _list_statements(
+    sensor: Sensor, channel: str, figure: str
+) -> Iterator[tuple[str | None, float]]:
+    """Yield the option and the standard deviation, SI, of each statement on an axis."""
     datasheet = _with_options(sensor.datasheet)
-    axis = PrintedAxis.of(datasheet, channel)
-    if figure in ("N", "B"):
-        statistic = {"N": "N", "B": "adev_minimum"}[figure]
-        rows = [row for row in read_comparables(datasheet, channel) if row.statistic == statistic]
-        # A random walk is N itself; a density of unknown sidedness counts as one-sided.
-        rows = [row for row in rows if row.sidedness != "two-sided" or not row.is_side_assumed]
-        yield from _sigmas_of(rows)
+    chosen = bool(sensor.datasheet.options)
+    if figure in _NOISE:
+        by_figure: dict[int, list[Comparable]] = {}
+        for row in read_comparables(datasheet, channel):
+            if row.statistic == _NOISE[figure] and row.figure and row.value:
+                by_figure.setdefault(id(row.figure), []).append(row)
+        for rows in by_figure.values():
+            # A density of unknown sidedness may be either: the larger N counts.
+            printed = rows[0].figure
+            assert printed is not None
+            yield None if chosen else printed.option, max(row.value or 0.0 for row in rows)
         return
-    own = list(_sigmas_of(_read(axis, figure)))
-    if figure == "temperature_coefficient" and not own:
-        span = _temperature_span(sensor)
-        totals = _sigmas_of(_read(axis, "temperature_total"))
-        own = [2.0 * total / span for total in totals]
-        if not own:
-            rms = _sigmas_of(_read(axis, "temperature_rms"))
-            own = [s * math.sqrt(12.0) / span for s in rms]
-    yield from own
+    axis = PrintedAxis.of(datasheet, channel)
+    for name in STATEMENTS[cast("Cause", figure)]:
+        if name not in FIGURE_DIMENSIONS[axis.quantity]:
+            continue
+        factor = 1.0
+        if name == "temperature_total":
+            factor = 2.0 / _temperature_span(sensor)
+        elif name == "temperature_rms":
+            factor = math.sqrt(12.0) / _temperature_span(sensor)
+        for row in axis.read(name, Comparable(name, name, None), axis.si(name)):
+            if row.figure and row.value and row.figure.kind in SIGMAS_OF_KIND:
+                sigma = factor * row.value / SIGMAS_OF_KIND[row.figure.kind]
+                yield None if chosen else row.figure.option, sigma
 
 
 def _with_options(datasheet: Datasheet) -> Datasheet:
@@ -138,22 +220,10 @@ def _with_options(datasheet: Datasheet) -> Datasheet:
     return datasheet if datasheet.options else datasheet.model_copy(update={"options": printed})
 
 
-def _read(axis: PrintedAxis, name: str) -> list[Comparable]:
-    return axis.read(name, Comparable(name, name, None), axis.si(name))
-
-
-def _sigmas_of(rows: Iterable[Comparable]) -> Iterator[float]:
-    """Yield the standard deviations of the kind that is preferred among those printed."""
-    listed = [(row.figure.kind, row.value) for row in rows if row.figure and row.value]
-    kind = next((kind for kind in SIGMAS_OF_KIND if kind in dict(listed)), None)
-    if kind is not None:
-        yield from (value / SIGMAS_OF_KIND[kind] for own, value in listed if own == kind)
-
-
 def _temperature_span(sensor: Sensor) -> float:
     """Return the width of the temperature range of operation, K."""
     if sensor.temperature_range is None:
-        return _USUAL_RANGE
+        return _UNKNOWN_RANGE
     low, high = (_celsius(text) for text in sensor.temperature_range)
     return high - low
 
@@ -168,19 +238,20 @@ def _unit_of(quantity: str, figure: str) -> str:
         return SI_UNITS[f"{quantity}_density"]
     if figure == "B":
         return SI_UNITS[QUANTITIES[quantity]]
-    return SI_UNITS[FIGURE_DIMENSIONS[quantity][figure][0]]
+    name = "rate_random_walk" if figure == "K" else STATEMENTS[cast("Cause", figure)][0]
+    return SI_UNITS[FIGURE_DIMENSIONS[quantity][name][0]]
 
 
 def write_class_limits(limits: Iterable[ClassLimit]) -> str:
-    """Return limits as CSV, with numbers of four digits."""
+    """Return limits as CSV, with numbers of four digits; the last column has the figures."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(field.name for field in fields(ClassLimit))
     for one in limits:
         spread = "" if one.spread is None else f"{one.spread:.3g}"
-        numbers = (one.sensors, f"{one.median:.4g}", f"{one.worst:.4g}", spread)
-        place = (one.grade, one.quantity, one.figure, one.unit)
-        writer.writerow((*place, *numbers, _SEPARATOR.join(one.names)))
+        numbers = (f"{one.best:.4g}", f"{one.median:.4g}", f"{one.worst:.4g}", spread)
+        names = _SEPARATOR.join(f"{name} {value:.4g}" for name, value in one.sensors.items())
+        writer.writerow((one.grade, one.quantity, one.figure, one.unit, *numbers, names))
     return text.getvalue()
 
 
@@ -188,16 +259,11 @@ def read_class_limits(path: Path = FILE) -> list[ClassLimit]:
     """Return the limits in a file that `write_class_limits` made."""
     with path.open(encoding="utf-8", newline="") as file:
         return [
-            ClassLimit(
-                grade=row["grade"],
-                quantity=row["quantity"],
-                figure=row["figure"],
-                unit=row["unit"],
-                sensors=int(row["sensors"]),
-                median=float(row["median"]),
-                worst=float(row["worst"]),
-                spread=float(row["spread"]) if row["spread"] else None,
-                names=tuple(row["names"].split(_SEPARATOR)),
-            )
+            _summarise(row["grade"], row["quantity"], row["figure"], _read_values(row["sensors"]))
             for row in csv.DictReader(file)
         ]
+
+
+def _read_values(text: str) -> dict[str, float]:
+    pairs = (each.split(" ") for each in text.split(_SEPARATOR))
+    return {name: float(value) for name, value in pairs}

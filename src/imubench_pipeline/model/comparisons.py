@@ -6,11 +6,11 @@ from typing import Annotated
 
 from imubench_pipeline.model.states import (
     Action,
+    Basis,
     DriftVerdict,
     Evidence,
     Origin,
     PoolVerdict,
-    ShortlistVerdict,
     SourceCode,
     SpreadOf,
     Verdict,
@@ -226,15 +226,22 @@ class ErrorBudgetRow(OfRecordingRow):
     reached_after: Annotated[
         float | None, Column("time after which the limit is reached; null: never", "s")
     ] = None
-    origin: Annotated[Origin | None, Column("origin of the figure of a source")] = None
-    kind: Annotated[str | None, Column("kind of a printed figure: typ, max, 1sigma, ...")] = None
-    convention: Annotated[
-        str | None, Column("conversion of the figure to a standard deviation")
+    noise: Annotated[float | None, Column("of a total: from noise alone", "as in unit")] = None
+    likely: Annotated[
+        float | None,
+        Column("of a total: with the median of the class for figures not known", "as in unit"),
+    ] = None
+    best: Annotated[
+        float | None,
+        Column("of a total: with the best of the class for figures not known", "as in unit"),
+    ] = None
+    origin: Annotated[
+        Origin | None, Column("origin of a source; class limit: worst figure of its class")
     ] = None
     largest: Annotated[
-        float | None, Column("largest 1 sigma of the figure within the limit", "as in largest_unit")
+        float | None,
+        Column("largest 1 sigma of a figure within the limit, SI, if its class limit is too large"),
     ] = None
-    largest_unit: Annotated[str | None, Column("SI unit of the figure")] = None
     reasons: Annotated[tuple[str, ...], Column("unknown figures")] = ()
     doubts: DoubtCodes = ()
 
@@ -270,7 +277,11 @@ class RankingRow(TableRow):
     lower: LowerLimit = None
     upper: UpperLimit = None
     unit: Unit
-    margin: Annotated[float | None, Column("limit over sigma")] = None
+    margin: Annotated[float | None, Column("in use: limit over sigma")] = None
+    noise_margin: Annotated[float | None, Column("limit over the error from noise alone")] = None
+    likely_margin: Annotated[
+        float | None, Column("margin in use with the median of the class for unknown figures")
+    ] = None
     chance: Annotated[
         float | None, Column("probability that sigma is within the limit, given logs and units")
     ] = None
@@ -367,24 +378,29 @@ class ShortlistRow(TableRow):
     requirement: Annotated[str, Column("requirement: file in config/requirements, without .yaml")]
     sensor: Annotated[str, Column("of the catalogue")]
     price_class: Annotated[str | None, Column("as stated")] = None
-    best_margin: Annotated[
-        float | None, Column("limit over error in the best case of the datasheet")
+    rank: Annotated[int | None, Column("by the margin in use; null: not judged")] = None
+    basis: Annotated[
+        Basis, Column("origin of the noise: printed, or as in the table ranking (simulated) logs")
+    ] = "printed"
+    margin: Annotated[
+        float | None,
+        Column("in use: limit over error, with the worst of the class for figures not known"),
     ] = None
-    worst_margin: Annotated[
-        float | None, Column("limit over error in the worst case; null: not known")
-    ] = None
-    decides: Annotated[
-        str | None, Column("the limit with the smallest margin in the best case")
-    ] = None
-    verdict: Annotated[ShortlistVerdict, Column("verdict from the data sheet alone")]
-    measured_margin_of: Annotated[
-        str | None, Column("source: logs or simulated logs; null: not measured")
-    ] = None
-    measured_margin: Annotated[
-        float | None, Column("limit over error by its logs (see the table ranking)")
-    ] = None
-    measured_verdict: Annotated[Verdict | None, Column("verdict, as in the table ranking")] = None
-    assumed: Annotated[tuple[str, ...], Column("unprinted figures, and the values assumed")] = ()
+    noise_margin: Annotated[float | None, Column("limit over the error from noise alone")] = None
+    likely_margin: Annotated[float | None, Column("margin in use with the median of the class")] = (
+        None
+    )
+    best_margin: Annotated[float | None, Column("margin in use with the best of the class")] = None
+    decides: Annotated[str | None, Column("the limit with the smallest margin in use")] = None
+    verdict: Annotated[Verdict, Column("verdict, as in the table ranking")]
+    conditions: Annotated[
+        tuple[Condition, ...],
+        Column("unknown figures and properties; largest: permitted 1 sigma, SI"),
+    ] = ()
+    parts: Annotated[tuple[Share, ...], Column("every source of 1 % of the variance or more")] = ()
+    assumed: Annotated[
+        tuple[str, ...], Column("figures that are not printed, and the class limits in their place")
+    ] = ()
     shortfalls: Annotated[
         tuple[Shortfall, ...], Column("required properties that it lacks; has: its own value, SI")
     ] = ()

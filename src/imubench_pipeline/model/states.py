@@ -32,11 +32,21 @@ The user; nothing, the spectrum is fitted up to Nyquist, without a filter or wit
 attenuation by a filter.
 """
 
-Verdict = Literal["meets", "likely_meets", "not_enough_data", "likely_fails", "fails", "excluded"]
+Verdict = Literal[
+    "meets",
+    "likely_meets",
+    "meets_if",
+    "not_enough_data",
+    "likely_fails",
+    "fails",
+    "cannot_meet",
+    "excluded",
+]
 """Verdict on a sensor and a requirement, or on one limit of it.
 
-It holds on the conditions beside it, if there are any. ``excluded``: the sensor lacks a property
-that the requirement demands.
+A figure that is not known counts as the worst of its class. ``meets_if``: it fails so, and meets
+the limit on the conditions beside it; ``cannot_meet``: it fails even with the best of its class, by
+its data sheet. ``excluded``: it lacks a property that the requirement demands.
 """
 
 SURE_PROBABILITY = 0.975
@@ -59,11 +69,12 @@ NoiseSource = Literal["Q", "N", "flicker", "GM", "K", "R", "line"]
 
 Cause = Literal[
     "turn_on_bias",
-    "repeatability",
     "temperature",
     "temperature_squared",
     "scale_factor",
+    "scale_factor_temperature",
     "nonlinearity",
+    "misalignment",
     "g_sensitivity",
     "vibration_rectification",
 ]
@@ -72,13 +83,13 @@ Cause = Literal[
 SourceCode = Literal["total", NoiseSource, Cause, "initial_tilt", "initial_heading"]
 """Source of an error: noise, a figure, a stated angle, or the total of all sources."""
 
-SourcePath = Literal["static_window", "initial_tilt"]
-"""Way of a source into an error, if it is not by the motion.
+SourcePath = Literal["static_window", "initial_tilt", "turn"]
+"""Way of a source into an error, if it is not by the motion along one axis.
 
-White noise in the static window; or levelling by the accelerometers.
+White noise in the static window; levelling by the accelerometers; or a turn at speed.
 """
 
-Origin = Literal["measured", "datasheet", "requirement", "not known"]
+Origin = Literal["measured", "datasheet", "class limit", "requirement"]
 """Origin of a figure in an error budget."""
 
 BacktestVerdict = Literal["as predicted", "more than predicted", "less than predicted"]
@@ -86,5 +97,5 @@ PoolVerdict = Literal["agree", "differ"]
 DriftVerdict = Literal["changed", "as before"]
 RatioVerdict = Literal["lower", "higher", "not significant", "not determined"]
 
-ShortlistVerdict = Literal["cannot_meet", "worth_logging", "meets_at_worst", "not_judged"]
-"""Verdict on a sensor by its data sheet alone."""
+Basis = Literal["printed", "logs", "simulated logs"]
+"""Origin of the noise behind a verdict."""

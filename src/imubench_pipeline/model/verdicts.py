@@ -5,7 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Literal, get_args
 
-from imubench_pipeline.model.states import Measured, NoiseSource, SourceCode, SourcePath
+from imubench_pipeline.model.states import (
+    Cause,
+    Measured,
+    NoiseSource,
+    Origin,
+    SourceCode,
+    SourcePath,
+)
 
 _NOISE_SOURCES = get_args(NoiseSource)
 
@@ -22,24 +29,22 @@ Property = Literal[
 ]
 """Properties of a sensor that a requirement can demand."""
 
-Figure = Literal[
-    "turn_on_bias", "temperature", "scale_factor", "g_sensitivity", "vibration_rectification"
-]
-"""Figures of a sensor that its logs at rest do not show, as causes of errors in use."""
-
 
 @dataclass(frozen=True, slots=True)
 class Condition:
     """An unknown figure, or property, on which a verdict depends.
 
     ``subject`` is the quantity (gyro, accel), or the axis of a property; ``largest`` is the largest
-    figure with which every limit is met, 1 sigma, SI (None: of a property).
+    figure with which every limit is met, 1 sigma, SI (None: of a property). Of ``printing`` sensors
+    of the catalogue that print the figure, ``within`` are within it.
     """
 
-    figure: Figure | None
+    figure: Cause | None
     property: Property | None
     subject: str
     largest: float | None = None
+    within: int | None = None
+    printing: int | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,8 +82,7 @@ class Share(ErrorSource):
     """A source of an error, and its part of the variance."""
 
     share: float = field(kw_only=True)
-    kind: str | None = None
-    """Kind of a figure of the data sheet, such as typ; None: not from the data sheet."""
+    origin: Origin | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,7 +6,7 @@ from dataclasses import asdict, dataclass, field, replace
 from functools import cache, partial
 from itertools import product
 from types import MappingProxyType
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 
@@ -14,6 +14,8 @@ from imubench_pipeline.earth import STANDARD_GRAVITY
 from imubench_pipeline.estimators.estimate import Estimate
 from imubench_pipeline.model.comparisons import ErrorBudgetRow
 from imubench_pipeline.model.estimates import ErrorGrowthRow
+from imubench_pipeline.model.states import Measured
+from imubench_pipeline.model.verdicts import ErrorSource
 from imubench_pipeline.navigation.error_budget import in_use, uncertainty
 from imubench_pipeline.navigation.error_budget.budget import (
     ACCEL_ORDER,
@@ -23,7 +25,7 @@ from imubench_pipeline.navigation.error_budget.budget import (
     time_until,
 )
 from imubench_pipeline.navigation.error_budget.gyrocompass import Gyrocompass
-from imubench_pipeline.navigation.error_budget.parts import Budget, Largest, Quantity
+from imubench_pipeline.navigation.error_budget.parts import Budget, Quantity
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.growth import Calibrated, Uncalibrated
 from imubench_pipeline.noise.model import sum_over_terms
@@ -43,6 +45,20 @@ class AxisErrors:
 
     model: NoiseModel = field(default_factory=NoiseModel)
     figures: in_use.Figures = field(default_factory=dict)
+    # models with the median and the best of the class where the sensor prints no noise
+    likely: NoiseModel | None = None
+    best: NoiseModel | None = None
+
+    def at(self, end: in_use.End) -> "AxisErrors":
+        """Return the sources with other figures of the class in place of its worst ones."""
+        model = {"in_use": None, "likely": self.likely, "best": self.best}[end]
+        figures = {cause: figure.at(end) for cause, figure in self.figures.items()}
+        return AxisErrors(model or self.model, figures)
+
+    @property
+    def noise(self) -> "AxisErrors":
+        """Its noise alone."""
+        return AxisErrors(self.model)
 
 
 _NO_AXIS_ERRORS = AxisErrors()
@@ -59,27 +75,46 @@ class Question:
     start: Start
     axis: Axis  # which axis of the sensor is used
     latitude: float | None = None  # rad; for ``north``
+    positions: int = 1  # for ``north``
     limit: float | None = None  # largest standard deviation that fulfils the requirement, SI
+    confidence: float | None = None  # of a radius; None: errors along one axis
     use: in_use.Use = in_use.NO_USE  # motion, temperature and vibration
 
     @property
-    def needs(self) -> tuple[str, ...]:
+    def needs(self) -> tuple[Measured, ...]:
         """Quantities that are needed to compute it."""
-        return ("gyro",) if self.error in ("heading", "north") else ("gyro", "accel")
+        return ("gyro",) if self.error in ("heading", "cross_track", "north") else _QUANTITIES
+
+    @property
+    def uses(self) -> tuple[Measured, ...]:
+        """Quantities that are used if they are recorded: accelerometers level a gyro for north."""
+        return _QUANTITIES if self.error == "north" else self.needs
 
     def answer(self, gyro: AxisErrors, accel: AxisErrors) -> Budget:
         """Return the budget for these axes."""
         if self.error == "north":
-            return self._make_gyrocompass(gyro).heading(self.time)
-        return budget(self.error, self.time, **self._make_arguments(gyro, accel))
+            return self._make_gyrocompass(gyro, accel).heading(self.time)
+        return self._in_plane(budget(self.error, self.time, **self._make_arguments(gyro, accel)))
+
+    def answer_all(self, gyro: AxisErrors, accel: AxisErrors) -> tuple[Budget, float, float, float]:
+        """Return the budget, and the totals of noise alone, likely, and best of the class."""
+        likely, best = (self.answer(gyro.at(end), accel.at(end)).total for end in _OTHER_ENDS)
+        noise = self.answer(gyro.noise, accel.noise).total
+        return self.answer(gyro, accel), noise, likely, best
 
     def reached(self, gyro: AxisErrors, accel: AxisErrors) -> float | None:
         """Return the time at which the limit is reached, s; for north, the static time needed."""
         if self.limit is None:
             return None
         if self.error == "north":
-            return self._make_gyrocompass(gyro).time_needed(self.limit)
-        return time_until(self.limit, self.error, **self._make_arguments(gyro, accel))
+            return self._make_gyrocompass(gyro, accel).time_needed(self.limit)
+        arguments = self._make_arguments(gyro, accel)
+        return time_until(self.limit, self.error, convert=self._in_plane, **arguments)
+
+    def _in_plane(self, along: Budget) -> Budget:
+        if self.confidence is None or self.error not in ("velocity", "position"):
+            return along
+        return along.to_radius(self.confidence)
 
     def _make_arguments(self, gyro: AxisErrors, accel: AxisErrors) -> dict[str, Any]:
         """Return the arguments of a budget other than the error and its time."""
@@ -92,12 +127,25 @@ class Question:
             "accel_figures": accel.figures,
         }
 
-    def _make_gyrocompass(self, gyro: AxisErrors) -> Gyrocompass:
+    def _make_gyrocompass(self, gyro: AxisErrors, accel: AxisErrors) -> Gyrocompass:
         assert self.latitude is not None  # checked with the requirement
         stated = self.start.gyro.bias if isinstance(self.start.gyro, Uncalibrated) else None
-        # North-finding at arbitrary times removes the bias by turning the gyro.
-        figures = gyro.figures if self.requirement is not None else in_use.NO_FIGURES
-        return Gyrocompass(gyro=gyro.model, latitude=self.latitude, bias=stated, figures=figures)
+        if self.requirement is None:  # at arbitrary times turning the gyro removes the biases
+            return Gyrocompass(gyro=gyro.model, latitude=self.latitude)
+        return Gyrocompass(
+            gyro=gyro.model,
+            accel=accel.model,
+            latitude=self.latitude,
+            positions=self.positions,
+            bias=stated,
+            figures=gyro.figures,
+            accel_figures=accel.figures,
+            temperature_change=self.use.temperature_change,
+        )
+
+
+_QUANTITIES: tuple[Measured, ...] = get_args(Measured)
+_OTHER_ENDS: tuple[in_use.End, ...] = ("likely", "best")
 
 
 def list_standard_questions(
@@ -132,7 +180,9 @@ def list_requirement_questions(name: str, requirement: Requirement) -> Iterator[
     stated = {
         "turns": (environment.turns, "angle"),
         "speed_change": (environment.speed_change, "velocity"),
+        "speed": (environment.speed or environment.speed_change, "velocity"),
         "vibration": (environment.vibration, "acceleration"),
+        "vibration_frequency": (environment.vibration_frequency, "frequency"),
     }
     use = {name: parse_quantity(text, of) for name, (text, of) in stated.items() if text}
     if environment.temperature_change:
@@ -146,7 +196,9 @@ def list_requirement_questions(name: str, requirement: Requirement) -> Iterator[
             start,  # a limit of dead reckoning has one
             requirement.axis,
             None if latitude is None else parse_quantity(latitude, "angle"),
+            requirement.positions,
             limit.size / requirement.sigmas,
+            requirement.confidence,
             in_use.Use(over=limit.seconds, **use),
         )
 
@@ -165,9 +217,13 @@ def list_error_rows(
     ``names`` are ``sensor`` and ``recording``; ``estimates`` the recommended one of each channel;
     ``draws`` the number of noise models that are drawn from each, for the interval of a total.
     Each channel has its own random stream of the seed. ``figures`` belong to the errors in use,
-    by channel (`in_use.collect_figures_in_use`).
+    by channel, and by quantity for a recording without it (`in_use.collect_figures_in_use`).
     """
     axes = collect_axis_errors(estimates, figures)
+    without = {
+        quantity: AxisErrors(figures=figures.get(quantity, in_use.NO_FIGURES))
+        for quantity in _QUANTITIES
+    }
 
     def drawn_of(channel: str) -> list[AxisErrors]:
         stream = partial(channel_rng, seed, repr(estimates[channel].model), channel)
@@ -201,9 +257,9 @@ def list_error_rows(
                     )
             yield replace(asked, reasons=tuple(missing))
             continue
-        pair = [axes[c] if c else _NO_AXIS_ERRORS for c in chosen.values()]
-        many = [drawn[c] if c else [_NO_AXIS_ERRORS] * draws for c in chosen.values()]
-        nominal = question.answer(*pair)
+        pair = [axes[c] if c else without[q] for q, c in chosen.items()]
+        many = [drawn[c] if c else [without[q]] * draws for q, c in chosen.items()]
+        nominal, noise, likely, best = question.answer_all(*pair)
         budgets = [question.answer(*axes_drawn) for axes_drawn in zip(*many, strict=True)]
         asked = replace(asked, gyro=chosen["gyro"], accel=chosen["accel"])
         lower, upper = uncertainty.compute_interval(budgets)
@@ -212,7 +268,6 @@ def list_error_rows(
         used = [channel for channel in chosen.values() if channel]
         apart = [channel for channel in used if estimates[channel].draws is None]
         reasons = (
-            *nominal.assumptions,
             *(
                 texts.parameter_status(name, channel, parameter.status)
                 for channel in used
@@ -231,16 +286,54 @@ def list_error_rows(
             sigma=nominal.total,
             lower=lower,
             upper=upper,
+            noise=noise,
+            likely=likely,
+            best=best,
             drawn="one by one" if apart else "jointly",
             within=question.limit and uncertainty.compute_chance_within(question.limit, budgets),
             reasons=reasons,
             reached_after=question.reached(*pair),
         )
-        largest = Largest.of(nominal, question.limit, upper)
-        for contribution in sorted(nominal.contributions, key=lambda part: -part.sigma):
-            yield largest.of_bias(asked, contribution)
-        for missed in nominal.missing if question.limit is not None else ():
-            yield largest.of_missing(asked, missed)
+        largest = find_largest_figures(nominal, question.limit, upper)
+        for part in sorted(nominal.contributions, key=lambda part: -part.sigma):
+            yield replace(
+                asked,
+                **asdict(part.source),
+                sigma=part.sigma,
+                origin=part.figure.origin if part.figure else "measured",
+                largest=largest.get(part.source),
+            )
+
+
+def find_largest_figures(
+    nominal: Budget, limit: float | None, upper: float
+) -> dict[ErrorSource, float]:
+    """Return the largest figures, SI, with which a limit is met, instead of limits of the class.
+
+    The figures that leave no room for others share the room equally; it is 0 if the other sources
+    exceed the limit, with the upper limit of the total, ``upper``, if that is below the limit.
+    """
+    parts = [
+        part
+        for part in nominal.contributions
+        if part.figure and part.figure.origin == "class limit" and part.sigma > 0.0
+    ]
+    if limit is None or not parts:
+        return {}
+    known = nominal.total**2 - math.fsum(part.sigma**2 for part in parts)
+    excess = upper**2 - nominal.total**2
+    if known + excess < limit**2:
+        known += excess
+    room = max(limit**2 - known, 0.0)
+    parts.sort(key=lambda part: part.sigma)
+    while parts and parts[0].sigma ** 2 <= room / len(parts):
+        room -= parts.pop(0).sigma ** 2
+    largest: dict[ErrorSource, float] = {}
+    for part in parts:
+        assert part.figure is not None  # of every limit of a class
+        figure = part.figure.sigma * math.sqrt(room / len(parts)) / part.sigma
+        largest[part.source] = min(figure, largest.get(part.source, math.inf))
+    return largest
 
 
 def collect_axis_errors(
@@ -256,12 +349,14 @@ def collect_axis_errors(
 
 def select_channels(
     question: Question, axes: Mapping[str, AxisErrors]
-) -> dict[str, str | None] | None:
+) -> dict[Measured, str | None] | None:
     """Return the gyro and accelerometer channels to use; None if one of them is missing."""
     if not all(_list_channels(quantity, axes) for quantity in question.needs):
         return None
-    chosen: dict[str, str | None] = {"gyro": None, "accel": None}
-    for quantity in question.needs:
+    chosen: dict[Measured, str | None] = {"gyro": None, "accel": None}
+    for quantity in question.uses:
+        if not _list_channels(quantity, axes):
+            continue
         # Rank the axes by their own part of the error.
         parts = {
             channel: question.answer(**{**_NO_ERRORS, quantity: axes[channel]}).total
@@ -281,17 +376,13 @@ def _draw_figures(
     figures: in_use.Figures, draws: int, rng: np.random.Generator
 ) -> list[in_use.Figures]:
     """Return draws of the figures of an axis, from the spread of measured sensors."""
-    spread = {
-        cause: figure
-        for cause, figure in figures.items()
-        if figure.spread and figure.sigma is not None
-    }
+    spread = {cause: figure for cause, figure in figures.items() if figure.spread}
     if not spread:
         return [figures] * draws
     normal = rng.standard_normal((draws, len(spread)))
 
     def moved(figure: in_use.Figure, number: float) -> in_use.Figure:
-        return replace(figure, sigma=abs((figure.sigma or 0.0) + figure.spread * float(number)))
+        return replace(figure, sigma=abs(figure.sigma + figure.spread * float(number)))
 
     return [
         {**figures, **dict(zip(spread, map(moved, spread.values(), numbers), strict=True))}

@@ -4,6 +4,7 @@ from collections.abc import Iterator, Sequence
 
 from imubench_pipeline.model.comparisons import RankingRow
 from imubench_pipeline.model.verdicts import UnitFactor
+from imubench_pipeline.navigation.suitability import PASSING_VERDICTS
 from imubench_pipeline.navigation.verdicts.basis import Basis
 from imubench_pipeline.navigation.verdicts.judgement import Judgement
 from imubench_pipeline.navigation.verdicts.standing import Standing, get_trajectory
@@ -13,7 +14,7 @@ def rank_sensors(judged: Sequence[Judgement], basis: Basis) -> Iterator[RankingR
     """Yield the rows of the table ``ranking``, from the judgements and their recordings.
 
     The rank of a sensor is one more than the number of significantly better ones: the interval of
-    their margin lies wholly above its own, and they have no unknown figures that it does not have.
+    their margin lies wholly above its own.
     """
     for name in dict.fromkeys(judgement.name for judgement in judged):
         own = [judgement for judgement in judged if judgement.name == name]
@@ -35,9 +36,11 @@ def rank_sensors(judged: Sequence[Judgement], basis: Basis) -> Iterator[RankingR
 
 
 def _is_better(first: Judgement, second: Judgement) -> bool:
-    """Return whether a sensor is significantly better, and has no other unknown figures."""
-    no_less_known = first.open.figures.keys() <= second.open.figures.keys()
-    return no_less_known and first.decides.margins[0] > second.decides.margins[1]
+    """Return whether a sensor is significantly better; one that meets the limits is."""
+    met = [judgement.verdict in PASSING_VERDICTS for judgement in (first, second)]
+    if met[0] != met[1]:
+        return met[0]
+    return first.decides.margins[0] > second.decides.margins[1]
 
 
 def _make_row(
@@ -79,6 +82,8 @@ def _make_row(
         upper=expected.upper,
         unit=total.unit,
         margin=_get_margin(standing),
+        noise_margin=standing.noise_margin,
+        likely_margin=standing.likely_margin,
         chance=standing.chance if known else None,
         limit_verdict=standing.verdict,
         source=source.source if source else None,

@@ -1,19 +1,19 @@
 """Hard requirements of a sensor other than noise, and the conditions of a verdict.
 
 Several unknown figures share the remaining error budget: with all of them at their largest, the
-limit is just reached. If the printed turn-on bias alone exceeds a limit, the sensor meets it
-if calibrated to within the remaining error budget.
+limit is just reached.
 """
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import Literal, get_args
+from typing import Literal, cast, get_args
 
 from pydantic import Field
 
+from imubench_pipeline.datasheets.class_limits import count_sensors_within
 from imubench_pipeline.model.comparisons import ErrorBudgetRow
-from imubench_pipeline.model.states import Measured, Verdict
-from imubench_pipeline.model.verdicts import Condition, Figure, Property, Share, Shortfall
+from imubench_pipeline.model.states import Cause, Measured, SourceCode, Verdict
+from imubench_pipeline.model.verdicts import Condition, Property, Share, Shortfall
 from imubench_pipeline.settings.printed import FIGURE_DIMENSIONS, SENSORS, Datasheet, PrintedFigure
 from imubench_pipeline.settings.requirements import Must
 from imubench_pipeline.settings.sensor import QUANTITIES, Sensor
@@ -184,10 +184,8 @@ def _list_known(value: float | None) -> tuple[float, ...]:
     return () if value is None else (value,)
 
 
-FIGURES: tuple[Figure, ...] = get_args(Figure)
-
 PASSING_VERDICTS: tuple[Verdict, ...] = ("meets", "likely_meets")
-"""Verdicts that a condition changes. A sensor that fails without a condition fails with it."""
+"""Verdicts with a margin above 1."""
 
 
 @dataclass(frozen=True)
@@ -196,41 +194,56 @@ class Conditions:
 
     shortfalls: tuple[Shortfall, ...]
     unknown: tuple[Condition, ...]  # demanded properties that are not known
-    # figures that are not known, or too large, by quantity and figure: the largest one within
-    # every limit, SI
-    figures: Mapping[tuple[str, Figure], float]
+    # figures that are not known, by quantity and cause: the largest one within every limit, SI
+    figures: Mapping[tuple[str, Cause], float]
 
     @classmethod
     def of(cls, must: Must, has: Abilities, conditions: Iterable[ErrorBudgetRow]) -> "Conditions":
         """Return the conditions of the verdict on a sensor.
 
         ``must`` are the hard requirements, ``has`` the properties of the sensor. ``conditions`` are
-        the rows of the table ``error_budget`` that the limits depend on.
+        the rows of the table ``error_budget`` whose class limits are too large.
         """
         lacking, unknown = judge(must, has)
-        figures: dict[tuple[str, Figure], float] = {}
-        for row in conditions:
-            largest = row.largest or 0.0
-            for figure in FIGURES:
-                if row.quantity and row.source == figure:
-                    key = row.quantity, figure
-                    figures[key] = min(figures.get(key, largest), largest)
-        return cls(tuple(lacking), tuple(unknown), figures)
+        largest = merge_largest((row.quantity, row.source, row.largest) for row in conditions)
+        return cls(tuple(lacking), tuple(unknown), largest)
 
     def judge(self, verdict: Verdict) -> tuple[Verdict, tuple[Condition, ...]]:
         """Return the verdict, and the conditions on which it holds."""
         if self.shortfalls:
             return "excluded", ()
-        return verdict, self.conditions if verdict in PASSING_VERDICTS else ()
+        if verdict == "meets_if":
+            return verdict, self.conditions
+        return verdict, self.unknown if verdict in PASSING_VERDICTS else ()
 
     @property
     def conditions(self) -> tuple[Condition, ...]:
         """Unknown figures and properties."""
-        figures = (
-            Condition(figure, None, quantity, largest)
-            for (quantity, figure), largest in self.figures.items()
-        )
-        return (*figures, *self.unknown)
+        return (*make_figure_conditions(self.figures), *self.unknown)
+
+
+def make_figure_conditions(figures: Mapping[tuple[str, Cause], float]) -> tuple[Condition, ...]:
+    """Return the conditions that figures are at most so large, SI, by quantity and cause."""
+    return tuple(
+        Condition(cause, None, quantity, size, *count_sensors_within(quantity, cause, size))
+        for (quantity, cause), size in figures.items()
+        if size > 0.0
+    )
+
+
+def merge_largest(
+    figures: Iterable[tuple[str | None, SourceCode, float | None]],
+) -> dict[tuple[str, Cause], float]:
+    """Return the least of the largest figures, by quantity and cause."""
+    merged: dict[tuple[str, Cause], float] = {}
+    for quantity, source, size in figures:
+        if quantity and size and source in _CAUSES:
+            key = quantity, cast("Cause", source)
+            merged[key] = min(merged.get(key, size), size)
+    return merged
+
+
+_CAUSES = get_args(Cause)
 
 
 def select_known_errors(rows: Iterable[ErrorBudgetRow]) -> list[tuple[ErrorBudgetRow, float]]:
@@ -252,7 +265,7 @@ def compute_variance_shares(
             row.T_B,
             row.frequency,
             share=(sigma / total) ** 2,
-            kind=row.kind if row.origin == "datasheet" else None,
+            origin=row.origin,
         )
         for row, sigma in select_known_errors(sources)
     )

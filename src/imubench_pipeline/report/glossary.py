@@ -14,15 +14,14 @@ from pydantic import RootModel
 from imubench_pipeline.settings.validation import ConfigError, Strict, parse
 from imubench_pipeline.settings.yaml_files import read_yaml
 from imubench_pipeline.words.estimates import STATUS_WORDS
-from imubench_pipeline.words.verdicts import SHORTLIST_WORDS, VERDICT_WORDS
+from imubench_pipeline.words.verdicts import VERDICT_WORDS
 
 _FILE = Path(__file__).with_name("glossary.yaml")
 
 _NAMES: Mapping[str, str] = {
     **dict(STATUS_WORDS.items()),
     **{f"verdict_{code}": words for code, words in VERDICT_WORDS.items()},
-    **{f"shortlist_{code}": words for code, words in SHORTLIST_WORDS.items()},
-    "conditions": f"{VERDICT_WORDS['meets']} if …",
+    "verdict_meets_if": f"{VERDICT_WORDS['meets']} if …",
 }
 """Names of terms whose wording is in `words`."""
 

@@ -105,9 +105,15 @@ _NAMES = {
     "heading": "heading",
     "velocity": "velocity, one axis",
     "position": "position, one axis",
+    "cross_track": "cross-track",
     "north": "north, found at rest",
 }
 _NAMES_IN_NOTES = {**_NAMES, "attitude": "attitude"}
+_NAMES_IN_LIMITS = {
+    **_NAMES,
+    "velocity": "horizontal velocity",
+    "position": "horizontal position",
+}
 _ERRORS = tuple(_NAMES)
 _QUARTER_TURN = math.pi / 2.0
 
@@ -122,6 +128,7 @@ class LimitLine:
     interval: str
     margin: str
     margins: str
+    other_margins: str  # of noise alone, and the likely one
     chance: str
     source: str
     parts: Sequence[str]
@@ -193,10 +200,9 @@ def _group(limits: Sequence[RankingRow], simulated: Simulated, system: System) -
     )
 
 
-def _order(row: RankingRow) -> tuple[int, int, float]:
-    """Sort by rank, then by conditions (with them, margins are large) and margin."""
-    meets = row.verdict in ("meets", "likely_meets")
-    return row.rank or 10**6, int(bool(row.conditions)) if meets else 2, -(row.margin or 0.0)
+def _order(row: RankingRow) -> tuple[int, float]:
+    """Sort by rank, then by margin; sensors without a rank come last."""
+    return row.rank or 10**6, -(row.margin or 0.0)
 
 
 def _limit(row: RankingRow, system: System) -> LimitLine:
@@ -210,6 +216,7 @@ def _limit(row: RankingRow, system: System) -> LimitLine:
         interval=_interval(row, system),
         margin=size[0] if size else NO_VALUE,
         margins=SourcedInterval(size[1], size[2]) if size else "",
+        other_margins=verdicts.other_margins_text(row) if size else "",
         chance=chance,
         source=f"{verdicts.source_text(row.parts[0])} ({_percent(row.share)})"
         if row.parts
@@ -260,7 +267,8 @@ def format_recording_error(total: ErrorBudgetRow, system: System) -> tuple[str, 
 def describe_limit(row: RankingRow) -> str:
     """Return the error and the time of a limit, from a row of ``ranking``."""
     drive = f" without GNSS ({row.trajectory})" if row.trajectory else ""
-    return f"{_NAMES[row.error]}, {duration_text(row.time)}{drive}"
+    names = _NAMES if row.trajectory else _NAMES_IN_LIMITS
+    return f"{names[row.error]}, {duration_text(row.time)}{drive}"
 
 
 def make_budget_tables(

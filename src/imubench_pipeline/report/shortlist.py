@@ -1,32 +1,34 @@
-"""The page that judges sensors by their data sheets alone."""
-
-from __future__ import annotations
+"""The page that judges all sensors of the catalogue, logged or not."""
 
 from collections.abc import Iterator, Mapping, Sequence
 
 from imubench_pipeline.model.comparisons import ShortlistRow
 from imubench_pipeline.report.site import Entry, Site
 from imubench_pipeline.words.numbers import number_text
-from imubench_pipeline.words.verdicts import SHORT_VERDICTS, SHORTLIST_WORDS, shortfall_text
+from imubench_pipeline.words.verdicts import (
+    SHORT_VERDICTS,
+    condition_text,
+    origins_text,
+    share_text,
+    shortfall_text,
+)
 
 
 def _make_context(site: Site) -> Mapping[str, object]:
     asked = site.settings["requirements"]
     boards: dict[str, list[Mapping[str, object]]] = {}
     for row in site.rows(ShortlistRow):
-        sensor, verdict, best, worst, measured, _ = format_shortlist_row(row)
+        margins = (row.margin, row.noise_margin, row.likely_margin)
         line = row.columns() | {
             "code": row.verdict,
+            "word": SHORT_VERDICTS[row.verdict],
             "shortfalls": list(map(shortfall_text, row.shortfalls)),
-            "measured_verdict": SHORT_VERDICTS[row.measured_verdict]
-            if row.measured_verdict
-            else "",
-            "name": site.names.get(row.sensor, sensor),
+            "conditions": list(map(condition_text, row.conditions)),
+            "parts": list(map(share_text, row.parts)),
+            "origins": origins_text(row.parts),
+            "name": site.names.get(row.sensor, row.sensor),
             "logged": row.sensor in site.sensors,
-            "verdict": verdict,
-            "best": best,
-            "worst": worst,
-            "measured": measured,
+            "margins": [(number_text(margin, 3), margin) for margin in margins],
         }
         boards.setdefault(row.requirement, []).append(line)
     return {
@@ -44,23 +46,23 @@ SHORTLIST = Entry(
 
 
 def format_shortlist_row(row: ShortlistRow) -> list[str]:
-    """Return sensor, verdict, margins (best, worst, measured) and deciding limit, as texts."""
-    measured = number_text(row.measured_margin, 3)
-    if row.measured_margin_of == "simulated logs":
-        measured += " (simulated)"
+    """Return rank, sensor, verdict, margins (in use, noise, likely) and limit, as texts."""
+    margins = (row.margin, row.noise_margin, row.likely_margin)
     return [
-        row.sensor,
-        SHORTLIST_WORDS[row.verdict],
-        number_text(row.best_margin, 3),
-        number_text(row.worst_margin, 3) if row.best_margin is not None else "–",
-        measured,
+        str(row.rank or "–"),
+        row.sensor + " *" * (row.basis != "printed"),
+        SHORT_VERDICTS[row.verdict],
+        *(number_text(margin, 3) for margin in margins),
         row.decides or "; ".join(row.reasons) or "; ".join(map(shortfall_text, row.shortfalls)),
     ]
 
 
-def list_assumptions(rows: Sequence[ShortlistRow]) -> Iterator[str]:
-    """Yield a line per sensor with its assumptions, or the reason why it is not judged."""
+def list_remarks(rows: Sequence[ShortlistRow]) -> Iterator[str]:
+    """Yield a line per sensor with its shortfalls or conditions, and the sources of its error."""
     for row in rows:
-        remarks = [*map(shortfall_text, row.shortfalls), *row.reasons, *row.assumed]
+        conditions = map(condition_text, row.conditions)
+        remarks = [*map(shortfall_text, row.shortfalls), *conditions, *row.reasons]
+        if not row.shortfalls and row.parts:
+            remarks.append(origins_text(row.parts))
         if remarks:
             yield f"{row.sensor}: {'; '.join(remarks)}"

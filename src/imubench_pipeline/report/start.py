@@ -13,6 +13,7 @@ from markupsafe import Markup
 from imubench_pipeline.model.comparisons import CoverageRow, NextStepRow, RankingRow
 from imubench_pipeline.model.recordings import FailureRow, FileRow, FindingRow
 from imubench_pipeline.model.states import Verdict
+from imubench_pipeline.navigation.suitability import PASSING_VERDICTS
 from imubench_pipeline.report import datasheets
 from imubench_pipeline.report.comparison import Comparison
 from imubench_pipeline.report.meaning import (
@@ -77,7 +78,8 @@ class Cell:
     verdict: Verdict
     conditions: int  # unknown figures on which the verdict depends
     margin: tuple[SourcedNumber, SourcedNumber, SourcedNumber] | None  # with its 95 % limits
-    bar: tuple[float, float, float] | None  # of these, the places
+    other_margins: str  # of noise alone, and the likely one
+    bar: tuple[float, float, float] | None  # of the margin and its limits, the places
     weak: str  # reasons for weak evidence
     doubts: str  # doubts about the recordings
     reason: str  # why it is not judged
@@ -186,7 +188,7 @@ def _empty(site: Site, requirement: str, sensor: str) -> Cell:
     """Return the cell of a sensor that is not ranked."""
     reason = explain_missing_rank(view for view in site.views if view.sensor == sensor)
     verdict: Verdict = "not_enough_data"
-    return Cell(requirement, sensor, verdict, 0, None, None, "", "", reason, (), -math.inf)
+    return Cell(requirement, sensor, verdict, 0, None, "", None, "", "", reason, (), -math.inf)
 
 
 def _cell(row: RankingRow, scale: Scale) -> Cell:
@@ -197,7 +199,7 @@ def _cell(row: RankingRow, scale: Scale) -> Cell:
         bar = (scale.place(row.margin), scale.place(low), scale.place(high))
     if judged:
         log = math.log10(row.margin) if row.margin else -_MAX_ORDER_DECADES
-        place = len(_VERDICTS) - _VERDICTS.index(row.verdict)
+        place = row.verdict in PASSING_VERDICTS
         log = min(max(log, -_MAX_ORDER_DECADES), _MAX_ORDER_DECADES)
         order = round(10.0 * place + log, 4)
         reason = ""
@@ -222,6 +224,7 @@ def _cell(row: RankingRow, scale: Scale) -> Cell:
         row.verdict,
         len(row.conditions) if judged else 0,
         format_margin(row) if judged else None,
+        verdicts.other_margins_text(row) if judged else "",
         bar,
         verdicts.evidence_text(row) if judged else "",
         verdicts.used_doubts_text(row),

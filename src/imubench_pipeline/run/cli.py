@@ -313,7 +313,7 @@ def _add_shortlist(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--results",
         type=Path,
-        help="of a run: measured figures, and substitutes for figures that nobody publishes",
+        help="of a run: sensors with usable logs are judged by these",
     )
 
 
@@ -321,7 +321,7 @@ def _shortlist(options: argparse.Namespace) -> int:
     # Only this command draws and computes: the others answer at once.
     from rich.console import Console
 
-    from imubench_pipeline.report.shortlist import format_shortlist_row, list_assumptions
+    from imubench_pipeline.report.shortlist import format_shortlist_row, list_remarks
     from imubench_pipeline.report.terminal import fit_table
     from imubench_pipeline.settings.requirements import Requirement, read_requirements
     from imubench_pipeline.settings.sensor import read_sensors
@@ -350,11 +350,13 @@ def _shortlist(options: argparse.Namespace) -> int:
     except (OSError, ValueError) as error:
         raise command_line.CommandError(str(error)) from None
     console = Console(highlight=False, markup=False, emoji=False)
-    margins = [f"Margin\n{which}" for which in ("at best", "at worst", "measured")]
-    heads = ["Sensor", "Verdict", *margins, "Limit"]
+    margins = [f"Margin\n{which}" for which in ("in use", "noise", "likely")]
+    heads = ["", "Sensor", "Verdict", *margins, "Limit"]
     lines = [format_shortlist_row(row) for row in rows]
-    console.print(fit_table(asked.title, heads, lines, console.width, names=0))
-    for note in list_assumptions(rows):
+    console.print(fit_table(asked.title, heads, lines, console.width, names=1))
+    if any(row.basis != "printed" for row in rows):
+        console.print("*: noise by logs; else as printed")
+    for note in list_remarks(rows):
         console.print(note, soft_wrap=True)
     return 0
 

@@ -17,6 +17,7 @@ from typing import Any
 from pydantic import BaseModel
 
 from imubench_pipeline.datasheets.suspicion import usual_as_text, usual_figures
+from imubench_pipeline.navigation.error_budget.in_use import state_figures
 from imubench_pipeline.navigation.suitability import read_abilities
 from imubench_pipeline.recordings.drop_zone import Recording, account_for, find_logs
 from imubench_pipeline.recordings.known_logs import plan_recording_versions
@@ -26,7 +27,6 @@ from imubench_pipeline.settings import sensor as sensor_files
 from imubench_pipeline.settings import simulated_recordings as simulations
 from imubench_pipeline.settings.config import Run, given_beside, read_run
 from imubench_pipeline.settings.experiments import AT_REST, Kind, kind_of, stated_experiments
-from imubench_pipeline.settings.printed import IN_USE
 from imubench_pipeline.settings.requirements import Requirement, read_requirements
 from imubench_pipeline.settings.shipped import find_own_folder, list_folders
 from imubench_pipeline.settings.validation import ConfigError, UnavailableSettingsError, parse
@@ -353,7 +353,7 @@ class Plan:
                 "error_budget": self.run.error_budget,
                 "fusion": self.run.fusion.model_dump(include={"longest", "draws", "seed"}),
                 "requirements": self._requirements(*_RANKING_KEYS, "title", "note", "example"),
-                "datasheet": declared.datasheet.only(IN_USE) if declared else {},
+                "figures": state_figures(declared),
             }
         )
 
@@ -366,7 +366,7 @@ class Plan:
         }
         for name, about in sensors.items():
             about["abilities"] = read_abilities(self.sensors[name]).model_dump(mode="json")
-        requirements = self._requirements("title", "note", "example", "environment")
+        requirements = self._requirements("title", "note", "example")
         return to_json({"requirements": requirements, "sensors": sensors})
 
     def _requirements(self, *unused: str) -> dict[str, object]:

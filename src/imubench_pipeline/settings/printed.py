@@ -7,7 +7,7 @@ Engers (2021, eq. 6-8) give the random walk in °/√h as 1/60 of a two-sided de
 """
 
 import math
-from collections.abc import Collection, Mapping
+from collections.abc import Mapping
 from typing import Annotated, Any, Literal
 
 from pydantic import (
@@ -19,7 +19,6 @@ from pydantic import (
 )
 
 from imubench_pipeline.settings.validation import Duration, Frequency, Strict, Text
-from imubench_pipeline.typing import JsonObject
 from imubench_pipeline.units import UnitError, convert_to_si, find_dimension, parse_quantity
 
 Sidedness = Literal["one-sided", "two-sided"]
@@ -299,12 +298,6 @@ FIGURE_DIMENSIONS: dict[str, dict[str, tuple[str, ...]]] = {
 
 SENSORS: Mapping[str, str] = {"gyro": "gyro", "accel": "accelerometer"}  # what measures it
 
-IN_USE = (
-    *("offset", "bias_repeatability", "temperature_coefficient", "scale_factor_error"),
-    *("nonlinearity", "g_sensitivity", "vibration_rectification"),
-)
-"""Figures of errors that come in use and are in no static log."""
-
 _MAX_ACCELERATION_NOISE = 1.0  # largest printed noise density of an accelerometer, SI
 
 
@@ -363,11 +356,3 @@ class Datasheet(Strict):
                     place = f".{number}" * (len(figures) > 1)
                     _check_unit(f"{quantity}.{name}{place}", quantity, name, figure)
         return self
-
-    def only(self, names: Collection[str]) -> JsonObject:
-        """Return a selection of figures, such as `IN_USE`, and the options, as in the file."""
-        written = self.model_dump(mode="json", include={"options", *FIGURE_DIMENSIONS})
-        for quantity in FIGURE_DIMENSIONS:
-            if (sheet := written[quantity]) is not None:
-                written[quantity] = {name: sheet[name] for name in sheet if name in names}
-        return written

@@ -19,14 +19,19 @@ from imubench_pipeline.settings.validation import (
 from imubench_pipeline.settings.yaml_files import read_folder, require_valid
 from imubench_pipeline.units import parse_difference, parse_quantity
 
-Error = Literal["attitude", "heading", "velocity", "position", "north"]
-"""What is limited; ``north`` is the heading that a gyro at rest finds from the Earth's rate."""
+Error = Literal["attitude", "heading", "velocity", "position", "cross_track", "north"]
+"""What is limited: velocity and position in the horizontal plane, attitude about one axis.
+
+``cross_track`` is the error across the way of a vehicle with an odometer; ``north`` is the heading
+that a gyro at rest finds from the Earth's rate.
+"""
 
 DIMENSIONS: Mapping[str, str] = {
     "attitude": "angle",
     "heading": "angle",
     "velocity": "velocity",
     "position": "length",
+    "cross_track": "length",
     "north": "angle",
 }
 """The dimension of each error."""
@@ -164,7 +169,11 @@ class Environment(Strict):
     speed_change: Annotated[Text, make_size_validator("velocity")] | None = Field(
         None, examples=["10 m/s"], description="± along the axis of the accelerometer, by the end"
     )
+    speed: Annotated[Text, make_size_validator("velocity")] | None = Field(
+        None, examples=["2 m/s"], description="in turns, and on the way; null: speed_change"
+    )
     vibration: Acceleration | None = Field(None, description="rms of one axis")
+    vibration_frequency: Frequency | None = Field(None, description="its lowest; null: 10 Hz")
 
 
 class FullScale(Strict):
@@ -204,12 +213,15 @@ class Requirement(Strict):
     )
     turn_on: TurnOn | None = Field(None, description="instead: turn-on biases without calibration")
     latitude: Latitude | None = Field(None, description="for limits of north")
+    positions: int = Field(
+        1, ge=1, description="for north: 1, or an even number of positions with half turns between"
+    )
     environment: Environment = Field(
         Environment(), description="conditions of use; datasheets give the resulting errors"
     )
     must: Must = Field(Must(), description="without it a sensor is excluded")
     confidence: float = Field(
-        0.95, gt=0, lt=1, description="probability of an error within its limit, on one axis"
+        0.95, gt=0, lt=1, description="probability of an error within its limit"
     )
     axis: Axis = Field("worst", description="the axis of a sensor that must fulfil it")
     price_class: tuple[Text, ...] | None = Field(
@@ -224,6 +236,11 @@ class Requirement(Strict):
             raise ValueError("expected either 'static_window' or 'turn_on'")
         if self.latitude is None and any(limit.error == "north" for limit in self.limits):
             raise ValueError("a limit of north needs 'latitude', such as 45 deg")
+        if self.positions > 1 and self.positions % 2:
+            raise ValueError(f"positions is {self.positions}; expected 1 or an even number")
+        moving = self.environment.speed or self.environment.speed_change
+        if not moving and any(limit.error == "cross_track" for limit in self.limits):
+            raise ValueError("a limit of cross_track needs 'speed' in 'environment', such as 1 m/s")
         return self
 
     @property

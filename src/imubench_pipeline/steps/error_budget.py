@@ -11,12 +11,14 @@ from imubench_pipeline.model.estimates import DeterministicRow, DrawnDeviationRo
 from imubench_pipeline.model.table import TableRow
 from imubench_pipeline.navigation import expected_errors
 from imubench_pipeline.navigation.backtest.comparison import list_backtest_rows
-from imubench_pipeline.navigation.error_budget.in_use import collect_figures_in_use
+from imubench_pipeline.navigation.error_budget.in_use import (
+    collect_figures_in_use,
+    read_stated_figures,
+)
 from imubench_pipeline.navigation.expected_errors import list_growth_rows
 from imubench_pipeline.navigation.ratios import ComparedChannel, list_deviation_rows
 from imubench_pipeline.recordings.kept import Quality, load_static_logs
 from imubench_pipeline.settings.config import ErrorBudgetSettings, FusionSettings
-from imubench_pipeline.settings.printed import Datasheet
 from imubench_pipeline.settings.requirements import validate_requirements
 from imubench_pipeline.tables.files import read
 from imubench_pipeline.units import parse_quantity
@@ -44,7 +46,7 @@ def compute_error_tables(
     apart = DeterministicRow.rows_of(read("deterministic", [folder / "deterministic.parquet"]))
     temperature = TemperatureRow.rows_of(read("temperature", [folder / "temperature.parquet"]))
     figures = collect_figures_in_use(
-        Datasheet.model_validate(sections["datasheet"]), estimates, temperature
+        read_stated_figures(sections["figures"]), estimates, temperature
     )
     tables = (
         expected_errors.list_error_rows(names, estimates, questions, figures=figures, **drawn),

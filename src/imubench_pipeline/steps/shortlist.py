@@ -2,23 +2,17 @@
 
 import json
 from collections.abc import Iterator, Mapping
-from dataclasses import replace
 from pathlib import Path
 
 from imubench_pipeline.model.comparisons import RankingRow, ShortlistRow
-from imubench_pipeline.model.estimates import ParameterRow
 from imubench_pipeline.model.recordings import RecordingRow
 from imubench_pipeline.model.table import R
-from imubench_pipeline.navigation.shortlist import (
-    collect_measured_ranges,
-    collect_printed_ranges,
-    list_shortlist_rows,
-)
+from imubench_pipeline.navigation.shortlist import list_shortlist_rows
 from imubench_pipeline.settings.requirements import Requirement, validate_requirements
 from imubench_pipeline.settings.sensor import Sensor, sensors_of
 from imubench_pipeline.tables.files import read, write_each
 
-NEEDED = ("recordings", "parameters", "ranking")  # the tables of a run that the step reads
+NEEDED = ("recordings", "ranking")  # the tables of a run that the step reads
 
 
 def list_shortlist(
@@ -36,11 +30,9 @@ def list_shortlist(
     def rows_of(of: type[R]) -> list[R]:
         return of.rows_of(read(of.table, [tables[of.table]])) if of.table in tables else []
 
-    recordings = rows_of(RecordingRow)
-    classes = {name: sensor.price_class for name, sensor in sensors.items()}
-    measured = collect_measured_ranges(rows_of(ParameterRow), recordings, classes)
-    ranges = replace(measured, printed=collect_printed_ranges(sensors))
-    yield from list_shortlist_rows(requirements, sensors, ranges, rows_of(RankingRow), recordings)
+    yield from list_shortlist_rows(
+        requirements, sensors, rows_of(RankingRow), rows_of(RecordingRow)
+    )
 
 
 def write_shortlist(

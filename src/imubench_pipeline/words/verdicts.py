@@ -8,14 +8,18 @@ from decimal import ROUND_DOWN, Decimal
 from typing import get_args
 
 from imubench_pipeline.earth import STANDARD_GRAVITY
-from imubench_pipeline.model.comparisons import ErrorBudgetRow, NextStepRow, RankingRow
+from imubench_pipeline.model.comparisons import (
+    ErrorBudgetRow,
+    NextStepRow,
+    RankingRow,
+    ShortlistRow,
+)
 from imubench_pipeline.model.estimates import ErrorGrowthRow
-from imubench_pipeline.model.states import Action, ShortlistVerdict, SourceCode, SpreadOf, Verdict
+from imubench_pipeline.model.states import Action, Cause, Origin, SourceCode, SpreadOf, Verdict
 from imubench_pipeline.model.verdicts import (
     Condition,
     DoubtMark,
     ErrorSource,
-    Figure,
     Property,
     Share,
     Shortfall,
@@ -53,41 +57,46 @@ def doubt_text(code: str, channels: Sequence[str] = ()) -> str:
 VERDICT_WORDS: Mapping[Verdict, str] = {
     "meets": "meets the limits",
     "likely_meets": "likely meets the limits",
+    "meets_if": "meets the limits",
     "not_enough_data": "not enough data",
     "likely_fails": "likely fails",
     "fails": "fails",
+    "cannot_meet": "cannot meet the limits",
     "excluded": "excluded",
 }
-"""Verdict on a sensor, the best first."""
+"""Verdict on a sensor, the best first; the conditions of ``meets_if`` follow it."""
 
 SHORT_VERDICTS: Mapping[Verdict, str] = {
     **VERDICT_WORDS,
     "meets": "meets",
     "likely_meets": "likely meets",
+    "meets_if": "meets if …",
+    "cannot_meet": "cannot meet",
 }
 """Verdict in a table cell."""
 
 VERDICT_MEANINGS: Mapping[Verdict, str] = {
     "meets": "probability of 97.5 % or more",
     "likely_meets": "50 to 97.5 %",
+    "meets_if": "an unknown figure decides: it counts as the worst of its class",
     "not_enough_data": "the logs cannot answer",
     "likely_fails": "2.5 to 50 %",
     "fails": "2.5 % or less",
+    "cannot_meet": "fails with the best figures of its class",
     "excluded": "lacks a demanded property",
 }
 
-SHORTLIST_WORDS: Mapping[ShortlistVerdict, str] = {
-    "cannot_meet": "cannot meet the limits",
-    "worth_logging": "worth logging",
-    "meets_at_worst": "meets the limits",
-    "not_judged": "not judged",
-}
-"""Verdict by the data sheet alone."""
+
+def source_name(source: SourceCode) -> str:
+    """Return the name of a source of errors: ``scale factor``."""
+    return _SOURCES.get(source, source)
+
 
 _SOURCES: Mapping[SourceCode, str] = {
     "turn_on_bias": "turn-on bias",
     "temperature_squared": "temperature squared",
     "scale_factor": "scale factor",
+    "scale_factor_temperature": "scale factor over temperature",
     "g_sensitivity": "g-sensitivity",
     "vibration_rectification": "vibration rectification",
     "initial_tilt": "initial tilt",
@@ -95,10 +104,13 @@ _SOURCES: Mapping[SourceCode, str] = {
 }
 """Sources of errors whose code is not their name."""
 
-_NOUNS: Mapping[Figure, tuple[str, str, str]] = {
-    "turn_on_bias": ("bias after calibration", "deg/s", "mg"),
+_NOUNS: Mapping[Cause, tuple[str, str, str]] = {
+    "turn_on_bias": ("turn-on bias", "deg/s", "mg"),
     "temperature": ("temperature coefficient", "deg/s/K", "mg/K"),
     "scale_factor": ("scale factor error", "ppm", "ppm"),
+    "scale_factor_temperature": ("scale factor over temperature", "ppm/K", "ppm/K"),
+    "nonlinearity": ("nonlinearity", "ppm", "ppm"),
+    "misalignment": ("misalignment", "mrad", "mrad"),
     "g_sensitivity": ("g-sensitivity", "deg/s/g", ""),
     "vibration_rectification": ("vibration rectification", "deg/s/g^2", "mg/g^2"),
 }
@@ -110,6 +122,8 @@ _DIMENSIONS = {
     "deg/s/K": "gyro_temperature_coefficient",
     "mg/K": "accel_temperature_coefficient",
     "ppm": "ratio",
+    "ppm/K": "ratio_temperature_coefficient",
+    "mrad": "angle",
     "deg/s/g": "gyro_acceleration_coefficient",
     "deg/s/g^2": "gyro_vibration_coefficient",
     "mg/g^2": "accel_vibration_coefficient",
@@ -167,13 +181,22 @@ def condition_text(condition: Condition) -> str:
         name = subject_text(condition)
         owned = condition.property in ("quantity", "axis")
         return f"it has a {name}" if owned else f"its {name} meets the requirement"
-    _, *units = _NOUNS[condition.figure]
-    unit = units[condition.subject == "accel"]
-    largest = convert_from_si(condition.largest or 0.0, unit, _DIMENSIONS[unit])
-    if largest:  # rounded down to three digits, to stay within the limit
+    size = figure_text(condition.subject, condition.figure, condition.largest or 0.0)
+    text = f"its {subject_text(condition)} is below {size} (1σ)"
+    if condition.printing is None:
+        return text
+    printing = counted(condition.printing, "sensor prints", "sensors print")
+    return f"{text}; {condition.within} of {printing} so little"
+
+
+def figure_text(quantity: str, cause: Cause, size: float) -> str:
+    """Return a figure, SI, in its practical unit, rounded down to three digits."""
+    unit = _NOUNS[cause][1 + (quantity == "accel")]
+    largest = float(convert_from_si(size, unit, _DIMENSIONS[unit]))
+    if largest:  # rounded down, to stay within a limit
         step = Decimal(1).scaleb(Decimal(largest).adjusted() - 2)
         largest = float(Decimal(largest).quantize(step, rounding=ROUND_DOWN))
-    return f"its {subject_text(condition)} is below {largest:g} {unit} (1σ)"
+    return f"{largest:g} {unit}"
 
 
 def subject_text(condition: Condition) -> str:
@@ -204,8 +227,36 @@ def shortfall_text(shortfall: Shortfall) -> str:
 
 def share_text(share: Share) -> str:
     """Return a source of an error with its share: ``gyro N 40 %``."""
-    origin = f" (data sheet, {share.kind})" if share.kind else ""
+    origin = _ORIGINS[share.origin] if share.origin and not share.is_noise else ""
     return f"{source_text(share)}{origin} {100.0 * share.share:.0f} %"
+
+
+_ORIGINS: Mapping[Origin, str] = {
+    "measured": " (measured)",
+    "datasheet": " (printed)",
+    "class limit": " (worst of its class)",
+    "requirement": "",
+}
+"""Origin of a figure in words."""
+
+
+def origins_text(shares: Iterable[Share]) -> str:
+    """Return the parts of the variance by origin: ``noise 40 %, printed 10 %, class 50 %``."""
+    parts: dict[str, float] = {}
+    for share in shares:
+        noise = share.is_noise and share.origin != "class limit"
+        name = "noise" if noise else _ORIGIN_WORDS[share.origin or "measured"]
+        parts[name] = parts.get(name, 0.0) + share.share
+    largest_first = sorted(parts.items(), key=lambda part: -part[1])
+    return ", ".join(f"{name} {100.0 * part:.0f} %" for name, part in largest_first)
+
+
+_ORIGIN_WORDS: Mapping[Origin, str] = {
+    "measured": "measured",
+    "datasheet": "printed",
+    "class limit": "worst of its class",
+    "requirement": "stated",
+}
 
 
 def source_text(source: ErrorSource | ErrorBudgetRow | ErrorGrowthRow) -> str:
@@ -222,10 +273,13 @@ def source_kind_text(source: ErrorSource | ErrorBudgetRow | ErrorGrowthRow) -> s
 
 def _name_source(source: ErrorSource | ErrorBudgetRow | ErrorGrowthRow, size: str = "") -> str:
     sensor = f"{source.quantity} " if source.quantity else ""
-    name = f"{sensor}{_SOURCES.get(source.source, source.source)}{size}"
-    if source.through == "static_window":
-        return f"{name} in the static window"
+    name = f"{sensor}{source_name(source.source)}{size}"
+    if source.through in _PATHS:
+        return f"{name} {_PATHS[source.through]}"
     return f"initial tilt by {name}" if source.through == "initial_tilt" else name
+
+
+_PATHS = {"static_window": "in the static window", "turn": "in the turn"}
 
 
 def evidence_text(row: RankingRow) -> str:
@@ -268,6 +322,16 @@ def doubts_text(doubts: Iterable[DoubtMark], *, named: bool = False, most: int =
 def used_doubts_text(row: RankingRow) -> str:
     """Return the doubts about the recordings of a row of ``ranking``, named if they are several."""
     return doubts_text(row.doubts, named=(row.recordings or 0) > 1)
+
+
+def other_margins_text(row: RankingRow | ShortlistRow) -> str:
+    """Return the margins other than in use: ``noise alone 4.2, likely 0.9``."""
+    parts = []
+    if row.noise_margin is not None:
+        parts.append(f"noise alone {number_text(row.noise_margin, 2)}")
+    if row.likely_margin is not None and row.likely_margin != row.margin:
+        parts.append(f"likely {number_text(row.likely_margin, 2)}")
+    return ", ".join(parts)
 
 
 def spread_text(row: RankingRow) -> str:
@@ -323,7 +387,11 @@ def answer_text(
         text = f"{name} {VERDICT_WORDS[best.verdict]}"
         if best.conditions:
             are = "is" if len(best.conditions) == 1 else "are"
-            text += f"; {counted(len(best.conditions), 'figure')} {are} unknown"
+            text += f"; {counted(len(best.conditions), 'property')} {are} not known"
+    elif best.verdict == "meets_if":
+        text = f"No sensor is shown to meet the limits. {name} meets them if "
+        text += f"{counted(len(best.conditions), 'unknown figure')} "
+        text += f"{'is' if len(best.conditions) == 1 else 'are'} small enough"
     elif best.verdict == "not_enough_data":
         text = "No sensor is shown to meet the limits. "
         text += f"{name} is closest, but there is not enough data"
@@ -341,9 +409,11 @@ def answer_text(
 _HEADINGS: Mapping[Verdict, str] = {
     "meets": "Also meet the limits",
     "likely_meets": "Likely meet the limits",
+    "meets_if": "Meet the limits",
     "not_enough_data": "Not enough data",
     "likely_fails": "Likely fail",
     "fails": "Fail",
+    "cannot_meet": "Cannot meet the limits",
     "excluded": "Excluded",
 }
 

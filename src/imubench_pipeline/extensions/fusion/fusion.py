@@ -22,7 +22,6 @@ from imubench_pipeline.model.recordings import RecordingRow
 from imubench_pipeline.model.table import ChannelRow, TableRow
 from imubench_pipeline.navigation.error_budget.in_use import SIGMAS
 from imubench_pipeline.navigation.ratios import ComparedChannel, TemperaturePart
-from imubench_pipeline.navigation.shortlist import parse_price_class
 from imubench_pipeline.recordings.fitness import attach_doubts, list_excluded
 from imubench_pipeline.settings.config import FusionSettings
 from imubench_pipeline.settings.printed import Datasheet
@@ -194,9 +193,6 @@ def yield_fusion_rows(
     return attach_doubts(rows, RecordingRow.rows_of(tables["recordings"]), RECORDINGS_OF_A_PAIR)
 
 
-TACTICAL_CLASS = "tactical"  # first word of the price class of the target datasheets
-
-
 def yield_grades_of_run(
     tables: Mapping[str, pa.Table], sensors: Mapping[str, Sensor]
 ) -> Iterator[GradeRow]:
@@ -204,7 +200,7 @@ def yield_grades_of_run(
     grades = [
         Grade(name, f"{sensor.vendor} {sensor.model}", sensor.datasheet)
         for name, sensor in sensors.items()
-        if parse_price_class(sensor.price_class) == TACTICAL_CLASS
+        if sensor.grade == "tactical"
     ]
     not_sold = {name for name, sensor in sensors.items() if not sensor.sold}
     return yield_grade_rows(yield_candidates(tables, None, not_sold), grades)

@@ -3,9 +3,10 @@
 All budgets here assume:
 
 - one horizontal axis: the accelerometer along it and the gyro across it, whose tilt projects
-  gravity into that accelerometer. If both axes are alike, the error in the plane is sqrt(2) times
-  the error of one axis. Misalignment, and the position error from heading times distance, are
-  neglected; errors in use are included if a use is stated (`in_use`);
+  gravity into that accelerometer. The other axis is alike (`Budget.to_radius`). Errors in use are
+  included if a use is stated (`in_use`); a heading error acts on velocity and position in a turn;
+- for the cross-track error, a vehicle whose odometer gives the way and whose gyro the heading, at a
+  constant speed;
 - small angles, up to about 0.2 rad;
 - a flat Earth that does not turn, g = 9.80665 m/s^2: no Schuler feedback, whose absence overstates
   errors by 0.3 % at most after 60 s, and by 3 to 10 % after 600 s (36 % of an initial tilt);
@@ -13,7 +14,7 @@ All budgets here assume:
 """
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import get_args
 
@@ -21,14 +22,19 @@ import numpy as np
 from scipy.optimize import brentq
 
 from imubench_pipeline.earth import STANDARD_GRAVITY
-from imubench_pipeline.model.states import Cause, Measured, SourcePath
+from imubench_pipeline.model.states import Measured
 from imubench_pipeline.model.verdicts import ErrorSource
 from imubench_pipeline.navigation.error_budget import in_use, parts
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.growth import Calibrated, SensorStart, Uncalibrated, of_constant
-from imubench_pipeline.words.reasons import budgets as texts
 
-GYRO_ORDER: dict[parts.Quantity, int] = {"attitude": 0, "heading": 0, "velocity": 1, "position": 2}
+GYRO_ORDER: dict[parts.Quantity, int] = {
+    "attitude": 0,
+    "heading": 0,
+    "velocity": 1,
+    "position": 2,
+    "cross_track": 1,
+}
 ACCEL_ORDER: dict[parts.Quantity, int] = {"velocity": 0, "position": 1}
 """Number of integrations minus one, m of `growth`."""
 
@@ -145,13 +151,14 @@ def budget(
     if not (math.isfinite(time) and time > 0):
         raise ValueError(f"time is {time}, expected a time above 0")
     order = GYRO_ORDER[quantity]
-    gravity = STANDARD_GRAVITY if order > 0 else 1.0
-    contributions = list(of_sensor("gyro", gyro, order, time, start.gyro, gravity))
+    factor = _get_factor(quantity, use)
+    contributions = list(of_sensor("gyro", gyro, order, time, start.gyro, factor))
     if quantity in ACCEL_ORDER:
         contributions.extend(of_sensor("accel", accel, ACCEL_ORDER[quantity], time, start.accel))
-    if quantity == "heading":
-        heading = ErrorSource("initial_heading")
-        contributions.append(parts.Contribution(heading, start.heading, in_use.STATED_FIGURE))
+    if quantity in ("heading", "cross_track"):
+        heading = start.heading * (factor * time if quantity == "cross_track" else 1.0)
+        source = ErrorSource("initial_heading")
+        contributions.append(parts.Contribution(source, heading, in_use.STATED_FIGURE))
     elif isinstance(start.tilt, Levelled):
         if quantity == "attitude" and isinstance(start.accel, Calibrated):
             for term in accel.terms:
@@ -165,39 +172,44 @@ def budget(
                 sigma = start.tilt.bias / STANDARD_GRAVITY
                 contributions.append(parts.Contribution(source, sigma, in_use.STATED_FIGURE))
     else:
-        tilt = start.tilt * gravity * of_constant(order - 1, time)
+        tilt = start.tilt * factor * of_constant(order - 1, time)
         contributions.append(
             parts.Contribution(ErrorSource("initial_tilt"), tilt, in_use.STATED_FIGURE)
         )
-    missing: list[parts.Missing] = []
-    assumptions: list[str] = []
-    for measured, cause, lever, through in _list_levers(quantity, time, start, use):
-        figures = gyro_figures if measured == "gyro" else accel_figures
-        part = parts.compute_figure_contribution(measured, cause, lever, figures, through)
-        if isinstance(part, parts.Contribution):
+    for measured, (cause, lever, through) in _list_levers(quantity, time, start, use):
+        figure = (gyro_figures if measured == "gyro" else accel_figures).get(cause)
+        if figure is not None:
+            source = ErrorSource(cause, measured, through)
+            vector = lever * figure.sigma if isinstance(lever, complex) else None
+            part = parts.Contribution(source, abs(lever) * figure.sigma, figure, vector)
             contributions.append(part)
-        elif part is not None:
-            missing.append(part)
-            if cause == "turn_on_bias":
-                assumptions.append(texts.bias_not_known(measured))
-    return parts.Budget(time, quantity, contributions, assumptions, missing)
+    return parts.Budget(time, quantity, contributions)
+
+
+def _get_factor(quantity: parts.Quantity, use: in_use.Use) -> float:
+    """Return the factor of the integrated angle: gravity for a tilt, the speed for a heading."""
+    if quantity == "cross_track":
+        return use.speed
+    return STANDARD_GRAVITY if GYRO_ORDER[quantity] > 0 else 1.0
 
 
 def _list_levers(
     quantity: parts.Quantity, time: float, start: Start, use: in_use.Use
-) -> Iterator[tuple[Measured, Cause, float, SourcePath | None]]:
-    """Yield sensor, cause, lever and path of the figures of the sensors."""
-    order = GYRO_ORDER[quantity]
-    gravity = STANDARD_GRAVITY if order > 0 else 1.0
-    for cause, lever in in_use.levers("gyro", order, time, start.gyro, use, seen=order == 0):
-        yield "gyro", cause, gravity * lever, None
+) -> Iterator[tuple[Measured, in_use.Lever]]:
+    """Yield the sensor and the lever of each figure."""
+    order, factor = GYRO_ORDER[quantity], _get_factor(quantity, use)
+    levers = in_use.list_levers("gyro", order, time, start.gyro, use, direct=order == 0)
+    for cause, lever, through in levers:
+        yield "gyro", (cause, factor * lever, through)
     if quantity in ACCEL_ORDER:
-        of_accel = in_use.levers("accel", ACCEL_ORDER[quantity], time, start.accel, use, seen=True)
-        for cause, lever in of_accel:
-            yield "accel", cause, lever, None
+        levers = in_use.list_levers(
+            "accel", ACCEL_ORDER[quantity], time, start.accel, use, direct=True
+        )
+        yield from (("accel", lever) for lever in levers)
+    yield from (("gyro", lever) for lever in in_use.list_turn_levers("gyro", quantity, time, use))
+    yield from (("accel", lever) for lever in in_use.list_turn_levers("accel", quantity, time, use))
     if quantity == "attitude" and isinstance(start.tilt, Levelled) and start.tilt.bias is None:
-        for cause in in_use.BIAS_CAUSES:
-            yield "accel", cause, 1.0 / STANDARD_GRAVITY, "initial_tilt"
+        yield "accel", ("turn_on_bias", 1.0 / STANDARD_GRAVITY, "initial_tilt")
 
 
 def of_sensor(
@@ -230,14 +242,16 @@ def time_until(
     use: in_use.Use = in_use.NO_USE,
     gyro_figures: in_use.Figures = in_use.NO_FIGURES,
     accel_figures: in_use.Figures = in_use.NO_FIGURES,
+    convert: Callable[[parts.Budget], parts.Budget] = lambda along: along,
 ) -> float | None:
     """Return the time after which an error reaches a limit.
 
     The total of a `budget` increases with time, because the errors at two times never have a
-    negative correlation. With lines it may oscillate: the first crossing is then found among 4096
-    times. The time is in s: 0 if the error exceeds the limit from the beginning, None if it does
-    not within 30 years. The limit is 1 sigma, rad, m/s or m; the others are as in `budget`. Raise a
-    ValueError if the limit is not above 0, or the quantity is not known.
+    negative correlation. With lines or turns it may oscillate; with lines the first crossing is
+    found among 4096 times. The time is in s: 0 if the error exceeds the limit from the beginning, None if it does
+    not within 30 years. The limit is 1 sigma, rad, m/s or m, for each budget as ``convert`` returns
+    it, such as by `Budget.to_radius`; the others are as in `budget`. Raise a ValueError if the
+    limit is not above 0, or the quantity is not known.
     """
     if not (math.isfinite(limit) and limit > 0):
         raise ValueError(f"limit is {limit}, expected a number above 0")
@@ -246,7 +260,7 @@ def time_until(
 
     def excess(time: float) -> float:
         after = budget(quantity, time, gyro=gyro, accel=accel, start=start, use=use, **figures)
-        return after.total - limit
+        return convert(after).total - limit
 
     if excess(_MIN_TIME) >= 0:
         return 0.0

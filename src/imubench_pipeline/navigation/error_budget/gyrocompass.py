@@ -1,31 +1,27 @@
 """Heading error of gyrocompassing: north from the Earth's rate, at rest.
 
 An error dw of the mean of a horizontal gyro across north gives a heading error of
-dw / (w_ie cos(latitude)). Neglected are the levelling error (tan(latitude) times the tilt about
-north) and large angles.
+dw / (w_ie cos(latitude)). A levelling error about north, the bias of the accelerometer over g,
+turns the upright part of the Earth's rate into that gyro: a heading error of tan(latitude) times
+the tilt. At several positions, with half turns between, both biases cancel. Large angles are
+neglected.
 """
 
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq, minimize_scalar
 
-from imubench_pipeline.earth import EARTH_RATE
+from imubench_pipeline.earth import EARTH_RATE, STANDARD_GRAVITY
+from imubench_pipeline.model.states import Cause, Measured
 from imubench_pipeline.model.verdicts import ErrorSource
 from imubench_pipeline.navigation.error_budget import in_use
-from imubench_pipeline.navigation.error_budget.parts import (
-    Budget,
-    Contribution,
-    Missing,
-    compute_figure_contribution,
-    describe_term,
-)
+from imubench_pipeline.navigation.error_budget.parts import Budget, Contribution, describe_term
 from imubench_pipeline.noise import NoiseModel, Sinusoid
-from imubench_pipeline.words.reasons import budgets as texts
+from imubench_pipeline.noise.terms.base import Term
 
 _WINDOW_LENGTHS: NDArray[np.float64] = np.geomspace(1e-3, 1e9, 601)
 
@@ -36,41 +32,35 @@ class Gyrocompass:
 
     gyro: NoiseModel
     latitude: float  # rad, between the poles
-    # turn-on bias, 1 sigma, rad/s; None: from ``figures``, else left out with a note
+    accel: NoiseModel = field(default_factory=NoiseModel)  # levels the gyro
+    # turn-on bias of the gyro, 1 sigma, rad/s; None: from ``figures``
     bias: float | None = None
-    # 2: the gyro is turned by 180 degrees after half the time; half the difference of the two means
-    # has no turn-on bias
-    positions: Literal[1, 2] = 1
+    # 1, or an even number: the gyro is turned by 180 degrees between equal parts of the time; the
+    # alternating mean has no turn-on bias
+    positions: int = 1
     figures: in_use.Figures = field(default_factory=dict)
+    accel_figures: in_use.Figures = field(default_factory=dict)
+    temperature_change: float = 0.0  # during the whole time, linear, K
 
     def __post_init__(self) -> None:
         if not abs(self.latitude) < math.pi / 2.0:
             raise ValueError(f"latitude is {self.latitude}, expected one between the poles, in rad")
-        in_use.check_not_negative(bias=self.bias or 0.0)
-        if self.positions not in (1, 2):
-            raise ValueError(f"positions is {self.positions}, expected 1 or 2")
+        in_use.check_not_negative(bias=self.bias or 0.0, temperature=self.temperature_change)
+        if self.positions < 1 or (self.positions > 1 and self.positions % 2):
+            raise ValueError(f"positions is {self.positions}, expected 1 or an even number")
 
     def heading(self, time: float) -> Budget:
         """Return the heading error after a static window, s, by source, rad.
 
         At one position the error of the mean has, by term, the variance `Term.mean_variance`; at
-        two positions sigma^2(t/2) / 2, with sigma^2 the Allan variance (Britting, "Inertial
-        Navigation Systems Analysis", Wiley 1971). Raises a ValueError if the time is not above 0.
+        n positions sigma^2(t/n) / n, with sigma^2 the Allan variance (Britting, "Inertial
+        Navigation Systems Analysis", Wiley 1971, for two). Raises a ValueError if the time is not
+        above 0.
         """
         if not (math.isfinite(time) and time > 0):
             raise ValueError(f"time is {time}, expected a time above 0")
-        biases = self._list_bias_errors()
-        missing = [part for part in biases if isinstance(part, Missing)]
-        return Budget(
-            time,
-            "heading",
-            [
-                *self._list_noise_errors(time, swings=True),
-                *(part for part in biases if isinstance(part, Contribution)),
-            ],
-            [texts.HEADING_BIAS_NOT_KNOWN] if missing else [],
-            missing,
-        )
+        noise = self._list_noise_errors(time, swings=True)
+        return Budget(time, "heading", [*noise, *self._list_figure_errors()])
 
     def time_needed(self, accuracy: float) -> float | None:
         """Return the shortest static window, s, that gives a heading accuracy, 1 sigma, rad.
@@ -82,7 +72,7 @@ class Gyrocompass:
         if not (math.isfinite(accuracy) and accuracy > 0):
             raise ValueError(f"accuracy is {accuracy}, expected an angle above 0")
 
-        biases = [part.sigma for part in self._list_bias_errors() if isinstance(part, Contribution)]
+        biases = [part.sigma for part in self._list_figure_errors()]
 
         def excess(logarithm: float) -> float:
             time = math.exp(logarithm)
@@ -116,29 +106,51 @@ class Gyrocompass:
         """North component of the Earth's rate, rad/s."""
         return EARTH_RATE * math.cos(self.latitude)
 
-    def _list_bias_errors(self) -> list[Contribution | Missing]:
-        """Return the contributions of the gyro bias, which do not decrease with time."""
-        if self.positions == 2:
-            return []
-        if self.bias is not None:
-            sigma = self.bias / self._north_rate
-            return [Contribution(ErrorSource("turn_on_bias", "gyro"), sigma, in_use.STATED_FIGURE)]
-        parts = (
-            compute_figure_contribution("gyro", cause, 1.0 / self._north_rate, self.figures)
-            for cause in in_use.BIAS_CAUSES
-        )
-        return [part for part in parts if part is not None]
+    @property
+    def _tilt_factor(self) -> float:
+        """Heading error from a tilt about north of 1 rad."""
+        return abs(math.tan(self.latitude))
+
+    def _list_figure_errors(self) -> Iterator[Contribution]:
+        """Yield the contributions of the figures, which do not decrease with time."""
+        per_rate = 1.0 / self._north_rate
+        levers: list[tuple[Measured, Cause, float]] = [
+            ("gyro", "temperature", per_rate * self.temperature_change / (2.0 * self.positions))
+        ]
+        if self.positions == 1:
+            levers.append(("accel", "turn_on_bias", self._tilt_factor / STANDARD_GRAVITY))
+            if self.bias is None:
+                levers.append(("gyro", "turn_on_bias", per_rate))
+            else:
+                source = ErrorSource("turn_on_bias", "gyro")
+                yield Contribution(source, self.bias * per_rate, in_use.STATED_FIGURE)
+        for measured, cause, lever in levers:
+            figure = (self.figures if measured == "gyro" else self.accel_figures).get(cause)
+            if figure is not None and lever > 0.0:
+                source = ErrorSource(
+                    cause, measured, "initial_tilt" if measured == "accel" else None
+                )
+                yield Contribution(source, lever * figure.sigma, figure)
 
     def _list_noise_errors(self, time: float, *, swings: bool) -> Iterator[Contribution]:
         for term in self.gyro.terms:
             if isinstance(term, Sinusoid) and not swings:
                 # The mean of a line is 0 after each whole period: use its envelope, of
-                # |sin(x) / x| at one position, of sin^2(x/2) / (x/2) at two.
+                # |sin(x) / x| at one position, of sin^2(x/2) / (x/2) at several.
                 x = math.pi * term.frequency * time / self.positions
                 most = min(1.0, 1.0 / x) if self.positions == 1 else min(x, 1.0 / x)
                 sigma = term.amplitude * most / math.sqrt(2.0)
-            elif self.positions == 1:
-                sigma = math.sqrt(term.mean_variance(time, 0.0))
             else:
-                sigma = math.sqrt(float(term.allan_variance(np.array([time / 2.0]))[0]) / 2.0)
+                sigma = self._compute_mean_error(term, time)
             yield Contribution(describe_term("gyro", term), sigma / self._north_rate)
+        for term in self.accel.terms:
+            tilt = self._compute_mean_error(term, time) / STANDARD_GRAVITY
+            source = describe_term("accel", term, "initial_tilt")
+            yield Contribution(source, self._tilt_factor * tilt)
+
+    def _compute_mean_error(self, term: Term, time: float) -> float:
+        """Return the standard deviation of the mean, alternating over the positions."""
+        if self.positions == 1:
+            return math.sqrt(term.mean_variance(time, 0.0))
+        part = np.array([time / self.positions])
+        return math.sqrt(float(term.allan_variance(part)[0]) / self.positions)

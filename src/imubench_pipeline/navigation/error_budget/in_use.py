@@ -2,62 +2,59 @@
 
 Each error is a figure of the sensor, a standard deviation, times a factor that depends on the use:
 
-- ``turn_on_bias``, ``repeatability``: a bias that no static window removes. Levelling turns an
-  accelerometer bias into a tilt, bias / g;
+- ``turn_on_bias``: a bias that no static window removes. Levelling turns an accelerometer bias into
+  a tilt, bias / g;
 - ``temperature``: coefficient times change. With a static window, the temperature changes linearly
   from the window to the end; without one, the whole change acts from the beginning.
   ``temperature_squared``: the same for a measured curvature;
-- ``scale_factor``, ``nonlinearity``: for a gyro, times the angle turned, in attitude and heading;
-  for an accelerometer, times the change of speed, in velocity and position. Both act evenly;
-- ``g_sensitivity``: for a gyro, times the vibration, as if it were constant: a bound.
-  ``vibration_rectification``: times the square of the rms of the vibration.
+- ``scale_factor``, ``nonlinearity``, and ``scale_factor_temperature`` times the change: for a gyro,
+  times the angle turned, in attitude and heading; for an accelerometer, times the change of speed,
+  as ``misalignment`` is. They act evenly. In position and velocity, a turn acts as in `turns`;
+- ``g_sensitivity``: for a gyro, times the acceleration by speed and in turns. Vibration averages to
+  zero and leaves an angle of the figure times its velocity, which is that of the lowest frequency;
+- ``vibration_rectification``: times the square of the rms of the vibration.
 
-Causes are independent of each other and of the noise; a figure has no sign.
+Causes are independent of each other and of the noise; a figure has no sign. A figure that a sensor
+does not print is the worst of its class (`datasheets.class_limits`).
 """
 
 import math
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, replace
 from types import MappingProxyType
+from typing import Literal
 
-from imubench_pipeline.datasheets.class_limits import SIGMAS_OF_KIND
-from imubench_pipeline.datasheets.comparable import Comparable, PrintedAxis
+from pydantic import TypeAdapter
+
+from imubench_pipeline.datasheets.class_limits import STATEMENTS, find_limit, read_sigma
 from imubench_pipeline.model.estimates import TemperatureRow
-from imubench_pipeline.model.states import Cause, Measured, Origin
+from imubench_pipeline.model.states import Cause, Measured, Origin, SourcePath
+from imubench_pipeline.navigation.error_budget.turns import Turn
 from imubench_pipeline.noise.growth import Calibrated, SensorStart, Uncalibrated, of_constant
-from imubench_pipeline.settings.printed import FIGURE_DIMENSIONS, Datasheet
-from imubench_pipeline.words.reasons import budgets as texts
+from imubench_pipeline.settings.sensor import QUANTITIES, Sensor, quantity_of
 
-_SUBSTITUTE_CAUSES: Mapping[tuple[Measured, Cause], Cause] = {
-    ("gyro", "turn_on_bias"): "repeatability",
-    ("accel", "turn_on_bias"): "repeatability",
-    ("gyro", "g_sensitivity"): "vibration_rectification",
-}
-"""Figure that replaces another one that is not known."""
-
-BIAS_CAUSES: tuple[Cause, ...] = ("turn_on_bias", "repeatability")
-"""Causes of a bias that is not calibrated."""
-
-_REQUIRED_CAUSES: frozenset[Cause] = frozenset(
-    ("turn_on_bias", "temperature", "scale_factor", "g_sensitivity")
-)
-"""Causes that are reported as missing without a figure. For an accelerometer,
-``vibration_rectification`` is too."""
+End = Literal["in_use", "likely", "best"]
+"""What counts where a sensor prints nothing: the worst, the median or the best of its class."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Figure:
     """Size of an error of one axis."""
 
-    sigma: float | None = None  # 1 sigma, SI; None if not known
-    origin: Origin = "not known"
-    kind: str | None = None  # kind of a printed figure: typ, max, 1sigma ...
-    convention: str | None = None  # how it was converted to a standard deviation
+    sigma: float  # 1 sigma, SI
+    # likely, best: if the figure is a limit of the class: its median and its best; else None
+    likely: float | None = None
+    best: float | None = None
+    origin: Origin = "measured"
     spread: float = 0.0  # 1 sigma of the figure itself, if it is an estimate
-    reason: str | None = None  # why it is not known
+
+    def at(self, end: End) -> "Figure":
+        """Return the figure with the median or the best of its class, if it is a limit of it."""
+        value = {"in_use": None, "likely": self.likely, "best": self.best}[end]
+        return self if value is None else replace(self, sigma=value)
 
 
-STATED_FIGURE = Figure(origin="requirement", convention=texts.STATED_SIGMA)
+STATED_FIGURE = Figure(sigma=0.0, origin="requirement")
 """Figure that is stated in a requirement."""
 
 Figures = Mapping[Cause, Figure]
@@ -81,16 +78,25 @@ class Use:
     """
 
     temperature_change: float = 0.0  # K
-    turns: float = 0.0  # rad about the axis of the gyro
+    turns: float = 0.0  # rad, about the vertical, and for the attitude about the axis of the gyro
     speed_change: float = 0.0  # m/s along the axis of the accelerometer
+    speed: float = 0.0  # m/s, in turns
     vibration: float = 0.0  # rms, m/s^2
+    vibration_frequency: float = 10.0  # its lowest frequency, Hz
     over: float = 1.0  # time during which temperature, heading and speed change evenly, s
 
     def __post_init__(self) -> None:
-        for name in ("temperature_change", "turns", "speed_change", "vibration"):
+        for name in ("temperature_change", "turns", "speed_change", "speed", "vibration"):
             check_not_negative(**{name: getattr(self, name)})
-        if not (math.isfinite(self.over) and self.over > 0):
-            raise ValueError(f"over is {self.over}, expected a time above 0")
+        for name in ("over", "vibration_frequency"):
+            if not (math.isfinite(value := getattr(self, name)) and value > 0):
+                raise ValueError(f"{name} is {value}, expected a number above 0")
+
+    @property
+    def turn(self) -> Turn | None:
+        """The turn, if the vehicle moves in it."""
+        moving = self.turns > 0.0 and self.speed > 0.0
+        return Turn(self.turns, self.over, self.speed) if moving else None
 
 
 NO_USE = Use()
@@ -122,65 +128,85 @@ def of_squared_rise(order: int, time: float, over: float) -> float:
     return 2.0 * (of_pulse(order + 2, time, over) - over * later) / over**2
 
 
-def levers(
-    measured: Measured, order: int, time: float, start: SensorStart, use: Use, *, seen: bool
-) -> Iterator[tuple[Cause, float]]:
-    """Yield each cause that occurs in a use, and its lever: the error from a figure of 1.
+Lever = tuple[Cause, float | complex, SourcePath | None]
+"""A cause, the error from a figure of 1 (complex: a vector in the plane), and its path."""
 
-    ``order`` is m, 0 to 2, the time in s. ``seen``: the sensor measures the quantity of the error
+
+def list_levers(
+    measured: Measured, order: int, time: float, start: SensorStart, use: Use, *, direct: bool
+) -> Iterator[Lever]:
+    """Yield the levers of the causes that occur in a use, for an error along one axis.
+
+    ``order`` is m, 0 to 2, the time in s. ``direct``: the sensor measures the quantity of the error
     or its rate, so that its scale factor matters. A lever is in s^(m+1) times the unit of the use.
     """
     constant = of_constant(order, time)
     calibrated = isinstance(start, Calibrated)
     if isinstance(start, Uncalibrated) and start.bias is None:
-        yield "turn_on_bias", constant
-        yield "repeatability", constant
+        yield "turn_on_bias", constant, None
     if change := use.temperature_change:
         rise = of_rise(order, time, use.over) if calibrated else constant
         square = of_squared_rise(order, time, use.over) if calibrated else constant
-        yield "temperature", change * rise
-        yield "temperature_squared", change**2 * square
+        yield "temperature", change * rise, None
+        yield "temperature_squared", change**2 * square, None
+    evenly = of_pulse(order, time, use.over) / use.over
     moved = use.turns if measured == "gyro" else use.speed_change
-    if seen and moved:
-        lever = moved / use.over * of_pulse(order, time, use.over)
-        yield "scale_factor", lever
-        yield "nonlinearity", lever
+    if direct and moved:
+        yield from _list_scale_factors(moved * evenly, use)
+        if measured == "accel":
+            yield "misalignment", moved * evenly, None
+    if measured == "gyro":
+        if use.speed_change:
+            yield "g_sensitivity", use.speed_change * evenly, None
+        if use.vibration:
+            angle = use.vibration / (2.0 * math.pi * use.vibration_frequency)
+            yield "g_sensitivity", angle * (of_constant(order - 1, time) if order else 1.0), None
     if use.vibration:
-        if measured == "gyro":
-            yield "g_sensitivity", use.vibration * constant
-        yield "vibration_rectification", use.vibration**2 * constant
+        yield "vibration_rectification", use.vibration**2 * constant, None
 
 
-def needed(measured: Measured, cause: Cause, figures: Figures) -> bool:
-    """Return whether an error in use is not known because a figure is missing."""
-
-    def has_figure(candidate: Cause) -> bool:
-        return candidate in figures and figures[candidate].sigma is not None
-
-    asked = cause in _REQUIRED_CAUSES or (measured, cause) == ("accel", "vibration_rectification")
-    otherwise = _SUBSTITUTE_CAUSES.get((measured, cause))
-    return asked and not has_figure(cause) and not (otherwise and has_figure(otherwise))
+def _list_scale_factors(
+    lever: float | complex, use: Use, path: SourcePath | None = None
+) -> Iterator[Lever]:
+    yield "scale_factor", lever, path
+    yield "nonlinearity", lever, path
+    if use.temperature_change:
+        yield "scale_factor_temperature", use.temperature_change * lever, path
 
 
-DATASHEET_KEY_OF_CAUSE: Mapping[Cause, str] = {
-    "turn_on_bias": "offset",
-    "repeatability": "bias_repeatability",
-    "temperature": "temperature_coefficient",
-    "scale_factor": "scale_factor_error",
-    "nonlinearity": "nonlinearity",
-    "g_sensitivity": "g_sensitivity",
-    "vibration_rectification": "vibration_rectification",
-}
-"""Datasheet key of the figure for each cause."""
+def list_turn_levers(measured: Measured, quantity: str, time: float, use: Use) -> Iterator[Lever]:
+    """Yield the levers of a turn at speed, for attitude, heading, velocity and position."""
+    turn = use.turn
+    if turn is None:
+        return
+    speed = use.speed
+    if quantity in ("velocity", "position"):
+        order = 0 if quantity == "velocity" else 1
+        if measured == "accel":
+            lateral = turn.accelerometer(order, time)
+            yield from _list_scale_factors(lateral, use, "turn")
+            yield "misalignment", lateral, "turn"
+            return
+        about, tilting = turn.scale_factor(order, time), turn.misalignment(order, time)
+        yield from _list_scale_factors(about, use, "turn")
+        yield "misalignment", tilting, "turn"
+        # The centripetal acceleration is the speed times the rate.
+        yield "g_sensitivity", speed * about, "turn"
+        yield "g_sensitivity", speed * tilting, "turn"
+    elif measured == "gyro":
+        turned = use.turns * min(time / use.over, 1.0)
+        if quantity == "attitude":
+            # The largest tilt so far: it is least again after a full circle.
+            tilt = 2.0 * math.sin(min(turned, math.pi) / 2.0)
+            yield "misalignment", tilt, "turn"
+            yield "g_sensitivity", speed * tilt, "turn"
+        elif quantity == "heading":
+            yield "g_sensitivity", speed * turned, "turn"
+        else:
+            across = turn.cross_track(time)
+            yield from _list_scale_factors(abs(across), use, "turn")
+            yield "g_sensitivity", speed * abs(across), "turn"
 
-_CONVENTIONS: Mapping[str, str] = {
-    "1sigma": texts.PRINTED_SIGMA,
-    "typ": texts.TYPICAL_AS_SIGMA,
-    "derived": texts.TYPICAL_AS_SIGMA,
-    "range": texts.RANGE_AS_UNIFORM,
-    "max": texts.MAXIMUM_AS_SIGMAS,
-}
-"""How a figure was converted to a standard deviation, by its kind."""
 
 SIGMAS = 1.96  # half the width of a 95 % interval
 
@@ -190,32 +216,36 @@ _CAUSE_OF_COEFFICIENT: Mapping[str, Cause] = {
 }
 
 
-def read_datasheet_figures(datasheet: Datasheet, channel: str) -> dict[Cause, Figure]:
-    """Return the datasheet figures of the errors in use of a channel, SI."""
-    axis = PrintedAxis.of(datasheet, channel)
-    names = FIGURE_DIMENSIONS[axis.quantity]
+def read_figures(sensor: Sensor | None, quantity: str) -> dict[Cause, Figure]:
+    """Return the figures of the errors in use of a quantity: printed, or limits of the class."""
     figures: dict[Cause, Figure] = {}
-    for cause, name in DATASHEET_KEY_OF_CAUSE.items():
-        if name not in names:
+    for cause in STATEMENTS:
+        if (quantity, cause) == ("accel", "g_sensitivity"):
             continue
-        like = Comparable(name, name, None)
-        rows = axis.read(name, like, axis.si(name))
-        by_kind: dict[str, list[float]] = {}
-        for row in rows:
-            if row.figure and row.value is not None:
-                by_kind.setdefault(row.figure.kind, []).append(row.value)
-        kind = next((kind for kind in SIGMAS_OF_KIND if kind in by_kind), None)
-        if kind is None:
-            obstacle = next((row.obstacle for row in rows if row.obstacle), None)
-            figures[cause] = Figure(reason=obstacle or axis.unpublished(like, name).reason)
+        printed = read_sigma(sensor, quantity, cause) if sensor else None
+        if printed is not None:
+            figures[cause] = Figure(sigma=printed, origin="datasheet")
         else:
+            limit = find_limit(sensor.grade if sensor else None, quantity, cause)
             figures[cause] = Figure(
-                sigma=max(by_kind[kind]) / SIGMAS_OF_KIND[kind],
-                origin="datasheet",
-                kind=kind,
-                convention=_CONVENTIONS[kind],
+                sigma=limit.worst, likely=limit.median, best=limit.best, origin="class limit"
             )
     return figures
+
+
+def state_figures(sensor: Sensor | None) -> dict[str, dict[str, dict[str, object]]]:
+    """Return the figures of both quantities as plain values, for the settings of a step."""
+    return {
+        quantity: {
+            cause: asdict(figure) for cause, figure in read_figures(sensor, quantity).items()
+        }
+        for quantity in QUANTITIES
+    }
+
+
+def read_stated_figures(stated: object) -> dict[str, Figures]:
+    """Return figures from the plain values of `state_figures`."""
+    return TypeAdapter(dict[str, dict[Cause, Figure]]).validate_python(stated)  # type: ignore[return-value]  # a dict is a mapping
 
 
 def read_log_figures(rows: Iterable[TemperatureRow]) -> dict[Cause, Figure]:
@@ -227,19 +257,20 @@ def read_log_figures(rows: Iterable[TemperatureRow]) -> dict[Cause, Figure]:
         spread = 0.0
         if row.lower is not None and row.upper is not None:
             spread = (row.upper - row.lower) / (2.0 * SIGMAS)
-        figures[_CAUSE_OF_COEFFICIENT[row.parameter]] = Figure(
-            sigma=abs(row.value), origin="measured", convention=texts.OF_THIS_UNIT, spread=spread
-        )
+        figures[_CAUSE_OF_COEFFICIENT[row.parameter]] = Figure(sigma=abs(row.value), spread=spread)
     return figures
 
 
 def collect_figures_in_use(
-    datasheet: Datasheet, channels: Iterable[str], temperature: Iterable[TemperatureRow]
-) -> dict[str, dict[Cause, Figure]]:
-    """Return the figures of the errors in use by channel, from datasheet and log."""
+    sensor: Mapping[str, Figures], channels: Iterable[str], temperature: Iterable[TemperatureRow]
+) -> dict[str, Figures]:
+    """Return the figures of the errors in use by channel, and of the sensor by quantity.
+
+    The temperature effect that a log determines replaces the figure of the sensor.
+    """
     rows = list(temperature)
-    return {
-        channel: read_datasheet_figures(datasheet, channel)
+    return dict(sensor) | {
+        channel: dict(sensor[quantity_of(channel)])
         | read_log_figures(row for row in rows if row.channel == channel)
         for channel in channels
     }

@@ -1,28 +1,22 @@
-"""Parts of an error budget: contributions of the sources, and missing figures.
-
-`Largest` gives the largest value of a figure that is not known, or that a calibration can reduce.
-"""
+"""Parts of an error budget: the contributions of its sources."""
 
 import math
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
+from functools import cache
+from statistics import NormalDist
 from typing import Literal
 
-from imubench_pipeline.model.comparisons import ErrorBudgetRow
-from imubench_pipeline.model.states import Cause, Measured, SourcePath
-from imubench_pipeline.model.verdicts import ErrorSource
-from imubench_pipeline.navigation.error_budget.in_use import (
-    DATASHEET_KEY_OF_CAUSE,
-    Figure,
-    Figures,
-    needed,
-)
-from imubench_pipeline.noise.terms.base import Term
-from imubench_pipeline.settings.printed import FIGURE_DIMENSIONS
-from imubench_pipeline.units import SI_UNITS
-from imubench_pipeline.words.reasons import budgets as texts
+import numpy as np
+from scipy.optimize import brentq
 
-Quantity = Literal["attitude", "heading", "velocity", "position"]
+from imubench_pipeline.model.states import Measured, SourcePath
+from imubench_pipeline.model.verdicts import ErrorSource
+from imubench_pipeline.navigation.error_budget.in_use import Figure
+from imubench_pipeline.noise.terms.base import Term
+from imubench_pipeline.typing import Array
+
+Quantity = Literal["attitude", "heading", "velocity", "position", "cross_track"]
 
 
 def describe_term(measured: Measured, term: Term, through: SourcePath | None = None) -> ErrorSource:
@@ -38,15 +32,8 @@ class Contribution:
     source: ErrorSource
     sigma: float  # 1 sigma, rad, m/s or m
     figure: Figure | None = None  # the figure that it follows from, if it is not noise
-
-
-@dataclass(frozen=True)
-class Missing:
-    """A source whose figure is not known."""
-
-    source: ErrorSource
-    lever: float  # error from a figure of 1 SI unit
-    reason: str  # why it is not known
+    # error in the horizontal plane, north real; None: along one axis, and alike along the other
+    vector: complex | None = None
 
 
 @dataclass(frozen=True)
@@ -54,93 +41,62 @@ class Budget:
     """An error and its contributions, which are independent of each other."""
 
     time: float  # s
-    quantity: Quantity  # attitude (a tilt) and heading in rad, velocity in m/s, position in m
+    # attitude (a tilt) and heading in rad, velocity in m/s, position and cross-track error in m
+    quantity: Quantity
     contributions: Sequence[Contribution]
-    assumptions: Sequence[str] = ()  # for figures that are not known
-    missing: Sequence[Missing] = ()  # sources that are left out because no figure is known
 
     @property
     def total(self) -> float:
         """1 sigma: the root of the sum of the squares of the contributions."""
         return math.hypot(*(contribution.sigma for contribution in self.contributions))
 
+    def to_radius(self, confidence: float) -> "Budget":
+        """Return the budget of the error in the plane, of velocity or position.
 
-def compute_figure_contribution(
-    measured: Measured,
-    cause: Cause,
-    lever: float,
-    figures: Figures,
-    through: SourcePath | None = None,
-) -> Contribution | Missing | None:
-    """Return the contribution of a figure, or that it is missing; None if it is not required.
-
-    ``lever`` is the error from a figure of 1 SI unit.
-    """
-    figure = figures.get(cause, Figure(reason=texts.NOT_STATED))
-    source = ErrorSource(cause, measured, through)
-    if figure.sigma is not None:
-        return Contribution(source, lever * figure.sigma, figure)
-    if needed(measured, cause, figures):
-        return Missing(source, lever, figure.reason or texts.NOT_KNOWN)
-    return None
-
-
-@dataclass(frozen=True)
-class Largest:
-    """Remaining error budget under a limit, for unknown figures and biases above the limit.
-
-    A printed turn-on bias is used as printed, unless it exceeds the limit: a calibration may then
-    reduce it to its share of the remaining budget (``room``), which all share equally.
-    """
-
-    room: float  # largest error of each of them, 1 sigma; 0 if there is none
-    biases: tuple[Contribution, ...] = ()  # printed biases, if the total exceeds the limit
-
-    @classmethod
-    def of(cls, budget: Budget, limit: float | None, upper: float) -> "Largest":
-        """Return the remaining budget under a limit, SI; ``upper``: upper limit of the total."""
-        if limit is None:
-            return cls(0.0)
-        biases = tuple(
-            contribution
-            for contribution in budget.contributions
-            if contribution.source.source == "turn_on_bias"
-            and contribution.figure
-            and contribution.figure.origin == "datasheet"
-        )
-        total = budget.total
-        if total > limit:
-            removed = math.fsum(bias.sigma**2 for bias in biases)
-            total, upper = (math.sqrt(max(size**2 - removed, 0.0)) for size in (total, upper))
-        else:
-            biases = ()
-        room = limit**2 - (upper if upper < limit else total) ** 2
-        parts = len(biases) + len(budget.missing)
-        return cls(math.sqrt(max(room, 0.0) / parts) if parts else 0.0, biases)
-
-    def of_bias(self, of: ErrorBudgetRow, contribution: Contribution) -> ErrorBudgetRow:
-        """Return the row of a source; a printed bias above the limit has its largest value."""
-        figure = contribution.figure
-        row = replace(
-            of,
-            **asdict(contribution.source),
-            sigma=contribution.sigma,
-            origin=figure.origin if figure else "measured",
-            kind=figure.kind if figure else None,
-            convention=figure.convention if figure else None,
-        )
-        if not self.room or contribution not in self.biases or figure is None or not figure.sigma:
-            return row
-        return self._add_largest(row, contribution.sigma / figure.sigma)
-
-    def of_missing(self, of: ErrorBudgetRow, missing: Missing) -> ErrorBudgetRow:
-        """Return the row of a source with a missing figure; ``of`` is the row of the error."""
-        row = replace(of, **asdict(missing.source), origin="not known", reasons=(missing.reason,))
-        return self._add_largest(row, missing.lever)
-
-    def _add_largest(self, row: ErrorBudgetRow, lever: float) -> ErrorBudgetRow:
-        name = DATASHEET_KEY_OF_CAUSE[row.source]  # type: ignore[index]  # a figure of a quantity
-        dimension = FIGURE_DIMENSIONS[row.quantity or ""][name][0]
+        A contribution along one axis acts along the other too. The total is the radius within which
+        the error is with the probability ``confidence``, over the number of standard deviations of
+        an error along one axis with that probability.
+        """
+        along = math.fsum(part.sigma**2 for part in self.contributions if part.vector is None)
+        vectors = [part.vector for part in self.contributions if part.vector is not None]
+        # The variances along the main axes are the mean plus and minus this.
+        mean = along + math.fsum(abs(vector) ** 2 for vector in vectors) / 2.0
+        apart = abs(sum(vector**2 for vector in vectors)) / 2.0
+        ratio = math.sqrt(max(mean - apart, 0.0) / (mean + apart)) if mean else 0.0
+        factor = float(np.interp(ratio, *_tabulate_radii(confidence)))
         return replace(
-            row, largest=self.room / lever if self.room else None, largest_unit=SI_UNITS[dimension]
+            self,
+            contributions=[
+                replace(
+                    part,
+                    sigma=factor * part.sigma * (math.sqrt(2.0) if part.vector is None else 1.0),
+                )
+                for part in self.contributions
+            ],
         )
+
+
+_RADIUS_STEPS = 33
+_ANGLES = 4096
+
+
+@cache
+def _tabulate_radii(confidence: float) -> tuple[Array, Array]:
+    """Return ratios of the standard deviations along two axes, and factors for the radius.
+
+    A factor is the radius over z times the root of the sum of both variances, with the normal
+    quantile z. The probability within a radius R is the mean over the angle of
+    (1 - exp(-R^2 g / 2)) / (g s1 s2), with g = cos^2 / s1^2 + sin^2 / s2^2.
+    """
+    ratios = np.linspace(0.0, 1.0, _RADIUS_STEPS)
+    z = NormalDist().inv_cdf((1.0 + confidence) / 2.0)
+    angle = (np.arange(_ANGLES) + 0.5) * math.pi / _ANGLES
+    factors = [1.0]
+    for ratio in ratios[1:]:
+        g = np.cos(angle) ** 2 + np.sin(angle) ** 2 / ratio**2
+
+        def excess(radius: float, g: Array = g, ratio: float = ratio) -> float:
+            return float(np.mean(-np.expm1(-(radius**2) * g / 2.0) / (g * ratio))) - confidence
+
+        factors.append(brentq(excess, 1e-3, 20.0) / (z * math.hypot(1.0, ratio)))
+    return ratios, np.array(factors)

@@ -185,6 +185,7 @@ _WORST_FIRST: tuple[Verdict, ...] = (
     "fails",
     "likely_fails",
     "not_enough_data",
+    "meets_if",
     "likely_meets",
     "meets",
 )
@@ -222,11 +223,10 @@ class Judgement:
 
     @property
     def _verdict_on_errors(self) -> Verdict:
-        """Verdict on the known errors: by the deciding limit, or by all after calibration."""
-        once = [standing.calibrated_verdict for standing in self.standings]
-        if self.decides.known and once != [standing.verdict for standing in self.standings]:
-            return min(once, key=_WORST_FIRST.index)
-        return self.decides.verdict
+        """Verdict on the errors: the worst one if all limits are known."""
+        if not self.decides.known:
+            return self.decides.verdict
+        return min((each.verdict for each in self.standings), key=_WORST_FIRST.index)
 
     @property
     def compared(self) -> bool:

@@ -41,7 +41,7 @@ class Standing:
     source: ErrorBudgetRow | None = None  # the largest contribution
     share: float | None = None  # its part of the variance
     parts: tuple[Share, ...] = ()  # all relevant sources
-    # rows of sources with an unknown figure, or with one above the limit before calibration
+    # rows of sources whose class limit is too large for the limit
     conditions: tuple[ErrorBudgetRow, ...] = ()
 
     @property
@@ -59,6 +59,26 @@ class Standing:
         """95 % limits of the margin."""
         limit = self.total.limit
         return _divide(limit, self.expected.upper), _divide(limit, self.expected.lower)
+
+    @property
+    def noise_margin(self) -> float | None:
+        """Margin of the noise alone, of the representative recording."""
+        return self._scale_margin(self.total.noise)
+
+    @property
+    def likely_margin(self) -> float | None:
+        """Margin with the median of the class for figures that are not known."""
+        return self._scale_margin(self.total.likely)
+
+    @property
+    def best_margin(self) -> float | None:
+        """Margin with the best figures of the class for figures that are not known."""
+        return self._scale_margin(self.total.best)
+
+    def _scale_margin(self, sigma: float | None) -> float | None:
+        if not self.known or sigma is None or not self.total.sigma:
+            return None
+        return self.margin * self.total.sigma / sigma if sigma > 0.0 else math.inf
 
     @property
     def chance(self) -> float:
@@ -79,6 +99,9 @@ class Standing:
             return "not_enough_data"
         if self.chance >= SURE_PROBABILITY:
             return "meets"
+        best = self.best_margin
+        if self.conditions and self.chance < 0.5 and best is not None and best >= 1.0:
+            return "meets_if"
         if self.chance <= 1.0 - SURE_PROBABILITY:
             return "fails"
         # The interval of the representative log may be too wide for a verdict.
@@ -86,19 +109,6 @@ class Standing:
         if lower is None or upper is None or lower <= 0.0 or upper / lower > MAX_LIMIT_RATIO:
             return "not_enough_data"
         return "likely_meets" if self.chance >= 0.5 else "likely_fails"
-
-    @property
-    def calibrated_verdict(self) -> Verdict:
-        """Verdict after calibration of the biases that exceed the limit."""
-        squares = [size**2 for _, size in suitability.select_known_errors(self.conditions)]
-        limit = self.total.limit
-        if squares and limit is not None and self.verdict not in suitability.PASSING_VERDICTS:
-            # The square of a bias is a term of every draw of the total.
-            sizes = self.expected.upper, self.expected.sigma
-            for size, better in zip(sizes, suitability.PASSING_VERDICTS, strict=True):
-                if size is not None and size**2 - math.fsum(squares) < limit**2:
-                    return better
-        return self.verdict
 
 
 def list_standings(
@@ -143,9 +153,7 @@ def list_standings(
         ]
         answer, sigma = figures[distances.index(min(distances))]
         own = [row for row in parts if row.source != "total" and row.recording == answer.recording]
-        # Figures of sources on which meeting the limit depends
-        asked = [row for row in own if row.largest_unit is not None]
-        conditions = tuple(row for row in asked if row.source in suitability.FIGURES)
+        conditions = tuple(row for row in own if row.largest)
         standing = Standing(answer, with_figure, prediction, conditions=conditions)
         sources = suitability.select_known_errors(own)
         if sources and sigma > 0.0:
