@@ -1,7 +1,5 @@
 """The page that judges sensors by their data sheets alone."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 
 from imubench_pipeline.model.comparisons import ShortlistRow
