@@ -64,8 +64,6 @@ References
 .. [3] W. J. Riley, "Handbook of Frequency Stability Analysis", NIST Special Publication 1065, 2008.
 """
 
-from __future__ import annotations
-
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:

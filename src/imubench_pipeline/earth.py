@@ -1,7 +1,5 @@
 """Effect of the Earth on a sensor at rest: rate of rotation, and gravity."""
 
-from __future__ import annotations
-
 EARTH_RATE = 7.292115e-5
 """w_ie, rad/s (WGS 84)."""
 

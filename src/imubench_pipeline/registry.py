@@ -6,8 +6,6 @@ asks for it through a `Hook`, which states its type. So each process of a run im
 needs.
 """
 
-from __future__ import annotations
-
 import pkgutil
 from collections.abc import Mapping
 from dataclasses import dataclass, field

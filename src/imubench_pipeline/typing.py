@@ -1,7 +1,5 @@
 """Types that are shared by all packages."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, TypeAlias
 

@@ -4,8 +4,6 @@ The registry is our own: angles have a dimension, so that °/s and Hz cannot be 
 standard gravity, or gram if only a mass is expected; ``LSB`` is a count.
 """
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Iterator
@@ -110,7 +108,7 @@ def add_key_to_errors(key: str) -> Iterator[None]:
 
 
 @lru_cache(maxsize=1)
-def _registry() -> pint.UnitRegistry[float]:
+def _registry() -> "pint.UnitRegistry[float]":
     import pint
 
     registry: pint.UnitRegistry[float] = pint.UnitRegistry(None)
@@ -174,7 +172,7 @@ def _expected(dimension: str) -> str:
     return f"expected a unit of {_said(dimension)} such as {_DIMENSIONS[dimension][1]}"
 
 
-def _parsed(unit: str) -> tuple[float, pint.Unit]:
+def _parsed(unit: str) -> "tuple[float, pint.Unit]":
     """Return the power of two in a unit as a factor, and the unit of the registry.
 
     Raises a `UnitError` without the expected unit.
@@ -292,7 +290,7 @@ def _number(tokens: list[str], place: int) -> tuple[float, int]:
 
 
 @lru_cache(maxsize=1)
-def _targets() -> dict[str, pint.Unit]:
+def _targets() -> "dict[str, pint.Unit]":
     return {name: _registry().parse_units(_normalise(unit)) for name, unit in SI_UNITS.items()}
 
 

@@ -6,8 +6,6 @@ w_i it is chi-squared. Otherwise the chi-squared variate with the same variance,
 1 / sum w_i^2 degrees of freedom, has too long a lower tail, which determines the upper limit.
 """
 
-from __future__ import annotations
-
 import math
 from functools import lru_cache
 from typing import Any

@@ -5,8 +5,6 @@ Clusters of n samples that start n/48 apart, or closer, cost no measurable effic
 that fits the cache. Longer clusters use the phase of the whole log at that stride. It takes O(L).
 """
 
-from __future__ import annotations
-
 from queue import SimpleQueue
 from typing import Any
 

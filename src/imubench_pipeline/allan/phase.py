@@ -3,8 +3,6 @@
 The missing samples of a log are recorded at two resolutions, in bounded memory (`Presence`).
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import partial

@@ -1,7 +1,5 @@
 """Distribute work on numbered pieces to threads; the result is independent of their number."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor

@@ -8,8 +8,6 @@ overlapping Allan variance at n samples a cluster is
 (IEEE Std 952; L - 2n + 1 terms, as in allantools' ``oadev``.)
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import groupby
@@ -102,7 +100,7 @@ class AllanCurve:
         """Sampling rate, Hz."""
         return float(self.cluster_size[0] / self.tau[0])
 
-    def select(self, points: NDArray[np.bool_]) -> AllanCurve:
+    def select(self, points: NDArray[np.bool_]) -> "AllanCurve":
         """Return the curve at some of its points."""
         arrays = {name: each for name, each in vars(self).items() if isinstance(each, np.ndarray)}
         columns: dict[str, Any] = {name: each[points] for name, each in arrays.items()}

@@ -4,8 +4,6 @@ Reading the Allan deviation, or fitting the papers' model, ignores filters and o
 are doubtful where the recommended method, which compares several models, excludes them.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 

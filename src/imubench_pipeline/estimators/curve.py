@@ -3,8 +3,6 @@
 A parameter whose slope is not visible has no value, but a reason.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

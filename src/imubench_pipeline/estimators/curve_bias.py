@@ -8,8 +8,6 @@
 Both are evaluated up to a ninth of the log; at longer tau the curve is too uncertain.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace

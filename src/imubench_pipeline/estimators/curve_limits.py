@@ -5,8 +5,6 @@ happens to show little random walk has too low a curve at its end: the upper lim
 a walk one standard error above the fitted one. (Without this, the coverage was 90 to 93 %.)
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

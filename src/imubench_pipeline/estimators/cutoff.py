@@ -7,8 +7,6 @@ filter, a longer one is a process. An analogue cut-off may exceed Nyquist: alias
 of the bend, but a long log can determine it.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -133,7 +131,7 @@ def find_cutoff(
     return Cutoff(_withhold(found.frequency, texts.filter_or_quantization(lower, upper)))
 
 
-def _describe_filter(spectrum: Spectrum, fits: _Fits, tried: Sequence[_Trial]) -> Cutoff:
+def _describe_filter(spectrum: Spectrum, fits: "_Fits", tried: "Sequence[_Trial]") -> Cutoff:
     """Return the best filter, with limits over all filters that the log does not exclude."""
     best, rate = tried[0], spectrum.rate
     # Trials with a floor count only if the best has one: with a floor no high cut-off is known.

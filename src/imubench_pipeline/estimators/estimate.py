@@ -1,7 +1,5 @@
 """Result of every estimator: parameters with their status, and their noise model."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Literal
@@ -106,7 +104,7 @@ class Parameter:
         """The value in the model of the log."""
         return self.value if self.fitted is None else self.fitted
 
-    def checked(self) -> Parameter:
+    def checked(self) -> "Parameter":
         """Return the parameter, ``not_identified`` where its interval is too wide to be ``ok``."""
         if self.status != "ok" or self.lower is None or self.upper is None:
             return self

@@ -4,8 +4,6 @@ Where the sensor has a low-pass filter (`imubench_pipeline.estimators.cutoff`), 
 only up to the frequency at which the filter changes the estimate of S_N by half its standard error.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -83,7 +81,7 @@ class FitSelection:
         """Return whether quantization noise is visible: no filter, and a sufficient band."""
         return self._gain is None and self.band.highest >= _MIN_QUANTIZATION_BAND * rate
 
-    def _limit(self, spectrum: Spectrum, highest: float, source: BandSource) -> FitSelection:
+    def _limit(self, spectrum: Spectrum, highest: float, source: BandSource) -> "FitSelection":
         """Return the selection up to a frequency, Hz."""
         used = self.used & (spectrum.upper <= highest * (1.0 + 1e-9))
         return replace(self, used=used, band=Band(highest, source))

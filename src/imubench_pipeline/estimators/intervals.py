@@ -4,8 +4,6 @@ The Cramér-Rao bounds are from the information of the Whittle likelihood, I_ij 
 d_i log S_k d_j log S_k, nu_k ordinates in bin k of density S_k (P. Whittle, Ark. Mat. 2, 1953).
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import replace

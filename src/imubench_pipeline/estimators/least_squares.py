@@ -4,8 +4,6 @@ For a given T_B the model is linear in S_N, S_B and S_K, which are found by non-
 squares; the search is over T_B alone (variable projection).
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace

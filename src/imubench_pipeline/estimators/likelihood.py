@@ -3,8 +3,6 @@
 Their errors reach the Cramér-Rao bound within a few per cent, and have intervals.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace

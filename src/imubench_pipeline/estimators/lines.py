@@ -7,8 +7,6 @@ one: A^2 = sum A_i^2 and f^2 = A^2 / sum (A_i / f_i)^2 preserve the variance of 
 its integral.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace

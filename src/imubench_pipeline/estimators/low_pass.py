@@ -11,8 +11,6 @@ White noise of density N behind a filter has the density N^2 G(f) in the samples
 f_c is where the power is halved; for the boxcar 0.443 / d, before the sampling.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from typing import Literal

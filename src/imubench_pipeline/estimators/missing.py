@@ -6,8 +6,6 @@ J. Durbin and S. J. Koopman, Biometrika 89, 2002). Fit and filling alternate (da
 Tanner and W. Wong, J. Am. Stat. Assoc. 82, 1987).
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass

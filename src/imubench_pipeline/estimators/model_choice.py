@@ -1,7 +1,5 @@
 """Comparison of the candidate noise models by BIC, and by AIC, over the bins of a spectrum."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, replace
 

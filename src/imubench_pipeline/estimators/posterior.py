@@ -4,8 +4,6 @@ The prior is uniform in the amplitudes Q, N, B and K, in R, and in log T_B up to
 The draws are by adaptive importance sampling.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -72,7 +70,7 @@ class Mixture:
         """Inverses of the roots of the scales."""
         return np.linalg.inv(np.linalg.cholesky(self.scales))
 
-    def fitted(self, points: Array) -> Mixture:
+    def fitted(self, points: Array) -> "Mixture":
         """Return the mixture after one expectation-maximisation step on points."""
         parts, freedom = self.densities(points), _get_degrees(points.shape[1])
         weights, means = np.empty_like(self.weights), np.empty_like(self.means)

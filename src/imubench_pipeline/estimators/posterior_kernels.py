@@ -5,8 +5,6 @@ the amplitudes and in R, over which it is integrated, and flat in log T_B within
 shapes.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

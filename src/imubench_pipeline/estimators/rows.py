@@ -1,7 +1,5 @@
 """Curves and estimates as rows of the tables, and estimates back from them."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator
 from dataclasses import asdict, dataclass, fields, replace
 from functools import partial

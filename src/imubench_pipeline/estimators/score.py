@@ -5,8 +5,6 @@ ranks no method. The scores use the curve of the model, and the distribution ove
 tau is weighted by the precision of the measured curve.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Findings on the spectrum of a channel: lines, a low-pass filter, missing slow noise."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import replace

@@ -6,8 +6,6 @@ transform. Low frequencies come from the means of blocks of samples over the who
 from segments of it. Lines are detected in a Hann-windowed Fourier spectrum of segments.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
@@ -49,7 +47,7 @@ class Spectrum:
     duration: float  # of the parts of the log that were used, s
     mean: float  # of the samples, rad/s or m/s²
 
-    def select(self, chosen: NDArray[np.bool_]) -> Spectrum:
+    def select(self, chosen: NDArray[np.bool_]) -> "Spectrum":
         """Return the spectrum of chosen bins."""
         arrays = {name: each for name, each in vars(self).items() if isinstance(each, np.ndarray)}
         columns: dict[str, Any] = {name: each[chosen] for name, each in arrays.items()}

@@ -5,8 +5,6 @@ tau far below T_B, and N^2 = N_0^2 + S_B T_B^2 far above it. Where the first lev
 such a process is part of N, and is removed from the model, so that it is not counted twice.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

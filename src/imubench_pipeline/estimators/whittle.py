@@ -6,8 +6,6 @@ I in bin i. For given correlation times S is linear in the squared parameters, w
 I to I - 2 R cross + R^2 ramp, and is profiled out.
 """
 
-from __future__ import annotations
-
 import copy
 import math
 from dataclasses import dataclass
@@ -218,7 +216,7 @@ class Whittle:
         """Logarithms of the shapes of Gauss-Markov processes at `times`, shape (t, b)."""
         return np.log(np.array([self.shape_of.gauss_markov(time) for time in self.times]))
 
-    def of(self, spectrum: Spectrum) -> Whittle:
+    def of(self, spectrum: Spectrum) -> "Whittle":
         """Return the likelihood of other data in the same bins."""
         _ = self.table  # made once for all
         other = copy.copy(self)
@@ -226,7 +224,7 @@ class Whittle:
         other.scale = float(np.median(spectrum.density))
         return other
 
-    def select(self, spectrum: Spectrum, chosen: NDArray[np.bool_]) -> Whittle:
+    def select(self, spectrum: Spectrum, chosen: NDArray[np.bool_]) -> "Whittle":
         """Return the likelihood of other data in chosen bins."""
         other = self.of(spectrum.select(chosen))
         other.columns = {letter: self.column(letter)[chosen] for letter in "QNFK"}

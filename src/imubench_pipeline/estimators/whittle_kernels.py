@@ -4,8 +4,6 @@ The loops are over scalars: numba takes longer to compile NumPy functions (`max`
 `@`, assignments of slices) than the kernel.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

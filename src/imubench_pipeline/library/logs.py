@@ -1,7 +1,5 @@
 """Read logs like the workflow: put files and arrays on a time base, check and store them in SI."""
 
-from __future__ import annotations
-
 import json
 import shutil
 import tempfile
@@ -172,7 +170,7 @@ class Log(Shown):
             )
         return {name: self._logs[name] for name in names}
 
-    def to_pandas(self) -> pd.DataFrame:
+    def to_pandas(self) -> "pd.DataFrame":
         """Return a table of all channels, with units in the names of columns and in ``attrs``.
 
         The index is the time in s from the first sample; missing samples are NaN.

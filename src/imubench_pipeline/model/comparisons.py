@@ -1,7 +1,5 @@
 """Sensors compared: with their data sheets, over time, with each other and with requirements."""
 
-from __future__ import annotations
-
 from typing import Annotated
 
 from imubench_pipeline.model.states import (

@@ -1,7 +1,5 @@
 """Rows of the estimates of a recording: curves, spectra, parameters and models."""
 
-from __future__ import annotations
-
 from typing import Annotated
 
 from imubench_pipeline.model.states import BacktestVerdict, GoodnessVerdict

@@ -1,7 +1,5 @@
 """Rows about each recording: its state, findings, doubts and failed steps."""
 
-from __future__ import annotations
-
 from typing import Annotated
 
 from imubench_pipeline.model.states import (

@@ -3,8 +3,6 @@
 Tables keep the codes; `imubench_pipeline.words` has the words that people read.
 """
 
-from __future__ import annotations
-
 from typing import Literal
 
 Severity = Literal["note", "warning", "fatal"]

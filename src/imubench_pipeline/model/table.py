@@ -11,8 +11,6 @@ A ``Literal`` is a category (dictionary-encoded, other values are refused), a tu
 frozen dataclass a struct.
 """
 
-from __future__ import annotations
-
 import types
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields, is_dataclass

@@ -1,7 +1,5 @@
 """Components of verdicts on sensors, besides their codes (`imubench_pipeline.model.states`)."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from typing import Literal, get_args
 

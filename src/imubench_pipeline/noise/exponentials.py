@@ -1,7 +1,5 @@
 """Phi functions of exponentials for the closed forms of Gauss-Markov processes and lines."""
 
-from __future__ import annotations
-
 import cmath
 import math
 from functools import lru_cache

@@ -13,8 +13,6 @@ walk (1/f^2). Each term has it in closed form (`Term.growth`), with t the time, 
 the time since switch-on, from the densities of IEEE Std 952-2020.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

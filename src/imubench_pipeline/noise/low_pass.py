@@ -1,7 +1,5 @@
 """The low-pass filter of a sensor, in continuous time: first order, or Butterworth of order n."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from itertools import pairwise

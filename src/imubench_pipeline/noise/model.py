@@ -1,7 +1,5 @@
 """The noise model of one axis: the sum of its terms."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, fields

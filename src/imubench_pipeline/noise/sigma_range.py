@@ -5,8 +5,6 @@ from models that are drawn from the distribution of the parameters. The range ha
 coverage if this distribution is correct.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace

@@ -6,8 +6,6 @@ of samples, which are drawn jointly with the state (exact). At short tau, with a
 or more, they are drawn from their covariance.
 """
 
-from __future__ import annotations
-
 import hashlib
 import math
 from collections.abc import Iterator

@@ -5,8 +5,6 @@ sums, which are Gaussian with covariance r_k at lag k. Its variance is 2 / M^2 t
 r_k^2 over all pairs. Ramps and lines contribute by their products with the noise only.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass

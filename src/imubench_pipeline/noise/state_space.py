@@ -1,7 +1,5 @@
 """Discrete state space of a noise process, for simulations and filters."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -25,7 +23,9 @@ class StateSpace:
     initial_variance: Array  # (m, m): the stationary covariance, or 0 for a random walk
 
     @classmethod
-    def scalar(cls, transition: float, process_noise: float, initial_variance: float) -> StateSpace:
+    def scalar(
+        cls, transition: float, process_noise: float, initial_variance: float
+    ) -> "StateSpace":
         """Return a model of one state, which is the output."""
         return cls(
             np.array([[transition]]),
@@ -37,13 +37,13 @@ class StateSpace:
         )
 
     @classmethod
-    def without_states(cls, measurement_noise: float) -> StateSpace:
+    def without_states(cls, measurement_noise: float) -> "StateSpace":
         """Return a model of white noise only."""
         none = np.zeros((0, 0))
         return cls(none, none, np.zeros(0), measurement_noise, np.zeros(0), none)
 
     @classmethod
-    def together(cls, spaces: Sequence[StateSpace]) -> StateSpace:
+    def together(cls, spaces: "Sequence[StateSpace]") -> "StateSpace":
         """Return the model of the sum of independent models, with their states in order."""
         spaces = [*spaces, cls.without_states(0.0)]  # there may be none
         return cls(
@@ -55,7 +55,7 @@ class StateSpace:
             _build_block_diagonal([space.initial_variance for space in spaces]),
         )
 
-    def of_either_sign(self) -> StateSpace:
+    def of_either_sign(self) -> "StateSpace":
         """Return the model with the mean of the first state replaced by its square as variance."""
         squares = np.diag([mean**2 for mean in self.initial_mean.tolist()])
         mean, variance = np.zeros_like(self.initial_mean), self.initial_variance + squares

@@ -4,8 +4,6 @@ Estimates at different tau use the same samples, so that neighbours are correlat
 log their covariance follows from the spectrum of the samples.
 """
 
-from __future__ import annotations
-
 from functools import lru_cache
 from typing import Protocol
 

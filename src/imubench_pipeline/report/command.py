@@ -1,7 +1,5 @@
 """`imubench report`: write the report of a finished run again, elsewhere or in one file."""
 
-from __future__ import annotations
-
 import argparse
 import sys
 from functools import partial
@@ -66,7 +64,7 @@ def run(arguments: argparse.Namespace) -> int:
     return int(bool(site.failed))
 
 
-def _write(site: Site, arguments: argparse.Namespace) -> None:
+def _write(site: "Site", arguments: argparse.Namespace) -> None:
     """Write the pages of a site to the selected place."""
     from imubench_pipeline.report.publish import publish, remove_old_pages, render_one_file
     from imubench_pipeline.report.static_figures.files import draw_comparison

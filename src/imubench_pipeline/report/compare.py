@@ -3,8 +3,6 @@
 The script computes the ratios of the recordings that the reader chooses, like `navigation.ratios`.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import fields
 from math import isnan

@@ -1,7 +1,5 @@
 """Channels of many recordings for comparison on pages: curves, and tables of parameters."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from itertools import chain

@@ -1,7 +1,5 @@
 """Datasheets on the pages: measured against printed figures, and published figures by vendor."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from statistics import median

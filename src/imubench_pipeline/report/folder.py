@@ -1,7 +1,5 @@
 """The files in the folder of the report."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Mapping
 from pathlib import Path

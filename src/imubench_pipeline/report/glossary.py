@@ -1,7 +1,5 @@
 """The terms of the report, each with a short explanation and a section of the theory page."""
 
-from __future__ import annotations
-
 import difflib
 import re
 from collections.abc import Mapping

@@ -1,7 +1,5 @@
 """The screen of `imubench analyse`: state, noise of each axis, and the events that matter."""
 
-from __future__ import annotations
-
 import math
 import re
 from collections import defaultdict

@@ -1,7 +1,5 @@
 """Rankings and error budgets, formatted for pages and terminal."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -38,7 +36,7 @@ class SourcedNumber(str):
     source: str
     unit: str
 
-    def __new__(cls, text: str, source: str, unit: str = "") -> SourcedNumber:
+    def __new__(cls, text: str, source: str, unit: str = "") -> "SourcedNumber":
         """Return the text, with its source."""
         number = super().__new__(cls, text)
         number.source, number.unit = source, unit
@@ -56,7 +54,7 @@ class SourcedInterval(str):
     __slots__ = ("ends",)
     ends: tuple[SourcedNumber, SourcedNumber]
 
-    def __new__(cls, lower: SourcedNumber, upper: SourcedNumber) -> SourcedInterval:
+    def __new__(cls, lower: SourcedNumber, upper: SourcedNumber) -> "SourcedInterval":
         """Return ``lower to upper``."""
         interval = super().__new__(cls, f"{lower} to {upper}")
         interval.ends = (lower, upper)

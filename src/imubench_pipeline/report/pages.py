@@ -1,7 +1,5 @@
 """The pages of a report: single ones, and one for each recording, sensor and device."""
 
-from __future__ import annotations
-
 import platform
 import re
 from collections.abc import Iterator, Mapping, Sequence

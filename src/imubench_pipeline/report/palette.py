@@ -4,8 +4,6 @@ The colours are from Okabe and Ito, for colour-blind readers. Pale ones are dark
 pages and dark ones lightened on dark pages, for a contrast of 3 : 1 with the background.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 

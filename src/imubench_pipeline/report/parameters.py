@@ -1,7 +1,5 @@
 """Table of parameters: a cell has a value with its interval, or the reason for a missing value."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from itertools import chain
 

@@ -1,7 +1,5 @@
 """The data of the figures of a page: numbers in SI, as JSON."""
 
-from __future__ import annotations
-
 import base64
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass

@@ -4,8 +4,6 @@ A page can show each quantity in several units (`list_page_units`). The first ch
 practical one, the last is SI.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from functools import cache
 

@@ -1,7 +1,5 @@
 """Write the report: the changed pages of a folder, or one file."""
 
-from __future__ import annotations
-
 import base64
 import hashlib
 import json

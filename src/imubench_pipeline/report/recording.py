@@ -1,7 +1,5 @@
 """The page of one recording and its channels."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """The summary of a run in the terminal: drop zone, states of recordings, and the best sensors."""
 
-from __future__ import annotations
-
 import re
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence

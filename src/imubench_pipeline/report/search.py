@@ -1,7 +1,5 @@
 """The index of the search: all named entries, and their addresses."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable, Iterable, Iterator
 from urllib.parse import quote

@@ -1,7 +1,5 @@
 """The pages of a sensor and of a device: agreement and change of its recordings."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict
 from functools import partial

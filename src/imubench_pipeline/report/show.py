@@ -1,7 +1,5 @@
 """`imubench show`: the comparison of the sensors in the terminal."""
 
-from __future__ import annotations
-
 import argparse
 import io
 import sys
@@ -58,7 +56,7 @@ def run(arguments: argparse.Namespace) -> int:
 
     chosen = any((arguments.requirement, arguments.channel, arguments.method))
 
-    def shown(width: int) -> Iterator[RenderableType]:
+    def shown(width: int) -> "Iterator[RenderableType]":
         if arguments.all or chosen:
             yield from render_comparison(
                 tables,
@@ -80,7 +78,7 @@ def run(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def show(parts: Callable[[int], Iterable[RenderableType]], width: int | None = None) -> None:
+def show(parts: "Callable[[int], Iterable[RenderableType]]", width: int | None = None) -> None:
     """Print the result of a function of the width, by default the width of the terminal."""
     from rich.console import Console
     from rich.text import Text
@@ -102,7 +100,7 @@ def show(parts: Callable[[int], Iterable[RenderableType]], width: int | None = N
     sys.stdout.writelines(f"{line.rstrip()}\n" for line in captured.get().splitlines())
 
 
-def _load(results: Path) -> dict[str, pa.Table]:
+def _load(results: Path) -> "dict[str, pa.Table]":
     from imubench_pipeline.tables.files import TableError, find_tables, read
 
     try:
@@ -115,7 +113,7 @@ def _load(results: Path) -> dict[str, pa.Table]:
         raise CommandError(f"{error}\n`snakemake -c2` makes the tables again") from error
 
 
-def _check(table: pa.Table, column: str, asked: str | None) -> None:
+def _check(table: "pa.Table", column: str, asked: str | None) -> None:
     existing = table[column].unique().to_pylist()
     if asked is not None and asked not in existing:
         raise CommandError(f"no {column} {asked!r}; there are: {', '.join(existing) or 'none'}")

@@ -1,7 +1,5 @@
 """The overview pages: start page with the decision matrix, all recordings, all datasheets."""
 
-from __future__ import annotations
-
 import math
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -50,7 +48,7 @@ class Scale:
     high: float
 
     @classmethod
-    def of(cls, margins: Iterable[float]) -> Scale:
+    def of(cls, margins: Iterable[float]) -> "Scale":
         """Return a scale that shows all margins, at least from 0.5 to 2."""
         logs = [math.log10(value) for value in margins if 0.0 < value < math.inf]
         low, high = min([*logs, math.log10(0.5)]), max([*logs, math.log10(2.0)])

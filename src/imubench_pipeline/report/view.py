@@ -1,7 +1,5 @@
 """The data of each recording and channel, gathered from the tables for the pages."""
 
-from __future__ import annotations
-
 import hashlib
 import math
 from collections.abc import Callable, Mapping

@@ -1,7 +1,5 @@
 """`imubench simulate`: simulate a log of a sensor, for example to test a filter."""
 
-from __future__ import annotations
-
 import argparse
 import math
 import os
@@ -207,7 +205,7 @@ def _declared(name: str, stated: Path | None) -> Any:
     return read_settings(Sensor, files[name])
 
 
-def _origin(options: argparse.Namespace) -> tuple[Origin, Any]:
+def _origin(options: argparse.Namespace) -> "tuple[Origin, Any]":
     """Return the model, and the sensor file if there is one."""
     from imubench_pipeline.settings.sensor import CHANNELS
     from imubench_pipeline.simulate import models
@@ -277,8 +275,8 @@ def _duration(text: str | None, hours: float | None, rate: float) -> float:
 
 
 def _profiles(
-    options: argparse.Namespace, origin: Origin
-) -> tuple[dict[str, Profile], Profile | None]:
+    options: argparse.Namespace, origin: "Origin"
+) -> "tuple[dict[str, Profile], Profile | None]":
     from imubench_pipeline.settings.profile_forms import Surroundings
     from imubench_pipeline.simulate.profiles import FileSeries, profiles_of
 
@@ -325,7 +323,7 @@ def _section(path: Path, key: str) -> Any:
 
 
 def _list_short_files(
-    duration: float, motion: Mapping[str, Profile], temperature: Profile | None
+    duration: float, motion: "Mapping[str, Profile]", temperature: "Profile | None"
 ) -> list[str]:
     """List the profile files that do not cover the log."""
     from imubench_pipeline.simulate.profiles import FileColumn
@@ -342,7 +340,7 @@ def _list_short_files(
     ]
 
 
-def _describe_aliasing(origin: Origin, rate: float) -> list[str]:
+def _describe_aliasing(origin: "Origin", rate: float) -> list[str]:
     """Describe the aliasing of white noise above the Nyquist frequency."""
     from imubench_pipeline.simulate.model import folding
 

@@ -1,7 +1,5 @@
 """Settings of extensions, and statements of notes about a moved sensor."""
 
-from __future__ import annotations
-
 from abc import abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, ClassVar, Literal, TypeVar
@@ -73,7 +71,7 @@ class SimulatedSensors(Strict):
     """A simulated recording of more than one static sensor."""
 
     @abstractmethod
-    def check(self, channels: Mapping[Any, AxisSettings]) -> None:
+    def check(self, channels: "Mapping[Any, AxisSettings]") -> None:
         """Raise ValueError if the experiment does not support the settings of its channels."""
 
 

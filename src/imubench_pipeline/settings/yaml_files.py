@@ -5,8 +5,6 @@ unless it is null or a number. A number keeps its notation, for settings of type
 (`validation.Strict`). A key is a text, and a duplicate key an error.
 """
 
-from __future__ import annotations
-
 import os
 import re
 import stat

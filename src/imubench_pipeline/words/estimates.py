@@ -1,7 +1,5 @@
 """Estimates in words: their status, interval, model, and the reason for a missing value."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 from imubench_pipeline.model.estimates import ParameterRow

@@ -1,7 +1,5 @@
 """Sentences about a recording and its events, for the screen of one log."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Mapping, Sequence
 

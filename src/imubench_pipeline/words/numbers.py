@@ -1,7 +1,5 @@
 """Formatting of numbers: digits, rounding and nouns, for pages, terminal and tables."""
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Iterable, Mapping, Sequence

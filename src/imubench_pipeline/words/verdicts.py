@@ -1,7 +1,5 @@
 """Verdicts on sensors in words: requirements, conditions, evidence, doubts and next steps."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from decimal import ROUND_DOWN, Decimal

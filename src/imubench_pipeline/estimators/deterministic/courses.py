@@ -1,7 +1,5 @@
 """Deterministic signals of a log: bias steps, warm-ups and periodic drift, with their sizes."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace

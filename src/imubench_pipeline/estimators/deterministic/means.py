@@ -3,8 +3,6 @@
 `assess_stationarity` tests whether that power is constant over the log.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 

@@ -6,8 +6,6 @@ lowest ordinates: an ordinate with leverage h_k counts as 1 - h_k of one. Regres
 exponentials, sinusoids and ramps at the block means of one part of a log; time is in blocks.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass

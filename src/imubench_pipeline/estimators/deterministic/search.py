@@ -8,8 +8,6 @@ numerator of a step at place t is sum_k w_k r_k s_k(t) with s_k(t) = -sqrt(2 / n
 other regressors are projected out.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace

@@ -1,7 +1,5 @@
 """Findings from the deterministic signals of a channel, and doubts about its parameters."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace

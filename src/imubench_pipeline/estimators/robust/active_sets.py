@@ -6,8 +6,6 @@ matrices depend on the weights only, so that hundreds of curves drawn around a m
 little more than one.
 """
 
-from __future__ import annotations
-
 from copy import copy
 from dataclasses import dataclass
 from itertools import combinations
@@ -82,7 +80,7 @@ class TermSearch:
             return self._columns[0]
         return self._columns[int(np.argmin(np.abs(np.log(self.times / T_B))))]
 
-    def exclude(self, term: int) -> TermSearch:
+    def exclude(self, term: int) -> "TermSearch":
         """Return the search among the sets without a term."""
         search = copy(self)
         search._gains = np.where(self._masks[:, term], np.inf, self._gains)

@@ -19,8 +19,6 @@ and N. Laird, "Meta-analysis in clinical trials", Controlled Clinical Trials 7, 
 of a spread.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, partial
@@ -168,7 +166,7 @@ def fit_values(curve: AllanCurve, lines: Sequence[Sinusoid] = ()) -> dict[str, f
 
 def _fit_curve(
     curve: AllanCurve, lines: Sequence[Sinusoid]
-) -> tuple[NDArray[np.bool_], _Points, _Fitted]:
+) -> "tuple[NDArray[np.bool_], _Points, _Fitted]":
     """Return which points are within a sixth of the log, these points, and the best model."""
     inside = curve.cluster_size <= LONGEST * curve.samples
     if inside.sum() < _MIN_POINTS:
@@ -199,7 +197,9 @@ class _Points:
     search: TermSearch
 
     @classmethod
-    def of(cls, curve: AllanCurve, inside: NDArray[np.bool_], lines: Sequence[Sinusoid]) -> _Points:
+    def of(
+        cls, curve: AllanCurve, inside: NDArray[np.bool_], lines: Sequence[Sinusoid]
+    ) -> "_Points":
         curve = curve.select(inside)
         curve = replace(curve, variance=curve.deviation**2)  # tables keep the deviation
         of_lines = NoiseModel(sinusoids=lines).allan_variance(curve.tau, curve.rate)

@@ -6,8 +6,6 @@ property of the sensor, which a longer log does not remove; it belongs into an i
 hold for the next log.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from itertools import groupby
@@ -43,7 +41,7 @@ class PartVariances:
     squares: Array
     terms: Array
 
-    def select(self, points: NDArray[np.bool_]) -> PartVariances:
+    def select(self, points: NDArray[np.bool_]) -> "PartVariances":
         """Return those at some points of the curve."""
         return PartVariances(self.squares[:, points], self.terms[:, points])
 

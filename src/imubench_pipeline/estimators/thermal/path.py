@@ -8,8 +8,6 @@ A reading in whole steps says little of the temperature within its cell. All rea
 cell are one measurement, of its centre; a change between two cells measures their edge.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass

@@ -5,8 +5,6 @@ coefficients are independent, with the density of the noise as variance, so that
 weighted sum. For given noise the lag is scanned; the noise is fitted to the residual in turn.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, replace
 from functools import cached_property

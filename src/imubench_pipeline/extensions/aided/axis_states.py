@@ -8,8 +8,6 @@ follow exactly from the matrices, by repeating
     [sum, x] -> [sum + T (H x + v), Phi x + w].
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple

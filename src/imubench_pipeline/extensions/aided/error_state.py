@@ -7,8 +7,6 @@ states are accumulated over steps, linearised about the estimate, and the covari
 from fix to fix. After each fix the error states correct the estimate (closed loop).
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

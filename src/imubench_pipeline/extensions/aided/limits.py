@@ -4,8 +4,6 @@ For each sensor, the filter that is tuned by its recommended estimate is used, o
 Errors are per axis: a root mean square in the plane is divided by sqrt(2).
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace

@@ -4,8 +4,6 @@ The signals are simulated with the true model of a simulated recording (low-pass
 included) or with the estimated model of a measured one, or they are pieces of a long log.
 """
 
-from __future__ import annotations
-
 import json
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence

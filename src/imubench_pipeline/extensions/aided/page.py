@@ -1,7 +1,5 @@
 """The page of navigation during outages of GNSS, with filters of different tunings."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass

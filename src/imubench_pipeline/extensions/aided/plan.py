@@ -1,7 +1,5 @@
 """Select the sensors for navigation runs, and their settings."""
 
-from __future__ import annotations
-
 import json
 
 from imubench_pipeline.extensions.aided.settings import NavigateSettings

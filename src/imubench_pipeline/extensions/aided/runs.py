@@ -1,7 +1,5 @@
 """Repeat runs of a filter with several tunings on the same signals."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor

@@ -1,7 +1,5 @@
 """Settings of the filters that run on simulated drives."""
 
-from __future__ import annotations
-
 from typing import Annotated, Literal
 
 from pydantic import AfterValidator, Field

@@ -12,8 +12,6 @@ mechanisation is of second order, with `invert_mechanisation` its exact inverse.
 scalars, since numba compiles slices and sums of arrays into slow code.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

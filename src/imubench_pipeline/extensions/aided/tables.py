@@ -1,7 +1,5 @@
 """Filters on simulated drives."""
 
-from __future__ import annotations
-
 from typing import Annotated
 
 from imubench_pipeline.model.table import Column, SensorRow, table

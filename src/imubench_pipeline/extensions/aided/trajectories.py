@@ -4,8 +4,6 @@ Speed, course and climb are smoothed sequences of stretches. A wheeled vehicle r
 with the ground, a drone banks in turns. The inverse mechanisation gives the ideal samples.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace

@@ -1,7 +1,5 @@
 """Bias, scale factor or attitude of one recording with known rates or directions, as rows."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace

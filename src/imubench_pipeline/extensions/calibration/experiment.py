@@ -5,8 +5,6 @@ latitude, to the south the same with the opposite sign, and its bias both times.
 means of blocks of samples within one dwell.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -73,7 +71,7 @@ class Experiment:
         rate: float,
         latitude: float,
         first: int = 1,
-    ) -> Experiment:
+    ) -> "Experiment":
         """Return an experiment with dwells and turns in s, a rate in Hz, a latitude in rad."""
         length = max(round(dwell * rate), 1)
         period = length + max(round(turning * rate), 0)
@@ -88,7 +86,7 @@ class Experiment:
         """Number of samples in dwells."""
         return sum(dwell.stop - dwell.start for dwell in self.dwells)
 
-    def blocks(self, longest: int) -> Blocks:
+    def blocks(self, longest: int) -> "Blocks":
         """Return the blocks of a complete log, of ``longest`` samples at most, from 1."""
         if longest < 1:
             raise ValueError(f"a block of {longest} samples is empty")
@@ -162,7 +160,7 @@ class Blocks:
         if not np.isfinite(means).all():
             raise ValueError("a block mean is not finite; leave its block out")
 
-    def chosen(self, which: NDArray[np.bool_] | NDArray[np.int64] | slice) -> Blocks:
+    def chosen(self, which: NDArray[np.bool_] | NDArray[np.int64] | slice) -> "Blocks":
         """Return some of the blocks: by bool, shape (b,), by number, or a slice."""
         return replace(
             self,
@@ -173,7 +171,7 @@ class Blocks:
             dwell=self.dwell[which],
         )
 
-    def of_dwells(self) -> Blocks:
+    def of_dwells(self) -> "Blocks":
         """Return one block per dwell, from the first sample of its blocks to the last."""
         first = np.flatnonzero(np.diff(self.dwell, prepend=-1))
         last = np.append(first[1:], len(self)) - 1

@@ -11,8 +11,6 @@ and C. T. Striebel, AIAA Journal 3(8), 1965; NEES and NIS: Y. Bar-Shalom, X. R. 
 T. Kirubarajan, "Estimation with Applications to Tracking and Navigation", 2001, section 5.4).
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

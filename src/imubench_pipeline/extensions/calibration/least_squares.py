@@ -7,8 +7,6 @@ model, not from the scatter, which contains little of the slow noise. The scatte
 (y - X b^)^T C^-1 (y - X b^) is chi-squared of b - p degrees of freedom if C and X are right.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cache

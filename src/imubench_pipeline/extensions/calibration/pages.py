@@ -1,7 +1,5 @@
 """The pages of recordings on a rate table and in positions, and sections for other pages."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace

@@ -10,8 +10,6 @@ unknown heading, w has the U-shaped distribution of the sine of a uniform angle,
 deviation is the half width over sqrt(2) (JCGM 101:2008, 6.4.6).
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

@@ -16,8 +16,6 @@ m the block means, X and b the regressors and estimates of the line, A the mean 
 steady rate, C the covariance of the noise model and D of the true rates about the stated ones.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

@@ -4,8 +4,6 @@ The ramps between two steady rates are left out, and a settling time of table an
 ramp.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -37,7 +35,7 @@ class Schedule:
     @classmethod
     def from_steps(
         cls, steps: Sequence[tuple[float, float, float]], rate: float, *, settling: float = 0.0
-    ) -> Schedule:
+    ) -> "Schedule":
         """Return the schedule of steps: start and end, s, and rate, rad/s; the sampling rate in Hz.
 
         The settling time, s, at their start is left out; ValueError if a step then has no sample.
@@ -57,7 +55,7 @@ class Schedule:
     @classmethod
     def from_column(
         cls, column: Array, rate: float, *, tolerance: float, shortest: float, settling: float = 0.0
-    ) -> Schedule:
+    ) -> "Schedule":
         """Find the steady rates in a column with the table's rate, rad/s, shape (n,), in Hz.
 
         A sample is steady if the column stays within the tolerance for half the shortest time, s,

@@ -1,7 +1,5 @@
 """Settings of recordings with known rates or directions, measured and simulated."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from itertools import pairwise

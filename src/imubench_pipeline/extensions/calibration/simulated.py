@@ -1,7 +1,5 @@
 """Readings of ideal gyros and accelerometers on a rate table, in positions, and at rest."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

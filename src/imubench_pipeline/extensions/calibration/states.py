@@ -5,8 +5,6 @@ Gaussian, given the states before the block. They are discretised at the samples
 a continuous process, so that the means agree with a simulated log.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -8,8 +8,6 @@ first sample, by generalised least squares; the present bias is the mean of bias
 last block, by the filter of the two-position experiment with a known rate.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

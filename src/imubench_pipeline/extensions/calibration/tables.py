@@ -1,7 +1,5 @@
 """Tables of gyros and accelerometers with known rates or directions."""
 
-from __future__ import annotations
-
 from typing import Annotated
 
 from imubench_pipeline.model.table import (

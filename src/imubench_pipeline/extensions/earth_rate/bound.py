@@ -9,8 +9,6 @@ sensitivity of the block means to the rate, and 1 to the fixed bias,
 are L^-1 y, with L the Cholesky root of the covariance (R. E. Kalman 1960).
 """
 
-from __future__ import annotations
-
 import math
 from functools import cache
 

@@ -3,8 +3,6 @@
 The events that are turns are chosen by dynamic programming with the schedule (`choose_turns`).
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace

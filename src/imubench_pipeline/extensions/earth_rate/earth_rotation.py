@@ -1,7 +1,5 @@
 """The Earth's rate of one recording of a gyro that was turned, as rows of the tables."""
 
-from __future__ import annotations
-
 import json
 import math
 from collections.abc import Iterator, Sequence

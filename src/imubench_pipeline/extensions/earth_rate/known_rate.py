@@ -10,8 +10,6 @@ Equation 13 is printed as P+ = (I - K H)^-1 P- instead of (I - K H) P-. Each mea
 increases the covariance instead of reducing it, and P grows without bound (`as_printed`).
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

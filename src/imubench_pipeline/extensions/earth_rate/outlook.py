@@ -5,8 +5,6 @@ for a turned gyro or with the noise of a static recording: a measured one before
 the longest of several. Axes that a log does not have take the noise of others.
 """
 
-from __future__ import annotations
-
 import json
 import math
 from collections.abc import Iterator, Sequence

@@ -1,7 +1,5 @@
 """The pages of the Earth's rate: of one turned gyro, and of all estimates and predictions."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from operator import attrgetter

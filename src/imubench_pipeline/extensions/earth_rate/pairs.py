@@ -8,8 +8,6 @@ an estimate with weights w on the means of the dwells is the root of w^T C w wit
 of these means in closed form.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

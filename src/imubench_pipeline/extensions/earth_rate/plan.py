@@ -1,7 +1,5 @@
 """Settings of the predictions for sensors at rest."""
 
-from __future__ import annotations
-
 from imubench_pipeline.extensions.earth_rate.settings import EarthRateSettings
 from imubench_pipeline.run.plan import Plan, to_json
 

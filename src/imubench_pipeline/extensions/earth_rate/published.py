@@ -13,8 +13,6 @@ latitude:
 - a wrong clock, so that the dwells are cut s dwells too late: v = (1 - 2 s) w up to one dwell.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
@@ -205,7 +203,7 @@ class PrintedRun:
     value: float  # printed estimate, rad/s
     sigma: float  # standard deviation of the mean over pairs by noise, rad/s
 
-    def without(self, last: PrintedRun) -> PrintedRun:
+    def without(self, last: "PrintedRun") -> "PrintedRun":
         """Return a run without its last part, whose pairs are disjoint from the others."""
         rest = self.duration - last.duration
         value = (self.duration * self.value - last.duration * last.value) / rest

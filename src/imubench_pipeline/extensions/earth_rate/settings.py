@@ -1,7 +1,5 @@
 """Settings of gyros that are turned between north and south."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Annotated, Any, Literal, Self
 

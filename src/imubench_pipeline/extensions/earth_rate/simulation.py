@@ -5,8 +5,6 @@ turned every 30 s, with the printed parameters. The paper prints neither the lat
 of a turn; both are assumed.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

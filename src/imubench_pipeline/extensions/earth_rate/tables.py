@@ -1,7 +1,5 @@
 """Tables of gyros turned between north and south, and of predictions for sensors at rest."""
 
-from __future__ import annotations
-
 from typing import Annotated
 
 from imubench_pipeline.model.table import (

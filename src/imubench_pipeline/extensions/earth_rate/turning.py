@@ -6,8 +6,6 @@ column with the position, else from events in the log, else from the schedule. `
 turns from such a column.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace

@@ -1,7 +1,5 @@
 """Dwells and turns in the log of a turned gyro, and the alternation of its level."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass

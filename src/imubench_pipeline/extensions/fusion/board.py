@@ -1,7 +1,5 @@
 """Several sensors on one board: noise models, rates, and shared processes."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -85,7 +83,7 @@ class Board:
         number: int,
         rate: float,
         correlation: Mapping[str, float] | None = None,
-    ) -> Board:
+    ) -> "Board":
         """Return a board of equal sensors, at a rate in Hz; the correlation is as for `divided`."""
         own, common = divided(model, correlation or {})
         shared = [Shared(common, [1.0] * number)] if common.terms else []

@@ -1,7 +1,5 @@
 """Number of averaged sensors that equals one better sensor: rows of the table ``fusion``."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace

@@ -1,7 +1,5 @@
 """The table ``fusion`` of a run, from its tables of recordings and parameters."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass

@@ -3,8 +3,6 @@
 Its steady state is computed by a doubling algorithm (`steady_covariance`).
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Iterator
 from dataclasses import replace

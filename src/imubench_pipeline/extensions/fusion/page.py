@@ -1,7 +1,5 @@
 """The page of fusion: how many cheap sensors match one good sensor."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass

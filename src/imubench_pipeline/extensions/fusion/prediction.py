@@ -3,8 +3,6 @@
 The Allan variance of any smooth spectrum of samples is computed by quadrature.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any

@@ -1,7 +1,5 @@
 """Compare printed figures of a sensor with estimates of the log simulated from them."""
 
-from __future__ import annotations
-
 import json
 import math
 from collections.abc import Iterable, Iterator, Mapping

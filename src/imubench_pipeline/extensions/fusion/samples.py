@@ -1,7 +1,5 @@
 """Decimate the samples of the sensors of a board to one rate, and fuse them."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 
 import numpy as np

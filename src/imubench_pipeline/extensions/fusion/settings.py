@@ -1,7 +1,5 @@
 """Settings of several simulated sensors on a board."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

@@ -5,8 +5,6 @@ white noise (N^-2, `weights.best_constant`). T_B and the low-pass are the same f
 and for the fused log.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 

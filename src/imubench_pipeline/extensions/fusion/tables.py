@@ -1,7 +1,5 @@
 """Rows about several sensors together, and about the printed figures of a board."""
 
-from __future__ import annotations
-
 from typing import Annotated
 
 from imubench_pipeline.model.comparisons import DoubtCodes

@@ -1,7 +1,5 @@
 """Weights of the sensors of a board in one virtual sensor; their sum is 1 at every frequency."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any, Protocol
 

@@ -1,7 +1,5 @@
 """The command `imubench nightly`, for timers."""
 
-from __future__ import annotations
-
 import argparse
 import sys
 from importlib import import_module

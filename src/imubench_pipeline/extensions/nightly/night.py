@@ -1,7 +1,5 @@
 """One nightly run: lock, recover, postpone incomplete logs, run, compare, report."""
 
-from __future__ import annotations
-
 import contextlib
 import os
 import re

@@ -6,8 +6,6 @@ be wrong: clocks of network disks and of copied files), and a process on this ma
 open for writing (a logger may write its buffer only every few minutes).
 """
 
-from __future__ import annotations
-
 import contextlib
 import os
 import re

@@ -1,7 +1,5 @@
 """State of a run, and its changes since the last nightly run, as data and as text."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 from collections.abc import Collection, Iterable, Mapping
@@ -86,7 +84,7 @@ class State(BaseModel):
         """Write the state atomically."""
         write_sealed_json(self.model_dump(mode="json"), path)
 
-    def without(self, names: Collection[str], before: State | None) -> State:
+    def without(self, names: Collection[str], before: "State | None") -> "State":
         """Return a state with the previous entries of some recordings, if there were any."""
         was = before or State(finished=self.finished)
         old = {name: was.recordings[name] for name in names if name in was.recordings}

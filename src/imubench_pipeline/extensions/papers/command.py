@@ -1,7 +1,5 @@
 """`imubench papers`: printed values of the papers and the results, in the terminal."""
 
-from __future__ import annotations
-
 import argparse
 import sys
 from collections.abc import Iterator, Sequence
@@ -67,7 +65,7 @@ def run(arguments: argparse.Namespace) -> int:
 
     shown_rows = [row for row in rows if arguments.place in (None, row.place)]
 
-    def shown_parts(width: int) -> Iterator[RenderableType]:
+    def shown_parts(width: int) -> "Iterator[RenderableType]":
         for paper in wanted:
             own = [row for row in shown_rows if row.paper == paper.name]
             if own:
@@ -79,7 +77,9 @@ def run(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _make_parts(title: str, rows: Sequence[PublishedRow], width: int) -> Iterator[RenderableType]:
+def _make_parts(
+    title: str, rows: "Sequence[PublishedRow]", width: int
+) -> "Iterator[RenderableType]":
     """Yield the table of a paper, and the reasons for differences."""
     from rich.text import Text
 

@@ -1,7 +1,5 @@
 """Counterparts of the results of Engers (2021), and of his aim: the fusion of cheap gyros."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Counterparts of the lines of Maia et al.; equations are evaluated for the MTi-7 gyro, Table 2."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from functools import cache

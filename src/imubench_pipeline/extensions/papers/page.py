@@ -1,7 +1,5 @@
 """The page of the papers, line by line: printed values, results, and reasons for differences."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from typing import Any

@@ -1,7 +1,5 @@
 """The table ``published``: lines of the papers, results of this project, and verdicts."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace

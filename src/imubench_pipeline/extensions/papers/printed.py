@@ -1,7 +1,5 @@
 """The papers as printed: one YAML file of ``data/`` for each, read into frozen dataclasses."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache

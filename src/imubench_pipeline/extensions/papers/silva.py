@@ -1,7 +1,5 @@
 """Counterparts of the lines of Silva et al. (SiRRS01-03, Earth's rotation)."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from functools import cache

@@ -1,7 +1,5 @@
 """Rows of the printed values of papers, with the computed values."""
 
-from __future__ import annotations
-
 from typing import Annotated
 
 from imubench_pipeline.model.table import Column, TableRow, table

@@ -1,7 +1,5 @@
 """Interface of the noise terms, and the joint input of several terms to a filter."""
 
-from __future__ import annotations
-
 import inspect
 import math
 from abc import ABC, abstractmethod
@@ -229,11 +227,11 @@ class Term(ABC):
         return ", ".join(f"{symbol} = {value:.3e}" for symbol, value in self.values.items())
 
     @property
-    def gauss_markov(self) -> GaussMarkov | None:
+    def gauss_markov(self) -> "GaussMarkov | None":
         """The term as a first-order Gauss-Markov process, if this is its role; else None."""
         return None
 
-    def realised(self, interval: float, longest: float) -> Sequence[Term]:
+    def realised(self, interval: float, longest: float) -> "Sequence[Term]":
         """Return terms with a finite state space that approximate it up to a tau ``longest``, s."""
         return [self]
 
@@ -246,7 +244,7 @@ class Term(ABC):
         }
         return replace(self, **scaled)
 
-    def as_unit(self) -> tuple[float, Term]:
+    def as_unit(self) -> "tuple[float, Term]":
         """Return a power and a term of the kind that times this power is this term.
 
         By default 1 and itself. If one parameter scales the term, the other serves all models.

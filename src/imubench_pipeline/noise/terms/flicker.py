@@ -16,8 +16,6 @@ covariance at times a and b after switch-on is
 or approximately (B^2 / pi) ln(4 a / |b - a|) long after switch-on.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass

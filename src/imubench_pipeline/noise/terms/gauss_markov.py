@@ -1,7 +1,5 @@
 """A first-order Gauss-Markov process, as a model of the bias instability."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from itertools import pairwise
@@ -124,7 +122,7 @@ class GaussMarkov(Term):
         return Drive(process=Process(self.T_B, self.density))
 
     @property
-    def gauss_markov(self) -> GaussMarkov:
+    def gauss_markov(self) -> "GaussMarkov":
         """Itself."""
         return self
 

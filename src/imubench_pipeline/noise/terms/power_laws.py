@@ -1,7 +1,5 @@
 """Terms whose density is a power of frequency: quantization, white noise, random walk and ramp."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass

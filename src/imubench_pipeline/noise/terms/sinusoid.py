@@ -1,7 +1,5 @@
 """A line: a sinusoid in the signal."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import dataclass

@@ -4,8 +4,6 @@ Tests of stationarity use block means and standard deviations. Random walk and f
 findings: a step must be far larger than the others, and a first drift far above any later one.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass

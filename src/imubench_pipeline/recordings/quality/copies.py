@@ -4,8 +4,6 @@ A copy of a recording would count as another unit, with no spread between the tw
 the log-likelihood and the mean of each channel: no two logs agree in nine digits of both.
 """
 
-from __future__ import annotations
-
 import math
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping

@@ -4,8 +4,6 @@ Where two of level, noise and register step change at once, the data of another 
 another range. Motion changes the level alone, and vibration the noise.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Sequence
 

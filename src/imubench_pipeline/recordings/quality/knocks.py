@@ -1,7 +1,5 @@
 """Find samples to leave out: knocks (isolated outliers) with their surroundings, straight lines."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass

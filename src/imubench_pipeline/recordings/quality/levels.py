@@ -1,7 +1,5 @@
 """Examine the values of a column: quantisation, saturation, repeats, level and noise."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass

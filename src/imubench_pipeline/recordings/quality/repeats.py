@@ -15,8 +15,6 @@ Sequences, 1997 (sampling by the lowest hashes); G. L. Steele, D. Lea and C. H. 
 splittable pseudorandom number generators", OOPSLA 2014 (SplitMix64, the mixing of bits).
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -4,8 +4,6 @@ A sensor that is moved has slow and large signals. At rest the deviation of mean
 far smaller than of single samples: also behind a low-pass filter, or in a wrong unit.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable
 

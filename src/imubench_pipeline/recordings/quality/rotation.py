@@ -1,7 +1,5 @@
 """Detect a steady rotation of an accelerometer from the direction of gravity."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -4,8 +4,6 @@ One pass, a few nanoseconds a sample. The other modules of this package evaluate
 the whole column is known.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Generic, TypeVar
@@ -186,7 +184,7 @@ class _State(Generic[T]):
     def __init__(self, kind: Callable[[float], T], place: int) -> None:
         self._kind, self._place = kind, place
 
-    def __get__(self, column: ColumnSummary, _: type) -> T:
+    def __get__(self, column: "ColumnSummary", _: type) -> T:
         return self._kind(column._state[self._place])
 
 

@@ -1,7 +1,5 @@
 """The command `imubench figures`: figures of a run as SVG and PDF."""
 
-from __future__ import annotations
-
 import argparse
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -156,7 +154,7 @@ def _select_rows(table: pa.Table, column: str, asked: str) -> pa.Table:
 
 def _list_figures(
     chosen: Mapping[str, pa.Table], sensors: Sequence[str], arguments: argparse.Namespace
-) -> Iterator[tuple[str, Make]]:
+) -> "Iterator[tuple[str, Make]]":
     """Yield name and maker of each selected figure."""
     from imubench_pipeline.report.static_figures import files
     from imubench_pipeline.report.static_figures.curves import draw_theory_figure

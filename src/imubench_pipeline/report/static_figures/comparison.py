@@ -1,7 +1,5 @@
 """One channel of all sensors: the curves, and the parameters with their intervals."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass

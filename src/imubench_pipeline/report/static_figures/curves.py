@@ -1,7 +1,5 @@
 """The figures of one channel: Allan deviation with models and datasheet, spectrum, theory."""
 
-from __future__ import annotations
-
 import math
 from collections import Counter
 from collections.abc import Mapping

@@ -1,7 +1,5 @@
 """The figures of channels and of all sensors, their names, and their files."""
 
-from __future__ import annotations
-
 import base64
 import io
 import re

@@ -1,7 +1,5 @@
 """The look of the static figures: sizes, fonts, names, logarithmic axes and legends."""
 
-from __future__ import annotations
-
 import contextlib
 import math
 from collections.abc import Iterator, Sequence

@@ -1,7 +1,5 @@
 """`imubench analyse`: estimate the noise parameters of logs directly."""
 
-from __future__ import annotations
-
 import argparse
 import gc
 import json
@@ -9,6 +7,7 @@ import os
 import shlex
 import sys
 import tempfile
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from importlib import import_module
 from pathlib import Path
@@ -24,8 +23,6 @@ from imubench_pipeline.settings.extras import require_extra
 from imubench_pipeline.tables.outputs import OutputFolder, add_output
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Mapping, Sequence
-
     import pyarrow as pa
 
     from imubench_pipeline.run.analysis.compilation import Compilation
@@ -100,7 +97,7 @@ def run(arguments: argparse.Namespace) -> int:
         return _run(arguments, compiling)
 
 
-def _run(arguments: argparse.Namespace, compiling: Compilation) -> int:
+def _run(arguments: argparse.Namespace, compiling: "Compilation") -> int:
     from imubench_pipeline.model.recordings import FailureRow
     from imubench_pipeline.report.log_screen import render_log_screen
     from imubench_pipeline.report.run_summary import list_failures
@@ -146,7 +143,7 @@ def _say(text: str) -> None:
     print(text, file=sys.stderr, flush=True)
 
 
-def _write(plan: Plan, tables: Mapping[str, pa.Table], arguments: argparse.Namespace) -> None:
+def _write(plan: "Plan", tables: "Mapping[str, pa.Table]", arguments: argparse.Namespace) -> None:
     """Write the page, the figures and the tables."""
     from imubench_pipeline.report.publish import make_site, render_one_file
     from imubench_pipeline.report.static_figures.files import list_drawings

@@ -10,8 +10,6 @@ A finding is a class of its data, which the base class makes a dataclass:
 The check that finds it passes the data to `imubench_pipeline.tables.findings.find`.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -47,7 +45,7 @@ POWERS_OF_TIME: Mapping[str, float] = {
 }
 """Power with which each parameter scales with time: N² = σ²(τ) τ."""
 
-FINDINGS: dict[str, type[FindingData]] = {}
+FINDINGS: "dict[str, type[FindingData]]" = {}
 """The class of each finding, by its code."""
 
 

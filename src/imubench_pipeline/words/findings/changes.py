@@ -1,7 +1,5 @@
 """Findings on changes over a log: steps and drifts of the bias, noise that is not stationary."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 

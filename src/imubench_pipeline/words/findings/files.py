@@ -1,7 +1,5 @@
 """Findings about files: what was not read, states another unit, or was rejected."""
 
-from __future__ import annotations
-
 from typing import Literal
 
 from imubench_pipeline.words.findings.base import (

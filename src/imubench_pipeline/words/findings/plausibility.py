@@ -1,7 +1,5 @@
 """Findings on data that are implausible for a sensor at rest in the stated units."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Findings about samples: values, quantisation, repeats, changes, joined logs, copies."""
 
-from __future__ import annotations
-
 from math import ceil
 from typing import Literal
 

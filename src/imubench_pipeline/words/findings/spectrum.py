@@ -1,7 +1,5 @@
 """Findings on the noise model: lines, fitted band, missing noise, other methods, back-tests."""
 
-from __future__ import annotations
-
 from imubench_pipeline.words.findings.base import NONE, SLOW, FindingData, channel_name, value_text
 from imubench_pipeline.words.numbers import counted, join_names, number_text, percent_text
 

@@ -1,7 +1,5 @@
 """Findings about time stamps, sampling rates, and missing samples."""
 
-from __future__ import annotations
-
 import math
 
 from imubench_pipeline.words.findings.base import (

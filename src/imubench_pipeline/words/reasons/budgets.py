@@ -1,7 +1,5 @@
 """Assumptions and reasons of error budgets, by a log or by a data sheet."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 
 from imubench_pipeline.model.states import Status

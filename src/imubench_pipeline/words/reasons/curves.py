@@ -1,7 +1,5 @@
 """Reasons for what an Allan deviation shows, by its slopes or by a fit to it."""
 
-from __future__ import annotations
-
 from imubench_pipeline.words.numbers import number_text, percent_text
 
 _MAX_PRINTED_ERROR = 10.0  # maximum relative standard error that is printed as a number

@@ -1,7 +1,5 @@
 """Reasons for comparisons of measured with printed figures."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 
 from imubench_pipeline.words.numbers import number_text

@@ -1,7 +1,5 @@
 """Reasons for the parameters of a likelihood: absent, doubtful, or not determined."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 from imubench_pipeline.model.states import Status

@@ -1,7 +1,5 @@
 """Cautions and notes in the head of exported files. Numbers are as in programs: ``1.2e-06``."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Literal
 

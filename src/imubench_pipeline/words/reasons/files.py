@@ -1,7 +1,5 @@
 """Reasons why files of the drop zone belong to no recording."""
 
-from __future__ import annotations
-
 STILL_WRITTEN = "still being written: the next run reads it"
 ARCHIVE_ATTRIBUTES = "copy of attributes that macOS adds to archives"
 DOCUMENTATION = "documentation (.md)"

@@ -1,7 +1,5 @@
 """Reasons for comparisons of recordings: pools, drift, repeatability, ratios, back-tests."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 from imubench_pipeline.model.states import Status

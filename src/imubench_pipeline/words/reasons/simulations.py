@@ -1,7 +1,5 @@
 """Sources and assumptions of simulated models, and of the noise that results are computed with."""
 
-from __future__ import annotations
-
 from imubench_pipeline.words.findings.base import channel_name
 from imubench_pipeline.words.numbers import counted, number_text
 

@@ -1,7 +1,5 @@
 """Reasons for what a spectrum shows: the fitted band, the filter of the sensor, lines."""
 
-from __future__ import annotations
-
 from imubench_pipeline.model.states import BandSource
 from imubench_pipeline.words.numbers import counted, number_text, percent_text
 

@@ -6,8 +6,6 @@ and aligned coarsely, then by the filter. If the error of the heading is too lar
 angles about the true attitude are compared.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass

@@ -8,8 +8,6 @@ in error by the small angles psi of the navigation frame,
                                  Technology", IET 2004, section 12.3).
 """
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import ArrayLike
 

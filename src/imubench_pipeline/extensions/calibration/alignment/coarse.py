@@ -9,8 +9,6 @@ Wiley 1971, chapter 9)
     psi_N = df_E / g,   psi_E = -df_N / g,   psi_D = dw_E / (w_ie cos(L)) - tan(L) psi_N.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

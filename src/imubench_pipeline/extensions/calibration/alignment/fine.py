@@ -13,8 +13,6 @@ east gyro from the heading:
     sigma(roll, pitch) -> accelerometer bias / g,   sigma(heading) -> gyro bias / (w_ie cos(L)).
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

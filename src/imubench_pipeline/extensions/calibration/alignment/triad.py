@@ -1,7 +1,5 @@
 """A triad of gyros and accelerometers at rest: noise, site and positions."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -69,7 +67,7 @@ class Triad:
         *,
         gyro_bias: float,
         accelerometer_bias: float,
-    ) -> Triad:
+    ) -> "Triad":
         """Return a triad with equal axes; the biases are in rad/s and m/s^2."""
         return cls(
             gyros=(gyro,) * 3,
@@ -104,7 +102,7 @@ class Positions:
             raise ValueError("turned contains a matrix that is not a rotation")
 
     @classmethod
-    def at_rest(cls, duration: float, block: float, rate: float) -> Positions:
+    def at_rest(cls, duration: float, block: float, rate: float) -> "Positions":
         """Return one position, in blocks of at most ``block`` s; the sampling rate is in Hz."""
         samples = max(round(duration * rate), 1)
         run = Experiment((Dwell(0, samples, 1),), rate, 0.0)
@@ -113,7 +111,7 @@ class Positions:
     @classmethod
     def turned_about_z(
         cls, headings: Sequence[float], *, dwell: float, turning: float, block: float, rate: float
-    ) -> Positions:
+    ) -> "Positions":
         """Return positions at headings, rad; dwell, turning and block in s, the rate in Hz."""
         run = Experiment.regular(
             dwell=dwell, turning=turning, dwells=len(headings), rate=rate, latitude=0.0
