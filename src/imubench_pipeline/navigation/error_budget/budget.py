@@ -248,10 +248,10 @@ def time_until(
 
     The total of a `budget` increases with time, because the errors at two times never have a
     negative correlation. With lines or turns it may oscillate; with lines the first crossing is
-    found among 4096 times. The time is in s: 0 if the error exceeds the limit from the beginning, None if it does
-    not within 30 years. The limit is 1 sigma, rad, m/s or m, for each budget as ``convert`` returns
-    it, such as by `Budget.to_radius`; the others are as in `budget`. Raise a ValueError if the
-    limit is not above 0, or the quantity is not known.
+    found among 4096 times. The time is in s: 0 if the error exceeds the limit from the beginning,
+    None if it does not within 30 years. The limit is 1 sigma, rad, m/s or m, for each budget as
+    ``convert`` returns it, such as by `Budget.to_radius`; the others are as in `budget`. Raise a
+    ValueError if the limit is not above 0, or the quantity is not known.
     """
     if not (math.isfinite(limit) and limit > 0):
         raise ValueError(f"limit is {limit}, expected a number above 0")
