@@ -15,7 +15,7 @@ from imubench_pipeline.datasheets.class_limits import find_limit, read_sigma
 from imubench_pipeline.model.comparisons import RankingRow, ShortlistRow
 from imubench_pipeline.model.recordings import RecordingRow
 from imubench_pipeline.model.states import Cause, Measured, Verdict
-from imubench_pipeline.model.verdicts import Condition, Share, Shortfall
+from imubench_pipeline.model.verdicts import Share, Shortfall
 from imubench_pipeline.navigation.error_budget.in_use import End, read_figures
 from imubench_pipeline.navigation.error_budget.parts import Budget
 from imubench_pipeline.navigation.expected_errors import (
@@ -105,18 +105,22 @@ def list_shortlist_rows(
             else:
                 row = _judge_by_datasheet(name, key, requirement, questions, sensor)
             rows.append(row)
-        rows.sort(key=_make_order)
+        rows.sort(key=make_order)
         places = (place for place, _ in enumerate(rows, 1))
         for row in rows:
-            judged = row.margin is not None and row.verdict != "excluded"
-            yield replace(row, rank=next(places)) if judged else row
+            yield replace(row, rank=next(places)) if _is_ranked(row) else row
 
 
-def _make_order(row: ShortlistRow) -> tuple[object, ...]:
+def make_order(row: ShortlistRow) -> tuple[object, ...]:
     """Return the sort key: the sensors that meet the limits first, by their margins in use."""
-    excluded = row.margin is None or row.verdict == "excluded"
-    margin = -(row.margin or 0.0)
-    return excluded, row.verdict not in PASSING_VERDICTS, margin, row.sensor
+    met = row.verdict in PASSING_VERDICTS
+    return not _is_ranked(row), not met, -(row.margin or 0.0), row.sensor
+
+
+def _is_ranked(row: ShortlistRow) -> bool:
+    """Return whether a sensor is judged and has all demanded properties."""
+    unknown = any(condition.property for condition in row.conditions)
+    return row.margin is not None and row.verdict != "excluded" and not unknown
 
 
 def _copy_ranking(
@@ -186,7 +190,7 @@ def _judge_by_datasheet(
         for asked, total, *_ in answers
         for source, size in find_largest_figures(total, asked.limit, total.total).items()
     )
-    conditions: tuple[Condition, ...] = ()
+    conditions = tuple(unknown)
     worst_best = min(each[3] for each in margins)
     verdict: Verdict = "meets"
     if lacking:
@@ -194,8 +198,11 @@ def _judge_by_datasheet(
     elif worst_best < 1.0:
         verdict = "cannot_meet"
     elif in_use < 1.0:
-        conditions = make_figure_conditions(largest)
-        verdict = "meets_if" if conditions else "not_enough_data"
+        figures = make_figure_conditions(largest)
+        conditions = (*figures, *unknown)
+        verdict = "meets_if" if figures else "not_enough_data"
+    elif unknown:
+        verdict = "meets_if"
     return replace(
         row,
         margin=in_use,
@@ -204,7 +211,7 @@ def _judge_by_datasheet(
         best_margin=best,
         decides=requirement.by_dead_reckoning[place].text,
         verdict=verdict,
-        conditions=(*conditions, *unknown) if verdict in ("meets", "meets_if") else (),
+        conditions=conditions if verdict == "meets_if" else (),
         parts=tuple(_list_shares(budget, noise)),
         assumed=tuple(dict.fromkeys(_list_assumed(budget, noise))),
         shortfalls=tuple(lacking),

@@ -214,7 +214,9 @@ class Conditions:
             return "excluded", ()
         if verdict == "meets_if":
             return verdict, self.conditions
-        return verdict, self.unknown if verdict in PASSING_VERDICTS else ()
+        if self.unknown and verdict in PASSING_VERDICTS:
+            return "meets_if", self.unknown
+        return verdict, ()
 
     @property
     def conditions(self) -> tuple[Condition, ...]:

@@ -230,8 +230,8 @@ class Judgement:
 
     @property
     def compared(self) -> bool:
-        """Whether the sensor is ranked among the others."""
-        return self.decides.known and not self.shortfalls
+        """Whether the sensor is ranked among the others: it has all demanded properties."""
+        return self.decides.known and not self.shortfalls and not self.open.unknown
 
     @property
     def reasons(self) -> Sequence[str]:
