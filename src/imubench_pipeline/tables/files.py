@@ -175,7 +175,7 @@ def write_arrow(table: pa.Table, path: Path) -> None:
 
 
 def write_csv(table: pa.Table, file: BinaryIO) -> None:
-    """Write an Arrow table as CSV: texts are no formulas, lists have semicolons, structs are JSON."""
+    """Write a table as CSV: texts are no formulas, lists are joined by ``;``, structs are JSON."""
     pacsv.write_csv(escape_cells(table), file)
 
 
