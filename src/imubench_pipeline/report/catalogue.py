@@ -95,7 +95,9 @@ def _make_cell(row: CoverageRow, found: Sequence[CatalogueRow]) -> Json:
     first = next(iter(ends.values()), [])
     return {
         "published": row.published,
-        "parts": [(min(values), max(values), kind) for kind, values in ends.items()],
+        "parts": [
+            (min(values), max(values), kind.replace("sigma", "σ")) for kind, values in ends.items()
+        ],
         "value": max(map(abs, first), default=None),
         "akin": "; ".join(row.as_printed) if not ends else "",
         "sources": list(
@@ -151,18 +153,20 @@ def _make_share(rows: Sequence[CoverageRow]) -> Json:
 
 def compare_with_paper(rows: Sequence[CoverageRow]) -> str:
     """Return the claim of Maia et al. on documentation, with the numbers of the catalogue."""
-    found: dict[tuple[str, str], dict[str, str]] = {}
+    found: dict[tuple[str, str], list[str]] = {}
     for row in rows:
-        found.setdefault((row.sensor, row.quantity), {})[row.figure] = row.published
-    complete = [one for one in found.values() if all(one[f] in _PUBLISHED for f in _PAPER_FIGURES)]
+        published = found.setdefault((row.sensor, row.quantity), [])
+        if row.figure in _PAPER_FIGURES and row.published in _PUBLISHED:
+            published.append(row.figure)
+    complete = sum(len(published) == len(_PAPER_FIGURES) for published in found.values())
     counts = [
-        f"{figure} for {format_counts(one[figure] for one in found.values()).split(';')[0]}"
+        f"{figure} for {_make_share([row for row in rows if row.figure == figure])['of']}"
         for figure in _PAPER_FIGURES
     ]
     return (
         "Maia et al. state that most manufacturers document stochastic errors incompletely; here "
-        f"{len(complete)} of {len(found)} gyroscopes and accelerometers have all of "
-        f"{join_names(_PAPER_FIGURES)} published ({join_names(counts)})."
+        f"{complete} of {len(found)} gyroscopes and accelerometers have all of "
+        f"{join_names(_PAPER_FIGURES)} published ({join_names(counts)} that were looked up)."
     )
 
 
