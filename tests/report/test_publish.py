@@ -523,7 +523,7 @@ def test_names_of_any_kind_break_nothing(tmp_path: Path) -> None:
     rows = recording_rows(name, name, device=HOSTILE, findings=[finding], started=HOSTILE,
                           requirements=requirement)  # fmt: skip
     for row in rows["datasheet"]:
-        row |= {"unit": HOSTILE, "condition": HOSTILE, "reason": HOSTILE}
+        row |= {"unit": HOSTILE, "condition": HOSTILE, "reasons": [HOSTILE]}
     for row in rows["models"]:
         row |= {"note": HOSTILE, "band_source": HOSTILE}
     hostile = {"vendor": HOSTILE, "grade": HOSTILE, "condition": HOSTILE, "place": HOSTILE,

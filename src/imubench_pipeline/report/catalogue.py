@@ -50,15 +50,18 @@ def make_catalogue_tables(
                     "technology": ", ".join(of.technology) if of else "",
                     "aliases": ", ".join(of.aliases) if of else "",
                     "document": row.document or "–",
-                    "cells": [],
+                    "cells": {},
                 },
             )
             keys = chain.from_iterable(KEYS_OF_FIGURE[row.figure])
             found = [one for key in keys for one in printed.get((row.sensor, quantity, key), [])]
-            line["cells"].append(_make_cell(row, found))
+            line["cells"][row.figure] = _make_cell(row, found)
         if not lines:
             continue
-        shown = sorted(lines.values(), key=lambda line: str(line["name"]).lower())
+        shown = [
+            line | {"cells": [line["cells"][figure] for figure in figures]}
+            for line in sorted(lines.values(), key=lambda line: str(line["name"]).lower())
+        ]
         yield {
             "title": title,
             "heads": [_make_head(quantity, figure, system) for figure in figures],
