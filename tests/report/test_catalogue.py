@@ -46,7 +46,7 @@ def cell_of(table: Json, name: str) -> Json:
 
 def test_cells_have_each_kind_in_si_and_their_sources() -> None:
     sheet = {
-        "random_walk": [figure(0.3, "deg/sqrt(h)"), figure(0.6, "deg/sqrt(h)", kind="max")],
+        "random_walk": [figure(0.6, "deg/sqrt(h)", kind="max"), figure(0.3, "deg/sqrt(h)")],
         "noise_density": figure(0.006 * math.sqrt(2), "deg/s/sqrt(Hz)", place="page 3"),
         "bias_instability": {"value": None, "place": "page 4"},
         "drift": figure(3, "deg/h"),

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import chain
+from typing import get_args
 
 from imubench_pipeline.datasheets.coverage import KEYS_OF_FIGURE
 from imubench_pipeline.model.comparisons import CatalogueRow, CoverageRow
@@ -12,7 +13,7 @@ from imubench_pipeline.report.datasheets import UNIT_SYMBOLS, compare_sensors_wi
 from imubench_pipeline.report.payload import Json
 from imubench_pipeline.report.practical import System, choose_figure_unit
 from imubench_pipeline.report.site import Entry, Site
-from imubench_pipeline.settings.printed import convert_density, convert_power_density
+from imubench_pipeline.settings.printed import Kind, convert_density, convert_power_density
 from imubench_pipeline.settings.sensor import QUANTITIES
 from imubench_pipeline.units import SI_UNITS
 from imubench_pipeline.words.numbers import join_names, percent_text
@@ -95,6 +96,7 @@ def _make_cell(row: CoverageRow, found: Sequence[CatalogueRow]) -> Json:
             ends.setdefault(one.kind, []).extend(
                 _convert_to_figure(one, value) for value in values if value is not None
             )
+    ends = {kind: ends[kind] for kind in get_args(Kind) if kind in ends}
     first = next(iter(ends.values()), [])
     return {
         "published": row.published,
