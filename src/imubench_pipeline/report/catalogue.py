@@ -1,7 +1,5 @@
 """The page of datasheets: measured against printed figures, and the figures of all sensors."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import chain
