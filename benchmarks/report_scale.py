@@ -49,6 +49,7 @@ OF_ALL = (
     "shortlist",
     "repeatability",
     "fusion",
+    "catalogue",
     "coverage",
     "coverage_by_vendor",
     "pooled",

@@ -41,6 +41,7 @@ OUTPUTS = {
     ("report", "output"): ["results", "--output", "{}"],
     ("figures", "output"): ["results", "--kind", "theory", "--format", "svg", "--output", "{}"],
     ("sensors", "class_limits"): ["--class-limits", "{}"],
+    ("sensors", "csv"): ["--csv", "{}"],
     ("simulate", "out"): ["bno055", "--duration", "1 s", "--out", "{}"],
 }
 """Every option that names an output, and the arguments of its command."""

@@ -266,7 +266,13 @@ def coverage_rows(*sensors: str) -> Rows:
              "figure": figure, "published": published, "as_printed": printed}
             for sensor in sensors
             for figure, published, printed in (("N", "yes", "5 m°/s/√Hz"), ("K", "no", None))
-        ]
+        ],
+        "catalogue": [
+            {"sensor": sensor, "vendor": "V & Co", "model": sensor, "quantity": "gyro",
+             "figure": "random_walk", "state": "published", "value": 0.3, "unit": "°/√h",
+             "value_si": 0.005 * DEGREE, "kind": "typ", "as_printed": "0.3 °/√h"}
+            for sensor in sensors
+        ],
     }  # fmt: skip
 
 

@@ -3,16 +3,14 @@ from typing import Any
 
 import pytest
 
-from imubench_pipeline.model.comparisons import CoverageRow, RepeatabilityRow
+from imubench_pipeline.model.comparisons import RepeatabilityRow
 from imubench_pipeline.report.datasheets import (
     compare_sensors_with_datasheets,
     compare_with_datasheet,
     format_curve_distances,
     format_repeatability,
-    make_coverage_tables,
 )
 from imubench_pipeline.report.view import RecordingView, gather_recordings
-from imubench_pipeline.tables.files import build
 from tests.report.tables import DEGREE, HOUR, Rows, joined, recording_rows
 
 FIGURE = {"statistic": "N", "quantity": "N", "printed": 0.3, "unit": "deg/sqrt(h)", "kind": "typ",
@@ -187,37 +185,6 @@ def test_distances_of_the_curve_are_told_in_words() -> None:
         "2.5 °/h, 0.046 decades, density read as two-sided",
         "2.5 °/h, 0.046 decades",
     ]
-
-
-def covered(sensor: str, published: dict[str, str], **given: Any) -> list[dict[str, Any]]:
-    about = {"sensor": sensor, "vendor": "V", "model": sensor.upper(), "quantity": "gyro"}
-    return [
-        about | {"figure": figure, "published": state, "document": "D-1"} | given
-        for figure, state in published.items()
-    ]
-
-
-def test_who_publishes_what_is_counted() -> None:
-    rows = [
-        *covered("b", {"N": "yes", "temperature_coefficient": "not looked up"}),
-        *covered("a", {"N": "yes", "temperature_coefficient": "other convention"}, document=None),
-        *covered("c", {"N": "no", "temperature_coefficient": "yes"}, as_printed=["7 ppm/K"]),
-        *covered("c", {"N": "no", "offset": "no"}, quantity="accel"),
-    ]
-    gyro, accel = make_coverage_tables(CoverageRow.rows_of(build("coverage", rows)))
-    assert gyro["figures"] == ["N", "temperature coefficient"]
-    assert gyro["counts"] == ["2 of 3 looked up", "1 of 2 looked up; 1 not looked up"]
-    assert [line["name"] for line in gyro["lines"]] == ["V A", "V B", "V C"]
-    assert [[cell["text"] for cell in line["cells"]] for line in gyro["lines"]] == [
-        ["yes", "other"],
-        ["yes", "?"],
-        ["no", "yes"],
-    ]
-    assert [line["document"] for line in gyro["lines"]] == ["–", "D-1", "D-1"]
-    assert gyro["lines"][2]["cells"][1]["note"] == "7 ppm/K"
-    assert [cell["class"] for cell in gyro["lines"][0]["cells"]] == ["", "none"]
-    assert (accel["figures"], accel["counts"]) == (["N", "offset"], ["0 of 1 looked up"] * 2)
-    assert list(make_coverage_tables([])) == []
 
 
 def test_turn_on_spread_is_compared_with_the_printed_figure() -> None:

@@ -106,7 +106,7 @@ rule repeatability:
 
 rule catalogue:
     output:
-        **as_files("coverage", "coverage_by_vendor"),
+        **as_files("catalogue", "coverage", "coverage_by_vendor"),
     log:
         LOGS + "/catalogue.log",
     group:
@@ -114,7 +114,7 @@ rule catalogue:
     resources:
         **cost(Cost(memory=300, time=1)),
     params:
-        catalogue=plan.catalogue(),
+        catalogue=plan.catalogue("aliases", "grade", "technology", "sold"),
         code=plan.code("catalogue"),
     script:
         "../scripts/catalogue.py"

@@ -6,12 +6,12 @@ from dataclasses import dataclass
 from itertools import product
 from typing import Literal
 
-from imubench_pipeline.settings.printed import PrintedFigure, QuantityDatasheet
+from imubench_pipeline.settings.printed import FIGURE_DIMENSIONS, PrintedFigure, QuantityDatasheet
 from imubench_pipeline.settings.sensor import QUANTITIES, Sensor
 
 Published = Literal["yes", "no", "other convention", "not looked up"]
 
-_KEYS_OF_FIGURE: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
+KEYS_OF_FIGURE: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     "N": (("noise_density", "random_walk"), ("rms_noise",)),
     "B": (("bias_instability",), ("allan_deviation", "drift")),
     "K": (("rate_random_walk",), ()),
@@ -21,8 +21,16 @@ _KEYS_OF_FIGURE: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
         ("temperature_total", "temperature_rms"),
     ),
     "offset": (("offset",), ("bias_repeatability",)),
+    "scale_factor_error": (("scale_factor_error",), ()),
+    "scale_factor_temperature": (("scale_factor_temperature",), ()),
+    "nonlinearity": (("nonlinearity",), ()),
+    "cross_axis": (("cross_axis", "misalignment"), ()),
+    "g_sensitivity": (("g_sensitivity",), ()),
+    "vibration_rectification": (("vibration_rectification",), ()),
+    "full_scale": (("full_scale",), ()),
+    "bandwidth": (("bandwidth",), ()),
 }
-"""Figures that a filter needs: keys that give them directly, and in another convention."""
+"""Figures that a filter or a choice needs: keys that give them, and in another convention."""
 
 
 @dataclass(frozen=True)
@@ -33,7 +41,7 @@ class Coverage:
     vendor: str
     model: str
     quantity: str  # ``gyro`` or ``accel``
-    figure: str  # ``N``, ``B``, ``K``, ``T_B``, ``temperature_coefficient`` or ``offset``
+    figure: str  # of `KEYS_OF_FIGURE`
     # ``yes``; ``other convention``: a related figure, such as an rms for N or a total over
     # temperature for the coefficient; ``no``: looked up (null), and not published; ``not looked
     # up``: the sensor file does not say, so it counts neither as published nor as unpublished
@@ -60,17 +68,19 @@ class VendorCoverage:
 def coverage(sensors: Mapping[str, Sensor]) -> list[Coverage]:
     """Return which figures the vendors of a catalogue publish.
 
-    There is one row for each sensor, quantity that it measures, and figure, in the order of the
-    sensors.
+    There is one row for each sensor that is sold, quantity that it measures, and figure, in the
+    order of the sensors.
     """
     rows = []
     for (name, sensor), quantity in product(sensors.items(), QUANTITIES):
         datasheet = sensor.datasheet
         sheet: QuantityDatasheet | None = getattr(datasheet, quantity)
-        if sheet is None:
+        if sheet is None or not sensor.sold:
             continue
         revision = f", revision {datasheet.revision}" if datasheet.revision else ""
-        for figure, (plain, akin) in _KEYS_OF_FIGURE.items():
+        for figure, (plain, akin) in KEYS_OF_FIGURE.items():
+            if not FIGURE_DIMENSIONS[quantity].keys() & plain:
+                continue
             printed = [each for key in (*plain, *akin) for each in sheet.printed(key)]
             sources = dict.fromkeys(each.source or datasheet.source or "" for each in printed)
             published: Published = "not looked up"
@@ -104,7 +114,7 @@ def by_vendor(rows: Iterable[Coverage]) -> list[VendorCoverage]:
 
     def order(item: tuple[tuple[str, str, str], Counter[str]]) -> tuple[str, int, int]:
         vendor, quantity, figure = item[0]
-        place = list(QUANTITIES).index(quantity), list(_KEYS_OF_FIGURE).index(figure)
+        place = list(QUANTITIES).index(quantity), list(KEYS_OF_FIGURE).index(figure)
         return vendor.lower(), *place
 
     return [

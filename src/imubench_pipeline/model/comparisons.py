@@ -7,6 +7,7 @@ from imubench_pipeline.model.states import (
     Basis,
     DriftVerdict,
     Evidence,
+    FigureState,
     Origin,
     PoolVerdict,
     SourceCode,
@@ -405,6 +406,11 @@ class ShortlistRow(TableRow):
     reasons: Annotated[tuple[str, ...], Column("why the sensor is not judged")] = ()
 
 
+CoveredFigure = Annotated[
+    str, Column("N, B, K, T_B, or a figure of the sensor file; cross_axis: or misalignment")
+]
+
+
 @table("coverage")
 class CoverageRow(SensorRow):
     """A row of the table ``coverage``."""
@@ -412,7 +418,7 @@ class CoverageRow(SensorRow):
     vendor: Annotated[str, Column("of the sensor")]
     model: Annotated[str, Column("of the sensor")]
     quantity: Annotated[str, Column("gyro or accel")]
-    figure: Annotated[str, Column("N, B, K, T_B, temperature_coefficient or offset")]
+    figure: CoveredFigure
     published: Annotated[str, Column("yes, no, other convention, not looked up")]
     as_printed: Annotated[tuple[str, ...], Column("all printed figures")] = ()
     document: Annotated[str | None, Column("with its revision")] = None
@@ -425,9 +431,48 @@ class VendorCoverageRow(TableRow):
 
     vendor: Annotated[str, Column("of the sensors")]
     quantity: Annotated[str, Column("gyro or accel")]
-    figure: Annotated[str, Column("N, B, K, T_B, temperature_coefficient or offset")]
-    sensors: Annotated[int, Column("number of sensors of the vendor in the catalogue")]
+    figure: CoveredFigure
+    sensors: Annotated[int, Column("number of sensors of the vendor that are sold")]
     yes: Annotated[int, Column("number with a published figure")]
     other_convention: Annotated[int, Column("number with a figure in another convention")]
-    no: Annotated[int, Column("that do not")]
+    no: Annotated[int, Column("number that were looked up, and have no such figure")]
     not_looked_up: Annotated[int, Column("number that were not looked up")]
+
+
+@table("catalogue")
+class CatalogueRow(SensorRow):
+    """A row of the table ``catalogue``: a number of a datasheet, or the lack of a figure."""
+
+    vendor: Annotated[str, Column("of the sensor")]
+    model: Annotated[str, Column("of the sensor")]
+    aliases: Annotated[tuple[str, ...], Column("products that contain it, other names")] = ()
+    grade: Annotated[str | None, Column("consumer, industrial, tactical or navigation")] = None
+    technology: Annotated[tuple[str, ...], Column("of gyro and accelerometer")] = ()
+    quantity: Annotated[str, Column("gyro or accel")]
+    figure: Annotated[str, Column("key of the sensor file, such as noise_density")]
+    state: Annotated[FigureState, Column("published or not, or not looked up")]
+    value: Annotated[
+        float | None, Column("as printed; one of a choice; the lower end of a range", "as in unit")
+    ] = None
+    value_to: Annotated[float | None, Column("upper end of a range", "as in unit")] = None
+    unit: Annotated[str | None, Column("as printed")] = None
+    value_si: Annotated[
+        float | None, Column("value; a density keeps its sidedness", "as in unit_si")
+    ] = None
+    value_to_si: Annotated[float | None, Column("value_to", "as in unit_si")] = None
+    unit_si: Annotated[str | None, Column("SI unit of value_si and value_to_si")] = None
+    kind: Annotated[
+        str | None, Column("typ, max, min, range, 1sigma, derived; choices: can be selected")
+    ] = None
+    axes: Annotated[str | None, Column("such as xy; null: all axes")] = None
+    sidedness: Annotated[str | None, Column("of a noise density")] = None
+    bandwidth: Annotated[str | None, Column("of an rms")] = None
+    tau: Annotated[str | None, Column("averaging time of an Allan deviation")] = None
+    option: Annotated[str | None, Column("grade, range or mode with this figure")] = None
+    condition: Annotated[str | None, Column("as printed")] = None
+    document: Annotated[str | None, Column("datasheet of the sensor")] = None
+    revision: Annotated[str | None, Column("of the document")] = None
+    place: Annotated[str | None, Column("where it was read, or sought, in the document")] = None
+    evidence: Annotated[str | None, Column("source of the figure or of its sidedness")] = None
+    source: Annotated[str | None, Column("primary: read in the document; or secondary")] = None
+    as_printed: Annotated[str | None, Column("the whole figure, as a text")] = None

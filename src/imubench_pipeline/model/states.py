@@ -95,5 +95,8 @@ PoolVerdict = Literal["agree", "differ"]
 DriftVerdict = Literal["changed", "as before"]
 RatioVerdict = Literal["lower", "higher", "not significant", "not determined"]
 
+FigureState = Literal["published", "derived", "not published", "not looked up"]
+"""A figure of a sensor file; ``derived``: computed from another one that is published."""
+
 Basis = Literal["printed", "logs", "simulated logs"]
 """Origin of the noise behind a verdict."""

@@ -1,10 +1,10 @@
-"""Datasheets on the pages: measured against printed figures, and published figures by vendor."""
+"""Datasheets on the pages: measured against printed figures."""
 
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from statistics import median
 
-from imubench_pipeline.model.comparisons import CoverageRow, DatasheetRow, RepeatabilityRow
+from imubench_pipeline.model.comparisons import DatasheetRow, RepeatabilityRow
 from imubench_pipeline.report.payload import Json
 from imubench_pipeline.report.practical import System, choose_page_unit, format_printed
 from imubench_pipeline.report.view import ChannelView, RecordingView
@@ -14,22 +14,17 @@ from imubench_pipeline.words.numbers import NO_VALUE, Unit
 _STATISTIC_NAMES = dict.fromkeys(("adev_minimum", "plateau"), "bias instability")
 _STATISTIC_NAMES |= {"N": "N", "K": "K", "T_B": "T_B"}
 _STATISTIC_TEXTS = {"adev_minimum": "lowest point of the curve", "plateau": "0.664 B alone"}
-_UNIT_SYMBOLS = {
+UNIT_SYMBOLS = {
     "N": "N",
     "K": "K",
     "T_B": "T_B",
     "offset": "signal",
     "temperature_coefficient": "sensitivity",
 }
+"""Symbols of the figures whose unit the reader can switch; other figures have that of B."""
 
 _WITHOUT_METHOD = ("mean", "temperature")
 """Entries of the column ``method`` for figures that no estimation method gives."""
-
-_COVERAGE_TITLES = {
-    "gyro": "Gyroscope: published figures",
-    "accel": "Accelerometer: published figures",
-}
-_COVERAGE_SIGNS = {"yes": "yes", "no": "no", "other convention": "other", "not looked up": "?"}
 
 
 def compare_with_datasheet(
@@ -42,7 +37,7 @@ def compare_with_datasheet(
         published = first.printed is not None
         figure = "B" if first.quantity == "bias_instability" else first.quantity
         verdict, why = merge_verdicts(rows)
-        unit = choose_page_unit(view.quantity, _UNIT_SYMBOLS.get(first.quantity, "B"), system)
+        unit = choose_page_unit(view.quantity, UNIT_SYMBOLS.get(first.quantity, "B"), system)
         yield {
             "quantity": _name_figure(first),
             "published": published,
@@ -113,9 +108,7 @@ def compare_sensors_with_datasheets(
             groups.setdefault((view.sensor, view.simulated, figure), []).append(rows)
     for (sensor, simulated, (channel, *_)), group in groups.items():
         first = group[0][0]
-        unit = choose_page_unit(
-            quantity_of(channel), _UNIT_SYMBOLS.get(first.quantity, "B"), system
-        )
+        unit = choose_page_unit(quantity_of(channel), UNIT_SYMBOLS.get(first.quantity, "B"), system)
         verdicts = Counter(merge_verdicts(rows)[0] for rows in group)
         by_reading: dict[str, list[DatasheetRow]] = {}
         for row in (row for rows in group for row in rows):
@@ -219,40 +212,3 @@ def _format_difference(row: DatasheetRow) -> list[str]:
     if lower is None or upper is None:
         return [_format_percent(row.delta)]
     return [_format_percent(row.delta), f"{_format_percent(lower)} to {_format_percent(upper)}"]
-
-
-def make_coverage_tables(rows: Sequence[CoverageRow]) -> Iterator[Json]:
-    """Yield a table per quantity with a line per sensor and a column per figure."""
-    for quantity, title in _COVERAGE_TITLES.items():
-        own = [row for row in rows if row.quantity == quantity]
-        figures = list(dict.fromkeys(row.figure for row in own))
-        lines: dict[str, Json] = {}
-        for row in own:
-            name = f"{row.vendor} {row.model}"
-            line = lines.setdefault(
-                row.sensor, {"name": name, "document": row.document or "–", "cells": {}}
-            )
-            line["cells"][row.figure] = {
-                "text": _COVERAGE_SIGNS[row.published],
-                "note": "; ".join(row.as_printed),
-                "class": "" if row.published == "yes" else "none",
-            }
-        if not lines:
-            continue
-        counts = []
-        for figure in figures:
-            published = Counter(row.published for row in own if row.figure == figure)
-            unknown = published["not looked up"]
-            text = f"{published['yes']} of {published.total() - unknown} looked up"
-            counts.append(f"{text}; {unknown} not looked up" if unknown else text)
-        yield {
-            "title": title,
-            "figures": [
-                figure.replace("_", " ") if len(figure) > 3 else figure for figure in figures
-            ],
-            "lines": [
-                line | {"cells": [line["cells"][figure] for figure in figures]}
-                for line in sorted(lines.values(), key=lambda line: str(line["name"]))
-            ],
-            "counts": counts,
-        }

@@ -7,7 +7,7 @@ from importlib.metadata import distribution, version
 from pathlib import Path
 
 from imubench_pipeline.registry import Hook
-from imubench_pipeline.report import compare, recording, shortlist, start
+from imubench_pipeline.report import catalogue, compare, recording, shortlist, start
 from imubench_pipeline.report.glossary import read_glossary
 from imubench_pipeline.report.sensor import make_device_page, make_sensor_page
 from imubench_pipeline.report.site import RECORDING_PAGES, Entry, Page, Site, make_command
@@ -109,7 +109,7 @@ ENTRIES: Sequence[Entry] = (
     start.START,
     compare.COMPARE,
     start.RECORDINGS,
-    start.DATASHEETS,
+    catalogue.DATASHEETS,
     shortlist.SHORTLIST,
     *sorted(_ADDED.objects(), key=lambda entry: entry.place),
     THEORY,

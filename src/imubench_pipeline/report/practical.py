@@ -10,8 +10,9 @@ from functools import cache
 from imubench_pipeline.estimators.estimate import DIMENSIONS
 from imubench_pipeline.model.comparisons import DatasheetRow, RepeatabilityRow
 from imubench_pipeline.model.recordings import RecordingRow
+from imubench_pipeline.settings.printed import FIGURE_DIMENSIONS
 from imubench_pipeline.settings.sensor import QUANTITIES
-from imubench_pipeline.units import find_conversion
+from imubench_pipeline.units import SI_UNITS, find_conversion
 from imubench_pipeline.words.findings.base import System as System
 from imubench_pipeline.words.numbers import NO_VALUE, Unit, number_text
 
@@ -49,6 +50,12 @@ _UNIT_CHOICES: dict[str, dict[str, dict[str, str]]] = {
     },
 }
 
+_FIGURE_SIGNS: dict[str, dict[str, str]] = {
+    "gyro": {"full_scale": "°/s", "g_sensitivity": "°/s/g", "vibration_rectification": "°/s/g²"},
+    "accel": {"full_scale": "g", "vibration_rectification": "mg/g²"},
+}
+_SIGNS_OF_RATIOS = {"ratio": "%", "ratio_temperature_coefficient": "%/K"}
+
 _SIGNS_OF_DIMENSIONS: dict[System, dict[str, str]] = {
     "practical": {"angle": "°", "velocity": "m/s", "length": "m"},
     "si": {"angle": "rad", "velocity": "m/s", "length": "m"},
@@ -67,6 +74,15 @@ def choose_page_unit(quantity: str, symbol: str, system: System) -> Unit:
     itself).
     """
     return _find_unit(quantity, symbol, choose_first_units(system)[quantity])
+
+
+def choose_figure_unit(quantity: str, figure: str, system: System) -> Unit:
+    """Return the unit of a datasheet figure on a page, by its key in the sensor file."""
+    dimension = FIGURE_DIMENSIONS[quantity][figure][0]
+    sign = SI_UNITS[dimension]
+    if system == "practical":
+        sign = _FIGURE_SIGNS[quantity].get(figure) or _SIGNS_OF_RATIOS.get(dimension, sign)
+    return _make_unit(sign, dimension)
 
 
 def list_page_units() -> dict[str, dict[str, dict[str, Unit]]]:

@@ -1,4 +1,4 @@
-"""The overview pages: start page with the decision matrix, all recordings, all datasheets."""
+"""The overview pages: start page with the decision matrix, and all recordings."""
 
 import math
 from collections import Counter
@@ -8,11 +8,10 @@ from typing import get_args
 
 from markupsafe import Markup
 
-from imubench_pipeline.model.comparisons import CoverageRow, NextStepRow, RankingRow
+from imubench_pipeline.model.comparisons import NextStepRow, RankingRow
 from imubench_pipeline.model.recordings import FailureRow, FileRow, FindingRow
 from imubench_pipeline.model.states import Verdict
 from imubench_pipeline.navigation.suitability import PASSING_VERDICTS
-from imubench_pipeline.report import datasheets
 from imubench_pipeline.report.comparison import Comparison
 from imubench_pipeline.report.meaning import (
     Group,
@@ -488,16 +487,6 @@ def _recordings(site: Site) -> Mapping[str, object]:
     return {"views": site.views, "summary": summarise_recordings(site.views), "filters": filters}
 
 
-def _datasheets(site: Site) -> Mapping[str, object]:
-    lines = list(datasheets.compare_sensors_with_datasheets(site.views, site.system))
-    filters = {
-        "figure": list(dict.fromkeys(line["quantity"] for line in lines)),
-        "sensor": list(dict.fromkeys(site.names[line["sensor"]] for line in lines)),
-    }
-    coverage = list(datasheets.make_coverage_tables(site.rows(CoverageRow)))
-    return {"lines": lines, "filters": filters, "coverage": coverage}
-
-
 START = Entry(
     file="index.html",
     title="Comparison",
@@ -511,12 +500,3 @@ RECORDINGS = Entry(
     file="recordings.html", title="Recordings", context=_recordings, views=lambda site: site.views
 )
 """The page that lists every recording with its state."""
-
-DATASHEETS = Entry(
-    file="datasheets.html",
-    title="Datasheets",
-    context=_datasheets,
-    tables=("coverage",),
-    views=lambda site: site.views,
-)
-"""The page of all comparisons with datasheets, and of the figures that vendors publish."""

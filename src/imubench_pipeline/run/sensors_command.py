@@ -40,27 +40,40 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--class-limits",
         help="write the limits of each class, from all sensors, into this CSV file",
     )
+    add_output(
+        parser,
+        "--csv",
+        help="write every figure of the sensors found, also as SI, into this CSV file",
+    )
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Print the catalogue or a sensor, or write the limits; return the exit status."""
+    """Print the catalogue or a sensor, or write figures or limits; return the exit status."""
     # Loaded here, so that other commands answer at once.
+    from imubench_pipeline.datasheets.catalogue import list_catalogue
     from imubench_pipeline.datasheets.class_limits import derive_class_limits, write_class_limits
     from imubench_pipeline.settings.config import Run
     from imubench_pipeline.settings.sensor import read_sensors
     from imubench_pipeline.settings.shipped import list_folders
+    from imubench_pipeline.tables.files import build, write_csv
 
     sensors = read_sensors(list_folders(arguments.sensors or Run().sensors, "sensors"))
-    if arguments.class_limits:
-        limits = derive_class_limits(sensors)
-        arguments.class_limits.write(write_class_limits(limits))
-        print(f"{len(limits)} limits of {len(sensors)} sensors")
-        return 0
     found = find_sensors(sensors, arguments.text)
     if not found:
         raise CommandError(
             f"no sensor {arguments.text!r} among {len(sensors)}; `imubench sensors` lists all"
         )
+    if arguments.class_limits:
+        limits = derive_class_limits(sensors)
+        arguments.class_limits.write(write_class_limits(limits))
+        print(f"{len(limits)} limits of {len(sensors)} sensors")
+    if arguments.csv:
+        figures = build("catalogue", list_catalogue(found))
+        with arguments.csv.replacing() as temporary, temporary.open("wb") as file:
+            write_csv(figures, file)
+        print(f"{figures.num_rows} rows of {len(found)} sensors")
+    if arguments.class_limits or arguments.csv:
+        return 0
     exact = arguments.text.lower() in found
     if arguments.text and (len(found) == 1 or exact):
         name = arguments.text.lower() if exact else next(iter(found))

@@ -9,7 +9,7 @@ import tempfile
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, is_dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import pyarrow as pa
 import pyarrow.compute as pc
@@ -159,8 +159,7 @@ def write_each(tables: Mapping[str, Iterable[AnyRow]], outputs: Iterable[Path]) 
 def write_arrow(table: pa.Table, path: Path) -> None:
     """Write an Arrow ``table`` as Parquet or, where the ``path`` ends so, CSV, atomically.
 
-    Texts in CSV are no formulas, lists are joined by semicolons, structs are JSON. Raises a
-    `TableError` for NaN or infinities.
+    Raises a `TableError` for NaN or infinities.
     """
     if fault := _not_finite(table):
         raise TableError(f"{path}: {fault}; expected a finite number or null")
@@ -168,11 +167,16 @@ def write_arrow(table: pa.Table, path: Path) -> None:
         if path.suffix == ".csv":
             # Arrow ignores that a file which it opened itself cannot be closed.
             with temporary.open("wb") as file:
-                pacsv.write_csv(escape_cells(table), file)
+                write_csv(table, file)
         else:
             # A small file is read in half the time by snappy, and thousands of them are.
             compression = "zstd" if table.nbytes > _SMALL else "snappy"
             write_sealed(table, temporary, compression)
+
+
+def write_csv(table: pa.Table, file: BinaryIO) -> None:
+    """Write a table as CSV: texts are no formulas, lists are joined by ``;``, structs are JSON."""
+    pacsv.write_csv(escape_cells(table), file)
 
 
 def find_tables_folder(results: Path) -> Path:

@@ -17,6 +17,7 @@ from unittest import mock
 import numpy as np
 import pyarrow as pa
 
+from imubench_pipeline.datasheets.catalogue import list_catalogue
 from imubench_pipeline.datasheets.comparable import read_comparables
 from imubench_pipeline.datasheets.coverage import by_vendor, coverage
 from imubench_pipeline.datasheets.deltas import bias_deltas, curve_rms, deltas
@@ -316,6 +317,7 @@ def rows_of(logs: Sequence[Log], rejected: Sequence[tuple[str, str]] = ()) -> Ro
     tables = {name: build(name, rows.get(name, [])) for name in NEEDED}
     rows["fusion"] = [*yield_fusion_rows(tables, FusionSettings(draws=100))]
     covered = coverage(SENSORS)
+    rows["catalogue"] = [row.columns() for row in list_catalogue(SENSORS)]
     rows["coverage"] = [asdict(one) for one in covered]
     rows["coverage_by_vendor"] = [asdict(one) for one in by_vendor(covered)]
     return rows
@@ -445,7 +447,7 @@ def single(results: Path) -> Site:
     return make_site(tables_of(rows_of([log])), settings, results)
 
 
-OF_SENSORS = ("ranking", "fusion", "coverage", "coverage_by_vendor", "pooled", "drift")
+OF_SENSORS = ("ranking", "fusion", "catalogue", "coverage", "coverage_by_vendor", "pooled", "drift")
 
 
 def many(results: Path, sensors: int, each: int) -> Site:

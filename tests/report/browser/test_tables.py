@@ -247,3 +247,19 @@ def test_a_report_of_many_recordings_is_drawn(read: Open, many: Path) -> None:
     for path in PAGES[1:]:
         reader.open(path)
         reader.draw_all()
+
+
+def test_figures_of_the_catalogue_are_sorted_and_unfold(read: Open, bench: Report) -> None:
+    table = table_of(read(bench.folder, "datasheets.html"), "Gyroscopes: published figures")
+    assert bar_of(table).get_by_label("Vendor").locator("option").count() == 3
+    before = cells(table, 1)
+    table.get_by_role("button", name="Sort by B", exact=True).click()
+    assert cells(table, 5)[0].strip() == "8 max" and cells(table, 5)[-1].strip() == "?"
+    bar_of(table).get_by_label("Vendor").select_option("Vendor & Sons")
+    assert len(cells(table, 1)) == 1 < len(before)
+    cell = table.locator("tbody td:nth-child(4)")
+    assert cell.locator("summary").inner_text().startswith("0.297 typ")
+    unfolded = cell.locator("details[open]")
+    assert unfolded.count() == 0
+    cell.locator("summary").click()
+    assert "noise density: 0.007 deg/s/sqrt(Hz) typ" in unfolded.inner_text()
