@@ -98,7 +98,7 @@ def derive_class_limits(sensors: Mapping[str, Sensor]) -> list[ClassLimit]:
 
 
 def _summarise(grade: str, quantity: str, figure: str, values: Mapping[str, float]) -> ClassLimit:
-    rounded = {name: float(f"{value:.4g}") for name, value in values.items()}
+    rounded = {name: _round_up(value) for name, value in values.items()}
     logarithms = np.log(list(rounded.values()))
     return ClassLimit(
         grade=grade,
@@ -111,6 +111,12 @@ def _summarise(grade: str, quantity: str, figure: str, values: Mapping[str, floa
         spread=float(np.std(logarithms, ddof=1)) if len(values) > 1 else None,
         sensors=rounded,
     )
+
+
+def _round_up(value: float) -> float:
+    """Return a figure with four digits, which is not below the printed one."""
+    step = 10.0 ** (math.floor(math.log10(value)) - 3)
+    return float(f"{math.ceil(value / step - 1e-6) * step:.4g}")
 
 
 @cache

@@ -9,12 +9,11 @@ the printed minimum of the Allan deviation, as flicker noise.
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
-from typing import cast
 
 from imubench_pipeline.datasheets.class_limits import find_limit, read_sigma
 from imubench_pipeline.model.comparisons import RankingRow, ShortlistRow
 from imubench_pipeline.model.recordings import RecordingRow
-from imubench_pipeline.model.states import Cause, Measured, Verdict
+from imubench_pipeline.model.states import Measured, Verdict
 from imubench_pipeline.model.verdicts import Share, Shortfall
 from imubench_pipeline.navigation.error_budget.in_use import End, read_figures
 from imubench_pipeline.navigation.error_budget.parts import Budget
@@ -35,7 +34,7 @@ from imubench_pipeline.noise import FLOOR, NoiseModel
 from imubench_pipeline.settings.requirements import Requirement
 from imubench_pipeline.settings.sensor import Sensor
 from imubench_pipeline.words.reasons import budgets as texts
-from imubench_pipeline.words.verdicts import figure_text, source_name
+from imubench_pipeline.words.verdicts import class_limit_text
 
 _QUANTITIES: tuple[Measured, ...] = ("gyro", "accel")
 _MIN_SHARE = 0.01  # of the variance
@@ -118,7 +117,7 @@ def make_order(row: ShortlistRow) -> tuple[object, ...]:
 
 
 def _is_ranked(row: ShortlistRow) -> bool:
-    """Return whether a sensor is judged and has all demanded properties."""
+    """Return whether a sensor is judged, and has all demanded properties for certain."""
     unknown = any(condition.property for condition in row.conditions)
     return row.margin is not None and row.verdict != "excluded" and not unknown
 
@@ -211,7 +210,7 @@ def _judge_by_datasheet(
         best_margin=best,
         decides=requirement.by_dead_reckoning[place].text,
         verdict=verdict,
-        conditions=conditions if verdict == "meets_if" else (),
+        conditions=conditions if verdict != "excluded" else (),
         parts=tuple(_list_shares(budget, noise)),
         assumed=tuple(dict.fromkeys(_list_assumed(budget, noise))),
         shortfalls=tuple(lacking),
@@ -247,6 +246,4 @@ def _list_assumed(budget: Budget, noise: Mapping[Measured, PrintedNoise]) -> Ite
     for share in _list_shares(budget, noise):
         if share.origin == "class limit" and share.quantity:
             figure = figures[share.quantity, share.source]
-            cause = cast("Cause", share.source)
-            size = figure_text(share.quantity, cause, figure.sigma) if figure else ""
-            yield texts.class_limit(share.quantity, source_name(share.source), size)
+            yield class_limit_text(share.quantity, share.source, figure.sigma if figure else None)

@@ -23,7 +23,7 @@ def _make_context(site: Site) -> Mapping[str, object]:
             "code": row.verdict,
             "word": SHORT_VERDICTS[row.verdict],
             "shortfalls": list(map(shortfall_text, row.shortfalls)),
-            "conditions": list(map(condition_text, row.conditions)),
+            "conditions": list(_list_conditions(row)),
             "parts": list(map(share_text, row.parts)),
             "origins": origins_text(row.parts),
             "name": site.names.get(row.sensor, row.sensor),
@@ -37,6 +37,12 @@ def _make_context(site: Site) -> Mapping[str, object]:
             for name, lines in boards.items()
         ]
     }
+
+
+def _list_conditions(row: ShortlistRow) -> Iterator[str]:
+    """Yield the conditions of a verdict; a sensor that fails does so with the best properties."""
+    if row.verdict == "meets_if":
+        yield from map(condition_text, row.conditions)
 
 
 SHORTLIST = Entry(
@@ -60,8 +66,7 @@ def format_shortlist_row(row: ShortlistRow) -> list[str]:
 def list_remarks(rows: Sequence[ShortlistRow]) -> Iterator[str]:
     """Yield a line per sensor with its shortfalls or conditions, and the sources of its error."""
     for row in rows:
-        conditions = map(condition_text, row.conditions)
-        remarks = [*map(shortfall_text, row.shortfalls), *conditions, *row.reasons]
+        remarks = [*map(shortfall_text, row.shortfalls), *_list_conditions(row), *row.reasons]
         if not row.shortfalls and row.parts:
             remarks.append(origins_text(row.parts))
         if remarks:

@@ -13,7 +13,7 @@ from imubench_pipeline.model.comparisons import (
     ShortlistRow,
 )
 from imubench_pipeline.model.estimates import ErrorGrowthRow
-from imubench_pipeline.model.states import Action, Cause, Origin, SourceCode, SpreadOf, Verdict
+from imubench_pipeline.model.states import Action, Origin, SourceCode, SpreadOf, Verdict
 from imubench_pipeline.model.verdicts import (
     Condition,
     DoubtMark,
@@ -102,7 +102,7 @@ _SOURCES: Mapping[SourceCode, str] = {
 }
 """Sources of errors whose code is not their name."""
 
-_NOUNS: Mapping[Cause, tuple[str, str, str]] = {
+_NOUNS: Mapping[SourceCode, tuple[str, str, str]] = {
     "turn_on_bias": ("turn-on bias", "deg/s", "mg"),
     "temperature": ("temperature coefficient", "deg/s/K", "mg/K"),
     "scale_factor": ("scale factor error", "ppm", "ppm"),
@@ -187,7 +187,7 @@ def condition_text(condition: Condition) -> str:
     return f"{text}; {condition.within} of {printing} so little"
 
 
-def figure_text(quantity: str, cause: Cause, size: float) -> str:
+def figure_text(quantity: str, cause: SourceCode, size: float) -> str:
     """Return a figure, SI, in its practical unit, rounded down to three digits."""
     unit = _NOUNS[cause][1 + (quantity == "accel")]
     largest = float(convert_from_si(size, unit, _DIMENSIONS[unit]))
@@ -195,6 +195,17 @@ def figure_text(quantity: str, cause: Cause, size: float) -> str:
         step = Decimal(1).scaleb(Decimal(largest).adjusted() - 2)
         largest = float(Decimal(largest).quantize(step, rounding=ROUND_DOWN))
     return f"{largest:g} {unit}"
+
+
+def class_limit_text(quantity: str, source: SourceCode, size: float | None) -> str:
+    """Return the figure of the class, SI, that counts for one that is not printed; None: noise."""
+    figure = ""
+    if size is None:
+        name = {"N": "white noise", "flicker": "bias instability"}.get(source, source)
+    else:
+        name = _NOUNS[source][0]
+        figure = f" ({figure_text(quantity, source, size)})"
+    return f"{SENSORS[quantity]} {name}: not printed, worst of its class{figure}"
 
 
 def subject_text(condition: Condition) -> str:

@@ -48,8 +48,3 @@ def missing_numbers(names: Sequence[str]) -> str:
 
 
 NOISE_NOT_PRINTED = "the noise is not printed, so a log decides"
-
-
-def class_limit(quantity: str, name: str, figure: str) -> str:
-    """Return the figure of the class that counts for one that is not printed; empty: of noise."""
-    return f"{SENSORS[quantity]} {name}: not printed, worst of its class{figure and f' ({figure})'}"
