@@ -126,7 +126,12 @@ def fit(
     draws = _draw(points, fitted, excesses, rng)
     estimate = _make_estimate(points, fitted, draws)
     duration = curve.samples / curve.rate
-    parameters = _state_changes(estimate.parameters, excesses)
+    parameters = {
+        symbol: replace(one, reason=texts.changes_between_parts(excesses[symbol]))
+        if one.status == "ok" and excesses.get(symbol)
+        else one
+        for symbol, one in estimate.parameters.items()
+    }
     return replace(
         estimate,
         parameters={symbol: _add_length(one, duration) for symbol, one in parameters.items()},
@@ -395,7 +400,8 @@ def _draw(
     root = vectors * np.sqrt(np.maximum(values, 0.0))
     normal = rng.standard_normal((_DRAWS // 2, len(values)))
     normal = np.concatenate((normal, -normal))
-    shift, scale = _chi_squared_logarithms(np.diag(covariance))
+    half = 1.0 / np.maximum(np.diag(covariance), 1e-9)
+    shift, scale = np.log(half) - digamma(half), np.sqrt(polygamma(1, half) * half)
     spread = shift + (normal @ root.T) * scale
     curves = points.variance * np.exp(spread)
     drawn = points.search.solve(curves, fitted.weights)
@@ -412,17 +418,6 @@ def _draw(
     step = np.log(points.search.times[1] / points.search.times[0])
     times = drawn.times * np.exp(step * rng.uniform(-0.5, 0.5, _DRAWS))  # between those tried
     return replace(drawn, squares=drawn.squares * factors, times=times)
-
-
-def _chi_squared_logarithms(relative: Array) -> tuple[Array, Array]:
-    """Return mean and scale of the logarithm of a true variance, given its estimate.
-
-    An estimate of relative variance v is chi-squared with 2/v degrees of freedom. Their logarithm
-    has the mean psi(1/v) + ln v and the variance psi'(1/v). The scale is for deviates of variance
-    v.
-    """
-    half = 1.0 / np.maximum(relative, 1e-9)
-    return np.log(half) - digamma(half), np.sqrt(polygamma(1, half) * half)
 
 
 _TERMS_OF = {"N": [WHITE], "B": [FLICKER, PROCESS], "K": [WALK, RAMP]}
@@ -447,18 +442,6 @@ def _estimate_excesses(
             excess = estimate_excess(parts, curve, influence, covariance)
         excesses[symbol] = min(float(np.sqrt(excess)), _MAX_EXCESS)
     return excesses
-
-
-def _state_changes(
-    parameters: Mapping[str, Parameter], excesses: Mapping[str, float]
-) -> dict[str, Parameter]:
-    """Return parameters whose reason states how much they change during the log."""
-    return {
-        symbol: replace(one, reason=texts.changes_between_parts(excesses[symbol]))
-        if one.status == "ok" and excesses.get(symbol)
-        else one
-        for symbol, one in parameters.items()
-    }
 
 
 def _add_length(parameter: Parameter, duration: float) -> Parameter:

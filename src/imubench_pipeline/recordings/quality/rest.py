@@ -10,7 +10,6 @@ from collections.abc import Iterable
 import numpy as np
 
 from imubench_pipeline.recordings.quality.summary import (
-    BlockStatistics,
     ColumnSummary,
     compute_finite_median,
 )
@@ -57,7 +56,12 @@ def find_motion(
     if _moves_throughout(column, quantity, rate):
         return [(0, column.present + column.missing)]
     blocks = column.blocks()
-    calm = _calm_deviation(blocks)
+    # The deviation of calm blocks; coarse registers may have none in many blocks
+    spread = blocks.spread[np.isfinite(blocks.spread)]
+    if len(spread) == 0:
+        calm = 0.0
+    else:
+        calm = float(np.quantile(spread, _CALM_QUANTILE)) or float(np.median(spread))
     if not calm > 0.0:
         return []
     reach = np.maximum(blocks.high - blocks.mean, blocks.mean - blocks.low)
@@ -70,14 +74,6 @@ def find_motion(
         return []
     groups = np.split(places, np.flatnonzero(np.diff(places) > 2) + 1)
     return [(int(group[0]) * blocks.size, (int(group[-1]) + 1) * blocks.size) for group in groups]
-
-
-def _calm_deviation(blocks: BlockStatistics) -> float:
-    """Return the deviation of calm blocks; coarse registers may have none in many blocks."""
-    spread = blocks.spread[np.isfinite(blocks.spread)]
-    if len(spread) == 0:
-        return 0.0
-    return float(np.quantile(spread, _CALM_QUANTILE)) or float(np.median(spread))
 
 
 def _moves_throughout(column: ColumnSummary, quantity: str, rate: float) -> bool:
