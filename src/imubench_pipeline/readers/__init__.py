@@ -112,8 +112,11 @@ def _find_file(
             "a folder; put the files into a folder, or drop 'file:'"
         )
     # The file may be one level deeper: a folder packed with its name, or unpacked into another.
-    names = {file: _compose_accents(file.relative_to(path).as_posix()) for file in present}
-    wanted = _compose_accents(Path(source.file).as_posix())
+    # Some systems store accents separately (NFD)
+    names = {
+        file: unicodedata.normalize("NFC", file.relative_to(path).as_posix()) for file in present
+    }
+    wanted = unicodedata.normalize("NFC", Path(source.file).as_posix())
     found = [file for file in present if names[file] == wanted] or [
         file for file in present if names[file].endswith(f"/{wanted}")
     ]
@@ -125,11 +128,6 @@ def _find_file(
             f"{name_settings_file(name)}"
         )
     return found[0]
-
-
-def _compose_accents(name: str) -> str:
-    """Return a name with composed accents (NFC): some systems store them separately (NFD)."""
-    return unicodedata.normalize("NFC", name)
 
 
 def find_only_log(path: Path, present: list[Path]) -> Path:
