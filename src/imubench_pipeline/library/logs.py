@@ -285,21 +285,9 @@ def read_log(
 
 
 def ingest_columns(columns: Mapping[str, Column], rate: float, name: str) -> Log:
-    """Return samples as a log, ingested like a file, with the same checks.
+    """Return samples at a rate, Hz, as a log of this name, ingested like a file with all checks.
 
-    Parameters
-    ----------
-    columns : mapping of str to Column
-        Channels, and perhaps the temperature.
-    rate : float
-        Hz.
-    name : str
-        Name of the log.
-
-    Raises
-    ------
-    RecordingError
-        If no channel can be used.
+    Raises RecordingError if no channel can be used.
     """
     if not name or Path(name).name != name:
         raise ValueError(f"name is {name!r}; expected the name of a log, without '/'")

@@ -41,25 +41,11 @@ def log_files(path: Path) -> list[Path]:
 
 
 def read(path: Path, log: sensor.LogFormat) -> list[LogFile]:
-    """Open a recording.
+    """Open a recording: a log file, or a folder or zip archive with the files of a recording.
 
-    Parameters
-    ----------
-    path : Path
-        A log file, or a folder or zip archive with the files of a recording.
-    log : LogFormat
-        Format of the files.
-
-    Returns
-    -------
-    list of LogFile
-        One for each file, or each topic of a file, sorted by name, with its columns.
-
-    Raises
-    ------
-    RecordingError
-        If a file that the format names is missing, or if the recording is a folder and the format
-        does not name the file of a channel.
+    Returns a LogFile for each file, or each topic of a file, sorted by name, with its columns.
+    Raises RecordingError if a file that the format names is missing, or if the recording is a
+    folder and the format does not name the file of a channel.
     """
     if is_endless(path):
         raise RecordingError(f"{path.name}: is neither a file nor a folder; expected a log")

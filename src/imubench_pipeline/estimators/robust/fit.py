@@ -98,28 +98,11 @@ def fit(
 ) -> Estimate:
     """Estimate N, B, T_B, K and R of an Allan variance, with limits that hold for the next log.
 
-    Parameters
-    ----------
-    curve : AllanCurve
-        Of m points, in (SI unit)^2 and s; without deterministic signals.
-    parts : PartVariances
-        At the same m points.
-    lines : sequence of Sinusoid
-        The lines of the spectrum; SI, Hz.
-    rng : numpy.random.Generator
-        Of the draws.
-
-    Returns
-    -------
-    Estimate
-        SI, with 95 % limits: sampling, choice of terms, error of the model, and changes of the
-        sensor within the log. ``not_identified`` with an upper limit where a term may be absent or
-        its limits are too wide.
-
-    Raises
-    ------
-    UnfitCurveError
-        If fewer than six points lie within a sixth of the log, or the variance is 0 at one.
+    ``curve`` and ``parts`` have the same m points, SI and s, without deterministic signals;
+    ``lines`` are those of the spectrum. Returns SI values with 95 % limits: sampling, choice of
+    terms, error of the model, and changes of the sensor within the log. ``not_identified`` with an
+    upper limit: a term may be absent, or its limits are too wide. Raises UnfitCurveError if fewer
+    than six points lie within a sixth of the log, or the variance is 0 at one.
     """
     inside, points, fitted = _fit_curve(curve, lines)
     excesses = _estimate_excesses(points, fitted, parts.select(inside))
@@ -140,24 +123,9 @@ def fit(
 
 
 def fit_values(curve: AllanCurve, lines: Sequence[Sinusoid] = ()) -> dict[str, float]:
-    """Return only the values of `fit`, without limits: 0 where a term is absent.
+    """Return the values of `fit`, SI, without limits: 0 where a term is absent.
 
-    Parameters
-    ----------
-    curve : AllanCurve
-        Of m points, in (SI unit)^2 and s, with or without deterministic signals.
-    lines : sequence of Sinusoid
-        The lines of the spectrum; SI, Hz.
-
-    Returns
-    -------
-    dict of str to float
-        By parameter, SI and s.
-
-    Raises
-    ------
-    UnfitCurveError
-        As `fit`.
+    The curve may contain deterministic signals. Raises UnfitCurveError as `fit` does.
     """
     _, points, fitted = _fit_curve(curve, lines)
     model, solution = fitted.model, fitted.solution

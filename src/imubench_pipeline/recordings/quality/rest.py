@@ -53,7 +53,14 @@ def find_motion(
     ``times``, ``least``: lower limits of the deviation, over its value at rest and in SI. A knock
     is no motion.
     """
-    if _moves_throughout(column, quantity, rate):
+    # Does most of the log have the slow signals of a sensor in motion?
+    size = max(round(_WINDOW * rate), _MIN_WINDOW)
+    slow = [
+        _has_slow_signals(samples, rate, _MIN_DEVIATION[quantity])
+        for piece in column.excerpts()
+        for samples in np.array_split(piece.present, max(len(piece.present) // size, 1))
+    ]
+    if sum(slow) > _MAX_MOVING_SHARE * len(slow):
         return [(0, column.present + column.missing)]
     blocks = column.blocks()
     # The deviation of calm blocks; coarse registers may have none in many blocks
@@ -74,17 +81,6 @@ def find_motion(
         return []
     groups = np.split(places, np.flatnonzero(np.diff(places) > 2) + 1)
     return [(int(group[0]) * blocks.size, (int(group[-1]) + 1) * blocks.size) for group in groups]
-
-
-def _moves_throughout(column: ColumnSummary, quantity: str, rate: float) -> bool:
-    """Return whether most of the log has the slow signals of a sensor in motion."""
-    size = max(round(_WINDOW * rate), _MIN_WINDOW)
-    moving = [
-        _has_slow_signals(samples, rate, _MIN_DEVIATION[quantity])
-        for piece in column.excerpts()
-        for samples in np.array_split(piece.present, max(len(piece.present) // size, 1))
-    ]
-    return sum(moving) > _MAX_MOVING_SHARE * len(moving)
 
 
 def _has_slow_signals(samples: Array, rate: float, least: float) -> bool:
