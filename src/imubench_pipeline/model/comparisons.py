@@ -36,8 +36,6 @@ DoubtCodes = Annotated[tuple[str, ...], "codes of doubts about the recording (se
 
 @table("drift")
 class DriftRow(SensorRow):
-    """A row of the table ``drift``."""
-
     device: Annotated[str, "device with the compared recordings"]
     channel: Annotated[str, "channel, gyro_x to accel_z"]
     parameter: Annotated[str, "N, B_curve, sigma_min, K, B, T_B, Q, R, or bias: the fixed bias"]
@@ -67,8 +65,6 @@ class DriftRow(SensorRow):
 
 @table("pooled")
 class PooledRow(SensorRow):
-    """A row of the table ``pooled``."""
-
     device: Annotated[str | None, "null: all recordings of the sensor"] = None
     channel: Annotated[str, "channel, gyro_x to accel_z"]
     parameter: Annotated[str, "N, B_curve, sigma_min, K, B, T_B, Q, R, or bias: the fixed bias"]
@@ -93,8 +89,6 @@ class PooledRow(SensorRow):
 
 @table("datasheet")
 class DatasheetRow(ChannelRow):
-    """A row of the table ``datasheet``."""
-
     method: Annotated[
         str, "method of the estimate; mean: of the log; temperature: of the thermal fit"
     ]
@@ -123,8 +117,6 @@ class DatasheetRow(ChannelRow):
 
 @table("repeatability")
 class RepeatabilityRow(SensorRow):
-    """A row of the table ``repeatability``."""
-
     device: Annotated[str, "device with the compared recordings"]
     channel: Annotated[str, "channel, gyro_x to accel_z"]
     recordings: Annotated[int, "number of turn-ons"]
@@ -146,8 +138,6 @@ class RepeatabilityRow(SensorRow):
 
 @table("datasheet_curve")
 class DatasheetCurveRow(ChannelRow):
-    """A row of the table ``datasheet_curve``."""
-
     sidedness: Annotated[str | None, "of the noise density, as assumed in this row"] = None
     N: Annotated[
         float | None, "line N / sqrt(tau) of the datasheet", "rad/s or m/s^2 times sqrt(s)"
@@ -161,8 +151,6 @@ class DatasheetCurveRow(ChannelRow):
 
 @table("error_budget")
 class ErrorBudgetRow(OfRecordingRow):
-    """A row of the table ``error_budget``."""
-
     requirement: Annotated[str | None, "requirement; null: the times of the settings"] = None
     axis: Annotated[str, "worst or median axis of the sensor"]
     gyro: Annotated[str | None, "channel that answers"] = None
@@ -206,8 +194,6 @@ class ErrorBudgetRow(OfRecordingRow):
 
 @table("ranking")
 class RankingRow(TableRow):
-    """A row of the table ``ranking``."""
-
     requirement: Annotated[str, "requirement: file in config/requirements, without .yaml"]
     sensor: Annotated[str, "name of the sensor file"]
     rank: Annotated[int | None, "1 is the best; null: not ranked"] = None
@@ -284,8 +270,6 @@ class RankingRow(TableRow):
 
 @table("next_steps")
 class NextStepRow(SensorRow):
-    """A row of the table ``next_steps``."""
-
     recording: Annotated[str | None, "name of the recording; null: a new one"] = None
     requirements: Annotated[tuple[str, ...], "requirements with verdicts that it can change"]
     action: Annotated[Action, "what to do"]
@@ -302,8 +286,6 @@ class NextStepRow(SensorRow):
 
 @table("shortlist")
 class ShortlistRow(TableRow):
-    """A row of the table ``shortlist``."""
-
     requirement: Annotated[str, "requirement: file in config/requirements, without .yaml"]
     sensor: Annotated[str, "of the catalogue"]
     price_class: Annotated[str | None, "as stated"] = None
@@ -339,8 +321,6 @@ CoveredFigure = Annotated[
 
 @table("coverage")
 class CoverageRow(SensorRow):
-    """A row of the table ``coverage``."""
-
     vendor: Annotated[str, "of the sensor"]
     model: Annotated[str, "of the sensor"]
     quantity: Annotated[str, "gyro or accel"]
@@ -353,8 +333,6 @@ class CoverageRow(SensorRow):
 
 @table("coverage_by_vendor")
 class VendorCoverageRow(TableRow):
-    """A row of the table ``coverage_by_vendor``."""
-
     vendor: Annotated[str, "of the sensors"]
     quantity: Annotated[str, "gyro or accel"]
     figure: CoveredFigure

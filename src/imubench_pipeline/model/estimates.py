@@ -35,8 +35,6 @@ _DegreesSource = Annotated[
 
 @table("allan")
 class AllanRow(ChannelRow):
-    """A row of the table ``allan``."""
-
     tau: Annotated[float, "cluster length, cluster_size / rate", "s"]
     cluster_size: Annotated[int, "samples in a cluster"]
     adev: Annotated[float, "Allan deviation", "rad/s or m/s^2"]
@@ -59,8 +57,6 @@ class AllanRow(ChannelRow):
 
 @table("parameters")
 class ParameterRow(ChannelRow):
-    """A row of the table ``parameters``."""
-
     method: Annotated[str, "estimation method"]
     recommended: Annotated[bool, "the method to use for this channel"]
     model: Annotated[str, "the terms of the model, such as N+GM+K"]
@@ -86,8 +82,6 @@ class ParameterRow(ChannelRow):
 
 @table("models")
 class ModelRow(ChannelRow):
-    """A row of the table ``models``."""
-
     model: Annotated[str, "the terms: Q, N, F (flicker), GM, K, R"]
     chosen: Annotated[bool, "the model of method likelihood: the lowest BIC"]
     free: Annotated[int, "free parameters"]
@@ -106,8 +100,6 @@ class ModelRow(ChannelRow):
 
 @table("lines")
 class LineRow(ChannelRow):
-    """A row of the table ``lines``."""
-
     kind: Annotated[str, "sinusoid; band of noise; alias of a faster line in block means"]
     frequency: Annotated[float, "of the line", "Hz"]
     frequency_lower: Annotated[float | None, "lower 95 % limit", "Hz"] = None
@@ -124,8 +116,6 @@ class LineRow(ChannelRow):
 
 @table("envelope")
 class EnvelopeRow(ChannelRow):
-    """A row of the table ``envelope``."""
-
     start: Annotated[float, "start of a part of the log, from the first sample", "s"]
     end: Annotated[float, "its end", "s"]
     low: Annotated[float | None, "least sample; degC for temperature", "SI"] = None
@@ -136,8 +126,6 @@ class EnvelopeRow(ChannelRow):
 
 @table("samples_of_models")
 class ModelSampleRow(ChannelRow):
-    """A row of the table ``samples_of_models``."""
-
     of: Annotated[str, "log; before: model read from the curve; after: model of the estimate"]
     what: Annotated[str, "deviation of all samples; stretch: each sample; envelope: over time"]
     start: Annotated[float, "from the first sample", "s"]
@@ -149,8 +137,6 @@ class ModelSampleRow(ChannelRow):
 
 @table("histogram")
 class HistogramRow(ChannelRow):
-    """A row of the table ``histogram``."""
-
     lower: Annotated[float, "lower edge of the bin", "SI"]
     upper: Annotated[float, "upper edge of the bin", "SI"]
     count: Annotated[int, "samples in it"]
@@ -158,8 +144,6 @@ class HistogramRow(ChannelRow):
 
 @table("spectrum")
 class SpectrumRow(ChannelRow):
-    """A row of the table ``spectrum``."""
-
     frequency: Annotated[float, "mean of the bin", "Hz"]
     lower: Annotated[float, "lower end of the bin", "Hz"]
     upper: Annotated[float, "upper end of the bin", "Hz"]
@@ -171,16 +155,12 @@ class SpectrumRow(ChannelRow):
 
 @table("fixed_bias")
 class FixedBiasRow(ChannelRow):
-    """A row of the table ``fixed_bias``."""
-
     value: Annotated[float, "mean of the samples", "as in unit"]
     unit: Annotated[str, "SI unit of value"]
 
 
 @table("temperature")
 class TemperatureRow(ChannelRow):
-    """A row of the table ``temperature``."""
-
     compensated: Annotated[
         bool, "whether the effect is removed from the noise (method compensated)"
     ]
@@ -196,8 +176,6 @@ class TemperatureRow(ChannelRow):
 
 @table("allan_compensated")
 class CompensatedAllanRow(ChannelRow):
-    """A row of the table ``allan_compensated``."""
-
     tau: Annotated[float, "cluster length", "s"]
     adev: Annotated[
         float, "Allan deviation of the log without the temperature effect", "rad/s or m/s^2"
@@ -212,8 +190,6 @@ class CompensatedAllanRow(ChannelRow):
 
 @table("low_pass")
 class LowPassRow(ChannelRow):
-    """A row of the table ``low_pass``."""
-
     kind: Annotated[str | None, "analogue, bilinear or boxcar; null: none is visible"] = None
     order: Annotated[
         int | None, "order of the filter: 1, or of a Butterworth; null: no filter found"
@@ -230,8 +206,6 @@ class LowPassRow(ChannelRow):
 
 @table("reconstruction")
 class ReconstructionRow(ChannelRow):
-    """A row of the table ``reconstruction``."""
-
     method: Annotated[str, "estimation method"]
     tau: Annotated[float, "cluster length", "s"]
     adev: Annotated[float, "median of the ensemble of simulated logs", "rad/s or m/s^2"]
@@ -244,8 +218,6 @@ class ReconstructionRow(ChannelRow):
 
 @table("scores")
 class ScoreRow(ChannelRow):
-    """A row of the table ``scores``."""
-
     method: Annotated[str, "estimation method"]
     rms: Annotated[
         float | None,
@@ -290,8 +262,6 @@ class ScoreRow(ChannelRow):
 
 @table("simulated_truth")
 class SimulatedTruthRow(ChannelRow):
-    """A row of the table ``simulated_truth``."""
-
     parameter: Annotated[str, "as in parameters, temperature and low_pass; bias"]
     component: Annotated[int, "number of a repeated term, from 1"]
     value: Annotated[float, "true value of the simulation", "as in unit"]
@@ -302,8 +272,6 @@ class SimulatedTruthRow(ChannelRow):
 
 @table("backtest")
 class BacktestRow(ChannelRow):
-    """A row of the table ``backtest``."""
-
     requirement: Annotated[str, "requirement with this limit"]
     error: Annotated[str, "attitude, heading, velocity or position: the part from this channel"]
     time: Annotated[float, "of dead reckoning", "s"]
@@ -341,8 +309,6 @@ class BacktestRow(ChannelRow):
 
 @table("drawn_deviations")
 class DrawnDeviationRow(ChannelRow):
-    """A row of the table ``drawn_deviations``."""
-
     tau: Annotated[float, "averaging time", "s"]
     draw: Annotated[
         int | None, "rank of a drawn noise model, the lowest first; null: the estimate itself"
@@ -353,8 +319,6 @@ class DrawnDeviationRow(ChannelRow):
 
 @table("deterministic")
 class DeterministicRow(ChannelRow):
-    """A row of the table ``deterministic``."""
-
     kind: Annotated[str, "bias_step, warm_up_drift or periodic_drift: removed from the noise"]
     start: Annotated[float, "start of the part with the signal, from the first sample", "s"]
     end: Annotated[float, "end of this part; for a step both are its position", "s"]
@@ -375,8 +339,6 @@ class DeterministicRow(ChannelRow):
 
 @table("draws")
 class DrawRow(ChannelRow):
-    """A row of the table ``draws``."""
-
     method: Annotated[str, "estimation method: robust, likelihood, likelihood_gm or compensated"]
     draw: Annotated[int, "number of the draw, from 0: a noise model that the log allows"]
     component: Annotated[int, "number of a repeated term, from 1"]
@@ -406,8 +368,6 @@ class DrawRow(ChannelRow):
 
 @table("error_growth")
 class ErrorGrowthRow(OfRecordingRow):
-    """A row of the table ``error_growth``."""
-
     axis: Annotated[str, "worst of all axes, or x, y or z alone if there are several"]
     gyro: Annotated[str, "channel that answers"]
     accel: Annotated[str | None, "channel that answers"] = None

@@ -17,8 +17,6 @@ _Channel = Annotated[str | None, "the channel concerned; null: the whole recordi
 
 @table("recordings")
 class RecordingRow(SensorRow):
-    """A row of the table ``recordings``."""
-
     device: Annotated[str, "specimen of the sensor; by default the recording's name"]
     recording: Annotated[str, "name of the recording"]
     kind: Annotated[str, "static, two_position, rate_table or positions"]
@@ -47,8 +45,6 @@ class RecordingRow(SensorRow):
 
 @table("files")
 class FileRow(TableRow):
-    """A row of the table ``files``."""
-
     file: Annotated[str, "path in the drop zone"]
     sensor: Annotated[str | None, "sensor; null: the file is skipped"] = None
     recording: Annotated[str | None, "recording of the file; null: the file is skipped"] = None
@@ -58,8 +54,6 @@ class FileRow(TableRow):
 
 @table("doubts")
 class DoubtRow(OfRecordingRow):
-    """A row of the table ``doubts``."""
-
     channel: _Channel = None
     code: Annotated[str, "a finding; not_explained: the spectrum; doubtful: a parameter's status"]
     fitness: Annotated[Fitness, "unfit: the values may not belong to a sensor at rest"]
@@ -72,8 +66,6 @@ class DoubtRow(OfRecordingRow):
 
 @table("findings")
 class FindingRow(OfRecordingRow):
-    """A row of the table ``findings``."""
-
     channel: _Channel = None
     finding: Annotated[str, "what was found"]
     severity: Annotated[Severity, "fatal: not analysed"]
@@ -87,8 +79,6 @@ class FindingRow(OfRecordingRow):
 
 @table("failures")
 class FailureRow(SensorRow):
-    """A row of the table ``failures``."""
-
     recording: Annotated[str | None, "omitted recording; null: a step of the whole sensor"] = None
     step: Annotated[str, "step of the workflow that failed"]
     cause: Annotated[FailureCause, "time: it exceeded its time limit"]

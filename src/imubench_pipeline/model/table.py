@@ -160,6 +160,7 @@ def table(name: str) -> Callable[[type[R]], type[R]]:
     def declare(cls: type[R]) -> type[R]:
         made = row(cls)
         made.table = name
+        made.__doc__ = f"A row of the table ``{name}``."
         return made
 
     return declare

@@ -14,8 +14,6 @@ def _rms(where: str) -> str:
 
 @table("navigation")
 class NavigationRow(SensorRow):
-    """A row of the table ``navigation``."""
-
     recording: Annotated[str, "recording with the estimates for the tuning"]
     trajectory: Annotated[str | None, "trajectory: field, car, drone or rest"] = None
     outage: Annotated[float | None, "of GNSS; null: epochs with GNSS", "s"] = None

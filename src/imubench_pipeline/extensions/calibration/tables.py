@@ -15,8 +15,6 @@ from imubench_pipeline.model.table import (
 
 @table("calibration")
 class CalibrationRow(OfRecordingRow):
-    """A row of the table ``calibration``."""
-
     channel: Annotated[str, "the gyro that was calibrated"]
     run: Annotated[str, "rate_table; at_rest (direction stated); positions of a triad"]
     parameter: Annotated[
@@ -52,8 +50,6 @@ class CalibrationRow(OfRecordingRow):
 
 @table("calibration_points")
 class CalibrationPointRow(OfRecordingRow):
-    """A row of the table ``calibration_points``."""
-
     channel: Annotated[str, "the gyro that was calibrated"]
     number: Annotated[int, "number of the steady rate, in order, from 1"]
     start: Annotated[float, "from the first sample of the recording, without settling", "s"]

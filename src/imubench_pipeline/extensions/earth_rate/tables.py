@@ -22,8 +22,6 @@ Method = Annotated[
 
 @table("earth_rate")
 class EarthRateRow(OfRecordingRow):
-    """A row of the table ``earth_rate``."""
-
     channel: TurnedGyro
     part: Part
     method: Method
@@ -56,8 +54,6 @@ class EarthRateRow(OfRecordingRow):
 
 @table("earth_rate_series")
 class EarthRateSeriesRow(OfRecordingRow):
-    """A row of the table ``earth_rate_series``."""
-
     channel: TurnedGyro
     part: Part
     method: Method
@@ -69,8 +65,6 @@ class EarthRateSeriesRow(OfRecordingRow):
 
 @table("turning")
 class TurningRow(OfRecordingRow):
-    """A row of the table ``turning``."""
-
     channel: TurnedGyro
     what: Annotated[str, "dwell, turn, knock, or a doubt about the whole log log"]
     number: Annotated[int | None, "in order, from 1"] = None
@@ -86,8 +80,6 @@ class TurningRow(OfRecordingRow):
 
 @table("earth_rate_prediction")
 class EarthRatePredictionRow(OfRecordingRow):
-    """A row of the table ``earth_rate_prediction``."""
-
     channel: TurnedGyro
     of: Annotated[str, "goal: need; time: over run length; dwell: over length of a dwell"]
     latitude: Annotated[float, "where", "rad"]
@@ -104,8 +96,6 @@ class EarthRatePredictionRow(OfRecordingRow):
 
 @table("earth_rate_published")
 class EarthRatePublishedRow(OfRecordingRow):
-    """A row of the table ``earth_rate_published``."""
-
     channel: TurnedGyro
     part: Part
     place: Annotated[str, "of the source"]
@@ -125,8 +115,6 @@ class EarthRatePublishedRow(OfRecordingRow):
 
 @table("alignment")
 class AlignmentRow(OfRecordingRow):
-    """A row of the table ``alignment``."""
-
     recording: Annotated[str, "static recording with its noise"]
     positions: Annotated[int, "number of positions: 1, or 2 (opposite about the vertical)"]
     method: Annotated[str, "coarse or fine"]

@@ -14,8 +14,6 @@ from imubench_pipeline.model.table import (
 
 @table("published_figures")
 class PublishedFigureRow(ChannelRow):
-    """A row of the table ``published_figures``."""
-
     place: Annotated[str, "table of the source"]
     figure: Annotated[str, "its name there"]
     printed: Annotated[str, "as printed, with its unit"]
@@ -35,8 +33,6 @@ class PublishedFigureRow(ChannelRow):
 
 @table("fusion")
 class FusionRow(TableRow):
-    """A row of the table ``fusion``."""
-
     quantity: Annotated[str, "gyro or accel"]
     tau: Annotated[float, "averaging time at which they are compared", "s"]
     sensor: Annotated[str, "sensor of which several are averaged"]
@@ -62,8 +58,6 @@ class FusionRow(TableRow):
 
 @table("grades")
 class GradeRow(TableRow):
-    """A row of the table ``grades``."""
-
     quantity: Annotated[str, "gyro or accel"]
     sensor: Annotated[str, "sensor of which several are averaged"]
     recording: Annotated[str, "recording that represents it: of its median channel"]

@@ -7,8 +7,6 @@ from imubench_pipeline.model.table import TableRow, table
 
 @table("published")
 class PublishedRow(TableRow):
-    """A row of the table ``published``."""
-
     paper: Annotated[str, "its authors"]
     place: Annotated[str, "table, figure, equation or section, with its number there"]
     quantity: Annotated[str, "quantity, in words"]
@@ -38,8 +36,6 @@ class PublishedRow(TableRow):
 
 @table("accuracy")
 class AccuracyRow(TableRow):
-    """A row of the table ``accuracy``."""
-
     method: Annotated[str, "estimation method; likelihood_gm with the papers' model alone"]
     parameter: Annotated[str, "N, B, T_B or K"]
     logs: Annotated[int, "simulated"]
