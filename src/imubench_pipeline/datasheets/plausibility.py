@@ -161,9 +161,7 @@ def _list_values(printed: float | tuple[float, ...] | None) -> tuple[float, ...]
 
 
 def implausible_rates(
-    rates: Mapping[str, float],
-    bandwidths: Mapping[str, float | None],
-    stated: float | None = None,
+    rates: Mapping[str, float], bandwidths: Mapping[str, float | None], stated: float | None = None
 ) -> list[Finding]:
     """Return a finding for each sampling rate that no sensor is likely to have.
 

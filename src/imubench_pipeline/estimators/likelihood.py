@@ -27,12 +27,7 @@ from imubench_pipeline.estimators.estimate import (
     Parameter,
     not_shown,
 )
-from imubench_pipeline.estimators.frame import (
-    MIN_BINS,
-    Band,
-    FitSelection,
-    select_for_fit,
-)
+from imubench_pipeline.estimators.frame import MIN_BINS, Band, FitSelection, select_for_fit
 from imubench_pipeline.estimators.intervals import add_upper_limits, describe
 from imubench_pipeline.estimators.lines import Line, select_sinusoids
 from imubench_pipeline.estimators.missing import (

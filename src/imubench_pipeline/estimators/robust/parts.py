@@ -91,10 +91,7 @@ def compute_part_variances(
 
 
 def estimate_excess(
-    parts: PartVariances,
-    curve: AllanCurve,
-    influence: Array,
-    covariance: Callable[[int], Array],
+    parts: PartVariances, curve: AllanCurve, influence: Array, covariance: Callable[[int], Array]
 ) -> float:
     """Return the variance of the logarithm of a parameter between parts, beyond sampling errors.
 

@@ -3,13 +3,7 @@
 from typing import Annotated
 
 from imubench_pipeline.model.comparisons import DoubtCodes
-from imubench_pipeline.model.table import (
-    ChannelRow,
-    LowerLimit,
-    TableRow,
-    UpperLimit,
-    table,
-)
+from imubench_pipeline.model.table import ChannelRow, LowerLimit, TableRow, UpperLimit, table
 
 
 @table("published_figures")

@@ -9,10 +9,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from imubench_pipeline.recordings.quality.summary import (
-    ColumnSummary,
-    compute_finite_median,
-)
+from imubench_pipeline.recordings.quality.summary import ColumnSummary, compute_finite_median
 from imubench_pipeline.typing import Array
 
 _MAX_CREST_FACTOR = 6.0  # of extremes over deviation; a knock exceeds it
