@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from imubench_pipeline.allan import of_blocks
 from imubench_pipeline.allan.phase import Span, count_gaps, list_spans
-from imubench_pipeline.estimators import least_squares
+from imubench_pipeline.estimators import least_squares, missing
 from imubench_pipeline.estimators.curve_bias import add_curve_figures, make_averaging_times
 from imubench_pipeline.estimators.cutoff import Cutoff
 from imubench_pipeline.estimators.estimate import (
@@ -30,12 +30,6 @@ from imubench_pipeline.estimators.estimate import (
 from imubench_pipeline.estimators.frame import MIN_BINS, Band, FitSelection, select_for_fit
 from imubench_pipeline.estimators.intervals import add_upper_limits, describe
 from imubench_pipeline.estimators.lines import Line, select_sinusoids
-from imubench_pipeline.estimators.missing import (
-    average_blocks,
-    draw_slow_part,
-    fill_missing,
-    split_at_gaps,
-)
 from imubench_pipeline.estimators.model_choice import (
     MIN_AKAIKE_WEIGHT,
     PAPERS_MODEL,
@@ -155,8 +149,8 @@ def fit_blocks(
     if not holes:
         spectrum, lines = compute_spectra(blocks(), samples, rate, spans)
         return fit_spectrum(spectrum, select(spectrum, lines), rng=rng)
-    means = average_blocks(blocks(), spans)
-    parts = split_at_gaps(means, spans)
+    means = missing.average_blocks(blocks(), spans)
+    parts = missing.split_at_gaps(means, spans)
     if not parts:
         raise ValueError(f"none of the {samples} samples is present")
     present = float(means.count.sum()) / sum(stop - start for start, stop in parts)
@@ -171,8 +165,8 @@ def fit_blocks(
     needed = math.log(_MAX_REMAINING_MEMORY) / math.log(min(max(1.0 - present, 1e-6), 0.9))
     rounds = min(max(2, math.ceil(needed)), _MAX_ROUNDS)
     for number in range(1, rounds + 1):
-        path = draw_slow_part(means, parts, model, rate, rng)
-        complete = fill_missing(blocks(), path, model, rate, rng)
+        path = missing.draw_slow_part(means, parts, model, rate, rng)
+        complete = missing.fill_missing(blocks(), path, model, rate, rng)
         spectrum, lines = compute_spectra(complete, samples, rate, parts)
         spectrum = replace(spectrum, ordinates=spectrum.ordinates * present)
         frame = select(spectrum, lines)

@@ -11,12 +11,7 @@ from imubench_pipeline.estimators.estimate import COMPARED, SI_UNITS
 from imubench_pipeline.library.estimates import ChannelEstimate, Estimates, estimate
 from imubench_pipeline.library.logs import Log
 from imubench_pipeline.library.shown import Shown, Summary, cut
-from imubench_pipeline.navigation.ratios import (
-    ComparedChannel,
-    Ratio,
-    compare_deviations,
-    compare_parameters,
-)
+from imubench_pipeline.navigation import ratios
 from imubench_pipeline.report.practical import choose_page_unit
 from imubench_pipeline.settings.config import FusionSettings, Method
 from imubench_pipeline.settings.sensor import quantity_of
@@ -41,7 +36,7 @@ class Compared:
     tau: float | None  # s, of the Allan deviation
     names: tuple[str, str]
     values: tuple[float | None, float | None]
-    ratio: Ratio
+    ratio: ratios.Ratio
 
     @property
     def verdict(self) -> str:
@@ -223,13 +218,13 @@ def _pair(
         for symbol in COMPARED:
             a, b = ({**one.parameters, **one.curve}.get(symbol) for one in pair)
             if a is not None and b is not None:
-                ratio = compare_parameters(a, b)
+                ratio = ratios.compare_parameters(a, b)
                 yield Compared(channel, symbol, None, names, (a.value, b.value), ratio)
         a_log, b_log = (_make_fusion_channel(one) for one in pair)
         for tau in seconds:
             if tau > _FUSION_DEFAULTS.longest * min(a_log.duration, b_log.duration):
                 continue
-            ratio = compare_deviations(
+            ratio = ratios.compare_deviations(
                 a_log,
                 b_log,
                 tau,
@@ -241,12 +236,12 @@ def _pair(
             yield Compared(channel, "adev", tau, names, deviations, ratio)
 
 
-def _make_fusion_channel(estimate: ChannelEstimate) -> ComparedChannel:
+def _make_fusion_channel(estimate: ChannelEstimate) -> ratios.ComparedChannel:
     """Return a channel in the form of `extensions.fusion`."""
     curve = estimate.measured
     assert curve is not None
     sensor, _, recording = estimate.log.partition("/")
-    return ComparedChannel(
+    return ratios.ComparedChannel(
         sensor=sensor,
         recording=recording,
         channel=estimate.channel,

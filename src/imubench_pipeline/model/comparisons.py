@@ -2,18 +2,7 @@
 
 from typing import Annotated
 
-from imubench_pipeline.model.states import (
-    Action,
-    Basis,
-    DriftVerdict,
-    Evidence,
-    FigureState,
-    Origin,
-    PoolVerdict,
-    SourceCode,
-    SpreadOf,
-    Verdict,
-)
+from imubench_pipeline.model import states
 from imubench_pipeline.model.table import (
     ChannelRow,
     LowerLimit,
@@ -59,7 +48,7 @@ class DriftRow(SensorRow):
     p_value: Annotated[float | None, "probability of such a difference for an unchanged device"] = (
         None
     )
-    verdict: Annotated[DriftVerdict | None, "null: cannot be judged"] = None
+    verdict: Annotated[states.DriftVerdict | None, "null: cannot be judged"] = None
     reasons: Annotated[tuple[str, ...], "in words"] = ()
 
 
@@ -82,7 +71,7 @@ class PooledRow(SensorRow):
     p_value: Annotated[float | None, "probability of such differences if the recordings agree"] = (
         None
     )
-    verdict: Annotated[PoolVerdict | None, "at a level of 1 %"] = None
+    verdict: Annotated[states.PoolVerdict | None, "at a level of 1 %"] = None
     reasons: Annotated[tuple[str, ...], "in words"] = ()
     doubts: Annotated[tuple[DoubtMark, ...], "methods of the pooled recordings"] = ()
 
@@ -182,7 +171,7 @@ class ErrorBudgetRow(OfRecordingRow):
         float | None, "of a total: with the best of the class for figures not known", "as in unit"
     ] = None
     origin: Annotated[
-        Origin | None, "origin of a source; class limit: worst figure of its class"
+        states.Origin | None, "origin of a source; class limit: worst figure of its class"
     ] = None
     largest: Annotated[
         float | None,
@@ -198,7 +187,7 @@ class RankingRow(TableRow):
     sensor: Annotated[str, "name of the sensor file"]
     rank: Annotated[int | None, "1 is the best; null: not ranked"] = None
     tied_with: Annotated[tuple[str, ...], "sensors with overlapping intervals"] = ()
-    verdict: Annotated[Verdict, "verdict, subject to the column conditions"]
+    verdict: Annotated[states.Verdict, "verdict, subject to the column conditions"]
     decides: Annotated[bool, "the limit with the least margin"]
     recording: Annotated[
         str | None, "representative recording: with the error nearest to sigma"
@@ -223,8 +212,8 @@ class RankingRow(TableRow):
     chance: Annotated[
         float | None, "probability that sigma is within the limit, given logs and units"
     ] = None
-    limit_verdict: Annotated[Verdict, "verdict on this limit alone"]
-    source: Annotated[SourceCode | None, "the largest contribution: see parts"] = None
+    limit_verdict: Annotated[states.Verdict, "verdict on this limit alone"]
+    source: Annotated[states.SourceCode | None, "the largest contribution: see parts"] = None
     share: Annotated[float | None, "share of this source in the variance"] = None
     reached_after: Annotated[float | None, "time after which the limit is reached", "s"] = None
     conditions: Annotated[
@@ -245,19 +234,21 @@ class RankingRow(TableRow):
     spread: Annotated[
         float | None, "standard deviation of ln sigma between specimens; null: unknown"
     ] = None
-    spread_of: Annotated[SpreadOf | None, "compared units or recordings"] = None
+    spread_of: Annotated[states.SpreadOf | None, "compared units or recordings"] = None
     evidence: Annotated[
-        Evidence | None, "strength of the evidence for this limit; null: there is no figure"
+        states.Evidence | None, "strength of the evidence for this limit; null: there is no figure"
     ] = None
     evidence_reasons: Annotated[
         tuple[str, ...],
         "one_specimen, short_log, wide_interval, few_axes, or codes of the table doubts",
     ] = ()
     corrected_units: Annotated[tuple[UnitFactor, ...], "factors that correct doubtful units"] = ()
-    corrected_verdict: Annotated[Verdict | None, "with these factors"] = None
+    corrected_verdict: Annotated[states.Verdict | None, "with these factors"] = None
     corrected_margin: Annotated[float | None, "with these factors"] = None
     corrected_reasons: Annotated[tuple[str, ...], "reason without a verdict for these factors"] = ()
-    logged_verdict: Annotated[Verdict | None, "verdict with unused recordings, as logged"] = None
+    logged_verdict: Annotated[
+        states.Verdict | None, "verdict with unused recordings, as logged"
+    ] = None
     logged_margin: Annotated[float | None, "verdict with unused recordings, as logged"] = None
     backtest_channel: Annotated[
         str | None, "channel with the largest part of the error; null: not tested"
@@ -272,7 +263,7 @@ class RankingRow(TableRow):
 class NextStepRow(SensorRow):
     recording: Annotated[str | None, "name of the recording; null: a new one"] = None
     requirements: Annotated[tuple[str, ...], "requirements with verdicts that it can change"]
-    action: Annotated[Action, "what to do"]
+    action: Annotated[states.Action, "what to do"]
     quantities: Annotated[tuple[str, ...], "quantities with the unit or axes concerned"] = ()
     figures: Annotated[tuple[Condition, ...], "figures to look up in data sheets"] = ()
     doubts: Annotated[tuple[DoubtMark, ...], "doubts that it removes"] = ()
@@ -291,7 +282,7 @@ class ShortlistRow(TableRow):
     price_class: Annotated[str | None, "as stated"] = None
     rank: Annotated[int | None, "by the margin in use; null: not judged"] = None
     basis: Annotated[
-        Basis, "origin of the noise: printed, or as in the table ranking (simulated) logs"
+        states.Basis, "origin of the noise: printed, or as in the table ranking (simulated) logs"
     ] = "printed"
     margin: Annotated[
         float | None, "in use: limit over error, with the worst of the class for figures not known"
@@ -300,7 +291,7 @@ class ShortlistRow(TableRow):
     likely_margin: Annotated[float | None, "margin in use with the median of the class"] = None
     best_margin: Annotated[float | None, "margin in use with the best of the class"] = None
     decides: Annotated[str | None, "the limit with the smallest margin in use"] = None
-    verdict: Annotated[Verdict, "verdict, as in the table ranking"]
+    verdict: Annotated[states.Verdict, "verdict, as in the table ranking"]
     conditions: Annotated[
         tuple[Condition, ...], "unknown figures and properties; largest: permitted 1 sigma, SI"
     ] = ()
@@ -354,7 +345,7 @@ class CatalogueRow(SensorRow):
     technology: Annotated[tuple[str, ...], "of gyro and accelerometer"] = ()
     quantity: Annotated[str, "gyro or accel"]
     figure: Annotated[str, "key of the sensor file, such as noise_density"]
-    state: Annotated[FigureState, "published or not, or not looked up"]
+    state: Annotated[states.FigureState, "published or not, or not looked up"]
     value: Annotated[
         float | None, "as printed; one of a choice; the lower end of a range", "as in unit"
     ] = None

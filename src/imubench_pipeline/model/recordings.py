@@ -2,13 +2,7 @@
 
 from typing import Annotated
 
-from imubench_pipeline.model.states import (
-    FailureCause,
-    FileStatus,
-    Fitness,
-    RecordingStatus,
-    Severity,
-)
+from imubench_pipeline.model import states
 from imubench_pipeline.model.table import OfRecordingRow, SensorRow, TableRow, table
 from imubench_pipeline.model.verdicts import DoubtMark
 
@@ -25,7 +19,7 @@ class RecordingRow(SensorRow):
         None
     )
     simulated: Annotated[bool, "simulated from known parameters, not measured"]
-    status: Annotated[RecordingStatus, "failed: a step of its analysis failed"]
+    status: Annotated[states.RecordingStatus, "failed: a step of its analysis failed"]
     reason: Annotated[str | None, "why a recording is rejected or failed"] = None
     rate: Annotated[float | None, "sampling rate used", "Hz"] = None
     rate_from: Annotated[str | None, "source of the rate: stamps, or stated"] = None
@@ -38,7 +32,7 @@ class RecordingRow(SensorRow):
     duration: Annotated[float | None, "duration from the first to the last sample", "s"] = None
     temperature_min: Annotated[float | None, "lowest temperature", "degC"] = None
     temperature_max: Annotated[float | None, "highest temperature", "degC"] = None
-    fitness: Annotated[Fitness | None, "null: not analysed"] = None
+    fitness: Annotated[states.Fitness | None, "null: not analysed"] = None
     decides: Annotated[bool | None, "whether it is used in rankings, pools and exports"] = None
     doubts: Annotated[tuple[DoubtMark, ...], "codes and channels of doubts"] = ()
 
@@ -48,7 +42,7 @@ class FileRow(TableRow):
     file: Annotated[str, "path in the drop zone"]
     sensor: Annotated[str | None, "sensor; null: the file is skipped"] = None
     recording: Annotated[str | None, "recording of the file; null: the file is skipped"] = None
-    status: Annotated[FileStatus, "outcome of the file"]
+    status: Annotated[states.FileStatus, "outcome of the file"]
     reason: Annotated[str | None, "reason why it is not analysed"] = None
 
 
@@ -56,7 +50,7 @@ class FileRow(TableRow):
 class DoubtRow(OfRecordingRow):
     channel: _Channel = None
     code: Annotated[str, "a finding; not_explained: the spectrum; doubtful: a parameter's status"]
-    fitness: Annotated[Fitness, "unfit: the values may not belong to a sensor at rest"]
+    fitness: Annotated[states.Fitness, "unfit: the values may not belong to a sensor at rest"]
     parameters: Annotated[tuple[str, ...], "affected; empty: all"] = ()
     factor: Annotated[float | None, "possible change of a value, if known"] = None
     start: Annotated[float | None, "start of the part concerned, from the first sample", "s"] = None
@@ -68,7 +62,7 @@ class DoubtRow(OfRecordingRow):
 class FindingRow(OfRecordingRow):
     channel: _Channel = None
     finding: Annotated[str, "what was found"]
-    severity: Annotated[Severity, "fatal: not analysed"]
+    severity: Annotated[states.Severity, "fatal: not analysed"]
     affects: Annotated[tuple[str, ...], "parameters with doubtful estimates"] = ()
     detail: Annotated[str, "description with advice"]
     value: Annotated[float | None, "its size", "as the finding says"] = None
@@ -81,5 +75,5 @@ class FindingRow(OfRecordingRow):
 class FailureRow(SensorRow):
     recording: Annotated[str | None, "omitted recording; null: a step of the whole sensor"] = None
     step: Annotated[str, "step of the workflow that failed"]
-    cause: Annotated[FailureCause, "time: it exceeded its time limit"]
+    cause: Annotated[states.FailureCause, "time: it exceeded its time limit"]
     reason: Annotated[str, "reason in one line; see the log of the step"]
