@@ -1,7 +1,5 @@
 """Comparison of logs or estimates: ratios with intervals, by channel and parameter."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import combinations
@@ -67,7 +65,7 @@ class Comparison(Shown, Sequence[Compared]):
     def __len__(self) -> int:
         return len(self._compared)
 
-    def plot(self, ax: Axes | None = None) -> Axes:
+    def plot(self, ax: "Axes | None" = None) -> "Axes":
         """Draw each ratio with its interval, on a logarithmic axis."""
         from imubench_pipeline.library.drawing import draw_ratios, get_axes
 
@@ -82,7 +80,7 @@ class Comparison(Shown, Sequence[Compared]):
         axes.set_xlabel(f"ratio {two}")
         return axes
 
-    def to_pandas(self) -> pd.DataFrame:
+    def to_pandas(self) -> "pd.DataFrame":
         """Return a row for each channel, figure and pair; values are in SI, ratios are a over b."""
         import pandas as pd
 
