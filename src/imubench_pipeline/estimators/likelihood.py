@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from imubench_pipeline.allan import of_blocks
 from imubench_pipeline.allan.phase import Span, count_gaps, list_spans
-from imubench_pipeline.estimators import least_squares, missing
+from imubench_pipeline.estimators import least_squares, missing, white_level
 from imubench_pipeline.estimators.curve_bias import add_curve_figures, make_averaging_times
 from imubench_pipeline.estimators.cutoff import Cutoff
 from imubench_pipeline.estimators.estimate import (
@@ -43,11 +43,6 @@ from imubench_pipeline.estimators.posterior import (
     sample,
 )
 from imubench_pipeline.estimators.spectrum import Spectrum, compute_spectra
-from imubench_pipeline.estimators.white_level import (
-    count_fast_processes,
-    merge_fast_draws,
-    merge_fast_processes,
-)
 from imubench_pipeline.estimators.whittle import Terms, Whittle, make_noise_model
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.typing import Array
@@ -197,7 +192,7 @@ def fit_spectrum(
     alike = [chosen] + [
         c for c in candidates[1:] if c.akaike_weight >= MIN_AKAIKE_WEIGHT and not c.terms.ramp
     ]
-    fast = count_fast_processes(chosen.maximum, spectrum.rate)
+    fast = white_level.count_fast_processes(chosen.maximum, spectrum.rate)
     wider = [c for c in candidates if c.terms in _with_one_more(chosen.terms, fast)]
     papers = next(c for c in candidates if c.terms == PAPERS_MODEL)
     drawn = [c for c in candidates if c in alike or c in wider or c is papers]
@@ -250,7 +245,7 @@ class _InTheLog:
         wider: Sequence[Candidate],
     ) -> None:
         self._whittle, self._highest = whittle, frame.band.highest
-        self._number = count_fast_processes(alike[0].maximum, whittle.spectrum.rate)
+        self._number = white_level.count_fast_processes(alike[0].maximum, whittle.spectrum.rate)
         self.draws: dict[Terms, Posterior] = {}
         self._posteriors = posteriors
         self.alike = list(self._merged(alike))
@@ -261,13 +256,15 @@ class _InTheLog:
         merged: set[Terms] = set()
         for candidate in candidates:
             number = min(self._number, int(np.sum(candidate.maximum.times < BROADBAND_TIME)))
-            maximum = merge_fast_processes(candidate.maximum, number)
+            maximum = white_level.merge_fast_processes(candidate.maximum, number)
             if maximum.terms in merged:
                 continue
             merged.add(maximum.terms)
             if maximum.terms not in self.draws:
                 posterior = self._posteriors[candidate.terms]
-                self.draws[maximum.terms] = merge_fast_draws(posterior, candidate.terms, number)
+                self.draws[maximum.terms] = white_level.merge_fast_draws(
+                    posterior, candidate.terms, number
+                )
             yield replace(candidate, maximum=maximum)
 
     def estimate(self, method: str) -> Estimate:
