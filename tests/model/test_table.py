@@ -9,7 +9,7 @@ import pyarrow as pa
 import pytest
 
 from imubench_pipeline.model.estimates import ParameterRow, ScoreRow
-from imubench_pipeline.model.table import Column, SensorRow, TableRow, columns_of, names_of, table
+from imubench_pipeline.model.table import SensorRow, TableRow, columns_of, names_of, table
 from imubench_pipeline.tables.files import build, make_schema
 from imubench_pipeline.tables.schemas import ROWS, TABLES
 from tests.test_architecture import PACKAGE
@@ -19,10 +19,10 @@ from tests.test_architecture import PACKAGE
 class ExampleRow(SensorRow):
     """All types of columns."""
 
-    count: Annotated[int, Column("how many")]
-    size: Annotated[float | None, Column("how large", "Hz")] = None
-    many: Annotated[float | None, Column("of very many", single=True)] = None
-    right: Annotated[bool | None, Column("yes or no")] = None
+    count: Annotated[int, "how many"]
+    size: Annotated[float | None, "how large", "Hz"] = None
+    many: Annotated[float | None, "of very many", "-", pa.float32()] = None
+    right: Annotated[bool | None, "yes or no"] = None
 
 
 def test_columns_derive_from_the_fields() -> None:

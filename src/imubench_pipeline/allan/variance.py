@@ -17,13 +17,8 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from imubench_pipeline.allan import octave
 from imubench_pipeline.allan.confidence import deviation_limits, equivalent_degrees, noise_exponent
-from imubench_pipeline.allan.octave import (
-    DECIMATION,
-    MIN_DECIMATED_SAMPLES,
-    OctaveSums,
-    round_octave_sizes,
-)
 from imubench_pipeline.allan.phase import (
     MIN_PRESENT_SHARE,
     NO_GAPS,
@@ -226,18 +221,18 @@ def of_blocks(
     octave. The other arguments and the errors are as in `allan_variance`.
     """
     spans = list_spans(segments, samples)
-    wanted = round_octave_sizes(_check_arguments(rate, sizes, samples, spans))
-    if samples < MIN_DECIMATED_SAMPLES:
+    wanted = octave.round_octave_sizes(_check_arguments(rate, sizes, samples, spans))
+    if samples < octave.MIN_DECIMATED_SAMPLES:
         phase = integrate(blocks, samples, holes=holes, segments=spans)
         return of_phase(phase, rate, wanted, gaps=gaps, threads=threads)
-    longest: OctaveSums | None = None
+    longest: octave.OctaveSums | None = None
     sums: list[NDArray[Any]] = []
     done = 0
     if threads > 1:
         blocks = read_ahead(blocks)
     for number, group in groupby(split(blocks, spans), key=itemgetter(0)):
         start, stop = spans[number]
-        part = OctaveSums(wanted, stop - start, holes=holes, gaps=gaps, threads=threads)
+        part = octave.OctaveSums(wanted, stop - start, holes=holes, gaps=gaps, threads=threads)
         for _, block in group:
             part.push(block if block.dtype == np.float32 else np.asarray(block, np.float64))
         if part.received != stop - start:
@@ -251,11 +246,11 @@ def of_blocks(
         raise ValueError(f"the blocks end before sample {spans[done][1]}")
 
     def edges(n: int) -> tuple[Array, NDArray[Any] | None, int]:
-        if n < _MIN_STRIDES_IN_CLUSTER * DECIMATION:
+        if n < _MIN_STRIDES_IN_CLUSTER * octave.DECIMATION:
             return *longest.first.every(n), n
         # The noise type is the same at the nearest multiple of the stride.
-        step = round(n / DECIMATION)
-        return *longest.phase.every(step), step * DECIMATION
+        step = round(n / octave.DECIMATION)
+        return *longest.phase.every(step), step * octave.DECIMATION
 
     return _make_curve(rate, wanted, samples, spans, sums, edges)
 

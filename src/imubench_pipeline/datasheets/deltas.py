@@ -194,18 +194,9 @@ def bias_deltas(
     """Compare the fixed bias of a recording and its temperature sensitivity with the datasheet.
 
     The rows are the offset; the temperature coefficient, if one is printed; and the printed figures
-    of repeatability and temperature that cannot be compared with one log.
-
-    Parameters
-    ----------
-    datasheet : Datasheet
-    channel : str
-    means : mapping of str to float
-        Mean of every channel of the recording, rad/s or m/s².
-    tolerance : float
-        Relative difference that still counts as printed.
-    sensitivity : Parameter, optional
-        From `datasheets.measured.compute_sensitivity`; None without readings of the temperature.
+    of repeatability and temperature that cannot be compared with one log. ``means``: of every
+    channel of the recording, rad/s or m/s²; ``tolerance``: relative difference that still counts as
+    printed; ``sensitivity``: of `compute_sensitivity`, None without readings of the temperature.
     """
     bias = compute_fixed_bias(channel, means)
     for entry in read_bias_comparables(datasheet, channel):
@@ -313,19 +304,9 @@ def curve_rms(
 
     The two add as variances: σ²(τ) = N²/τ + floor². If a datasheet prints only one of them, that
     line is used alone. A density of unknown sidedness gives two curves. Typical figures are
-    preferred.
-
-    Parameters
-    ----------
-    printed : sequence of Comparable
-        Figures of a channel, from `comparable.comparables`.
-    tau, adev : ndarray, shape (m,)
-        s, and measured Allan deviation, rad/s or m/s².
-
-    Raises
-    ------
-    ValueError
-        If the shapes of the arrays differ, or a deviation is not above 0.
+    preferred. ``printed``: figures of a channel; ``tau`` and ``adev``, shape (m,): s, and measured
+    Allan deviation, rad/s or m/s². Raises ValueError if the shapes differ, or a deviation is not
+    above 0.
     """
     if tau.shape != adev.shape or not tau.size or np.any(adev <= 0):
         raise ValueError(

@@ -161,25 +161,13 @@ def _list_values(printed: float | tuple[float, ...] | None) -> tuple[float, ...]
 
 
 def implausible_rates(
-    rates: Mapping[str, float],
-    bandwidths: Mapping[str, float | None],
-    stated: float | None = None,
+    rates: Mapping[str, float], bandwidths: Mapping[str, float | None], stated: float | None = None
 ) -> list[Finding]:
     """Return a finding for each sampling rate that no sensor is likely to have.
 
-    Parameters
-    ----------
-    rates : mapping of str to float
-        Rate of each channel, Hz.
-    bandwidths : mapping of str to float or None
-        Largest bandwidth that the data sheet prints for each channel, Hz.
-    stated : float or None
-        Rate in the sensor file, Hz.
-
-    Returns
-    -------
-    list of Finding
-        Their values are the factors that correct the times.
+    ``rates``, Hz, and ``bandwidths``, the largest that the datasheet prints, Hz, are by channel;
+    ``stated`` is the rate in the sensor file, Hz. The values of the findings are the factors that
+    correct the times.
     """
     slowest = MIN_RATE if stated is None else MIN_RATE_STATED
     by_rate: dict[tuple[float, float], list[str]] = {}

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from imubench_pipeline.allan import of_blocks
 from imubench_pipeline.allan.phase import Span, count_gaps, list_spans
-from imubench_pipeline.estimators import least_squares
+from imubench_pipeline.estimators import least_squares, missing, white_level
 from imubench_pipeline.estimators.curve_bias import add_curve_figures, make_averaging_times
 from imubench_pipeline.estimators.cutoff import Cutoff
 from imubench_pipeline.estimators.estimate import (
@@ -27,20 +27,9 @@ from imubench_pipeline.estimators.estimate import (
     Parameter,
     not_shown,
 )
-from imubench_pipeline.estimators.frame import (
-    MIN_BINS,
-    Band,
-    FitSelection,
-    select_for_fit,
-)
+from imubench_pipeline.estimators.frame import MIN_BINS, Band, FitSelection, select_for_fit
 from imubench_pipeline.estimators.intervals import add_upper_limits, describe
 from imubench_pipeline.estimators.lines import Line, select_sinusoids
-from imubench_pipeline.estimators.missing import (
-    average_blocks,
-    draw_slow_part,
-    fill_missing,
-    split_at_gaps,
-)
 from imubench_pipeline.estimators.model_choice import (
     MIN_AKAIKE_WEIGHT,
     PAPERS_MODEL,
@@ -54,11 +43,6 @@ from imubench_pipeline.estimators.posterior import (
     sample,
 )
 from imubench_pipeline.estimators.spectrum import Spectrum, compute_spectra
-from imubench_pipeline.estimators.white_level import (
-    count_fast_processes,
-    merge_fast_draws,
-    merge_fast_processes,
-)
 from imubench_pipeline.estimators.whittle import Terms, Whittle, make_noise_model
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.typing import Array
@@ -160,8 +144,8 @@ def fit_blocks(
     if not holes:
         spectrum, lines = compute_spectra(blocks(), samples, rate, spans)
         return fit_spectrum(spectrum, select(spectrum, lines), rng=rng)
-    means = average_blocks(blocks(), spans)
-    parts = split_at_gaps(means, spans)
+    means = missing.average_blocks(blocks(), spans)
+    parts = missing.split_at_gaps(means, spans)
     if not parts:
         raise ValueError(f"none of the {samples} samples is present")
     present = float(means.count.sum()) / sum(stop - start for start, stop in parts)
@@ -176,8 +160,8 @@ def fit_blocks(
     needed = math.log(_MAX_REMAINING_MEMORY) / math.log(min(max(1.0 - present, 1e-6), 0.9))
     rounds = min(max(2, math.ceil(needed)), _MAX_ROUNDS)
     for number in range(1, rounds + 1):
-        path = draw_slow_part(means, parts, model, rate, rng)
-        complete = fill_missing(blocks(), path, model, rate, rng)
+        path = missing.draw_slow_part(means, parts, model, rate, rng)
+        complete = missing.fill_missing(blocks(), path, model, rate, rng)
         spectrum, lines = compute_spectra(complete, samples, rate, parts)
         spectrum = replace(spectrum, ordinates=spectrum.ordinates * present)
         frame = select(spectrum, lines)
@@ -208,7 +192,7 @@ def fit_spectrum(
     alike = [chosen] + [
         c for c in candidates[1:] if c.akaike_weight >= MIN_AKAIKE_WEIGHT and not c.terms.ramp
     ]
-    fast = count_fast_processes(chosen.maximum, spectrum.rate)
+    fast = white_level.count_fast_processes(chosen.maximum, spectrum.rate)
     wider = [c for c in candidates if c.terms in _with_one_more(chosen.terms, fast)]
     papers = next(c for c in candidates if c.terms == PAPERS_MODEL)
     drawn = [c for c in candidates if c in alike or c in wider or c is papers]
@@ -261,7 +245,7 @@ class _InTheLog:
         wider: Sequence[Candidate],
     ) -> None:
         self._whittle, self._highest = whittle, frame.band.highest
-        self._number = count_fast_processes(alike[0].maximum, whittle.spectrum.rate)
+        self._number = white_level.count_fast_processes(alike[0].maximum, whittle.spectrum.rate)
         self.draws: dict[Terms, Posterior] = {}
         self._posteriors = posteriors
         self.alike = list(self._merged(alike))
@@ -272,13 +256,15 @@ class _InTheLog:
         merged: set[Terms] = set()
         for candidate in candidates:
             number = min(self._number, int(np.sum(candidate.maximum.times < BROADBAND_TIME)))
-            maximum = merge_fast_processes(candidate.maximum, number)
+            maximum = white_level.merge_fast_processes(candidate.maximum, number)
             if maximum.terms in merged:
                 continue
             merged.add(maximum.terms)
             if maximum.terms not in self.draws:
                 posterior = self._posteriors[candidate.terms]
-                self.draws[maximum.terms] = merge_fast_draws(posterior, candidate.terms, number)
+                self.draws[maximum.terms] = white_level.merge_fast_draws(
+                    posterior, candidate.terms, number
+                )
             yield replace(candidate, maximum=maximum)
 
     def estimate(self, method: str) -> Estimate:

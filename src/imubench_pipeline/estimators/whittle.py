@@ -329,11 +329,7 @@ class Whittle:
 
 
 def make_whittle(
-    spectrum: Spectrum,
-    highest: float,
-    shapes: int = SHAPES,
-    *,
-    shortest: float | None = None,
+    spectrum: Spectrum, highest: float, shapes: int = SHAPES, *, shortest: float | None = None
 ) -> Whittle:
     """Return the likelihood of a spectrum, with the correlation times that it can show.
 

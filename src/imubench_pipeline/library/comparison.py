@@ -1,7 +1,5 @@
 """Comparison of logs or estimates: ratios with intervals, by channel and parameter."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import combinations
@@ -11,12 +9,7 @@ from imubench_pipeline.estimators.estimate import COMPARED, SI_UNITS
 from imubench_pipeline.library.estimates import ChannelEstimate, Estimates, estimate
 from imubench_pipeline.library.logs import Log
 from imubench_pipeline.library.shown import Shown, Summary, cut
-from imubench_pipeline.navigation.ratios import (
-    ComparedChannel,
-    Ratio,
-    compare_deviations,
-    compare_parameters,
-)
+from imubench_pipeline.navigation import ratios
 from imubench_pipeline.report.practical import choose_page_unit
 from imubench_pipeline.settings.config import FusionSettings, Method
 from imubench_pipeline.settings.sensor import quantity_of
@@ -41,7 +34,7 @@ class Compared:
     tau: float | None  # s, of the Allan deviation
     names: tuple[str, str]
     values: tuple[float | None, float | None]
-    ratio: Ratio
+    ratio: ratios.Ratio
 
     @property
     def verdict(self) -> str:
@@ -72,7 +65,7 @@ class Comparison(Shown, Sequence[Compared]):
     def __len__(self) -> int:
         return len(self._compared)
 
-    def plot(self, ax: Axes | None = None) -> Axes:
+    def plot(self, ax: "Axes | None" = None) -> "Axes":
         """Draw each ratio with its interval, on a logarithmic axis."""
         from imubench_pipeline.library.drawing import draw_ratios, get_axes
 
@@ -87,7 +80,7 @@ class Comparison(Shown, Sequence[Compared]):
         axes.set_xlabel(f"ratio {two}")
         return axes
 
-    def to_pandas(self) -> pd.DataFrame:
+    def to_pandas(self) -> "pd.DataFrame":
         """Return a row for each channel, figure and pair; values are in SI, ratios are a over b."""
         import pandas as pd
 
@@ -223,13 +216,13 @@ def _pair(
         for symbol in COMPARED:
             a, b = ({**one.parameters, **one.curve}.get(symbol) for one in pair)
             if a is not None and b is not None:
-                ratio = compare_parameters(a, b)
+                ratio = ratios.compare_parameters(a, b)
                 yield Compared(channel, symbol, None, names, (a.value, b.value), ratio)
         a_log, b_log = (_make_fusion_channel(one) for one in pair)
         for tau in seconds:
             if tau > _FUSION_DEFAULTS.longest * min(a_log.duration, b_log.duration):
                 continue
-            ratio = compare_deviations(
+            ratio = ratios.compare_deviations(
                 a_log,
                 b_log,
                 tau,
@@ -241,12 +234,12 @@ def _pair(
             yield Compared(channel, "adev", tau, names, deviations, ratio)
 
 
-def _make_fusion_channel(estimate: ChannelEstimate) -> ComparedChannel:
+def _make_fusion_channel(estimate: ChannelEstimate) -> ratios.ComparedChannel:
     """Return a channel in the form of `extensions.fusion`."""
     curve = estimate.measured
     assert curve is not None
     sensor, _, recording = estimate.log.partition("/")
-    return ComparedChannel(
+    return ratios.ComparedChannel(
         sensor=sensor,
         recording=recording,
         channel=estimate.channel,

@@ -1,7 +1,5 @@
 """Allan curves of logs, arrays and tables, by channel."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING, Any, Literal
@@ -46,7 +44,7 @@ class Curve(Shown, AllanCurve):
     channel: str | None = None
 
     @classmethod
-    def of(cls, curve: AllanCurve, channel: str | None) -> Curve:
+    def of(cls, curve: AllanCurve, channel: str | None) -> "Curve":
         """Return a curve with its channel."""
         values = {field.name: getattr(curve, field.name) for field in fields(AllanCurve)}
         return cls(**values, channel=channel)
@@ -56,7 +54,7 @@ class Curve(Shown, AllanCurve):
         """``gyro`` or ``accel``; None: not known."""
         return None if self.channel is None else quantity_of(self.channel)
 
-    def plot(self, ax: Axes | None = None) -> Axes:
+    def plot(self, ax: "Axes | None" = None) -> "Axes":
         """Draw the deviation with 95 % limits, and the slopes of noise terms in grey."""
         from imubench_pipeline.library.drawing import draw_curves, get_axes
 
@@ -64,7 +62,7 @@ class Curve(Shown, AllanCurve):
         draw_curves(axes, {self.channel or "Allan deviation": self}, self.quantity)
         return axes
 
-    def to_pandas(self) -> pd.DataFrame:
+    def to_pandas(self) -> "pd.DataFrame":
         """Return a row for each tau: deviation, 95 % limits, degrees of freedom; units in attrs."""
         return _make_table([self])
 
@@ -95,7 +93,7 @@ class Curves(Shown, Mapping[str, Curve]):
     def __len__(self) -> int:
         return len(self._curves)
 
-    def plot(self, ax: Axes | Sequence[Axes] | None = None) -> Any:
+    def plot(self, ax: "Axes | Sequence[Axes] | None" = None) -> Any:
         """Draw the curves, one panel per quantity; return the axes, shape (quantities,)."""
         from imubench_pipeline.library.drawing import create_panels, draw_curves
 
@@ -107,7 +105,7 @@ class Curves(Shown, Mapping[str, Curve]):
             draw_curves(panel, curves, quantity)
         return axes
 
-    def to_pandas(self) -> pd.DataFrame:
+    def to_pandas(self) -> "pd.DataFrame":
         """Return a row for each channel and tau, like the workflow's table ``allan``, in SI."""
         return _make_table(self.values())
 
@@ -142,7 +140,7 @@ def _make_row(curve: Curve) -> list[str]:
     ]
 
 
-def _make_table(curves: Iterable[Curve]) -> pd.DataFrame:
+def _make_table(curves: Iterable[Curve]) -> "pd.DataFrame":
     import pandas as pd
 
     rows = []

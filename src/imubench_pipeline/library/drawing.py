@@ -1,7 +1,5 @@
 """Draw results on axes of the user, who can continue to use them."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from itertools import cycle
@@ -23,7 +21,7 @@ if TYPE_CHECKING:
 _SAMPLE_UNIT = Unit("unit of the samples", 1.0)
 
 
-def create_panels(names: Sequence[str], ax: Axes | Sequence[Axes] | None = None) -> Any:
+def create_panels(names: Sequence[str], ax: "Axes | Sequence[Axes] | None" = None) -> Any:
     """Return the given axes, or new ones, at most three in a row: one for each name, (n,).
 
     Raises ExtraError if matplotlib is not installed, and ValueError for another number of axes.
@@ -46,7 +44,7 @@ def create_panels(names: Sequence[str], ax: Axes | Sequence[Axes] | None = None)
     return axes.ravel()[:count]
 
 
-def get_axes(ax: Axes | None) -> Any:
+def get_axes(ax: "Axes | None") -> Any:
     """Return the given axes, or new ones."""
     return create_panels([""])[0] if ax is None else ax
 
@@ -56,7 +54,7 @@ def choose_deviation_unit(quantity: str | None) -> Unit:
     return _SAMPLE_UNIT if quantity is None else choose_page_unit(quantity, "adev", "practical")
 
 
-def draw_curves(axes: Axes, curves: Mapping[str, AllanCurve], quantity: str | None) -> None:
+def draw_curves(axes: "Axes", curves: Mapping[str, AllanCurve], quantity: str | None) -> None:
     """Draw Allan deviations with their 95 % limits, and the slopes of noise."""
     unit = choose_deviation_unit(quantity)
     looks = cycle(assign_sensor_styles([*curves]).values())
@@ -88,14 +86,14 @@ def draw_curves(axes: Axes, curves: Mapping[str, AllanCurve], quantity: str | No
     axes.set_ylim(*limits[1])
 
 
-def draw_measured(axes: Axes, curve: AllanCurve, unit: Unit, name: str, colour: str) -> None:
+def draw_measured(axes: "Axes", curve: AllanCurve, unit: Unit, name: str, colour: str) -> None:
     """Draw an Allan deviation with its 95 % limits."""
     lower, upper = (limit * unit.per_si for limit in curve.limits())
     axes.fill_between(curve.tau, lower, upper, color=colour, alpha=0.2, linewidth=0)
     axes.plot(curve.tau, curve.deviation * unit.per_si, color=colour, label=name, linewidth=1.2)
 
 
-def draw_model(axes: Axes, curve: AllanCurve, model: NoiseModel, quantity: str) -> None:
+def draw_model(axes: "Axes", curve: AllanCurve, model: NoiseModel, quantity: str) -> None:
     """Draw a measured curve, the terms of a model, and their sum."""
     from imubench_pipeline.report.static_figures.style import SUM_LOOK, TERM_LOOKS, TERM_NAMES
 
@@ -118,7 +116,7 @@ def draw_model(axes: Axes, curve: AllanCurve, model: NoiseModel, quantity: str) 
     _format_axes(axes, unit)
 
 
-def draw_ratios(axes: Axes, labels: Sequence[str], ratios: Sequence[Ratio]) -> None:
+def draw_ratios(axes: "Axes", labels: Sequence[str], ratios: Sequence[Ratio]) -> None:
     """Draw ratios with 95 % intervals in rows."""
     places = range(len(ratios), 0, -1)
     for place, ratio in zip(places, ratios, strict=True):
@@ -141,7 +139,7 @@ def draw_ratios(axes: Axes, labels: Sequence[str], ratios: Sequence[Ratio]) -> N
     axes.grid(True, axis="x", color="0.9")
 
 
-def _format_axes(axes: Axes, unit: Unit) -> None:
+def _format_axes(axes: "Axes", unit: Unit) -> None:
     axes.set_xscale("log")
     axes.set_yscale("log")
     axes.set_xlabel("averaging time τ (s)")

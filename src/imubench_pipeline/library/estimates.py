@@ -1,7 +1,5 @@
 """Noise parameters of logs, arrays and tables, estimated by the functions of the workflow."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from typing import TYPE_CHECKING, Any, get_args
@@ -54,7 +52,7 @@ class ChannelEstimate(Shown, Estimate):
     log: str = "/"
 
     @classmethod
-    def of(cls, estimate: Estimate, channel: str, measured: Curve, log: str) -> ChannelEstimate:
+    def of(cls, estimate: Estimate, channel: str, measured: Curve, log: str) -> "ChannelEstimate":
         """Return an estimate with its channel, curve and log."""
         values = {each.name: getattr(estimate, each.name) for each in fields(Estimate)}
         return cls(**values, channel=channel, measured=measured, log=log)
@@ -71,7 +69,7 @@ class ChannelEstimate(Shown, Estimate):
             raise KeyError(f"no parameter {parameter!r}; {self.method} has {', '.join(known)}")
         return known[parameter]
 
-    def plot(self, ax: Axes | None = None) -> Axes:
+    def plot(self, ax: "Axes | None" = None) -> "Axes":
         """Draw the measured curve with 95 % limits, the terms of the model, and their sum."""
         from imubench_pipeline.library.drawing import draw_model, get_axes
 
@@ -81,7 +79,7 @@ class ChannelEstimate(Shown, Estimate):
         axes.set_title(self.channel)
         return axes
 
-    def to_pandas(self, units: System = "si") -> pd.DataFrame:
+    def to_pandas(self, units: System = "si") -> "pd.DataFrame":
         """Return a row for each parameter: see `Estimates.to_pandas`."""
         return _make_table([self], units)
 
@@ -159,7 +157,7 @@ class Estimates(Shown, Mapping[str, ChannelEstimate]):
             )
         return next(iter(self.values())).model
 
-    def plot(self, ax: Axes | Sequence[Axes] | None = None) -> Any:
+    def plot(self, ax: "Axes | Sequence[Axes] | None" = None) -> Any:
         """Draw curve and terms of each channel; return the axes, shape (channels,)."""
         from imubench_pipeline.library.drawing import create_panels
 
@@ -168,7 +166,7 @@ class Estimates(Shown, Mapping[str, ChannelEstimate]):
             estimate.plot(panel)
         return axes
 
-    def to_pandas(self, units: System = "si") -> pd.DataFrame:
+    def to_pandas(self, units: System = "si") -> "pd.DataFrame":
         """Return a row for each channel and parameter, like the workflow's table ``parameters``.
 
         Parameters
@@ -336,7 +334,7 @@ def _list_reasons(estimates: Any) -> list[str]:
     return list(dict.fromkeys(reasons))
 
 
-def _make_table(estimates: Any, units: System) -> pd.DataFrame:
+def _make_table(estimates: Any, units: System) -> "pd.DataFrame":
     import pandas as pd
 
     if units not in get_args(System):

@@ -17,15 +17,10 @@ from imubench_pipeline.library.given import Channels, Column, Units, expand_chan
 from imubench_pipeline.library.shown import Shown, Summary, cut
 from imubench_pipeline.readers.inspection import inspect
 from imubench_pipeline.readers.inspection.draft import Entry
+from imubench_pipeline.recordings import recording
 from imubench_pipeline.recordings.drop_zone import get_recording_name, get_sensor_name
 from imubench_pipeline.recordings.ingest import ingest_as_planned
 from imubench_pipeline.recordings.kept import Quality
-from imubench_pipeline.recordings.recording import (
-    ChannelLog,
-    open_channel_logs,
-    place_on_grid,
-    was_at_rest,
-)
 from imubench_pipeline.settings.quality import QualitySettings
 from imubench_pipeline.settings.sensor import (
     CHANNELS,
@@ -79,14 +74,14 @@ class Log(Shown):
         self, folder: Path, quality: Quality, sensor: Sensor | None, bandwidth: float | None
     ) -> None:
         weakref.finalize(self, shutil.rmtree, folder, ignore_errors=True)
-        self._logs = open_channel_logs(folder)
+        self._logs = recording.open_channel_logs(folder)
         self._about = quality.recording
         self.quality, self.declared = quality, sensor
         self.sensor = self._about.sensor
         self.recording = self._about.recording
         self.bandwidth = bandwidth
         self.channels = tuple(self._logs)
-        self._at_rest = was_at_rest(folder)
+        self._at_rest = recording.was_at_rest(folder)
         rows = [*quality.findings, *implausible_of(quality, sensor)]
         self.findings = tuple(map(make_finding, rows))
 
@@ -133,12 +128,12 @@ class Log(Shown):
         """Return a channel, or ``temperature``, on its grid: SI, shape (L,), NaN where missing."""
         if channel == TEMPERATURE and self._has_temperature:
             log = next(log for log in self._logs.values() if log.temperature)
-            return place_on_grid(log.temperatures(), log.grid)
+            return recording.place_on_grid(log.temperatures(), log.grid)
         if channel not in self._logs:
             there = [*self.channels, *([TEMPERATURE] if self._has_temperature else [])]
             raise KeyError(f"no channel {channel!r} in {self.name}; it has {', '.join(there)}")
         log = self._logs[channel]
-        return place_on_grid(log.blocks(), log.grid)
+        return recording.place_on_grid(log.blocks(), log.grid)
 
     def __iter__(self) -> Iterator[str]:
         return iter(self.channels)
@@ -150,7 +145,7 @@ class Log(Shown):
     def _has_temperature(self) -> bool:
         return any(log.temperature for log in self._logs.values())
 
-    def chosen(self, channels: Channels | None = None) -> dict[str, ChannelLog]:
+    def chosen(self, channels: Channels | None = None) -> dict[str, recording.ChannelLog]:
         """Return channels, by default all, in the form of the steps of the workflow.
 
         Raises
@@ -285,21 +280,9 @@ def read_log(
 
 
 def ingest_columns(columns: Mapping[str, Column], rate: float, name: str) -> Log:
-    """Return samples as a log, ingested like a file, with the same checks.
+    """Return samples at a rate, Hz, as a log of this name, ingested like a file with all checks.
 
-    Parameters
-    ----------
-    columns : mapping of str to Column
-        Channels, and perhaps the temperature.
-    rate : float
-        Hz.
-    name : str
-        Name of the log.
-
-    Raises
-    ------
-    RecordingError
-        If no channel can be used.
+    Raises RecordingError if no channel can be used.
     """
     if not name or Path(name).name != name:
         raise ValueError(f"name is {name!r}; expected the name of a log, without '/'")

@@ -2,10 +2,11 @@
 
 from typing import Annotated
 
+import pyarrow as pa
+
 from imubench_pipeline.model.states import BacktestVerdict, GoodnessVerdict
 from imubench_pipeline.model.table import (
     ChannelRow,
-    Column,
     Estimate,
     EstimateReason,
     EstimateStatus,
@@ -23,58 +24,49 @@ from imubench_pipeline.model.table import (
     table,
 )
 
-_Degrees = Annotated[float | None, Column("equivalent degrees of freedom of the Allan variance")]
+_Degrees = Annotated[float | None, "equivalent degrees of freedom of the Allan variance"]
 _UpperDegrees = Annotated[
-    float | None,
-    Column("degrees of freedom of the upper 95 % limit: more where few clusters remain"),
+    float | None, "degrees of freedom of the upper 95 % limit: more where few clusters remain"
 ]
 _DegreesSource = Annotated[
-    str, Column("basis of the degrees of freedom: fitted spectrum, or power law at this tau")
+    str, "basis of the degrees of freedom: fitted spectrum, or power law at this tau"
 ]
 
 
 @table("allan")
 class AllanRow(ChannelRow):
-    """A row of the table ``allan``."""
-
-    tau: Annotated[float, Column("cluster length, cluster_size / rate", "s")]
-    cluster_size: Annotated[int, Column("samples in a cluster")]
-    adev: Annotated[float, Column("Allan deviation", "rad/s or m/s^2")]
-    lower: Annotated[float | None, Column("lower 95 % limit", "rad/s or m/s^2")] = None
-    upper: Annotated[float | None, Column("upper 95 % limit", "rad/s or m/s^2")] = None
+    tau: Annotated[float, "cluster length, cluster_size / rate", "s"]
+    cluster_size: Annotated[int, "samples in a cluster"]
+    adev: Annotated[float, "Allan deviation", "rad/s or m/s^2"]
+    lower: Annotated[float | None, "lower 95 % limit", "rad/s or m/s^2"] = None
+    upper: Annotated[float | None, "upper 95 % limit", "rad/s or m/s^2"] = None
     edf: _Degrees = None
     edf_upper: _UpperDegrees = None
     edf_source: _DegreesSource
     averaged: Annotated[
         float | None,
-        Column(
-            "average number of samples present in a cluster, below its size if samples are missing"
-        ),
+        "average number of samples present in a cluster, below its size if samples are missing",
     ] = None
     exponent: Annotated[
-        int | None, Column("noise type: 0 white, -1 flicker, -2 random walk, 1 and 2 phase noise")
+        int | None, "noise type: 0 white, -1 flicker, -2 random walk, 1 and 2 phase noise"
     ] = None
     share: Annotated[
-        float | None, Column("fraction of the differences that is left by missing samples")
+        float | None, "fraction of the differences that is left by missing samples"
     ] = None
 
 
 @table("parameters")
 class ParameterRow(ChannelRow):
-    """A row of the table ``parameters``."""
-
-    method: Annotated[str, Column("estimation method")]
-    recommended: Annotated[bool, Column("the method to use for this channel")]
-    model: Annotated[str, Column("the terms of the model, such as N+GM+K")]
-    component: Annotated[int, Column("number of a repeated term, from 1")]
+    method: Annotated[str, "estimation method"]
+    recommended: Annotated[bool, "the method to use for this channel"]
+    model: Annotated[str, "the terms of the model, such as N+GM+K"]
+    component: Annotated[int, "number of a repeated term, from 1"]
     parameter: Annotated[
         str,
-        Column(
-            "Q, N, B, T_B, K, R; N_sensor (white density before a low-pass or an interpolation "
-            "that shows); amplitude and frequency of a line; of the curve of the model: B_curve "
-            "(bias instability of the curve: highest Allan deviation of all F and GM terms over "
-            "0.664), sigma_min and tau_min (lowest point, up to a ninth of the log)"
-        ),
+        "Q, N, B, T_B, K, R; N_sensor (white density before a low-pass or an interpolation "
+        "that shows); amplitude and frequency of a line; of the curve of the model: B_curve "
+        "(bias instability of the curve: highest Allan deviation of all F and GM terms over "
+        "0.664), sigma_min and tau_min (lowest point, up to a ninth of the log)",
     ]
     value: Estimate = None
     lower: LowerLimit = None
@@ -83,126 +75,96 @@ class ParameterRow(ChannelRow):
     status: EstimateStatus
     reason: EstimateReason = None
     duration_needed: Annotated[
-        float | None, Column("length of a log that determines the value to 10 %", "s")
+        float | None, "length of a log that determines the value to 10 %", "s"
     ] = None
     fitted: FittedValue = None
 
 
 @table("models")
 class ModelRow(ChannelRow):
-    """A row of the table ``models``."""
-
-    model: Annotated[str, Column("the terms: Q, N, F (flicker), GM, K, R")]
-    chosen: Annotated[bool, Column("the model of method likelihood: the lowest BIC")]
-    free: Annotated[int, Column("free parameters")]
-    log_likelihood: Annotated[float, Column("up to a constant of the channel")]
-    bic: Annotated[float, Column("-2 log likelihood + free log(bins); + 4: GM for K, + 6: Q, R")]
-    aic: Annotated[float, Column("-2 log likelihood + 2 free")]
-    weight: Annotated[float, Column("weight weight of the model among the candidates, by BIC")]
-    deviance: Annotated[
-        float | None, Column("mean deviance of a bin; about 1 for a correct model")
-    ] = None
-    chance: Annotated[float | None, Column("probability of so poor a fit for a correct model")] = (
-        None
-    )
-    verdict: Annotated[GoodnessVerdict, Column("whether the model explains the spectrum")]
-    note: Annotated[str | None, Column("frequency of the largest deviation")] = None
-    bins: Annotated[int, Column("bins of the spectrum used")]
-    band: Annotated[float | None, Column("highest frequency used", "Hz")] = None
-    band_source: Annotated[str | None, Column("method of detection")] = None
+    model: Annotated[str, "the terms: Q, N, F (flicker), GM, K, R"]
+    chosen: Annotated[bool, "the model of method likelihood: the lowest BIC"]
+    free: Annotated[int, "free parameters"]
+    log_likelihood: Annotated[float, "up to a constant of the channel"]
+    bic: Annotated[float, "-2 log likelihood + free log(bins); + 4: GM for K, + 6: Q, R"]
+    aic: Annotated[float, "-2 log likelihood + 2 free"]
+    weight: Annotated[float, "weight weight of the model among the candidates, by BIC"]
+    deviance: Annotated[float | None, "mean deviance of a bin; about 1 for a correct model"] = None
+    chance: Annotated[float | None, "probability of so poor a fit for a correct model"] = None
+    verdict: Annotated[GoodnessVerdict, "whether the model explains the spectrum"]
+    note: Annotated[str | None, "frequency of the largest deviation"] = None
+    bins: Annotated[int, "bins of the spectrum used"]
+    band: Annotated[float | None, "highest frequency used", "Hz"] = None
+    band_source: Annotated[str | None, "method of detection"] = None
 
 
 @table("lines")
 class LineRow(ChannelRow):
-    """A row of the table ``lines``."""
-
-    kind: Annotated[str, Column("sinusoid; band of noise; alias of a faster line in block means")]
-    frequency: Annotated[float, Column("of the line", "Hz")]
-    frequency_lower: Annotated[float | None, Column("lower 95 % limit", "Hz")] = None
-    frequency_upper: Annotated[float | None, Column("upper 95 % limit", "Hz")] = None
-    amplitude: Annotated[float, Column("of the sinusoid", "rad/s or m/s^2")]
-    amplitude_lower: Annotated[float | None, Column("lower 95 % limit", "rad/s or m/s^2")] = None
-    amplitude_upper: Annotated[float | None, Column("upper 95 % limit", "rad/s or m/s^2")] = None
-    ratio: Annotated[float | None, Column("ratio of the highest density to the noise")] = None
+    kind: Annotated[str, "sinusoid; band of noise; alias of a faster line in block means"]
+    frequency: Annotated[float, "of the line", "Hz"]
+    frequency_lower: Annotated[float | None, "lower 95 % limit", "Hz"] = None
+    frequency_upper: Annotated[float | None, "upper 95 % limit", "Hz"] = None
+    amplitude: Annotated[float, "of the sinusoid", "rad/s or m/s^2"]
+    amplitude_lower: Annotated[float | None, "lower 95 % limit", "rad/s or m/s^2"] = None
+    amplitude_upper: Annotated[float | None, "upper 95 % limit", "rad/s or m/s^2"] = None
+    ratio: Annotated[float | None, "ratio of the highest density to the noise"] = None
     false_alarm: Annotated[
-        float | None, Column("probability of such a line in a channel without lines")
+        float | None, "probability of such a line in a channel without lines"
     ] = None
-    width: Annotated[float | None, Column("width of the line", "Hz")] = None
+    width: Annotated[float | None, "width of the line", "Hz"] = None
 
 
 @table("envelope")
 class EnvelopeRow(ChannelRow):
-    """A row of the table ``envelope``."""
-
-    start: Annotated[float, Column("start of a part of the log, from the first sample", "s")]
-    end: Annotated[float, Column("its end", "s")]
-    low: Annotated[float | None, Column("least sample; degC for temperature", "SI")] = None
-    high: Annotated[float | None, Column("largest sample", "SI")] = None
-    mean: Annotated[float | None, Column("mean of the samples", "SI")] = None
-    samples: Annotated[int, Column("samples present")]
+    start: Annotated[float, "start of a part of the log, from the first sample", "s"]
+    end: Annotated[float, "its end", "s"]
+    low: Annotated[float | None, "least sample; degC for temperature", "SI"] = None
+    high: Annotated[float | None, "largest sample", "SI"] = None
+    mean: Annotated[float | None, "mean of the samples", "SI"] = None
+    samples: Annotated[int, "samples present"]
 
 
 @table("samples_of_models")
 class ModelSampleRow(ChannelRow):
-    """A row of the table ``samples_of_models``."""
-
-    of: Annotated[
-        str, Column("log; before: model read from the curve; after: model of the estimate")
-    ]
-    what: Annotated[
-        str, Column("deviation of all samples; stretch: each sample; envelope: over time")
-    ]
-    start: Annotated[float, Column("from the first sample", "s")]
-    end: Annotated[float, Column("its end", "s")]
-    low: Annotated[float | None, Column("of an envelope: least sample", "SI")] = None
-    high: Annotated[float | None, Column("largest sample", "SI")] = None
-    mean: Annotated[
-        float | None, Column("mean of the samples, the sample, or the deviation", "SI")
-    ] = None
+    of: Annotated[str, "log; before: model read from the curve; after: model of the estimate"]
+    what: Annotated[str, "deviation of all samples; stretch: each sample; envelope: over time"]
+    start: Annotated[float, "from the first sample", "s"]
+    end: Annotated[float, "its end", "s"]
+    low: Annotated[float | None, "of an envelope: least sample", "SI"] = None
+    high: Annotated[float | None, "largest sample", "SI"] = None
+    mean: Annotated[float | None, "mean of the samples, the sample, or the deviation", "SI"] = None
 
 
 @table("histogram")
 class HistogramRow(ChannelRow):
-    """A row of the table ``histogram``."""
-
-    lower: Annotated[float, Column("lower edge of the bin", "SI")]
-    upper: Annotated[float, Column("upper edge of the bin", "SI")]
-    count: Annotated[int, Column("samples in it")]
+    lower: Annotated[float, "lower edge of the bin", "SI"]
+    upper: Annotated[float, "upper edge of the bin", "SI"]
+    count: Annotated[int, "samples in it"]
 
 
 @table("spectrum")
 class SpectrumRow(ChannelRow):
-    """A row of the table ``spectrum``."""
-
-    frequency: Annotated[float, Column("mean of the bin", "Hz")]
-    lower: Annotated[float, Column("lower end of the bin", "Hz")]
-    upper: Annotated[float, Column("upper end of the bin", "Hz")]
-    ordinates: Annotated[float, Column("degrees of freedom of the bin")]
-    density: Annotated[float, Column("measured, two-sided", "(rad/s)^2/Hz or (m/s^2)^2/Hz")]
-    fitted: Annotated[
-        float | None, Column("of the chosen model", "(rad/s)^2/Hz or (m/s^2)^2/Hz")
-    ] = None
-    used: Annotated[bool, Column("whether the bin is in the fitted band and without lines")]
+    frequency: Annotated[float, "mean of the bin", "Hz"]
+    lower: Annotated[float, "lower end of the bin", "Hz"]
+    upper: Annotated[float, "upper end of the bin", "Hz"]
+    ordinates: Annotated[float, "degrees of freedom of the bin"]
+    density: Annotated[float, "measured, two-sided", "(rad/s)^2/Hz or (m/s^2)^2/Hz"]
+    fitted: Annotated[float | None, "of the chosen model", "(rad/s)^2/Hz or (m/s^2)^2/Hz"] = None
+    used: Annotated[bool, "whether the bin is in the fitted band and without lines"]
 
 
 @table("fixed_bias")
 class FixedBiasRow(ChannelRow):
-    """A row of the table ``fixed_bias``."""
-
-    value: Annotated[float, Column("mean of the samples", "as in unit")]
-    unit: Annotated[str, Column("SI unit of value")]
+    value: Annotated[float, "mean of the samples", "as in unit"]
+    unit: Annotated[str, "SI unit of value"]
 
 
 @table("temperature")
 class TemperatureRow(ChannelRow):
-    """A row of the table ``temperature``."""
-
     compensated: Annotated[
-        bool, Column("whether the effect is removed from the noise (method compensated)")
+        bool, "whether the effect is removed from the noise (method compensated)"
     ]
-    parameter: Annotated[
-        str, Column("T_0 (mean temperature), sensitivity, quadratic, lag, bias (at T_0)")
-    ]
+    parameter: Annotated[str, "T_0 (mean temperature), sensitivity, quadratic, lag, bias (at T_0)"]
     value: Estimate = None
     lower: LowerLimit = None
     upper: UpperLimit = None
@@ -214,35 +176,25 @@ class TemperatureRow(ChannelRow):
 
 @table("allan_compensated")
 class CompensatedAllanRow(ChannelRow):
-    """A row of the table ``allan_compensated``."""
-
-    tau: Annotated[float, Column("cluster length", "s")]
+    tau: Annotated[float, "cluster length", "s"]
     adev: Annotated[
-        float, Column("Allan deviation of the log without the temperature effect", "rad/s or m/s^2")
+        float, "Allan deviation of the log without the temperature effect", "rad/s or m/s^2"
     ]
-    lower: Annotated[float | None, Column("lower 95 % limit", "rad/s or m/s^2")] = None
-    upper: Annotated[float | None, Column("upper 95 % limit", "rad/s or m/s^2")] = None
+    lower: Annotated[float | None, "lower 95 % limit", "rad/s or m/s^2"] = None
+    upper: Annotated[float | None, "upper 95 % limit", "rad/s or m/s^2"] = None
     edf: _Degrees = None
     edf_upper: _UpperDegrees = None
     edf_source: _DegreesSource
-    temperature: Annotated[
-        float, Column("Allan deviation of the temperature effect", "rad/s or m/s^2")
-    ]
+    temperature: Annotated[float, "Allan deviation of the temperature effect", "rad/s or m/s^2"]
 
 
 @table("low_pass")
 class LowPassRow(ChannelRow):
-    """A row of the table ``low_pass``."""
-
-    kind: Annotated[str | None, Column("analogue, bilinear or boxcar; null: none is visible")] = (
-        None
-    )
+    kind: Annotated[str | None, "analogue, bilinear or boxcar; null: none is visible"] = None
     order: Annotated[
-        int | None, Column("order of the filter: 1, or of a Butterworth; null: no filter found")
+        int | None, "order of the filter: 1, or of a Butterworth; null: no filter found"
     ] = None
-    parameter: Annotated[
-        str, Column("cutoff (-3 dB), floor (white noise that does not pass the filter)")
-    ]
+    parameter: Annotated[str, "cutoff (-3 dB), floor (white noise that does not pass the filter)"]
     value: Estimate = None
     lower: LowerLimit = None
     upper: UpperLimit = None
@@ -254,224 +206,180 @@ class LowPassRow(ChannelRow):
 
 @table("reconstruction")
 class ReconstructionRow(ChannelRow):
-    """A row of the table ``reconstruction``."""
-
-    method: Annotated[str, Column("estimation method")]
-    tau: Annotated[float, Column("cluster length", "s")]
-    adev: Annotated[float, Column("median of the ensemble of simulated logs", "rad/s or m/s^2")]
-    lower: Annotated[float, Column("lower 95 % limit of the ensemble", "rad/s or m/s^2")]
-    upper: Annotated[float, Column("upper 95 % limit of the ensemble", "rad/s or m/s^2")]
+    method: Annotated[str, "estimation method"]
+    tau: Annotated[float, "cluster length", "s"]
+    adev: Annotated[float, "median of the ensemble of simulated logs", "rad/s or m/s^2"]
+    lower: Annotated[float, "lower 95 % limit of the ensemble", "rad/s or m/s^2"]
+    upper: Annotated[float, "upper 95 % limit of the ensemble", "rad/s or m/s^2"]
     reconstructed: Annotated[
-        float, Column("Allan deviation of the full-length simulated log", "rad/s or m/s^2")
+        float, "Allan deviation of the full-length simulated log", "rad/s or m/s^2"
     ]
 
 
 @table("scores")
 class ScoreRow(ChannelRow):
-    """A row of the table ``scores``."""
-
-    method: Annotated[str, Column("estimation method")]
+    method: Annotated[str, "estimation method"]
     rms: Annotated[
         float | None,
-        Column(
-            "RMS over tau of model minus measured Allan deviation, weighted by the precision at "
-            "each tau",
-            "rad/s or m/s^2",
-        ),
+        "RMS over tau of model minus measured Allan deviation, weighted by the precision at "
+        "each tau",
+        "rad/s or m/s^2",
     ] = None
-    rms_log10: Annotated[
-        float | None, Column("the same for the difference of log10", "decades")
-    ] = None
+    rms_log10: Annotated[float | None, "the same for the difference of log10", "decades"] = None
     drawn: Annotated[
         float | None,
-        Column("rms of one simulated log instead of the model: median of many", "rad/s or m/s^2"),
+        "rms of one simulated log instead of the model: median of many",
+        "rad/s or m/s^2",
     ] = None
     drawn_lower: Annotated[
-        float | None, Column("lower end of the range of 90 % of them", "rad/s or m/s^2")
+        float | None, "lower end of the range of 90 % of them", "rad/s or m/s^2"
     ] = None
-    drawn_upper: Annotated[float | None, Column("upper end", "rad/s or m/s^2")] = None
+    drawn_upper: Annotated[float | None, "upper end", "rad/s or m/s^2"] = None
     drawn_log10: Annotated[
-        float | None, Column("rms_log10 of one simulated log: median of many", "decades")
+        float | None, "rms_log10 of one simulated log: median of many", "decades"
     ] = None
     drawn_log10_lower: Annotated[
-        float | None, Column("lower end of the range of 90 % of them", "decades")
+        float | None, "lower end of the range of 90 % of them", "decades"
     ] = None
-    drawn_log10_upper: Annotated[float | None, Column("upper end", "decades")] = None
+    drawn_log10_upper: Annotated[float | None, "upper end", "decades"] = None
     whole: Annotated[
         float | None,
-        Column("RMS of one simulated log with equal weights: median of many", "rad/s or m/s^2"),
+        "RMS of one simulated log with equal weights: median of many",
+        "rad/s or m/s^2",
     ] = None
     whole_lower: Annotated[
-        float | None, Column("lower end of the range of 90 % of them", "rad/s or m/s^2")
+        float | None, "lower end of the range of 90 % of them", "rad/s or m/s^2"
     ] = None
-    whole_upper: Annotated[float | None, Column("upper end", "rad/s or m/s^2")] = None
+    whole_upper: Annotated[float | None, "upper end", "rad/s or m/s^2"] = None
     beats: Annotated[
         float | None,
-        Column(
-            "probability that a log simulated from it has a lower RMS with equal weights than a "
-            "log of the recommended method: 0.5 for the same model"
-        ),
+        "probability that a log simulated from it has a lower RMS with equal weights than a "
+        "log of the recommended method: 0.5 for the same model",
     ] = None
-    inside_band: Annotated[
-        float | None, Column("share of the measured curve inside the 95 % band")
-    ] = None
-    reason: Annotated[str | None, Column("reason for a missing score")] = None
+    inside_band: Annotated[float | None, "share of the measured curve inside the 95 % band"] = None
+    reason: Annotated[str | None, "reason for a missing score"] = None
 
 
 @table("simulated_truth")
 class SimulatedTruthRow(ChannelRow):
-    """A row of the table ``simulated_truth``."""
-
-    parameter: Annotated[str, Column("as in parameters, temperature and low_pass; bias")]
-    component: Annotated[int, Column("number of a repeated term, from 1")]
-    value: Annotated[float, Column("true value of the simulation", "as in unit")]
-    unit: Annotated[str, Column("SI unit of value")]
-    assumed: Annotated[bool, Column("assumed, not published by the source")]
-    source: Annotated[str, Column("where the parameters are published")]
+    parameter: Annotated[str, "as in parameters, temperature and low_pass; bias"]
+    component: Annotated[int, "number of a repeated term, from 1"]
+    value: Annotated[float, "true value of the simulation", "as in unit"]
+    unit: Annotated[str, "SI unit of value"]
+    assumed: Annotated[bool, "assumed, not published by the source"]
+    source: Annotated[str, "where the parameters are published"]
 
 
 @table("backtest")
 class BacktestRow(ChannelRow):
-    """A row of the table ``backtest``."""
-
-    requirement: Annotated[str, Column("requirement with this limit")]
-    error: Annotated[
-        str, Column("attitude, heading, velocity or position: the part from this channel")
-    ]
-    time: Annotated[float, Column("of dead reckoning", "s")]
-    window: Annotated[
-        float | None, Column("window at rest before it, whose mean is the bias", "s")
-    ] = None
-    windows: Annotated[
-        int | None, Column("number of overlapping windows of the log without gaps")
-    ] = None
-    independent: Annotated[float | None, Column("equivalent number of independent windows")] = None
+    requirement: Annotated[str, "requirement with this limit"]
+    error: Annotated[str, "attitude, heading, velocity or position: the part from this channel"]
+    time: Annotated[float, "of dead reckoning", "s"]
+    window: Annotated[float | None, "window at rest before it, whose mean is the bias", "s"] = None
+    windows: Annotated[int | None, "number of overlapping windows of the log without gaps"] = None
+    independent: Annotated[float | None, "equivalent number of independent windows"] = None
     measured: Annotated[
-        float | None, Column("rms error over the windows of the log as recorded", "as in unit")
+        float | None, "rms error over the windows of the log as recorded", "as in unit"
     ] = None
     predicted: Annotated[
-        float | None, Column("standard deviation by the noise model of the channel", "as in unit")
+        float | None, "standard deviation by the noise model of the channel", "as in unit"
     ] = None
-    predicted_lower: Annotated[
-        float | None, Column("lower 95 % limit from drawn models", "as in unit")
-    ] = None
+    predicted_lower: Annotated[float | None, "lower 95 % limit from drawn models", "as in unit"] = (
+        None
+    )
     predicted_upper: UpperLimit = None
-    ratio: Annotated[float | None, Column("measured over predicted")] = None
+    ratio: Annotated[float | None, "measured over predicted"] = None
     ratio_lower: Annotated[
-        float | None, Column("lower end of the range for 95 % of logs, the model right")
+        float | None, "lower end of the range for 95 % of logs, the model right"
     ] = None
-    ratio_upper: Annotated[float | None, Column("upper end")] = None
-    chance: Annotated[
-        float | None, Column("probability of at least this ratio for a correct model")
-    ] = None
-    verdict: Annotated[BacktestVerdict | None, Column("verdict; null: not tested")] = None
+    ratio_upper: Annotated[float | None, "upper end"] = None
+    chance: Annotated[float | None, "probability of at least this ratio for a correct model"] = None
+    verdict: Annotated[BacktestVerdict | None, "verdict; null: not tested"] = None
     contradicted: Annotated[
         bool | None,
-        Column(
-            "at least 1.1 times the prediction, significant at 1 % over all rows of the recording"
-        ),
+        "at least 1.1 times the prediction, significant at 1 % over all rows of the recording",
     ] = None
     unit: Unit
     taken_out: Annotated[
-        tuple[str, ...], Column("in the log, not in the model: kinds of deterministic")
+        tuple[str, ...], "in the log, not in the model: kinds of deterministic"
     ] = ()
-    duration_needed: Annotated[
-        float | None, Column("length of a log that this test requires", "s")
-    ] = None
-    reason: Annotated[str | None, Column("reason without a test")] = None
+    duration_needed: Annotated[float | None, "length of a log that this test requires", "s"] = None
+    reason: Annotated[str | None, "reason without a test"] = None
 
 
 @table("drawn_deviations")
 class DrawnDeviationRow(ChannelRow):
-    """A row of the table ``drawn_deviations``."""
-
-    tau: Annotated[float, Column("averaging time", "s")]
+    tau: Annotated[float, "averaging time", "s"]
     draw: Annotated[
-        int | None,
-        Column("rank of a drawn noise model, the lowest first; null: the estimate itself"),
+        int | None, "rank of a drawn noise model, the lowest first; null: the estimate itself"
     ] = None
-    adev: Annotated[float, Column("Allan deviation of the noise model", "rad/s or m/s^2")]
-    unknown: Annotated[
-        tuple[str, ...], Column("parameters that matter and are not determined")
-    ] = ()
+    adev: Annotated[float, "Allan deviation of the noise model", "rad/s or m/s^2"]
+    unknown: Annotated[tuple[str, ...], "parameters that matter and are not determined"] = ()
 
 
 @table("deterministic")
 class DeterministicRow(ChannelRow):
-    """A row of the table ``deterministic``."""
-
-    kind: Annotated[
-        str, Column("bias_step, warm_up_drift or periodic_drift: removed from the noise")
-    ]
-    start: Annotated[float, Column("start of the part with the signal, from the first sample", "s")]
-    end: Annotated[float, Column("end of this part; for a step both are its position", "s")]
-    size: Annotated[
-        float, Column("size of a step, of a warm-up at its start, or amplitude", "as in unit")
-    ]
+    kind: Annotated[str, "bias_step, warm_up_drift or periodic_drift: removed from the noise"]
+    start: Annotated[float, "start of the part with the signal, from the first sample", "s"]
+    end: Annotated[float, "end of this part; for a step both are its position", "s"]
+    size: Annotated[float, "size of a step, of a warm-up at its start, or amplitude", "as in unit"]
     size_lower: LowerLimit = None
     size_upper: UpperLimit = None
-    unit: Annotated[str, Column("SI unit of the sizes")]
-    time: Annotated[
-        float | None, Column("time constant of a warm-up, period of periodic drift", "s")
-    ] = None
-    time_lower: Annotated[float | None, Column("lower 95 % limit", "s")] = None
-    time_upper: Annotated[float | None, Column("upper 95 % limit", "s")] = None
+    unit: Annotated[str, "SI unit of the sizes"]
+    time: Annotated[float | None, "time constant of a warm-up, period of periodic drift", "s"] = (
+        None
+    )
+    time_lower: Annotated[float | None, "lower 95 % limit", "s"] = None
+    time_upper: Annotated[float | None, "upper 95 % limit", "s"] = None
     place_error: Annotated[
-        float | None, Column("half width of the 95 % interval of the position of a step", "s")
+        float | None, "half width of the 95 % interval of the position of a step", "s"
     ] = None
-    gain: Annotated[float | None, Column("twice the loss of log likelihood without it")] = None
+    gain: Annotated[float | None, "twice the loss of log likelihood without it"] = None
 
 
 @table("draws")
 class DrawRow(ChannelRow):
-    """A row of the table ``draws``."""
-
-    method: Annotated[
-        str, Column("estimation method: robust, likelihood, likelihood_gm or compensated")
-    ]
-    draw: Annotated[int, Column("number of the draw, from 0: a noise model that the log allows")]
-    component: Annotated[int, Column("number of a repeated term, from 1")]
+    method: Annotated[str, "estimation method: robust, likelihood, likelihood_gm or compensated"]
+    draw: Annotated[int, "number of the draw, from 0: a noise model that the log allows"]
+    component: Annotated[int, "number of a repeated term, from 1"]
     Q: Annotated[
-        float | None,
-        Column("quantization noise; null: the model has none", "rad or m/s", single=True),
+        float | None, "quantization noise; null: the model has none", "rad or m/s", pa.float32()
     ] = None
     N: Annotated[
         float | None,
-        Column("white noise; null: it has none", "rad/s/sqrt(Hz) or m/s^2/sqrt(Hz)", single=True),
+        "white noise; null: it has none",
+        "rad/s/sqrt(Hz) or m/s^2/sqrt(Hz)",
+        pa.float32(),
     ] = None
     B: Annotated[
-        float | None, Column("bias instability; null: it has none", "rad/s or m/s^2", single=True)
+        float | None, "bias instability; null: it has none", "rad/s or m/s^2", pa.float32()
     ] = None
     T_B: Annotated[
-        float | None, Column("correlation time; null where B is flicker noise", "s", single=True)
+        float | None, "correlation time; null where B is flicker noise", "s", pa.float32()
     ] = None
     K: Annotated[
         float | None,
-        Column("random walk; null: it has none", "rad/s/sqrt(s) or m/s^2/sqrt(s)", single=True),
+        "random walk; null: it has none",
+        "rad/s/sqrt(s) or m/s^2/sqrt(s)",
+        pa.float32(),
     ] = None
-    R: Annotated[
-        float | None, Column("ramp; null: it has none", "rad/s^2 or m/s^3", single=True)
-    ] = None
+    R: Annotated[float | None, "ramp; null: it has none", "rad/s^2 or m/s^3", pa.float32()] = None
 
 
 @table("error_growth")
 class ErrorGrowthRow(OfRecordingRow):
-    """A row of the table ``error_growth``."""
-
-    axis: Annotated[str, Column("worst of all axes, or x, y or z alone if there are several")]
-    gyro: Annotated[str, Column("channel that answers")]
-    accel: Annotated[str | None, Column("channel that answers")] = None
-    window: Annotated[
-        float, Column("window at rest before it, for the estimation of biases and tilt", "s")
-    ]
-    error: Annotated[str, Column("attitude, heading, velocity or position")]
-    time: Annotated[float, Column("of dead reckoning", "s")]
+    axis: Annotated[str, "worst of all axes, or x, y or z alone if there are several"]
+    gyro: Annotated[str, "channel that answers"]
+    accel: Annotated[str | None, "channel that answers"] = None
+    window: Annotated[float, "window at rest before it, for the estimation of biases and tilt", "s"]
+    error: Annotated[str, "attitude, heading, velocity or position"]
+    time: Annotated[float, "of dead reckoning", "s"]
     source: SourceColumn
     quantity: SourceQuantity = None
     through: SourceThrough = None
     T_B: SourceTime = None
     frequency: SourceFrequency = None
-    sigma: Annotated[float, Column("standard deviation", "as in unit")]
-    lower: Annotated[float | None, Column("lower 95 % limit of a total", "as in unit")] = None
-    upper: Annotated[float | None, Column("upper 95 % limit of a total", "as in unit")] = None
+    sigma: Annotated[float, "standard deviation", "as in unit"]
+    lower: Annotated[float | None, "lower 95 % limit of a total", "as in unit"] = None
+    upper: Annotated[float | None, "upper 95 % limit of a total", "as in unit"] = None
     unit: Unit

@@ -1,10 +1,11 @@
 """Rows of tables as frozen dataclasses, from which columns, schema and documentation derive.
 
-A class is declared with `table`; each field is a column, with its meaning and unit:
+A class is declared with `table`; each field is a column, with its meaning, its unit (``-`` by
+default: a text, a count or a ratio) and, where it is not that of the type, its Arrow type:
 
     @table("recordings")
     class RecordingRow(TableRow):
-        rate: Annotated[float | None, Column("sampling rate used", "Hz")] = None
+        rate: Annotated[float | None, "sampling rate used", "Hz"] = None
 
 The type of a field sets the type of its column; a column that may be null has a type with ``None``.
 A ``Literal`` is a category (dictionary-encoded, other values are refused), a tuple a list, and a
@@ -46,34 +47,22 @@ CATEGORY = pa.dictionary(pa.int32(), pa.string())
 """Arrow type of a column with one of a few values."""
 
 
-@dataclass(frozen=True, slots=True)
-class Column:
-    """Meaning of a column; ``unit`` is ``-`` for a text, a count or a ratio.
-
-    ``single``: single precision, for columns of very many numbers.
-    """
-
-    meaning: str
-    unit: str = "-"
-    single: bool = False
-
-
 # Columns that several tables have.
-LowerLimit = Annotated[float | None, Column("lower 95 % limit", "as in unit")]
-UpperLimit = Annotated[float | None, Column("upper 95 % limit", "as in unit")]
-Estimate = Annotated[float | None, Column("estimate; null: see status", "as in unit")]
-Unit = Annotated[str, Column("SI unit")]
-EstimateUnit = Annotated[str, Column("SI unit of value, lower and upper; degC for T_0")]
-EstimateReason = Annotated[str | None, Column("reason for a missing or doubtful value")]
+LowerLimit = Annotated[float | None, "lower 95 % limit", "as in unit"]
+UpperLimit = Annotated[float | None, "upper 95 % limit", "as in unit"]
+Estimate = Annotated[float | None, "estimate; null: see status", "as in unit"]
+Unit = Annotated[str, "SI unit"]
+EstimateUnit = Annotated[str, "SI unit of value, lower and upper; degC for T_0"]
+EstimateReason = Annotated[str | None, "reason for a missing or doubtful value"]
 FittedValue = Annotated[
-    float | None, Column("value in the fitted model if there is no estimate", "as in unit")
+    float | None, "value in the fitted model if there is no estimate", "as in unit"
 ]
-SourceColumn = Annotated[SourceCode, Column("total, or the source of the error")]
-SourceQuantity = Annotated[Measured | None, Column("sensor of the source")]
-SourceThrough = Annotated[SourcePath | None, Column("null: the source acts by the motion")]
-SourceTime = Annotated[float | None, Column("correlation time of a source GM", "s")]
-SourceFrequency = Annotated[float | None, Column("of a source line", "Hz")]
-EstimateStatus = Annotated[Status, Column("whether there is a value, and its quality")]
+SourceColumn = Annotated[SourceCode, "total, or the source of the error"]
+SourceQuantity = Annotated[Measured | None, "sensor of the source"]
+SourceThrough = Annotated[SourcePath | None, "null: the source acts by the motion"]
+SourceTime = Annotated[float | None, "correlation time of a source GM", "s"]
+SourceFrequency = Annotated[float | None, "of a source line", "Hz"]
+EstimateStatus = Annotated[Status, "whether there is a value, and its quality"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -171,6 +160,7 @@ def table(name: str) -> Callable[[type[R]], type[R]]:
     def declare(cls: type[R]) -> type[R]:
         made = row(cls)
         made.table = name
+        made.__doc__ = f"A row of the table ``{name}``."
         return made
 
     return declare
@@ -210,14 +200,15 @@ def columns_of(cls: type[TableRow]) -> tuple[TypedColumn, ...]:
 
 def _typed(name: str, hint: Any) -> TypedColumn:
     assert get_origin(hint) is Annotated, name
-    kind, column = get_args(hint)
+    kind, meaning, *stated = get_args(hint)
     options = get_args(kind) if get_origin(kind) in (Union, types.UnionType) else (kind,)
     (plain,) = (option for option in options if option is not types.NoneType)
     values = get_args(plain) if get_origin(plain) is Literal else ()
     element = get_args(plain)[0] if get_origin(plain) is tuple else None
-    arrow = pa.float32() if column.single else arrow_type(plain)
+    unit = stated[0] if stated else "-"
+    arrow = stated[1] if len(stated) > 1 else arrow_type(plain)
     parts = element if is_dataclass(element) else None
-    return TypedColumn(name, arrow, column.unit, column.meaning, len(options) == 1, values, parts)
+    return TypedColumn(name, arrow, unit, meaning, len(options) == 1, values, parts)
 
 
 def arrow_type(kind: Any) -> pa.DataType:
@@ -247,18 +238,18 @@ def _make_struct(kind: type, values: Mapping[str, Any]) -> Any:
 class SensorRow(TableRow):
     """Key columns of a sensor in a table."""
 
-    sensor: Annotated[str, Column("name of the sensor file")]
+    sensor: Annotated[str, "name of the sensor file"]
 
 
 @row
 class OfRecordingRow(SensorRow):
     """Key columns of a recording in a table."""
 
-    recording: Annotated[str, Column("name of the recording")]
+    recording: Annotated[str, "name of the recording"]
 
 
 @row
 class ChannelRow(OfRecordingRow):
     """Key columns of a channel in a table."""
 
-    channel: Annotated[str, Column("channel, gyro_x to accel_z")]
+    channel: Annotated[str, "channel, gyro_x to accel_z"]

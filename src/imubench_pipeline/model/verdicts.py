@@ -3,16 +3,9 @@
 from dataclasses import dataclass, field
 from typing import Literal, get_args
 
-from imubench_pipeline.model.states import (
-    Cause,
-    Measured,
-    NoiseSource,
-    Origin,
-    SourceCode,
-    SourcePath,
-)
+from imubench_pipeline.model import states
 
-_NOISE_SOURCES = get_args(NoiseSource)
+_NOISE_SOURCES = get_args(states.NoiseSource)
 
 Property = Literal[
     "price_class",
@@ -37,7 +30,7 @@ class Condition:
     of the catalogue that print the figure, ``within`` are within it.
     """
 
-    figure: Cause | None
+    figure: states.Cause | None
     property: Property | None
     subject: str
     largest: float | None = None
@@ -63,9 +56,9 @@ class Shortfall:
 class ErrorSource:
     """Source of an error; ``T_B`` (s) and ``frequency`` (Hz) distinguish terms of one kind."""
 
-    source: SourceCode
-    quantity: Measured | None = None
-    through: SourcePath | None = None
+    source: states.SourceCode
+    quantity: states.Measured | None = None
+    through: states.SourcePath | None = None
     T_B: float | None = None
     frequency: float | None = None
 
@@ -80,7 +73,7 @@ class Share(ErrorSource):
     """A source of an error, and its part of the variance."""
 
     share: float = field(kw_only=True)
-    origin: Origin | None = None
+    origin: states.Origin | None = None
 
 
 @dataclass(frozen=True, slots=True)

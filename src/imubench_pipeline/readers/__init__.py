@@ -41,25 +41,11 @@ def log_files(path: Path) -> list[Path]:
 
 
 def read(path: Path, log: sensor.LogFormat) -> list[LogFile]:
-    """Open a recording.
+    """Open a recording: a log file, or a folder or zip archive with the files of a recording.
 
-    Parameters
-    ----------
-    path : Path
-        A log file, or a folder or zip archive with the files of a recording.
-    log : LogFormat
-        Format of the files.
-
-    Returns
-    -------
-    list of LogFile
-        One for each file, or each topic of a file, sorted by name, with its columns.
-
-    Raises
-    ------
-    RecordingError
-        If a file that the format names is missing, or if the recording is a folder and the format
-        does not name the file of a channel.
+    Returns a LogFile for each file, or each topic of a file, sorted by name, with its columns.
+    Raises RecordingError if a file that the format names is missing, or if the recording is a
+    folder and the format does not name the file of a channel.
     """
     if is_endless(path):
         raise RecordingError(f"{path.name}: is neither a file nor a folder; expected a log")
@@ -112,8 +98,11 @@ def _find_file(
             "a folder; put the files into a folder, or drop 'file:'"
         )
     # The file may be one level deeper: a folder packed with its name, or unpacked into another.
-    names = {file: _compose_accents(file.relative_to(path).as_posix()) for file in present}
-    wanted = _compose_accents(Path(source.file).as_posix())
+    # Some systems store accents separately (NFD)
+    names = {
+        file: unicodedata.normalize("NFC", file.relative_to(path).as_posix()) for file in present
+    }
+    wanted = unicodedata.normalize("NFC", Path(source.file).as_posix())
     found = [file for file in present if names[file] == wanted] or [
         file for file in present if names[file].endswith(f"/{wanted}")
     ]
@@ -125,11 +114,6 @@ def _find_file(
             f"{name_settings_file(name)}"
         )
     return found[0]
-
-
-def _compose_accents(name: str) -> str:
-    """Return a name with composed accents (NFC): some systems store them separately (NFD)."""
-    return unicodedata.normalize("NFC", name)
 
 
 def find_only_log(path: Path, present: list[Path]) -> Path:

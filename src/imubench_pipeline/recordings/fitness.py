@@ -128,7 +128,7 @@ def exclude_simulated(
 
 def judge_fitness(of_recording: Iterable[DoubtRow]) -> Fitness:
     """Return the verdict on a recording from all doubts about it."""
-    of_log = [doubt for doubt in of_recording if _is_of_log(doubt)]
+    of_log = [doubt for doubt in of_recording if doubt.code != "doubtful"]
     if any(doubt.fitness == "unfit" for doubt in of_log):
         return "unfit"
     return "fit with doubts" if of_log else "fit"
@@ -156,7 +156,7 @@ def mark_doubts(of_recording: Iterable[DoubtRow]) -> tuple[DoubtMark, ...]:
     """Return the codes of the doubts of a recording with channels, the most serious first."""
     channels: dict[tuple[str, str], dict[str, None]] = {}
     for doubt in of_recording:
-        if _is_of_log(doubt):
+        if doubt.code != "doubtful":
             own = channels.setdefault((doubt.recording, doubt.code), {})
             if doubt.channel:
                 own[doubt.channel] = None
@@ -232,11 +232,6 @@ def _doubt(
         reason=reason,
         **more,
     )
-
-
-def _is_of_log(doubt: DoubtRow) -> bool:
-    """Return whether a doubt is about the log, not only about a poorly determined parameter."""
-    return doubt.code != "doubtful"
 
 
 def _key(row: RecordingRow | OfRecordingRow) -> Key:

@@ -1,7 +1,5 @@
 """The pages of the report, with digests that show whether a page must be written again."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import re
@@ -73,18 +71,18 @@ class Entry:
 
     file: str  # its name; its template is called so, too, with ``.jinja``
     title: str  # its name in the navigation
-    context: Callable[[Site], Mapping[str, object]]  # of the template
+    context: "Callable[[Site], Mapping[str, object]]"  # of the template
     # the joined tables that it shows: it is written again if one of them changes
     tables: tuple[str, ...] = ()
     # returns the recordings that it shows: likewise if any of their rows change
-    views: Callable[[Site], Sequence[RecordingView]] = lambda _: ()
+    views: "Callable[[Site], Sequence[RecordingView]]" = lambda _: ()
     # returns the files of recordings that it shows: likewise
-    files: Callable[[Site], Iterable[Path]] = lambda _: ()
-    exists: Callable[[Site], bool] = lambda _: True  # returns whether a report has it
+    files: "Callable[[Site], Iterable[Path]]" = lambda _: ()
+    exists: "Callable[[Site], bool]" = lambda _: True  # returns whether a report has it
     place: int = 0  # in the navigation, among the pages of extensions
 
     @property
-    def sections(self) -> list[Section]:
+    def sections(self) -> "list[Section]":
         """The sections that extensions add."""
         return [section for section in _SECTIONS.objects() if section.page == self.file]
 
@@ -93,7 +91,7 @@ class Entry:
         """The joined tables that it shows, including its sections."""
         return {*self.tables, *chain.from_iterable(section.tables for section in self.sections)}
 
-    def page(self, site: Site) -> Page:
+    def page(self, site: "Site") -> Page:
         """Return the page of a report."""
         shown = (site.tables[table].to_pylist() for table in sorted(self.shown_tables))
         kept = (path.read_bytes() for path in self.files(site) if path.is_file())
@@ -112,7 +110,7 @@ class Section:
 
     page: str  # the file of its `Entry`
     template: str  # gets the result of `context` as `section`
-    context: Callable[[Site], Any]  # returns None if the section is omitted
+    context: "Callable[[Site], Any]"  # returns None if the section is omitted
     tables: tuple[str, ...] = ()  # further joined tables that it shows
 
 

@@ -311,9 +311,7 @@ def _add_shortlist(parser: argparse.ArgumentParser) -> None:
         help="folder of the requirements; default: the package's and config/requirements",
     )
     parser.add_argument(
-        "--results",
-        type=Path,
-        help="of a run: sensors with usable logs are judged by these",
+        "--results", type=Path, help="of a run: sensors with usable logs are judged by these"
     )
 
 

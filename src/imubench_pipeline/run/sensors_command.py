@@ -85,19 +85,15 @@ def run(arguments: argparse.Namespace) -> int:
 
 def find_sensors(sensors: Mapping[str, "Sensor"], text: str) -> dict[str, "Sensor"]:
     """Return the sensors whose file, model, vendor or product contains a text, in order."""
-    asked = _simplify(text)
+    asked = "".join(letter for letter in text.lower() if letter.isalnum())
     return {
         name: sensor
         for name, sensor in sorted(sensors.items())
         if any(
-            asked in _simplify(known)
+            asked in "".join(letter for letter in known.lower() if letter.isalnum())
             for known in (name, sensor.model, sensor.vendor, *sensor.aliases)
         )
     }
-
-
-def _simplify(text: str) -> str:
-    return "".join(letter for letter in text.lower() if letter.isalnum())
 
 
 def _render_list(

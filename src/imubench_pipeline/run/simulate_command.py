@@ -130,9 +130,22 @@ def run(options: argparse.Namespace) -> int:
         "motion": None if options.motion is None else str(options.motion),
     }
     kind = "static" if not motion else "in_motion"
-    metadata = _make_metadata(sensor_name, out.path.stem, kind, rate, columns) | {
-        "simulation": about
-    }
+    metadata = {
+        "sensor": sensor_name,
+        "device": "simulated",
+        "recording": out.path.stem,
+        "kind": kind,
+        "simulated": True,
+        "sources": [],
+        "reader": None,
+        "begins": 0.0,
+        "started": None,
+        "rate": rate,
+        "rate_from": "stated",
+        "uniform": True,
+        "holes": dict.fromkeys(columns, False),
+        "unusable": [],
+    } | {"simulation": about}
     # A name of its own in the stream: the same seed gives every sensor its own noise.
     blocks = simulate_imu(
         origin.imu,
@@ -166,28 +179,6 @@ def _check_depth(out: OutputFile) -> None:
                     f"{out}: lies at {'/'.join(parts)} in the drop zone {logs}; expected "
                     "<sensor>/<recording>, as a recording of its own: name another --out"
                 )
-
-
-def _make_metadata(
-    sensor: str, recording: str, kind: str, rate: float, columns: list[str]
-) -> dict[str, Any]:
-    """Return the metadata of a log, in the form of ingested logs."""
-    return {
-        "sensor": sensor,
-        "device": "simulated",
-        "recording": recording,
-        "kind": kind,
-        "simulated": True,
-        "sources": [],
-        "reader": None,
-        "begins": 0.0,
-        "started": None,
-        "rate": rate,
-        "rate_from": "stated",
-        "uniform": True,
-        "holes": dict.fromkeys(columns, False),
-        "unusable": [],
-    }
 
 
 def _declared(name: str, stated: Path | None) -> Any:

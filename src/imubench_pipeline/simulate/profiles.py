@@ -19,26 +19,11 @@ import pyarrow as pa
 import pyarrow.csv as pacsv
 import pyarrow.parquet as pq
 
-from imubench_pipeline.settings.profile_forms import (
-    ConstantForm,
-    DayCycleForm,
-    FileForm,
-    Form,
-    Formula,
-    StepsForm,
-    Surroundings,
-    WarmUpForm,
-)
+from imubench_pipeline import units
+from imubench_pipeline.settings import profile_forms
 from imubench_pipeline.settings.sensor import QUANTITIES, quantity_of
 from imubench_pipeline.settings.validation import ConfigError
 from imubench_pipeline.typing import Array
-from imubench_pipeline.units import (
-    SI_UNITS,
-    UnitError,
-    find_conversion,
-    parse_difference,
-    parse_quantity,
-)
 
 _HEADING_PATTERN = re.compile(r"^\s*(\w+)\s*(?:[\[(]\s*(.+?)\s*[\])])?\s*$")
 _TIME_COLUMN = "time"
@@ -74,12 +59,12 @@ class FileSeries:
         if name not in self._headings:
             raise ConfigError(
                 f"{self.path}: no column {name!r}; it has {', '.join(self._headings) or 'none'}; "
-                f"expected such as '{name} [{SI_UNITS[dimension]}]'"
+                f"expected such as '{name} [{units.SI_UNITS[dimension]}]'"
             )
         heading, unit = self._headings[name]
         try:
-            factor, offset = find_conversion(unit or SI_UNITS[dimension], dimension)
-        except UnitError as error:
+            factor, offset = units.find_conversion(unit or units.SI_UNITS[dimension], dimension)
+        except units.UnitError as error:
             raise ConfigError(f"{self.path}: column {heading!r}: {error}") from error
         self._asked[name] = (heading, factor, offset)
         self._batches = None
@@ -320,7 +305,9 @@ class FileColumn(Profile):
         return self.series.at(self.name, times)
 
 
-def profiles_of(around: Surroundings, folder: Path) -> tuple[dict[str, Profile], Profile | None]:
+def profiles_of(
+    around: profile_forms.Surroundings, folder: Path
+) -> tuple[dict[str, Profile], Profile | None]:
     """Return motion by channel, and temperature, in SI; file names are relative to a folder.
 
     Raises ConfigError if a file cannot be used. Raises UnitError if a unit has another dimension
@@ -335,7 +322,9 @@ def profiles_of(around: Surroundings, folder: Path) -> tuple[dict[str, Profile],
     return motion, None if warm is None else make_profile(warm, "temperature", folder, opened)
 
 
-def make_profile(form: Form, name: str, folder: Path, opened: dict[Path, FileSeries]) -> Profile:
+def make_profile(
+    form: profile_forms.Form, name: str, folder: Path, opened: dict[Path, FileSeries]
+) -> Profile:
     """Return a profile, in SI, of a channel or of ``temperature``.
 
     File names are relative to the folder. A file is opened once: a newly opened file is added to
@@ -343,7 +332,7 @@ def make_profile(form: Form, name: str, folder: Path, opened: dict[Path, FileSer
     another dimension.
     """
     dimension = name if name == "temperature" else QUANTITIES[quantity_of(name)]
-    if isinstance(form, FileForm):
+    if isinstance(form, profile_forms.FileForm):
         path = folder / form.file
         if path not in opened:
             opened[path] = FileSeries(path)
@@ -353,19 +342,23 @@ def make_profile(form: Form, name: str, folder: Path, opened: dict[Path, FileSer
     return _make_formula_profile(form, dimension)
 
 
-def _make_formula_profile(form: Formula, dimension: str, *, difference: bool = False) -> Profile:
+def _make_formula_profile(
+    form: profile_forms.Formula, dimension: str, *, difference: bool = False
+) -> Profile:
     """Return a profile of a value, or of a difference, for which 5 degC and 5 K are the same."""
-    time = partial(parse_quantity, dimension="time")
-    value = partial(parse_difference if difference else parse_quantity, dimension=dimension)
+    time = partial(units.parse_quantity, dimension="time")
+    value = partial(
+        units.parse_difference if difference else units.parse_quantity, dimension=dimension
+    )
     match form:
-        case ConstantForm():
+        case profile_forms.ConstantForm():
             return Constant(value(form.value))
-        case StepsForm():
+        case profile_forms.StepsForm():
             return Steps(tuple(map(time, form.times)), tuple(map(value, form.values)))
-        case DayCycleForm():
-            swing = parse_difference(form.amplitude, dimension)
+        case profile_forms.DayCycleForm():
+            swing = units.parse_difference(form.amplitude, dimension)
             return DayCycle(value(form.mean), swing, time(form.period), time(form.highest))
-        case WarmUpForm():
+        case profile_forms.WarmUpForm():
             start, end = value(form.start), value(form.end)
             return WarmUp(start, end, time(form.time_constant), time(form.begin))
     first, *others = form.parts

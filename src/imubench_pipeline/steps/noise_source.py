@@ -109,11 +109,7 @@ def take_printed_noise(name: str, sensor: Sensor, channel: str) -> NoiseSource |
     if channel not in origin.imu.axes or not origin.imu.axes[channel].noise.N:
         return None
     model = origin.imu.axes[channel].noise
-    return NoiseSource(
-        model,
-        model,
-        texts.printed_noise(origin.source),
-    )
+    return NoiseSource(model, model, texts.printed_noise(origin.source))
 
 
 def explain_segments(log: ChannelLog) -> str:

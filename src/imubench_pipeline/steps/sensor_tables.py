@@ -21,11 +21,7 @@ from imubench_pipeline.registry import Hook
 from imubench_pipeline.settings.sensor import Sensor, sensors_of
 from imubench_pipeline.settings.simulated_recordings import SimulatedRecording
 from imubench_pipeline.simulate.models import SIMULATIONS, list_true_figures
-from imubench_pipeline.tables.failures import (
-    mark_failures,
-    read_with_failures,
-    remove_recordings,
-)
+from imubench_pipeline.tables.failures import mark_failures, read_with_failures, remove_recordings
 from imubench_pipeline.tables.files import build
 from imubench_pipeline.units import parse_quantity
 

@@ -3,13 +3,7 @@
 from types import ModuleType
 
 from imubench_pipeline.model import comparisons, estimates, recordings
-from imubench_pipeline.model.table import (
-    OfRecordingRow,
-    TableRow,
-    TypedColumn,
-    columns_of,
-    rows_in,
-)
+from imubench_pipeline.model.table import OfRecordingRow, TableRow, TypedColumn, columns_of, rows_in
 from imubench_pipeline.registry import Hook
 
 _MODULES: Hook[ModuleType] = Hook("tables")

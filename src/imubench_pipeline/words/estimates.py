@@ -4,13 +4,7 @@ from collections.abc import Mapping
 
 from imubench_pipeline.model.estimates import ParameterRow
 from imubench_pipeline.model.states import Status
-from imubench_pipeline.words.numbers import (
-    Unit,
-    counted,
-    duration_text,
-    interval_text,
-    percent_text,
-)
+from imubench_pipeline.words import numbers
 
 STATUS_WORDS: Mapping[Status, str] = {
     "ok": "estimated",
@@ -45,7 +39,7 @@ def symbol_text(symbol: str) -> str:
     return _SYMBOLS.get(symbol, symbol)
 
 
-def estimate_text(row: ParameterRow, unit: Unit, duration: float | None) -> str:
+def estimate_text(row: ParameterRow, unit: numbers.Unit, duration: float | None) -> str:
     """Return why a parameter has no plain value, in sentences; may be empty.
 
     ``duration`` is the length of the recording, s.
@@ -59,9 +53,11 @@ def estimate_text(row: ParameterRow, unit: Unit, duration: float | None) -> str:
         return text + f"; {below} {unit.sign}" * (row.upper is not None) + "."
     if status == "not_identified":
         text = f"{symbol} is not determined"
-        text += f" by {duration_text(duration)} of data" if duration else ""
+        text += f" by {numbers.duration_text(duration)} of data" if duration else ""
         if row.lower is not None and row.upper is not None:
-            text += f"; 95 % interval: {interval_text(row.lower, row.upper, unit)} {unit.sign}"
+            text += (
+                f"; 95 % interval: {numbers.interval_text(row.lower, row.upper, unit)} {unit.sign}"
+            )
         return f"{text}{_describe_needed(row, duration)}."
     reason = (row.reason or STATUS_WORDS[status]).rstrip(".")
     return f"{symbol}: {reason}{_describe_needed(row, duration)}."
@@ -71,17 +67,17 @@ def _describe_needed(row: ParameterRow, duration: float | None) -> str:
     needed = row.duration_needed
     if needed is None or (duration is not None and needed <= duration):
         return ""
-    return f"; ± 10 % needs {duration_text(needed)}"
+    return f"; ± 10 % needs {numbers.duration_text(needed)}"
 
 
-def precision_text(row: ParameterRow, unit: Unit) -> str:
+def precision_text(row: ParameterRow, unit: numbers.Unit) -> str:
     """Return the uncertainty of a value: ``± 4 %``, or its interval; empty if not known."""
     if row.value is None or row.lower is None or row.upper is None or not row.value:
         return ""
     half = (row.upper - row.lower) / 2.0 / abs(row.value)
     if half > _MAX_SYMMETRIC:
-        return interval_text(row.lower, row.upper, unit, row.value)
-    return f"± {percent_text(half, 2)}"
+        return numbers.interval_text(row.lower, row.upper, unit, row.value)
+    return f"± {numbers.percent_text(half, 2)}"
 
 
 def model_text(name: str) -> str:
@@ -89,4 +85,4 @@ def model_text(name: str) -> str:
     terms = name.split("+")
     lines = terms.count("S")
     rest = "+".join(term for term in terms if term != "S")
-    return f"{rest} + {counted(lines, 'line')}" if lines else rest
+    return f"{rest} + {numbers.counted(lines, 'line')}" if lines else rest

@@ -8,14 +8,9 @@ from typing import Literal
 import numpy as np
 
 from imubench_pipeline.allan.phase import Span
+from imubench_pipeline.estimators.deterministic import search
 from imubench_pipeline.estimators.deterministic.means import Means, average_blocks
 from imubench_pipeline.estimators.deterministic.ordinates import Fit, Ordinates, Regressor
-from imubench_pipeline.estimators.deterministic.search import (
-    MIN_CYCLES,
-    Gain,
-    SearchResult,
-    search_signals,
-)
 from imubench_pipeline.estimators.estimate import SIGMAS
 from imubench_pipeline.typing import Array
 
@@ -60,7 +55,7 @@ class DeterministicSignals:
 
     signals: tuple[DeterministicSignal, ...]
     means: Means | None  # the block means that were searched; None where the log is too short
-    searched: SearchResult | None
+    searched: search.SearchResult | None
 
     @property
     def telegraph(self) -> bool:
@@ -111,13 +106,13 @@ def find_deterministic_signals(
     ordinates = Ordinates(means, highest) if means.parts else None
     if ordinates is None or not ordinates.is_usable:
         return DeterministicSignals((), None, None)
-    searched = search_signals(ordinates)
+    searched = search.search_signals(ordinates)
     if searched.many:
         return DeterministicSignals((), means, searched)
     return DeterministicSignals(tuple(_describe(ordinates, searched)), means, searched)
 
 
-def _describe(ordinates: Ordinates, searched: SearchResult) -> Iterator[DeterministicSignal]:
+def _describe(ordinates: Ordinates, searched: search.SearchResult) -> Iterator[DeterministicSignal]:
     """Yield the signals with their sizes and intervals."""
     fit, means = searched.fit, ordinates.means
     column = 0
@@ -174,11 +169,11 @@ def _find_limits(ordinates: Ordinates, fit: Fit, regressor: Regressor) -> tuple[
         half = 0.5 * regressor.length
         return regressor.where - half, regressor.where + half
     others = tuple(x for x in fit.regressors if x is not regressor)
-    gain = Gain(ordinates, others, fit.density, regressor.part)
+    gain = search.Gain(ordinates, others, fit.density, regressor.part)
     best = gain.of(regressor)
     n = ordinates.sizes[regressor.part]
     unit = {"step": 0.25, "exponential": 0.02 * regressor.where, "sinusoid": 0.02 / n}
-    least = MIN_CYCLES / n if regressor.kind == "sinusoid" else 1e-6
+    least = search.MIN_CYCLES / n if regressor.kind == "sinusoid" else 1e-6
     limits = []
     for side in (-1.0, 1.0):
         away = unit[regressor.kind]

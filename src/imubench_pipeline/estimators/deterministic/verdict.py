@@ -81,10 +81,7 @@ def assess_signals(
 
 
 def state_effects(
-    findings: Iterable[Finding],
-    estimate: Estimate,
-    without: Mapping[str, float],
-    mean: float,
+    findings: Iterable[Finding], estimate: Estimate, without: Mapping[str, float], mean: float
 ) -> tuple[Finding, ...]:
     """Return findings that state how parameters would change without the removal of signals.
 

@@ -48,16 +48,8 @@ class Solutions:
 class TermSearch:
     """The Allan variance of each term on a grid of tau, and the search for the best set of terms.
 
-    Parameters
-    ----------
-    tau : ndarray, shape (m,)
-        s.
-    rate : float
-        Hz.
-    averaged : ndarray, shape (m,)
-        Samples present in a cluster.
-    times : ndarray, shape (t,)
-        Correlation times that are tried, s.
+    ``tau``, s, and ``averaged``, samples present in a cluster, have the shape (m,); the rate is in
+    Hz; ``times``, shape (t,), are the correlation times that are tried, s.
     """
 
     def __init__(self, tau: Array, rate: float, averaged: Array, times: Array) -> None:

@@ -98,35 +98,23 @@ def fit(
 ) -> Estimate:
     """Estimate N, B, T_B, K and R of an Allan variance, with limits that hold for the next log.
 
-    Parameters
-    ----------
-    curve : AllanCurve
-        Of m points, in (SI unit)^2 and s; without deterministic signals.
-    parts : PartVariances
-        At the same m points.
-    lines : sequence of Sinusoid
-        The lines of the spectrum; SI, Hz.
-    rng : numpy.random.Generator
-        Of the draws.
-
-    Returns
-    -------
-    Estimate
-        SI, with 95 % limits: sampling, choice of terms, error of the model, and changes of the
-        sensor within the log. ``not_identified`` with an upper limit where a term may be absent or
-        its limits are too wide.
-
-    Raises
-    ------
-    UnfitCurveError
-        If fewer than six points lie within a sixth of the log, or the variance is 0 at one.
+    ``curve`` and ``parts`` have the same m points, SI and s, without deterministic signals;
+    ``lines`` are those of the spectrum. Returns SI values with 95 % limits: sampling, choice of
+    terms, error of the model, and changes of the sensor within the log. ``not_identified`` with an
+    upper limit: a term may be absent, or its limits are too wide. Raises UnfitCurveError if fewer
+    than six points lie within a sixth of the log, or the variance is 0 at one.
     """
     inside, points, fitted = _fit_curve(curve, lines)
     excesses = _estimate_excesses(points, fitted, parts.select(inside))
     draws = _draw(points, fitted, excesses, rng)
     estimate = _make_estimate(points, fitted, draws)
     duration = curve.samples / curve.rate
-    parameters = _state_changes(estimate.parameters, excesses)
+    parameters = {
+        symbol: replace(one, reason=texts.changes_between_parts(excesses[symbol]))
+        if one.status == "ok" and excesses.get(symbol)
+        else one
+        for symbol, one in estimate.parameters.items()
+    }
     return replace(
         estimate,
         parameters={symbol: _add_length(one, duration) for symbol, one in parameters.items()},
@@ -135,24 +123,9 @@ def fit(
 
 
 def fit_values(curve: AllanCurve, lines: Sequence[Sinusoid] = ()) -> dict[str, float]:
-    """Return only the values of `fit`, without limits: 0 where a term is absent.
+    """Return the values of `fit`, SI, without limits: 0 where a term is absent.
 
-    Parameters
-    ----------
-    curve : AllanCurve
-        Of m points, in (SI unit)^2 and s, with or without deterministic signals.
-    lines : sequence of Sinusoid
-        The lines of the spectrum; SI, Hz.
-
-    Returns
-    -------
-    dict of str to float
-        By parameter, SI and s.
-
-    Raises
-    ------
-    UnfitCurveError
-        As `fit`.
+    The curve may contain deterministic signals. Raises UnfitCurveError as `fit` does.
     """
     _, points, fitted = _fit_curve(curve, lines)
     model, solution = fitted.model, fitted.solution
@@ -395,7 +368,8 @@ def _draw(
     root = vectors * np.sqrt(np.maximum(values, 0.0))
     normal = rng.standard_normal((_DRAWS // 2, len(values)))
     normal = np.concatenate((normal, -normal))
-    shift, scale = _chi_squared_logarithms(np.diag(covariance))
+    half = 1.0 / np.maximum(np.diag(covariance), 1e-9)
+    shift, scale = np.log(half) - digamma(half), np.sqrt(polygamma(1, half) * half)
     spread = shift + (normal @ root.T) * scale
     curves = points.variance * np.exp(spread)
     drawn = points.search.solve(curves, fitted.weights)
@@ -412,17 +386,6 @@ def _draw(
     step = np.log(points.search.times[1] / points.search.times[0])
     times = drawn.times * np.exp(step * rng.uniform(-0.5, 0.5, _DRAWS))  # between those tried
     return replace(drawn, squares=drawn.squares * factors, times=times)
-
-
-def _chi_squared_logarithms(relative: Array) -> tuple[Array, Array]:
-    """Return mean and scale of the logarithm of a true variance, given its estimate.
-
-    An estimate of relative variance v is chi-squared with 2/v degrees of freedom. Their logarithm
-    has the mean psi(1/v) + ln v and the variance psi'(1/v). The scale is for deviates of variance
-    v.
-    """
-    half = 1.0 / np.maximum(relative, 1e-9)
-    return np.log(half) - digamma(half), np.sqrt(polygamma(1, half) * half)
 
 
 _TERMS_OF = {"N": [WHITE], "B": [FLICKER, PROCESS], "K": [WALK, RAMP]}
@@ -447,18 +410,6 @@ def _estimate_excesses(
             excess = estimate_excess(parts, curve, influence, covariance)
         excesses[symbol] = min(float(np.sqrt(excess)), _MAX_EXCESS)
     return excesses
-
-
-def _state_changes(
-    parameters: Mapping[str, Parameter], excesses: Mapping[str, float]
-) -> dict[str, Parameter]:
-    """Return parameters whose reason states how much they change during the log."""
-    return {
-        symbol: replace(one, reason=texts.changes_between_parts(excesses[symbol]))
-        if one.status == "ok" and excesses.get(symbol)
-        else one
-        for symbol, one in parameters.items()
-    }
 
 
 def _add_length(parameter: Parameter, duration: float) -> Parameter:

@@ -91,21 +91,13 @@ def compute_part_variances(
 
 
 def estimate_excess(
-    parts: PartVariances,
-    curve: AllanCurve,
-    influence: Array,
-    covariance: Callable[[int], Array],
+    parts: PartVariances, curve: AllanCurve, influence: Array, covariance: Callable[[int], Array]
 ) -> float:
     """Return the variance of the logarithm of a parameter between parts, beyond sampling errors.
 
-    Parameters
-    ----------
-    parts : PartVariances
-    curve : AllanCurve
-    influence : ndarray, shape (m,)
-        Derivatives of the logarithm of the parameter by the logarithms of the variances.
-    covariance : callable
-        Returns the covariance of the relative variances of a log of a number of samples.
+    ``influence``, shape (m,), are the derivatives of the logarithm of the parameter by the
+    logarithms of the variances; ``covariance`` returns the covariance of the relative variances of
+    a log of a number of samples.
     """
     excesses = []
     for number in _DIVISIONS:

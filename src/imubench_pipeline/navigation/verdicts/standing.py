@@ -21,7 +21,7 @@ MAX_LIMIT_RATIO = 4.0
 class OutageErrorRow(ErrorBudgetRow):
     """An error at the end of outages on a trajectory."""
 
-    trajectory: Annotated[str | None, table.Column("of the outages")]
+    trajectory: Annotated[str | None, "of the outages"]
 
 
 def get_trajectory(total: ErrorBudgetRow) -> str | None:

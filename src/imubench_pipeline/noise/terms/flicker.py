@@ -25,13 +25,8 @@ import numpy as np
 
 from imubench_pipeline.noise.growth import Calibrated, SensorStart
 from imubench_pipeline.noise.state_space import StateSpace
+from imubench_pipeline.noise.terms import gauss_markov
 from imubench_pipeline.noise.terms.base import Drive, Reading, Role, SampleBlocks, Term
-from imubench_pipeline.noise.terms.gauss_markov import (
-    BIAS_INSTABILITY,
-    FLOOR,
-    PEAK_TAU,
-    GaussMarkov,
-)
 from imubench_pipeline.noise.terms.power_laws import WhiteNoise
 from imubench_pipeline.typing import Array
 
@@ -64,7 +59,7 @@ class Flicker(Term):
     standard_name = "bias instability (flicker)"
     word = "flicker"
     role = Role.SLOW
-    parameters = (BIAS_INSTABILITY,)
+    parameters = (gauss_markov.BIAS_INSTABILITY,)
     states = ()
 
     def psd(self, frequency: Array, interval: float | None = None) -> Array:
@@ -73,7 +68,7 @@ class Flicker(Term):
 
     def allan_variance(self, tau: Array) -> Array:
         """(2 ln 2 / pi) B^2 at every tau."""
-        return FLOOR**2 * self.B**2 * np.ones_like(tau)
+        return gauss_markov.FLOOR**2 * self.B**2 * np.ones_like(tau)
 
     def sampled_allan_variance(self, n: Array, interval: float) -> Array:
         """2 B^2 / (pi n^2) times the integral of sin^4(n x) / sin^3(x) from 0 to pi/2."""
@@ -161,7 +156,7 @@ class Flicker(Term):
 
     def reading(self, lowest_tau: float) -> Reading:
         """0.664 B at every tau; read where the curve is lowest."""
-        return Reading(lowest_tau, FLOOR * self.B, "B", FLOOR)
+        return Reading(lowest_tau, gauss_markov.FLOOR * self.B, "B", gauss_markov.FLOOR)
 
     @property
     def in_words(self) -> str:
@@ -186,7 +181,7 @@ def fit_flicker_bank(B: float, interval: float, longest: float) -> list[Term]:
         raise ValueError(f"the band from {interval} to {longest} s is empty")
     times, levels, white = _fit_unit_bank(round(math.log10(longest / interval), 6))
     terms: list[Term] = [
-        GaussMarkov(B * level, interval * time)
+        gauss_markov.GaussMarkov(B * level, interval * time)
         for time, level in zip(times, levels, strict=True)
         if level > 0
     ]
@@ -217,12 +212,12 @@ def _fit_unit_bank(decades: float) -> tuple[Array, Array, float]:
     """Return correlation times, their B, and N, for B = 1 and tau from 1 s to 10^decades s."""
     from scipy.optimize import nnls  # half a second at the start of each command
 
-    first, last = 0.5, max(10.0**decades / PEAK_TAU * _LAST_TIME_FACTOR, 1.0)
+    first, last = 0.5, max(10.0**decades / gauss_markov.PEAK_TAU * _LAST_TIME_FACTOR, 1.0)
     members = 1 + math.ceil(math.log10(last / first) * _MEMBERS_PER_DECADE)
     times = np.geomspace(first, last, members)
     n = np.unique(np.rint(np.geomspace(1.0, 10.0**decades, 2 + int(decades * _POINTS_PER_DECADE))))
     wanted = Flicker(1.0).sampled_allan_variance(n, 1.0)
-    shapes = [GaussMarkov(1.0, time).sampled_allan_variance(n, 1.0) for time in times]
+    shapes = [gauss_markov.GaussMarkov(1.0, time).sampled_allan_variance(n, 1.0) for time in times]
     powers, _ = nnls(np.column_stack([*shapes, 1.0 / n]) / wanted[:, None], np.ones_like(n))
     return times, np.sqrt(powers[:-1]), math.sqrt(powers[-1])
 

@@ -10,26 +10,17 @@ from numpy.typing import ArrayLike
 from imubench_pipeline.noise.exponentials import evaluate_decay, integrate_squared_response
 from imubench_pipeline.noise.growth import SensorStart, Uncalibrated, of_constant
 from imubench_pipeline.noise.state_space import ContinuousSpace, StateSpace, draw_block_sums
-from imubench_pipeline.noise.terms.base import (
-    Drive,
-    Process,
-    Reading,
-    Role,
-    SampleBlocks,
-    SearchRange,
-    Term,
-    TermParameter,
-)
+from imubench_pipeline.noise.terms import base
 from imubench_pipeline.noise.terms.power_laws import RandomWalk
 from imubench_pipeline.typing import Array
 
 PEAK = 0.4365  # peak of the Allan deviation of a Gauss-Markov process over sqrt(S_B T_B)
 PEAK_TAU = 1.8926  # tau of that peak over T_B
 FLOOR = math.sqrt(2.0 * math.log(2.0) / math.pi)  # bias instability plateau over B: 0.664
-BIAS_INSTABILITY = TermParameter("B", "bias instability", 1.0, 0.0)
+BIAS_INSTABILITY = base.TermParameter("B", "bias instability", 1.0, 0.0)
 """B of a Gauss-Markov process, and of flicker noise with an equally high Allan deviation."""
 
-CORRELATION_TIMES = SearchRange(samples=20.0, of_log=1 / 5)
+CORRELATION_TIMES = base.SearchRange(samples=20.0, of_log=1 / 5)
 """Search range: a shorter correlation is due to a filter, not to bias instability; a longer one is
 indistinguishable from a random walk."""
 
@@ -51,7 +42,7 @@ _ROWS_PER_BLOCK = 256  # rows of a covariance that are computed together
 
 
 @dataclass(frozen=True)
-class GaussMarkov(Term):
+class GaussMarkov(base.Term):
     """First-order Gauss-Markov process as a model of bias instability (Maia et al., eq. 4-8)."""
 
     B: float
@@ -60,10 +51,10 @@ class GaussMarkov(Term):
     label = "Gauss-Markov"
     standard_name = "bias instability (GM)"
     word = "GM"
-    role = Role.GAUSS_MARKOV
+    role = base.Role.GAUSS_MARKOV
     parameters = (
         BIAS_INSTABILITY,
-        TermParameter("T_B", "correlation time", 0.0, 1.0, search=CORRELATION_TIMES),
+        base.TermParameter("T_B", "correlation time", 0.0, 1.0, search=CORRELATION_TIMES),
     )
     states = ("z_G",)
 
@@ -117,9 +108,9 @@ class GaussMarkov(Term):
         return ContinuousSpace(F, Q, np.ones(1))
 
     @property
-    def drive(self) -> Drive:
+    def drive(self) -> base.Drive:
         """S_B through T_B."""
-        return Drive(process=Process(self.T_B, self.density))
+        return base.Drive(process=base.Process(self.T_B, self.density))
 
     @property
     def gauss_markov(self) -> "GaussMarkov":
@@ -173,7 +164,7 @@ class GaussMarkov(Term):
         apart = (math.expm1(-x) / x) ** 2 * np.exp(-(np.maximum(lags, 1.0) - 1.0) * x)
         return self._variance * np.where(lags == 0.0, 2.0 * (x + math.expm1(-x)) / x**2, apart)
 
-    def mean_covariance(self, blocks: SampleBlocks) -> Array:
+    def mean_covariance(self, blocks: base.SampleBlocks) -> Array:
         """V s_n s_m p^lag, with s_n = (1 - p^n) / (n (1 - p)), p = e^(-T/T_B), v = S_B T_B / 2.
 
         The lag is from the last sample of one block to the first of the other; on the diagonal
@@ -203,9 +194,9 @@ class GaussMarkov(Term):
         space = self.state_space(interval)
         return draw_block_sums(space, self.start(rng, interval), blocks, width, rng)
 
-    def reading(self, lowest_tau: float) -> Reading:
+    def reading(self, lowest_tau: float) -> base.Reading:
         """0.664 B at the peak."""
-        return Reading(PEAK_TAU * self.T_B, FLOOR * self.B, "B", FLOOR, peak=True)
+        return base.Reading(PEAK_TAU * self.T_B, FLOOR * self.B, "B", FLOOR, peak=True)
 
     @property
     def in_words(self) -> str:

@@ -17,21 +17,12 @@ from imubench_pipeline.noise.growth import (
     of_white_mean,
 )
 from imubench_pipeline.noise.state_space import ContinuousSpace, StateSpace, draw_block_sums
-from imubench_pipeline.noise.terms.base import (
-    Deterministic,
-    Drive,
-    Process,
-    Reading,
-    Role,
-    SampleBlocks,
-    Term,
-    TermParameter,
-)
+from imubench_pipeline.noise.terms import base
 from imubench_pipeline.typing import Array
 
 
 @dataclass(frozen=True)
-class Quantization(Term):
+class Quantization(base.Term):
     """Angle or velocity quantization Q of a sensor that rounds its increments (IEEE Std 952)."""
 
     Q: float
@@ -39,8 +30,8 @@ class Quantization(Term):
     label = "quantization"
     standard_name = "{integral} quantization"
     word = "Q"
-    role = Role.NOT_GROWING
-    parameters = (TermParameter("Q", "quantization", 1.0, 1.0),)
+    role = base.Role.NOT_GROWING
+    parameters = (base.TermParameter("Q", "quantization", 1.0, 1.0),)
     states = ("z_Q", "z_Q before")
 
     def psd(self, frequency: Array, interval: float | None = None) -> Array:
@@ -77,7 +68,7 @@ class Quantization(Term):
         )
 
     @property
-    def drive(self) -> Drive | None:
+    def drive(self) -> base.Drive | None:
         """None: a converter that counts increments follows every filter."""
         return None
 
@@ -101,7 +92,7 @@ class Quantization(Term):
         """2 Q^2 / d^2 at k = 0 and -Q^2 / d^2 at 1."""
         return self.Q**2 / block**2 * (2.0 * (lags == 0.0) - (lags == 1.0))
 
-    def mean_covariance(self, blocks: SampleBlocks) -> Array:
+    def mean_covariance(self, blocks: base.SampleBlocks) -> Array:
         """2 Q^2 / (n T)^2 on the diagonal, -Q^2 / (n m T^2) for blocks without a gap between.
 
         A block's mean is (q_stop - q_start) / (n T), n its samples.
@@ -118,7 +109,7 @@ class Quantization(Term):
 
 
 @dataclass(frozen=True)
-class WhiteNoise(Term):
+class WhiteNoise(base.Term):
     """White noise of density N: angle or velocity random walk (IEEE Std 952)."""
 
     N: float
@@ -126,8 +117,8 @@ class WhiteNoise(Term):
     label = "white noise"
     standard_name = "{integral} random walk"
     word = "N"
-    role = Role.WHITE
-    parameters = (TermParameter("N", "noise density", 1.0, 0.5),)
+    role = base.Role.WHITE
+    parameters = (base.TermParameter("N", "noise density", 1.0, 0.5),)
     states = ()
 
     def psd(self, frequency: Array, interval: float | None = None) -> Array:
@@ -159,11 +150,11 @@ class WhiteNoise(Term):
         return ContinuousSpace(np.zeros((0, 0)), np.zeros((0, 0)), np.zeros(0))
 
     @property
-    def drive(self) -> Drive:
+    def drive(self) -> base.Drive:
         """N^2."""
-        return Drive(white=self.N**2)
+        return base.Drive(white=self.N**2)
 
-    def as_unit(self) -> tuple[float, Term]:
+    def as_unit(self) -> tuple[float, base.Term]:
         """N^2 and N = 1."""
         return self.N**2, WhiteNoise(1.0)
 
@@ -188,7 +179,7 @@ class WhiteNoise(Term):
         """N^2 / d at k = 0."""
         return self.N**2 / block * (lags == 0.0)
 
-    def mean_covariance(self, blocks: SampleBlocks) -> Array:
+    def mean_covariance(self, blocks: base.SampleBlocks) -> Array:
         """N^2 / (T count) on the diagonal, count the samples present."""
         return np.diag(self.N**2 / (1.0 / blocks.rate * blocks.count))
 
@@ -196,13 +187,13 @@ class WhiteNoise(Term):
         """Draw sums of variance n N^2 / T."""
         return rng.standard_normal(blocks) * math.sqrt(width * self.N**2 * rate)
 
-    def reading(self, lowest_tau: float) -> Reading:
+    def reading(self, lowest_tau: float) -> base.Reading:
         """N at 1 s."""
-        return Reading(1.0, self.N, "N")
+        return base.Reading(1.0, self.N, "N")
 
 
 @dataclass(frozen=True)
-class RandomWalk(Term):
+class RandomWalk(base.Term):
     """Rate or acceleration random walk K (IEEE Std 952)."""
 
     K: float
@@ -210,8 +201,8 @@ class RandomWalk(Term):
     label = "random walk"
     standard_name = "{signal} random walk"
     word = "K"
-    role = Role.RANDOM_WALK
-    parameters = (TermParameter("K", "random walk", 1.0, -0.5),)
+    role = base.Role.RANDOM_WALK
+    parameters = (base.TermParameter("K", "random walk", 1.0, -0.5),)
     states = ("z_K",)
 
     def psd(self, frequency: Array, interval: float | None = None) -> Array:
@@ -244,11 +235,11 @@ class RandomWalk(Term):
         return ContinuousSpace(np.zeros((1, 1)), np.array([[self.K**2]]), np.ones(1))
 
     @property
-    def drive(self) -> Drive:
+    def drive(self) -> base.Drive:
         """K^2, never forgotten."""
-        return Drive(process=Process(math.inf, self.K**2))
+        return base.Drive(process=base.Process(math.inf, self.K**2))
 
-    def as_unit(self) -> tuple[float, Term]:
+    def as_unit(self) -> tuple[float, base.Term]:
         """K^2 and K = 1."""
         return self.K**2, RandomWalk(1.0)
 
@@ -265,7 +256,7 @@ class RandomWalk(Term):
         """-K^2 d k / 2, and -K^2 d / 6 at k = 0."""
         return -(self.K**2) * block * np.where(lags == 0.0, 1.0 / 6.0, 0.5 * lags)
 
-    def mean_covariance(self, blocks: SampleBlocks) -> Array:
+    def mean_covariance(self, blocks: base.SampleBlocks) -> Array:
         """K^2 times the mean time of the earlier block.
 
         On the diagonal K^2 T (start + (n - 1) (2 n - 1) / (6 n)).
@@ -284,13 +275,13 @@ class RandomWalk(Term):
         space = self.state_space(interval)
         return draw_block_sums(space, self.start(rng, interval), blocks, width, rng)
 
-    def reading(self, lowest_tau: float) -> Reading:
+    def reading(self, lowest_tau: float) -> base.Reading:
         """K at 3 s."""
-        return Reading(3.0, self.K, "K")
+        return base.Reading(3.0, self.K, "K")
 
 
 @dataclass(frozen=True)
-class Ramp(Deterministic):
+class Ramp(base.Deterministic):
     """Rate or acceleration ramp R, a linear drift (IEEE Std 952); deterministic."""
 
     R: float
@@ -298,8 +289,8 @@ class Ramp(Deterministic):
     label = "ramp"
     standard_name = "{signal} ramp"
     word = "R"
-    role = Role.SLOW
-    parameters = (TermParameter("R", "ramp", 1.0, -1.0, signed=True),)
+    role = base.Role.SLOW
+    parameters = (base.TermParameter("R", "ramp", 1.0, -1.0, signed=True),)
     states = ("z_R", "z_R slope")
 
     def psd(self, frequency: Array, interval: float | None = None) -> Array:
@@ -336,7 +327,7 @@ class Ramp(Deterministic):
         rise = of_constant(order + 1, time) + of_constant(order, time) * lag
         return (self.R * rise) ** 2
 
-    def mean_covariance(self, blocks: SampleBlocks) -> Array:
+    def mean_covariance(self, blocks: base.SampleBlocks) -> Array:
         """R^2 times the product of the mean times: a slope of variance R^2, of either sign."""
         return np.asarray(self.R**2 * np.outer(blocks.middle, blocks.middle))
 

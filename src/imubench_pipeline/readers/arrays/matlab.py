@@ -19,19 +19,9 @@ from typing import IO
 import h5py
 import numpy as np
 
-from imubench_pipeline.readers.arrays import hdf5
+from imubench_pipeline.readers.arrays import hdf5, table
 from imubench_pipeline.readers.arrays.file import ArrayFile
 from imubench_pipeline.readers.arrays.matlab_4 import HEADER_BYTES, parse_header
-from imubench_pipeline.readers.arrays.table import (
-    MAX_DEFLATE_RATIO,
-    StreamedArray,
-    Table,
-    UnsupportedArray,
-    UnusableError,
-    describe_shape,
-    read_exactly,
-    skip,
-)
 from imubench_pipeline.readers.bounds import MAX_DIMENSIONS, MAX_MATLAB_NAME, MAX_STRUCTURE_DEPTH
 
 _MAX_CLASS_LENGTH = 64
@@ -41,7 +31,7 @@ _COMPLEX_FAULT = "holds complex numbers; expected numbers: save real() of it"
 class MatlabFile(ArrayFile):
     """A MATLAB file of version 7.3, 5 or 4."""
 
-    def tables(self, stack: ExitStack) -> Iterable[Table]:
+    def tables(self, stack: ExitStack) -> Iterable[table.Table]:
         """Describe every variable."""
         if h5py.is_hdf5(self.path):
             return _list_variables_of_7(stack.enter_context(h5py.File(self.path, "r")))
@@ -52,13 +42,13 @@ class MatlabFile(ArrayFile):
             return _list_variables_of_5(self.path)
         if parse_header(begin[:HEADER_BYTES]) is not None:
             return _list_variables_of_4(self.path)
-        raise UnusableError(
+        raise table.UnusableError(
             "not a MATLAB file of version 4, 5 or 7.3, or its beginning is damaged; save it with "
             "-v7.3"
         )
 
 
-def _list_variables_of_7(file: h5py.File) -> Iterator[Table]:
+def _list_variables_of_7(file: h5py.File) -> Iterator[table.Table]:
     """Yield the variables of version 7.3, where matrices are stored transposed."""
     # Parts of cells, objects and sparse matrices are not variables.
     for data_set in hdf5.list_data_sets(file, time_axis=1, passed_over="#"):
@@ -83,7 +73,7 @@ def _list_variables_of_7(file: h5py.File) -> Iterator[Table]:
         yield data_set
 
 
-def _list_variables_of_4(path: Path) -> Iterator[Table]:
+def _list_variables_of_4(path: Path) -> Iterator[table.Table]:
     """Yield the variables of a file."""
     start, size = 0, path.stat().st_size
     opened = partial(_open_plain, path)
@@ -97,9 +87,9 @@ def _list_variables_of_4(path: Path) -> Iterator[Table]:
             if end > size:
                 raise _make_truncated_error(end, size)
             if header.fault is not None:
-                yield UnsupportedArray(header.name, header.fault)
+                yield table.UnsupportedArray(header.name, header.fault)
             else:
-                yield StreamedArray(
+                yield table.StreamedArray(
                     header.name, header.shape, header.dtype, True, opened, begin, False
                 )
             start = end
@@ -137,7 +127,7 @@ _TAG_ORDER = {"<": 1, ">": -1}  # order of type and size in the tag of a small e
 _READ_BLOCK = 1 << 16
 
 
-def _list_variables_of_5(path: Path) -> Iterator[Table]:
+def _list_variables_of_5(path: Path) -> Iterator[table.Table]:
     """Yield the variables of a file, and the fields of its structures as ``name/field``."""
     size = path.stat().st_size
     with path.open("rb") as file:
@@ -145,14 +135,14 @@ def _list_variables_of_5(path: Path) -> Iterator[Table]:
         start = _HEADER_5_BYTES
         while start < size:
             file.seek(start)
-            kind, length = struct.unpack(f"{order}II", read_exactly(file, 8))
+            kind, length = struct.unpack(f"{order}II", table.read_exactly(file, 8))
             begin, end = start + 8, start + 8 + length
             if end > size:
                 raise _make_truncated_error(end, size)
             if kind == _TYPE_COMPRESSED:
                 opened = partial(_Inflated.opened, path, begin, length)
                 with opened() as stream:
-                    most = MAX_DEFLATE_RATIO * (length + 8)
+                    most = table.MAX_DEFLATE_RATIO * (length + 8)
                     elements = _Elements(stream, order, 0, most, opened, checked=True)
                     yield from _read_matrix(elements, elements.tag(_TYPE_MATRIX))
             elif kind == _TYPE_MATRIX:
@@ -201,12 +191,12 @@ class _Elements:
         return read
 
     def skip(self, size: int) -> None:
-        skip(self.stream, size)
+        table.skip(self.stream, size)
         self.at += size
 
     def _read(self, size: int) -> bytes:
         self.at += size
-        return read_exactly(self.stream, size)
+        return table.read_exactly(self.stream, size)
 
     def _check(self, length: int) -> None:
         if self.at + length > self.end:
@@ -215,24 +205,24 @@ class _Elements:
             )
 
 
-def _make_truncated_error(end: int, size: int) -> UnusableError:
-    return UnusableError(
+def _make_truncated_error(end: int, size: int) -> table.UnusableError:
+    return table.UnusableError(
         f"cut short: a variable ends at byte {end}, the file at {size}; copy it again"
     )
 
 
-def _make_damaged_error(what: str, at: int) -> UnusableError:
-    return UnusableError(f"corrupt data: {what} at byte {at}; copy the file again")
+def _make_damaged_error(what: str, at: int) -> table.UnusableError:
+    return table.UnusableError(f"corrupt data: {what} at byte {at}; copy the file again")
 
 
 def _read_matrix(
     elements: _Elements, length: int, above: str | None = None, depth: int = 0
-) -> Iterator[Table]:
+) -> Iterator[table.Table]:
     """Yield the arrays of an element that is a variable, or a field of the structure ``above``."""
     end = elements.at + length
     outer, elements.end = elements.end, end
     if length == 0 and above is not None:
-        yield UnsupportedArray(above, "is empty; expected a vector or a matrix")
+        yield table.UnsupportedArray(above, "is empty; expected a vector or a matrix")
     else:
         (flags, _) = struct.unpack(f"{elements.order}II", elements.data(6)[:8].ljust(8, b"\0"))
         kind = flags & 0xFF
@@ -249,27 +239,31 @@ def _read_matrix(
         elif kind == _CLASS_STRUCTURE and math.prod(shape) == 1:
             yield from _read_fields(elements, name, depth)
         elif not _FIRST_NUMERIC_CLASS <= kind <= _LAST_NUMERIC_CLASS:
-            yield UnsupportedArray(name, _CLASS_FAULTS.get(kind, f"is of the unknown class {kind}"))
+            yield table.UnsupportedArray(
+                name, _CLASS_FAULTS.get(kind, f"is of the unknown class {kind}")
+            )
         elif flags & _FLAG_COMPLEX:
-            yield UnsupportedArray(name, _COMPLEX_FAULT)
+            yield table.UnsupportedArray(name, _COMPLEX_FAULT)
         else:
             size = elements.tag(*_NUMBER_TYPES)
             dtype = np.dtype(elements.order + _NUMBER_TYPES[elements.kind])
             if size != math.prod(shape) * dtype.itemsize:
-                raise UnusableError(
-                    f"corrupt data: {name} promises {describe_shape(shape)} values of "
+                raise table.UnusableError(
+                    f"corrupt data: {name} promises {table.describe_shape(shape)} values of "
                     f"{dtype.itemsize} bytes, but has {size} bytes; copy the file again"
                 )
             opened, checked = elements.opened, elements.checked
-            yield StreamedArray(name, shape, dtype, True, opened, elements.at, checked)
+            yield table.StreamedArray(name, shape, dtype, True, opened, elements.at, checked)
     elements.end = outer
     if above is not None:
         elements.skip(end - elements.at)
 
 
-def _read_fields(elements: _Elements, name: str, depth: int) -> Iterator[Table]:
+def _read_fields(elements: _Elements, name: str, depth: int) -> Iterator[table.Table]:
     if depth == MAX_STRUCTURE_DEPTH:
-        yield UnsupportedArray(name, f"lies {depth} structures deep; expected a vector or a matrix")
+        yield table.UnsupportedArray(
+            name, f"lies {depth} structures deep; expected a vector or a matrix"
+        )
         return
     width = int.from_bytes(elements.data(5), "little" if elements.order == "<" else "big")
     names = elements.data(1)
@@ -311,7 +305,7 @@ class _Inflated(io.RawIOBase):
                 view[: len(read)] = read
                 return len(read)
             if not packed and not self._inflate.eof:
-                raise UnusableError(
+                raise table.UnusableError(
                     "compressed data end early; the file is cut short: copy it again"
                 )
         return 0

@@ -115,7 +115,21 @@ def _recognise_number(column: LogColumn, table: LogTable) -> Clock | None:
     if joined == _XSENS_PACKETS or (
         not _TIME_WORDS.intersection(words) and _COUNTER_WORDS.intersection(words)
     ):
-        return _recognise_counter(column, joined == _XSENS_PACKETS)
+        steps = _take_steps(column.values)
+        step = float(np.median(steps[steps > 0]))
+        highest = float(np.nanmax(column.values))
+        if not step.is_integer() or not step <= _MAX_COUNTER_STEP or not highest < _MAX_COUNT:
+            return None
+        scale, wraps = 1 / step if step > 1 else None, None
+        falls = (steps < 0).any()
+        comment = "a count of samples"
+        if joined == _XSENS_PACKETS and highest < 1 << 16:
+            wraps = 1 << 16
+        elif falls:
+            wraps = 1 << max(int(highest).bit_length(), 1)
+            comment = "a count of samples; 'wraps' is guessed from the highest one"
+        source = Source(column=_get_source(column), unit="samples", scale=scale, wraps=wraps)
+        return Clock(column, Entry(source, comment), True, (1, 3))
     unit = parse_unit(column.unit or "", "time") or split_unit(column.label, "time")[1]
     if unit is None:
         units = [parse_unit(word, "time") for word in words if len(word) > 1]
@@ -138,24 +152,6 @@ def _recognise_number(column: LogColumn, table: LogTable) -> Clock | None:
         comment = f"guessed, since it {grows}; {comment.removeprefix('guessed: ')}"
     order = (_rank_resolution(column) + (0 if named else 2), 0 if unit != UNKNOWN else 2)
     return Clock(column, Entry(replace(source, unit=unit), comment), False, order)
-
-
-def _recognise_counter(column: LogColumn, of_16_bits: bool) -> Clock | None:
-    steps = _take_steps(column.values)
-    step = float(np.median(steps[steps > 0]))
-    highest = float(np.nanmax(column.values))
-    if not step.is_integer() or not step <= _MAX_COUNTER_STEP or not highest < _MAX_COUNT:
-        return None
-    scale, wraps = 1 / step if step > 1 else None, None
-    falls = (steps < 0).any()
-    comment = "a count of samples"
-    if of_16_bits and highest < 1 << 16:
-        wraps = 1 << 16
-    elif falls:
-        wraps = 1 << max(int(highest).bit_length(), 1)
-        comment = "a count of samples; 'wraps' is guessed from the highest one"
-    source = Source(column=_get_source(column), unit="samples", scale=scale, wraps=wraps)
-    return Clock(column, Entry(source, comment), True, (1, 3))
 
 
 def _guess_unit(values: NDArray[np.float64], rate: float | None) -> tuple[str, str]:

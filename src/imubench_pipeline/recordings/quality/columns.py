@@ -172,7 +172,19 @@ def check_columns(
             continue
         fatal = _find_unusable(channel, column, settings)
         findings += [fatal] if fatal else []
-        findings += _find_missing_cells(channel, column, rate)
+        length, last = column.longest_gap
+        begin, end = (last - length) / rate, last / rate
+        if column.missing:
+            few = column.missing < _MAX_HARMLESS_EMPTY_SHARE * (column.missing + column.present)
+            severity: Severity = "note" if few else "warning"
+            empty = samples.EmptyCells(column.missing, length, length / rate, begin)
+            findings.append(find(empty, severity, column.missing, channel, begin, end))
+        if column.not_finite:
+            number = column.not_finite
+            infinite = samples.NotFinite(
+                number, summary.MAX_MEASUREMENT, length, length / rate, begin
+            )
+            findings.append(find(infinite, "warning", number, channel, begin, end))
         if fatal is None:
             usable[channel] = column
     steps = {channel: levels.detect_quantisation(column) for channel, column in usable.items()}
@@ -212,22 +224,6 @@ def _find_unusable(
     if column.low == column.high:
         return find(samples.Stuck(column.low, column.present), "fatal", column.low, channel)
     return None
-
-
-def _find_missing_cells(
-    channel: str, column: summary.ColumnSummary, rate: float
-) -> Iterator[Finding]:
-    length, last = column.longest_gap
-    begin, end = (last - length) / rate, last / rate
-    if column.missing:
-        few = column.missing < _MAX_HARMLESS_EMPTY_SHARE * (column.missing + column.present)
-        severity: Severity = "note" if few else "warning"
-        empty = samples.EmptyCells(column.missing, length, length / rate, begin)
-        yield find(empty, severity, column.missing, channel, begin, end)
-    if column.not_finite:
-        number = column.not_finite
-        infinite = samples.NotFinite(number, summary.MAX_MEASUREMENT, length, length / rate, begin)
-        yield find(infinite, "warning", number, channel, begin, end)
 
 
 def _find_bad_values(

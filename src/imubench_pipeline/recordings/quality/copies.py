@@ -14,7 +14,6 @@ import numpy as np
 
 from imubench_pipeline.model.estimates import FixedBiasRow, ModelRow
 from imubench_pipeline.model.recordings import FindingRow
-from imubench_pipeline.model.table import ChannelRow
 from imubench_pipeline.recordings.quality import levels
 from imubench_pipeline.recordings.quality.repeats import WINDOW, Stretch
 from imubench_pipeline.recordings.quality.summary import ColumnSummary, Excerpt, pair_common_samples
@@ -133,17 +132,17 @@ def find_copied_recordings(
     models: Iterable[ModelRow], biases: Iterable[FixedBiasRow]
 ) -> Iterator[FindingRow]:
     """Yield findings about recordings that are copies of an earlier one, in their order."""
-    means = {_get_channel_key(row): row.value for row in biases}
+    means = {(row.sensor, row.recording, row.channel): row.value for row in biases}
     first: dict[tuple[Any, ...], str] = {}
     copies: dict[tuple[str, str], dict[str, list[str]]] = {}
     for row in models:
-        mean = means.get(_get_channel_key(row))
+        mean = means.get((row.sensor, row.recording, row.channel))
         if not row.chosen or mean is None:
             continue
         samples = tuple(
             format(figure, _FINGERPRINT_FORMAT) for figure in (row.log_likelihood, mean)
         )
-        sensor, recording, channel = _get_channel_key(row)
+        sensor, recording, channel = row.sensor, row.recording, row.channel
         of = first.setdefault((sensor, channel, *samples), recording)
         if of != recording:
             copies.setdefault((sensor, recording), {}).setdefault(of, []).append(channel)
@@ -151,10 +150,6 @@ def find_copied_recordings(
         for of, channels in originals.items():
             data = words.RecordingTwice(recording, of, tuple(channels))
             yield find(data, "warning", float(len(channels))).row(sensor, recording)
-
-
-def _get_channel_key(row: ChannelRow) -> tuple[str, str, str]:
-    return row.sensor, row.recording, row.channel
 
 
 _MIN_SHARED_CORRELATION = 0.45

@@ -165,7 +165,7 @@ class Quantisation:
 
 def detect_quantisation(column: ColumnSummary) -> Quantisation | None:
     """Return the quantisation of a column, or None if no steps are found."""
-    spread = estimate_noise(column)
+    spread = compute_finite_median(column.blocks().spread)
     if not (0.0 < column.step < np.inf):
         return None
     hidden = find_hidden_step(column.excerpts())
@@ -176,11 +176,6 @@ def detect_quantisation(column: ColumnSummary) -> Quantisation | None:
     over_noise = step / spread if spread > 0.0 else math.inf  # most blocks have one value
     levels = (column.high - column.low) / step + 1.0
     return Quantisation(step, levels, over_noise, hidden is not None)
-
-
-def estimate_noise(column: ColumnSummary) -> float:
-    """Return the median standard deviation of the samples of a block, SI."""
-    return compute_finite_median(column.blocks().spread)
 
 
 def find_piled_value(
@@ -258,7 +253,7 @@ def bound_noise_density(column: ColumnSummary, rate: float) -> tuple[float, floa
     is at least the quantisation noise of the register; it is None if there are too few blocks.
     """
     blocks = column.blocks()
-    spread = estimate_noise(column) / math.sqrt(rate)
+    spread = compute_finite_median(column.blocks().spread) / math.sqrt(rate)
     steps = np.diff(np.where(blocks.count > 0.9 * blocks.size, blocks.mean, np.nan))
     steps = steps[np.isfinite(steps)]
     if len(steps) < _MIN_BLOCK_STEPS:

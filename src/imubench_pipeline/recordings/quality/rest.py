@@ -9,11 +9,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from imubench_pipeline.recordings.quality.summary import (
-    BlockStatistics,
-    ColumnSummary,
-    compute_finite_median,
-)
+from imubench_pipeline.recordings.quality.summary import ColumnSummary, compute_finite_median
 from imubench_pipeline.typing import Array
 
 _MAX_CREST_FACTOR = 6.0  # of extremes over deviation; a knock exceeds it
@@ -54,10 +50,22 @@ def find_motion(
     ``times``, ``least``: lower limits of the deviation, over its value at rest and in SI. A knock
     is no motion.
     """
-    if _moves_throughout(column, quantity, rate):
+    # Does most of the log have the slow signals of a sensor in motion?
+    size = max(round(_WINDOW * rate), _MIN_WINDOW)
+    slow = [
+        _has_slow_signals(samples, rate, _MIN_DEVIATION[quantity])
+        for piece in column.excerpts()
+        for samples in np.array_split(piece.present, max(len(piece.present) // size, 1))
+    ]
+    if sum(slow) > _MAX_MOVING_SHARE * len(slow):
         return [(0, column.present + column.missing)]
     blocks = column.blocks()
-    calm = _calm_deviation(blocks)
+    # The deviation of calm blocks; coarse registers may have none in many blocks
+    spread = blocks.spread[np.isfinite(blocks.spread)]
+    if len(spread) == 0:
+        calm = 0.0
+    else:
+        calm = float(np.quantile(spread, _CALM_QUANTILE)) or float(np.median(spread))
     if not calm > 0.0:
         return []
     reach = np.maximum(blocks.high - blocks.mean, blocks.mean - blocks.low)
@@ -70,25 +78,6 @@ def find_motion(
         return []
     groups = np.split(places, np.flatnonzero(np.diff(places) > 2) + 1)
     return [(int(group[0]) * blocks.size, (int(group[-1]) + 1) * blocks.size) for group in groups]
-
-
-def _calm_deviation(blocks: BlockStatistics) -> float:
-    """Return the deviation of calm blocks; coarse registers may have none in many blocks."""
-    spread = blocks.spread[np.isfinite(blocks.spread)]
-    if len(spread) == 0:
-        return 0.0
-    return float(np.quantile(spread, _CALM_QUANTILE)) or float(np.median(spread))
-
-
-def _moves_throughout(column: ColumnSummary, quantity: str, rate: float) -> bool:
-    """Return whether most of the log has the slow signals of a sensor in motion."""
-    size = max(round(_WINDOW * rate), _MIN_WINDOW)
-    moving = [
-        _has_slow_signals(samples, rate, _MIN_DEVIATION[quantity])
-        for piece in column.excerpts()
-        for samples in np.array_split(piece.present, max(len(piece.present) // size, 1))
-    ]
-    return sum(moving) > _MAX_MOVING_SHARE * len(moving)
 
 
 def _has_slow_signals(samples: Array, rate: float, least: float) -> bool:

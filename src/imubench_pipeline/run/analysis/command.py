@@ -13,12 +13,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from imubench_pipeline.settings.command_line import (
-    MOST_WHOLE,
-    CommandError,
-    add_units,
-    make_number_type,
-)
+from imubench_pipeline.settings import command_line
 from imubench_pipeline.settings.extras import require_extra
 from imubench_pipeline.tables.outputs import OutputFolder, add_output
 
@@ -69,14 +64,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="FILE",
         help="settings of the estimates; default: config/config.yaml, if it is there",
     )
-    add_units(parser)
+    command_line.add_units(parser)
     parser.add_argument(
         "-v", "--verbose", action="store_true", help="print all findings and parameters"
     )
     parser.add_argument(
         "-c",
         "--cores",
-        type=make_number_type(1, MOST_WHOLE, "at least 1", int),
+        type=command_line.make_number_type(1, command_line.MOST_WHOLE, "at least 1", int),
         default=os.cpu_count() or 1,
         metavar="N",
         help="default: all",
@@ -122,7 +117,7 @@ def _run(arguments: argparse.Namespace, compiling: "Compilation") -> int:
                 config["quality"] = {**own, "at_rest": True}
             plan = Plan(config)
         except ConfigError as error:
-            raise CommandError(f"imubench analyse: {error}") from None
+            raise command_line.CommandError(f"imubench analyse: {error}") from None
         analysis = Analysis(plan, compiling, arguments.cores, _say)
         tables = analysis.estimates()
         render = render_logs if arguments.verbose else render_log_screen
