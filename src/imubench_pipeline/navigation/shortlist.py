@@ -82,6 +82,24 @@ def read_printed_noise(sensor: Sensor, quantity: Measured) -> PrintedNoise:
     return PrintedNoise(models, frozenset(assumed))
 
 
+@dataclass(frozen=True)
+class _PrintedErrors:
+    """The error sources of a sensor by its datasheet."""
+
+    noise: Mapping[Measured, PrintedNoise]  # of the quantities that it measures
+    axes: Mapping[Measured, AxisErrors]
+
+
+def _read_printed_errors(sensor: Sensor) -> _PrintedErrors:
+    noise = {q: read_printed_noise(sensor, q) for q in _QUANTITIES if getattr(sensor.datasheet, q)}
+    axes = {}
+    for q in _QUANTITIES:
+        models = noise[q].models if q in noise else dict.fromkeys(_WALK_TIMES, NoiseModel())
+        figures = read_figures(sensor, q)
+        axes[q] = AxisErrors(models["in_use"], figures, models["likely"], models["best"])
+    return _PrintedErrors(noise, axes)
+
+
 def list_shortlist_rows(
     requirements: Mapping[str, Requirement],
     sensors: Mapping[str, Sensor],
@@ -91,6 +109,7 @@ def list_shortlist_rows(
     """Yield a row for each requirement and sensor of a catalogue, in the order of their ranks."""
     simulated = {(row.sensor, row.recording): row.simulated for row in recordings}
     measured = {(row.requirement, row.sensor): row for row in ranking if row.decides}
+    printed = {name: _read_printed_errors(sensor) for name, sensor in sensors.items()}
     for name, requirement in requirements.items():
         questions = list(list_requirement_questions(name, requirement))
         if not questions:
@@ -102,7 +121,7 @@ def list_shortlist_rows(
                 made = ranked.recording and simulated.get((key, ranked.recording), False)
                 row = _copy_ranking(ranked, sensor, requirement, simulated=bool(made))
             else:
-                row = _judge_by_datasheet(name, key, requirement, questions, sensor)
+                row = _judge_by_datasheet((name, key), requirement, questions, sensor, printed[key])
             rows.append(row)
         rows.sort(key=make_order)
         places = (place for place, _ in enumerate(rows, 1))
@@ -151,11 +170,18 @@ def _copy_ranking(
 
 
 def _judge_by_datasheet(
-    name: str, key: str, requirement: Requirement, questions: Sequence[Question], sensor: Sensor
+    names: tuple[str, str],
+    requirement: Requirement,
+    questions: Sequence[Question],
+    sensor: Sensor,
+    printed: _PrintedErrors,
 ) -> ShortlistRow:
-    """Return the row of a requirement and a sensor without usable logs."""
+    """Return the row of a requirement and a sensor without usable logs, by these names."""
     row = ShortlistRow(
-        requirement=name, sensor=key, price_class=sensor.price_class, verdict="not_enough_data"
+        requirement=names[0],
+        sensor=names[1],
+        price_class=sensor.price_class,
+        verdict="not_enough_data",
     )
     # The sensor has all axes of its quantities, logged or not.
     has = read_abilities(sensor)
@@ -169,9 +195,11 @@ def _judge_by_datasheet(
     if without := [quantity for quantity in needed if quantity in has.without]:
         lacking += [Shortfall("quantity", quantity, quantity) for quantity in without]
         return replace(row, verdict="excluded", shortfalls=tuple(dict.fromkeys(lacking)))
-    noise = {q: read_printed_noise(sensor, q) for q in _QUANTITIES if q not in has.without}
-    axes = {q: _make_axis_errors(sensor, q, noise.get(q)) for q in _QUANTITIES}
-    answers = [(question, *question.answer_all(**axes)) for question in questions]
+    noise = printed.noise
+    answers = [
+        (question, *question.answer_all(printed.axes["gyro"], printed.axes["accel"]))
+        for question in questions
+    ]
 
     def margin(question: Question, total: float) -> float:
         assert question.limit is not None  # of every limit of a requirement
@@ -216,12 +244,6 @@ def _judge_by_datasheet(
         shortfalls=tuple(lacking),
         reasons=(texts.NOISE_NOT_PRINTED,) if verdict == "not_enough_data" else (),
     )
-
-
-def _make_axis_errors(sensor: Sensor, quantity: Measured, noise: PrintedNoise | None) -> AxisErrors:
-    models = noise.models if noise else dict.fromkeys(_WALK_TIMES, NoiseModel())
-    figures = read_figures(sensor, quantity)
-    return AxisErrors(models["in_use"], figures, models["likely"], models["best"])
 
 
 def _list_shares(budget: Budget, noise: Mapping[Measured, PrintedNoise]) -> Iterator[Share]:

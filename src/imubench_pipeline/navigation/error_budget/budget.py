@@ -39,6 +39,7 @@ ACCEL_ORDER: dict[parts.Quantity, int] = {"velocity": 0, "position": 1}
 """Number of integrations minus one, m of `growth`."""
 
 
+_QUANTITIES: tuple[Measured, ...] = get_args(Measured)
 _MIN_TIME = 1e-6
 _MAX_TIME = 1e9
 _CROSSING_POINTS = 4096
@@ -199,15 +200,17 @@ def _list_levers(
     """Yield the sensor and the lever of each figure."""
     order, factor = GYRO_ORDER[quantity], _get_factor(quantity, use)
     levers = in_use.list_levers("gyro", order, time, start.gyro, use, direct=order == 0)
-    for cause, lever, through in levers:
-        yield "gyro", (cause, factor * lever, through)
+    for cause, size, through in levers:
+        yield "gyro", (cause, factor * size, through)
     if quantity in ACCEL_ORDER:
         levers = in_use.list_levers(
             "accel", ACCEL_ORDER[quantity], time, start.accel, use, direct=True
         )
         yield from (("accel", lever) for lever in levers)
-    yield from (("gyro", lever) for lever in in_use.list_turn_levers("gyro", quantity, time, use))
-    yield from (("accel", lever) for lever in in_use.list_turn_levers("accel", quantity, time, use))
+    levelled = isinstance(start.tilt, Levelled)
+    for measured in _QUANTITIES:
+        for lever in in_use.list_turn_levers(measured, quantity, time, use, levelled=levelled):
+            yield measured, lever
     if quantity == "attitude" and isinstance(start.tilt, Levelled) and start.tilt.bias is None:
         yield "accel", ("turn_on_bias", 1.0 / STANDARD_GRAVITY, "initial_tilt")
 

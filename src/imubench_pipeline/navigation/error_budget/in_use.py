@@ -27,6 +27,7 @@ from typing import Literal
 from pydantic import TypeAdapter
 
 from imubench_pipeline.datasheets.class_limits import STATEMENTS, find_limit, read_sigma
+from imubench_pipeline.earth import STANDARD_GRAVITY
 from imubench_pipeline.model.estimates import TemperatureRow
 from imubench_pipeline.model.states import Cause, Measured, Origin, SourcePath
 from imubench_pipeline.navigation.error_budget.turns import Turn
@@ -150,17 +151,20 @@ def list_levers(
         yield "temperature", change * rise, None
         yield "temperature_squared", change**2 * square, None
     evenly = of_pulse(order, time, use.over) / use.over
-    moved = use.turns if measured == "gyro" else use.speed_change
-    if direct and moved:
-        yield from _list_scale_factors(moved * evenly, use)
-        if measured == "accel":
-            yield "misalignment", moved * evenly, None
+    if direct and measured == "gyro" and use.turns:
+        yield from _list_scale_factors(use.turns * evenly, use)
+    if direct and measured == "accel" and use.speed_change:
+        # Along the way, and across it.
+        yield from _list_scale_factors(complex(use.speed_change * evenly), use)
+        yield "misalignment", 1j * use.speed_change * evenly, None
     if measured == "gyro":
         if use.speed_change:
             yield "g_sensitivity", use.speed_change * evenly, None
         if use.vibration:
-            angle = use.vibration / (2.0 * math.pi * use.vibration_frequency)
-            yield "g_sensitivity", angle * (of_constant(order - 1, time) if order else 1.0), None
+            # Of three axes; the angle swings, and is off by its first phase on average.
+            angle = math.sqrt(3.0) * use.vibration / (2.0 * math.pi * use.vibration_frequency)
+            swing = of_constant(order - 1, time) if order else math.sqrt(2.0)
+            yield "g_sensitivity", angle * swing, None
     if use.vibration:
         yield "vibration_rectification", use.vibration**2 * constant, None
 
@@ -174,8 +178,14 @@ def _list_scale_factors(
         yield "scale_factor_temperature", use.temperature_change * lever, path
 
 
-def list_turn_levers(measured: Measured, quantity: str, time: float, use: Use) -> Iterator[Lever]:
-    """Yield the levers of a turn at speed, for attitude, heading, velocity and position."""
+def list_turn_levers(
+    measured: Measured, quantity: str, time: float, use: Use, *, levelled: bool
+) -> Iterator[Lever]:
+    """Yield the levers of a turn at speed, for attitude, heading, velocity and position.
+
+    ``levelled``: the tilt was found by the accelerometers. It cancels a constant error of these,
+    until a turn carries the error with the vehicle, and leaves the tilt behind.
+    """
     turn = use.turn
     if turn is None:
         return
@@ -185,9 +195,14 @@ def list_turn_levers(measured: Measured, quantity: str, time: float, use: Use) -
         if measured == "accel":
             lateral = turn.accelerometer(order, time)
             yield from _list_scale_factors(lateral, use, "turn")
-            yield "misalignment", lateral, "turn"
+            yield "misalignment", 1j * lateral, "turn"
+            if levelled:
+                carried = abs(turn.misalignment(order, time))
+                yield "misalignment", carried, "turn"
+                yield "turn_on_bias", carried / STANDARD_GRAVITY, "turn"
             return
-        about, tilting = turn.scale_factor(order, time), turn.misalignment(order, time)
+        # Two horizontal gyros tilt about two axes, alike in all directions.
+        about, tilting = turn.scale_factor(order, time), abs(turn.misalignment(order, time))
         yield from _list_scale_factors(about, use, "turn")
         yield "misalignment", tilting, "turn"
         # The centripetal acceleration is the speed times the rate.
