@@ -13,6 +13,7 @@ import numpy as np
 import pyarrow as pa
 
 from imubench_pipeline.estimators.estimate import COMPARED
+from imubench_pipeline.model.comparisons import RankingRow
 from imubench_pipeline.model.table import CATEGORY
 from imubench_pipeline.model.verdicts import ErrorSource
 from imubench_pipeline.report.comparison import Comparison
@@ -25,7 +26,12 @@ from imubench_pipeline.settings.requirements import DIMENSIONS, Requirement
 from imubench_pipeline.tables.files import read
 from imubench_pipeline.units import parse_quantity
 from imubench_pipeline.words.numbers import duration_text, number_text
-from imubench_pipeline.words.verdicts import source_kind_text, source_text
+from imubench_pipeline.words.verdicts import (
+    SHORT_VERDICTS,
+    other_margins_text,
+    source_kind_text,
+    source_text,
+)
 
 KEPT = ("error_growth", "drawn_deviations")
 """The tables of each recording that the page uses, besides the joined tables."""
@@ -55,7 +61,8 @@ def _make_context(site: Site) -> Mapping[str, object]:
         (name, Requirement.model_validate(declared))
         for name, declared in site.settings["requirements"].items()
     ]
-    window = site.settings["settings"]["error_budget"]["static_window"]
+    windows = [each.static_window for _, each in requirements if each.static_window]
+    window = [*windows, site.settings["settings"]["error_budget"]["static_window"]][0]
     errors = {}
     for error in _COMPARED_ERRORS:
         # The unit of an axis, and the units of numbers: smallest size in SI, sign, factor.
@@ -73,21 +80,27 @@ def _make_context(site: Site) -> Mapping[str, object]:
             "recordings": recordings,
             "errors": errors,
             "window": parse_quantity(window, "time"),
-            "limits": [  # as 1 sigma
+            "requirements": [
                 {
-                    "requirement": name,
                     "title": requirement.title,
-                    "error": limit.error,
-                    "time": limit.seconds,
-                    "limit": limit.size / requirement.sigmas,
+                    "sensors": {
+                        row.sensor: _describe_verdict(row)
+                        for row in site.rows(RankingRow)
+                        if row.requirement == name and row.decides
+                    },
                 }
                 for name, requirement in requirements
-                for limit in requirement.limits
-                if limit.error in _COMPARED_ERRORS
             ],
             **together.page,
         },
     }
+
+
+def _describe_verdict(row: RankingRow) -> str:
+    """Return the verdict of a row of ``ranking`` with its margins: in use, and others."""
+    margins = [f"margin {number_text(row.margin, 3)}" if row.margin is not None else ""]
+    margins.append(other_margins_text(row))
+    return ", ".join(filter(None, [SHORT_VERDICTS[row.verdict], *margins]))
 
 
 def _select_recordings(site: Site) -> list[RecordingView]:
@@ -217,6 +230,7 @@ COMPARE = Entry(
     file="compare.html",
     title="Side by side",
     context=_make_context,
+    tables=("ranking",),
     views=_select_recordings,
     files=lambda site: (
         _make_path(site, view, table) for view in _select_recordings(site) for table in KEPT

@@ -450,11 +450,10 @@ def list_others(rows: Iterable[RankingRow], names: Mapping[str, str]) -> list[st
 def next_step_text(step: NextStepRow) -> str:
     """Return a next step: ``Record 3 more units: this could settle 1 verdict``."""
     parts = []
-    looked_up = step.action == "find_figures"
-    changed = step.verdicts_strengthened if looked_up else step.verdicts_turned
-    if looked_up or changed:
-        parts.append(_EFFECTS[step.action].format(verdicts=counted(changed, "verdict")))
-    if step.verdicts_strengthened and not looked_up:
+    if step.verdicts_turned:
+        changed = counted(step.verdicts_turned, "verdict")
+        parts.append(_EFFECTS[step.action].format(verdicts=changed))
+    if step.verdicts_strengthened:
         parts.append(f"give {counted(step.verdicts_strengthened, 'verdict')} stronger evidence")
         if len(parts) == 1:
             parts[0] = f"this would {parts[0]}"
@@ -468,7 +467,11 @@ def _describe_action(step: NextStepRow) -> str:
             units = f"{quantities} unit" + "s" * (len(step.quantities) > 1)
             return f"Check the {units.strip()} of {step.recording}"
         case "find_figures":
-            return f"Look up the {join_names(list(map(subject_text, step.figures)))}"
+            names = join_names(list(map(subject_text, step.figures)))
+            causes = {condition.figure for condition in step.figures} - {None}
+            hints = [_MEASURING[cause] for cause in _MEASURING if cause in causes]
+            verb = "Look up or measure" if causes else "Look up"
+            return f"{verb} the {names}" + f" ({'; '.join(hints)})" * bool(hints)
         case "record_again":
             doubts = "; ".join(doubt_text(doubt.code, doubt.channels) for doubt in step.doubts)
             return f"Record {step.recording} again" + f" ({doubts})" * bool(doubts)
@@ -484,13 +487,23 @@ def _describe_action(step: NextStepRow) -> str:
             return f"Record {counted(step.specimens or 0, 'more unit', 'more units')}"
 
 
+_MEASURING: Mapping[SourceCode, str] = {
+    "temperature": "a climate chamber over 20 K in 2 h is enough",
+    "scale_factor": "turn the gyro by known angles, or the accelerometer against gravity",
+    "misalignment": "turn the sensor about each edge of its case on a level plate",
+    "turn_on_bias": "switch it on ten times at rest, the accelerometers in six positions",
+    "g_sensitivity": "rest in six positions is enough",
+    "vibration_rectification": "a shaker, or a log at rest with motors on",
+}
+"""How to measure a figure that decides."""
+
 _EFFECTS: Mapping[Action, str] = {
     "check_unit": "this could change {verdicts}",
     "record_again": "this could allow {verdicts}",
     "add_channels": "this could allow {verdicts}",
     "log_longer": "this could settle {verdicts}",
     "add_specimens": "this could settle {verdicts}",
-    "find_figures": "this would remove a condition from {verdicts}",
+    "find_figures": "this decides {verdicts}",
 }
 
 

@@ -111,12 +111,27 @@ def _list_steps(judgement: Judgement, basis: Basis) -> Iterator[_Step]:
         return
     if judgement.decides.verdict not in ("meets", "fails"):
         yield from _find_settling_steps(judgement, basis)
-    unknown = [each for each in judgement.open.conditions if each.figure != "turn_on_bias"]
-    if judgement.compared and unknown:
-        figures = tuple(replace(each, largest=None) for each in unknown)
-        yield _Step("find_figures", (judgement.sensor, None), name, False, figures=figures)
+    if judgement.verdict == "meets_if":
+        figures = tuple(
+            replace(each, largest=None, within=None, printing=None)
+            for each in _select_deciding(judgement)
+        )
+        yield _Step("find_figures", (judgement.sensor, None), name, True, figures=figures)
     for reason in judgement.reasons:
         yield from _find_strengthening_steps(judgement, reason, basis)
+
+
+def _select_deciding(judgement: Judgement) -> Sequence[Condition]:
+    """Return the condition with the largest part of the error; without figures, all of them."""
+    sizes: dict[tuple[str | None, str | None], float] = {
+        (row.quantity, row.source): row.sigma or 0.0
+        for standing in judgement.standings
+        for row in standing.conditions
+    }
+    figures = [each for each in judgement.conditions if each.figure is not None]
+    if not figures:
+        return judgement.conditions
+    return [max(figures, key=lambda each: sizes.get((each.subject, each.figure), 0.0))]
 
 
 def _find_settling_steps(judgement: Judgement, basis: Basis) -> Iterator[_Step]:

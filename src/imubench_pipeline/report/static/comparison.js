@@ -145,6 +145,7 @@ function verdictOf(ratio, first, second) {
 function compareChosen(root) {
   drawVerdicts(root, comparedFigures());
   drawEvidence(root);
+  drawRequirements(root);
   drawErrors(root);
 }
 

@@ -267,6 +267,18 @@ function errorUnit(error, size) {
 
 const timeText = (seconds) => (seconds >= 120 ? `${numberText(seconds / 60, 3)} min` : `${numberText(seconds, 3)} s`);
 
+// The verdicts of the sensors, as on the start page: the chosen recording does not change them.
+function drawRequirements(root) {
+  const table = root.querySelector("table.requirements");
+  if (!table) return;
+  table.tHead.replaceChildren(headOf("Requirement", ...chosen.map((one) => pageData.names[one.row.sensor] ?? one.row.sensor)));
+  table.tBodies[0].replaceChildren(
+    ...pageData.requirements.map(({ title, sensors }) =>
+      element("tr", {}, element("th", { scope: "row" }, title), ...chosen.map((one) => element("td", {}, sensors[one.row.sensor] ?? "not ranked"))),
+    ),
+  );
+}
+
 function drawErrors(root) {
   const table = root.querySelector("table.errors");
   const figures = [];
@@ -286,7 +298,7 @@ function drawErrors(root) {
   table.tHead.replaceChildren(headOf(`After ${timeText(growthOf.time)}`, ...headsOfPairs(), ...chosen.map(shortName)));
   table.tBodies[0].replaceChildren(...linesOf(figures));
   const without = chosen.filter((one) => !grownOf(one)).map(shortName);
-  table.caption.textContent = `1σ of ${axesText()} after ${timeText(growthOf.time)} of dead reckoning and ${timeText(growthOf.window)} at rest${without.length ? `; ${growthOf.error} not determined for ${without.join(", ")}` : ""}`;
+  table.caption.textContent = `1σ of noise alone, ${axesText()}, after ${timeText(growthOf.time)} of dead reckoning and ${timeText(growthOf.window)} at rest${without.length ? `; ${growthOf.error} not determined for ${without.join(", ")}` : ""}`;
 }
 
 kinds.growth = () => {
@@ -314,23 +326,12 @@ kinds.growth = () => {
     });
     ends.push({ y: Math.log10(y.at(-1)), text: one.letter, colour: colourOf(look) });
   }
-  const { mark, soft } = inks();
-  const limits = pageData.limits.filter((limit) => limit.error === growthOf.error);
-  if (limits.length > 0 && every.length > 0) {
-    extent.push(...limits.map((limit) => limit.limit * factor));
-    every.push(...limits.map((limit) => limit.time));
-    traces.push({
-      group: "requirements", type: "scatter", mode: "markers", name: "limit of a requirement", x: limits.map((limit) => limit.time), y: limits.map((limit) => limit.limit * factor),
-      marker: { symbol: "triangle-down", size: 12, color: mark }, text: limits.map((limit) => `${limit.title}: at most ${numberText(limit.limit * factor, 3)} ${sign} (1σ) after ${timeText(limit.time)}`),
-      hovertemplate: "%{text}<extra></extra>",
-    });
-  }
+  const { soft } = inks();
   const range = logRange(extent, 0.15);
   return {
     traces,
     groups: [
       { key: "limits", label: "95 % band", on: true, look: { ...black(), filled: true } },
-      { key: "requirements", label: "limits of requirements", on: true, look: { light: mark, dark: mark, line: false, marker: "triangle-down" }, absent: limits.length === 0 },
     ],
     layout: {
       margin: { l: 62, r: 26, t: 8, b: 46 },
