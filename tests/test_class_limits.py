@@ -100,7 +100,7 @@ def test_totals_over_temperature_bound_the_coefficient() -> None:
     assert coefficient(total | own, **span) == pytest.approx(0.01 * DEG)
 
 
-def test_a_density_of_unknown_sidedness_has_the_larger_N() -> None:
+def test_a_density_of_unknown_sidedness_has_the_larger_noise() -> None:
     def noise(**sided: str) -> float | None:
         density = {"value": 0.01, "unit": "deg/s/sqrt(Hz)"} | sided
         return read_sigma(sensor({"noise_density": density}), "gyro", "N")
