@@ -143,6 +143,10 @@ def test_a_sensor_that_lacks_something_is_excluded_and_not_ranked() -> None:
     assert (row["verdict"], row["rank"], price["property"]) == ("excluded", None, "price_class")
     assert (price["subject"], price["asked"]) == (row["price_class"], "tactical")
     assert row["margin"] is not None
+    # A property that is not known is a condition.
+    (row,) = judged(sensor(**NOISE, **WALK), requirement(must={"mass": "30 g"}))
+    assert (row["verdict"], row["rank"]) == ("meets_if", None)
+    assert [each["property"] for each in row["conditions"]] == ["mass"]
     alone = {"datasheet": {"gyro": NOISE, "accel": None}}
     position = [{"error": "position", "after": "10 s", "at_most": "1 m"}]
     (row,) = judged(parse(Sensor, SENSOR | alone, "s.yaml"), requirement(limits=position))
