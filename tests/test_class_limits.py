@@ -122,6 +122,8 @@ def test_limits_are_of_the_sensors_of_a_class_that_are_sold() -> None:
     )
     expected = {"a": DEG, "b": 4 * DEG, "c": 2 * DEG}
     assert dict(consumer.sensors) == pytest.approx(expected, rel=1e-3)
+    # Rounded up: a sensor that prints nothing is no better than the worst.
+    assert all(consumer.sensors[name] >= value for name, value in expected.items())
     assert (consumer.best, consumer.median, consumer.worst) == pytest.approx(
         (DEG, 2 * DEG, 4 * DEG), rel=1e-3
     )

@@ -128,8 +128,6 @@ BUDGETS = [
     of(budgets.parameter_status, "K of gyro x is bounded", "K", "gyro_x", "at_bound"),
     of(budgets.independent_draws, "may be too wide", "weighted", "gyro_x"),
     of(budgets.missing_numbers, "no value and no probability", ["sigma", "within"]),
-    of(budgets.class_limit, "accelerometer N: not printed, worst of its class", "accel", "N", ""),
-    of(budgets.class_limit, "class (30 deg/s)", "gyro", "turn-on bias", "30 deg/s"),
 ]
 
 DATASHEETS = [

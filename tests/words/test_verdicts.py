@@ -23,6 +23,7 @@ from imubench_pipeline.words.verdicts import (
     VERDICT_MEANINGS,
     VERDICT_WORDS,
     answer_text,
+    class_limit_text,
     condition_text,
     corrected_text,
     evidence_text,
@@ -200,6 +201,23 @@ def test_the_origins_of_an_error_are_summed() -> None:
         Share("scale_factor", "gyro", share=0.05, origin="datasheet"),
     ]
     assert origins_text(shares) == "worst of its class 60 %, noise 35 %, printed 5 %"
+
+
+@pytest.mark.parametrize(
+    ("quantity", "source", "size", "named"),
+    [
+        ("gyro", "temperature", 0.0123 * DEGREE, "gyro temperature coefficient"),
+        ("gyro", "N", None, "gyro white noise"),
+        ("accel", "flicker", None, "accelerometer bias instability"),
+        ("accel", "K", None, "accelerometer K"),
+    ],
+)
+def test_a_class_limit_is_named(
+    quantity: str, source: SourceCode, size: float | None, named: str
+) -> None:
+    figure = " (0.0123 deg/s/K)" if size else ""
+    stated = class_limit_text(quantity, source, size)
+    assert stated == f"{named}: not printed, worst of its class{figure}"
 
 
 def test_margins_other_than_in_use() -> None:
