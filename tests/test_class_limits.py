@@ -8,7 +8,9 @@ import pytest
 
 from imubench_pipeline.datasheets.class_limits import (
     FIGURES,
+    count_sensors_within,
     derive_class_limits,
+    find_limit,
     read_class_limits,
     read_sigma,
     write_class_limits,
@@ -31,46 +33,80 @@ def sensor(gyro: dict[str, Any] | None = None, **about: Any) -> Sensor:
     return Sensor.model_validate(known | about)
 
 
+TYPICAL = {"value": 2, "unit": "deg/s", "kind": "typ"}
+LARGEST = {"value": 9, "unit": "deg/s", "kind": "max"}
+
+
 @pytest.mark.parametrize(
-    ("name", "figure", "sigma"),
+    ("cause", "figures", "sigma"),
     [
-        ("offset", {"value": 3, "unit": "deg/s", "kind": "typ"}, 3 * DEG),
-        ("offset", {"value": 3, "unit": "deg/s", "kind": "max"}, DEG),
-        ("offset", {"value": [-2, 3], "unit": "deg/s", "kind": "range"}, 3 * DEG / math.sqrt(3)),
-        ("offset", [{"value": 9, "unit": "deg/s", "kind": "max"},
-                    {"value": 1, "unit": "deg/s", "kind": "typ"}], DEG),
-        ("offset", {"value": {"xy": 1, "z": 2}, "unit": "deg/s"}, 2 * DEG),
-        ("misalignment", {"value": 0.5, "unit": "deg", "kind": "max"}, 0.5 * DEG / 3),
-        ("cross_axis", {"value": 2, "unit": "%"}, 0.02),
-        ("scale_factor_temperature", {"value": 0.03, "unit": "%/K"}, 3e-4),
-        ("rate_random_walk", {"value": None, "place": "table 1"}, None),
+        ("turn_on_bias", {"offset": {"value": 3, "unit": "deg/s", "kind": "typ"}}, 3 * DEG),
+        ("turn_on_bias", {"offset": {"value": 3, "unit": "deg/s", "kind": "max"}}, DEG),
+        (
+            "turn_on_bias",
+            {"offset": {"value": [-2, 3], "unit": "deg/s", "kind": "range"}},
+            3 * DEG / math.sqrt(3),
+        ),
+        # The least statement counts: a further one never makes a sensor worse.
+        ("turn_on_bias", {"offset": [LARGEST, TYPICAL]}, 2 * DEG),
+        ("turn_on_bias", {"offset": [LARGEST | {"value": 3}, TYPICAL]}, DEG),
+        ("turn_on_bias", {"offset": TYPICAL, "bias_repeatability": LARGEST | {"value": 3}}, DEG),
+        ("turn_on_bias", {"offset": {"value": {"xy": 1, "z": 2}, "unit": "deg/s"}}, 2 * DEG),
+        ("turn_on_bias", {"offset": {"value": {"xy": 1}, "unit": "deg/s"}}, None),
+        ("turn_on_bias", {"offset": {"value": 1, "unit": "deg/s", "kind": "min"}}, None),
+        # Of options that are not chosen, the worst.
+        (
+            "turn_on_bias",
+            {"offset": [TYPICAL | {"option": "A"}, TYPICAL | {"option": "B", "value": 5}]},
+            5 * DEG,
+        ),
+        ("misalignment", {"misalignment": {"value": 0.5, "unit": "deg", "kind": "max"}}, DEG / 6),
+        ("misalignment", {"cross_axis": {"value": 2, "unit": "%"}}, 0.02),
+        (
+            "scale_factor_temperature",
+            {"scale_factor_temperature": {"value": 0.03, "unit": "%/K"}},
+            3e-4,
+        ),
+        (
+            "vibration_rectification",
+            {"vibration_rectification": {"value": 2, "unit": "deg/h/g^2"}},
+            2 * DEG / 3600 / 9.80665**2,
+        ),
+        ("K", {"rate_random_walk": {"value": None, "place": "table 1"}}, None),
     ],
-)  # fmt: skip
+)
 def test_a_figure_counts_as_one_standard_deviation(
-    name: str, figure: Any, sigma: float | None
+    cause: str, figures: Any, sigma: float | None
 ) -> None:
-    found = read_sigma(sensor({name: figure}), "gyro", name)
+    found = read_sigma(sensor(figures), "gyro", cause)
     assert found is None if sigma is None else found == pytest.approx(sigma)
+    assert read_sigma(sensor(figures), "accel", cause) is None  # the sensor has none
 
 
 def test_totals_over_temperature_bound_the_coefficient() -> None:
     total = {"temperature_total": {"value": 3, "unit": "deg/s", "kind": "max"}}
     rms = {"temperature_rms": {"value": 0.1, "unit": "deg/s"}}
     span = {"temperature_range": ["-40 degC", "60 degC"]}
-    name = "temperature_coefficient"
+
+    def coefficient(sheet: dict[str, Any], **about: Any) -> float | None:
+        return read_sigma(sensor(sheet, **about), "gyro", "temperature")
+
     # The maximum of 3 deg/s at 50 K from the middle, of three standard deviations.
-    assert read_sigma(sensor(total, **span), "gyro", name) == pytest.approx(DEG / 50)
-    assert read_sigma(sensor(rms, **span), "gyro", name) == pytest.approx(
-        0.1 * DEG * math.sqrt(12) / 100
-    )
-    assert read_sigma(sensor(total), "gyro", name) == pytest.approx(2 * DEG / 125)
+    assert coefficient(total, **span) == pytest.approx(DEG / 50)
+    assert coefficient(rms, **span) == pytest.approx(0.1 * DEG * math.sqrt(12) / 100)
+    # A range that is not known counts as 50 K.
+    assert coefficient(total) == pytest.approx(2 * DEG / 50)
     own = {"temperature_coefficient": {"value": 0.01, "unit": "deg/s/K"}}
-    assert read_sigma(sensor(total | own), "gyro", name) == pytest.approx(0.01 * DEG)
+    assert coefficient(total | own, **span) == pytest.approx(0.01 * DEG)
 
 
-def test_a_density_of_unknown_side_counts_as_one_sided() -> None:
-    density = {"noise_density": {"value": 0.01, "unit": "deg/s/sqrt(Hz)"}}
-    assert read_sigma(sensor(density), "gyro", "N") == pytest.approx(0.01 * DEG / math.sqrt(2))
+def test_a_density_of_unknown_sidedness_has_the_larger_noise() -> None:
+    def noise(**sided: str) -> float | None:
+        density = {"value": 0.01, "unit": "deg/s/sqrt(Hz)"} | sided
+        return read_sigma(sensor({"noise_density": density}), "gyro", "N")
+
+    assert noise() == noise(sidedness="two-sided") == pytest.approx(0.01 * DEG)
+    assert noise(sidedness="one-sided") == pytest.approx(0.01 * DEG / math.sqrt(2))
 
 
 def test_limits_are_of_the_sensors_of_a_class_that_are_sold() -> None:
@@ -79,15 +115,55 @@ def test_limits_are_of_the_sensors_of_a_class_that_are_sold() -> None:
 
     sensors = {"a": of(1), "b": of(4), "c": of(2), "board": of(99, sold=False), "silent": sensor()}
     sensors |= {"t": of(0.1, grade="tactical"), "unknown": of(50, grade=None)}
-    limits = derive_class_limits(sensors)
-    assert [(one.grade, one.figure, one.names) for one in limits] == [
-        ("consumer", "offset", ("a", "b", "c")),
-        ("tactical", "offset", ("t",)),
-    ]
-    consumer, tactical = limits
-    assert (consumer.median, consumer.worst) == pytest.approx((2 * DEG, 4 * DEG))
-    assert consumer.spread == pytest.approx(math.log(2)) and tactical.spread is None
+    consumer, tactical = derive_class_limits(sensors)
+    assert (consumer.grade, consumer.figure, tactical.grade) == (
+        *("consumer", "turn_on_bias"),
+        "tactical",
+    )
+    expected = {"a": DEG, "b": 4 * DEG, "c": 2 * DEG}
+    assert dict(consumer.sensors) == pytest.approx(expected, rel=1e-3)
+    # Rounded up: a sensor that prints nothing is no better than the worst.
+    assert all(consumer.sensors[name] >= value for name, value in expected.items())
+    assert (consumer.best, consumer.median, consumer.worst) == pytest.approx(
+        (DEG, 2 * DEG, 4 * DEG), rel=1e-3
+    )
+    assert consumer.spread == pytest.approx(math.log(2), rel=1e-3) and tactical.spread is None
     assert consumer.unit == "rad/s"
+
+
+@pytest.mark.parametrize(
+    ("grade", "quantity", "figure", "worst"),
+    [
+        # The worst of four industrial sensors: the ISM330DHCX and the IIM-42652, 0.005 %/K.
+        ("industrial", "gyro", "scale_factor_temperature", 5e-5),
+        # A class that does not print it has the limit of the class below.
+        ("tactical", "gyro", "scale_factor_temperature", 5e-5),
+        ("navigation", "gyro", "scale_factor_temperature", 5e-5),
+        # The one consumer sensor is not taken to be better than the ADIS16405, 0.007 deg/s.
+        ("consumer", "gyro", "B", 0.007 * DEG),
+        (None, "gyro", "B", 0.007 * DEG),
+        # None is below the consumer sensors: the class above counts, with the ADIS16448, 0.25 mg.
+        ("consumer", "accel", "B", 0.25e-3 * 9.80665),
+    ],
+)
+def test_what_no_sensor_of_a_class_prints_has_a_limit(
+    grade: str | None, quantity: str, figure: str, worst: float
+) -> None:
+    assert find_limit(grade, quantity, figure).worst == pytest.approx(worst, rel=1e-3)
+
+
+def test_sensors_within_a_figure_are_counted() -> None:
+    values = [
+        value
+        for limit in read_class_limits()
+        if (limit.quantity, limit.figure) == ("gyro", "g_sensitivity")
+        for value in limit.sensors.values()
+    ]
+    assert count_sensors_within("gyro", "g_sensitivity", 0.0) == (0, len(values))
+    assert count_sensors_within("gyro", "g_sensitivity", max(values)) == (len(values),) * 2
+    assert count_sensors_within("gyro", "g_sensitivity", min(values))[0] == values.count(
+        min(values)
+    )
 
 
 def test_the_shipped_limits_are_of_the_shipped_catalogue(tmp_path: Path) -> None:

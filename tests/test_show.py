@@ -174,7 +174,7 @@ def test_one_requirement_has_all_its_limits(
     results: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     text = shown(capsys, results, "--requirement", "robot", "--width", 120)
-    assert "1 m of 2 m" in text and "position, one axis" in text
+    assert "1 m of 2 m" in text and "horizontal position" in text
     assert "drone" not in text
 
 

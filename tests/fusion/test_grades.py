@@ -54,7 +54,7 @@ def test_each_option_has_its_own_number() -> None:
 
 
 def test_what_is_not_printed_or_not_identified_has_no_number() -> None:
-    found = rows_of(channel(0.27, 1.5), grade="vn_110")
+    found = rows_of(channel(0.27, 1.5), grade="lsm9ds1")
     assert all(row["n"] is None and row["reason"] for row in found.values())
     row = rows_of(channel(0.27, None))["", "sigma_min"]
     assert row["n"] is None and row["reason"] == "too short" and row["printed"] > 0

@@ -29,7 +29,6 @@ from imubench_pipeline.model.states import (
     DriftVerdict,
     GoodnessVerdict,
     PoolVerdict,
-    ShortlistVerdict,
     Verdict,
 )
 from imubench_pipeline.navigation.error_budget.budget import Start, budget
@@ -301,8 +300,6 @@ def values_in_tables() -> Iterator[tuple[str, str]]:
     for verdicts in (Verdict, GoodnessVerdict, DriftVerdict, PoolVerdict, BacktestVerdict):
         for verdict in get_args(verdicts):
             yield verdict, "verdict"
-    for verdict in get_args(ShortlistVerdict):
-        yield verdict, "shortlist"
     for published in get_args(coverage.Published):
         yield published, "published"
     for kind in get_args(get_type_hints(lines.Line)["kind"]):

@@ -6,7 +6,7 @@ import pytest
 
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
 from imubench_pipeline.model.comparisons import ErrorBudgetRow, RankingRow
-from imubench_pipeline.model.verdicts import Condition, DoubtMark
+from imubench_pipeline.model.verdicts import DoubtMark
 from imubench_pipeline.navigation.expected_errors import (
     list_error_rows,
     list_requirement_questions,
@@ -227,19 +227,3 @@ def test_tied_sensors_stand_in_the_order_of_their_margins(margins: list[float]) 
 def test_a_requirement_that_nothing_answers_has_no_groups() -> None:
     (one,) = format_rankings([], {"robot": ROBOT}, {}, "si")
     assert (one.name, one.groups) == ("robot", [])
-
-
-def test_of_tied_sensors_one_without_conditions_is_named_first() -> None:
-    requirements = {"robot": Requirement.model_validate(ROBOT)}
-    about = {sensor: {"price_class": None} for sensor, _ in SIMULATED}
-    table = RankingRow.rows_of(build("ranking", ranking_rows(errors(), requirements, about)))
-    conditions = (Condition("scale_factor", None, "gyro", 1e-3),)
-    good = {"verdict": "meets", "conditions": conditions}
-    poor = {"verdict": "likely_meets"}
-    given = [
-        replace(row, rank=1, **(good if row.sensor == "good" else poor))
-        for row in table
-        if row.sensor != "gyro"
-    ]
-    (shown,) = format_rankings(given, {"robot": ROBOT}, SIMULATED, "practical")
-    assert [group.sensor for group in shown.groups] == ["poor", "good"]

@@ -217,7 +217,7 @@ def test_drift_and_cut_off_are_those_of_the_run(tmp_path: Path, capsys) -> None:
             "found gyro_x twice; expected each channel once",
         ),
         (["bno055", "--hours", "1", "--channels", "accel_x"], "no figures of accel_x"),
-        (["vn_110", "--hours", "1", "--rate", "100 Hz"], "prints no noise"),
+        (["lsm9ds1", "--hours", "1", "--rate", "100 Hz"], "prints no noise"),
         (["no.yaml", "--hours", "1"], "no.yaml: no such file"),
         (["bno055", "--hours", "1", "--results", "nowhere"], "no table recordings"),
     ],

@@ -39,33 +39,31 @@ def ask(folder: Path, *more: str, requirement: str = "robot") -> int:
 def test_the_command_prints_the_verdicts(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert ask(folder) == 0
     printed = capsys.readouterr().out
-    assert "A robot" in printed and "worth logging" in printed
-    assert "one: gyro B, K and T_B: not published, and not measured of any sensor" in printed
+    assert "A robot" in printed and "not enough data" in printed
+    assert "one: the noise is not printed, so a log decides; worst of its class " in printed
+    assert "by logs" not in printed
     assert ask(folder, requirement=str(folder / "requirements/robot.yaml")) == 0
     assert capsys.readouterr().out == printed
 
 
-def test_what_a_run_measured_fills_what_is_not_published(
+def test_a_sensor_with_usable_logs_is_judged_by_them(
     folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    names = {"sensor": "other", "recording": "a"}
-    known = {"value": 1e-7, "lower": 1e-7, "upper": 1e-7, "status": "ok", "unit": "SI"}
+    names = {"sensor": "one", "recording": "a"}
     rows = {
         "recordings": [names | {"device": "a", "kind": "static", "simulated": False,
                                 "status": "ok", "decides": True}],
-        "parameters": [
-            names | known | {"channel": "gyro_x", "method": "likelihood", "recommended": True,
-                             "model": "N+F+K", "component": 1, "parameter": name}
-            for name in ("B_curve", "K")
-        ],
-        "ranking": [],
+        "ranking": [names | {"requirement": "robot", "decides": True, "error": "heading",
+                             "time": 600.0, "unit": "rad", "verdict": "meets",
+                             "limit_verdict": "meets", "margin": 1.25, "noise_margin": 7.5}],
     }  # fmt: skip
     for name, listed in rows.items():
         write_arrow(build(name, listed), folder / f"results/tables/{name}.parquet")
     assert ask(folder, "--results", str(folder / "results")) == 0
     printed = capsys.readouterr().out
-    assert "meets the limits" in printed
-    assert "K: 1.24 °/h/√h, as in measured sensors of any class" in printed
+    (line,) = (line for line in printed.splitlines() if "one *" in line)
+    assert line.split()[:6] == ["1", "one", "*", "meets", "1.25", "7.5"]
+    assert "*: noise by logs; else as printed" in printed
 
 
 @pytest.mark.parametrize(

@@ -1,5 +1,6 @@
 """Error budgets of white noise for the tests of verdicts."""
 
+from collections.abc import Mapping
 from typing import Any
 
 from imubench_pipeline.estimators.estimate import Estimate
@@ -7,7 +8,12 @@ from imubench_pipeline.model.comparisons import ErrorBudgetRow
 from imubench_pipeline.model.estimates import ParameterRow
 from imubench_pipeline.model.recordings import DoubtRow, RecordingRow
 from imubench_pipeline.model.verdicts import DoubtMark
-from imubench_pipeline.navigation.expected_errors import list_error_rows, list_requirement_questions
+from imubench_pipeline.navigation.error_budget.in_use import Figures
+from imubench_pipeline.navigation.expected_errors import (
+    NO_FIGURES_OF_CHANNELS,
+    list_error_rows,
+    list_requirement_questions,
+)
 from imubench_pipeline.navigation.selection import rank_sensors
 from imubench_pipeline.navigation.verdicts.basis import Basis
 from imubench_pipeline.navigation.verdicts.judgement import judge_sensors
@@ -68,6 +74,7 @@ def judge(
     doubts: Rows | None = None,
     parameters: Rows | None = None,
     abilities: dict[str, Any] | None = None,
+    figures: Mapping[str, Figures] = NO_FIGURES_OF_CHANNELS,
 ) -> tuple[Rows, Rows]:
     """Return the tables ``ranking``, of the limits that decide, and ``next_steps``."""
     questions = [q for name, one in asked.items() for q in list_requirement_questions(name, one)]
@@ -75,7 +82,7 @@ def judge(
     for sensor, logs in sensors.items():
         for recording, estimates in logs.items():
             names = {"sensor": sensor, "recording": recording}
-            rows = list_error_rows(names, estimates, questions, draws=400, seed=1)
+            rows = list_error_rows(names, estimates, questions, draws=400, seed=1, figures=figures)
             errors += ErrorBudgetRow.rows_of(build("error_budget", rows))
     if recordings is None:
         recordings = [about(sensor, name) for sensor, logs in sensors.items() for name in logs]

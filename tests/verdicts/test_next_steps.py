@@ -4,6 +4,8 @@ import pytest
 from scipy import stats
 
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
+from imubench_pipeline.model.states import Cause
+from imubench_pipeline.navigation.error_budget.in_use import Figure, Figures
 from imubench_pipeline.navigation.verdicts.next_steps import count_specimens_needed
 from imubench_pipeline.navigation.verdicts.specimens import Expected, Spread
 from tests.verdicts.budgets import (
@@ -104,15 +106,17 @@ def test_a_short_log_is_to_be_as_long_as_it_takes() -> None:
 def test_unknown_figures_give_the_step_find_figures() -> None:
     turns = {"environment": {"turns": "360 deg", "temperature_change": "2 K"}}
     asked = {"robot": requirement(("heading", "100 s", "0.1 deg"), **turns)}
-    (row,), steps = judge({"s": {"r": gyro(5.0)}}, asked)
-    assert row["verdict"] == "meets" and len(row["conditions"]) == 2
-    first = steps[0]
-    assert (first["action"], first["verdicts_strengthened"]) == ("find_figures", 1)
-    assert first["text"] == (
-        "Look up the gyro temperature coefficient and gyro scale factor error: "
-        "this would remove a condition from 1 verdict"
+    unknown = Figure(sigma=1.0, likely=1e-6, best=1e-6, origin="class limit")
+    known = Figure(sigma=1e-6, origin="datasheet")
+    causes: tuple[Cause, ...] = ("temperature", "scale_factor")
+    figures: Figures = {"nonlinearity": known, **dict.fromkeys(causes, unknown)}
+    (row,), steps = judge({"s": {"r": gyro(5.0)}}, asked, figures={"gyro_x": figures})
+    assert row["verdict"] == "meets_if" and len(row["conditions"]) == 2
+    (step,) = (one for one in steps if one["action"] == "find_figures")
+    assert step["verdicts_turned"] + step["verdicts_strengthened"] == 1
+    assert step["text"].startswith(
+        "Look up the gyro temperature coefficient and gyro scale factor error: this would "
     )
-    assert "log_longer" not in {one["action"] for one in steps}
 
 
 def test_excluded_sensor_has_no_next_steps() -> None:

@@ -121,8 +121,6 @@ POOLS = [
 ]
 
 BUDGETS = [
-    of(budgets.bias_not_known, "of the accelerometer is not known", "accel"),
-    of(budgets.figure_not_known, "gyro bias: not known (why)", "gyro bias", "why"),
     of(budgets.not_recorded, "has no gyro", "gyro"),
     of(budgets.noise_not_known, "gyro x and gyro y is", ["gyro_x", "gyro_y"], "short log"),
     of(budgets.noise_not_known, "the log does not show it", ["gyro_x"], None),
@@ -130,23 +128,6 @@ BUDGETS = [
     of(budgets.parameter_status, "K of gyro x is bounded", "K", "gyro_x", "at_bound"),
     of(budgets.independent_draws, "may be too wide", "weighted", "gyro_x"),
     of(budgets.missing_numbers, "no value and no probability", ["sigma", "within"]),
-    of(budgets.no_quantity, "it has no gyro", "gyro"),
-    of(budgets.no_density, "is published", "gyro"),
-    of(budgets.any_option, "options A, B", "gyro", ["A", "B"]),
-    of(budgets.either_side, "one- or two-sided", "gyro", "N"),
-    of(budgets.only_maximum, "only a maximum", "accel", "B"),
-    of(
-        budgets.assumed_range,
-        "gyro N: 0.34 to 0.69 °/√h",
-        *("gyro", "N", 1e-4, 2e-4, budgets.range_source(["m"], "consumer", measured=True)),
-    ),
-    of(budgets.assumed_range, "gyro K: 0 °/h/√h", "gyro", "K", 0.0, 0.0, "as measured"),
-    of(budgets.assumed_range, "T_B: 10 to 400 s", "accel", "T_B", 10.0, 400.0, "as measured"),
-    of(budgets.range_source, "measured sensors of class a (m)", ["m"], "a", measured=True),
-    of(budgets.range_source, "data sheets of any class", ["m"], "", measured=False),
-    of(budgets.floor_and_minimum, "best case", "gyro"),
-    of(budgets.neither_printed_nor_measured, "B and K: not published", "gyro", ["B", "K"]),
-    of(budgets.flicker_assumed, "flicker noise", "gyro"),
 ]
 
 DATASHEETS = [

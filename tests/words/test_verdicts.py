@@ -8,11 +8,10 @@ from typing import Any, get_args
 import pytest
 
 from imubench_pipeline.model.comparisons import RankingRow
-from imubench_pipeline.model.states import ShortlistVerdict, SpreadOf, Verdict
+from imubench_pipeline.model.states import Cause, Origin, SourceCode, SpreadOf, Verdict
 from imubench_pipeline.model.verdicts import (
     Condition,
     DoubtMark,
-    Figure,
     Property,
     Share,
     Shortfall,
@@ -21,16 +20,19 @@ from imubench_pipeline.model.verdicts import (
 from imubench_pipeline.navigation.verdicts.judgement import WEAKNESS_REASONS
 from imubench_pipeline.words.verdicts import (
     SHORT_VERDICTS,
-    SHORTLIST_WORDS,
     VERDICT_MEANINGS,
     VERDICT_WORDS,
     answer_text,
+    class_limit_text,
     condition_text,
     corrected_text,
     evidence_text,
     list_others,
+    origins_text,
+    other_margins_text,
     share_text,
     shortfall_text,
+    source_name,
     spread_text,
     stated_verdict,
     subject_text,
@@ -64,20 +66,21 @@ def test_every_verdict_has_words(verdict: Verdict) -> None:
     assert is_plain(stated_verdict(row(verdict=verdict, shortfalls=shortfalls)))
 
 
-@pytest.mark.parametrize("verdict", get_args(ShortlistVerdict))
-def test_every_verdict_by_the_data_sheet_has_words(verdict: ShortlistVerdict) -> None:
-    assert is_plain(SHORTLIST_WORDS[verdict])
+@pytest.mark.parametrize("source", get_args(SourceCode))
+def test_every_source_of_errors_has_a_name(source: SourceCode) -> None:
+    assert is_plain(source_name(source))
 
 
 @pytest.mark.parametrize(
     ("figure", "quantity"),
     [
         (figure, quantity)
-        for figure, quantity in product(get_args(Figure), ("gyro", "accel"))
-        if (figure, quantity) != ("g_sensitivity", "accel")  # an accelerometer has none
+        for figure, quantity in product(get_args(Cause), ("gyro", "accel"))
+        # An accelerometer has no g-sensitivity, and no data sheet prints the square.
+        if (figure, quantity) != ("g_sensitivity", "accel") and figure != "temperature_squared"
     ],
 )
-def test_every_unknown_figure_has_words_and_a_unit(figure: Figure, quantity: str) -> None:
+def test_every_unknown_figure_has_words_and_a_unit(figure: Cause, quantity: str) -> None:
     text = condition_text(Condition(figure, None, quantity, 1.2345e-3))
     assert text.startswith(f"its {'gyro' if quantity == 'gyro' else 'accelerometer'} ")
     assert is_plain(text) and " is below " in text and text.endswith(" (1σ)")
@@ -92,11 +95,19 @@ def test_every_unknown_figure_has_words_and_a_unit(figure: Figure, quantity: str
         (replace(SCALE, largest=None), "its gyro scale factor error is below 0 ppm (1σ)"),
         (
             Condition("turn_on_bias", None, "accel", 0.0412),
-            "its accelerometer bias after calibration is below 4.2 mg (1σ)",
+            "its accelerometer turn-on bias is below 4.2 mg (1σ)",
         ),
         (
             Condition("temperature", None, "gyro", 0.1 * DEGREE),
             "its gyro temperature coefficient is below 0.1 deg/s/K (1σ)",
+        ),
+        (
+            Condition("g_sensitivity", None, "gyro", 0.1001 * DEGREE / 9.80665, 3, 21),
+            "its gyro g-sensitivity is below 0.1 deg/s/g (1σ); 3 of 21 sensors print so little",
+        ),
+        (
+            replace(SCALE, within=1, printing=1),
+            "its gyro scale factor error is below 1200 ppm (1σ); 1 of 1 sensor prints so little",
         ),
         (MASS, "its mass meets the requirement"),
         (Condition(None, "axis", "gyro_x"), "it has a gyro x axis"),
@@ -152,10 +163,11 @@ def test_a_shortfall_says_what_is_missing(shortfall: Shortfall, text: str) -> No
 def test_a_verdict_has_its_conditions() -> None:
     one = "its gyro scale factor error is below 1200 ppm (1σ)"
     mass = "its mass meets the requirement"
-    assert stated_verdict(row(conditions=(SCALE,))) == f"meets the limits if {one}"
-    several = row(verdict="likely_meets", conditions=(SCALE, MASS, Condition(None, "power", "")))
+    stated = stated_verdict(row(verdict="meets_if", conditions=(SCALE,)))
+    assert stated == f"meets the limits if {one}"
+    several = row(verdict="meets_if", conditions=(SCALE, MASS, Condition(None, "power", "")))
     assert stated_verdict(several) == (
-        f"likely meets the limits if {one}, {mass} and its power meets the requirement"
+        f"meets the limits if {one}, {mass} and its power meets the requirement"
     )
 
 
@@ -165,11 +177,55 @@ def test_an_excluded_sensor_has_its_shortfalls() -> None:
     assert stated_verdict(excluded) == "excluded: no gyro; mass 20 g, required 15 g"
 
 
-def test_a_share_has_its_source() -> None:
+@pytest.mark.parametrize(
+    ("origin", "words"),
+    [
+        ("measured", " (measured)"),
+        ("datasheet", " (printed)"),
+        ("class limit", " (worst of its class)"),
+        ("requirement", ""),
+    ],
+)
+def test_a_share_has_its_source_and_its_origin(origin: Origin, words: str) -> None:
     assert share_text(Share("N", "gyro", share=0.404)) == "gyro N 40 %"
-    assert share_text(Share("scale_factor", "gyro", share=0.1, kind="typ")) == (
-        "gyro scale factor (data sheet, typ) 10 %"
-    )
+    share = Share("scale_factor", "gyro", "turn", share=0.1, origin=origin)
+    assert share_text(share) == f"gyro scale factor in the turn{words} 10 %"
+
+
+def test_the_origins_of_an_error_are_summed() -> None:
+    shares = [
+        Share("turn_on_bias", "gyro", share=0.5, origin="class limit"),
+        Share("N", "accel", share=0.2, origin="measured"),
+        Share("K", "gyro", share=0.15, origin="measured"),
+        Share("misalignment", "gyro", share=0.1, origin="class limit"),
+        Share("scale_factor", "gyro", share=0.05, origin="datasheet"),
+    ]
+    assert origins_text(shares) == "worst of its class 60 %, noise 35 %, printed 5 %"
+
+
+@pytest.mark.parametrize(
+    ("quantity", "source", "size", "named"),
+    [
+        ("gyro", "temperature", 0.0123 * DEGREE, "gyro temperature coefficient"),
+        ("gyro", "N", None, "gyro white noise"),
+        ("accel", "flicker", None, "accelerometer bias instability"),
+        ("accel", "K", None, "accelerometer K"),
+    ],
+)
+def test_a_class_limit_is_named(
+    quantity: str, source: SourceCode, size: float | None, named: str
+) -> None:
+    figure = " (0.0123 deg/s/K)" if size else ""
+    stated = class_limit_text(quantity, source, size)
+    assert stated == f"{named}: not printed, worst of its class{figure}"
+
+
+def test_margins_other_than_in_use() -> None:
+    both = row(margin=0.5, noise_margin=4.234, likely_margin=0.9)
+    assert other_margins_text(both) == "noise alone 4.2, likely 0.9"
+    # Where every figure is known, the likely margin is the margin in use.
+    assert other_margins_text(replace(both, likely_margin=0.5)) == "noise alone 4.2"
+    assert other_margins_text(row()) == ""
 
 
 def weak(*reasons: str, **values: Any) -> str:
@@ -296,9 +352,11 @@ def test_weak_evidence_stands_with_the_answer() -> None:
 
 
 def test_unknown_figures_are_counted_in_the_answer() -> None:
-    assert answer(row(conditions=(SCALE,))).startswith("A meets the limits; 1 figure is unknown. ")
-    two = row(verdict="likely_meets", conditions=(SCALE, MASS))
-    assert answer(two).startswith("A likely meets the limits; 2 figures are unknown. ")
+    unknown = "No sensor is shown to meet the limits. A meets them if"
+    one = answer(row(verdict="meets_if", conditions=(SCALE,)))
+    assert one.startswith(f"{unknown} 1 unknown figure is small enough. ")
+    two = answer(row(verdict="meets_if", conditions=(SCALE, replace(SCALE, subject="accel"))))
+    assert two.startswith(f"{unknown} 2 unknown figures are small enough. ")
 
 
 def test_sensors_that_cannot_be_judged_are_told_from_those_that_can() -> None:
@@ -323,11 +381,11 @@ def test_the_others_are_listed_by_their_verdicts_in_the_order_of_merit() -> None
         row("e", "likely_meets"),
         row("f", "excluded", shortfalls=(Shortfall("price_class", "chip", "tactical"),)),
         row("h", "meets"),
-        row("g", "meets", conditions=(SCALE,)),
+        row("g", "meets_if", conditions=(SCALE,)),
     ]
     assert others(rows) == (
-        "Also meet the limits: H. Also meet the limits on conditions: G. "
-        "Likely meet the limits: E. Not enough data (no accelerometer): D. Likely fail: C. "
+        "Also meet the limits: H. Likely meet the limits: E. Meet the limits on conditions: G. "
+        "Not enough data (no accelerometer): D. Likely fail: C. "
         "Fail: B. Excluded: F (price class chip, required tactical)."
     )
 

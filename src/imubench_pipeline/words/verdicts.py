@@ -394,9 +394,6 @@ def answer_text(
     name = names[best.sensor]
     if best.verdict in ("meets", "likely_meets"):
         text = f"{name} {VERDICT_WORDS[best.verdict]}"
-        if best.conditions:
-            are = "is" if len(best.conditions) == 1 else "are"
-            text += f"; {counted(len(best.conditions), 'property')} {are} not known"
     elif best.verdict == "meets_if":
         text = f"No sensor is shown to meet the limits. {name} meets them if "
         text += f"{counted(len(best.conditions), 'unknown figure')} "
