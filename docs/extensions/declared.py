@@ -29,7 +29,8 @@ def substitutions() -> dict[str, int | str]:
 
 def verdicts() -> str:
     """Return the verdicts on a sensor with their words and probabilities."""
-    rows = ((code(v), cell(VERDICT_WORDS[v]), cell(VERDICT_MEANINGS[v])) for v in VERDICT_WORDS)
+    words = {**VERDICT_WORDS, "meets_if": f"{VERDICT_WORDS['meets_if']} if …"}
+    rows = ((code(v), cell(words[v]), cell(VERDICT_MEANINGS[v])) for v in VERDICT_WORDS)
     return table(("`verdict`", "the page says", "meaning"), rows)
 
 

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
+from functools import partial
 
 from sphinx.application import Sphinx
 
-from extensions import commands, declared, models
+from extensions import commands, declared, models, shortlists
 
 PARTS: dict[str, Callable[[], str]] = {
     "configuration": models.configuration,
@@ -25,6 +26,11 @@ PARTS: dict[str, Callable[[], str]] = {
     "noise-terms": declared.noise_terms,
     "commands": commands.commands,
     "exit-statuses": commands.exit_statuses,
+    **{
+        f"shortlist-{file.stem}": partial(shortlists.describe_requirement, file.stem)
+        for folder in shortlists.FOLDERS
+        for file in folder.glob("*.yaml")
+    },
 }
 """Markdown of each part, made when a page that names it is read."""
 

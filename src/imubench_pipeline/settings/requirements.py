@@ -111,12 +111,13 @@ class Limit(Strict):
     @property
     def text(self) -> str:
         """The limit in words."""
+        name = self.error.replace("_", "-")
         if self.outage is not None:
             return (
-                f"{self.error} within {self.at_most} at the end of {self.outage} without GNSS "
+                f"{name} within {self.at_most} at the end of {self.outage} without GNSS "
                 f"({self.trajectory})"
             )
-        return f"{self.error} within {self.at_most} after {self.after}"
+        return f"{name} within {self.at_most} after {self.after}"
 
 
 def _axes(text: str) -> str:
