@@ -43,8 +43,8 @@ DEGREE = math.pi / 180
 NOTHING = NoiseModel()
 QUANTITIES: tuple[Quantity, ...] = ("attitude", "heading", "velocity", "position")
 USE = Use(temperature_change=20.0, turns=2 * math.pi, speed_change=10.0, vibration=G, over=60.0)
-ANGLE = G / (2 * math.pi * 10.0)
-"""Velocity of the vibration, m/s: the angle by a g-sensitivity of 1."""
+ANGLE = math.sqrt(3.0) * G / (2 * math.pi * 10.0)
+"""Velocity of the vibration of three axes, m/s: the angle by a g-sensitivity of 1, rms."""
 
 
 def figures(**sigmas: float) -> Any:
@@ -94,8 +94,8 @@ def test_what_each_figure_adds_after_a_static_window() -> None:
         "gyro scale factor": pytest.approx(1e-3 * 2 * math.pi),
         "gyro scale factor over temperature": pytest.approx(3e-5 * 20.0 * 2 * math.pi),
         "gyro nonlinearity": pytest.approx(4e-4 * 2 * math.pi),
-        # Vibration averages to zero; what remains is an angle.
-        "gyro g-sensitivity": pytest.approx(2e-5 * math.hypot(10.0, ANGLE)),
+        # Vibration averages to zero; the angle swings about its first phase.
+        "gyro g-sensitivity": pytest.approx(2e-5 * math.hypot(10.0, math.sqrt(2.0) * ANGLE)),
     }
     # The window takes off the bias; what it makes of it is a tilt of 50 mg over g.
     assert parts_of("attitude", start, **given_) == pytest.approx(
@@ -180,7 +180,7 @@ def test_a_full_circle_at_speed_by_hand() -> None:
     use = Use(turns=2 * math.pi, speed=2.0, over=60.0)
     start = Start.calibrated(10.0)
     known = figures(scale_factor=1e-3, misalignment=1e-3, g_sensitivity=1e-5)
-    given_ = {"gyro_figures": known, "accel_figures": figures(scale_factor=1e-2)}
+    given_ = {"gyro_figures": known, "accel_figures": figures(scale_factor=1e-2, turn_on_bias=0.01)}
     rate = 2 * math.pi / 60.0
     assert parts_of("heading", start, use, **given_) == {
         "gyro scale factor": pytest.approx(1e-3 * 2 * math.pi),
@@ -193,6 +193,8 @@ def test_a_full_circle_at_speed_by_hand() -> None:
         "gyro g-sensitivity in the turn": pytest.approx(
             1e-5 * 2.0 * math.hypot(2 * math.pi * 2.0, G * 60.0)
         ),
+        # The turn carries the bias around; the tilt that cancelled it stays behind.
+        "accel turn-on bias in the turn": pytest.approx(0.01 * 60.0),
     }
     assert parts_of("attitude", start, use, gyro_figures=known) == {
         "gyro scale factor": pytest.approx(1e-3 * 2 * math.pi),
@@ -349,12 +351,12 @@ def test_simulated_runs_agree() -> None:
     rate = rate + of_gyro["g_sensitivity"] * use.speed_change / time
     turned = np.cumsum(rate + of_gyro["scale_factor"] * use.turns / time, axis=1) * step
     tilt = np.cumsum(rate, axis=1) * step - rate * step / 2
-    # The integral of a vibration that begins at any phase.
-    own = of_gyro["g_sensitivity"] * rng.choice([-1.0, 1.0], (runs, 1))
-    frequency, phase = 2 * np.pi * 0.5, rng.uniform(0.0, 2 * np.pi, (runs, 1))
-    tilt = tilt + own * math.sqrt(2.0) * use.vibration / frequency * (
-        np.sin(frequency * at + phase) - np.sin(phase)
-    )
+    # The integral of a vibration of three axes that begins at any phase.
+    frequency, phase = 2 * np.pi * 0.5, rng.uniform(0.0, 2 * np.pi, (3, runs, 1))
+    own = gyro["g_sensitivity"].sigma * rng.standard_normal((3, runs, 1))
+    swing = np.sin(frequency * at + phase) - np.sin(phase)
+    angle = math.sqrt(2.0) * use.vibration / frequency * np.sum(own * swing, axis=0)
+    turned, tilt = turned + angle, tilt + angle
     shaken = math.sqrt(2.0) * use.vibration * np.sin(2 * np.pi * 7.3 * at)
     force = of_accel["temperature"] * change + of_accel["vibration_rectification"] * shaken**2
     force = force + of_accel["scale_factor"] * use.speed_change / time + G * tilt

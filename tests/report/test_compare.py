@@ -7,8 +7,7 @@ import pytest
 
 from imubench_pipeline.report.compare import COMPARE, KEPT
 from imubench_pipeline.report.publish import publish
-from imubench_pipeline.settings.requirements import Requirement
-from imubench_pipeline.tables.files import write
+from imubench_pipeline.tables.files import build, write
 from tests.report.browser.made import publish_some
 from tests.report.pages import read_pages
 from tests.report.tables import ROBOT, joined, recording_rows, rejected_rows, site
@@ -47,7 +46,12 @@ def put(results: Path, sensor: str, recording: str) -> None:
 def test_what_is_kept_of_a_recording_is_in_the_page(tmp_path: Path) -> None:
     asked = {"robot": ROBOT}
     rows = recording_rows("one", "day1"), recording_rows("two", "day1"), rejected_rows("two", "no")
-    made = site(joined(*rows, requirements=asked), tmp_path, requirements=asked)
+    standing = {"requirement": "robot", "sensor": "one", "decides": True, "verdict": "meets_if",
+                "error": "heading", "time": 100.0, "unit": "rad", "limit_verdict": "meets_if",
+                "margin": 0.25, "likely_margin": 0.9}  # fmt: skip
+    others = standing | {"decides": False, "error": "position", "unit": "m", "margin": 3.0}
+    tables = joined(*rows, requirements=asked) | {"ranking": build("ranking", [standing, others])}
+    made = site(tables, tmp_path, requirements=asked)
     put(tmp_path, "one", "day1")
     page = COMPARE.context(made)["page"]
     first, second = page["recordings"]
@@ -60,10 +64,9 @@ def test_what_is_kept_of_a_recording_is_in_the_page(tmp_path: Path) -> None:
         (one["sensor"], one["channel"]): one["drawn"] for one in page["channels"] if one["drawn"]
     }
     assert drawn.keys() == {("one", "gyro_x")}
-    assert page["window"] == 60.0
-    limit = next(one for one in page["limits"] if one["requirement"] == "robot")
-    robot = Requirement.model_validate(ROBOT)
-    assert limit["limit"] == pytest.approx(robot.limits[0].size / robot.sigmas)
+    assert page["window"] == 10.0  # of the requirement
+    (robot,) = page["requirements"]
+    assert robot == {"title": "a robot", "sensors": {"one": "meets if …, margin 0.25, likely 0.9"}}
 
 
 def test_the_page_is_written_again_when_what_is_kept_changes(tmp_path: Path) -> None:

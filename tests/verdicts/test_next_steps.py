@@ -4,7 +4,6 @@ import pytest
 from scipy import stats
 
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
-from imubench_pipeline.model.states import Cause
 from imubench_pipeline.navigation.error_budget.in_use import Figure, Figures
 from imubench_pipeline.navigation.verdicts.next_steps import count_specimens_needed
 from imubench_pipeline.navigation.verdicts.specimens import Expected, Spread
@@ -103,20 +102,28 @@ def test_a_short_log_is_to_be_as_long_as_it_takes() -> None:
     assert step["text"] == ("Extend c by 8.5 h to 9 h: this would give 1 verdict stronger evidence")
 
 
-def test_unknown_figures_give_the_step_find_figures() -> None:
+def test_the_unknown_figure_with_the_largest_error_is_to_be_found() -> None:
     turns = {"environment": {"turns": "360 deg", "temperature_change": "2 K"}}
     asked = {"robot": requirement(("heading", "100 s", "0.1 deg"), **turns)}
-    unknown = Figure(sigma=1.0, likely=1e-6, best=1e-6, origin="class limit")
-    known = Figure(sigma=1e-6, origin="datasheet")
-    causes: tuple[Cause, ...] = ("temperature", "scale_factor")
-    figures: Figures = {"nonlinearity": known, **dict.fromkeys(causes, unknown)}
+    small, large = (
+        Figure(sigma=sigma, likely=1e-6, best=1e-6, origin="class limit") for sigma in (0.1, 9.0)
+    )
+    figures: Figures = {
+        "nonlinearity": Figure(sigma=1e-6, origin="datasheet"),
+        "temperature": small,  # 0.1 times 2 K over 100 s, and half of it on average
+        "scale_factor": large,  # 9 times 360 deg
+    }
     (row,), steps = judge({"s": {"r": gyro(5.0)}}, asked, figures={"gyro_x": figures})
     assert row["verdict"] == "meets_if" and len(row["conditions"]) == 2
     (step,) = (one for one in steps if one["action"] == "find_figures")
-    assert step["verdicts_turned"] + step["verdicts_strengthened"] == 1
-    assert step["text"].startswith(
-        "Look up the gyro temperature coefficient and gyro scale factor error: this would "
+    (figure,) = step["figures"]
+    assert (figure["figure"], figure["subject"], figure["largest"]) == (
+        *("scale_factor", "gyro"),
+        None,
     )
+    assert (step["verdicts_turned"], step["verdicts_strengthened"]) == (1, 0)
+    assert step["text"].startswith("Look up or measure the gyro scale factor error (")
+    assert step["text"].endswith("): this decides 1 verdict")
 
 
 def test_excluded_sensor_has_no_next_steps() -> None:
