@@ -14,7 +14,6 @@ import json
 import re
 import sys
 import zlib
-from collections.abc import Callable
 from pathlib import Path
 
 import pyarrow.parquet as pq
@@ -22,7 +21,11 @@ import pyarrow.parquet as pq
 from imubench_pipeline.model.comparisons import RankingRow, ShortlistRow
 from imubench_pipeline.run.cli import main as imubench
 from imubench_pipeline.words.numbers import number_text
-from imubench_pipeline.words.verdicts import SHORT_VERDICTS, VERDICT_WORDS
+from imubench_pipeline.words.verdicts import (
+    SHORT_VERDICTS,
+    VERDICT_WORDS,
+    other_margins_text,
+)
 
 
 def read_text(page: str) -> str:
@@ -38,6 +41,11 @@ def run(*arguments: str) -> str:
     return " ".join(said.getvalue().split())
 
 
+def describe(row: RankingRow | ShortlistRow) -> str:
+    """Return the verdict of a row with all margins, to the last digit."""
+    return f"{row.verdict} {row.margin} {row.noise_margin} {row.likely_margin}"
+
+
 def main() -> int:
     """Print the counts and the differences; return 1 if there are any."""
     results = Path(sys.argv[1])
@@ -51,55 +59,41 @@ def main() -> int:
     )
     assert packed is not None
     page = json.loads(zlib.decompress(base64.b64decode(packed[1]), -15))
-    titles = {
-        re.sub(r"\s+", " ", each["title"]): each["sensors"] for each in page["requirements"]
-    }
+    titles = {re.sub(r"\s+", " ", each["title"]): each["sensors"] for each in page["requirements"]}
     checked: dict[str, int] = {}
     wrong: list[str] = []
 
-    def check(where: str, row: RankingRow, found: str, test: Callable[[str], bool]) -> None:
+    def check(where: str, row: RankingRow, found: str, *expected: str) -> None:
         checked[where] = checked.get(where, 0) + 1
-        if not test(found):
+        if not all(each in found for each in expected):
             wrong.append(f"{row.requirement}/{row.sensor}: {where} has {found[:200]!r}")
 
-    for row in ranking:
-        if not row.decides:
-            continue
-        word, margin = SHORT_VERDICTS[row.verdict], number_text(row.margin, 2)
+    for row in (row for row in ranking if row.decides):
+        word, margin = SHORT_VERDICTS[row.verdict], number_text(row.margin, 3)
         judged = row.margin is not None and row.verdict != "excluded"
         link = rf'sensors/{row.sensor}\.html#requirement-{row.requirement}"'
         cell = re.search(rf'<td class="cell[^>]*>\s*<a href="{link}>(.*?)</td>', start, re.S)
-        text = read_text(cell[1]) if cell else ""
-        check("start page", row, text, lambda t, w=word, m=margin, j=judged: w in t and (not j or m[:3] in t))  # type: ignore[misc]
+        other = other_margins_text(row) if judged else ""
+        check("start page", row, read_text(cell[1]) if cell else "", word, other)
         own = (report / "sensors" / f"{row.sensor}.html").read_text()
-        section = re.search(
-            rf'<section[^>]*aria-labelledby="requirement-{row.requirement}">(.*?)</section>', own, re.S
-        )
-        text = read_text(section[1]) if section else ""
-        check("sensor page", row, text, lambda t, w=word: w in t)  # type: ignore[misc]
-        if row.rank:
-            check("rank on it", row, text, lambda t, r=row.rank: f"rank {r} of" in t)  # type: ignore[misc]
-        beside = next((own[row.sensor] for own in titles.values() if row.sensor in own), "")
-        every = [own.get(row.sensor, "") for own in titles.values()]
-        check("side by side", row, " | ".join(every), lambda t, w=word: w in t)  # type: ignore[misc]
-        assert beside or not titles
-        other = listed.get((row.requirement, row.sensor))
-        if other is not None and judged:
-            same = (other.verdict, other.margin, other.noise_margin) == (
-                row.verdict, row.margin, row.noise_margin
-            )  # fmt: skip
-            check("table shortlist", row, str(other), lambda _, s=same: s)  # type: ignore[misc]
-            check("before buying", row, buying, lambda t, w=number_text(row.margin, 3): w in t)  # type: ignore[misc]
+        begin = rf'<section[^>]*aria-labelledby="requirement-{row.requirement}">'
+        section = re.search(rf"{begin}(.*?)</section>", own, re.S)
+        rank = f"rank {row.rank} of" if row.rank else ""
+        check("sensor page", row, read_text(section[1]) if section else "", word, rank, other)
+        beside = " | ".join(each.get(row.sensor, "") for each in titles.values())
+        check("side by side", row, beside, word, margin if judged else "", other)
+        entry = listed.get((row.requirement, row.sensor))
+        if entry is not None and judged:
+            check("table shortlist", row, describe(entry), describe(row))
+            check("before buying", row, buying, margin)
     for name in dict.fromkeys(row.requirement for row in ranking):
         shown = run("show", str(results), "--requirement", name, "--width", "200")
         of_catalogue = run("shortlist", name, "--results", str(results))
         for row in ranking:
             if row.decides and row.requirement == name and row.margin is not None:
-                words = VERDICT_WORDS[row.verdict]
-                check("show", row, shown, lambda t, w=words: w in t)  # type: ignore[misc]
+                check("show", row, shown, VERDICT_WORDS[row.verdict])
                 if (name, row.sensor) in listed and row.verdict != "excluded":
-                    margin = number_text(row.margin, 3)
-                    check("shortlist", row, of_catalogue, lambda t, m=margin: m in t)  # type: ignore[misc]
+                    check("shortlist", row, of_catalogue, number_text(row.margin, 3))
     print("verdicts checked:", ", ".join(f"{where} {n}" for where, n in checked.items()))
     print("\n".join(wrong))
     return int(bool(wrong) or not checked)

@@ -103,7 +103,7 @@ def test_every_unknown_figure_has_words_and_a_unit(figure: Cause, quantity: str)
         ),
         (
             Condition("g_sensitivity", None, "gyro", 0.1001 * DEGREE / 9.80665, 3, 21),
-            "its gyro g-sensitivity is below 0.1 deg/s/g (1σ); 3 of 21 sensors print so little",
+            "its gyro g-sensitivity is below 0.1 deg/s/g (1σ; 3 of 21 sensors print so little)",
         ),
         (
             replace(SCALE, within=1, printing=1),

@@ -34,10 +34,11 @@ from imubench_pipeline.noise import FLOOR, NoiseModel
 from imubench_pipeline.settings.requirements import Requirement
 from imubench_pipeline.settings.sensor import Sensor
 from imubench_pipeline.words.reasons import budgets as texts
-from imubench_pipeline.words.verdicts import class_limit_text
+from imubench_pipeline.words.verdicts import class_limit_text, worse_than_class_text
 
 _QUANTITIES: tuple[Measured, ...] = ("gyro", "accel")
 _MIN_SHARE = 0.01  # of the variance
+_MIN_EXCESS = 1.001  # of a printed figure over the worst of the class, which is rounded
 
 _WALK_TIMES: Mapping[End, float] = {"in_use": 500.0, "likely": 2000.0, "best": 9000.0}
 """Time, s, after which an unknown random walk is as large as the bias instability.
@@ -88,16 +89,21 @@ class _PrintedErrors:
 
     noise: Mapping[Measured, PrintedNoise]  # of the quantities that it measures
     axes: Mapping[Measured, AxisErrors]
+    remarks: tuple[str, ...]  # on figures that are worse than its class
 
 
 def _read_printed_errors(sensor: Sensor) -> _PrintedErrors:
     noise = {q: read_printed_noise(sensor, q) for q in _QUANTITIES if getattr(sensor.datasheet, q)}
-    axes = {}
+    axes, remarks = {}, []
     for q in _QUANTITIES:
         models = noise[q].models if q in noise else dict.fromkeys(_WALK_TIMES, NoiseModel())
         figures = read_figures(sensor, q)
         axes[q] = AxisErrors(models["in_use"], figures, models["likely"], models["best"])
-    return _PrintedErrors(noise, axes)
+        for cause, figure in figures.items():
+            worst = find_limit(sensor.grade, q, cause).worst
+            if figure.origin == "datasheet" and figure.sigma > _MIN_EXCESS * worst:
+                remarks.append(worse_than_class_text(q, cause, figure.sigma))
+    return _PrintedErrors(noise, axes, tuple(remarks))
 
 
 def list_shortlist_rows(
@@ -242,7 +248,10 @@ def _judge_by_datasheet(
         parts=tuple(_list_shares(budget, noise)),
         assumed=tuple(dict.fromkeys(_list_assumed(budget, noise))),
         shortfalls=tuple(lacking),
-        reasons=(texts.NOISE_NOT_PRINTED,) if verdict == "not_enough_data" else (),
+        reasons=(
+            *((texts.NOISE_NOT_PRINTED,) if verdict == "not_enough_data" else ()),
+            *printed.remarks,
+        ),
     )
 
 

@@ -13,7 +13,7 @@ from imubench_pipeline.model.comparisons import (
     ShortlistRow,
 )
 from imubench_pipeline.model.estimates import ErrorGrowthRow
-from imubench_pipeline.model.states import Action, Origin, SourceCode, SpreadOf, Verdict
+from imubench_pipeline.model.states import Action, Cause, Origin, SourceCode, SpreadOf, Verdict
 from imubench_pipeline.model.verdicts import (
     Condition,
     DoubtMark,
@@ -180,11 +180,11 @@ def condition_text(condition: Condition) -> str:
         owned = condition.property in ("quantity", "axis")
         return f"it has a {name}" if owned else f"its {name} meets the requirement"
     size = figure_text(condition.subject, condition.figure, condition.largest or 0.0)
-    text = f"its {subject_text(condition)} is below {size} (1σ)"
+    text = f"its {subject_text(condition)} is below {size}"
     if condition.printing is None:
-        return text
+        return f"{text} (1σ)"
     printing = counted(condition.printing, "sensor prints", "sensors print")
-    return f"{text}; {condition.within} of {printing} so little"
+    return f"{text} (1σ; {condition.within} of {printing} so little)"
 
 
 def figure_text(quantity: str, cause: SourceCode, size: float) -> str:
@@ -195,6 +195,12 @@ def figure_text(quantity: str, cause: SourceCode, size: float) -> str:
         step = Decimal(1).scaleb(Decimal(largest).adjusted() - 2)
         largest = float(Decimal(largest).quantize(step, rounding=ROUND_DOWN))
     return f"{largest:g} {unit}"
+
+
+def worse_than_class_text(quantity: str, cause: Cause, size: float) -> str:
+    """Return that a sensor prints a figure, SI, that is worse than its class."""
+    figure = figure_text(quantity, cause, size)
+    return f"its {SENSORS[quantity]} {_NOUNS[cause][0]}, {figure}, is worse than its class prints"
 
 
 def class_limit_text(quantity: str, source: SourceCode, size: float | None) -> str:
