@@ -58,12 +58,12 @@ def main() -> int:
         r'<script[^>]*class="page"[^>]*>(.*?)</script>', (report / "compare.html").read_text(), re.S
     )
     assert packed is not None
-    page = json.loads(zlib.decompress(base64.b64decode(packed[1]), -15))
-    titles = {re.sub(r"\s+", " ", each["title"]): each["sensors"] for each in page["requirements"]}
+    page = json.loads(zlib.decompress(base64.b64decode(packed[1])))
+    titles = {each["title"]: each["sensors"] for each in page["requirements"]}
     checked: dict[str, int] = {}
     wrong: list[str] = []
 
-    def check(where: str, row: RankingRow, found: str, *expected: str) -> None:
+    def check(where: str, row: RankingRow | ShortlistRow, found: str, *expected: str) -> None:
         checked[where] = checked.get(where, 0) + 1
         if not all(each in found for each in expected):
             wrong.append(f"{row.requirement}/{row.sensor}: {where} has {found[:200]!r}")
@@ -92,8 +92,9 @@ def main() -> int:
         for row in ranking:
             if row.decides and row.requirement == name and row.margin is not None:
                 check("show", row, shown, VERDICT_WORDS[row.verdict])
-                if (name, row.sensor) in listed and row.verdict != "excluded":
-                    check("shortlist", row, of_catalogue, number_text(row.margin, 3))
+        for entry in shortlist:
+            if entry.requirement == name and entry.margin is not None:
+                check("shortlist", entry, of_catalogue, number_text(entry.margin, 3))
     print("verdicts checked:", ", ".join(f"{where} {n}" for where, n in checked.items()))
     print("\n".join(wrong))
     return int(bool(wrong) or not checked)

@@ -65,6 +65,9 @@ class SourcedInterval(str):
         return Markup("{} to {}").format(*self.ends)
 
 
+_MAX_DIGITS = 3  # of errors, whose intervals do not include the limits of a class
+
+
 def source_number(
     row: RankingRow | ErrorBudgetRow, column: str, text: str, unit: str = ""
 ) -> SourcedNumber:
@@ -79,7 +82,7 @@ def format_margin(row: RankingRow) -> tuple[SourcedNumber, SourcedNumber, Source
     if row.margin is None:
         return None
     low, high = compute_margin_limits(row)
-    digits = count_digits(row.margin, low, high)
+    digits = min(count_digits(row.margin, low, high), _MAX_DIGITS)
     named = (("margin", row.margin), ("limit:upper", low), ("limit:lower", high))
     first, lower, upper = (source_number(row, name, number_text(x, digits)) for name, x in named)
     return first, lower, upper
@@ -247,7 +250,7 @@ def _interval(row: ErrorRow, system: System) -> str:
     if not _is_sensible(row, row.sigma):
         return NO_VALUE
     unit = choose_unit(DIMENSIONS[row.error], system, row.sigma)
-    digits = unit.digits(row.sigma, row.lower, row.upper)
+    digits = min(unit.digits(row.sigma, row.lower, row.upper), _MAX_DIGITS)
     lower, upper = (
         source_number(row, name, unit.text(value, digits), unit.sign)
         for name, value in (("lower", row.lower), ("upper", row.upper))
@@ -368,7 +371,8 @@ def _format_error(row: ErrorRow, sigma: float, unit: Unit) -> str:
     if not _is_sensible(row, sigma):
         north = row.error == "north"
         return "not determined" if north else f"over {unit.text(_QUARTER_TURN, 3)} {unit.sign}"
-    return f"{unit.estimate_texts(sigma, row.lower, row.upper)[0]} {unit.sign}"
+    digits = min(unit.digits(sigma, row.lower, row.upper), _MAX_DIGITS)
+    return f"{unit.text(sigma, digits)} {unit.sign}"
 
 
 def _percent(share: float | None) -> str:

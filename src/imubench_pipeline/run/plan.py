@@ -410,7 +410,7 @@ class Plan:
         return to_json({"report": {"units": self.run.report.units}})
 
     def catalogue(self, *more: str) -> str:
-        """Return the datasheets of all sensor files, with vendor and model, and more keys."""
+        """Return the datasheets of all sensor files, with vendor, model and grade, and more keys."""
         return self._sensor_files(self.sensors, more)
 
     def sensor_file(self, sensor: str, *more: str) -> str:
@@ -418,7 +418,7 @@ class Plan:
         return self._sensor_files({sensor} & self.sensors.keys(), more)
 
     def _sensor_files(self, names: Iterable[str], more: Iterable[str]) -> str:
-        keys = {"vendor", "model", "datasheet", *more}
+        keys = {"vendor", "model", "grade", "temperature_range", "datasheet", *more}
         return to_json(
             {
                 name: self.sensors[name].model_dump(mode="json", include=keys)

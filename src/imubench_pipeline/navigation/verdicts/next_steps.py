@@ -109,7 +109,7 @@ def _list_steps(judgement: Judgement, basis: Basis) -> Iterator[_Step]:
         elif (needed := _compute_duration_needed(judgement)) > (basis.duration(key) or math.inf):
             yield _Step("log_longer", key, name, turns=True, duration=needed)
         return
-    if judgement.decides.verdict not in ("meets", "fails"):
+    if judgement.decides.verdict not in ("meets", "meets_if", "fails"):
         yield from _find_settling_steps(judgement, basis)
     if judgement.verdict == "meets_if":
         figures = tuple(
