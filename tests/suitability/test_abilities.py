@@ -6,7 +6,7 @@ import pytest
 
 from imubench_pipeline.model.verdicts import Condition, Shortfall
 from imubench_pipeline.navigation.suitability import judge, read_abilities
-from imubench_pipeline.settings.requirements import Must
+from imubench_pipeline.settings.requirements import Requirement
 from imubench_pipeline.settings.sensor import CHANNELS, Sensor
 from imubench_pipeline.words.verdicts import shortfall_text, subject_text
 
@@ -26,11 +26,17 @@ WHOLE: dict[str, Any] = {
     },
     "datasheet": {"gyro": FIGURES},
 }
+HEADING: dict[str, Any] = {
+    "title": "heading",
+    "static_window": "10 s",
+    "limits": [{"error": "heading", "after": "10 s", "at_most": "1 deg"}],
+}
 
 
 def of_sensor(must: dict[str, Any], **changes: Any) -> tuple[list[Shortfall], list[Condition]]:
     sensor = Sensor.model_validate(WHOLE | changes)
-    return judge(Must.model_validate(must), read_abilities(sensor))
+    asked = Requirement.model_validate(HEADING | {"must": must})
+    return judge(asked, read_abilities(sensor))
 
 
 def judged(must: dict[str, Any], **changes: Any) -> tuple[list[str], list[str]]:
@@ -122,3 +128,12 @@ def test_figures_of_other_options_do_not_count() -> None:
     assert judged(asked, datasheet=sheet) == ([], ["gyro full scale"])
     lacking, _ = judged(asked, datasheet=sheet | {"options": ["mode A"]})
     assert lacking == ["gyro full scale 250 deg/s, required 1000 deg/s"]
+
+
+def test_a_sensor_without_a_needed_quantity_lacks_it() -> None:
+    position = HEADING | {"limits": [{"error": "position", "after": "9 s", "at_most": "1 m"}]}
+    without = WHOLE | {"datasheet": {"gyro": FIGURES, "accel": None}}
+    has = read_abilities(Sensor.model_validate(without))
+    (lacking,), unknown = judge(Requirement.model_validate(position), has)
+    assert shortfall_text(lacking) == "no accelerometer" and not unknown
+    assert judge(Requirement.model_validate(HEADING), has) == ([], [])

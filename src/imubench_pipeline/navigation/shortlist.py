@@ -193,14 +193,12 @@ def _judge_by_datasheet(
     has = read_abilities(sensor)
     channels = tuple(f"{q}_{axis}" for q in _QUANTITIES if q not in has.without for axis in "xyz")
     has = has.model_copy(update={"channels": channels, "logged_rate": None})
-    lacking, unknown = judge(requirement.must, has)
+    lacking, unknown = judge(requirement, has)
     if not requirement.admits(sensor.price_class):
         asked = " or ".join(requirement.price_class or ())
         lacking.append(Shortfall("price_class", sensor.price_class or "", asked))
-    needed = dict.fromkeys(quantity for question in questions for quantity in question.needs)
-    if without := [quantity for quantity in needed if quantity in has.without]:
-        lacking += [Shortfall("quantity", quantity, quantity) for quantity in without]
-        return replace(row, verdict="excluded", shortfalls=tuple(dict.fromkeys(lacking)))
+    if any(quantity in has.without for quantity in requirement.quantities):
+        return replace(row, verdict="excluded", shortfalls=tuple(lacking))
     noise = printed.noise
     answers = [
         (question, *question.answer_all(printed.axes["gyro"], printed.axes["accel"]))

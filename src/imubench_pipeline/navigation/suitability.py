@@ -15,7 +15,7 @@ from imubench_pipeline.model.comparisons import ErrorBudgetRow
 from imubench_pipeline.model.states import Cause, Measured, SourceCode, Verdict
 from imubench_pipeline.model.verdicts import Condition, Property, Share, Shortfall
 from imubench_pipeline.settings.printed import FIGURE_DIMENSIONS, SENSORS, Datasheet, PrintedFigure
-from imubench_pipeline.settings.requirements import Must
+from imubench_pipeline.settings.requirements import Requirement
 from imubench_pipeline.settings.sensor import QUANTITIES, Sensor
 from imubench_pipeline.settings.validation import Strict
 from imubench_pipeline.units import convert_to_si, parse_quantity
@@ -109,10 +109,10 @@ def _find_largest(datasheet: Datasheet, quantity: Measured, name: str) -> float 
     return min(by_axis, default=None)
 
 
-def judge(must: Must, has: Abilities) -> tuple[list[Shortfall], list[Condition]]:
+def judge(requirement: Requirement, has: Abilities) -> tuple[list[Shortfall], list[Condition]]:
     """Return the required properties that a sensor lacks, and the unknown ones."""
     points: dict[tuple[Property, str], _Point] = {}
-    for point in _compare(must, has):
+    for point in _compare(requirement, has):
         points.setdefault((point.property, point.subject), point)
     lacking = [
         Shortfall(point.property, point.subject, point.asked, point.has)
@@ -127,7 +127,11 @@ def judge(must: Must, has: Abilities) -> tuple[list[Shortfall], list[Condition]]
     return lacking, unknown
 
 
-def _compare(must: Must, has: Abilities) -> Iterator[_Point]:
+def _compare(requirement: Requirement, has: Abilities) -> Iterator[_Point]:
+    must = requirement.must
+    for measured in requirement.quantities:
+        if measured in has.without:
+            yield _Point("quantity", measured, False, measured)
     for text in must.axes:
         quantity, axes = text.split("_")
         if quantity in has.without:
@@ -198,13 +202,15 @@ class Conditions:
     figures: Mapping[tuple[str, Cause], float]
 
     @classmethod
-    def of(cls, must: Must, has: Abilities, conditions: Iterable[ErrorBudgetRow]) -> "Conditions":
+    def of(
+        cls, requirement: Requirement, has: Abilities, conditions: Iterable[ErrorBudgetRow]
+    ) -> "Conditions":
         """Return the conditions of the verdict on a sensor.
 
-        ``must`` are the hard requirements, ``has`` the properties of the sensor. ``conditions`` are
-        the rows of the table ``error_budget`` whose class limits are too large.
+        ``has`` are the properties of the sensor; ``conditions`` the rows of the table
+        ``error_budget`` whose class limits are too large.
         """
-        lacking, unknown = judge(must, has)
+        lacking, unknown = judge(requirement, has)
         largest = merge_largest((row.quantity, row.source, row.largest) for row in conditions)
         return cls(tuple(lacking), tuple(unknown), largest)
 

@@ -410,7 +410,7 @@ class Plan:
         return to_json({"report": {"units": self.run.report.units}})
 
     def catalogue(self, *more: str) -> str:
-        """Return the datasheets of all sensor files, with vendor, model and grade, and more keys."""
+        """Return the datasheets of all sensor files, with vendor, model, grade, and more keys."""
         return self._sensor_files(self.sensors, more)
 
     def sensor_file(self, sensor: str, *more: str) -> str:

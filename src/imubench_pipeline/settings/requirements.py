@@ -8,6 +8,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import AfterValidator, Field, model_validator
 
+from imubench_pipeline.model.states import Measured
 from imubench_pipeline.settings.validation import (
     Between,
     Frequency,
@@ -253,6 +254,13 @@ class Requirement(Strict):
     def in_outages(self) -> tuple[Limit, ...]:
         """Limits that are compared with a filter on a simulated drive."""
         return tuple(limit for limit in self.limits if limit.outage is not None)
+
+    @property
+    def quantities(self) -> tuple[Measured, ...]:
+        """Quantities that its errors come from."""
+        turned = ("heading", "cross_track", "north")
+        gyro_alone = all(limit.outage is None and limit.error in turned for limit in self.limits)
+        return ("gyro",) if gyro_alone else ("gyro", "accel")
 
     @property
     def sigmas(self) -> float:

@@ -219,7 +219,7 @@ class Judgement:
     @property
     def shortfalls(self) -> tuple[Shortfall, ...]:
         """Required properties that the sensor does not have."""
-        return (self.price,) if self.price else self.open.shortfalls
+        return (*filter(None, (self.price,)), *self.open.shortfalls)
 
     @property
     def _verdict_on_errors(self) -> Verdict:
@@ -278,7 +278,7 @@ def judge_sensors(
                 ],
                 price,
                 suitability.Conditions.of(
-                    requirement.must,
+                    requirement,
                     suitability.Abilities.model_validate(sensors[sensor].get("abilities", {})),
                     [row for each in by_limit for row in each.conditions],
                 ),
