@@ -86,8 +86,8 @@ def test_conditions_are_counted_in_the_answer_and_listed_below_it() -> None:
     scale = Condition("scale_factor", None, "gyro", 1.2e-3)
     answer, lines = said(row(verdict="meets_if", conditions=(scale,)))
     assert answer == (
-        "No sensor is shown to meet the limits. A meets them if 1 unknown figure is small enough. "
-        "Only sensor with usable data."
+        "No sensor is shown to meet the limits. A meets them if its gyro scale "
+        "factor error is below 1200 ppm (1σ). Only sensor with usable data."
     )
     assert lines[1] == "Conditions: its gyro scale factor error is below 1200 ppm (1σ)."
 

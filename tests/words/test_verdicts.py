@@ -354,9 +354,9 @@ def test_weak_evidence_stands_with_the_answer() -> None:
 def test_unknown_figures_are_counted_in_the_answer() -> None:
     unknown = "No sensor is shown to meet the limits. A meets them if"
     one = answer(row(verdict="meets_if", conditions=(SCALE,)))
-    assert one.startswith(f"{unknown} 1 unknown figure is small enough. ")
+    assert one.startswith(f"{unknown} {condition_text(SCALE)}. ")
     two = answer(row(verdict="meets_if", conditions=(SCALE, replace(SCALE, subject="accel"))))
-    assert two.startswith(f"{unknown} 2 unknown figures are small enough. ")
+    assert two.startswith(f"{unknown} 2 unknown figures and properties are as required. ")
 
 
 def test_sensors_that_cannot_be_judged_are_told_from_those_that_can() -> None:

@@ -402,8 +402,10 @@ def answer_text(
         text = f"{name} {VERDICT_WORDS[best.verdict]}"
     elif best.verdict == "meets_if":
         text = f"No sensor is shown to meet the limits. {name} meets them if "
-        text += f"{counted(len(best.conditions), 'unknown figure')} "
-        text += f"{'is' if len(best.conditions) == 1 else 'are'} small enough"
+        if len(best.conditions) == 1:
+            text += condition_text(best.conditions[0])
+        else:
+            text += f"{len(best.conditions)} unknown figures and properties are as required"
     elif best.verdict == "not_enough_data":
         text = "No sensor is shown to meet the limits. "
         text += f"{name} is closest, but there is not enough data"
