@@ -107,7 +107,7 @@ def test_every_unknown_figure_has_words_and_a_unit(figure: Cause, quantity: str)
         ),
         (
             replace(SCALE, within=1, printing=1),
-            "its gyro scale factor error is below 1200 ppm (1σ); 1 of 1 sensor prints so little",
+            "its gyro scale factor error is below 1200 ppm (1σ; 1 of 1 sensor prints so little)",
         ),
         (MASS, "its mass meets the requirement"),
         (Condition(None, "axis", "gyro_x"), "it has a gyro x axis"),
