@@ -456,6 +456,14 @@ def parse_difference(text: str, dimension: str) -> float:
     return _finite(factor * number, text)
 
 
+def split_quantity(text: str) -> tuple[float, str]:
+    """Return the number and the unit of a quantity of any dimension; raises a `UnitError`."""
+    match = _QUANTITY.match(text)
+    if not match:
+        raise UnitError(f"{text[:_LONGEST]!r} is not a number with its unit, such as '1 deg/h'")
+    return float(match[1]), match[2]
+
+
 def _finite(value: float, text: str) -> float:
     if not math.isfinite(value):
         raise UnitError(f"{str(text)[:_LONGEST]!r} is out of range; expected less than 1e308 in SI")

@@ -21,6 +21,7 @@ from imubench_pipeline.registry import Hook
 from imubench_pipeline.report import command as report
 from imubench_pipeline.report import show
 from imubench_pipeline.report.static_figures import command as figures
+from imubench_pipeline.run import convert_command as conversion
 from imubench_pipeline.run import formats_command as formats
 from imubench_pipeline.run import project
 from imubench_pipeline.run import sensors_command as sensors
@@ -448,7 +449,7 @@ COMMANDS = {
         ("shown", "", command_line.NO_RESULTS),
     ),
     "shortlist": command_line.Command(
-        "say by datasheets alone which sensors are worth logging",
+        "judge all sensors of the catalogue for a requirement",
         _add_shortlist,
         _shortlist,
         ("said", "", command_line.NO_RESULTS),
@@ -458,6 +459,12 @@ COMMANDS = {
         sensors.add_arguments,
         sensors.run,
         ("shown", "", "no such sensor"),
+    ),
+    "convert": command_line.Command(
+        "convert a figure to another unit or quantity",
+        conversion.add_arguments,
+        conversion.run,
+        ("printed", "", "the units do not belong together"),
     ),
     "report": command_line.Command(
         "write the report again, elsewhere or in one file",
