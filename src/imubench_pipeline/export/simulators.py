@@ -3,11 +3,7 @@
 import math
 from collections.abc import Sequence
 
-from imubench_pipeline.export.comments import (
-    describe_model,
-    format_comments,
-    format_python_comments,
-)
+from imubench_pipeline.export import comments
 from imubench_pipeline.export.imu import AXES, AxisNoise, Imu, TemperatureEffect
 from imubench_pipeline.export.mapping import Mapped, as_process
 from imubench_pipeline.noise import NoiseModel, compute_driving_density
@@ -40,7 +36,7 @@ def write_gnss_ins_sim(imu: Imu) -> str:
     imu.require_both()
     mapped = {name: as_process(a.model, imu.horizon, imu.rate) for name, a in imu.axes.items()}
     gyro, accel = mapped["gyro"].model, mapped["accel"].model
-    about = describe_model(imu, "gnss-ins-sim", _GNSS_INS_SIM_CONVENTION, mapped)
+    about = comments.describe_model(imu, "gnss-ins-sim", _GNSS_INS_SIM_CONVENTION, mapped)
     for name, process in mapped.items():
         if process.model.T_B is not None and process.model.T_B * imu.rate < _MIN_SAMPLES_IN_T_B:
             about.append(f"{name}: {texts.short_process(process.model.T_B * imu.rate)}.")
@@ -60,7 +56,7 @@ def write_gnss_ins_sim(imu: Imu) -> str:
         for key, value, comment in entries
     ]
     text = "import numpy as np\n\nimu_err = {\n" + "".join(lines) + "}\n"
-    return format_python_comments(about) + text
+    return comments.format_python_comments(about) + text
 
 
 def _stationary_deviation(model: NoiseModel) -> float:
@@ -112,10 +108,10 @@ def write_matlab(imu: Imu) -> str:
     for name, axis in imu.axes.items():
         mapped[name], parameters[name] = _map_parameters(axis, imu)
     convention = _MATLAB_CONVENTION.format(rate=imu.rate)
-    about = describe_model(imu, "MATLAB imuSensor", convention, mapped, temperature=True)
+    about = comments.describe_model(imu, "MATLAB imuSensor", convention, mapped, temperature=True)
     biases = {name: _map_temperature(imu.temperature.get(name)) for name in parameters}
     about += [f"{name} and temperature: {words}." for name in biases for words in biases[name][1]]
-    text = format_comments(about, "%") + "IMU = imuSensor('accel-gyro');\n"
+    text = comments.format_comments(about, "%") + "IMU = imuSensor('accel-gyro');\n"
     text += f"IMU.SampleRate = {imu.rate:.9g};  % Hz\n"
     members = {
         "gyro": ("Gyroscope", "gyroparams", "rad/s"),

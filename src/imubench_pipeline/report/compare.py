@@ -25,13 +25,8 @@ from imubench_pipeline.report.view import RecordingView
 from imubench_pipeline.settings.requirements import DIMENSIONS, Requirement
 from imubench_pipeline.tables.files import read
 from imubench_pipeline.units import parse_quantity
+from imubench_pipeline.words import verdicts
 from imubench_pipeline.words.numbers import duration_text, number_text
-from imubench_pipeline.words.verdicts import (
-    SHORT_VERDICTS,
-    other_margins_text,
-    source_kind_text,
-    source_text,
-)
 
 KEPT = ("error_growth", "drawn_deviations")
 """The tables of each recording that the page uses, besides the joined tables."""
@@ -99,8 +94,8 @@ def _make_context(site: Site) -> Mapping[str, object]:
 def _describe_verdict(row: RankingRow) -> str:
     """Return the verdict of a row of ``ranking`` with its margins: in use, and others."""
     margins = [f"margin {number_text(row.margin, 3)}" if row.margin is not None else ""]
-    margins.append(other_margins_text(row))
-    return ", ".join(filter(None, [SHORT_VERDICTS[row.verdict], *margins]))
+    margins.append(verdicts.other_margins_text(row))
+    return ", ".join(filter(None, [verdicts.SHORT_VERDICTS[row.verdict], *margins]))
 
 
 def _select_recordings(site: Site) -> list[RecordingView]:
@@ -209,8 +204,8 @@ def _pack_errors(kept: Mapping[str, Any], of_axis: Any, arrays: Arrays) -> Json:
             "gyro": _merge_axes(kept["gyro"][total]),
             "accel": _merge_axes(kept["accel"][total]),
             "sources": {
-                source_text(source): {
-                    "kind": source_kind_text(source),
+                verdicts.source_text(source): {
+                    "kind": verdicts.source_kind_text(source),
                     "shares": arrays.even(share),
                 }
                 for source, share in sources.items()

@@ -14,14 +14,8 @@ from rich.text import Text
 from imubench_pipeline.model.estimates import AllanRow, ParameterRow
 from imubench_pipeline.model.recordings import FindingRow, RecordingRow
 from imubench_pipeline.recordings.quality.rest import find_still_spans
-from imubench_pipeline.report import run_summary
+from imubench_pipeline.report import run_summary, terminal
 from imubench_pipeline.report.practical import System, choose_page_unit
-from imubench_pipeline.report.terminal import (
-    TITLES,
-    describe_length,
-    explain_no_estimates,
-    select_of,
-)
 from imubench_pipeline.settings.sensor import quantity_of
 from imubench_pipeline.tables.findings import LEFT_OUT
 from imubench_pipeline.words.estimates import symbol_text
@@ -91,20 +85,16 @@ class Event:
             return 100.0
         channels = max(len(self.channels), 1)
         if all(row.severity == "note" for row in self.findings):
-            return _score_note(self.findings)
+            code = self.findings[0].finding
+            strong = max(getattr(read_data(row), "ratio", _MIN_LINE) for row in self.findings)
+            if code not in _NOTES or (code == "lines" and strong < _MIN_LINE):
+                return 0.0
+            return 1e-3 * (len(_NOTES) - _NOTES.index(code))
         factors = self.factors()
         if factors is None:
             affected = any(row.affects for row in self.findings)
             return channels if affected else 0.01 * channels
         return 0.1 + channels * max(map(_effect, factors.values()), default=0.0)
-
-
-def _score_note(findings: Sequence[FindingRow]) -> float:
-    code = findings[0].finding
-    strong = max(getattr(read_data(row), "ratio", _MIN_LINE) for row in findings)
-    if code not in _NOTES or (code == "lines" and strong < _MIN_LINE):
-        return 0.0
-    return 1e-3 * (len(_NOTES) - _NOTES.index(code))
 
 
 def _effect(factor: float) -> float:
@@ -146,9 +136,9 @@ def render_log_screen(
     every_parameter = ParameterRow.rows_of(tables["parameters"])
     allan = AllanRow.rows_of(tables["allan"])
     for row in RecordingRow.rows_of(tables["recordings"]):
-        findings = select_of(row, every_finding)
-        parameters = [each for each in select_of(row, every_parameter) if each.recommended]
-        length = describe_length(row, parameters, select_of(row, allan))
+        findings = terminal.select_of(row, every_finding)
+        parameters = [each for each in terminal.select_of(row, every_parameter) if each.recommended]
+        length = terminal.describe_length(row, parameters, terminal.select_of(row, allan))
         others = [each for each in findings if each.finding not in (*LEFT_OUT, "motion")]
         motion = [each for each in findings if each.finding == "motion"]
         events = [] if motion else group_events(others)[:_MAX_EVENTS]
@@ -166,26 +156,21 @@ def render_log_screen(
         elif reason := reason_text(row):
             yield Text(_fold(reason, width, 2))
         if not parameters:
-            yield explain_no_estimates(row)
+            yield terminal.explain_no_estimates(row)
         elif not motion:
             yield Text("95 % intervals are below the values; ?: doubtful; <: upper limit")
-            doubted = _list_doubted(others)
-            for quantity, title in TITLES.items():
+            doubted = {
+                (row.channel, name)
+                for row in others
+                if row.channel and row.severity != "note" and row.finding not in _REMOVED
+                for name in row.affects
+            }
+            for quantity, title in terminal.TITLES.items():
                 lines = [line for line in parameters if quantity_of(line.channel) == quantity]
                 if lines:
                     table = _tabulate(title, quantity, lines, system, row.duration or 0.0, doubted)
                     yield Text("\n".join(table))
         yield from _list_events(events, others, system, width)
-
-
-def _list_doubted(findings: Iterable[FindingRow]) -> set[tuple[str, str]]:
-    """Return channel and parameter of values in doubt by findings without a measured effect."""
-    return {
-        (row.channel, name)
-        for row in findings
-        if row.channel and row.severity != "note" and row.finding not in _REMOVED
-        for name in row.affects
-    }
 
 
 def _merge(spans: Iterable[tuple[float, float]]) -> list[tuple[float, float]]:

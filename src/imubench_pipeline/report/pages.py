@@ -38,13 +38,6 @@ def read_plotting_script() -> str:
     return f"{head}{_BRACKETED_FACTORY_START}{body}}})));{tail}" if opening and closing else script
 
 
-def read_plotting_version() -> str:
-    """Return the version that plotly.js states."""
-    with _find_script().open(encoding="utf-8") as script:
-        stated = _VERSION_PATTERN.search(script.read(_BANNER_LENGTH))
-    return stated[1] if stated else "unknown"
-
-
 def _find_script() -> Path:
     """Return the file in the wheel, or in a checkout the file of the package plotly."""
     if _SHIPPED_SCRIPT.is_file():
@@ -84,12 +77,14 @@ def _describe_making(site: Site) -> Mapping[str, object]:
         commands.append((make_command(name, site.results_name, options), words))
     if site.at_once:
         commands = [(site.at_once, "writes these pages again")]
+    with _find_script().open(encoding="utf-8") as script:
+        stated = _VERSION_PATTERN.search(script.read(_BANNER_LENGTH))
     return {
         "commands": commands,
         "versions": {
             "python": platform.python_version(),
             **{name: version(name) for name in ("imubench_pipeline", *_LIBRARIES)},
-            "plotly.js": read_plotting_version(),
+            "plotly.js": stated[1] if stated else "unknown",
         },
         "settings": {
             f"{section}.{key}": value

@@ -7,23 +7,11 @@ from typing import Any
 import numpy as np
 
 from imubench_pipeline.estimators.estimate import SENSOR
+from imubench_pipeline.model import estimates
 from imubench_pipeline.model.comparisons import CoverageRow
-from imubench_pipeline.model.estimates import (
-    BacktestRow,
-    EnvelopeRow,
-    HistogramRow,
-    LowPassRow,
-    ModelSampleRow,
-    ParameterRow,
-    TemperatureRow,
-)
 from imubench_pipeline.model.table import R
+from imubench_pipeline.recordings import recording
 from imubench_pipeline.recordings.kept import Quality
-from imubench_pipeline.recordings.recording import (
-    LogMetadata,
-    list_log_files,
-    read_metadata,
-)
 from imubench_pipeline.registry import Hook
 from imubench_pipeline.report import meaning, payload
 from imubench_pipeline.report.datasheets import compare_with_datasheet, format_curve_distances
@@ -56,7 +44,7 @@ _UNIT_SYMBOLS = {"sensitivity": "sensitivity", "quadratic": "quadratic"}
 _UNIT_SYMBOLS |= {"bias": "signal", SENSOR: "N"}
 """Symbol of the unit, for quantities whose unit the reader can choose."""
 
-_Figure = TemperatureRow | LowPassRow | ParameterRow
+_Figure = estimates.TemperatureRow | estimates.LowPassRow | estimates.ParameterRow
 _FIXED_UNITS = {"lag": "s", "cutoff": "Hz"}
 _SHOWN_TAU = np.array([100.0, 300.0, 1_000.0, 3_000.0, 10_000.0, 30_000.0])
 """Averaging times for which the effect of temperature is stated, s."""
@@ -177,8 +165,8 @@ def read_sample_rows(folder: Path, of: type[R]) -> list[R]:
 def make_recording_context(site: Site, view: RecordingView, folder: Path) -> Mapping[str, object]:
     """Return the context of the template; ``folder`` is the recording's."""
     arrays = payload.Arrays()
-    envelope = read_sample_rows(folder, EnvelopeRow)
-    histogram = read_sample_rows(folder, HistogramRow)
+    envelope = read_sample_rows(folder, estimates.EnvelopeRow)
+    histogram = read_sample_rows(folder, estimates.HistogramRow)
     channels = view.channels()
     names = {channel.channel for channel in channels}
     sorted_findings = sorted(view.findings, key=lambda row: _SEVERITIES.index(row.severity))
@@ -187,7 +175,7 @@ def make_recording_context(site: Site, view: RecordingView, folder: Path) -> Map
         for i, row in enumerate(sorted_findings, start=1)
     ]
     samples = payload.pack_samples(envelope, histogram, arrays)
-    of_models = read_sample_rows(folder, ModelSampleRow)
+    of_models = read_sample_rows(folder, estimates.ModelSampleRow)
     budgets = list(
         meaning.make_budget_tables(view.budget, {view.full_name: view.simulated}, site.system)
     )
@@ -204,7 +192,7 @@ def make_recording_context(site: Site, view: RecordingView, folder: Path) -> Map
         "added": [made for add in _SECTIONS.objects() if (made := add(site, view)) is not None],
         "budget": budgets[0] if budgets else None,
         "backtest": meaning.format_backtest(
-            view.rows(BacktestRow), site.settings["requirements"], site.system
+            view.rows(estimates.BacktestRow), site.settings["requirements"], site.system
         ),
         "budget_words": meaning.explain_budget(site.settings["settings"]["error_budget"]),
         "command": site.again(view, "scores"),
@@ -256,7 +244,7 @@ def _describe_channel(
     view: RecordingView,
     channel: ChannelView,
     samples: Mapping[str, Any],
-    of_models: Sequence[ModelSampleRow],
+    of_models: Sequence[estimates.ModelSampleRow],
 ) -> dict[str, Any]:
     symbols, lines = make_methods_table(channel, view.row.duration, site.system)
     used = next(line for line in lines if line["recommended"])
@@ -341,7 +329,7 @@ def _describe_values(channel: ChannelView, system: System) -> str:
     return "; ".join(parts) + "."
 
 
-def _compare_deviations(rows: Sequence[ModelSampleRow], channel: str) -> str:
+def _compare_deviations(rows: Sequence[estimates.ModelSampleRow], channel: str) -> str:
     """Return the standard deviations of the simulated samples relative to the log in words."""
     own = {row.of: row for row in rows if row.channel == channel and row.what == "deviation"}
     log = own.get("log")
@@ -379,7 +367,7 @@ def describe_recording(
     }
 
 
-def load_metadata(folder: Path) -> LogMetadata | None:
+def load_metadata(folder: Path) -> recording.LogMetadata | None:
     """Return the metadata of the log in a folder of a recording; None without samples.
 
     Raises RecordingError if it is not there any more, or not as the ingest left it.
@@ -387,12 +375,12 @@ def load_metadata(folder: Path) -> LogMetadata | None:
     quality = folder / "quality.json"
     if quality.is_file() and (fault := Quality.read(quality).fault(folder)):
         raise RecordingError(fault)
-    paths = list_log_files(folder)
-    return read_metadata(paths[0]) if paths else None
+    paths = recording.list_log_files(folder)
+    return recording.read_metadata(paths[0]) if paths else None
 
 
 def _list_provenance(
-    view: RecordingView, channels: Sequence[ChannelView], metadata: LogMetadata | None
+    view: RecordingView, channels: Sequence[ChannelView], metadata: recording.LogMetadata | None
 ) -> Iterator[tuple[str, str]]:
     """Yield the origin of a recording, as names and texts."""
     row = view.row

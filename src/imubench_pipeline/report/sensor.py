@@ -18,17 +18,9 @@ from imubench_pipeline.report.site import Page, Site
 from imubench_pipeline.report.start import explain_missing_rank, summarise_recordings
 from imubench_pipeline.report.view import QUANTITY_NAMES, RecordingView
 from imubench_pipeline.settings.sensor import quantity_of
+from imubench_pipeline.words import verdicts
 from imubench_pipeline.words.estimates import symbol_text
 from imubench_pipeline.words.numbers import count_digits, counted, number_text
-from imubench_pipeline.words.verdicts import (
-    SHORT_VERDICTS,
-    condition_text,
-    doubts_text,
-    requirement_text,
-    spread_text,
-    stated_verdict,
-    verdict_text,
-)
 
 _TREND_COLUMNS = ("value", "lower", "upper", "expected_lower", "expected_upper", "verdict")
 _UNIT_SYMBOLS = {"bias": "signal"}
@@ -224,9 +216,13 @@ def trace_verdicts(
     requirements = site.settings["requirements"] if rows else {}
     for ranking in meaning.format_rankings(own_rows, requirements, simulated, site.system):
         name, requirement = ranking.name, ranking.requirement
-        about = {"name": name, "title": requirement.title, "asked": requirement_text(requirement)}
+        about = {
+            "name": name,
+            "title": requirement.title,
+            "asked": verdicts.requirement_text(requirement),
+        }
         if not ranking.groups:
-            word, why = SHORT_VERDICTS["not_enough_data"], explain_missing_rank(own)
+            word, why = verdicts.SHORT_VERDICTS["not_enough_data"], explain_missing_rank(own)
             yield {**about, "row": None, "verdict": "not_enough_data", "word": word, "why": why}
             continue
         (group,) = ranking.groups
@@ -247,17 +243,19 @@ def trace_verdicts(
         yield about | {
             "row": row,
             "verdict": row.verdict,
-            "word": SHORT_VERDICTS[row.verdict],
-            "stated": verdict_text(row.verdict) if row.conditions else stated_verdict(row),
+            "word": verdicts.SHORT_VERDICTS[row.verdict],
+            "stated": verdicts.verdict_text(row.verdict)
+            if row.conditions
+            else verdicts.stated_verdict(row),
             "group": group,
             "place": f"rank {row.rank} of {judged}" if row.rank else "",
-            "conditions": [condition_text(each) for each in row.conditions],
-            "spread": spread_text(row),
-            "left_out": doubts_text(row.left_out, named=True),
+            "conditions": [verdicts.condition_text(each) for each in row.conditions],
+            "spread": verdicts.spread_text(row),
+            "left_out": verdicts.doubts_text(row.left_out, named=True),
             "alternatives": [
                 (
                     words,
-                    verdict_text(verdict) if verdict else "",
+                    verdicts.verdict_text(verdict) if verdict else "",
                     meaning.source_number(row, column, number_text(size, 3)),
                 )
                 for words, column, size, verdict in alternatives

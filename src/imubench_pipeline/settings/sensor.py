@@ -10,19 +10,10 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, JsonValue, model_validator
 
 from imubench_pipeline.registry import blocks
-from imubench_pipeline.settings import experiments
+from imubench_pipeline.settings import experiments, validation
 from imubench_pipeline.settings.printed import Datasheet
 from imubench_pipeline.settings.quality import QualitySettings
 from imubench_pipeline.settings.shipped import CATALOGUE, list_folders
-from imubench_pipeline.settings.validation import (
-    Between,
-    ConfigError,
-    Frequency,
-    Strict,
-    Text,
-    make_size_validator,
-    parse,
-)
 from imubench_pipeline.settings.yaml_files import read_folder, require_valid
 from imubench_pipeline.typing import JsonObject
 from imubench_pipeline.units import UnitError, find_conversion, parse_quantity
@@ -47,7 +38,7 @@ def quantity_of(channel: str) -> str:
     return channel.split("_", maxsplit=1)[0]
 
 
-class ColumnSource(Strict):
+class ColumnSource(validation.Strict):
     """Location and unit of one column of a recording."""
 
     column: str | int = Field(
@@ -81,7 +72,7 @@ class PositionSource(ColumnSource):
     unit: str = Field("1", description="not relevant: any two numbers distinguish two positions")
 
 
-class TimeSource(Strict):
+class TimeSource(validation.Strict):
     """Location and format of the time stamps."""
 
     column: str | int = Field(description="name in the header, or position counted from 1")
@@ -154,13 +145,13 @@ Reader = Literal["csv", "vectornav", "ubx", "rosbag", "matlab", "numpy", "arrow"
 _MIN_RATE, _MAX_RATE = 1e-6, 1e9  # range of valid sampling rates, Hz
 
 
-class LogFormat(Strict):
+class LogFormat(validation.Strict):
     """Format of the logs of a sensor."""
 
     reader: Reader | None = Field(
         None, description="format of the files; null: found in the file by its first bytes"
     )
-    rate: Frequency | None = Field(
+    rate: validation.Frequency | None = Field(
         None, description="sampling rate with its unit; needed where there are no stamps"
     )
     time: TimeSource | None = Field(None, description="null: no time stamps")
@@ -176,7 +167,7 @@ class LogFormat(Strict):
         description="of a sensor on a rate table: the rate of the table, of the gyro's sign; null: "
         "the notes beside the log have the steps",
     )
-    bandwidth: Frequency | None = Field(
+    bandwidth: validation.Frequency | None = Field(
         None, description="cut-off of the sensor's own low-pass filter, where known"
     )
     delimiter: str | None = Field(
@@ -238,41 +229,45 @@ Technology = Literal[
 ]
 
 
-class Sensor(Strict):
+class Sensor(validation.Strict):
     """One IMU model: its logs, its demands on a vehicle, and its datasheet."""
 
-    vendor: Text
-    model: Text
-    aliases: tuple[Text, ...] = Field(
+    vendor: validation.Text
+    model: validation.Text
+    aliases: tuple[validation.Text, ...] = Field(
         (), description="products that contain it, and other names, such as RealSense D435i"
     )
     grade: Grade | None = Field(None, description="class of the sensor, by which limits are made")
     technology: tuple[Technology, ...] = Field(
         (), description="of gyro and accelerometer, or one for both"
     )
-    price_class: Text | None = Field(None, description="its price in words")
+    price_class: validation.Text | None = Field(None, description="its price in words")
     sold: bool = Field(
         True,
         description="false: the sensor is not for sale, such as a simulated board of several; it "
         "is in no comparison and on no shortlist",
     )
-    price: Text | None = Field(None, description="with its currency and number, such as 12 EUR")
-    mass: Annotated[Text, make_size_validator("mass")] | None = Field(
+    price: validation.Text | None = Field(
+        None, description="with its currency and number, such as 12 EUR"
+    )
+    mass: Annotated[validation.Text, validation.make_size_validator("mass")] | None = Field(
         None, examples=["15 g"], description="null: not known"
     )
-    power: Annotated[Text, make_size_validator("power")] | None = Field(
+    power: Annotated[validation.Text, validation.make_size_validator("power")] | None = Field(
         None, examples=["0.2 W"], description="supply that it requires; null: not known"
     )
-    temperature_range: Between | None = Field(
+    temperature_range: validation.Between | None = Field(
         None, description="of operation, such as [-40 degC, 85 degC]; null: not known"
     )
-    rate: Frequency | None = Field(None, description="highest sampling rate; null: not known")
-    interface: Text | None = Field(None, description="such as SPI, I2C, UART or CAN")
+    rate: validation.Frequency | None = Field(
+        None, description="highest sampling rate; null: not known"
+    )
+    interface: validation.Text | None = Field(None, description="such as SPI, I2C, UART or CAN")
     log: LogFormat
     datasheet: Datasheet = Datasheet()
 
 
-class UsedPart(Strict):
+class UsedPart(validation.Strict):
     """The part of a recording to analyse, in s from its first sample."""
 
     start: float = Field(0.0, ge=0)
@@ -289,8 +284,10 @@ class UsedPart(Strict):
 class RecordingNotes(experiments.WithBlocks):
     """Contents of ``<recording>.yaml`` beside a log."""
 
-    device: Text | None = Field(None, description="serial number; default: the recording's name")
-    started: Text | None = Field(None, description="date and time of the first sample")
+    device: validation.Text | None = Field(
+        None, description="serial number; default: the recording's name"
+    )
+    started: validation.Text | None = Field(None, description="date and time of the first sample")
     simulated: bool | None = Field(
         None,
         description="true: the log is simulated, and is not compared with measured ones; false "
@@ -334,7 +331,7 @@ def read_sensors(folders: Path | Iterable[Path]) -> dict[str, Sensor]:
     return require_valid(read_sensor_files(folders))
 
 
-def read_sensor_files(folders: Path | Iterable[Path]) -> dict[str, Sensor | ConfigError]:
+def read_sensor_files(folders: Path | Iterable[Path]) -> dict[str, Sensor | validation.ConfigError]:
     """Read every sensor file of folders; return the errors of invalid ones, or ConfigError."""
     return read_folder(Sensor, folders, "sensor")
 
@@ -354,10 +351,10 @@ def sensors_of(catalogue: str) -> dict[str, Sensor]:
 def merged_log(sensor: Sensor, notes: RecordingNotes, file: str) -> LogFormat:
     """Return the log format of one recording: the keys of its notes override the sensor file."""
     merged = _merge(sensor.log.model_dump(exclude_unset=True), notes.log)
-    return parse(LogFormat, merged, f"{file}: log")
+    return validation.parse(LogFormat, merged, f"{file}: log")
 
 
-class IngestPlan(Strict):
+class IngestPlan(validation.Strict):
     """Settings of the ingest of a recording; without ``log``, the reason why it cannot be read."""
 
     kind: experiments.Kind = experiments.AT_REST

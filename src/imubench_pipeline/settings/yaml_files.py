@@ -134,7 +134,32 @@ def read_yaml(path: Path) -> object:
             line = text.count("\n", 0, unseen.start()) + 1
             problem = f"U+{ord(unseen[0]):04X} is no printable character; remove it"
             raise ConfigError(f"{path}, line {line}: not readable as YAML: {problem}")
-        _check_size(text)
+        # Raise if YAML exceeds the limits of depth or size; only its events are parsed
+        sizes: dict[str, int] = {}
+        open_nodes: list[tuple[str | None, int]] = []  # anchor and nodes before it
+        nodes = 0
+        for event in yaml.parse(text, Loader=_SAFE):
+            if isinstance(event, yaml.AliasEvent):
+                if event.anchor in (anchor for anchor, _ in open_nodes):
+                    raise _make_fault(event, f"*{cut(event.anchor, str)} holds itself")
+                nodes += sizes.get(event.anchor or "", 1)
+            elif isinstance(event, yaml.CollectionStartEvent):
+                open_nodes.append((event.anchor, nodes))
+                nodes += 1
+                if len(open_nodes) > MAX_DEPTH:
+                    raise _make_fault(
+                        event, f"more than {MAX_DEPTH} lists and mappings in each other"
+                    )
+            elif isinstance(event, yaml.CollectionEndEvent):
+                anchor, before = open_nodes.pop()
+                if anchor is not None:
+                    sizes[anchor] = nodes - before
+            elif isinstance(event, yaml.ScalarEvent):
+                nodes += 1
+                if event.anchor is not None:
+                    sizes[event.anchor] = 1
+            if nodes > MAX_NODES:
+                raise _make_fault(event, f"more than {MAX_NODES} keys and values, aliases counted")
         return yaml.load(text, Loader=_Loader)
     except ConfigError:
         raise
@@ -213,30 +238,3 @@ def _read_text(path: Path) -> str:
             f"{path}, line {line}: byte 0x{content[error.start]:02X} is not UTF-8; save the file "
             "in that encoding"
         ) from None
-
-
-def _check_size(text: str) -> None:
-    """Raise if YAML exceeds the limits of depth or size; only its events are parsed."""
-    sizes: dict[str, int] = {}
-    open_nodes: list[tuple[str | None, int]] = []  # anchor and nodes before it
-    nodes = 0
-    for event in yaml.parse(text, Loader=_SAFE):
-        if isinstance(event, yaml.AliasEvent):
-            if event.anchor in (anchor for anchor, _ in open_nodes):
-                raise _make_fault(event, f"*{cut(event.anchor, str)} holds itself")
-            nodes += sizes.get(event.anchor or "", 1)
-        elif isinstance(event, yaml.CollectionStartEvent):
-            open_nodes.append((event.anchor, nodes))
-            nodes += 1
-            if len(open_nodes) > MAX_DEPTH:
-                raise _make_fault(event, f"more than {MAX_DEPTH} lists and mappings in each other")
-        elif isinstance(event, yaml.CollectionEndEvent):
-            anchor, before = open_nodes.pop()
-            if anchor is not None:
-                sizes[anchor] = nodes - before
-        elif isinstance(event, yaml.ScalarEvent):
-            nodes += 1
-            if event.anchor is not None:
-                sizes[event.anchor] = 1
-        if nodes > MAX_NODES:
-            raise _make_fault(event, f"more than {MAX_NODES} keys and values, aliases counted")

@@ -25,12 +25,7 @@ from scipy.optimize import nnls
 from imubench_pipeline.noise import GaussMarkov, NoiseModel, Term, compute_bias_instability
 from imubench_pipeline.noise.low_pass import LowPass
 from imubench_pipeline.noise.terms.base import drives_of
-from imubench_pipeline.simulate.discretisation import (
-    compute_filter_transition,
-    compute_stationary_distribution,
-    compute_white_factor,
-    discretise_slow_sources,
-)
+from imubench_pipeline.simulate import discretisation
 from imubench_pipeline.typing import Array
 
 _FREQUENCIES_PER_CHUNK = 2048  # frequencies per block of the computation
@@ -84,9 +79,9 @@ def compute_sampled_spectrum(
     flat = np.ravel(omega)
     lowest = float(np.abs(flat).min(initial=math.pi))
     times, densities = sources.realised(low_pass, interval, interval / lowest)
-    slow = discretise_slow_sources(times, interval, low_pass)
-    transition = compute_filter_transition(low_pass, interval)
-    white = compute_white_factor(low_pass, interval)
+    slow = discretisation.discretise_slow_sources(times, interval, low_pass)
+    transition = discretisation.compute_filter_transition(low_pass, interval)
+    white = discretisation.compute_white_factor(low_pass, interval)
     spectrum = np.empty_like(flat)
     for begin in range(0, len(flat), _FREQUENCIES_PER_CHUNK):
         w = flat[begin : begin + _FREQUENCIES_PER_CHUNK]
@@ -180,8 +175,8 @@ def _make_one_sample(
 ) -> tuple[_Cluster, Array]:
     """Return one sample of every source, white noise last, and the stationary covariance."""
     n, m = len(times), low_pass.order
-    slow = discretise_slow_sources(times, interval, low_pass)
-    A = compute_filter_transition(low_pass, interval)
+    slow = discretisation.discretise_slow_sources(times, interval, low_pass)
+    A = discretisation.compute_filter_transition(low_pass, interval)
     transition = np.zeros((n + 1, 1 + m, 1 + m))
     transition[:, 1:, 1:] = A
     transition[:n, 0, 0] = slow.decay
@@ -193,7 +188,7 @@ def _make_one_sample(
     factor[:n, 0, 1:] = slow.shared
     factor[:n, 1:, 1:] = slow.residual
     factor[:n] *= np.sqrt(densities)[:, None, None]
-    factor[n, 1:, 1:] = math.sqrt(white) * compute_white_factor(low_pass, interval)
+    factor[n, 1:, 1:] = math.sqrt(white) * discretisation.compute_white_factor(low_pass, interval)
     sums = np.zeros((n + 1, 1 + m))
     sums[:n, 0] = 1.0
     sums[:, 1:] = low_pass.output
@@ -203,12 +198,14 @@ def _make_one_sample(
     for i in range(n):
         # The initial value of a random walk does not matter: it cancels in the difference.
         alone = (times[i : i + 1], densities[i : i + 1])
-        mean, covariance = compute_stationary_distribution(*alone, 0.0, low_pass)
+        mean, covariance = discretisation.compute_stationary_distribution(*alone, 0.0, low_pass)
         variance = 0.0 if math.isinf(times[i]) else densities[i] * times[i] / 2.0
         start[i, 0, 0] = variance
         start[i, 0, 1:] = start[i, 1:, 0] = variance * mean[0]
         start[i, 1:, 1:] = covariance + variance * np.outer(mean[0], mean[0])
-    start[n, 1:, 1:] = compute_stationary_distribution(times[:0], densities[:0], white, low_pass)[1]
+    start[n, 1:, 1:] = discretisation.compute_stationary_distribution(
+        times[:0], densities[:0], white, low_pass
+    )[1]
     return sample, start
 
 

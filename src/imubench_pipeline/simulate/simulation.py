@@ -200,7 +200,22 @@ class _Axis:
         lag = np.array([hold.lag_decay, hold.lag_step])
         figures = (drift.sensitivity, drift.quadratic, drift.reference) if drift else (0.0,) * 3
         self._input = (hold.step, lag, hold.lag_coupling, hold.lagged_step, np.array(figures))
-        self._x, self._e = self._draw_initial_states(begin)
+        # Draw the states at the first sample
+        walk = np.isinf(self._times)
+        spread = np.where(walk, 0.0, np.sqrt(self._densities * np.where(walk, 0, self._times) / 2))
+        x = spread * begin.standard_normal(len(spread))
+        low_pass = self._model.low_pass
+        if low_pass is None:
+            self._x, self._e = x, np.zeros(0)
+        else:
+            mean, covariance = compute_stationary_distribution(
+                self._times, self._densities, self._white, low_pass
+            )
+            values, vectors = np.linalg.eigh(covariance)
+            root = vectors * np.sqrt(np.maximum(values, 0.0))
+            # For a ramp that has always been rising, e is constant: F^-1 p R.
+            ramp = np.linalg.solve(low_pass.transition, low_pass.steady_state) * self._model.noise.R
+            self._x, self._e = x, x @ mean + root @ begin.standard_normal(low_pass.order) + ramp
         self._memory = np.zeros(4)
         phases = (lines.uniform(0.0, 2.0 * math.pi) for _ in model.noise.sinusoids)
         self._sinusoids = list(zip(model.noise.sinusoids, phases, strict=True))
@@ -225,23 +240,6 @@ class _Axis:
         white_part = math.sqrt(self._white) * compute_white_factor(low_pass, interval)
         factor = np.asarray(np.linalg.qr(np.concatenate([parts, white_part]), mode="r"))
         return states, (compute_filter_transition(low_pass, interval), factor, low_pass.output, 0.0)
-
-    def _draw_initial_states(self, rng: np.random.Generator) -> tuple[Array, Array]:
-        """Draw the states at the first sample."""
-        walk = np.isinf(self._times)
-        spread = np.where(walk, 0.0, np.sqrt(self._densities * np.where(walk, 0, self._times) / 2))
-        x = spread * rng.standard_normal(len(spread))
-        low_pass = self._model.low_pass
-        if low_pass is None:
-            return x, np.zeros(0)
-        mean, covariance = compute_stationary_distribution(
-            self._times, self._densities, self._white, low_pass
-        )
-        values, vectors = np.linalg.eigh(covariance)
-        root = vectors * np.sqrt(np.maximum(values, 0.0))
-        # For a ramp that has always been rising, e is constant: F^-1 p R.
-        ramp = np.linalg.solve(low_pass.transition, low_pass.steady_state) * self._model.noise.R
-        return x, x @ mean + root @ rng.standard_normal(low_pass.order) + ramp
 
     def samples(
         self, start: int, stop: int, true: Signal | None, temperature: Signal | None

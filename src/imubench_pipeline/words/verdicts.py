@@ -6,22 +6,9 @@ from decimal import ROUND_DOWN, Decimal
 from typing import get_args
 
 from imubench_pipeline.earth import STANDARD_GRAVITY
-from imubench_pipeline.model.comparisons import (
-    ErrorBudgetRow,
-    NextStepRow,
-    RankingRow,
-    ShortlistRow,
-)
+from imubench_pipeline.model import comparisons, verdicts
 from imubench_pipeline.model.estimates import ErrorGrowthRow
 from imubench_pipeline.model.states import Action, Cause, Origin, SourceCode, SpreadOf, Verdict
-from imubench_pipeline.model.verdicts import (
-    Condition,
-    DoubtMark,
-    ErrorSource,
-    Property,
-    Share,
-    Shortfall,
-)
 from imubench_pipeline.settings.printed import SENSORS
 from imubench_pipeline.settings.requirements import Requirement
 from imubench_pipeline.settings.validation import Strict
@@ -127,7 +114,7 @@ _DIMENSIONS = {
     "mg/g^2": "accel_vibration_coefficient",
 }
 
-_PROPERTIES: Mapping[Property, tuple[str, str, str]] = {
+_PROPERTIES: Mapping[verdicts.Property, tuple[str, str, str]] = {
     "price_class": ("price class", "", ""),
     "quantity": ("{subject}", "", ""),
     "axis": ("{subject} axis", "", ""),
@@ -160,20 +147,20 @@ _SPREAD_OF: Mapping[SpreadOf, str] = {
 }
 
 
-def verdict_text(verdict: Verdict, conditions: Sequence[Condition] = ()) -> str:
+def verdict_text(verdict: Verdict, conditions: Sequence[verdicts.Condition] = ()) -> str:
     """Return a verdict with its conditions, such as ``meets the limits if its gyro ... is ...``."""
     text = VERDICT_WORDS[verdict]
     return f"{text} if {join_names(list(map(condition_text, conditions)))}" if conditions else text
 
 
-def stated_verdict(row: RankingRow) -> str:
+def stated_verdict(row: comparisons.RankingRow) -> str:
     """Return the verdict of a row of ``ranking``, with conditions, or with the shortfalls."""
     if row.verdict == "excluded":
         return f"excluded: {'; '.join(map(shortfall_text, row.shortfalls))}"
     return verdict_text(row.verdict, row.conditions)
 
 
-def condition_text(condition: Condition) -> str:
+def condition_text(condition: verdicts.Condition) -> str:
     """Return a condition: ``its gyro g-sensitivity is below 0.1 deg/s/g (1σ)``."""
     if condition.figure is None:
         name = subject_text(condition)
@@ -214,7 +201,7 @@ def class_limit_text(quantity: str, source: SourceCode, size: float | None) -> s
     return f"{SENSORS[quantity]} {name}: not printed, worst of its class{figure}"
 
 
-def subject_text(condition: Condition) -> str:
+def subject_text(condition: verdicts.Condition) -> str:
     """Return the name of the figure or property of a condition, such as ``gyro g-sensitivity``."""
     if condition.figure is not None:
         return f"{SENSORS[condition.subject]} {_NOUNS[condition.figure][0]}"
@@ -222,11 +209,11 @@ def subject_text(condition: Condition) -> str:
     return _name_property(condition.property, condition.subject)
 
 
-def _name_property(of: Property, subject: str) -> str:
+def _name_property(of: verdicts.Property, subject: str) -> str:
     return _PROPERTIES[of][0].format(subject=SENSORS.get(subject, subject.replace("_", " ")))
 
 
-def shortfall_text(shortfall: Shortfall) -> str:
+def shortfall_text(shortfall: verdicts.Shortfall) -> str:
     """Return a missing property: ``gyro full scale 250 deg/s, required 300 deg/s``."""
     if shortfall.property == "price_class":
         return f"price class {shortfall.subject or 'not stated'}, required {shortfall.asked}"
@@ -240,7 +227,7 @@ def shortfall_text(shortfall: Shortfall) -> str:
     return f"{name} {own} {unit}, required {shortfall.asked}"
 
 
-def share_text(share: Share) -> str:
+def share_text(share: verdicts.Share) -> str:
     """Return a source of an error with its share: ``gyro N 40 %``."""
     origin = _ORIGINS[share.origin] if share.origin and not share.is_noise else ""
     return f"{source_text(share)}{origin} {100.0 * share.share:.0f} %"
@@ -255,7 +242,7 @@ _ORIGINS: Mapping[Origin, str] = {
 """Origin of a figure in words."""
 
 
-def origins_text(shares: Iterable[Share]) -> str:
+def origins_text(shares: Iterable[verdicts.Share]) -> str:
     """Return the parts of the variance by origin: ``noise 40 %, printed 10 %, class 50 %``."""
     parts: dict[str, float] = {}
     for share in shares:
@@ -274,19 +261,23 @@ _ORIGIN_WORDS: Mapping[Origin, str] = {
 }
 
 
-def source_text(source: ErrorSource | ErrorBudgetRow | ErrorGrowthRow) -> str:
+def source_text(source: verdicts.ErrorSource | comparisons.ErrorBudgetRow | ErrorGrowthRow) -> str:
     """Return a source of an error: ``gyro N``, ``initial tilt by accel GM 89.5 s``."""
     size = "" if source.T_B is None else f" {source.T_B:.4g} s"
     size += "" if source.frequency is None else f" {source.frequency:.4g} Hz"
     return _name_source(source, size)
 
 
-def source_kind_text(source: ErrorSource | ErrorBudgetRow | ErrorGrowthRow) -> str:
+def source_kind_text(
+    source: verdicts.ErrorSource | comparisons.ErrorBudgetRow | ErrorGrowthRow,
+) -> str:
     """Return a source without the time or frequency, which differs between logs."""
     return _name_source(source)
 
 
-def _name_source(source: ErrorSource | ErrorBudgetRow | ErrorGrowthRow, size: str = "") -> str:
+def _name_source(
+    source: verdicts.ErrorSource | comparisons.ErrorBudgetRow | ErrorGrowthRow, size: str = ""
+) -> str:
     sensor = f"{source.quantity} " if source.quantity else ""
     name = f"{sensor}{source_name(source.source)}{size}"
     if source.through in _PATHS:
@@ -297,14 +288,14 @@ def _name_source(source: ErrorSource | ErrorBudgetRow | ErrorGrowthRow, size: st
 _PATHS = {"static_window": "in the static window", "turn": "in the turn"}
 
 
-def evidence_text(row: RankingRow) -> str:
+def evidence_text(row: comparisons.RankingRow) -> str:
     """Return why the evidence of a verdict is weak; empty if it is strong or there is none."""
     if row.evidence != "weak":
         return ""
     return "; ".join(_describe_weakness(code, row) for code in row.evidence_reasons)
 
 
-def _describe_weakness(code: str, row: RankingRow) -> str:
+def _describe_weakness(code: str, row: comparisons.RankingRow) -> str:
     match code:
         case "one_specimen":
             borrowed = row.spread_of == "other sensors"
@@ -322,7 +313,7 @@ def _describe_weakness(code: str, row: RankingRow) -> str:
     return doubt_text(code, list(dict.fromkeys(name for mark in marks for name in mark.channels)))
 
 
-def doubts_text(doubts: Iterable[DoubtMark], *, named: bool = False, most: int = 3) -> str:
+def doubts_text(doubts: Iterable[verdicts.DoubtMark], *, named: bool = False, most: int = 3) -> str:
     """Return doubts about recordings in words, the first few; ``named``: with the recording."""
     texts = list(
         dict.fromkeys(
@@ -334,12 +325,12 @@ def doubts_text(doubts: Iterable[DoubtMark], *, named: bool = False, most: int =
     return "; ".join(texts[:most]) + (f"; and {more} more" if more > 0 else "")
 
 
-def used_doubts_text(row: RankingRow) -> str:
+def used_doubts_text(row: comparisons.RankingRow) -> str:
     """Return the doubts about the recordings of a row of ``ranking``, named if they are several."""
     return doubts_text(row.doubts, named=(row.recordings or 0) > 1)
 
 
-def other_margins_text(row: RankingRow | ShortlistRow) -> str:
+def other_margins_text(row: comparisons.RankingRow | comparisons.ShortlistRow) -> str:
     """Return the margins other than in use: ``noise alone 4.2, likely 0.9``."""
     parts = []
     if row.noise_margin is not None:
@@ -349,14 +340,14 @@ def other_margins_text(row: RankingRow | ShortlistRow) -> str:
     return ", ".join(parts)
 
 
-def spread_text(row: RankingRow) -> str:
+def spread_text(row: comparisons.RankingRow) -> str:
     """Return the spread between units, of a row of ``ranking``; empty if it is not known."""
     if row.spread is None or row.spread_of is None:
         return ""
     return f"{percent_text(row.spread, 2)} {_SPREAD_OF[row.spread_of]}"
 
 
-def corrected_text(row: RankingRow) -> str:
+def corrected_text(row: comparisons.RankingRow) -> str:
     """Return the verdict with a corrected unit, or with the recordings that are not used."""
     parts = []
     if row.logged_verdict is not None:
@@ -386,7 +377,7 @@ def _describe_outcome(verdict: Verdict, margin: float | None) -> str:
 
 
 def answer_text(
-    rows: Sequence[RankingRow], names: Mapping[str, str], asked: int, excluded: int = 0
+    rows: Sequence[comparisons.RankingRow], names: Mapping[str, str], asked: int, excluded: int = 0
 ) -> str:
     """Return the recommended sensors in one line, the best first; only judged ones.
 
@@ -434,7 +425,7 @@ _HEADINGS: Mapping[Verdict, str] = {
 _MAX_NAMES = 4  # maximum number of sensors that are named with one verdict
 
 
-def list_others(rows: Iterable[RankingRow], names: Mapping[str, str]) -> list[str]:
+def list_others(rows: Iterable[comparisons.RankingRow], names: Mapping[str, str]) -> list[str]:
     """Return the sensors, or their number, by verdict, from their deciding rows."""
     by_heading: dict[str, list[str]] = {}
     listed = list(rows)
@@ -452,7 +443,7 @@ def list_others(rows: Iterable[RankingRow], names: Mapping[str, str]) -> list[st
     ]
 
 
-def next_step_text(step: NextStepRow) -> str:
+def next_step_text(step: comparisons.NextStepRow) -> str:
     """Return a next step: ``Record 3 more units: this could settle 1 verdict``."""
     parts = []
     if step.verdicts_turned:
@@ -465,7 +456,7 @@ def next_step_text(step: NextStepRow) -> str:
     return f"{_describe_action(step)}: {' and '.join(parts)}"
 
 
-def _describe_action(step: NextStepRow) -> str:
+def _describe_action(step: comparisons.NextStepRow) -> str:
     quantities = " and ".join(SENSORS[name] for name in step.quantities)
     match step.action:
         case "check_unit":

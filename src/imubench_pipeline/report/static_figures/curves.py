@@ -9,7 +9,6 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from imubench_pipeline.model.comparisons import DatasheetRow
 from imubench_pipeline.noise import FLOOR, NoiseModel, Term
 from imubench_pipeline.report.palette import get_method_style
 from imubench_pipeline.report.practical import System, choose_page_unit
@@ -292,19 +291,17 @@ def draw_datasheet_figure(view: ChannelView, system: System = "practical") -> Fi
             line *= np.sqrt(view.tau / 3.0)
         levels += [float(line.min()), float(line.max())]
         colour = TERM_LOOKS["F" if row.statistic == "adev_minimum" else row.statistic]["color"]
-        axes.plot(view.tau, line, color=colour, ls=dash, label=_label_printed(row))
+        unit = row.unit or ""
+        for written, sign in _UNIT_SIGNS.items():
+            unit = unit.replace(written, sign)
+        reading = f"read as {row.sidedness}" if row.sidedness else None
+        about = ", ".join(filter(None, [_KIND_TEXTS.get(row.kind, row.kind), reading]))
+        number = NO_VALUE if row.printed is None else f"{row.printed:g}"
+        text = f"datasheet {_FIGURE_NAMES[row.statistic]}: {number} {unit}"
+        axes.plot(
+            view.tau, line, color=colour, ls=dash, label=(f"{text} ({about})" if about else text)
+        )
     return finish(figure, axes, view, scale, *levels)
-
-
-def _label_printed(row: DatasheetRow) -> str:
-    unit = row.unit or ""
-    for written, sign in _UNIT_SIGNS.items():
-        unit = unit.replace(written, sign)
-    reading = f"read as {row.sidedness}" if row.sidedness else None
-    about = ", ".join(filter(None, [_KIND_TEXTS.get(row.kind, row.kind), reading]))
-    number = NO_VALUE if row.printed is None else f"{row.printed:g}"
-    text = f"datasheet {_FIGURE_NAMES[row.statistic]}: {number} {unit}"
-    return f"{text} ({about})" if about else text
 
 
 _SPECTRUM_METHOD = "likelihood"  # the method whose model the table ``spectrum`` has

@@ -11,11 +11,7 @@ import pyarrow as pa
 from matplotlib.figure import Figure
 
 from imubench_pipeline.report.practical import System
-from imubench_pipeline.report.static_figures import curves
-from imubench_pipeline.report.static_figures.comparison import (
-    draw_comparison_figure,
-    draw_forest_figure,
-)
+from imubench_pipeline.report.static_figures import comparison, curves
 from imubench_pipeline.report.static_figures.style import set_style
 from imubench_pipeline.report.view import ChannelView, gather_recordings
 from imubench_pipeline.tables.files import make_schema, replace_file
@@ -24,8 +20,10 @@ from imubench_pipeline.tables.schemas import BY_RECORDING
 Make = Callable[[], Figure | None]
 
 CROSS_KINDS: dict[str, Callable[[Sequence[ChannelView], Sequence[str], System], Figure]] = {
-    "comparison": draw_comparison_figure,
-    "forest": lambda views, sensors, system: draw_forest_figure(views, sensors, system=system),
+    "comparison": comparison.draw_comparison_figure,
+    "forest": lambda views, sensors, system: comparison.draw_forest_figure(
+        views, sensors, system=system
+    ),
 }
 """Figures of one channel of all sensors."""
 

@@ -2,18 +2,10 @@
 
 import math
 
-from imubench_pipeline.words.findings.base import (
-    ALL,
-    NONE,
-    POWERS_OF_TIME,
-    SLOW,
-    WHITE,
-    FindingData,
-    channel_name,
-)
+from imubench_pipeline.words.findings import base
 from imubench_pipeline.words.numbers import counted, join_names, number_text, percent_text
 
-_TIMED = frozenset(POWERS_OF_TIME)  # parameters that a wrong sampling rate changes
+_TIMED = frozenset(base.POWERS_OF_TIME)  # parameters that a wrong sampling rate changes
 
 
 def _rate_text(rate: float) -> str:
@@ -25,7 +17,7 @@ def _at(seconds: float) -> str:
     return f"{number_text(seconds, 5)} s"
 
 
-class RateChanges(FindingData, affects=WHITE, doubt="the sampling rate changes"):
+class RateChanges(base.FindingData, affects=base.WHITE, doubt="the sampling rate changes"):
     """A part of a log has every n-th sample only."""
 
     share: float  # share of the samples in that part
@@ -35,7 +27,7 @@ class RateChanges(FindingData, affects=WHITE, doubt="the sampling rate changes")
     rate: float  # rate at which all are analysed, Hz
 
     def text(self, channel: str) -> str:
-        of = f" of {channel_name(channel)}" if channel else ""
+        of = f" of {base.channel_name(channel)}" if channel else ""
         low = 1.0 - math.sqrt(self.lower_rate / self.rate)
         return (
             f"The sampling rate{of} changes. {percent_text(self.share, 2)} of the samples, from "
@@ -46,7 +38,7 @@ class RateChanges(FindingData, affects=WHITE, doubt="the sampling rate changes")
         )
 
 
-class CoarseStamps(FindingData, affects=_TIMED, doubt="the sampling rate is ambiguous"):
+class CoarseStamps(base.FindingData, affects=_TIMED, doubt="the sampling rate is ambiguous"):
     """Stamps with double or zero steps at regular distances."""
 
     rate: float
@@ -66,7 +58,7 @@ class CoarseStamps(FindingData, affects=_TIMED, doubt="the sampling rate is ambi
         )
 
 
-class MissingSamples(FindingData, affects=ALL, doubt="samples are missing"):
+class MissingSamples(base.FindingData, affects=base.ALL, doubt="samples are missing"):
     """Points of the grid without a sample."""
 
     missing: int
@@ -98,7 +90,9 @@ class MissingSamples(FindingData, affects=ALL, doubt="samples are missing"):
         return text
 
 
-class Segments(FindingData, affects=SLOW | {"bias"}, doubt="the recording was interrupted"):
+class Segments(
+    base.FindingData, affects=base.SLOW | {"bias"}, doubt="the recording was interrupted"
+):
     """Pauses of the recording, or jumps of its clock."""
 
     has_grid: bool  # the stamps lie on a uniform grid
@@ -114,7 +108,7 @@ class Segments(FindingData, affects=SLOW | {"bias"}, doubt="the recording was in
         return f"{what} {often} {step}. The recording is analysed as {self.pauses + 1} segments"
 
 
-class RepeatedStamps(FindingData, affects=NONE):
+class RepeatedStamps(base.FindingData, affects=base.NONE):
     """Records with the stamp of an earlier one, which are left out."""
 
     records: int
@@ -128,7 +122,7 @@ class RepeatedStamps(FindingData, affects=NONE):
         )
 
 
-class MissingStamps(FindingData, affects=_TIMED, doubt="time stamps are missing"):
+class MissingStamps(base.FindingData, affects=_TIMED, doubt="time stamps are missing"):
     """Records without a stamp, which are taken as consecutive."""
 
     records: int
@@ -141,7 +135,7 @@ class MissingStamps(FindingData, affects=_TIMED, doubt="time stamps are missing"
 
 
 class RateContradictsStamps(
-    FindingData, affects=_TIMED, doubt="the stated rate contradicts the time stamps"
+    base.FindingData, affects=_TIMED, doubt="the stated rate contradicts the time stamps"
 ):
     """The stated rate contradicts the stamps, whose rate is used."""
 
@@ -155,7 +149,7 @@ class RateContradictsStamps(
         )
 
 
-class RateDrifts(FindingData, affects=_TIMED, doubt="the clock drifts"):
+class RateDrifts(base.FindingData, affects=_TIMED, doubt="the clock drifts"):
     """The sampling interval differs between the halves of a log."""
 
     drift: float  # relative change of the interval
@@ -168,7 +162,7 @@ class RateDrifts(FindingData, affects=_TIMED, doubt="the clock drifts"):
         )
 
 
-class JitteredStamps(FindingData, affects=_TIMED, doubt="the time stamps are irregular"):
+class JitteredStamps(base.FindingData, affects=_TIMED, doubt="the time stamps are irregular"):
     """Stamps on no uniform grid, so that lost samples are not seen."""
 
     share: float  # share of the stamps off the grid
@@ -188,7 +182,9 @@ class JitteredStamps(FindingData, affects=_TIMED, doubt="the time stamps are irr
 
 
 class IrregularStamps(
-    FindingData, affects=_TIMED, doubt="some time stamps have more or fewer samples than others"
+    base.FindingData,
+    affects=_TIMED,
+    doubt="some time stamps have more or fewer samples than others",
 ):
     """Time stamps shared by more or fewer samples than others."""
 
@@ -203,7 +199,7 @@ class IrregularStamps(
         )
 
 
-class OwnRate(FindingData, affects=NONE):
+class OwnRate(base.FindingData, affects=base.NONE):
     """Channels with fewer numbers than the log has records."""
 
     channels: tuple[str, ...]
@@ -214,7 +210,7 @@ class OwnRate(FindingData, affects=NONE):
     def text(self, channel: str) -> str:
         one = len(self.channels) == 1
         return (
-            f"{join_names([channel_name(name) for name in self.channels])} "
+            f"{join_names([base.channel_name(name) for name in self.channels])} "
             f"{'has' if one else 'have'} numbers in {self.rows} of {self.records} records, and a "
             f"clock of {'its' if one else 'their'} own. {'It is' if one else 'They are'} analysed "
             f"at {_rate_text(self.rate)}"
