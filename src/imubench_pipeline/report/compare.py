@@ -205,7 +205,7 @@ def _pack_errors(kept: Mapping[str, Any], of_axis: Any, arrays: Arrays) -> Json:
             "accel": _merge_axes(kept["accel"][total]),
             "sources": {
                 verdicts.source_text(source): {
-                    "kind": verdicts.source_kind_text(source),
+                    "kind": verdicts.source_text(source, sized=False),
                     "shares": arrays.even(share),
                 }
                 for source, share in sources.items()

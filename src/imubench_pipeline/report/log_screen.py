@@ -152,7 +152,14 @@ def render_log_screen(
             moved = [(each.start or 0.0, each.end or 0.0) for each in motion]
             rest = find_still_spans(moved, 0.0, row.duration or 0.0)
             channels = [each.channel for each in motion if each.channel]
-            yield Text(_fold(motion_text(channels, _merge(moved), rest), width, 6))
+            # Return spans in order, with those that touch joined
+            merged: list[tuple[float, float]] = []
+            for start, stop in sorted(moved):
+                if merged and start <= merged[-1][1]:
+                    merged[-1] = merged[-1][0], max(stop, merged[-1][1])
+                else:
+                    merged.append((start, stop))
+            yield Text(_fold(motion_text(channels, merged, rest), width, 6))
         elif reason := reason_text(row):
             yield Text(_fold(reason, width, 2))
         if not parameters:
@@ -171,17 +178,6 @@ def render_log_screen(
                     table = _tabulate(title, quantity, lines, system, row.duration or 0.0, doubted)
                     yield Text("\n".join(table))
         yield from _list_events(events, others, system, width)
-
-
-def _merge(spans: Iterable[tuple[float, float]]) -> list[tuple[float, float]]:
-    """Return spans in order, with those that touch joined."""
-    merged: list[tuple[float, float]] = []
-    for start, stop in sorted(spans):
-        if merged and start <= merged[-1][1]:
-            merged[-1] = merged[-1][0], max(stop, merged[-1][1])
-        else:
-            merged.append((start, stop))
-    return merged
 
 
 def _fold(text: str, width: int, lines: int, indent: str = "") -> str:
@@ -250,7 +246,11 @@ def _list_events(
     """Yield the most important events, and the number of the other findings."""
     for number, event in enumerate(events, start=1):
         text = f"{number}. {events_text(event.findings, system, event.factors())}"
-        yield Text(_fold(_shorten(text, width), width, _MAX_EVENT_LINES, "   "))
+        # A text without sentences before the last one, which is what to do, until it fits
+        sentences = re.split(r"(?<=\D\.) (?=[A-Z])", text)
+        while len(sentences) > 2 and len(wrap(" ".join(sentences), width - 3)) > _MAX_EVENT_LINES:
+            del sentences[-2]
+        yield Text(_fold(" ".join(sentences), width, _MAX_EVENT_LINES, "   "))
     shown = sum(len(event.findings) for event in events)
     removed = sum(row.severity == "note" and row.finding in _REMOVED for row in findings)
     counts = [f"{counted(removed, 'signal')} removed without effect on a parameter"] * (removed > 0)
@@ -258,11 +258,3 @@ def _list_events(
         counts.append(counted(others, "other finding"))
     rest = f"{join_names(counts)}; all" if counts else "All"
     yield Text(_fold(f"{rest} findings and parameters: --verbose", width, 2) + "\n")
-
-
-def _shorten(text: str, width: int) -> str:
-    """Return a text without sentences before the last one, which is what to do, until it fits."""
-    sentences = re.split(r"(?<=\D\.) (?=[A-Z])", text)
-    while len(sentences) > 2 and len(wrap(" ".join(sentences), width - 3)) > _MAX_EVENT_LINES:
-        del sentences[-2]
-    return " ".join(sentences)

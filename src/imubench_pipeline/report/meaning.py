@@ -181,7 +181,8 @@ def format_rankings(
             if row.requirement == name:
                 by_sensor.setdefault(row.sensor, []).append(row)
         groups = [_group(limits, simulated, system) for limits in by_sensor.values()]
-        groups.sort(key=lambda group: _order(group.row))
+        # By rank, then by margin; sensors without a rank come last.
+        groups.sort(key=lambda group: (group.row.rank or 10**6, -(group.row.margin or 0.0)))
         yield Ranking(name, Requirement.model_validate(declared), groups)
 
 
@@ -199,11 +200,6 @@ def _group(limits: Sequence[RankingRow], simulated: Simulated, system: System) -
         corrected=verdicts.corrected_text(row),
         limits=[_limit(limit, system) for limit in limits],
     )
-
-
-def _order(row: RankingRow) -> tuple[int, float]:
-    """Sort by rank, then by margin; sensors without a rank come last."""
-    return row.rank or 10**6, -(row.margin or 0.0)
 
 
 def _limit(row: RankingRow, system: System) -> LimitLine:
@@ -326,7 +322,7 @@ def make_budget_bars(rows: Sequence[ErrorBudgetRow], system: System) -> list[Jso
             (
                 verdicts.source_text(row),
                 float(f"{(row.sigma / sigma) ** 2:.3g}"),
-                verdicts.source_kind_text(row),
+                verdicts.source_text(row, sized=False),
             )
             for row in parts
             if row.source != "total" and row.sigma

@@ -40,8 +40,7 @@ class AllanSettings(Strict):
     overlap: Literal["full", "octave"] = Field(
         "octave",
         description="octave: clusters that start 1/48 of their length apart, fast and equally "
-        "precise; "
-        "full: every cluster",
+        "precise; full: every cluster",
     )
     per_decade: int = Field(10, ge=1, le=100, description="cluster sizes per decade of tau")
     longest: FractionOfLog = Field(0.5, description="longest tau, as a part of the log")

@@ -291,8 +291,7 @@ class RecordingNotes(experiments.WithBlocks):
     simulated: bool | None = Field(
         None,
         description="true: the log is simulated, and is not compared with measured ones; false "
-        "does not overrule the mark in a log of `imubench simulate`; null: by the mark "
-        "in the log",
+        "does not overrule the mark in a log of `imubench simulate`; null: by the mark in the log",
     )
     power_cycled: bool | None = Field(
         None,

@@ -229,17 +229,9 @@ def shortfall_text(shortfall: verdicts.Shortfall) -> str:
 
 def share_text(share: verdicts.Share) -> str:
     """Return a source of an error with its share: ``gyro N 40 %``."""
-    origin = _ORIGINS[share.origin] if share.origin and not share.is_noise else ""
+    stated = share.is_noise or share.origin in (None, "requirement")
+    origin = "" if stated else f" ({_ORIGIN_WORDS[share.origin or 'measured']})"
     return f"{source_text(share)}{origin} {100.0 * share.share:.0f} %"
-
-
-_ORIGINS: Mapping[Origin, str] = {
-    "measured": " (measured)",
-    "datasheet": " (printed)",
-    "class limit": " (worst of its class)",
-    "requirement": "",
-}
-"""Origin of a figure in words."""
 
 
 def origins_text(shares: Iterable[verdicts.Share]) -> str:
@@ -259,25 +251,20 @@ _ORIGIN_WORDS: Mapping[Origin, str] = {
     "class limit": "worst of its class",
     "requirement": "stated",
 }
+"""Origin of a figure in words."""
 
 
-def source_text(source: verdicts.ErrorSource | comparisons.ErrorBudgetRow | ErrorGrowthRow) -> str:
-    """Return a source of an error: ``gyro N``, ``initial tilt by accel GM 89.5 s``."""
-    size = "" if source.T_B is None else f" {source.T_B:.4g} s"
-    size += "" if source.frequency is None else f" {source.frequency:.4g} Hz"
-    return _name_source(source, size)
-
-
-def source_kind_text(
+def source_text(
     source: verdicts.ErrorSource | comparisons.ErrorBudgetRow | ErrorGrowthRow,
+    *,
+    sized: bool = True,
 ) -> str:
-    """Return a source without the time or frequency, which differs between logs."""
-    return _name_source(source)
+    """Return a source of an error: ``gyro N``, ``initial tilt by accel GM 89.5 s``.
 
-
-def _name_source(
-    source: verdicts.ErrorSource | comparisons.ErrorBudgetRow | ErrorGrowthRow, size: str = ""
-) -> str:
+    Without ``sized`` it lacks the time or frequency, which differs between logs.
+    """
+    size = f" {source.T_B:.4g} s" if sized and source.T_B is not None else ""
+    size += f" {source.frequency:.4g} Hz" if sized and source.frequency is not None else ""
     sensor = f"{source.quantity} " if source.quantity else ""
     name = f"{sensor}{source_name(source.source)}{size}"
     if source.through in _PATHS:

@@ -19,7 +19,7 @@ from functools import cache
 from typing import ClassVar, Literal, dataclass_transform
 
 from imubench_pipeline.units import convert_from_si
-from imubench_pipeline.words.numbers import Unit, join_names
+from imubench_pipeline.words.numbers import Unit, join_names, number_text
 
 SLOW = frozenset({"B", "B_curve", "sigma_min", "tau_min", "T_B", "K", "R"})
 """Parameters of slow noise."""
@@ -106,19 +106,13 @@ Kind = Literal["signal", "level", "density"]
 System = Literal["practical", "si"]
 _system: ContextVar[System] = ContextVar("system", default="practical")
 
-_SI_SIGNS: Mapping[str, str] = {
-    "angular_rate": "rad/s",
-    "gyro_density": "rad/s/√Hz",
-    "acceleration": "m/s²",
-    "accel_density": "m/s²/√Hz",
-}
-_UNITS: Mapping[tuple[str, Kind], tuple[str, str]] = {
-    ("gyro", "signal"): ("°/s", "angular_rate"),
-    ("gyro", "level"): ("°/h", "angular_rate"),
-    ("gyro", "density"): ("°/s/√Hz", "gyro_density"),
-    ("accel", "signal"): ("mg", "acceleration"),
-    ("accel", "level"): ("µg", "acceleration"),
-    ("accel", "density"): ("µg/√Hz", "accel_density"),
+_UNITS: Mapping[tuple[str, Kind], tuple[str, str, str]] = {
+    ("gyro", "signal"): ("°/s", "rad/s", "angular_rate"),
+    ("gyro", "level"): ("°/h", "rad/s", "angular_rate"),
+    ("gyro", "density"): ("°/s/√Hz", "rad/s/√Hz", "gyro_density"),
+    ("accel", "signal"): ("mg", "m/s²", "acceleration"),
+    ("accel", "level"): ("µg", "m/s²", "acceleration"),
+    ("accel", "density"): ("µg/√Hz", "m/s²/√Hz", "accel_density"),
 }
 
 
@@ -139,16 +133,20 @@ def unit_of(channel: str, kind: Kind) -> Unit:
 
 @cache
 def _unit_of(quantity: str, kind: Kind, system: System) -> Unit:
-    sign, dimension = _UNITS[quantity, kind]
-    if system == "si":
-        return Unit(_SI_SIGNS[dimension], 1.0)
-    return Unit(sign, convert_from_si(1.0, sign, dimension))
+    sign, si_sign, dimension = _UNITS[quantity, kind]
+    per_si = 1.0 if system == "si" else convert_from_si(1.0, sign, dimension)
+    return Unit(si_sign if system == "si" else sign, per_si)
 
 
-def value_text(value: float, channel: str, kind: Kind, digits: int = 3) -> str:
+def value_text(value: float, channel: str, kind: Kind = "signal") -> str:
     """Return a value of a channel, SI, with its unit: ``0.24 °/s/√Hz``."""
     unit = unit_of(channel, kind)
-    return f"{unit.text(value, digits)} {unit.sign}"
+    return f"{unit.text(value, 3)} {unit.sign}"
+
+
+def at_text(seconds: float) -> str:
+    """Return a position in a recording, in s as in ``use:``."""
+    return f"{number_text(seconds, 5)} s"
 
 
 def estimate_text(value: float, lower: float, upper: float, unit: Unit) -> str:

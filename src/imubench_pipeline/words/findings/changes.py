@@ -84,9 +84,8 @@ class WarmUpDrift(
         time = estimate_text(self.time, self.time_lower, self.time_upper, _SECONDS)
         return (
             f"The bias of {channel_name(channel)} starts {size} from its final value. It settles "
-            f"with a time constant of {time}. It is removed from the noise"
-            f"{removal_text(self.factors)}. "
-            "Let the sensor warm up before recording"
+            f"with a time constant of {time}. It is removed from the "
+            f"noise{removal_text(self.factors)}. Let the sensor warm up before recording"
         )
 
 
@@ -144,8 +143,7 @@ class NoiseTrend(FindingData, code="noise_grows", affects=NONE):
     def text(self, channel: str) -> str:
         verb = "grows" if self.trend > 0.0 else "falls"
         return (
-            f"The white noise of {channel_name(channel)} {verb} by "
-            f"{percent_text(abs(self.trend))} (± {percent_text(self.error, 2)}) over the log. "
-            "N is its mean over the log, and its limits contain the change. "
-            "Look for a change of temperature or supply voltage"
+            f"The white noise of {channel_name(channel)} {verb} by {percent_text(abs(self.trend))} "
+            f"(± {percent_text(self.error, 2)}) over the log. N is its mean over the log, and its "
+            "limits contain the change. Look for a change of temperature or supply voltage"
         )

@@ -118,9 +118,8 @@ class UnusedFiles(FindingData, affects=NONE):
         more = self.number - len(self.files)
         names = join_names([*self.files, *([f"{more} more"] if more else [])])
         return (
-            f"No channel is read from {names}. Name the file of a channel "
-            "with 'file:' in the sensor file. Notes belong beside the folder, as "
-            f"{self.folder}.yaml"
+            f"No channel is read from {names}. Name the file of a channel with 'file:' in the "
+            f"sensor file. Notes belong beside the folder, as {self.folder}.yaml"
         )
 
 

@@ -113,14 +113,13 @@ class SuspiciousUnit(
             unit = unit_of(channel, "density")
             seen = f"its noise is {unit.text(self.noise)} {unit.sign}"
             if self.mean is not None:
-                seen += f", and the mean rate {value_text(self.mean, channel, 'signal')}"
+                seen += f", and the mean rate {value_text(self.mean, channel)}"
             limits = " to ".join(unit.text(limit) for limit in self.usual)
             usual = f"expected {limits} {'by its data sheet' if self.printed else 'for any gyro'}"
             mended = f"{unit.text(self.noise * self.factor)} {unit.sign}"
         return (
-            f"The unit of {name} is probably wrong: {seen}; {usual}. "
-            f"If the log is in {self.likely}, and not {self.stated}, it is {mended}. "
-            f"{_CORRECT_UNIT}"
+            f"The unit of {name} is probably wrong: {seen}; {usual}. If the log is in "
+            f"{self.likely}, and not {self.stated}, it is {mended}. {_CORRECT_UNIT}"
         )
 
 

@@ -10,6 +10,7 @@ from imubench_pipeline.words.findings.base import (
     SLOW,
     WHITE,
     FindingData,
+    at_text,
     channel_name,
     value_text,
 )
@@ -20,15 +21,6 @@ Change = Literal["level", "noise", "steps"]
 
 _CHANGES: dict[str, str] = {"level": "level", "noise": "noise", "steps": "resolution"}
 _ROUNDED = ". The values were rounded again afterwards"
-
-
-def _value_text(channel: str, value: float) -> str:
-    return value_text(value, channel, "signal")
-
-
-def _at(seconds: float) -> str:
-    """Return a position in a recording, in s as in ``use:``."""
-    return f"{number_text(seconds, 5)} s"
 
 
 class Quantised(FindingData, affects=NONE):
@@ -47,7 +39,7 @@ class Quantised(FindingData, affects=NONE):
                 f"The temperature has steps of {number_text(self.step, 3)} °C, from "
                 f"{number_text(self.lowest)} to {number_text(self.highest)} °C"
             )
-        text = f"{channel_name(channel)} is quantised in steps of {_value_text(channel, self.step)}"
+        text = f"{channel_name(channel)} is quantised in steps of {value_text(self.step, channel)}"
         if self.step_over_noise is not None:
             text += f", {number_text(self.step_over_noise, 2)} times its noise"
         return text + (_ROUNDED if self.is_rounded else "")
@@ -61,7 +53,7 @@ class Truncated(FindingData, affects=WHITE, doubt="truncated samples of {channel
     def text(self, channel: str) -> str:
         return (
             f"{channel_name(channel)} was truncated towards 0 in steps of "
-            f"{_value_text(channel, self.step)}. The level 0 is twice as frequent as it should be, "
+            f"{value_text(self.step, channel)}. The level 0 is twice as frequent as it should be, "
             "and the noise is too small. Round to integers instead, and record again"
         )
 
@@ -78,7 +70,7 @@ class Coarse(FindingData, affects=ALL, doubt="coarse resolution of {channels}"):
         rounded = _ROUNDED if self.is_rounded else ""
         return (
             f"{channel_name(channel)} has {counted(round(self.levels), 'level')}, "
-            f"{_value_text(channel, self.step)} apart; at least {self.required} are required. Its "
+            f"{value_text(self.step, channel)} apart; at least {self.required} are required. Its "
             "noise is rounding noise. Record more digits, or use a finer range" + rounded
         )
 
@@ -163,7 +155,7 @@ class Stuck(FindingData, affects=ALL, unfit=True, doubt="{channels} did not chan
     samples: int
 
     def text(self, channel: str) -> str:
-        stays = f"stays at {_value_text(channel, self.value)}" if self.value else "is exactly 0"
+        stays = f"stays at {value_text(self.value, channel)}" if self.value else "is exactly 0"
         return (
             f"{channel_name(channel)} never changes: it {stays} in all {self.samples} samples. The "
             "axis is dead or was not read, or the column is the wrong one"
@@ -206,7 +198,7 @@ def _longest_run(records: int, duration: float, start: float) -> str:
     """Return a sentence about the longest run of records without a finite number."""
     return (
         f"The longest run has {counted(records, 'record')} ({number_text(duration, 3)} s), from "
-        f"{_at(start)}"
+        f"{at_text(start)}"
     )
 
 
@@ -233,7 +225,7 @@ class Saturated(FindingData, affects=ALL, doubt="saturated samples in {channels}
     def text(self, channel: str) -> str:
         return (
             f"{channel_name(channel)} has {self.samples} samples at its {self.side} value, "
-            f"{_value_text(channel, self.value)}: it is saturated. Use a wider range"
+            f"{value_text(self.value, channel)}: it is saturated. Use a wider range"
         )
 
 
@@ -246,7 +238,7 @@ class PiledUp(FindingData, affects=ALL, doubt="one value is too frequent in {cha
     def text(self, channel: str) -> str:
         return (
             f"{percent_text(self.share, 2)} of the samples of {channel_name(channel)} are exactly "
-            f"{_value_text(channel, self.value)}, many times more than at neighbouring values. "
+            f"{value_text(self.value, channel)}, many times more than at neighbouring values. "
             "Lost samples were filled in, or the sensor has a dead band. Leave the cells of lost "
             "samples empty"
         )
@@ -260,8 +252,9 @@ class Motion(FindingData, affects=ALL, unfit=True, doubt="the sensor was moved")
 
     def text(self, channel: str) -> str:
         return (
-            f"{channel_name(channel)} shows motion from {_at(self.start)} to {_at(self.end)}. "
-            "Leave it out: 'use:' in the notes beside the log, or quality.at_rest in the settings"
+            f"{channel_name(channel)} shows motion from {at_text(self.start)} to "
+            f"{at_text(self.end)}. Leave it out: 'use:' in the notes beside the log, or "
+            "quality.at_rest in the settings"
         )
 
 
@@ -274,9 +267,9 @@ class Step(FindingData, affects=SLOW | {"bias"}, doubt="a step in {channels}"):
 
     def text(self, channel: str) -> str:
         return (
-            f"The mean of {channel_name(channel)} changes by {_value_text(channel, self.size)} at "
-            f"{_at(self.at)}, {number_text(self.sigmas, 3)} times its usual change. The sensor was "
-            "moved, or its range or temperature jumped"
+            f"The mean of {channel_name(channel)} changes by {value_text(self.size, channel)} at "
+            f"{at_text(self.at)}, {number_text(self.sigmas, 3)} times its usual change. The sensor "
+            "was moved, or its range or temperature jumped"
         )
 
 
@@ -292,9 +285,9 @@ class WarmUp(FindingData, affects=SLOW | {"bias"}, doubt="warm-up drift of {chan
         if self.ratio is not None:
             later = f", {number_text(self.ratio, 2)} times as much as later"
         return (
-            f"{channel_name(channel)} drifts by {_value_text(channel, self.drift)} in its first "
-            f"{_at(self.end)}{later}. Leave this out with 'use: {{start: {ceil(self.end)}}}' in "
-            "the notes beside the log, or with quality.trim_warm_up"
+            f"{channel_name(channel)} drifts by {value_text(self.drift, channel)} in its first "
+            f"{at_text(self.end)}{later}. Leave this out with 'use: {{start: {ceil(self.end)}}}' "
+            "in the notes beside the log, or with quality.trim_warm_up"
         )
 
 
@@ -307,9 +300,9 @@ class NotStationary(FindingData, affects=ALL, doubt="the noise of {channels} cha
 
     def text(self, channel: str) -> str:
         return (
-            f"The noise of {channel_name(channel)} is not stationary: from {_at(self.start)} to "
-            f"{_at(self.end)} it is {number_text(self.ratio, 3)} times as large as in the calmest "
-            "part"
+            f"The noise of {channel_name(channel)} is not stationary: from {at_text(self.start)} "
+            f"to {at_text(self.end)} it is {number_text(self.ratio, 3)} times as large as in the "
+            "calmest part"
         )
 
 
@@ -323,10 +316,10 @@ class Joined(FindingData, affects=ALL, unfit=True, doubt="two logs are joined"):
     def text(self, channel: str) -> str:
         changed = join_names([_CHANGES[change] for change in self.changes])
         return (
-            f"The {changed} of {channel_name(channel)} change at once at {_at(self.at)}. The noise "
-            f"is {number_text(self.noise_ratio, 3)} times as large after that. Two sensors, or two "
-            "ranges of one, are joined in this log. Use one part: 'use:' in the notes beside the "
-            "log"
+            f"The {changed} of {channel_name(channel)} change at once at {at_text(self.at)}. The "
+            f"noise is {number_text(self.noise_ratio, 3)} times as large after that. Two sensors, "
+            "or two ranges of one, are joined in this log. Use one part: 'use:' in the notes "
+            "beside the log"
         )
 
 

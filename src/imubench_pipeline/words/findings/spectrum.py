@@ -79,7 +79,7 @@ class TooManyLines(
             f"Error budgets, simulations and filters use the {self.single} strongest individually. "
             f"The other {self.lines - self.single} are merged into one of the same power, "
             f"{percent_text(self.share)} of the power of all lines "
-            f"({value_text(self.rms, channel, 'signal')} rms). "
+            f"({value_text(self.rms, channel)} rms). "
             "Look for motors, fans or converters nearby, or record without them"
         )
 
@@ -122,11 +122,10 @@ class SlowNoiseMissing(
     def text(self, channel: str) -> str:
         return (
             f"Up to {number_text(self.highest, 3)} Hz the spectrum of {channel_name(channel)} has "
-            f"{number_text(self.ratio, 2)} times the density of its white noise. "
-            "Slow noise only adds to it, so it was removed before the log was written. "
-            "K, B and the errors of dead reckoning are too small. "
-            "Switch off automatic zeroing, high-pass filters and the subtraction of means or "
-            "curves, and record again"
+            f"{number_text(self.ratio, 2)} times the density of its white noise. Slow noise only "
+            "adds to it, so it was removed before the log was written. K, B and the errors of dead "
+            "reckoning are too small. Switch off automatic zeroing, high-pass filters and the "
+            "subtraction of means or curves, and record again"
         )
 
 
@@ -156,11 +155,10 @@ class BacktestContradicts(
         )
         return (
             f"{channel_name(channel)} drifts {number_text(self.ratio, 3)} times as much as "
-            f"predicted: {self.error} after {number_text(self.time)} s{rest}. "
-            f"In 95 % of logs a correct model gives {number_text(self.ratio_lower, 3)} to "
-            f"{number_text(self.ratio_upper, 3)} times. "
-            f"The log has {counted(self.windows or 0, 'window')}, equivalent to "
-            f"{number_text(self.independent, 3)} independent ones. "
-            f"Error budgets of this channel are too small: {why}. "
-            "Multiply them by this ratio until the cause is found"
+            f"predicted: {self.error} after {number_text(self.time)} s{rest}. In 95 % of logs a "
+            f"correct model gives {number_text(self.ratio_lower, 3)} to "
+            f"{number_text(self.ratio_upper, 3)} times. The log has "
+            f"{counted(self.windows or 0, 'window')}, equivalent to "
+            f"{number_text(self.independent, 3)} independent ones. Error budgets of this channel "
+            f"are too small: {why}. Multiply them by this ratio until the cause is found"
         )

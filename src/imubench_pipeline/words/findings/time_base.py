@@ -3,6 +3,7 @@
 import math
 
 from imubench_pipeline.words.findings import base
+from imubench_pipeline.words.findings.base import at_text
 from imubench_pipeline.words.numbers import counted, join_names, number_text, percent_text
 
 _TIMED = frozenset(base.POWERS_OF_TIME)  # parameters that a wrong sampling rate changes
@@ -10,11 +11,6 @@ _TIMED = frozenset(base.POWERS_OF_TIME)  # parameters that a wrong sampling rate
 
 def _rate_text(rate: float) -> str:
     return f"{number_text(rate, 6)} Hz"
-
-
-def _at(seconds: float) -> str:
-    """Return a position in a recording, in s as in ``use:``."""
-    return f"{number_text(seconds, 5)} s"
 
 
 class RateChanges(base.FindingData, affects=base.WHITE, doubt="the sampling rate changes"):
@@ -31,10 +27,10 @@ class RateChanges(base.FindingData, affects=base.WHITE, doubt="the sampling rate
         low = 1.0 - math.sqrt(self.lower_rate / self.rate)
         return (
             f"The sampling rate{of} changes. {percent_text(self.share, 2)} of the samples, from "
-            f"{_at(self.start)} to {_at(self.end)}, have {_rate_text(self.lower_rate)} instead of "
-            f"{_rate_text(self.rate)}. They are analysed at {_rate_text(self.rate)} with missing "
-            f"samples. If the sensor was set to the lower rate, their N is {percent_text(low, 2)} "
-            "too low. Analyse the parts separately: 'use:' in the notes"
+            f"{at_text(self.start)} to {at_text(self.end)}, have {_rate_text(self.lower_rate)} "
+            f"instead of {_rate_text(self.rate)}. They are analysed at {_rate_text(self.rate)} "
+            "with missing samples. If the sensor was set to the lower rate, their N is "
+            f"{percent_text(low, 2)} too low. Analyse the parts separately: 'use:' in the notes"
         )
 
 
@@ -53,8 +49,7 @@ class CoarseStamps(base.FindingData, affects=_TIMED, doubt="the sampling rate is
         return (
             f"The time stamps {what} at regular distances: taken as rounded, at "
             f"{_rate_text(self.rate)}. If {cause} so regularly instead, the rate is "
-            f"{_rate_text(self.other_rate)}, and N is {size}. "
-            "State 'rate' in the sensor file"
+            f"{_rate_text(self.other_rate)}, and N is {size}. State 'rate' in the sensor file"
         )
 
 
@@ -71,7 +66,7 @@ class MissingSamples(base.FindingData, affects=base.ALL, doubt="samples are miss
     noise_ratio: float | None = None  # N at that rate over N
 
     def text(self, channel: str) -> str:
-        longest = f"{number_text(self.longest, 3)} s, from {_at(self.start)} on"
+        longest = f"{number_text(self.longest, 3)} s, from {at_text(self.start)} on"
         gaps = (
             f"1 gap of {longest}" if self.gaps == 1 else f"{self.gaps} gaps, the longest {longest}"
         )
@@ -103,7 +98,7 @@ class Segments(
     def text(self, channel: str) -> str:
         what = "The clock jumps or stops" if self.has_grid else "The stamps stop or run backwards"
         direction = "backwards" if self.longest < 0.0 else "forward"
-        step = f"{number_text(abs(self.longest), 5)} s {direction}, after {_at(self.at)} of samples"
+        step = f"{at_text(abs(self.longest))} {direction}, after {at_text(self.at)} of samples"
         often = "once, by" if self.pauses == 1 else f"{self.pauses} times, by up to"
         return f"{what} {often} {step}. The recording is analysed as {self.pauses + 1} segments"
 
@@ -175,9 +170,9 @@ class JitteredStamps(base.FindingData, affects=_TIMED, doubt="the time stamps ar
         return (
             f"The time stamps lie on no uniform grid: {percent_text(self.share, 2)} are off it, "
             f"with {counted(self.pauses, 'pause')}, and intervals up to "
-            f"{number_text(1e3 * self.longest, 3)} ms (at {_at(self.at)}). The samples are taken "
-            f"as consecutive at the mean rate, {_rate_text(self.rate)}. Lost samples cannot be "
-            "detected"
+            f"{number_text(1e3 * self.longest, 3)} ms (at {at_text(self.at)}). The samples are "
+            f"taken as consecutive at the mean rate, {_rate_text(self.rate)}. Lost samples cannot "
+            "be detected"
         )
 
 
