@@ -11,6 +11,8 @@ from imubench_pipeline.estimators.estimate import Estimate
 from imubench_pipeline.estimators.rows import make_estimate
 from imubench_pipeline.export.imu import AXES, AxisNoise, ExportError
 from imubench_pipeline.model.estimates import ParameterRow
+from imubench_pipeline.words.findings.base import channel_name
+from imubench_pipeline.words.numbers import join_names
 from imubench_pipeline.words.reasons import exports as texts
 
 Key = tuple[str, str]  # recording, channel
@@ -113,7 +115,9 @@ def _describe_other_axes(
     channels = {chosen, *(channel for keys in others.values() for _, channel in keys)}
     without = [name for axis in AXES if (name := f"{quantity}_{axis}") not in channels]
     if without:
-        statements.append(texts.axes_without_estimate(without))
+        statements.append(
+            f"axes without an estimate: {join_names(list(map(channel_name, without)))}"
+        )
     return statements
 
 

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from imubench_pipeline.export.imu import Imu
 from imubench_pipeline.export.mapping import Mapped, describe_terms
 from imubench_pipeline.tables.texts import escape_invisible
+from imubench_pipeline.words.numbers import number_text
 from imubench_pipeline.words.reasons import exports as texts
 
 _LINE_WIDTH = 96
@@ -33,7 +34,7 @@ def describe_model(
     units = {"gyro": "rad, s", "accel": "m, s"}
     estimated = {"gyro": imu.gyro, "accel": imu.accel}
     missing = [name for name, axis in estimated.items() if axis is None]
-    statements += [f"{texts.no_estimate(name)}." for name in missing]
+    statements += [f"{name}: not included, as there is no estimate." for name in missing]
     for name, axis in imu.axes.items():
         statements.append(f"{name}: {axis.origin}.")
         terms = describe_terms((estimated[name] or axis).model.terms)
@@ -49,7 +50,10 @@ def describe_model(
     else:
         statements.append(f"{texts.NOISE_ONLY}.")
     if imu.inflation != 1.0:
-        statements.append(f"{texts.inflated(imu.inflation, imu.because or '')}.")
+        statements.append(
+            f"INFLATED: all densities and amplitudes below are {number_text(imu.inflation)} times "
+            f"those above, because: {imu.because or ''}."
+        )
     printed = [_join_lines(words) for words in statements]
     replacements = (mapped or {}).items()
     return printed + [f"{name}: {words}." for name, model in replacements for words in model.words]

@@ -9,6 +9,7 @@ from imubench_pipeline.earth import STANDARD_GRAVITY
 from imubench_pipeline.model.estimates import TemperatureRow
 from imubench_pipeline.model.recordings import RecordingRow
 from imubench_pipeline.noise import NoiseModel
+from imubench_pipeline.words.numbers import number_text, percent_text
 from imubench_pipeline.words.reasons import exports as texts
 
 AXES = "xyz"
@@ -58,7 +59,9 @@ def find_temperature_effect(
         if of == quantity:
             by_axis.setdefault(axis, {})[row.parameter] = row
     if not by_axis or low is None or high is None:
-        return TemperatureEffect(notes=[texts.no_temperature(recording.recording)])
+        return TemperatureEffect(
+            notes=[f"not included, as {recording.recording} has no temperature readings"]
+        )
     reference = _require_value(min(by_axis.items())[1]["T_0"])
     unit = {"gyro": "rad/s", "accel": "m/s^2"}[quantity]
     slope: dict[str, float] = {}
@@ -94,20 +97,29 @@ def _find_objection(fit: Mapping[str, TemperatureRow], span: float, horizon: flo
     """Return the reason against a correction with a fit; None if it is safe."""
     s, lag = fit["sensitivity"], fit["lag"]
     if s.value is None or s.lower is None or s.upper is None:
-        return texts.sensitivity_status(s.status, s.reason)
+        return texts.status_reason("the sensitivity", s.status, s.reason)
     if not s.compensated:
         return texts.effect_not_shown(s.reason)
     error = 0.5 * (s.upper - s.lower) / abs(s.value)
     if error > _MAX_RELATIVE_ERROR:
-        return texts.sensitivity_uncertain(error, _MAX_RELATIVE_ERROR)
+        return (
+            f"the sensitivity is known to {percent_text(error, 2)}, from noise and the resolution "
+            f"of the temperature, and {percent_text(_MAX_RELATIVE_ERROR, 2)} is needed"
+        )
     if span < _MIN_TEMPERATURE_RANGE:
-        return texts.small_temperature_range(span, _MIN_TEMPERATURE_RANGE)
+        return (
+            f"the temperature varies by only {number_text(span, 2)} K, and "
+            f"{number_text(_MIN_TEMPERATURE_RANGE)} K is needed"
+        )
     if lag.status != "absent":
         longest = lag.upper
         if longest is None:
-            return texts.lag_status(lag.status, lag.reason)
+            return texts.status_reason("its lag", lag.status, lag.reason)
         if longest > horizon:
-            return texts.long_lag(longest, horizon)
+            return (
+                f"it may lag the temperature by {number_text(longest, 3)} s, more than the horizon "
+                f"of {number_text(horizon)} s, and the program has no lag"
+            )
     return None
 
 

@@ -23,6 +23,7 @@ import numpy as np
 
 from imubench_pipeline.noise import GaussMarkov, NoiseModel, Role, Term, compute_bias_instability
 from imubench_pipeline.typing import Array
+from imubench_pipeline.words.numbers import number_text
 from imubench_pipeline.words.reasons import exports as texts
 
 _MIN_TIME_OVER_HORIZON = 1 / 30
@@ -55,13 +56,18 @@ def as_walk(
     """
     slow = _select_slow_terms(model)
     if not slow:
-        words = texts.upper_walk_used(least_walk) if least_walk else texts.NO_WALK_KNOWN
+        words = (
+            f"the model has no random walk, and its upper 95 % limit K = {least_walk:.3e} "
+            "is used. A filter stops estimating a bias that does not change"
+            if least_walk
+            else texts.NO_WALK_KNOWN
+        )
         replacement = NoiseModel(N=model.N, K=least_walk or 0.0)
         return Mapped(replacement, [words, *_describe_omitted_terms(model)])
     if all(term.role is Role.RANDOM_WALK for term in slow):
         return Mapped(NoiseModel(N=model.N, K=model.K), _describe_omitted_terms(model))
     K = math.sqrt(3.0 * _sum_allan_variance(slow, horizon) / horizon)
-    words = texts.random_walk(K)
+    words = f"a random walk K = {K:.3e}"
     return _describe_replacement(model, NoiseModel(N=model.N, K=K), words, slow, horizon, rate)
 
 
@@ -80,9 +86,26 @@ def as_process(model: NoiseModel, horizon: float, rate: float, *, walk: bool = F
     if len(replaced) == len(processes) <= 1:
         B, T_B = (processes[0].B, processes[0].T_B) if processes else (0.0, None)
         return Mapped(NoiseModel(N=model.N, B=B, T_B=T_B, K=K), _describe_omitted_terms(model))
-    process = _fit_nearest_process(replaced, model.N, horizon)
+    tau = np.geomspace(_MIN_TIME_OVER_HORIZON * horizon, horizon, 60)
+    white = model.N**2 / tau
+    wanted = np.log(white + sum(term.allan_variance(tau) for term in replaced))
+    variance = _sum_allan_variance(replaced, horizon)
+
+    def make_process(T_B: float) -> GaussMarkov:
+        unit = GaussMarkov(compute_bias_instability(1.0, T_B), T_B)
+        density = variance / _sum_allan_variance([unit], horizon)
+        return GaussMarkov(compute_bias_instability(density, T_B), T_B)
+
+    times = np.geomspace(
+        _MIN_TIME_OVER_HORIZON * horizon, _MAX_TIME_OVER_HORIZON * horizon, _TRIED_CORRELATION_TIMES
+    )
+    errors = [
+        float(np.mean((np.log(white + make_process(T_B).allan_variance(tau)) - wanted) ** 2))
+        for T_B in times
+    ]
+    process = make_process(float(times[int(np.argmin(errors))]))
     replacement = NoiseModel(N=model.N, B=process.B, T_B=process.T_B, K=K)
-    what = texts.gauss_markov_process(process.B, process.T_B)
+    what = f"a Gauss-Markov process B = {process.B:.3e}, T_B = {number_text(process.T_B)} s"
     return _describe_replacement(model, replacement, what, replaced, horizon, rate)
 
 
@@ -97,39 +120,18 @@ def _select_slow_terms(model: NoiseModel) -> list[Term]:
 
 def _describe_omitted_terms(model: NoiseModel) -> list[str]:
     words = [
-        texts.growing_only(term.label, term.in_words)
+        f"{term.label} noise {term.in_words} is not included, as its error does not grow"
         for term in model.terms
         if term.role is Role.NOT_GROWING
     ]
     lines = [term for term in model.terms if term.role is Role.NO_NOISE]
     if lines:
-        words.append(texts.lines_not_included(describe_terms(lines)))
+        words.append(f"{describe_terms(lines)}: not included, as a spectral line is not noise")
     return words
 
 
 def _sum_allan_variance(terms: Sequence[Term], tau: float) -> float:
     return float(sum(term.allan_variance(np.array([tau]))[0] for term in terms))
-
-
-def _fit_nearest_process(slow: Sequence[Term], N: float, horizon: float) -> GaussMarkov:
-    tau = np.geomspace(_MIN_TIME_OVER_HORIZON * horizon, horizon, 60)
-    white = N**2 / tau
-    wanted = np.log(white + sum(term.allan_variance(tau) for term in slow))
-    variance = _sum_allan_variance(slow, horizon)
-
-    def process(T_B: float) -> GaussMarkov:
-        unit = GaussMarkov(compute_bias_instability(1.0, T_B), T_B)
-        density = variance / _sum_allan_variance([unit], horizon)
-        return GaussMarkov(compute_bias_instability(density, T_B), T_B)
-
-    times = np.geomspace(
-        _MIN_TIME_OVER_HORIZON * horizon, _MAX_TIME_OVER_HORIZON * horizon, _TRIED_CORRELATION_TIMES
-    )
-    errors = [
-        float(np.mean((np.log(white + process(T_B).allan_variance(tau)) - wanted) ** 2))
-        for T_B in times
-    ]
-    return process(float(times[int(np.argmin(errors))]))
 
 
 def _describe_replacement(

@@ -27,7 +27,6 @@ from imubench_pipeline.export.mapping import describe_terms
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.terms.base import drives_of
 from imubench_pipeline.typing import Array
-from imubench_pipeline.words.reasons import exports as texts
 
 FLICKER_TAU_OVER_HORIZON = 4.0
 """Longest tau of the approximation of flicker noise, over the horizon."""
@@ -191,7 +190,7 @@ def write_python(imu: Imu) -> str:
     for name, axis in imu.axes.items():
         others = [term for term in axis.model.terms if term.drive is None]
         if others:
-            left_out.append(f"{name}: {texts.terms_not_supported(describe_terms(others))}.")
+            left_out.append(f"{name}: not included: {describe_terms(others)}.")
         longest = max(FLICKER_TAU_OVER_HORIZON * imu.horizon, 4.0 / imu.rate)
         drives = drives_of(axis.model.realised(1.0 / imu.rate, longest))
         white = float(drives.white)

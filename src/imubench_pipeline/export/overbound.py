@@ -50,6 +50,7 @@ from imubench_pipeline import noise
 from imubench_pipeline.allan import AllanCurve
 from imubench_pipeline.export.growth import growth
 from imubench_pipeline.typing import Array
+from imubench_pipeline.words.numbers import number_text
 from imubench_pipeline.words.reasons import exports as texts
 
 Family = Literal["N+K", "N+GM", "N+GM+K"]
@@ -274,7 +275,10 @@ def overbound(
     processes = [term.gauss_markov for term in fitted.terms if term.gauss_markov is not None]
     shortest = min((process.T_B for process in processes), default=math.inf)
     if "GM" not in family and max(horizon, reach) > _MAX_HORIZON_OVER_T_B * shortest:
-        unsuited = texts.walk_cannot_follow(shortest, _MAX_HORIZON_OVER_T_B * shortest)
+        unsuited = (
+            f"a random walk cannot follow a Gauss-Markov process of T_B = {number_text(shortest)} "
+            f"s beyond {number_text(_MAX_HORIZON_OVER_T_B * shortest)} s"
+        )
     warning = None
     if excess[0] > most_excess or unsuited:
         others = {

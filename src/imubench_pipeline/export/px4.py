@@ -29,7 +29,6 @@ import math
 from imubench_pipeline.export.comments import describe_model, format_comments
 from imubench_pipeline.export.imu import AXES, ExportError, Imu
 from imubench_pipeline.export.visual_inertial import map_to_walks
-from imubench_pipeline.words.reasons import exports as texts
 
 DEFAULT_PERIOD = 10_000  # default of EKF2_PREDICT_US, us
 
@@ -77,7 +76,10 @@ def write(imu: Imu, period: int = DEFAULT_PERIOD) -> str:
         low, high = _PARAMETER_RANGES[name]
         clipped = min(max(value, low), high)
         if clipped != value:
-            about.append(f"{name}: {texts.value_clipped(value, low, high, clipped)}.")
+            about.append(
+                f"{name}: {value:.4g} is outside the range of {low:g} to {high:g}, and {clipped:g} "
+                "is used."
+            )
         about.append(f"{name} = {clipped:.6g} {comment}.")
         rows.append(f"1\t1\t{name}\t{clipped:.9g}\t{_REAL32_TYPE}\n")
     rows.append(f"1\t1\tEKF2_PREDICT_US\t{period}\t{_INT32_TYPE}\n")

@@ -106,7 +106,7 @@ def build_imu(tables: Tables, request: Request, folder: Path | None = None) -> i
         )
         about = by_name[choice.recording]
         if about.doubts:
-            cautions.append(texts.recording_in_doubt(choice.recording, doubts_text(about.doubts)))
+            cautions.append(f"{choice.recording} is in doubt: {doubts_text(about.doubts)}")
         simulated = simulated or about.simulated
         if about.rate is None:
             raise imu.ExportError(f"{choice.recording}: its rate is not known; state it (--rate)")
@@ -146,7 +146,7 @@ def _select_deciding(
     rows = _select_rows(ParameterRow, tables, sensor=request.sensor)
     apart = list_excluded(recordings)
     without = [
-        texts.recording_rejected(row.recording, row.status, row.reason)
+        f"{row.recording} is not used, as it was {row.status}: {row.reason or 'no reason is known'}"
         for row in recordings
         if row.status != "ok"
     ]
@@ -155,7 +155,7 @@ def _select_deciding(
     doubted = [(recording, doubts_text(doubts)) for (_, recording), doubts in apart.items()]
     reasons = recordings_not_used(doubted)
     if (request.because or "").strip():
-        return rows, [texts.used_despite_doubts(reasons, request.because or ""), *without]
+        return rows, [f"{reasons}; used all the same, because: {request.because or ''}", *without]
     deciding = [row for row in rows if (row.sensor, row.recording) not in apart]
     if rows and not deciding:
         raise imu.ExportError(
@@ -194,7 +194,7 @@ def _bound_axis(
             f"take a horizon shorter than {request.horizon:g} s, or the fitted model without "
             "overbound, or allow a larger excess"
         ) from error
-    fitted = texts.fitted_terms(describe_terms(choice.axis.model.terms))
+    fitted = f"the fitted model was: {describe_terms(choice.axis.model.terms)}"
     notes = [bound.words, bound.density_words, fitted, *choice.axis.notes]
     if bound.warning:
         notes.insert(0, texts.excess_warning(bound.warning, _list_larger_programs(family)))
@@ -208,7 +208,9 @@ def _list_larger_programs(family: Family) -> list[str]:
         for other in FAMILIES
         if set(other.split("+")) - set(family.split("+"))
     }
-    return [texts.programs_of(other, names) for other, names in kinds.items() if names]
+    return [
+        f"{other} is supported by {', '.join(names)}" for other, names in kinds.items() if names
+    ]
 
 
 def curve_of(rows: Sequence[AllanRow]) -> AllanCurve:

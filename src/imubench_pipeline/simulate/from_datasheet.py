@@ -15,6 +15,8 @@ from imubench_pipeline.simulate.imu import ImuModel
 from imubench_pipeline.simulate.model import SensorModel, TemperatureDrift
 from imubench_pipeline.simulate.models import Origin, Remark, Topic
 from imubench_pipeline.units import convert_to_si, find_dimension, parse_quantity
+from imubench_pipeline.words.findings.base import channel_name
+from imubench_pipeline.words.numbers import number_text
 from imubench_pipeline.words.reasons import simulations as texts
 
 _STEPS_PER_SIDE = 1 << 15  # steps on each side of 0 of a 16-bit register
@@ -35,7 +37,9 @@ def from_datasheet(name: str, sensor: Sensor, seed: int) -> Origin:
         noise = axis.noise()
         if noise is None:
             origin.figures.pop(channel)
-            origin.assume("noise", texts.channel_not_printed(channel))
+            origin.assume(
+                "noise", f"{channel_name(channel)} is not included, as no noise of it is printed"
+            )
             continue
         signs = channel_rng(seed, name, channel, "signs").choice([-1.0, 1.0], 2)
         axes[channel] = axis.model(noise, [float(sign) for sign in signs])
@@ -101,7 +105,7 @@ class _Printed:
             self._assume("register", texts.NOT_ROUNDED)
         stated = self._sensor.log.bandwidth
         if stated is not None:
-            self._remarks.append(Remark("low-pass", texts.stated_cutoff(stated)))
+            self._remarks.append(Remark("low-pass", f"cut-off {stated}: stated for the log"))
             cutoff: float | None = parse_quantity(stated, "frequency")
         else:
             cutoff = self._single("bandwidth", "low-pass", "cut-off")
@@ -127,10 +131,10 @@ class _Printed:
             if step is not None and len(ranges) > 1:
                 # The printed sensitivity belongs to the range that it gives with a 16-bit register.
                 chosen = int(np.argmin(np.abs(np.log(np.array(ranges) / (step * _STEPS_PER_SIDE)))))
-            text = texts.printed_full_scale(values[chosen], figure.unit)
+            text = f"full scale {number_text(values[chosen])} {figure.unit}: data sheet"
             self._remarks.append(Remark("register", text))
             if len(ranges) > 1:
-                self._assume("register", texts.chosen_range(values[chosen], figure.unit))
+                self._assume("register", f"range {number_text(values[chosen])} {figure.unit}")
             return ranges[chosen]
         self._assume("register", texts.NO_SATURATION)
         return None

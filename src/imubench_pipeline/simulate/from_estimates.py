@@ -17,6 +17,7 @@ from imubench_pipeline.simulate.imu import ImuModel
 from imubench_pipeline.simulate.model import SensorModel, TemperatureDrift, before_the_filter
 from imubench_pipeline.simulate.models import Origin, Remark, Topic
 from imubench_pipeline.tables.files import find_tables, find_tables_folder, read
+from imubench_pipeline.words.numbers import number_text
 from imubench_pipeline.words.reasons import simulations as texts
 
 _NEEDED_TABLES = ("recordings", "parameters", "fixed_bias", "temperature", "low_pass")
@@ -62,13 +63,13 @@ def with_estimates(
     estimated = set[Topic].intersection(*topics)
     origin = Origin(
         ImuModel(axes=axes),
-        texts.of_run(str(results), f"{name}/{chosen}"),
+        f"the estimates of a run in {results}, from the recording {name}/{chosen}",
         figures,
         [remark for remark in printed.assumed if remark.topic not in estimated],
         name,
     )
     if recorded.simulated:
-        origin.assume("log", texts.log_is_simulated(f"{name}/{chosen}"))
+        origin.assume("log", f"{name}/{chosen} is itself simulated")
     if any(quantity_of(channel) == "accel" for channel in axes):
         origin.assume("bias", texts.GRAVITY_IS_NO_BIAS)
     return origin
@@ -100,7 +101,9 @@ def _estimate_axis(
     low_pass, drift, bias = printed.low_pass, printed.drift, printed.bias
     if cutoffs and cutoffs[-1].value is not None and cutoffs[-1].order is not None:
         low_pass = LowPass(cutoffs[-1].value, cutoffs[-1].order)
-        remarks.append(Remark("low-pass", texts.estimated_cutoff(low_pass.cutoff, log)))
+        remarks.append(
+            Remark("low-pass", f"cut-off {number_text(low_pass.cutoff)} Hz: estimated from {log}")
+        )
     effect = {row.parameter: row for row in TemperatureRow.rows_of(tables["temperature"])}
     compensated = any(row.compensated for row in effect.values())
     reference = effect["T_0"].value if compensated else None
@@ -113,7 +116,9 @@ def _estimate_axis(
             sensitivity=sensitivity, reference=reference, quadratic=quadratic, lag=lag
         )
         unit = effect["sensitivity"].unit
-        text = texts.estimated_sensitivity(drift.sensitivity, unit, log)
+        text = (
+            f"temperature sensitivity {number_text(drift.sensitivity)} {unit}: estimated from {log}"
+        )
         remarks.append(Remark("drift", text))
     rows = [
         row
@@ -121,7 +126,10 @@ def _estimate_axis(
         if (row.method == "compensated" if compensated else row.recommended)
     ]
     estimate = make_estimate(rows[0].method, rows)
-    text = texts.estimated_noise(estimate.model.name, estimate.method, log)
+    text = (
+        f"noise {estimate.model.name}: estimated by method {estimate.method} "
+        f"from {log}. N is converted to its value before low-pass and rounding"
+    )
     remarks.append(Remark("noise", text))
     # The mean of an accelerometer is mostly gravity.
     if quantity_of(channel) != "accel":
@@ -129,9 +137,11 @@ def _estimate_axis(
         at_reference = effect["bias"].value if compensated else None
         if at_reference is not None:
             bias = at_reference
-            remarks.append(Remark("bias", texts.bias_at_reference(bias, log)))
+            remarks.append(
+                Remark("bias", f"bias {number_text(bias)} rad/s at T_0: estimated from {log}")
+            )
         elif fixed:
             bias = fixed[0].value
-            remarks.append(Remark("bias", texts.bias_of_mean(bias, log)))
+            remarks.append(Remark("bias", f"bias {number_text(bias)} rad/s: mean of {log}"))
     model = replace(printed, low_pass=low_pass, drift=drift, bias=bias)
     return replace(model, noise=before_the_filter(model, estimate.model, rate)), remarks

@@ -60,7 +60,7 @@ def read_model_file(path: Path) -> Origin:
     """
     settings = read_settings(ModelSettings, path)
     source = texts.of_model_file(path.name, settings.source)
-    as_given = Remark("noise", texts.stated_in(path.name))
+    as_given = Remark("noise", f"as stated in {path.name}")
     figures = {str(name): [as_given] for name in settings.axes}
     try:
         model = make_imu_model(settings.axes, settings)

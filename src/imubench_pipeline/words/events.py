@@ -116,18 +116,17 @@ def events_text(
         ]
         low, high = unit.text(min(own), 2), unit.text(max(own), 2)
         sizes.append(f"{low} to {high} {unit.sign}" if low != high else f"{low} {unit.sign}")
-    returned = ", which return" * _do_steps_return(findings)
+    by_channel: dict[str | None, list[float]] = {}
+    for row in findings:
+        by_channel.setdefault(row.channel, []).append(row.value or 0.0)
+    # The steps of each channel add up to less than half of the largest.
+    returned = ", which return" * all(
+        len(steps) > 1 and abs(sum(steps)) < 0.5 * max(map(abs, steps))
+        for steps in by_channel.values()
+    )
     return (
         f"Disturbed at {when}: {counted(len(findings), 'bias step')} of {join_names(sizes)} "
         f"({channels_text(names)}){returned}. They are removed from "
         f"the noise{removal_text(factors)}. Look for a touched table, a supply that changes, or a "
         "loose connection"
     )
-
-
-def _do_steps_return(findings: Sequence[FindingRow]) -> bool:
-    """Return whether the steps of each channel add up to less than half of the largest."""
-    sizes: dict[str | None, list[float]] = {}
-    for row in findings:
-        sizes.setdefault(row.channel, []).append(row.value or 0.0)
-    return all(len(own) > 1 and abs(sum(own)) < 0.5 * max(map(abs, own)) for own in sizes.values())

@@ -6,7 +6,7 @@ from typing import Literal
 from imubench_pipeline.model.states import Status
 from imubench_pipeline.words.estimates import STATUS_WORDS
 from imubench_pipeline.words.findings.base import channel_name
-from imubench_pipeline.words.numbers import counted, join_names, number_text, percent_text
+from imubench_pipeline.words.numbers import counted, join_names, number_text
 
 OtherAxes = Literal["other_device", "no_white_noise", "not_median", "less_noise"]
 """Why an axis is not the one that represents a sensor."""
@@ -28,18 +28,6 @@ NOISE_ONLY = (
 NO_WALK_KNOWN = "the model has no random walk, and no upper limit of it is known, so it is 0"
 NO_TEMPERATURE_FIT = "no fit of the temperature"
 BIAS_NOT_LINEAR = "its bias is not linear in temperature, and the program supports a slope only"
-
-
-def no_estimate(quantity: str) -> str:
-    """Return why a file has no ``gyro`` or ``accel``."""
-    return f"{quantity}: not included, as there is no estimate"
-
-
-def inflated(factor: float, because: str) -> str:
-    return (
-        f"INFLATED: all densities and amplitudes below are {number_text(factor)} times those "
-        f"above, because: {because}"
-    )
 
 
 def chosen_axis(
@@ -74,10 +62,6 @@ def axes_not_used(
     return f"{text}; and of {counted(more, 'more recording')}" if more > 0 else text
 
 
-def axes_without_estimate(channels: Sequence[str]) -> str:
-    return f"axes without an estimate: {join_names(list(map(channel_name, channels)))}"
-
-
 def component_label(symbol: str, number: int) -> str:
     """Return a parameter of a component: ``B``, ``B of component 2``."""
     return symbol if number == 1 else f"{symbol} of component {number}"
@@ -98,7 +82,7 @@ def fitted_used(
 ) -> str:
     """Return the note that the fit is used where no value is given, SI."""
     return (
-        f"{label} is {STATUS_WORDS[status]}{_because(reason)}. "
+        f"{status_reason(label, status, reason)}. "
         f"The fitted {value:.3e} is used{_limits_text(limits)}"
     )
 
@@ -106,7 +90,7 @@ def fitted_used(
 def zero_used(label: str, status: Status, reason: str | None, upper: float) -> str:
     """Return the note that 0 is used where a term has an upper limit, SI."""
     return (
-        f"{label} is {STATUS_WORDS[status]}{_because(reason)}. "
+        f"{status_reason(label, status, reason)}. "
         f"It is 0 in this file, and its upper limit is {upper:.3e}"
     )
 
@@ -117,24 +101,6 @@ def _because(reason: str | None) -> str:
 
 def _limits_text(limits: tuple[float, float] | None) -> str:
     return "" if limits is None else f", with 95 % limits of {limits[0]:.3e} to {limits[1]:.3e}"
-
-
-def upper_walk_used(K: float) -> str:
-    """Return why the random walk of a file is an upper limit, SI."""
-    return (
-        f"the model has no random walk, and its upper 95 % limit K = {K:.3e} is used. "
-        "A filter stops estimating a bias that does not change"
-    )
-
-
-def random_walk(K: float) -> str:
-    """Return a random walk that replaces other terms, SI."""
-    return f"a random walk K = {K:.3e}"
-
-
-def gauss_markov_process(B: float, T_B: float) -> str:
-    """Return a process that replaces other terms, SI."""
-    return f"a Gauss-Markov process B = {B:.3e}, T_B = {number_text(T_B)} s"
 
 
 def terms_replaced(
@@ -156,18 +122,6 @@ def terms_replaced(
 
 def _signed(share: float) -> str:
     return f"{100 * share:+.1f} %"
-
-
-def growing_only(label: str, term: str) -> str:
-    return f"{label} noise {term} is not included, as its error does not grow"
-
-
-def lines_not_included(lines: str) -> str:
-    return f"{lines}: not included, as a spectral line is not noise"
-
-
-def fitted_terms(terms: str) -> str:
-    return f"the fitted model was: {terms}"
 
 
 def overbound_used(
@@ -202,14 +156,6 @@ def density_bounded(lowest: float, passed: float | None) -> str:
     )
 
 
-def walk_cannot_follow(T_B: float, longest: float) -> str:
-    """Return why a random walk does not suit times above ``longest``, s."""
-    return (
-        f"a random walk cannot follow a Gauss-Markov process of T_B = {number_text(T_B)} s beyond "
-        f"{number_text(longest)} s"
-    )
-
-
 def families_compared(
     family: str,
     excess: tuple[float, float],
@@ -233,28 +179,8 @@ def families_compared(
     return f"{text}. No family is closer than {number_text(least, 3)} times"
 
 
-def programs_of(family: str, programs: Sequence[str]) -> str:
-    return f"{family} is supported by {', '.join(programs)}"
-
-
 def excess_warning(text: str, programs: Sequence[str]) -> str:
     return "WARNING: " + "; ".join([text, *programs])
-
-
-def recording_in_doubt(recording: str, doubts: str) -> str:
-    return f"{recording} is in doubt: {doubts}"
-
-
-def recording_rejected(recording: str, status: str, reason: str | None) -> str:
-    return f"{recording} is not used, as it was {status}: {reason or 'no reason is known'}"
-
-
-def used_despite_doubts(reasons: str, because: str) -> str:
-    return f"{reasons}; used all the same, because: {because}"
-
-
-def no_temperature(recording: str) -> str:
-    return f"not included, as {recording} has no temperature readings"
 
 
 def temperature_range(
@@ -288,57 +214,9 @@ def axis_slope(
     )
 
 
-def sensitivity_status(status: Status, reason: str | None) -> str:
-    return f"the sensitivity is {STATUS_WORDS[status]}{_because(reason)}"
+def status_reason(figure: str, status: Status, reason: str | None) -> str:
+    return f"{figure} is {STATUS_WORDS[status]}{_because(reason)}"
 
 
 def effect_not_shown(reason: str | None) -> str:
     return f"the log does not show an effect{_because(reason)}"
-
-
-def sensitivity_uncertain(error: float, most: float) -> str:
-    return (
-        f"the sensitivity is known to {percent_text(error, 2)}, from noise and the resolution of "
-        f"the temperature, and {percent_text(most, 2)} is needed"
-    )
-
-
-def small_temperature_range(span: float, least: float) -> str:
-    return (
-        f"the temperature varies by only {number_text(span, 2)} K, and {number_text(least)} K is "
-        "needed"
-    )
-
-
-def lag_status(status: Status, reason: str | None) -> str:
-    return f"its lag is {STATUS_WORDS[status]}{_because(reason)}"
-
-
-def long_lag(longest: float, horizon: float) -> str:
-    return (
-        f"it may lag the temperature by {number_text(longest, 3)} s, more than the horizon of "
-        f"{number_text(horizon)} s, and the program has no lag"
-    )
-
-
-def flicker_poles(B: float, poles: int, longest: float) -> str:
-    """Return the approximation of flicker noise, SI, with its longest tau, s."""
-    return (
-        f"flicker noise B = {B:.3e} is generated by {poles} poles. Its Allan deviation is within "
-        f"11 % up to {number_text(longest)} s"
-    )
-
-
-def short_process(samples: float) -> str:
-    return (
-        f"T_B is {number_text(samples, 3)} samples, and the discretisation of the program is "
-        "inaccurate for so short a process"
-    )
-
-
-def terms_not_supported(terms: str) -> str:
-    return f"not included: {terms}"
-
-
-def value_clipped(value: float, low: float, high: float, used: float) -> str:
-    return f"{value:.4g} is outside the range of {low:g} to {high:g}, and {used:g} is used"

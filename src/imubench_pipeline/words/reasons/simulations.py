@@ -28,16 +28,8 @@ def of_data_sheet(name: str, document: str | None) -> str:
     return f"the data sheet of {name}" + (f": {document}" if document else "")
 
 
-def of_run(results: str, recording: str) -> str:
-    return f"the estimates of a run in {results}, from the recording {recording}"
-
-
 def of_model_file(name: str, source: str | None) -> str:
     return f"the model file {name}" + (f" ({source})" if source else "")
-
-
-def stated_in(name: str) -> str:
-    return f"as stated in {name}"
 
 
 def printed_figure(
@@ -47,57 +39,14 @@ def printed_figure(
     return f"{text} ({reason})" if reason else text
 
 
-def printed_full_scale(value: float, unit: str) -> str:
-    return f"full scale {number_text(value)} {unit}: data sheet"
-
-
-def chosen_range(value: float, unit: str) -> str:
-    return f"range {number_text(value)} {unit}"
-
-
-def channel_not_printed(channel: str) -> str:
-    return f"{channel_name(channel)} is not included, as no noise of it is printed"
-
-
 def bias_instability_printed(floor: float, *, timed: bool) -> str:
     """Return the interpretation of a printed bias instability; ``floor``: its ratio to B."""
     text = f"B is the printed bias instability / {number_text(floor, 3)}"
     return text if timed else f"{text}, as flicker noise, because no correlation time is printed"
 
 
-def stated_cutoff(text: str) -> str:
-    return f"cut-off {text}: stated for the log"
-
-
 def low_pass_assumed(*, known: bool) -> str:
     return "the low-pass is of first order" if known else "no low-pass, as no cut-off is known"
-
-
-def estimated_cutoff(cutoff: float, log: str) -> str:
-    return f"cut-off {number_text(cutoff)} Hz: estimated from {log}"
-
-
-def estimated_sensitivity(value: float, unit: str, log: str) -> str:
-    return f"temperature sensitivity {number_text(value)} {unit}: estimated from {log}"
-
-
-def estimated_noise(model: str, method: str, log: str) -> str:
-    return (
-        f"noise {model}: estimated by method {method} from {log}. "
-        "N is converted to its value before low-pass and rounding"
-    )
-
-
-def bias_at_reference(bias: float, log: str) -> str:
-    return f"bias {number_text(bias)} rad/s at T_0: estimated from {log}"
-
-
-def bias_of_mean(bias: float, log: str) -> str:
-    return f"bias {number_text(bias)} rad/s: mean of {log}"
-
-
-def log_is_simulated(log: str) -> str:
-    return f"{log} is itself simulated"
 
 
 def printed_noise(source: str) -> str:
