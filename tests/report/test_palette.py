@@ -3,9 +3,9 @@ from itertools import combinations
 import pytest
 
 from imubench_pipeline.report.palette import (
+    METHOD_STYLES,
     Appearance,
     assign_sensor_styles,
-    get_method_style,
     make_recording_styles,
 )
 from imubench_pipeline.report.view import METHOD_NAMES
@@ -30,7 +30,7 @@ def contrast(one: str, other: str) -> float:
 
 def all_looks() -> list[Appearance]:
     sensors = assign_sensor_styles([str(i) for i in range(8)])
-    return [*sensors.values(), *(get_method_style(name) for name in METHOD_NAMES)]
+    return [*sensors.values(), *(METHOD_STYLES[name] for name in METHOD_NAMES)]
 
 
 @pytest.mark.parametrize("scheme", BACKGROUNDS)
@@ -67,7 +67,7 @@ def test_no_two_recordings_of_a_sensor_look_alike_until_the_looks_repeat() -> No
 
 
 def test_methods_differ_in_more_than_their_colour() -> None:
-    for one, other in combinations([get_method_style(name) for name in METHOD_NAMES], 2):
+    for one, other in combinations([METHOD_STYLES[name] for name in METHOD_NAMES], 2):
         assert one.light != other.light
         assert one.marker != other.marker
         assert one.dash != other.dash

@@ -40,7 +40,7 @@ _INK_COLOURS = ("#1b1b1b", "#e8e8e8")
 _INK_SHARES = (0.0, 0.5, 0.25, 0.75)
 _STYLES_PER_DASH = len(_INK_SHARES) * len(_MARKERS)  # recordings with the same dash
 
-_METHOD_STYLES = {
+METHOD_STYLES = {
     "robust": Appearance("#1B6F3A", "#5FC98A", "11px,3px,5px,3px", "star"),
     "likelihood": Appearance("#008F6B", "#2EC4A0", "solid", "diamond"),
     "likelihood_gm": Appearance("#9A6B00", "#E0A82E", "longdash", "square"),
@@ -50,6 +50,7 @@ _METHOD_STYLES = {
     "weighted": Appearance("#0072B2", "#4DA3D9", "dot", "cross"),
     "authors": Appearance("#7A4B3A", "#C69A88", "7px,3px,2px,3px,2px,3px", "circle"),
 }
+"""The appearance of each estimation method."""
 
 
 def assign_sensor_styles(sensors: list[str]) -> dict[str, Appearance]:
@@ -60,11 +61,6 @@ def assign_sensor_styles(sensors: list[str]) -> dict[str, Appearance]:
         marker = _MARKERS[(place + turn) % len(_MARKERS)]
         looks[sensor] = Appearance(*_COLOURS[colour], _DASHES[turn % len(_DASHES)], marker)
     return looks
-
-
-def get_method_style(method: str) -> Appearance:
-    """Return the appearance of an estimation method."""
-    return _METHOD_STYLES[method]
 
 
 def make_recording_styles(sensor_style: Appearance) -> list[Appearance]:

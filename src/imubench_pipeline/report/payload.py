@@ -12,7 +12,7 @@ from imubench_pipeline.estimators.estimate import COMPARED
 from imubench_pipeline.model.estimates import EnvelopeRow, HistogramRow, ModelSampleRow
 from imubench_pipeline.model.table import ChannelRow
 from imubench_pipeline.noise import NoiseModel, Term
-from imubench_pipeline.report.palette import Appearance, get_method_style
+from imubench_pipeline.report.palette import METHOD_STYLES, Appearance
 from imubench_pipeline.report.practical import format_printed
 from imubench_pipeline.report.view import METHOD_NAMES, ChannelView
 
@@ -92,7 +92,7 @@ def pack_styles(sensors: Mapping[str, Appearance]) -> Json:
     return {
         "sensors": {name: asdict(look) for name, look in sensors.items()},
         "methods": {
-            name: asdict(get_method_style(name)) | {"name": text}
+            name: asdict(METHOD_STYLES[name]) | {"name": text}
             for name, text in METHOD_NAMES.items()
         },
     }

@@ -356,12 +356,35 @@ def describe_recording(
     site: Site, view: RecordingView, channels: Sequence[ChannelView], folder: Path
 ) -> Mapping[str, object]:
     """Return the common context of the pages of recordings; ``folder`` is the recording's."""
-    metadata = load_metadata(folder)
+    metadata, row = load_metadata(folder), view.row
+    provenance = [
+        ("Recording", f"{row.sensor} / {row.recording}"),
+        ("Device", str(row.device)),
+        ("Kind", row.kind.replace("_", " ") + (", simulated" if row.simulated else "")),
+        ("Started", started_text(row.started) or "not stated in the log"),
+    ]
+    if metadata is not None:
+        provenance.append(("Format", metadata.reader or "detected from the content"))
+    if row.rate is not None:
+        error = ""
+        if row.rate_error is not None and row.rate_error > _MAX_HIDDEN_RATE_ERROR * row.rate:
+            error = f" ± {number_text(row.rate_error, 2)} Hz"
+        source = _RATE_FROM.get(row.rate_from or "", "")
+        provenance.append(("Rate", f"{number_text(row.rate, 7)} Hz{error}, {source}"))
+        rates = {channel.channel: number_text(channel.rate, 6) for channel in channels}
+        if len(set(rates.values())) > 1:
+            each = ", ".join(f"{name} {rate} Hz" for name, rate in rates.items())
+            provenance.append(("Rate per channel", each))
+    if row.samples is not None:
+        provenance.append(("Samples", f"{row.samples:,}".replace(",", " ")))
+    if metadata is not None and len(metadata.segments) > 1:
+        provenance.append(("Segments", str(len(metadata.segments))))
+    truths = {parameter.source for channel in channels for parameter in channel.truth.values()}
     return {
         "view": view,
         "name": site.names[view.sensor],
         "sensor_page": site.sensor_page(view.sensor),
-        "provenance": list(_list_provenance(view, channels, metadata)),
+        "provenance": provenance + [("Simulated from", truth) for truth in truths],
         "sources": metadata.sources if metadata else (),
         "figures_command": None,
     }
@@ -377,31 +400,3 @@ def load_metadata(folder: Path) -> recording.LogMetadata | None:
         raise RecordingError(fault)
     paths = recording.list_log_files(folder)
     return recording.read_metadata(paths[0]) if paths else None
-
-
-def _list_provenance(
-    view: RecordingView, channels: Sequence[ChannelView], metadata: recording.LogMetadata | None
-) -> Iterator[tuple[str, str]]:
-    """Yield the origin of a recording, as names and texts."""
-    row = view.row
-    yield "Recording", f"{row.sensor} / {row.recording}"
-    yield "Device", str(row.device)
-    yield "Kind", row.kind.replace("_", " ") + (", simulated" if row.simulated else "")
-    yield "Started", started_text(row.started) or "not stated in the log"
-    if metadata is not None:
-        yield "Format", metadata.reader or "detected from the content"
-    if row.rate is not None:
-        error = ""
-        if row.rate_error is not None and row.rate_error > _MAX_HIDDEN_RATE_ERROR * row.rate:
-            error = f" ± {number_text(row.rate_error, 2)} Hz"
-        source = _RATE_FROM.get(row.rate_from or "", "")
-        yield "Rate", f"{number_text(row.rate, 7)} Hz{error}, {source}"
-        rates = {channel.channel: number_text(channel.rate, 6) for channel in channels}
-        if len(set(rates.values())) > 1:
-            yield "Rate per channel", ", ".join(f"{name} {rate} Hz" for name, rate in rates.items())
-    if row.samples is not None:
-        yield "Samples", f"{row.samples:,}".replace(",", " ")
-    if metadata is not None and len(metadata.segments) > 1:
-        yield "Segments", str(len(metadata.segments))
-    for truth in {parameter.source for channel in channels for parameter in channel.truth.values()}:
-        yield "Simulated from", truth

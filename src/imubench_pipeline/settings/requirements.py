@@ -82,13 +82,9 @@ class Limit(Strict):
     at_most: Text = Field(description="with its unit, such as 1 deg or 5 m")
 
     @model_validator(mode="after")
-    def _size_is_right(self) -> Self:
+    def _consistent(self) -> Self:
         if self.size <= 0:
             raise ValueError(f"at_most is {self.at_most}; expected more than zero")
-        return self
-
-    @model_validator(mode="after")
-    def _one_time(self) -> Self:
         if (self.after is None) == (self.outage is None):
             raise ValueError("expected either 'after' or 'outage', such as 30 s")
         if (self.outage is None) != (self.trajectory is None):

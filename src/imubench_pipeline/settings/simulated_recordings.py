@@ -147,21 +147,12 @@ class SimulatedRecording(OfASensor, Surroundings, WithBlocks):
     seed: int
 
     @model_validator(mode="after")
-    def _simulated_otherwise(self) -> Self:
+    def _consistent(self) -> Self:
         for key, sensors in self.simulated_sensors.items():
             try:
                 sensors.check(self.channels)
             except ValueError as error:
                 raise ValueError(f"{key}: {error}") from None
-        return self
-
-    @property
-    def simulated_sensors(self) -> dict[str, SimulatedSensors]:
-        """The special simulation, by its key: one at most."""
-        return {key: value for key, value in self if isinstance(value, SimulatedSensors)}
-
-    @model_validator(mode="after")
-    def _one_experiment(self) -> Self:
         experiments = stated_experiments(self)
         if len(experiments) > 1:
             raise ValueError(f"found {' and '.join(experiments)}; expected one of them")
@@ -176,6 +167,11 @@ class SimulatedRecording(OfASensor, Surroundings, WithBlocks):
                     "one of the two"
                 )
         return self
+
+    @property
+    def simulated_sensors(self) -> dict[str, SimulatedSensors]:
+        """The special simulation, by its key: one at most."""
+        return {key: value for key, value in self if isinstance(value, SimulatedSensors)}
 
     @property
     def moved_gyro(self) -> str | None:

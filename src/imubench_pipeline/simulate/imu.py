@@ -40,10 +40,7 @@ class ImuModel:
             raise ValueError(f"temperature_step is {self.temperature_step}, expected from 0")
 
     def sensed(self, channel: str) -> dict[str, float]:
-        """Return the sensitivity of an axis, such as ``gyro_x``, to the true channels.
-
-        Channels with zero sensitivity are left out.
-        """
+        """Return the sensitivity of an axis, such as ``gyro_x``, to each channel that it senses."""
         quantity, row = quantity_of(channel), "xyz".index(channel[-1])
         matrix = np.asarray(self.misalignment.get(quantity, np.eye(3)))
         parts = {f"{quantity}_{axis}": float(matrix[row, i]) for i, axis in enumerate("xyz")}

@@ -69,10 +69,7 @@ def write_log(
 
 
 def notes_text(name: str, log: LogFormat, sensor: LogFormat | None, words: str) -> str:
-    """Return the notes of a log, with its log format if it differs from the sensor file.
-
-    ``name``: file name of the log. ``words``: description of the log.
-    """
+    """Return the notes of a log of this file name, with its format if the sensor has another."""
     own = log.model_dump(exclude_unset=True, exclude_none=True)
     base = {} if sensor is None else sensor.model_dump(exclude_unset=True)
     notes = {"device": "simulated", "simulated": True, "log": _diff_settings(own, base)}
@@ -106,10 +103,7 @@ def check_notes(notes: Path, path: Path) -> None:
 
 
 def layout(path: Path, columns: Iterable[str], rate: float, sensor: LogFormat | None) -> LogFormat:
-    """Return the format of a log of channels, and perhaps temperature, at a rate, Hz.
-
-    Raises ConfigError if the suffix is not a supported format.
-    """
+    """Return the format of a log at a rate, Hz; ConfigError if its suffix is not supported."""
     if path.suffix not in FORMATS:
         raise ConfigError(f"{path}: expected a name that ends in {' or '.join(FORMATS)}")
     names = list(columns)

@@ -76,7 +76,13 @@ def _make_list_reader(choices: Sequence[str]) -> Callable[[str], tuple[str, ...]
 
 def run(arguments: argparse.Namespace) -> int:
     """Write the selected figures; return the exit status."""
-    tables = _load(arguments.results)
+    # The folder may be the folder of the tables itself.
+    paths = {name: find_tables_folder(arguments.results) / f"{name}.parquet" for name in TABLES}
+    try:
+        find_tables(arguments.results, NEEDED)
+        tables = {name: read(name, [p] if p.is_file() else []) for name, p in paths.items()}
+    except (OSError, ValueError) as error:
+        raise CommandError(str(error)) from error
     chosen = select(tables, arguments.sensor, arguments.recording, arguments.channel)
     # Matplotlib is loaded only if there is something to draw.
     with require_extra("workflow", "draw figures"):
@@ -104,17 +110,6 @@ def run(arguments: argparse.Namespace) -> int:
         ]
         raise CommandError(f"found nothing to draw: {'; '.join(needs)}")
     return 0
-
-
-def _load(results: Path) -> dict[str, pa.Table]:
-    """Read the tables of a run; ``results`` may be the folder ``tables`` itself."""
-    folder = find_tables_folder(results)
-    paths = {name: folder / f"{name}.parquet" for name in TABLES}
-    try:
-        find_tables(results, NEEDED)
-        return {name: read(name, [path] if path.is_file() else []) for name, path in paths.items()}
-    except (OSError, ValueError) as error:
-        raise CommandError(str(error)) from error
 
 
 def select(

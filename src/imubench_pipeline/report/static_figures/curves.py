@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from imubench_pipeline.noise import FLOOR, NoiseModel, Term
-from imubench_pipeline.report.palette import get_method_style
+from imubench_pipeline.report.palette import METHOD_STYLES
 from imubench_pipeline.report.practical import System, choose_page_unit
 from imubench_pipeline.report.static_figures.style import (
     MEASURED,
@@ -129,7 +129,7 @@ def draw_methods_figure(view: ChannelView, system: System = "practical") -> Figu
         deviation = np.sqrt(model.allan_variance(view.tau))
         best = method == view.recommended
         width, order = (1.3, 3.0) if best else (0.9, 2.8)
-        look = convert_line_style(get_method_style(method)) | {"linewidth": width, "zorder": order}
+        look = convert_line_style(METHOD_STYLES[method]) | {"linewidth": width, "zorder": order}
         label = METHOD_NAMES[method] + " (recommended)" * best
         axes.plot(view.tau, deviation * scale, label=label, **look)
         ratio.plot(view.tau, deviation / view.adev, **look)
@@ -145,7 +145,7 @@ def _draw_reconstruction(axes: Axes, ratio: Axes, view: ChannelView, scale: floa
     curve = view.reconstruction.get(view.recommended)
     if curve is None:
         return
-    colour = get_method_style(view.recommended).light
+    colour = METHOD_STYLES[view.recommended].light
     for panel, unit, name in (
         (axes, np.full_like(curve["tau"], scale), "95 % of reconstructions"),
         (ratio, 1.0 / np.interp(curve["tau"], view.tau, view.adev), None),
@@ -276,7 +276,7 @@ def draw_datasheet_figure(view: ChannelView, system: System = "practical") -> Fi
     draw_measured(axes, view, scale)
     model = view.model(view.recommended)
     if model.terms:
-        look = convert_line_style(get_method_style(view.recommended)) | {"zorder": 2.8}
+        look = convert_line_style(METHOD_STYLES[view.recommended]) | {"zorder": 2.8}
         deviation = np.sqrt(model.allan_variance(view.tau)) * scale
         axes.plot(view.tau, deviation, label=METHOD_NAMES[view.recommended], **look)
     levels = []
