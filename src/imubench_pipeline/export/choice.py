@@ -125,7 +125,7 @@ def parameter_notes(estimate: Estimate) -> list[str]:
     """Describe the treatment of the parameters without a plain value."""
     notes = []
     for number, name, parameter in estimate.components():
-        label = texts.component_label(name, number)
+        label = name if number == 1 else f"{name} of component {number}"
         status, reason = parameter.status, parameter.reason
         lower, upper = parameter.lower, parameter.upper
         limits = None if lower is None or upper is None else (lower, upper)

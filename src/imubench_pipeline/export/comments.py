@@ -8,7 +8,6 @@ from imubench_pipeline.export.imu import Imu
 from imubench_pipeline.export.mapping import Mapped, describe_terms
 from imubench_pipeline.tables.texts import escape_invisible
 from imubench_pipeline.words.numbers import number_text
-from imubench_pipeline.words.reasons import exports as texts
 
 _LINE_WIDTH = 96
 
@@ -28,7 +27,7 @@ def describe_model(
     """
     statements = [f"Noise of the {imu.sensor} for {program}, by imubench."]
     if imu.simulated:
-        statements.append(f"{texts.SIMULATED_RECORDINGS}.")
+        statements.append("The recordings are SIMULATED, not measured.")
     statements += [f"CAUTION: {caution}." for caution in imu.cautions]
     statements.append(convention)
     units = {"gyro": "rad, s", "accel": "m, s"}
@@ -46,9 +45,14 @@ def describe_model(
             for name, effect in imu.temperature.items()
             for note in effect.notes
         ]
-        statements.append(f"{texts.BIASES_NOT_INCLUDED}.")
+        statements.append(
+            "Fixed biases are not included, as they change from one start to the next."
+        )
     else:
-        statements.append(f"{texts.NOISE_ONLY}.")
+        statements.append(
+            "The file contains noise only. Fixed biases change from one start to the next, and "
+            "they and their dependence on temperature are not included."
+        )
     if imu.inflation != 1.0:
         statements.append(
             f"INFLATED: all densities and amplitudes below are {number_text(imu.inflation)} times "

@@ -21,7 +21,6 @@ from imubench_pipeline.model.recordings import RecordingRow
 from imubench_pipeline.model.table import R
 from imubench_pipeline.recordings.fitness import list_excluded
 from imubench_pipeline.tables.files import find_tables, find_tables_folder, read
-from imubench_pipeline.words.reasons import exports as texts
 from imubench_pipeline.words.reasons.pools import recordings_not_used
 from imubench_pipeline.words.verdicts import doubts_text
 
@@ -197,7 +196,7 @@ def _bound_axis(
     fitted = f"the fitted model was: {describe_terms(choice.axis.model.terms)}"
     notes = [bound.words, bound.density_words, fitted, *choice.axis.notes]
     if bound.warning:
-        notes.insert(0, texts.excess_warning(bound.warning, _list_larger_programs(family)))
+        notes.insert(0, f"WARNING: {'; '.join([bound.warning, *_list_larger_programs(family)])}")
     return replace(choice.axis, model=bound.model, notes=notes, bounded=bound.band)
 
 

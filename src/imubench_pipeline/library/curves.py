@@ -1,6 +1,6 @@
 """Allan curves of logs, arrays and tables, by channel."""
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -13,7 +13,7 @@ from imubench_pipeline.allan.threads import count_threads
 from imubench_pipeline.estimators.rows import make_allan_rows
 from imubench_pipeline.library import given
 from imubench_pipeline.library.logs import Log
-from imubench_pipeline.library.shown import Shown, Summary
+from imubench_pipeline.library.shown import Shown, ShownMapping, Summary
 from imubench_pipeline.recordings.recording import ChannelLog
 from imubench_pipeline.settings.sensor import TEMPERATURE, quantity_of
 from imubench_pipeline.steps.allan import curve_of, report_too_sparse
@@ -71,7 +71,7 @@ class Curve(Shown, AllanCurve):
         return Summary(f"{title}, {self.samples:,} samples", _SUMMARY_HEADS, [_make_row(self)])
 
 
-class Curves(Shown, Mapping[str, Curve]):
+class Curves(ShownMapping[Curve]):
     """Allan curves by channel, in SI.
 
     Attributes
@@ -81,17 +81,8 @@ class Curves(Shown, Mapping[str, Curve]):
     """
 
     def __init__(self, curves: Iterable[Curve], name: str = "") -> None:
-        self._curves = {str(curve.channel): curve for curve in curves}
+        self._by_channel = {str(curve.channel): curve for curve in curves}
         self.name = name
-
-    def __getitem__(self, channel: str) -> Curve:
-        return self._curves[channel]
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._curves)
-
-    def __len__(self) -> int:
-        return len(self._curves)
 
     def plot(self, ax: "Axes | Sequence[Axes] | None" = None) -> Any:
         """Draw the curves, one panel per quantity; return the axes, shape (quantities,)."""

@@ -12,7 +12,7 @@ from imubench_pipeline.estimators.rows import make_parameter_rows
 from imubench_pipeline.library.curves import Curve, Curves, measured
 from imubench_pipeline.library.given import Channels, Units, read_columns, read_rate
 from imubench_pipeline.library.logs import Log, ingest_columns
-from imubench_pipeline.library.shown import Shown, Summary, cut
+from imubench_pipeline.library.shown import Shown, ShownMapping, Summary, cut
 from imubench_pipeline.model.recordings import DoubtRow
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.recordings.fitness import derive_doubts
@@ -88,7 +88,7 @@ class ChannelEstimate(Shown, Estimate):
         return Summary(title, _SUMMARY_HEADS, list(_make_rows(self)), _list_reasons([self]))
 
 
-class Estimates(Shown, Mapping[str, ChannelEstimate]):
+class Estimates(ShownMapping[ChannelEstimate]):
     """The noise parameters of a log, by channel.
 
     Attributes
@@ -113,19 +113,10 @@ class Estimates(Shown, Mapping[str, ChannelEstimate]):
         doubts: Sequence[DoubtRow],
         left_out: Mapping[str, str],
     ) -> None:
-        self._estimates = {estimate.channel: estimate for estimate in estimates}
+        self._by_channel = {estimate.channel: estimate for estimate in estimates}
         self.log, self.method = log, method
         self.findings, self.doubts = tuple(findings), tuple(doubts)
         self.left_out = dict(left_out)
-
-    def __getitem__(self, channel: str) -> ChannelEstimate:
-        return self._estimates[channel]
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._estimates)
-
-    def __len__(self) -> int:
-        return len(self._estimates)
 
     @property
     def name(self) -> str:

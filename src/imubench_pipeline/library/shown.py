@@ -1,10 +1,12 @@
 """Summaries of results for notebooks and terminals: a title, a small table, remarks."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from html import escape
+from typing import TypeVar
 
+V = TypeVar("V")
 _MAX_ROWS = 60  # max. number of rows in a summary
 
 
@@ -59,6 +61,21 @@ class Shown(ABC):
 
     def _repr_html_(self) -> str:
         return self._summary().html()
+
+
+class ShownMapping(Shown, Mapping[str, V]):
+    """Results by channel."""
+
+    _by_channel: Mapping[str, V]
+
+    def __getitem__(self, channel: str) -> V:
+        return self._by_channel[channel]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._by_channel)
+
+    def __len__(self) -> int:
+        return len(self._by_channel)
 
 
 def cut(text: str, most: int = 60) -> str:

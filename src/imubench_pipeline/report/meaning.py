@@ -13,15 +13,7 @@ from imubench_pipeline.navigation.suitability import compute_variance_shares
 from imubench_pipeline.report.payload import Json
 from imubench_pipeline.report.practical import System, choose_unit
 from imubench_pipeline.settings.requirements import DIMENSIONS, Requirement
-from imubench_pipeline.words import verdicts
-from imubench_pipeline.words.numbers import (
-    NO_VALUE,
-    Unit,
-    count_digits,
-    duration_text,
-    interval_text,
-    number_text,
-)
+from imubench_pipeline.words import numbers, verdicts
 
 
 class SourcedNumber(str):
@@ -82,9 +74,11 @@ def format_margin(row: RankingRow) -> tuple[SourcedNumber, SourcedNumber, Source
     if row.margin is None:
         return None
     low, high = compute_margin_limits(row)
-    digits = min(count_digits(row.margin, low, high), _MAX_DIGITS)
+    digits = min(numbers.count_digits(row.margin, low, high), _MAX_DIGITS)
     named = (("margin", row.margin), ("limit:upper", low), ("limit:lower", high))
-    first, lower, upper = (source_number(row, name, number_text(x, digits)) for name, x in named)
+    first, lower, upper = (
+        source_number(row, name, numbers.number_text(x, digits)) for name, x in named
+    )
     return first, lower, upper
 
 
@@ -192,7 +186,7 @@ def _group(limits: Sequence[RankingRow], simulated: Simulated, system: System) -
     return Group(
         row,
         simulated=all(simulated.get((row.sensor, name or ""), False) for name in used),
-        rank=str(row.rank or NO_VALUE),
+        rank=str(row.rank or numbers.NO_VALUE),
         verdict=verdicts.VERDICT_WORDS[row.verdict],
         stated=verdicts.stated_verdict(row),
         weak=verdicts.evidence_text(row) if row.rank else "",
@@ -211,15 +205,15 @@ def _limit(row: RankingRow, system: System) -> LimitLine:
         allowed=source_number(row, "limit", f"{unit.text(row.limit)} {unit.sign}", unit.sign),
         sigma=_expected(row, system),
         interval=_interval(row, system),
-        margin=size[0] if size else NO_VALUE,
+        margin=size[0] if size else numbers.NO_VALUE,
         margins=SourcedInterval(size[1], size[2]) if size else "",
         other_margins=verdicts.other_margins_text(row) if size else "",
         chance=chance,
         source=f"{verdicts.source_text(row.parts[0])} ({_percent(row.share)})"
         if row.parts
-        else NO_VALUE,
-        parts=[verdicts.share_text(share) for share in row.parts] or [NO_VALUE],
-        reached=duration_text(row.reached_after),
+        else numbers.NO_VALUE,
+        parts=[verdicts.share_text(share) for share in row.parts] or [numbers.NO_VALUE],
+        reached=numbers.duration_text(row.reached_after),
         decides=row.decides,
         reason="; ".join(row.reasons),
         backtest=describe_backtest(row),
@@ -233,7 +227,7 @@ ErrorRow = RankingRow | ErrorBudgetRow
 def _expected(row: ErrorRow, system: System) -> str:
     """Return the error of a row; a dash where it is not known."""
     if row.sigma is None:
-        return NO_VALUE
+        return numbers.NO_VALUE
     unit = choose_unit(DIMENSIONS[row.error], system, row.sigma)
     text = _format_error(row, row.sigma, unit)
     return source_number(row, "sigma", text, unit.sign) if _is_sensible(row, row.sigma) else text
@@ -242,9 +236,9 @@ def _expected(row: ErrorRow, system: System) -> str:
 def _interval(row: ErrorRow, system: System) -> str:
     """Return the limits of the error of a row, in the unit of the error."""
     if row.sigma is None or row.lower is None or row.upper is None:
-        return NO_VALUE
+        return numbers.NO_VALUE
     if not _is_sensible(row, row.sigma):
-        return NO_VALUE
+        return numbers.NO_VALUE
     unit = choose_unit(DIMENSIONS[row.error], system, row.sigma)
     digits = min(unit.digits(row.sigma, row.lower, row.upper), _MAX_DIGITS)
     lower, upper = (
@@ -265,7 +259,7 @@ def describe_limit(row: RankingRow) -> str:
     """Return the error and the time of a limit, from a row of ``ranking``."""
     drive = f" without GNSS ({row.trajectory})" if row.trajectory else ""
     names = _NAMES if row.trajectory else _NAMES_IN_LIMITS
-    return f"{names[row.error]}, {duration_text(row.time)}{drive}"
+    return f"{names[row.error]}, {numbers.duration_text(row.time)}{drive}"
 
 
 def make_budget_tables(
@@ -297,7 +291,7 @@ def make_budget_tables(
             "sensor": key[0],
             "recording": key[1],
             "simulated": simulated.get(key, False),
-            "times": [duration_text(time) for time in times],
+            "times": [numbers.duration_text(time) for time in times],
             "lines": list(lines.values()),
             "missing": "; ".join(missing),
             "notes": [f"{', '.join(of).capitalize()}: {note}" for note, of in notes.items()],
@@ -327,7 +321,7 @@ def make_budget_bars(rows: Sequence[ErrorBudgetRow], system: System) -> list[Jso
             for row in parts
             if row.source != "total" and row.sigma
         ]
-        bars.append({"label": f"{error} {duration_text(time)}: {size}", "shares": shares})
+        bars.append({"label": f"{error} {numbers.duration_text(time)}: {size}", "shares": shares})
     return bars
 
 
@@ -341,14 +335,14 @@ def _cell(rows: Sequence[ErrorBudgetRow], system: System) -> Json:
     total = _total(rows)
     if total is None or total.sigma is None:
         return {
-            "lines": [NO_VALUE],
+            "lines": [numbers.NO_VALUE],
             "note": "; ".join(total.reasons) if total else "",
             "known": False,
         }
     unit = choose_unit(DIMENSIONS[total.error], system, total.sigma)
     lines = [_format_error(total, total.sigma, unit)]
     if _is_sensible(total, total.sigma):
-        lines.append(interval_text(total.lower, total.upper, unit, total.sigma))
+        lines.append(numbers.interval_text(total.lower, total.upper, unit, total.sigma))
     sources = [row for row in rows if row.source != "total"]
     if total.sigma > 0.0:
         lines += [
@@ -362,7 +356,7 @@ def _is_sensible(row: ErrorRow, sigma: float) -> bool:
     return DIMENSIONS[row.error] != "angle" or sigma <= _QUARTER_TURN
 
 
-def _format_error(row: ErrorRow, sigma: float, unit: Unit) -> str:
+def _format_error(row: ErrorRow, sigma: float, unit: numbers.Unit) -> str:
     """Return the error of a row with its unit, and as many digits as its limits allow."""
     if not _is_sensible(row, sigma):
         north = row.error == "north"
@@ -372,7 +366,7 @@ def _format_error(row: ErrorRow, sigma: float, unit: Unit) -> str:
 
 
 def _percent(share: float | None) -> str:
-    return NO_VALUE if share is None else f"{100 * share:.0f} %"
+    return numbers.NO_VALUE if share is None else f"{100 * share:.0f} %"
 
 
 def explain_budget(settings: Mapping[str, Any]) -> str:
@@ -396,8 +390,8 @@ def format_backtest(
         line: dict[str, object] = {
             "requirement": requirements.get(row.requirement, {}).get("title") or row.requirement,
             "channel": row.channel.replace("_", " "),
-            "error": f"{row.error}, {duration_text(row.time)}",
-            "window": duration_text(row.window) if row.window is not None else "–",
+            "error": f"{row.error}, {numbers.duration_text(row.time)}",
+            "window": numbers.duration_text(row.window) if row.window is not None else "–",
             "measured": "–",
             "predicted": "–",
             "ratio": "–",
@@ -411,10 +405,10 @@ def format_backtest(
             line["predicted"] = f"{unit.text(row.predicted)} {unit.sign}"
         if row.ratio is not None:
             line["measured"] = f"{unit.text(row.measured)} {unit.sign}"
-            line["ratio"] = number_text(row.ratio, 3)
+            line["ratio"] = numbers.number_text(row.ratio, 3)
             line["range"] = format_range(row.ratio_lower, row.ratio_upper)
-            independent = f"({number_text(row.independent, 2)} independent)"
-            line["windows"] = f"{number_text(row.windows, 9)} {independent}"
+            independent = f"({numbers.number_text(row.independent, 2)} independent)"
+            line["windows"] = f"{numbers.number_text(row.windows, 9)} {independent}"
         if row.taken_out and not row.reason:
             line["why"] = (
                 f"in the log, not in the model: {', '.join(row.taken_out).replace('_', ' ')}"
@@ -425,7 +419,7 @@ def format_backtest(
 
 def format_range(lower: float | None, upper: float | None) -> str:
     """Return the expected range of a ratio."""
-    return f"{number_text(lower, 2)} to {number_text(upper, 2)}"
+    return f"{numbers.number_text(lower, 2)} to {numbers.number_text(upper, 2)}"
 
 
 def describe_backtest(row: RankingRow) -> str:
@@ -438,6 +432,7 @@ def describe_backtest(row: RankingRow) -> str:
     if lower is not None and upper is not None:
         place = ": inside" if lower <= row.backtest_ratio <= upper else ": outside"
     return (
-        f"observed / predicted {row.error} of {channel} after {duration_text(row.time)}: "
-        f"{number_text(row.backtest_ratio, 3)} (expected {format_range(lower, upper)}){place}"
+        f"observed / predicted {row.error} of {channel} after {numbers.duration_text(row.time)}: "
+        f"{numbers.number_text(row.backtest_ratio, 3)} (expected "
+        f"{format_range(lower, upper)}){place}"
     )

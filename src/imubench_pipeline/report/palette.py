@@ -64,11 +64,7 @@ def assign_sensor_styles(sensors: list[str]) -> dict[str, Appearance]:
 
 
 def make_recording_styles(sensor_style: Appearance) -> list[Appearance]:
-    """Return the appearances of the recordings of a sensor, by their order; they repeat.
-
-    The first equals the appearance of the sensor; the others have darker shades of its colour,
-    other markers, and finally other dashes.
-    """
+    """Return the styles of the recordings of a sensor: its own, other shades, markers, dashes."""
     own = sensor_style
     first, shades = _MARKERS.index(own.marker), len(_INK_SHARES)
     dashes = [own.dash, *(dash for dash in _DASHES if dash != own.dash)]

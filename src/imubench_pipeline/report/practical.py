@@ -68,11 +68,7 @@ _MIN_SIZE_OF_PREFIX = ((1e3, "k"), (0.1, ""), (1e-4, "m"), (0.0, "µ"))
 
 
 def choose_page_unit(quantity: str, symbol: str, system: System) -> Unit:
-    """Return the initial unit of a figure of a quantity on a page.
-
-    The symbol is a parameter, or ``adev``, ``psd`` (root of a density) or ``signal`` (the log
-    itself).
-    """
+    """Return the initial unit of a parameter, ``adev``, ``psd`` (root of it) or ``signal``."""
     return _find_unit(quantity, symbol, choose_first_units(system)[quantity])
 
 

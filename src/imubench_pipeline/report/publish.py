@@ -72,7 +72,7 @@ def make_templates(system: System) -> jinja2.Environment:
         return Markup(f'<data value="{rounded}"{of}>{text}</data>')
 
     def parameter_cell(cell: Mapping[str, Any], unit: str) -> Markup:
-        """Return a cell of `report.parameters` with its intervals, as compact HTML."""
+        """Return a cell of `report.comparison` with its intervals, as compact HTML."""
         digits = cell["digits"]
         number = partial(si, unit=unit, digits=digits, inside=True)
         parts = []
@@ -340,11 +340,7 @@ def make_site(tables: Mapping[str, pa.Table], settings: str, results: Path) -> S
 
 
 def load_site(results: Path) -> Site:
-    """Return the site of a finished run, from its files.
-
-    Raises FileNotFoundError if there is no report. Raises ValueError if it is damaged, or from
-    another version.
-    """
+    """Return the site of a finished run; FileNotFoundError without one, else ValueError."""
     path = results / "report" / _SETTINGS_FILE
     settings = path.read_text(encoding="utf-8")
     try:

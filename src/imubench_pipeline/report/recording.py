@@ -14,24 +14,15 @@ from imubench_pipeline.recordings import recording
 from imubench_pipeline.recordings.kept import Quality
 from imubench_pipeline.registry import Hook
 from imubench_pipeline.report import meaning, payload
+from imubench_pipeline.report.comparison import make_methods_table
 from imubench_pipeline.report.datasheets import compare_with_datasheet, format_curve_distances
-from imubench_pipeline.report.parameters import make_methods_table
 from imubench_pipeline.report.practical import System, choose_page_unit, format_temperature
 from imubench_pipeline.report.site import Page, RecordingPage, Site, make_command
 from imubench_pipeline.report.view import ChannelView, RecordingView
 from imubench_pipeline.tables.files import read
 from imubench_pipeline.tables.findings import RecordingError
+from imubench_pipeline.words import numbers
 from imubench_pipeline.words.estimates import model_text, precision_text, symbol_text
-from imubench_pipeline.words.numbers import (
-    NO_VALUE,
-    count_digits,
-    counted,
-    duration_text,
-    number_text,
-    rates_text,
-    sentence,
-    started_text,
-)
 
 _TEMPERATURE_TERMS = (
     ("sensitivity", "temperature_sensitivity", "sensitivity"),
@@ -79,10 +70,10 @@ def list_thermal_figures(channel: ChannelView) -> Iterator[Mapping[str, object]]
             "value": row.value,
             "lower": row.lower,
             "upper": row.upper,
-            "digits": count_digits(row.value, row.lower, row.upper, name),
+            "digits": numbers.count_digits(row.value, row.lower, row.upper, name),
             "status": "" if row.status == "ok" else row.status,
             "truth": truth.value if truth else None,
-            "why": sentence(row.reason),
+            "why": numbers.sentence(row.reason),
         }
 
 
@@ -99,7 +90,9 @@ def describe_thermal(channel: ChannelView, system: System) -> list[str]:
             lines += [change + _describe_reduction(channel), _NOT_COMPENSATED]
         else:
             lines.append(f"The temperature effect is not removed: {sensitivity.reason}.")
-        lines.append(f"The mean temperature T₀ is {number_text(temperature['T_0'].value)} °C.")
+        lines.append(
+            f"The mean temperature T₀ is {numbers.number_text(temperature['T_0'].value)} °C."
+        )
     if low_pass and low_pass["cutoff"].status == "absent":
         lines.append("The spectrum shows no low-pass of the sensor.")
     elif low_pass:
@@ -108,7 +101,8 @@ def describe_thermal(channel: ChannelView, system: System) -> list[str]:
         kind += f", order {order}" if order not in (None, 1) else ""
         if cutoff is not None:
             lines.append(
-                f"The sensor's own low-pass has its cut-off at {number_text(cutoff)} Hz ({kind})."
+                f"The sensor's own low-pass has its cut-off at {numbers.number_text(cutoff)} Hz "
+                f"({kind})."
             )
     return lines
 
@@ -122,7 +116,7 @@ def _describe_reduction(channel: ChannelView) -> str:
     taus = _SHOWN_TAU[(_SHOWN_TAU >= left["tau"][0]) & (_SHOWN_TAU <= left["tau"][-1])]
     at = np.interp(np.log(taus), np.log(left["tau"]), ratio)
     parts = [
-        f"{number_text(float(factor), 3)} at τ = {number_text(float(tau))} s"
+        f"{numbers.number_text(float(factor), 3)} at τ = {numbers.number_text(float(tau))} s"
         for tau, factor in zip(taus, at, strict=True)
         if factor > _MIN_SHOWN_RATIO
     ]
@@ -225,16 +219,16 @@ def _summarise(view: RecordingView, channels: int) -> str:
     if view.left_out:
         why = "was rejected" if view.rejected else "could not be analysed, because a step failed"
         return f"This recording {why}; the comparison does not include it."
-    started = f"from {started_text(view.row.started)}" if view.row.started else ""
-    warnings = counted(len(view.warnings), "warning") if view.warnings else "no warnings"
-    parts = (started, format_temperature(view.row), counted(channels, "channel"), warnings)
+    started = f"from {numbers.started_text(view.row.started)}" if view.row.started else ""
+    warnings = numbers.counted(len(view.warnings), "warning") if view.warnings else "no warnings"
+    parts = (started, format_temperature(view.row), numbers.counted(channels, "channel"), warnings)
     return summarise_recording(view, [part for part in parts if part])
 
 
 def summarise_recording(view: RecordingView, parts: Sequence[str]) -> str:
     """Return length and rate of a recording, and additional parts, as a sentence."""
     row = view.row
-    length = f"{duration_text(row.duration)} at {rates_text(row.rate, view.rates)}"
+    length = f"{numbers.duration_text(row.duration)} at {numbers.rates_text(row.rate, view.rates)}"
     kind = "Simulated from known parameters, not measured: " if view.simulated else ""
     return kind + ", ".join([length, *parts]) + "."
 
@@ -253,11 +247,11 @@ def _describe_channel(
         score = channel.scores.get(line["method"] or "")
         if score is not None and score.rms_log10 is not None:
             ends = (score.drawn_log10_lower, score.drawn_log10_upper)
-            low, high = (number_text(end, 2) for end in ends)
+            low, high = (numbers.number_text(end, 2) for end in ends)
             inside = score.inside_band
-            line["score"] = number_text(score.rms_log10, 2)
-            line["drawn"] = number_text(score.drawn_log10, 2), f"{low} to {high}"
-            line["inside"] = NO_VALUE if inside is None else f"{100 * inside:.0f} %"
+            line["score"] = numbers.number_text(score.rms_log10, 2)
+            line["drawn"] = numbers.number_text(score.drawn_log10, 2), f"{low} to {high}"
+            line["inside"] = numbers.NO_VALUE if inside is None else f"{100 * inside:.0f} %"
     best = channel.models[0] if channel.models else None
     return {
         "view": channel,
@@ -273,8 +267,8 @@ def _describe_channel(
             {
                 "model": row.model,
                 "chosen": row.chosen,
-                "above": number_text(row.bic - best.bic, 3) if best else "",
-                "deviance": number_text(row.deviance, 3),
+                "above": numbers.number_text(row.bic - best.bic, 3) if best else "",
+                "deviance": numbers.number_text(row.deviance, 3),
                 "verdict": row.verdict,
             }
             for place, row in enumerate(channel.models)
@@ -283,7 +277,7 @@ def _describe_channel(
         "spectral_lines": channel.lines,
         "thermal": describe_thermal(channel, site.system),
         "thermal_figures": list(list_thermal_figures(channel)),
-        "line_count": counted(len(channel.lines), "line"),
+        "line_count": numbers.counted(len(channel.lines), "line"),
         "deltas": list(compare_with_datasheet(channel, site.coverage, site.system)),
         "away": list(format_curve_distances(channel, site.system)),
     }
@@ -336,8 +330,10 @@ def _compare_deviations(rows: Sequence[estimates.ModelSampleRow], channel: str) 
     widths = [(of, own[of].mean) for of in ("before", "after") if of in own]
     if log is None or not log.mean:
         return ""
-    ratios = [f"{number_text(w / log.mean, 4)} {of} the fit" for of, w in widths if w is not None]
-    length = f"Standard deviation relative to the log ({duration_text(log.end)})"
+    ratios = [
+        f"{numbers.number_text(w / log.mean, 4)} {of} the fit" for of, w in widths if w is not None
+    ]
+    length = f"Standard deviation relative to the log ({numbers.duration_text(log.end)})"
     return f"{length}: {', '.join(ratios)}." if ratios else ""
 
 
@@ -347,9 +343,11 @@ def _describe_model(channel: ChannelView) -> str:
     best = channel.models[0]
     text = (
         f"{model_text(best.model)} has the lowest BIC ({best.verdict}). The deviance per bin is "
-        f"{number_text(best.deviance, 3)}; a correct model gives about 1."
+        f"{numbers.number_text(best.deviance, 3)}; a correct model gives about 1."
     )
-    return " ".join(filter(None, [text, sentence(best.note), sentence(best.band_source)]))
+    return " ".join(
+        filter(None, [text, numbers.sentence(best.note), numbers.sentence(best.band_source)])
+    )
 
 
 def describe_recording(
@@ -361,17 +359,17 @@ def describe_recording(
         ("Recording", f"{row.sensor} / {row.recording}"),
         ("Device", str(row.device)),
         ("Kind", row.kind.replace("_", " ") + (", simulated" if row.simulated else "")),
-        ("Started", started_text(row.started) or "not stated in the log"),
+        ("Started", numbers.started_text(row.started) or "not stated in the log"),
     ]
     if metadata is not None:
         provenance.append(("Format", metadata.reader or "detected from the content"))
     if row.rate is not None:
         error = ""
         if row.rate_error is not None and row.rate_error > _MAX_HIDDEN_RATE_ERROR * row.rate:
-            error = f" ± {number_text(row.rate_error, 2)} Hz"
+            error = f" ± {numbers.number_text(row.rate_error, 2)} Hz"
         source = _RATE_FROM.get(row.rate_from or "", "")
-        provenance.append(("Rate", f"{number_text(row.rate, 7)} Hz{error}, {source}"))
-        rates = {channel.channel: number_text(channel.rate, 6) for channel in channels}
+        provenance.append(("Rate", f"{numbers.number_text(row.rate, 7)} Hz{error}, {source}"))
+        rates = {channel.channel: numbers.number_text(channel.rate, 6) for channel in channels}
         if len(set(rates.values())) > 1:
             each = ", ".join(f"{name} {rate} Hz" for name, rate in rates.items())
             provenance.append(("Rate per channel", each))
@@ -391,10 +389,7 @@ def describe_recording(
 
 
 def load_metadata(folder: Path) -> recording.LogMetadata | None:
-    """Return the metadata of the log in a folder of a recording; None without samples.
-
-    Raises RecordingError if it is not there any more, or not as the ingest left it.
-    """
+    """Return the metadata of a log; None without samples, RecordingError if it was altered."""
     quality = folder / "quality.json"
     if quality.is_file() and (fault := Quality.read(quality).fault(folder)):
         raise RecordingError(fault)

@@ -26,10 +26,7 @@ from imubench_pipeline.tables.schemas import OF_ONE_RECORDING, TABLES
 
 
 def make_command(name: str, results: str, options: Mapping[str, str] | None = None) -> str:
-    """Return a command of `make_command`, such as ``figures``, for the results of a run.
-
-    ``options`` has the values of options such as ``--sensor``; a word in capitals is a placeholder.
-    """
+    """Return a command such as ``figures`` for the results of a run, with values of its options."""
     words = ["imubench", name, f"./{results}" if results.startswith("-") else results]
     for key, value in (options or {}).items():
         words += [f"{key}={value}"] if value.startswith("-") else [key, value]

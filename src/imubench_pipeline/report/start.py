@@ -25,14 +25,7 @@ from imubench_pipeline.report.payload import FOREST, pack_styles
 from imubench_pipeline.report.site import Entry, Site
 from imubench_pipeline.report.view import RecordingView
 from imubench_pipeline.settings.requirements import Requirement
-from imubench_pipeline.words import verdicts
-from imubench_pipeline.words.numbers import (
-    counted,
-    duration_text,
-    join_names,
-    number_text,
-    sentence,
-)
+from imubench_pipeline.words import numbers, verdicts
 
 _VERDICTS: tuple[Verdict, ...] = get_args(Verdict)
 _MAX_ORDER_DECADES = 4.0  # maximum decades from 1 by which margins are sorted
@@ -63,7 +56,7 @@ class Scale:
     def ticks(self) -> list[tuple[str, float]]:
         """Decades with their places."""
         powers = range(math.ceil(self.low), math.floor(self.high) + 1)
-        return [(number_text(10.0**power), self.place(10.0**power)) for power in powers]
+        return [(numbers.number_text(10.0**power), self.place(10.0**power)) for power in powers]
 
 
 @dataclass(frozen=True)
@@ -208,7 +201,7 @@ def _cell(row: RankingRow, scale: Scale) -> Cell:
         reason = "; ".join(row.reasons) or "too little is known"
     # Margins with the recordings that are not used, and with corrected units.
     alternatives = [
-        (words, source_number(row, name, number_text(size, 2)), scale.place(size))
+        (words, source_number(row, name, numbers.number_text(size, 2)), scale.place(size))
         for words, name, size in (
             ("as logged", "logged_margin", row.logged_margin),
             ("if corrected", "corrected_margin", row.corrected_margin),
@@ -239,9 +232,9 @@ def summarise_counts(site: Site) -> list[dict[str, object]]:
     seconds = sum(view.row.duration or 0.0 for view in views)
     doubted = sum(bool(view.warnings) for view in views)
     parts = [
-        (counted(len(site.sensors), "sensor"), "#sensors", 0),
-        (counted(len(views), "recording"), "recordings.html", 0),
-        (f"{duration_text(seconds)} of data", "recordings.html", 0),
+        (numbers.counted(len(site.sensors), "sensor"), "#sensors", 0),
+        (numbers.counted(len(views), "recording"), "recordings.html", 0),
+        (f"{numbers.duration_text(seconds)} of data", "recordings.html", 0),
         (f"{rejected} rejected", "#rejected" if rejected else "recordings.html", rejected),
         (f"{doubted} in doubt", "#warnings" if doubted else "recordings.html", doubted),
         *([(f"{failed} failed", "#failed", failed)] if failed else []),
@@ -266,7 +259,7 @@ def _start(site: Site) -> Mapping[str, object]:
     unexpected = sum(
         any(row.finding not in site.on_purpose(view) for row in view.warnings) for view in warned
     )
-    in_doubt = f"{counted(len(warned), 'recording')} in doubt"
+    in_doubt = f"{numbers.counted(len(warned), 'recording')} in doubt"
     if unexpected < len(warned):
         in_doubt += f", all{f' but {unexpected}' if unexpected else ''} simulated to show it"
     return {
@@ -313,10 +306,10 @@ def summarise_recordings(views: Sequence[RecordingView], several: bool = True) -
     sensors = {view.sensor for view in views}
     rejected = sum(view.rejected for view in views)
     failed = sum(view.left_out for view in views) - rejected
-    of = f" of {counted(len(sensors), 'sensor')}" if several else ""
-    parts = [counted(len(views), "recording") + of]
+    of = f" of {numbers.counted(len(sensors), 'sensor')}" if several else ""
+    parts = [numbers.counted(len(views), "recording") + of]
     lasting = sum(view.row.duration or 0.0 for view in views)
-    parts += [f"{duration_text(lasting)} of data" if lasting else "", describe_dates(views)]
+    parts += [f"{numbers.duration_text(lasting)} of data" if lasting else "", describe_dates(views)]
     counts = f"{len(views) - rejected - failed} analysed, {rejected} rejected"
     counts += f", {failed} failed" * bool(failed)
     return f"{', '.join(filter(None, parts))}: {counts}. {describe_simulated(views)}".rstrip()
@@ -416,7 +409,8 @@ def _details(site: Site, groups: Sequence[Group], ranked: Sequence[Group]) -> It
         if conditions := group.row.conditions:
             yield f"Conditions: {'; '.join(map(verdicts.condition_text, conditions))}."
         if tied := _name_tied(site, group):
-            yield f"The difference from {join_names(tied)} is not statistically significant."
+            others = numbers.join_names(tied)
+            yield f"The difference from {others} is not statistically significant."
     yield from verdicts.list_others(
         (group.row for group in groups if group not in ranked[:1]), site.names
     )
@@ -436,7 +430,7 @@ def _list_next_steps(site: Site) -> Iterator[Mapping[str, object]]:
                 for view in site.views
                 if view.sensor == row.sensor and row.recording in (None, view.name)
             ),
-            "text": sentence(row.text),
+            "text": numbers.sentence(row.text),
             "about": "; ".join(asked[name]["title"] for name in row.requirements),
         }
 
@@ -450,12 +444,12 @@ def _describe_data(site: Site, row: RankingRow) -> str:
     )
     if chosen is None or not row.recordings:
         return left_out.strip()
-    axes = counted(len(chosen.recommended()), "axis", "axes")
-    log = f"{chosen.name} ({duration_text(chosen.row.duration)}, {axes})"
+    axes = numbers.counted(len(chosen.recommended()), "axis", "axes")
+    log = f"{chosen.name} ({numbers.duration_text(chosen.row.duration)}, {axes})"
     if row.recordings == 1:
         text = f"Data: one recording, {log}; other units may differ."
     else:
-        units = f" of {counted(row.specimens, 'unit')}" if row.specimens is not None else ""
+        units = f" of {numbers.counted(row.specimens, 'unit')}" if row.specimens is not None else ""
         text = f"Data: {row.recordings} recordings{units}; {log} is nearest to the prediction."
     if spread := verdicts.spread_text(row):
         text += f" Spread: {spread}."
@@ -466,7 +460,7 @@ def _describe_data(site: Site, row: RankingRow) -> str:
 
 def _describe_sensor(site: Site, name: str) -> Mapping[str, object]:
     own = [view for view in site.views if view.sensor == name]
-    counts = [counted(len(own), "recording")]
+    counts = [numbers.counted(len(own), "recording")]
     for status in ("rejected", "failed"):
         number = sum(view.row.status == status for view in own)
         counts += [f"{number} {status}"] * bool(number)

@@ -18,8 +18,8 @@ from imubench_pipeline.model.recordings import DoubtRow, FailureRow, FindingRow,
 from imubench_pipeline.model.states import Verdict
 from imubench_pipeline.model.table import OfRecordingRow
 from imubench_pipeline.report import run_summary
+from imubench_pipeline.report.comparison import select_symbols
 from imubench_pipeline.report.meaning import Group, format_rankings
-from imubench_pipeline.report.parameters import select_symbols
 from imubench_pipeline.report.practical import System, choose_page_unit, format_temperature
 from imubench_pipeline.settings.requirements import Requirement
 from imubench_pipeline.settings.sensor import quantity_of

@@ -31,10 +31,7 @@ class WithBlocks(Strict):
 
 
 def with_blocks(place: Place) -> Callable[[type[_Model]], type[_Model]]:
-    """Return a decorator that adds the blocks of all extensions to a model, as fields.
-
-    An omitted block of a run has its defaults; any other omitted block is null.
-    """
+    """Return a decorator that adds the blocks of extensions: defaults for a run, else null."""
 
     def extend(model: type[_Model]) -> type[_Model]:
         fields: dict[str, Any] = {}

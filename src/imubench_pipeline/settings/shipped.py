@@ -20,10 +20,7 @@ def find_project() -> Path:
 
 
 def list_folders(stated: Folders, kind: Literal["sensors", "requirements"]) -> list[Path]:
-    """Return the folders named in a configuration, without duplicates; later ones have precedence.
-
-    The folder of a project, ``config/<kind>``, may be missing beside another one.
-    """
+    """Return the folders of a configuration, each once, later ones with precedence."""
     found: dict[Path, Path] = {}
     for folder in [stated] if isinstance(stated, Path) else stated:
         place = find_project() / "config" / kind if folder == CATALOGUE else folder

@@ -54,10 +54,7 @@ class Origin:
 
 
 def read_model_file(path: Path) -> Origin:
-    """Read a file of models (see `settings`).
-
-    Raises ConfigError if the file does not exist, or a figure cannot be used.
-    """
+    """Read a file of models (see `settings`); ConfigError without it, or for an invalid figure."""
     settings = read_settings(ModelSettings, path)
     source = texts.of_model_file(path.name, settings.source)
     as_given = Remark("noise", f"as stated in {path.name}")
@@ -70,10 +67,7 @@ def read_model_file(path: Path) -> Origin:
 
 
 def select_channels(origin: Origin, channels: Sequence[str]) -> Origin:
-    """Return a model with the given channels only.
-
-    Raises ConfigError if it has no such channel.
-    """
+    """Return a model with the given channels only; ConfigError if it has no such channel."""
     if missing := [name for name in channels if name not in origin.imu.axes]:
         channels_there = ", ".join(origin.imu.axes) or "none"
         raise ConfigError(f"no figures of {missing[0]}; there are figures of {channels_there}")

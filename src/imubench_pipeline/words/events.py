@@ -23,10 +23,7 @@ Span = tuple[float, float]
 def state_text(
     row: RecordingRow, length: str, events: Sequence[int] = (), moved: bool = False
 ) -> str:
-    """Return the state of a recording in a line.
-
-    ``length`` has duration, rate and channels; ``events`` are the numbers of those that cast doubt.
-    """
+    """Return the state of a recording in a line; ``events``: numbers of those that cast doubt."""
     if row.status != "ok":
         return f"{row.recording}: {row.status}: {row.reason or 'no reason is known'}"
     state = _STATES.get(row.fitness, "not judged")
@@ -88,10 +85,7 @@ def events_text(
     system: System = "practical",
     factors: Mapping[str, float] | None = None,
 ) -> str:
-    """Return an event in sentences: a single finding as it is, several in one sentence.
-
-    ``factors``: by which parameters would change without the removal of the event.
-    """
+    """Return an event in sentences; ``factors``: change of parameters without its removal."""
     first = max(findings, key=lambda row: abs(row.value or 0.0))
     if len(findings) == 1:
         return finding_text(first, system)

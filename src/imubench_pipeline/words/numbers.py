@@ -105,10 +105,7 @@ def duration_text(seconds: float | None, digits: int = 3) -> str:
 
 
 def rates_text(rate: float | None, of_channels: Iterable[float]) -> str:
-    """Return the rates of the channels of a recording, Hz, the highest first.
-
-    ``rate``: of the recording, Hz, used where no channel has an Allan variance.
-    """
+    """Return the rates of the channels, Hz, the highest first; without any, ``rate``."""
     rates = sorted({float(f"{each:.6g}") for each in of_channels}, reverse=True)
     texts = list(dict.fromkeys(map(number_text, rates))) or [number_text(rate)]
     return f"{join_names(texts)} Hz"

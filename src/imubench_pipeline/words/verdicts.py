@@ -259,10 +259,7 @@ def source_text(
     *,
     sized: bool = True,
 ) -> str:
-    """Return a source of an error: ``gyro N``, ``initial tilt by accel GM 89.5 s``.
-
-    Without ``sized`` it lacks the time or frequency, which differs between logs.
-    """
+    """Return a source of an error: ``gyro N``; ``sized``: with its time or frequency."""
     size = f" {source.T_B:.4g} s" if sized and source.T_B is not None else ""
     size += f" {source.frequency:.4g} Hz" if sized and source.frequency is not None else ""
     sensor = f"{source.quantity} " if source.quantity else ""

@@ -151,10 +151,7 @@ class Mark:
 
 
 def make_marks(view: ChannelView, symbol: str, place: float, spread: float = 0.0) -> Iterator[Mark]:
-    """Yield a mark for each component of a parameter of the model.
-
-    ``spread`` is the height for these about the place of the recording, in the same unit.
-    """
+    """Yield a mark for each component of a parameter, within ``spread`` about the place."""
     if view.recommended not in view.parameters:
         return
     rows = view.named(view.recommended, symbol)

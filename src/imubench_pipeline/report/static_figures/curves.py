@@ -400,10 +400,7 @@ _DRAWN_TAU = np.geomspace(1e-2, 1e5, 281)
 
 @set_style()
 def draw_theory_figure(system: System = "practical") -> Figure:
-    """Draw a curve with white noise, bias instability and random walk, with the reading points.
-
-    Figure 1 of Maia et al. and of Silva et al.
-    """
+    """Draw the characteristic curve and its reading points (Maia et al., Silva et al., Fig. 1)."""
     unit = choose_page_unit("gyro", "adev", system)
     model = CHARACTERISTIC
     figure = make_figure(SINGLE, 68.0, "Characteristic curve of the Allan deviation")

@@ -2,19 +2,11 @@
 
 from typing import Literal
 
-from imubench_pipeline.words.findings.base import (
-    ALL,
-    NONE,
-    POWERS_OF_UNIT,
-    SLOW,
-    WHITE,
-    FindingData,
-    channel_name,
-)
+from imubench_pipeline.words.findings import base
 from imubench_pipeline.words.numbers import counted, duration_text, join_names, number_text
 
 
-class Rejected(FindingData, affects=ALL, doubt="the recording was rejected"):
+class Rejected(base.FindingData, affects=base.ALL, doubt="the recording was rejected"):
     """A recording that cannot be used."""
 
     reason: str
@@ -23,7 +15,7 @@ class Rejected(FindingData, affects=ALL, doubt="the recording was rejected"):
         return self.reason
 
 
-class Failed(FindingData, affects=ALL, doubt="the analysis failed"):
+class Failed(base.FindingData, affects=base.ALL, doubt="the analysis failed"):
     """A recording of which a step failed."""
 
     reason: str
@@ -34,7 +26,7 @@ class Failed(FindingData, affects=ALL, doubt="the analysis failed"):
         )
 
 
-class WarmUpTrimmed(FindingData, affects=NONE):
+class WarmUpTrimmed(base.FindingData, affects=base.NONE):
     """A warm-up that is left out."""
 
     end: float
@@ -46,7 +38,7 @@ class WarmUpTrimmed(FindingData, affects=NONE):
         )
 
 
-class PartAtRest(FindingData, affects=NONE):
+class PartAtRest(base.FindingData, affects=base.NONE):
     """Only the longest part at rest is analysed."""
 
     start: float
@@ -59,7 +51,7 @@ class PartAtRest(FindingData, affects=NONE):
         )
 
 
-class ShortRecording(FindingData, affects=SLOW, doubt="the recording is short"):
+class ShortRecording(base.FindingData, affects=base.SLOW, doubt="the recording is short"):
     """A recording that is too short for slow noise."""
 
     duration: float
@@ -71,7 +63,7 @@ class ShortRecording(FindingData, affects=SLOW, doubt="the recording is short"):
         )
 
 
-class Knocks(FindingData, affects=WHITE, doubt="knocks in {channels}"):
+class Knocks(base.FindingData, affects=base.WHITE, doubt="knocks in {channels}"):
     """Short disturbances, which are left out."""
 
     knocks: int
@@ -84,7 +76,7 @@ class Knocks(FindingData, affects=WHITE, doubt="knocks in {channels}"):
         more = ", ..." if self.knocks > len(self.times) else ""
         samples = counted(self.samples, "sample", "samples")
         return (
-            f"{channel_name(channel)} has {counted(self.knocks, 'knock')}, up to "
+            f"{base.channel_name(channel)} has {counted(self.knocks, 'knock')}, up to "
             f"{number_text(self.sigmas, 3)} standard deviations (at {at}{more} s). {samples} about "
             f"{'it' if self.knocks == 1 else 'them'} {'is' if self.samples == 1 else 'are'} left "
             "out"
@@ -92,8 +84,8 @@ class Knocks(FindingData, affects=WHITE, doubt="knocks in {channels}"):
 
 
 class SimulatedByMark(
-    FindingData,
-    affects=NONE,
+    base.FindingData,
+    affects=base.NONE,
     doubt="the log is marked as simulated, and the notes say that it is not",
 ):
     """The notes contradict the mark of a simulated log."""
@@ -107,7 +99,7 @@ class SimulatedByMark(
         )
 
 
-class UnusedFiles(FindingData, affects=NONE):
+class UnusedFiles(base.FindingData, affects=base.NONE):
     """Files of a folder from which no channel is read."""
 
     files: tuple[str, ...]  # the first ones
@@ -123,7 +115,7 @@ class UnusedFiles(FindingData, affects=NONE):
         )
 
 
-class UnequalLength(FindingData, affects=NONE, doubt="files may be cut short"):
+class UnequalLength(base.FindingData, affects=base.NONE, doubt="files may be cut short"):
     """Files without time stamps that have different numbers of samples."""
 
     files: tuple[str, ...]
@@ -140,7 +132,7 @@ class UnequalLength(FindingData, affects=NONE, doubt="files may be cut short"):
         )
 
 
-class NotUsed(FindingData, affects=NONE):
+class NotUsed(base.FindingData, affects=base.NONE):
     """Samples outside of the part to use."""
 
     file: str
@@ -154,10 +146,10 @@ class NotUsed(FindingData, affects=NONE):
 
 
 class UnitContradicts(
-    FindingData,
-    affects=frozenset(POWERS_OF_UNIT),
+    base.FindingData,
+    affects=frozenset(base.POWERS_OF_UNIT),
     unfit=True,
-    scales=POWERS_OF_UNIT,
+    scales=base.POWERS_OF_UNIT,
     doubt="the unit of {channels} contradicts the file",
 ):
     """Log and sensor file state different units."""
@@ -172,14 +164,14 @@ class UnitContradicts(
     def text(self, channel: str) -> str:
         scaled = "" if self.scale == 1.0 else f", times {number_text(self.scale)}"
         return (
-            f"{self.file} states {self.in_log} for {channel_name(channel)} ({self.where}). The "
-            f"sensor file states {self.in_sensor_file}{scaled} (log.channels.{channel}.unit), "
-            f"which is used. If the log is right, multiply the values by "
+            f"{self.file} states {self.in_log} for {base.channel_name(channel)} ({self.where}). "
+            f"The sensor file states {self.in_sensor_file}{scaled} (log.channels.{channel}.unit), "
+            "which is used. If the log is right, multiply the values by "
             f"{number_text(self.factor, 5)}. Correct the one that is wrong"
         )
 
 
-class ZeroBytes(FindingData, affects=ALL, doubt="the file has zero bytes"):
+class ZeroBytes(base.FindingData, affects=base.ALL, doubt="the file has zero bytes"):
     """Runs of zero bytes, which are left out."""
 
     file: str
@@ -209,7 +201,7 @@ class ZeroBytes(FindingData, affects=ALL, doubt="the file has zero bytes"):
         return text
 
 
-class TruncatedFile(FindingData, affects=NONE, doubt="the end of the file is missing"):
+class TruncatedFile(base.FindingData, affects=base.NONE, doubt="the end of the file is missing"):
     """A file without its end, or with records in a journal beside it."""
 
     file: str
@@ -228,7 +220,7 @@ class TruncatedFile(FindingData, affects=NONE, doubt="the end of the file is mis
         return f"{self.file}: {what}; read as far as possible"
 
 
-class IncompleteLastRecord(FindingData, affects=NONE):
+class IncompleteLastRecord(base.FindingData, affects=base.NONE):
     """A last record that is cut short, and left out."""
 
     file: str
@@ -255,7 +247,7 @@ class IncompleteLastRecord(FindingData, affects=NONE):
         return f"{self.file}: {why}; left out: {self.shown!r}"
 
 
-class IncompleteFirstRecord(FindingData, affects=NONE):
+class IncompleteFirstRecord(base.FindingData, affects=base.NONE):
     """First lines that are only parts of records, and left out."""
 
     file: str
@@ -271,7 +263,7 @@ class IncompleteFirstRecord(FindingData, affects=NONE):
         )
 
 
-class NotRecords(FindingData, affects=NONE):
+class NotRecords(base.FindingData, affects=base.NONE):
     """Lines under the names of columns that are neither units nor records."""
 
     file: str
@@ -287,7 +279,7 @@ class NotRecords(FindingData, affects=NONE):
         )
 
 
-class RestartedLog(FindingData, affects=NONE):
+class RestartedLog(base.FindingData, affects=base.NONE):
     """Headers within a log."""
 
     file: str
@@ -304,7 +296,7 @@ class RestartedLog(FindingData, affects=NONE):
         )
 
 
-class LeapSecond(FindingData, affects=NONE):
+class LeapSecond(base.FindingData, affects=base.NONE):
     """Time stamps that count leap seconds."""
 
     file: str
@@ -314,7 +306,7 @@ class LeapSecond(FindingData, affects=NONE):
         return f"{self.file}: the time stamps count {counted(self.seconds, 'leap second')}"
 
 
-class DamagedMessage(FindingData, affects=ALL, doubt="messages are damaged"):
+class DamagedMessage(base.FindingData, affects=base.ALL, doubt="messages are damaged"):
     """Messages of a bag that do not match their type."""
 
     file: str
@@ -330,7 +322,7 @@ class DamagedMessage(FindingData, affects=ALL, doubt="messages are damaged"):
         )
 
 
-class NotMeasured(FindingData, affects=ALL, doubt="messages without a measurement"):
+class NotMeasured(base.FindingData, affects=base.ALL, doubt="messages without a measurement"):
     """Messages that state that a quantity was not measured."""
 
     file: str
@@ -346,7 +338,7 @@ class NotMeasured(FindingData, affects=ALL, doubt="messages without a measuremen
         )
 
 
-class WrongChecksum(FindingData, affects=ALL, doubt="messages have a wrong checksum"):
+class WrongChecksum(base.FindingData, affects=base.ALL, doubt="messages have a wrong checksum"):
     """Messages or sentences with a wrong checksum."""
 
     file: str
@@ -371,7 +363,7 @@ class WrongChecksum(FindingData, affects=ALL, doubt="messages have a wrong check
         return text
 
 
-class UnreadableSentence(FindingData, affects=ALL, doubt="sentences are not readable"):
+class UnreadableSentence(base.FindingData, affects=base.ALL, doubt="sentences are not readable"):
     """Sentences with other fields than expected."""
 
     file: str
@@ -387,7 +379,7 @@ class UnreadableSentence(FindingData, affects=ALL, doubt="sentences are not read
         )
 
 
-class OtherSentences(FindingData, affects=NONE):
+class OtherSentences(base.FindingData, affects=base.NONE):
     """Sentences of other kinds, which are not read."""
 
     file: str
@@ -401,7 +393,7 @@ class OtherSentences(FindingData, affects=NONE):
         )
 
 
-class NotSentences(FindingData, affects=NONE):
+class NotSentences(base.FindingData, affects=base.NONE):
     """Lines that are no sentence, and not read."""
 
     file: str

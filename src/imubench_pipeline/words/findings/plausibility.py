@@ -6,27 +6,18 @@ from dataclasses import replace
 
 from imubench_pipeline.earth import STANDARD_GRAVITY
 from imubench_pipeline.settings.printed import SENSORS
-from imubench_pipeline.words.findings.base import (
-    ALL,
-    NONE,
-    POWERS_OF_TIME,
-    POWERS_OF_UNIT,
-    FindingData,
-    channel_name,
-    unit_of,
-    value_text,
-)
+from imubench_pipeline.words.findings import base
 from imubench_pipeline.words.numbers import join_names, number_text
 
-_OF_UNIT = frozenset(POWERS_OF_UNIT)
+_OF_UNIT = frozenset(base.POWERS_OF_UNIT)
 _CORRECT_UNIT = "If so, correct 'unit' in the sensor file"
 
 
 class RateImplausible(
-    FindingData,
-    affects=frozenset(POWERS_OF_TIME),
+    base.FindingData,
+    affects=frozenset(base.POWERS_OF_TIME),
     unfit=True,
-    scales=POWERS_OF_TIME,
+    scales=base.POWERS_OF_TIME,
     doubt="the sampling rate looks wrong",
 ):
     """No such sensor samples at this rate."""
@@ -52,7 +43,7 @@ class RateImplausible(
         return text
 
 
-class SlowSampling(FindingData, affects=NONE):
+class SlowSampling(base.FindingData, affects=base.NONE):
     """Samples so slow that noise of higher frequencies may be folded into N."""
 
     rate: float  # Hz
@@ -66,7 +57,10 @@ class SlowSampling(FindingData, affects=NONE):
 
 
 class ImpossibleNoise(
-    FindingData, affects=ALL, unfit=True, doubt="the noise of {channels} is impossibly small"
+    base.FindingData,
+    affects=base.ALL,
+    unfit=True,
+    doubt="the noise of {channels} is impossibly small",
 ):
     """Less noise than physics allows for any sensor of this kind."""
 
@@ -76,18 +70,19 @@ class ImpossibleNoise(
 
     def text(self, channel: str) -> str:
         return (
-            f"The noise of {channel_name(channel)} is {value_text(self.noise, channel, 'density')},"
-            f" {number_text(self.least / self.noise, 2)} times below the least of {self.sensors} "
+            f"The noise of {base.channel_name(channel)} is "
+            f"{base.value_text(self.noise, channel, 'density')}, "
+            f"{number_text(self.least / self.noise, 2)} times below the least of {self.sensors} "
             "sensors. No sensor is so quiet: the axis is dead, or its values were filled in or "
             "computed. Check the column"
         )
 
 
 class SuspiciousUnit(
-    FindingData,
+    base.FindingData,
     affects=_OF_UNIT,
     unfit=True,
-    scales=POWERS_OF_UNIT,
+    scales=base.POWERS_OF_UNIT,
     doubt="the unit of {channels} looks wrong",
 ):
     """Gravity, or the noise, is usual in another unit than the stated one."""
@@ -102,7 +97,7 @@ class SuspiciousUnit(
     mean: float | None = None  # rate of all gyros, rad/s, if it is unusual too
 
     def text(self, channel: str) -> str:
-        name = channel_name(channel)
+        name = base.channel_name(channel)
         if self.gravity is not None:
             seen = f"the mean acceleration is {number_text(self.gravity)} m/s²"
             usual = f"expected {number_text(STANDARD_GRAVITY)}"
@@ -110,10 +105,10 @@ class SuspiciousUnit(
         else:
             assert self.noise is not None
             assert self.usual is not None
-            unit = unit_of(channel, "density")
+            unit = base.unit_of(channel, "density")
             seen = f"its noise is {unit.text(self.noise)} {unit.sign}"
             if self.mean is not None:
-                seen += f", and the mean rate {value_text(self.mean, channel)}"
+                seen += f", and the mean rate {base.value_text(self.mean, channel)}"
             limits = " to ".join(unit.text(limit) for limit in self.usual)
             usual = f"expected {limits} {'by its data sheet' if self.printed else 'for any gyro'}"
             mended = f"{unit.text(self.noise * self.factor)} {unit.sign}"
@@ -123,7 +118,7 @@ class SuspiciousUnit(
         )
 
 
-class GravityNorm(FindingData, affects=ALL, doubt="the mean acceleration is not gravity"):
+class GravityNorm(base.FindingData, affects=base.ALL, doubt="the mean acceleration is not gravity"):
     """The mean acceleration is not gravity, in no unit."""
 
     norm: float  # m/s²
@@ -142,7 +137,7 @@ class GravityNorm(FindingData, affects=ALL, doubt="the mean acceleration is not 
 
 
 class NoiseUnlikeDatasheet(
-    FindingData, affects=ALL, doubt="the noise of {channels} differs from its data sheet"
+    base.FindingData, affects=base.ALL, doubt="the noise of {channels} differs from its data sheet"
 ):
     """The white noise is far from the printed one, and no unit explains it."""
 
@@ -152,7 +147,7 @@ class NoiseUnlikeDatasheet(
     stated_rate: float | None  # Hz, if the log has no time stamps: it may be the cause
 
     def text(self, channel: str) -> str:
-        name, unit = channel_name(self.measured_on), unit_of(self.measured_on, "density")
+        name, unit = base.channel_name(self.measured_on), base.unit_of(self.measured_on, "density")
         rate = f"the stated rate of {number_text(self.stated_rate)} Hz, " * bool(self.stated_rate)
         return (
             f"The noise of {name} is {unit.text(self.noise)} {unit.sign}, "
@@ -163,7 +158,7 @@ class NoiseUnlikeDatasheet(
 
 
 class AxisUnlike(
-    FindingData, affects=ALL, doubt="the noise of {channels} differs from the other axes"
+    base.FindingData, affects=base.ALL, doubt="the noise of {channels} differs from the other axes"
 ):
     """One axis has much more or much less noise than both others."""
 
@@ -180,14 +175,14 @@ class AxisUnlike(
             else ""
         )
         return (
-            f"The noise of {channel_name(channel)} is {number_text(self.ratio, 3)} times that of "
-            f"{join_names([channel_name(other) for other in self.others])}: "
-            f"{value_text(self.noise, channel, 'density')}. Axes of one sensor rarely differ so "
-            f"much. {unit}Check unit, scale and column of this axis"
+            f"The noise of {base.channel_name(channel)} is {number_text(self.ratio, 3)} times that "
+            f"of {join_names([base.channel_name(other) for other in self.others])}: "
+            f"{base.value_text(self.noise, channel, 'density')}. Axes of one sensor rarely differ "
+            f"so much. {unit}Check unit, scale and column of this axis"
         )
 
 
-class Turning(FindingData, affects=ALL, unfit=True, doubt="the sensor was turning"):
+class Turning(base.FindingData, affects=base.ALL, unfit=True, doubt="the sensor was turning"):
     """The mean rate of a gyro, or a steady turn of gravity, shows a rotation."""
 
     rate: float  # of the gyro, or of gravity relative to the sensor, rad/s
@@ -206,7 +201,7 @@ class Turning(FindingData, affects=ALL, unfit=True, doubt="the sensor was turnin
                 self.offset_of, f"of price class {self.offset_of}"
             )
             return (
-                f"The mean rate of {channel_name(channel)} is {rate} °/s, above the largest "
+                f"The mean rate of {base.channel_name(channel)} is {rate} °/s, above the largest "
                 f"plausible offset {limit} ({number_text(math.degrees(self.largest), 3)} °/s). "
                 "The sensor is turning, or the unit is wrong. "
                 "Record with the sensor at rest, or correct the unit"
@@ -246,7 +241,7 @@ UNIT_MISTAKES: Mapping[str, Sequence[tuple[float, str]]] = {
 
 
 class UnusualFigure(
-    FindingData,
+    base.FindingData,
     affects=_OF_UNIT | {"S"},
     doubt="N or B of {channels} differs from all known sensors",
 ):
@@ -266,7 +261,7 @@ class UnusualFigure(
 
     def text(self, channel: str) -> str:
         symbol = "σ_min" if self.figure == "B" and self.estimated else self.figure
-        unit = unit_of(self.quantity, "density" if self.figure == "N" else "level")
+        unit = base.unit_of(self.quantity, "density" if self.figure == "N" else "level")
         unit = replace(unit, parameter=self.figure)
         value, _ = unit.estimate_texts(self.value, self.lower, self.upper)
         if self.value > self.usual:
@@ -277,7 +272,7 @@ class UnusualFigure(
             (words for factor, words in UNIT_MISTAKES[self.quantity] if factor == self.factor), None
         )
         return (
-            f"{symbol} of {channel_name(channel) if channel else SENSORS[self.quantity]} is "
+            f"{symbol} of {base.channel_name(channel) if channel else SENSORS[self.quantity]} is "
             f"{value} {unit.sign}, {how} of {self.sensors} sensors "
             f"({unit.text(self.usual)} {unit.sign}). "
             + (

@@ -19,12 +19,6 @@ _OTHER_AXES: Mapping[OtherAxes, str] = {
 }
 
 
-SIMULATED_RECORDINGS = "The recordings are SIMULATED, not measured"
-BIASES_NOT_INCLUDED = "Fixed biases are not included, as they change from one start to the next"
-NOISE_ONLY = (
-    "The file contains noise only. Fixed biases change from one start to the next, and they "
-    "and their dependence on temperature are not included"
-)
 NO_WALK_KNOWN = "the model has no random walk, and no upper limit of it is known, so it is 0"
 NO_TEMPERATURE_FIT = "no fit of the temperature"
 BIAS_NOT_LINEAR = "its bias is not linear in temperature, and the program supports a slope only"
@@ -60,11 +54,6 @@ def axes_not_used(
     text = f"axes not used ({reason}): {'; '.join(named[:most])}"
     more = len(named) - most
     return f"{text}; and of {counted(more, 'more recording')}" if more > 0 else text
-
-
-def component_label(symbol: str, number: int) -> str:
-    """Return a parameter of a component: ``B``, ``B of component 2``."""
-    return symbol if number == 1 else f"{symbol} of component {number}"
 
 
 def bound_used(
@@ -177,10 +166,6 @@ def families_compared(
         offers = ", ".join(f"{name} {number_text(x, 3)} times" for name, x in better)
         return f"{text}. Smaller excess: {offers}"
     return f"{text}. No family is closer than {number_text(least, 3)} times"
-
-
-def excess_warning(text: str, programs: Sequence[str]) -> str:
-    return "WARNING: " + "; ".join([text, *programs])
 
 
 def temperature_range(
