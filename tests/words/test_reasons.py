@@ -161,17 +161,6 @@ EXPORTS = [
         "(less noise at 60 s): gyro x and gyro y of a; and of 1 more recording",
         *("less_noise", 60.0, {"a": ["gyro_x", "gyro_y"], "b": ["gyro_x"]}, 1),
     ),
-    of(exports.bound_used, "is used", "T_B", "the longest", 7200.0, (100.0, 7200.0)),
-    of(exports.fitted_used, "fitted 5.000e-06", "B", "not_identified", "short", 5e-6, None),
-    of(exports.zero_used, "upper limit is 2.000e-06", "K", "absent", None, 2e-6),
-    of(
-        exports.terms_replaced,
-        "-8.4 % at 30 s and +22.3 % at 120 s",
-        *("flicker noise", "a random walk K = 1.000e-06", 60.0, -0.084, 0.223, (-0.091, 12.0)),
-    ),
-    of(exports.overbound_used, "smallest N+K", "N+K", 60.0, (0.00167, 50.0), 60.0, 1.3),
-    of(exports.density_bounded, "bounded above 0.00167 Hz only", 0.00167, None),
-    of(exports.density_bounded, "below 0.001 Hz", 0.00167, 0.001),
     of(
         exports.families_compared,
         "Smaller excess: N+GM 1.2 times",
@@ -194,7 +183,6 @@ EXPORTS = [
 SIMULATIONS = [
     of(simulations.of_data_sheet, "data sheet of s: sheet 1", "s", "sheet 1"),
     of(simulations.of_data_sheet, "the data sheet of s", "s", None),
-    of(simulations.of_model_file, "the model file m.yaml (me)", "m.yaml", "me"),
     of(
         simulations.printed_figure,
         "N 0.01 dps: typ, data sheet (why)",
@@ -204,10 +192,6 @@ SIMULATIONS = [
         "typ",
         "why",
     ),
-    of(simulations.bias_instability_printed, "flicker noise", 0.6643, timed=False),
-    of(simulations.bias_instability_printed, "/ 0.664", 0.6643, timed=True),
-    of(simulations.low_pass_assumed, "first order", known=True),
-    of(simulations.low_pass_assumed, "no low-pass", known=False),
     of(simulations.printed_noise, "not measured", simulations.of_data_sheet("s", None)),
     of(simulations.static_noise, "static recording r; method likelihood", "r", "likelihood"),
     of(

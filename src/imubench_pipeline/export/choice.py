@@ -128,12 +128,19 @@ def parameter_notes(estimate: Estimate) -> list[str]:
         label = name if number == 1 else f"{name} of component {number}"
         status, reason = parameter.status, parameter.reason
         lower, upper = parameter.lower, parameter.upper
-        limits = None if lower is None or upper is None else (lower, upper)
+        limits = ""
+        if lower is not None and upper is not None:
+            limits = f", with 95 % limits of {lower:.3e} to {upper:.3e}"
+        why = texts.status_reason(label, status, reason)
         if parameter.value is not None:
             if status == "at_bound":
-                notes.append(texts.bound_used(label, reason, parameter.value, limits))
+                because = f" ({reason})" if reason else ""
+                notes.append(
+                    f"{label} is at the end of its search{because}. Its value of "
+                    f"{parameter.value:.4e} is used{limits}"
+                )
         elif parameter.fitted is not None:
-            notes.append(texts.fitted_used(label, status, reason, parameter.fitted, limits))
+            notes.append(f"{why}. The fitted {parameter.fitted:.3e} is used{limits}")
         elif upper is not None:
-            notes.append(texts.zero_used(label, status, reason, upper))
+            notes.append(f"{why}. It is 0 in this file, and its upper limit is {upper:.3e}")
     return notes

@@ -141,10 +141,7 @@ class AxisNoise:
 
 @dataclass(frozen=True, kw_only=True)
 class Imu:
-    """The noise of a sensor.
-
-    Raises ExportError if a number is out of range, or an inflation has no reason.
-    """
+    """The noise of a sensor; ExportError out of range, or for an inflation without reason."""
 
     sensor: str
     rate: float  # of the samples that the program will get, Hz

@@ -152,6 +152,11 @@ def _describe_replacement(
     tau = np.geomspace(1.0 / rate, horizon, 200)
     below = error(tau)
     worst = int(np.argmax(np.abs(below)))
-    at_worst = float(below[worst]), float(tau[worst])
-    words = texts.terms_replaced(describe_terms(replaced), what, horizon, half, twice, at_worst)
-    return Mapped(replacement, [words, *_describe_omitted_terms(model)], half, twice, at_worst[0])
+    largest, at_largest = float(below[worst]), number_text(float(tau[worst]), 3)
+    words = (
+        f"{describe_terms(replaced)}: replaced by {what}, with the same Allan variance at the "
+        f"horizon of {number_text(horizon)} s. The Allan deviation differs by {100 * half:+.1f} % "
+        f"at {number_text(horizon / 2)} s and {100 * twice:+.1f} % at {number_text(2 * horizon)} "
+        f"s. Below the horizon the largest difference is {100 * largest:+.1f} %, at {at_largest} s"
+    )
+    return Mapped(replacement, [words, *_describe_omitted_terms(model)], half, twice, largest)

@@ -214,13 +214,27 @@ class Overbound:
     @property
     def words(self) -> str:
         """Description of the model, for the head of a file."""
-        excess = math.sqrt(self.at_minimum)
-        return texts.overbound_used(self.family, self.longest, self.band, self.horizon, excess)
+        low, high = (number_text(frequency, 3) for frequency in self.band)
+        return (
+            f"this is the smallest {self.family} above the measured Allan variance at every "
+            f"tau up to {number_text(self.longest)} s (95 % for all together). It is also above "
+            f"the fitted spectral density from {low} to {high} Hz, and the growth of the integrals "
+            f"up to {number_text(self.horizon)} s. Its Allan deviation is "
+            f"{number_text(math.sqrt(self.at_minimum), 3)} times the measured one at the minimum "
+            "of the curve"
+        )
 
     @property
     def density_words(self) -> str:
         """Range of frequencies where the density is bounded, for the head of a file."""
-        return texts.density_bounded(self.band[0], self.passed_below)
+        lowest, passed = self.band[0], self.passed_below
+        below = "Below, the fitted density does not exceed the bound, but is less certain"
+        if passed is not None:
+            below = f"The fitted density exceeds the bound below {number_text(passed, 3)} Hz"
+        return (
+            f"the spectral density is bounded above {number_text(lowest, 3)} Hz only. {below}. "
+            f"Filters that average for longer than {number_text(1.0 / lowest)} s are not covered"
+        )
 
 
 def simultaneous_upper(curve: AllanCurve, longest: float, confidence: float = 0.95) -> Array:

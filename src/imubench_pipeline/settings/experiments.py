@@ -57,11 +57,7 @@ class Experiment(Strict):
 
     @abstractmethod
     def moved_gyro(self, channels: Sequence[str], *, column: bool) -> str | None:
-        """Return the channel of the experiment; None: it uses all axes.
-
-        `column`: the log has a column with the rate of a table. Raises ValueError if the log lacks
-        what it takes; the text begins with the key.
-        """
+        """Return the channel of the experiment, None for all; ValueError begins with the key."""
 
 
 class SimulatedSensors(Strict):

@@ -78,7 +78,10 @@ class _Printed:
         if floor is not None and floor.value:
             self._note("bias instability", floor)
             B, T_B = floor.value / FLOOR, time.value if time else None
-            self._assume("noise", texts.bias_instability_printed(FLOOR, timed=bool(T_B)))
+            text = f"B is the printed bias instability / {number_text(FLOOR, 3)}"
+            if not T_B:
+                text += ", as flicker noise, because no correlation time is printed"
+            self._assume("noise", text)
         else:
             self._assume("noise", texts.NO_BIAS_INSTABILITY)
         if walk is not None and walk.value:
@@ -109,7 +112,9 @@ class _Printed:
             cutoff: float | None = parse_quantity(stated, "frequency")
         else:
             cutoff = self._single("bandwidth", "low-pass", "cut-off")
-        self._assume("low-pass", texts.low_pass_assumed(known=cutoff is not None))
+        filtered = "the low-pass is of first order"
+        unknown = "no low-pass, as no cut-off is known"
+        self._assume("low-pass", unknown if cutoff is None else filtered)
         return SensorModel(
             noise=noise,
             bias=signs[0] * bias if bias else 0.0,

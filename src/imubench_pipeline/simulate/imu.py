@@ -19,10 +19,7 @@ SAMPLES_PER_BLOCK = 8 * SAMPLES_PER_CHUNK
 
 @dataclass(frozen=True, kw_only=True)
 class ImuModel:
-    """The axes of one sensor.
-
-    Raises ValueError if a channel is not known, or a matrix is not of finite numbers, 3 by 3.
-    """
+    """The axes of one sensor; ValueError for an unknown channel, or no finite 3 by 3 matrix."""
 
     axes: Mapping[str, SensorModel]  # by channel, ``gyro_x`` to ``accel_z``
     misalignment: Mapping[str, Array] = field(default_factory=dict)

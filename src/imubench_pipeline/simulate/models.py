@@ -21,7 +21,6 @@ from imubench_pipeline.simulate.model import SensorModel, TemperatureDrift, in_t
 from imubench_pipeline.simulate.profiles import Profile
 from imubench_pipeline.typing import Array
 from imubench_pipeline.units import parse_difference, parse_quantity
-from imubench_pipeline.words.reasons import simulations as texts
 
 Topic = Literal["noise", "bias", "drift", "low-pass", "register", "log"]
 """Part of a model; ``log``: remarks on the written log."""
@@ -56,7 +55,7 @@ class Origin:
 def read_model_file(path: Path) -> Origin:
     """Read a file of models (see `settings`); ConfigError without it, or for an invalid figure."""
     settings = read_settings(ModelSettings, path)
-    source = texts.of_model_file(path.name, settings.source)
+    source = f"the model file {path.name}" + (f" ({settings.source})" if settings.source else "")
     as_given = Remark("noise", f"as stated in {path.name}")
     figures = {str(name): [as_given] for name in settings.axes}
     try:

@@ -56,93 +56,8 @@ def axes_not_used(
     return f"{text}; and of {counted(more, 'more recording')}" if more > 0 else text
 
 
-def bound_used(
-    label: str, reason: str | None, value: float, limits: tuple[float, float] | None
-) -> str:
-    """Return the note that a value at the end of its search is used, SI."""
-    return (
-        f"{label} is at the end of its search{_because(reason)}. "
-        f"Its value of {value:.4e} is used{_limits_text(limits)}"
-    )
-
-
-def fitted_used(
-    label: str, status: Status, reason: str | None, value: float, limits: tuple[float, float] | None
-) -> str:
-    """Return the note that the fit is used where no value is given, SI."""
-    return (
-        f"{status_reason(label, status, reason)}. "
-        f"The fitted {value:.3e} is used{_limits_text(limits)}"
-    )
-
-
-def zero_used(label: str, status: Status, reason: str | None, upper: float) -> str:
-    """Return the note that 0 is used where a term has an upper limit, SI."""
-    return (
-        f"{status_reason(label, status, reason)}. "
-        f"It is 0 in this file, and its upper limit is {upper:.3e}"
-    )
-
-
 def _because(reason: str | None) -> str:
     return f" ({reason})" if reason else ""
-
-
-def _limits_text(limits: tuple[float, float] | None) -> str:
-    return "" if limits is None else f", with 95 % limits of {limits[0]:.3e} to {limits[1]:.3e}"
-
-
-def terms_replaced(
-    terms: str, by: str, horizon: float, half: float, twice: float, worst: tuple[float, float]
-) -> str:
-    """Return the replacement of terms, with the relative errors of the Allan deviation.
-
-    ``half``, ``twice``: at half and at twice the horizon, s; ``worst``: largest error below the
-    horizon, and its tau, s.
-    """
-    at = number_text
-    return (
-        f"{terms}: replaced by {by}, with the same Allan variance at the horizon of "
-        f"{at(horizon)} s. The Allan deviation differs by {_signed(half)} at {at(horizon / 2)} s "
-        f"and {_signed(twice)} at {at(2 * horizon)} s. Below the horizon the largest "
-        f"difference is {_signed(worst[0])}, at {at(worst[1], 3)} s"
-    )
-
-
-def _signed(share: float) -> str:
-    return f"{100 * share:+.1f} %"
-
-
-def overbound_used(
-    family: str, longest: float, band: tuple[float, float], horizon: float, excess: float
-) -> str:
-    """Return the limits that an overbound covers: times in s, frequencies in Hz.
-
-    ``excess``: its Allan deviation over the measured one at the minimum of the curve.
-    """
-    low, high = (number_text(frequency, 3) for frequency in band)
-    return (
-        f"this is the smallest {family} above the measured Allan variance at every "
-        f"tau up to {number_text(longest)} s (95 % for all together). It is also above the "
-        f"fitted spectral density from {low} to {high} Hz, and the growth of the integrals up "
-        f"to {number_text(horizon)} s. Its Allan deviation is {number_text(excess, 3)} times the "
-        "measured one at the minimum of the curve"
-    )
-
-
-def density_bounded(lowest: float, passed: float | None) -> str:
-    """Return the frequency, Hz, above which the density is bounded.
-
-    ``passed``: frequency below which the fitted density is above the bound, Hz.
-    """
-    if passed is None:
-        below = "Below, the fitted density does not exceed the bound, but is less certain"
-    else:
-        below = f"The fitted density exceeds the bound below {number_text(passed, 3)} Hz"
-    return (
-        f"the spectral density is bounded above {number_text(lowest, 3)} Hz only. {below}. "
-        f"Filters that average for longer than {number_text(1.0 / lowest)} s are not covered"
-    )
 
 
 def families_compared(
@@ -152,10 +67,7 @@ def families_compared(
     better: Sequence[tuple[str, float]],
     least: float,
 ) -> str:
-    """Return the excess of a family of models over its limit, and the closer families.
-
-    ``excess``: ratio of the Allan deviation to its limit, and its tau, s; ``least``: of all.
-    """
+    """Return how far a family exceeds its limit (ratio, tau in s), and the closer families."""
     text = (
         f"the Allan deviation of the smallest {family} is {number_text(excess[0], 3)} times its "
         f"limit at {number_text(excess[1])} s"

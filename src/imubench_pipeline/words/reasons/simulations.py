@@ -28,25 +28,11 @@ def of_data_sheet(name: str, document: str | None) -> str:
     return f"the data sheet of {name}" + (f": {document}" if document else "")
 
 
-def of_model_file(name: str, source: str | None) -> str:
-    return f"the model file {name}" + (f" ({source})" if source else "")
-
-
 def printed_figure(
     label: str, value: float, unit: str, kind: str, reason: str | None = None
 ) -> str:
     text = f"{label} {number_text(value)} {unit}: {kind}, data sheet"
     return f"{text} ({reason})" if reason else text
-
-
-def bias_instability_printed(floor: float, *, timed: bool) -> str:
-    """Return the interpretation of a printed bias instability; ``floor``: its ratio to B."""
-    text = f"B is the printed bias instability / {number_text(floor, 3)}"
-    return text if timed else f"{text}, as flicker noise, because no correlation time is printed"
-
-
-def low_pass_assumed(*, known: bool) -> str:
-    return "the low-pass is of first order" if known else "no low-pass, as no cut-off is known"
 
 
 def printed_noise(source: str) -> str:
