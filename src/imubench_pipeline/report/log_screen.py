@@ -152,7 +152,7 @@ def render_log_screen(
             moved = [(each.start or 0.0, each.end or 0.0) for each in motion]
             rest = find_still_spans(moved, 0.0, row.duration or 0.0)
             channels = [each.channel for each in motion if each.channel]
-            # Return spans in order, with those that touch joined
+            # Spans that touch are joined.
             merged: list[tuple[float, float]] = []
             for start, stop in sorted(moved):
                 if merged and start <= merged[-1][1]:
@@ -246,7 +246,7 @@ def _list_events(
     """Yield the most important events, and the number of the other findings."""
     for number, event in enumerate(events, start=1):
         text = f"{number}. {events_text(event.findings, system, event.factors())}"
-        # A text without sentences before the last one, which is what to do, until it fits
+        # Sentences before the last one, which gives the advice, are left out until it fits.
         sentences = re.split(r"(?<=\D\.) (?=[A-Z])", text)
         while len(sentences) > 2 and len(wrap(" ".join(sentences), width - 3)) > _MAX_EVENT_LINES:
             del sentences[-2]

@@ -134,7 +134,7 @@ def read_yaml(path: Path) -> object:
             line = text.count("\n", 0, unseen.start()) + 1
             problem = f"U+{ord(unseen[0]):04X} is no printable character; remove it"
             raise ConfigError(f"{path}, line {line}: not readable as YAML: {problem}")
-        # Raise if YAML exceeds the limits of depth or size; only its events are parsed
+        # The limits of depth and size are checked on the events, before any object is built.
         sizes: dict[str, int] = {}
         open_nodes: list[tuple[str | None, int]] = []  # anchor and nodes before it
         nodes = 0

@@ -200,7 +200,7 @@ class _Axis:
         lag = np.array([hold.lag_decay, hold.lag_step])
         figures = (drift.sensitivity, drift.quadratic, drift.reference) if drift else (0.0,) * 3
         self._input = (hold.step, lag, hold.lag_coupling, hold.lagged_step, np.array(figures))
-        # Draw the states at the first sample
+        # The states at the first sample.
         walk = np.isinf(self._times)
         spread = np.where(walk, 0.0, np.sqrt(self._densities * np.where(walk, 0, self._times) / 2))
         x = spread * begin.standard_normal(len(spread))

@@ -298,9 +298,8 @@ def draw_datasheet_figure(view: ChannelView, system: System = "practical") -> Fi
         about = ", ".join(filter(None, [_KIND_TEXTS.get(row.kind, row.kind), reading]))
         number = NO_VALUE if row.printed is None else f"{row.printed:g}"
         text = f"datasheet {_FIGURE_NAMES[row.statistic]}: {number} {unit}"
-        axes.plot(
-            view.tau, line, color=colour, ls=dash, label=(f"{text} ({about})" if about else text)
-        )
+        text += f" ({about})" if about else ""
+        axes.plot(view.tau, line, color=colour, ls=dash, label=text)
     return finish(figure, axes, view, scale, *levels)
 
 
