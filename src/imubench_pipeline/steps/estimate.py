@@ -165,15 +165,16 @@ class _Channel:
 
     def by_curve(self) -> dict[str, Estimate]:
         """Return the estimates that are read from the Allan variance, or fitted to it."""
-        settings, curve = self.settings, self._bare
+        settings, curve, longest = self.settings, self._bare, self.settings.longest
         estimates: dict[str, Estimate] = {}
         if "curve" in settings.methods:
-            estimates["curve"] = reading.read(curve, longest=settings.longest)
+            estimates["curve"] = reading.read(curve, longest=longest)
         for method in ("paper", "weighted"):
             if method in settings.methods:
-                estimates[method] = least_squares.fit_if_possible(
-                    curve, method=method, longest=settings.longest
-                )
+                try:
+                    estimates[method] = least_squares.fit(curve, method=method, longest=longest)
+                except least_squares.UnfitCurveError as error:
+                    estimates[method] = not_shown(method, str(error))
         return estimates
 
     def by_likelihood(self, into: Estimation) -> dict[str, Estimate]:
