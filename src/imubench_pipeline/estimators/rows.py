@@ -51,8 +51,8 @@ class CurvePoint:
 def make_curve_points(curve: AllanCurve) -> Iterator[CurvePoint]:
     """Yield the points of a measured curve, with 95 % limits."""
     columns = curve.tau, curve.deviation, *curve.limits(0.95), curve.edf, curve.edf_upper
-    for numbers, source in zip(np.column_stack(columns).tolist(), curve.edf_source, strict=True):
-        yield CurvePoint(*numbers, source)
+    numbers = (column.tolist() for column in columns)
+    yield from (CurvePoint(*row) for row in zip(*numbers, curve.edf_source, strict=True))
 
 
 def make_parameter_rows(

@@ -187,7 +187,10 @@ class _Channel:
         compensating = log.temperature and "compensated" in self.settings.methods
         warm = self._fit_temperature(into) if compensating else None
         if warm is not None and warm.compensated:
-            rest = partial(_compensate, warm, log)
+
+            def rest() -> Iterator[Array]:
+                return warm.compensate(log.blocks())
+
             left = self._curve_of(rest())
             without = self._fitted(rest, left)
             nothing = (np.zeros(len(values)) for values in log.blocks())
@@ -309,11 +312,6 @@ class _Channel:
     def _stream(self, use: str) -> np.random.Generator:
         """Return a random stream that depends only on the samples, not on file names."""
         return channel_rng(self.settings.seed, f"{self.mean!r}", f"{self.log.grid}", use)
-
-
-def _compensate(fit: ThermalFit, log: ChannelLog) -> Iterator[Array]:
-    """Yield a log without the effect of temperature."""
-    return fit.compensate(log.blocks())
 
 
 _MIN_SAMPLES_FOR_STEP = 1 << 16  # samples from which the step of a register is found
