@@ -206,11 +206,7 @@ class _Search:
     def estimate(self) -> Estimate:
         """Return the estimate at the best T_B."""
         scan = np.geomspace(self.shortest, self.longest, _SCAN_TIMES)
-        if self._sampled:
-            shapes = np.array([self._shape(T_B) for T_B in scan])
-        else:
-            shapes = evaluate_gauss_markov_shape(self._tau, scan[:, None])
-        costs = [self._solved(shape)[1] for shape in shapes]
+        costs = [self._solved(self._shape(T_B))[1] for T_B in scan.tolist()]
         best = int(np.argmin(costs))
         low, high = scan[max(best - 1, 0)], scan[min(best + 1, _SCAN_TIMES - 1)]
         minimum = minimize_scalar(
