@@ -17,6 +17,7 @@ import argparse
 import math
 import sys
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import Literal
 
 import numpy as np
@@ -45,7 +46,7 @@ from imubench_pipeline.extensions.earth_rate.simulation import (
     simulate_runs,
 )
 from imubench_pipeline.noise import NoiseModel
-from imubench_pipeline.noise.sigma_range import drawn_from_covariance, sigma_range
+from imubench_pipeline.noise.sigma_range import sigma_range
 
 Array = NDArray[np.float64]
 
@@ -367,13 +368,13 @@ def ranges() -> Iterator[bool]:
     steps = [(70.0 * i + 10.0, 70.0 * i + 70.0, math.radians(one)) for i, one in enumerate(DEGREES)]
     schedule = Schedule.from_steps(steps, PAPER_RATE)
     blocks = schedule.experiment.blocks(480)
-    drawn = drawn_from_covariance(
-        PAPER_MODEL,
-        ["N", "B", "T_B", "K"],
-        np.diag(np.array([0.001, 0.1, 0.2, 0.3]) ** 2),
-        400,
-        np.random.default_rng(4),
-    )
+    known = {"N": 0.001, "B": 0.1, "T_B": 0.2, "K": 0.3}
+    factors = np.exp(np.random.default_rng(4).standard_normal((400, 4)) * [*known.values()])
+    names = [(name, getattr(PAPER_MODEL, name)) for name in known]
+    drawn = [
+        replace(PAPER_MODEL, **{n: value * x for (n, value), x in zip(names, row, strict=True)})
+        for row in factors.tolist()
+    ]
     found = sigma_range(
         lambda model: RateTable(schedule, blocks, model).sigma[1], PAPER_MODEL, drawn
     )

@@ -24,9 +24,9 @@ from scipy.signal import fftconvolve
 from bands import bounds_over, highest, what_is_cut
 from imubench_pipeline.estimators.estimate import PARAMETERS, Parameter
 from imubench_pipeline.estimators.likelihood import Likelihood, fit
-from imubench_pipeline.noise import GaussMarkov, NoiseModel
+from imubench_pipeline.noise import Flicker, GaussMarkov, NoiseModel
 from imubench_pipeline.noise.simulate import simulate
-from imubench_pipeline.noise.terms.flicker import compute_bank_ripple
+from imubench_pipeline.noise.terms.flicker import fit_flicker_bank
 
 RATE = 20.0
 DURATION = 36_000.0
@@ -145,6 +145,19 @@ def table(case: Case, found: list[Found]) -> Iterator[str]:
             f"{errors.mean():+.2f}  covered {100 * np.mean(covered):.1f} % of "
             f"{len(covered)}"
         )
+
+
+def compute_bank_ripple(interval: float, longest: float) -> tuple[float, float]:
+    """Return the largest relative errors of the Allan variance and spectrum of a bank."""
+    terms, flicker = fit_flicker_bank(1.0, interval, longest), Flicker(1.0)
+    n = np.unique(np.rint(np.geomspace(1.0, longest / interval, 400)))
+    omega = np.pi / n
+    variance = np.sum([term.sampled_allan_variance(n, interval) for term in terms], axis=0)
+    density = np.sum([term.sampled_spectrum(omega, interval) for term in terms], axis=0)
+    return (
+        float(np.max(np.abs(variance / flicker.sampled_allan_variance(n, interval) - 1.0))),
+        float(np.max(np.abs(density / flicker.sampled_spectrum(omega, interval) - 1.0))),
+    )
 
 
 def main() -> None:

@@ -10,7 +10,7 @@ from imubench_pipeline.allan import AllanCurve, allan_variance, cluster_sizes
 from imubench_pipeline.allan.confidence import equivalent_degrees
 from imubench_pipeline.estimators.curve import read
 from imubench_pipeline.estimators.estimate import Estimate
-from imubench_pipeline.estimators.least_squares import Method, UnfitCurveError, _Search, fit
+from imubench_pipeline.estimators.least_squares import UnfitCurveError, fit
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.simulate import channel_rng, ensemble, simulate
 from tests.conftest import few
@@ -330,18 +330,3 @@ def test_a_log_of_any_form_is_fitted_or_refused(
                 assert (parameter.value is not None) == (parameter.status in ("ok", "at_bound")), (
                     name
                 )
-
-
-@pytest.mark.parametrize("sampled", [False, True])
-@pytest.mark.parametrize("method", ["paper", "weighted"])
-@pytest.mark.parametrize("model", [MTI_7, C102, WHITE, NoiseModel(K=1e-5)])
-def test_the_scan_has_the_costs_of_lawson_and_hanson(
-    model: NoiseModel, method: Method, sampled: bool
-) -> None:
-    log = simulate(model, 10.0, 50_000, channel_rng(1, model.name, "scan"))
-    curve = allan_variance(log, 10.0, overlap="octave")
-    search = _Search(curve, curve.cluster_size <= len(log) // 9, method, sampled=sampled)
-    times = np.geomspace(search.shortest, search.longest, 40)
-    shapes = np.array([search._shape(time) for time in times])
-    one_by_one = np.array([search._solved(shape)[1] for shape in shapes]) ** 2
-    assert search._costs(shapes) == pytest.approx(one_by_one, rel=1e-6)

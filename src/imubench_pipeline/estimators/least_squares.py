@@ -7,7 +7,6 @@ squares; the search is over T_B alone (variable projection).
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import combinations
 from typing import Literal
 
 import numpy as np
@@ -27,7 +26,6 @@ from imubench_pipeline.estimators.estimate import (
     SIGMAS,
     Estimate,
     Parameter,
-    not_shown,
 )
 from imubench_pipeline.noise import (
     PEAK_TAU,
@@ -51,10 +49,6 @@ _MAX_FADED_BEND = 0.1
 _MAX_SAMPLING_SIGMAS = 0.02
 _SCAN_TIMES = 160  # Number of correlation times of the scan before optimisation
 
-_ACTIVE_SETS = [list(chosen) for p in (1, 2, 3) for chosen in combinations(range(3), p)]
-"""Sets of nonzero columns among N, B and K."""
-
-_RIDGE, _MIN_NORM = 1e-13, 1e-300  # For collinear columns, and of a column
 _MIN_VARIANCE_FRACTION = 1e-9  # A term below this fraction of the variance at every tau is absent
 
 
@@ -82,14 +76,6 @@ def fit(curve: AllanCurve, *, method: Method = "weighted", longest: float = 1 / 
     ``longest``, or the Allan variance is 0 at one; ValueError if the method is not known.
     """
     return add_limits(*_solved(curve, method, longest))
-
-
-def fit_if_possible(curve: AllanCurve, *, method: Method, longest: float) -> Estimate:
-    """Fit as `fit` does; a curve that cannot be fitted is ``not_shown``, with the reason."""
-    try:
-        return fit(curve, method=method, longest=longest)
-    except UnfitCurveError as error:
-        return not_shown(method, str(error))
 
 
 def solve(curve: AllanCurve, *, method: Method = "weighted", longest: float = 1 / 9) -> Estimate:
@@ -217,31 +203,11 @@ class _Search:
         solution, residual = nnls(columns / size, self._target)
         return solution / size, float(residual)
 
-    def _costs(self, shapes: Array) -> Array:
-        """Return the squared costs of `_solved` for shapes (t, m), over all active sets at once."""
-        columns = np.empty((len(shapes), 3, len(self._tau)))
-        columns[:, 0], columns[:, 1], columns[:, 2] = self._white, shapes, self._walk
-        columns *= self._root_weight
-        columns /= np.maximum(np.linalg.norm(columns, axis=2, keepdims=True), _MIN_NORM)
-        products = columns @ columns.transpose(0, 2, 1)
-        target = columns @ self._target
-        cost = np.full(len(shapes), self._target @ self._target)
-        for chosen in _ACTIVE_SETS:
-            part = products[:, chosen][:, :, chosen] + _RIDGE * np.eye(len(chosen))
-            solution = np.linalg.solve(part, target[:, chosen, None])[..., 0]
-            left = self._target @ self._target - (solution * target[:, chosen]).sum(axis=1)
-            cost = np.where((solution >= 0.0).all(axis=1), np.minimum(cost, left), cost)
-        return cost
-
     def estimate(self) -> Estimate:
         """Return the estimate at the best T_B."""
         scan = np.geomspace(self.shortest, self.longest, _SCAN_TIMES)
-        if self._sampled:
-            shapes = np.array([self._shape(T_B) for T_B in scan])
-        else:
-            shapes = evaluate_gauss_markov_shape(self._tau, scan[:, None])
-        best = int(np.argmin(self._costs(shapes)))
-        cost = self._solved(self._shape(float(scan[best])))[1]
+        costs = [self._solved(self._shape(T_B))[1] for T_B in scan.tolist()]
+        best = int(np.argmin(costs))
         low, high = scan[max(best - 1, 0)], scan[min(best + 1, _SCAN_TIMES - 1)]
         minimum = minimize_scalar(
             lambda u: self._solved(self._shape(math.exp(u)))[1],
@@ -249,7 +215,7 @@ class _Search:
             method="bounded",
             options={"xatol": 1e-10},
         )
-        T_B = math.exp(minimum.x) if minimum.fun < cost else float(scan[best])
+        T_B = math.exp(minimum.x) if minimum.fun < costs[best] else float(scan[best])
         shape = self._shape(T_B)
         (white, drive, walk), _ = self._solved(shape)
         parts = {"N": white * self._white, "B": drive * shape, "K": walk * self._walk}

@@ -6,7 +6,6 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
-import pyarrow as pa
 
 from imubench_pipeline.allan import AllanCurve
 from imubench_pipeline.estimators.estimate import (
@@ -51,17 +50,9 @@ class CurvePoint:
 
 def make_curve_points(curve: AllanCurve) -> Iterator[CurvePoint]:
     """Yield the points of a measured curve, with 95 % limits."""
-    lower, upper = curve.limits(0.95)
-    for i, tau in enumerate(curve.tau):
-        yield CurvePoint(
-            tau=float(tau),
-            adev=float(curve.deviation[i]),
-            lower=float(lower[i]),
-            upper=float(upper[i]),
-            edf=float(curve.edf[i]),
-            edf_upper=float(curve.edf_upper[i]),
-            edf_source=curve.edf_source[i],
-        )
+    columns = curve.tau, curve.deviation, *curve.limits(0.95), curve.edf, curve.edf_upper
+    numbers = (column.tolist() for column in columns)
+    yield from (CurvePoint(*row) for row in zip(*numbers, curve.edf_source, strict=True))
 
 
 def make_parameter_rows(
@@ -117,19 +108,18 @@ def read_draws(path: Path) -> dict[tuple[str, str], JointDraws]:
     return joint_draws
 
 
-def read_estimates(path: Path, joint: Path | None = None) -> dict[str, list[Estimate]]:
-    """Read the estimates of a recording by channel, with joint draws if their path is given."""
-    return _estimates(read("parameters", [path]), joint)
-
-
 def read_recommended_estimates(path: Path, joint: Path | None = None) -> dict[str, Estimate]:
     """Read the recommended estimate of each channel (see `read_estimates`)."""
+    every = read_estimates(path, joint, recommended=True)
+    return {channel: by_method[0] for channel, by_method in every.items()}
+
+
+def read_estimates(
+    path: Path, joint: Path | None = None, *, recommended: bool = False
+) -> dict[str, list[Estimate]]:
+    """Read the estimates of a recording by channel, with joint draws if their path is given."""
     table = read("parameters", [path])
-    estimates_of_channels = _estimates(table.filter(table["recommended"]), joint)
-    return {channel: by_method[0] for channel, by_method in estimates_of_channels.items()}
-
-
-def _estimates(table: pa.Table, joint: Path | None) -> dict[str, list[Estimate]]:
+    table = table.filter(table["recommended"]) if recommended else table
     drawn = read_draws(joint) if joint is not None else {}
     estimates_of_channels: dict[str, list[Estimate]] = {}
     for (channel, method), rows in split_table(table, "channel", "method").items():

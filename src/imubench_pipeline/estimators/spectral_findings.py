@@ -13,13 +13,7 @@ from imubench_pipeline.estimators.lines import MAX_LINES, Line, describe_groupin
 from imubench_pipeline.estimators.spectrum import Spectrum
 from imubench_pipeline.tables.findings import Finding, find
 from imubench_pipeline.typing import Array
-from imubench_pipeline.words.findings.spectrum import (
-    BandLimit,
-    Filtered,
-    Lines,
-    SlowNoiseMissing,
-    StrongLine,
-)
+from imubench_pipeline.words.findings import spectrum as words
 from imubench_pipeline.words.reasons import estimates as texts
 
 _MIN_SINUSOID_RATIO = 0.5  # Integral of a sinusoid over the integral of white noise after 1 s
@@ -36,10 +30,10 @@ def spectral_findings(channel: str, frame: FitSelection, white: float | None) ->
     highest, low_pass = frame.band.highest, frame.low_pass
     findings = describe_lines(channel, frame.lines, white)
     if low_pass is not None and low_pass.N is not None and low_pass.N.value is None:
-        findings.append(find(BandLimit(highest), "note", highest, channel))
+        findings.append(find(words.BandLimit(highest), "note", highest, channel))
     elif low_pass is not None and low_pass.kind is not None and low_pass.frequency.in_model:
         cutoff = low_pass.frequency.in_model
-        findings.append(find(Filtered(cutoff), "note", cutoff, channel))
+        findings.append(find(words.Filtered(cutoff), "note", cutoff, channel))
     return findings
 
 
@@ -50,7 +44,9 @@ def describe_lines(channel: str, lines: Iterable[Line], white: float | None) -> 
         return []
     strongest = max(group, key=lambda line: line.ratio)
     sinusoids = [line for line in group if line.kind == "sinusoid"]
-    data = Lines(len(sinusoids), len(group) - len(sinusoids), strongest.frequency, strongest.ratio)
+    data = words.Lines(
+        len(sinusoids), len(group) - len(sinusoids), strongest.frequency, strongest.ratio
+    )
     findings = [find(data, "note", strongest.frequency, channel)]
     if white:
         # After t the integral A / (2 pi f) of a sinusoid differs by A sin(pi f t) / (pi f sqrt(2))
@@ -61,7 +57,7 @@ def describe_lines(channel: str, lines: Iterable[Line], white: float | None) -> 
         }
         most = max(integrals, default=0.0)
         if most >= _MIN_SINUSOID_RATIO:
-            strong = StrongLine(integrals[most].frequency, most)
+            strong = words.StrongLine(integrals[most].frequency, most)
             findings.append(find(strong, "warning", most, channel))
     if len(sinusoids) > MAX_LINES:
         findings.append(describe_grouping(channel, sinusoids))
@@ -99,7 +95,7 @@ def find_missing_slow_noise(
         return None
     ratio = float(power[worst] / degrees[worst])
     highest = float(spectrum.upper[order[worst]])
-    return find(SlowNoiseMissing(highest, ratio), "warning", ratio, channel)
+    return find(words.SlowNoiseMissing(highest, ratio), "warning", ratio, channel)
 
 
 def withhold_slow_noise(estimate: Estimate) -> Estimate:

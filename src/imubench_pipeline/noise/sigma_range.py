@@ -5,10 +5,8 @@ from models that are drawn from the distribution of the parameters. The range ha
 coverage if this distribution is correct.
 """
 
-import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -18,8 +16,6 @@ from imubench_pipeline.typing import Array
 
 Sigma = Callable[[NoiseModel], ArrayLike]
 """A standard deviation, or several, from a noise model; the same shape for every model."""
-
-_SCALABLE_PARAMETERS = ("Q", "N", "B", "T_B", "K")
 
 
 @dataclass(frozen=True)
@@ -45,8 +41,8 @@ def sigma_range(
 
     ``sigma`` is a function of a model, such as ``lambda model: RateFilter(blocks,
     model).rate_sigma[-1]``; ``model`` is the estimated one. ``drawn`` are from
-    `error_budget.draw_models`, `drawn_from_covariance`, or a posterior; ``level`` is their share
-    between the limits. Raises ValueError if there is no draw, or the level is not between 0 and 1.
+    `error_budget.draw_models` or a posterior; ``level`` is their share between the limits. Raises
+    ValueError if there is no draw, or the level is not between 0 and 1.
     """
     if not drawn:
         raise ValueError("expected noise models, and there is none")
@@ -61,36 +57,3 @@ def sigma_range(
         np.asarray(upper),
         np.sqrt(np.mean(values**2, axis=0)),
     )
-
-
-def drawn_from_covariance(
-    model: NoiseModel, names: Sequence[str], covariance: Array, draws: int, rng: np.random.Generator
-) -> list[NoiseModel]:
-    """Return noise models with jointly log-normal parameters, whose medians are those of a model.
-
-    ``covariance``, shape (p, p), is the covariance of the natural logarithms of the parameters
-    ``names``, of Q, N, B, T_B and K; the others are not changed. Raises ValueError if a name is
-    unknown, the model has no such parameter, or the covariance has a wrong shape, is not symmetric
-    or not positive semi-definite.
-    """
-    for name in names:
-        if name not in _SCALABLE_PARAMETERS:
-            raise ValueError(f"no parameter {name!r}; expected {', '.join(_SCALABLE_PARAMETERS)}")
-        if not getattr(model, name):
-            raise ValueError(f"the model {model.name} has no {name}")
-    if covariance.shape != (len(names), len(names)) or not np.allclose(covariance, covariance.T):
-        raise ValueError(f"expected a symmetric covariance of {len(names)} parameters")
-    values, vectors = np.linalg.eigh(covariance)
-    if values.size and values[0] < -1e-9 * max(float(values[-1]), 0.0):
-        raise ValueError("the covariance has a negative eigenvalue")
-    root = vectors * np.sqrt(np.maximum(values, 0.0))
-    logarithms = rng.standard_normal((draws, len(names))) @ root.T
-    medians = [float(getattr(model, name)) for name in names]
-    models = []
-    for row in logarithms.tolist():
-        changed: dict[str, Any] = {
-            name: median * math.exp(change)
-            for name, median, change in zip(names, medians, row, strict=True)
-        }
-        models.append(replace(model, **changed))
-    return models

@@ -112,16 +112,14 @@ def _create_zstd() -> zstd.ZstdDecompressor:
     return zstd.ZstdDecompressor(options=largest)
 
 
-DECOMPRESSORS: Mapping[str, Callable[[FileWithoutHoles], Any]] = {
-    "gzip": lambda file: _CompressedParts(file, _GzipDecompressor),
-    "zstd": lambda file: _CompressedParts(file, _create_zstd),
+DECOMPRESSORS: Mapping[str, Callable[[], Any]] = {
+    "gzip": _GzipDecompressor,
+    "zstd": _create_zstd,
     # The memory for the dictionary that a file requests is allocated before the first byte.
-    "xz": lambda file: _CompressedParts(
-        file, partial(lzma.LZMADecompressor, memlimit=bounds.MAX_WINDOW)
-    ),
-    "bzip2": lambda file: _CompressedParts(file, bz2.BZ2Decompressor),
+    "xz": partial(lzma.LZMADecompressor, memlimit=bounds.MAX_WINDOW),
+    "bzip2": bz2.BZ2Decompressor,
 }
-"""Function that opens a compressed file, by compression."""
+"""Function that makes the decompressor of one part of a file, by compression."""
 
 _MAGIC = re.compile(
     rb"(?P<gzip>\x1f\x8b\x08[\0-\x1f])|(?P<zstd>\x28\xb5\x2f\xfd)|(?P<xz>\xfd7zXZ\0)"
@@ -267,7 +265,7 @@ def open_bytes(path: Path) -> Bytes:
                             "bzip2 or zip: unpack it"
                         )
                 if how := recognise_compression(begin):
-                    stream = DECOMPRESSORS[how](log)
+                    stream = _CompressedParts(log, DECOMPRESSORS[how])
                     opened = Bytes(path.name, stream, path.stat().st_size, (log,))
                 else:
                     opened = Bytes(path.name, log, _UNKNOWN_SIZE)

@@ -100,7 +100,8 @@ class LogColumn:
         cls, source: str, label: str, values: NDArray[Any], unit: str | None = None
     ) -> "LogColumn":
         """Return a column of numbers."""
-        return cls(source, label, "number", format_first_numbers(values), values, unit)
+        first = format_first_numbers(values)
+        return cls(source, label, "number", first, values.astype(np.float64), unit)
 
 
 @dataclass(frozen=True, eq=False)

@@ -294,18 +294,12 @@ class VectorNavFile(LogFile):
         if len(able) == 1:
             return able[0]
         # The names of the sentences at the beginning of the file
-        names: Counter[str] = Counter()
+        probe = Sentences(able[0], stamped=True)
         for text in read_lines(self.path, []):
-            pieces = [piece.rpartition(b"*") for piece in text.replace(b"\n", b"$").split(b"$")]
-            right = verify_checksums([p[0] for p in pieces], [p[2].rstrip() for p in pieces])
-            names.update(
-                piece[0].partition(b",")[0].decode("ascii", "replace")
-                for good, piece in zip(right, pieces, strict=True)
-                if good and piece[0]
-            )
-            if names.total() >= _MAX_PROBED_SENTENCES:
+            probe.add(text)
+            if probe.right + probe.others.total() >= _MAX_PROBED_SENTENCES:
                 break
-        present = set(names)
+        present = {*probe.others, *[able[0]] * bool(probe.right)}
         both = [kind for kind in able if kind in present]
         if len(both) == 1:
             return both[0]

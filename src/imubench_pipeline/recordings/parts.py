@@ -12,14 +12,7 @@ import pyarrow as pa
 from numpy.typing import NDArray
 
 from imubench_pipeline.readers import LogFile
-from imubench_pipeline.recordings.quality import levels
-from imubench_pipeline.recordings.quality.knocks import (
-    Knock,
-    detect_interpolation,
-    find_knocks,
-    find_outlier_blocks,
-    mark_straight_lines,
-)
+from imubench_pipeline.recordings.quality import knocks, levels
 from imubench_pipeline.recordings.quality.summary import ColumnSummary
 from imubench_pipeline.recordings.recording import BESIDE, ROW_GROUP, LogWriter
 from imubench_pipeline.recordings.timebase import TimeBase
@@ -141,21 +134,23 @@ def read_part(file: LogFile, use: UsedPart, scratch: Path, number: int) -> Part:
 
 def leave_out_disturbed(
     part: Part, sigmas: float, longest: int, scratch: Path
-) -> dict[str, list[Knock]]:
+) -> dict[str, list[knocks.Knock]]:
     """Replace knocks and interpolated samples by NaN in the file of a part.
 
     Returns the knocks by column. ``sigmas``: their least distance from the level, in standard
     deviations. ``longest``: in records.
     """
     blocks = {name: column.blocks() for name, column in part.columns.items()}
-    doubtful = [name for name, b in blocks.items() if len(find_outlier_blocks(b, sigmas)[0])]
+    doubtful = [name for name, b in blocks.items() if len(knocks.find_outlier_blocks(b, sigmas)[0])]
     steps = {name: levels.detect_quantisation(part.columns[name]) for name in doubtful}
     step = {name: steps_of.step if steps_of else None for name, steps_of in steps.items()}
     doubtful = [
-        name for name in doubtful if len(find_outlier_blocks(blocks[name], sigmas, step[name])[0])
+        name
+        for name in doubtful
+        if len(knocks.find_outlier_blocks(blocks[name], sigmas, step[name])[0])
     ]
     rules = {
-        name: detect_interpolation(column.excerpts(), part.rows)
+        name: knocks.detect_interpolation(column.excerpts(), part.rows)
         for name, column in part.columns.items()
         if name not in BESIDE
     }
@@ -165,7 +160,7 @@ def leave_out_disturbed(
     knocks_of = {}
     for name in doubtful:
         values = _read_row_groups(part.data, name)
-        if here := list(find_knocks(values, blocks[name], sigmas, longest, step[name])):
+        if here := list(knocks.find_knocks(values, blocks[name], sigmas, longest, step[name])):
             knocks_of[name] = here
     # Write the columns again without those samples; the new writer stays open.
     old = part.data
@@ -187,7 +182,7 @@ def leave_out_disturbed(
                 after = int(np.isfinite(samples).sum())
                 part.knocks[name] += before - after
                 if rules.get(name):
-                    samples[mark_straight_lines(samples, rules[name])] = np.nan
+                    samples[knocks.mark_straight_lines(samples, rules[name])] = np.nan
                     part.interpolated[name] += after - int(np.isfinite(samples).sum())
                 columns[name] = samples
             reached += table.num_rows

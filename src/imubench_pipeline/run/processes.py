@@ -30,13 +30,9 @@ class StepError(Exception):
     script cannot be imported. ``reason`` is one line, ``trace`` the traceback in the script.
     """
 
-    def __init__(
-        self, text: str, cause: Cause | None = None, reason: str = "", trace: str = ""
-    ) -> None:
+    def __init__(self, text: str, cause: Cause | None = None, reason: str = "") -> None:
         super().__init__(text)
-        self.cause = cause
-        self.reason = reason or text
-        self.trace = trace
+        self.cause, self.reason, self.trace = cause, reason or text, ""
 
 
 @dataclass(frozen=True)

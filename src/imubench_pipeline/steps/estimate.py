@@ -165,15 +165,16 @@ class _Channel:
 
     def by_curve(self) -> dict[str, Estimate]:
         """Return the estimates that are read from the Allan variance, or fitted to it."""
-        settings, curve = self.settings, self._bare
+        settings, curve, longest = self.settings, self._bare, self.settings.longest
         estimates: dict[str, Estimate] = {}
         if "curve" in settings.methods:
-            estimates["curve"] = reading.read(curve, longest=settings.longest)
+            estimates["curve"] = reading.read(curve, longest=longest)
         for method in ("paper", "weighted"):
             if method in settings.methods:
-                estimates[method] = least_squares.fit_if_possible(
-                    curve, method=method, longest=settings.longest
-                )
+                try:
+                    estimates[method] = least_squares.fit(curve, method=method, longest=longest)
+                except least_squares.UnfitCurveError as error:
+                    estimates[method] = not_shown(method, str(error))
         return estimates
 
     def by_likelihood(self, into: Estimation) -> dict[str, Estimate]:
@@ -186,7 +187,10 @@ class _Channel:
         compensating = log.temperature and "compensated" in self.settings.methods
         warm = self._fit_temperature(into) if compensating else None
         if warm is not None and warm.compensated:
-            rest = partial(_compensate, warm, log)
+
+            def rest() -> Iterator[Array]:
+                return warm.compensate(log.blocks())
+
             left = self._curve_of(rest())
             without = self._fitted(rest, left)
             nothing = (np.zeros(len(values)) for values in log.blocks())
@@ -308,11 +312,6 @@ class _Channel:
     def _stream(self, use: str) -> np.random.Generator:
         """Return a random stream that depends only on the samples, not on file names."""
         return channel_rng(self.settings.seed, f"{self.mean!r}", f"{self.log.grid}", use)
-
-
-def _compensate(fit: ThermalFit, log: ChannelLog) -> Iterator[Array]:
-    """Yield a log without the effect of temperature."""
-    return fit.compensate(log.blocks())
 
 
 _MIN_SAMPLES_FOR_STEP = 1 << 16  # samples from which the step of a register is found

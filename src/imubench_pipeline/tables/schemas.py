@@ -7,11 +7,11 @@ from imubench_pipeline.model.table import OfRecordingRow, TableRow, TypedColumn,
 from imubench_pipeline.registry import Hook
 
 _MODULES: Hook[ModuleType] = Hook("tables")
-_ADDED = [row for module in _MODULES.objects() for row in rows_in(module)]
 
 ROWS: dict[str, type[TableRow]] = {
     row.table: row
-    for row in (*rows_in(recordings), *rows_in(estimates), *rows_in(comparisons), *_ADDED)
+    for module in (recordings, estimates, comparisons, *_MODULES.objects())
+    for row in rows_in(module)
 }
 """The class of the rows of every table a run leaves, by its name."""
 
@@ -23,28 +23,8 @@ SAMPLES = ("envelope", "histogram")  # tables of the samples, for pages of recor
 OF_ONE_RECORDING = (*SAMPLES, "samples_of_models", "draws", "error_growth", "drawn_deviations")
 """The tables that are kept with each recording and not joined."""
 
-BY_RECORDING = (  # the joined tables in which a recording has rows of its own
-    "recordings",
-    "findings",
-    "doubts",
-    "allan",
-    "parameters",
-    "reconstruction",
-    "scores",
-    "models",
-    "lines",
-    "datasheet",
-    "datasheet_curve",
-    "spectrum",
-    "fixed_bias",
-    "temperature",
-    "allan_compensated",
-    "low_pass",
-    "deterministic",
-    "simulated_truth",
-    "error_budget",
-    "backtest",
-    *(row.table for row in _ADDED if issubclass(row, OfRecordingRow)),
-)
+_OF_RECORDING = {name for name, row in ROWS.items() if issubclass(row, OfRecordingRow)}
+BY_RECORDING = ("recordings", *sorted(_OF_RECORDING - {*OF_ONE_RECORDING}))
+"""The joined tables in which a recording has rows of its own."""
 
 COMPARED = ("recordings", "allan", "parameters", "simulated_truth")  # drawn for all sensors

@@ -10,16 +10,12 @@ from imubench_pipeline.estimators.deterministic.search import MAX_REGRESSORS
 from imubench_pipeline.estimators.estimate import CURVE, SIGMAS, Estimate, Parameter
 from imubench_pipeline.model.estimates import DeterministicRow
 from imubench_pipeline.tables.findings import Finding, find
+from imubench_pipeline.words.findings import changes
 from imubench_pipeline.words.findings.base import SLOW, WHITE, FindingData
-from imubench_pipeline.words.findings.changes import (
-    BiasStep,
-    NoiseTrend,
-    PeriodicDrift,
-    TelegraphNoise,
-    WarmUpDrift,
-)
 
-_KINDS = {kind.code: kind for kind in (BiasStep, WarmUpDrift, PeriodicDrift)}
+_KINDS = {
+    kind.code: kind for kind in (changes.BiasStep, changes.WarmUpDrift, changes.PeriodicDrift)
+}
 _MIN_EFFECT = 0.1  # of the interval of a value, or of the mean
 
 
@@ -61,20 +57,22 @@ def assess_signals(
     for signal in signals.signals:
         size = (signal.size, signal.size_lower, signal.size_upper)
         time = (signal.time or 0.0, signal.time_lower or 0.0, signal.time_upper or 0.0)
-        change: FindingData = BiasStep(*size, signal.start, signal.place_error or 0.0)
+        change: FindingData = changes.BiasStep(*size, signal.start, signal.place_error or 0.0)
         if signal.kind == "warm_up_drift":
-            change = WarmUpDrift(*size, *time)
+            change = changes.WarmUpDrift(*size, *time)
         elif signal.kind == "periodic_drift":
             cycles = (signal.end - signal.start) / time[0]
-            change = PeriodicDrift(*size, *time, cycles=cycles, has_temperature=has_temperature)
+            change = changes.PeriodicDrift(
+                *size, *time, cycles=cycles, has_temperature=has_temperature
+            )
         place = channel, signal.start, signal.end
         findings.append(find(change, "warning", signal.size, *place))
     steady = assess_stationarity(signals.means)
     if steady is not None and steady.has_trend:
-        data = NoiseTrend(steady.trend, SIGMAS * steady.trend_error)
+        data = changes.NoiseTrend(steady.trend, SIGMAS * steady.trend_error)
         findings.append(find(data, "note", steady.trend, channel, steady.start, steady.end))
     if signals.telegraph:
-        many = TelegraphNoise(MAX_REGRESSORS)
+        many = changes.TelegraphNoise(MAX_REGRESSORS)
         findings.append(find(many, "warning", float(MAX_REGRESSORS), channel))
         return Verdict(tuple(findings), findings[-1].detail)
     return Verdict(tuple(findings))
@@ -100,7 +98,7 @@ def state_effects(
         kind = _KINDS.get(finding.finding)
         if kind is not None and finding.data is not None:
             data = replace(kind(**json.loads(finding.data)), factors=factors)
-            of_bias = finding.finding != PeriodicDrift.code and (
+            of_bias = finding.finding != changes.PeriodicDrift.code and (
                 abs(finding.value) > _MIN_EFFECT * abs(mean)
             )
             affects = (*factors, "bias") if of_bias else tuple(factors)

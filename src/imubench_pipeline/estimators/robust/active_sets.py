@@ -64,7 +64,9 @@ class TermSearch:
         sets = [s for size in range(1, TERMS + 1) for s in combinations(range(TERMS), size)]
         self._sets = [np.array(s) for s in sets]
         self._masks = np.array([[term in s for term in range(TERMS)] for s in sets])
-        self._gains = np.array([_required_gain(s) for s in sets])
+        # The decrease of chi-squared that a set of terms must bring beside the simplest
+        of_process = np.where(self._masks[:, FLICKER], _GAIN_OF_BOTH, _GAIN_OF_PROCESS)
+        self._gains = np.where(self._masks[:, PROCESS], of_process, 0.0)
 
     def design(self, T_B: float) -> Array:
         """Return the columns, shape (m, 5), with a process of the tried time nearest to T_B."""
@@ -108,13 +110,6 @@ class TermSearch:
         )
         times = np.where(index >= 0, self.times[index], np.nan)
         return Solutions(squares / size[np.maximum(index, 0)], times, cost)
-
-
-def _required_gain(chosen: tuple[int, ...]) -> float:
-    """Return the decrease of chi-squared that a set of terms must bring beside the simplest."""
-    if PROCESS not in chosen:
-        return 0.0
-    return _GAIN_OF_BOTH if FLICKER in chosen else _GAIN_OF_PROCESS
 
 
 @njit(cache=True)

@@ -188,25 +188,6 @@ def fit_flicker_bank(B: float, interval: float, longest: float) -> list[Term]:
     return [*terms, WhiteNoise(B * white * math.sqrt(interval))] if white else terms
 
 
-def compute_bank_ripple(interval: float, longest: float) -> tuple[float, float]:
-    """Return the largest relative errors of a bank within its band.
-
-    The first is for the sampled Allan variance, the second for the spectrum of the samples at
-    frequencies from 1 / (2 longest) to Nyquist, both relative to sampled flicker noise.
-    """
-    terms = fit_flicker_bank(1.0, interval, longest)
-    points = math.ceil(math.log10(longest / interval) * _POINTS_PER_DECADE * 2)
-    n = np.unique(np.rint(np.geomspace(1.0, longest / interval, points)))
-    omega = np.pi / n
-    variance = np.sum([term.sampled_allan_variance(n, interval) for term in terms], axis=0)
-    density = np.sum([term.sampled_spectrum(omega, interval) for term in terms], axis=0)
-    flicker = Flicker(1.0)
-    return (
-        float(np.max(np.abs(variance / flicker.sampled_allan_variance(n, interval) - 1.0))),
-        float(np.max(np.abs(density / flicker.sampled_spectrum(omega, interval) - 1.0))),
-    )
-
-
 @lru_cache(maxsize=16)
 def _fit_unit_bank(decades: float) -> tuple[Array, Array, float]:
     """Return correlation times, their B, and N, for B = 1 and tau from 1 s to 10^decades s."""

@@ -16,15 +16,10 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
+from imubench_pipeline.readers import bounds
 from imubench_pipeline.readers.arrays.file import ArrayFile
 from imubench_pipeline.readers.arrays.table import Array, Table, UnusableError
 from imubench_pipeline.readers.bounded import run_bounded
-from imubench_pipeline.readers.bounds import (
-    MAX_CHUNK_BYTES,
-    MAX_CHUNKS,
-    MAX_GROUP_DEPTH,
-    MAX_OBJECTS,
-)
 
 _CACHE_SLOTS, _CACHE_PREEMPTION, _MIN_CACHE = 521, 0.75, 1 << 20
 """Defaults of the library: slots, preemption weight (w0) and bytes of the chunk cache."""
@@ -57,15 +52,15 @@ def list_data_sets(file: h5py.File, time_axis: int = 0, passed_over: str = "\0")
     def below(group: h5py.Group, above: str, depth: int) -> Iterator[DataSet]:
         nonlocal objects
         # The `visit` of the library crashes the process on deeply nested groups.
-        if depth > MAX_GROUP_DEPTH:
+        if depth > bounds.MAX_GROUP_DEPTH:
             raise UnusableError(
-                f"groups lie more than {MAX_GROUP_DEPTH} deep; expected the log of one sensor: "
-                "copy its data sets into a separate file"
+                f"groups lie more than {bounds.MAX_GROUP_DEPTH} deep; expected the log of one "
+                "sensor: copy its data sets into a separate file"
             )
-        if objects + len(group) > MAX_OBJECTS:
+        if objects + len(group) > bounds.MAX_OBJECTS:
             raise UnusableError(
-                f"more than {MAX_OBJECTS} objects; expected the log of one sensor: copy its data "
-                "sets into a file of their own"
+                f"more than {bounds.MAX_OBJECTS} objects; expected the log of one sensor: copy its "
+                "data sets into a file of their own"
             )
         for key in sorted(group, key=lambda key: key.encode() if isinstance(key, str) else key):
             objects += 1
@@ -201,9 +196,9 @@ def _check_written(data: h5py.Dataset, name: str, unpacked: int) -> None:
                 f"{name} is compressed with filter {code} ({title.decode('ascii', 'replace')}), "
                 "which is not installed; expected gzip: repack it with h5repack -f GZIP=4"
             )
-    if unpacked > MAX_CHUNK_BYTES:
+    if unpacked > bounds.MAX_CHUNK_BYTES:
         raise UnusableError(
-            f"{name} has chunks of {unpacked} bytes; expected at most {MAX_CHUNK_BYTES}: "
+            f"{name} has chunks of {unpacked} bytes; expected at most {bounds.MAX_CHUNK_BYTES}: "
             "repack it with h5repack -l"
         )
     chunks = math.prod(
@@ -215,9 +210,9 @@ def _check_written(data: h5py.Dataset, name: str, unpacked: int) -> None:
             f"{written} of {chunks} chunks of {name} were written, the others would read as "
             "zeros; cut it to the recorded samples, or copy the file again"
         )
-    if chunks > MAX_CHUNKS:
+    if chunks > bounds.MAX_CHUNKS:
         raise UnusableError(
-            f"{name} lies in {chunks} chunks; expected at most {MAX_CHUNKS}: repack it with "
+            f"{name} lies in {chunks} chunks; expected at most {bounds.MAX_CHUNKS}: repack it with "
             "h5repack -l"
         )
 

@@ -76,7 +76,6 @@ def _list_variables_of_7(file: h5py.File) -> Iterator[table.Table]:
 def _list_variables_of_4(path: Path) -> Iterator[table.Table]:
     """Yield the variables of a file."""
     start, size = 0, path.stat().st_size
-    opened = partial(_open_plain, path)
     with path.open("rb") as file:
         while start < size:
             file.seek(start)
@@ -89,9 +88,8 @@ def _list_variables_of_4(path: Path) -> Iterator[table.Table]:
             if header.fault is not None:
                 yield table.UnsupportedArray(header.name, header.fault)
             else:
-                yield table.StreamedArray(
-                    header.name, header.shape, header.dtype, True, opened, begin, False
-                )
+                about = header.name, header.shape, header.dtype
+                yield table.StreamedArray(*about, True, lambda: path.open("rb"), begin, False)
             start = end
 
 
@@ -143,11 +141,10 @@ def _list_variables_of_5(path: Path) -> Iterator[table.Table]:
                 opened = partial(_Inflated.opened, path, begin, length)
                 with opened() as stream:
                     most = table.MAX_DEFLATE_RATIO * (length + 8)
-                    elements = _Elements(stream, order, 0, most, opened, checked=True)
+                    elements = _Elements(stream, order, 0, most, opened, True)
                     yield from _read_matrix(elements, elements.tag(_TYPE_MATRIX))
             elif kind == _TYPE_MATRIX:
-                plain = partial(_open_plain, path)
-                elements = _Elements(file, order, begin, end, plain, checked=False)
+                elements = _Elements(file, order, begin, end, lambda: path.open("rb"), False)
                 yield from _read_matrix(elements, length)
             else:
                 raise _make_damaged_error(f"a variable of type {kind}", start)
@@ -313,7 +310,3 @@ class _Inflated(io.RawIOBase):
     def close(self) -> None:
         self._file.close()
         super().close()
-
-
-def _open_plain(path: Path) -> IO[bytes]:
-    return path.open("rb")

@@ -66,7 +66,7 @@ def interpret_label(label: str, context: str = "") -> Meaning | None:
     for quantity, dimension in DIMENSIONS.items():
         name, unit = split_unit(label, dimension)
         meant = _interpret_name(name)
-        words = _split_words(name)
+        words = split_label(name)
         if meant is None and len(words) == 1 and (words[0] in _AXES or _is_axis_number(words[0])):
             by_context = find_quantity(context)
             if by_context is not None:
@@ -90,15 +90,11 @@ def find_quantity(text: str) -> tuple[Quantity, int] | None:
 
 def split_label(label: str) -> list[str]:
     """Return the words of a name in lower case: ang, vel and x for ``AngVelX``."""
-    return _split_words(label[:_MAX_LABEL_LENGTH])
-
-
-def _split_words(text: str) -> list[str]:
-    return [word.lower() for word in _WORD.findall(text)]
+    return [word.lower() for word in _WORD.findall(label[:_MAX_LABEL_LENGTH])]
 
 
 def _interpret_name(name: str) -> Meaning | None:
-    words = _split_words(name)
+    words = split_label(name)
     joined = "".join(words)
     axis, rest, beside = _find_axis(words)
     if _TEMPERATURE.search(joined) and not _OTHER_QUANTITIES.search(joined):
@@ -121,7 +117,7 @@ def _interpret_name(name: str) -> Meaning | None:
 
 def _interpret_by_unit(quantity: Quantity, name: str, unit: str) -> Meaning | None:
     """Return the meaning of a name with a unit that determines the quantity."""
-    words = _split_words(name)
+    words = split_label(name)
     axis, rest, _ = _find_axis(words)
     joined = "".join(rest)
     if quantity == "temperature":

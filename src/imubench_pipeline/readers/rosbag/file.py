@@ -334,12 +334,7 @@ def _describe_topic(
             columns.append(formats.LogColumn.of_numbers(name, name, values, layout.units[name]))
     logged = np.array([time for time, _ in messages], np.int64)
     for name, times in ((HEADER_STAMP, stamps[sound]), (LOG_TIME, logged[sound])):
-        values = times.astype(np.float64)
-        columns.append(
-            formats.LogColumn(
-                name, name, "number", formats.format_first_numbers(times), values, "ns"
-            )
-        )
+        columns.append(formats.LogColumn.of_numbers(name, name, times, "ns"))
     fault = None if sound.any() else "has no message that can be read"
     described = tuple(columns) if sound.any() else ()
     return formats.LogTable(

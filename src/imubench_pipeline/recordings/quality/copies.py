@@ -46,27 +46,24 @@ def find_copied_channels(columns: Mapping[str, ColumnSummary]) -> Iterator[Findi
     pieces = {
         name: column.excerpts() for name, column in columns.items() if column.low < column.high
     }
-    names = list(pieces)
     named: set[str] = set()
-    for place, first in enumerate(names):
-        for other in names[place + 1 :]:
-            slopes, alike = [], []
-            for x, y, dx, dy in _pair_increments(pieces[first], pieces[other]):
-                xx, yy, xy = float(dx @ dx), float(dy @ dy), float(dx @ dy)
-                correlation = abs(xy) / (np.sqrt(xx) * np.sqrt(yy))
-                slopes.append(xy / xx)
-                copied = correlation > _MIN_COPY_CORRELATION
-                if not copied and correlation > _MIN_ROUNDED_COPY_CORRELATION:
-                    # The columns differ by no more than the steps of both.
-                    steps = _find_step(y) + abs(slopes[-1]) * _find_step(x)
-                    copied = np.ptp(y - slopes[-1] * x) <= 1.02 * steps
-                alike.append(bool(copied))
-            factor = None if not alike or 2 * sum(alike) <= len(alike) else float(np.median(slopes))
-            if factor is None:
-                continue
-            for channel, of, times in ((first, other, 1.0 / factor), (other, first, factor)):
-                if channel in named:
-                    continue
+    for first, other in combinations(pieces, 2):
+        slopes, alike = [], []
+        for x, y, dx, dy in _pair_increments(pieces[first], pieces[other]):
+            xx, yy, xy = float(dx @ dx), float(dy @ dy), float(dx @ dy)
+            correlation = abs(xy) / (np.sqrt(xx) * np.sqrt(yy))
+            slopes.append(xy / xx)
+            copied = correlation > _MIN_COPY_CORRELATION
+            if not copied and correlation > _MIN_ROUNDED_COPY_CORRELATION:
+                # The columns differ by no more than the steps of both.
+                steps = _find_step(y) + abs(slopes[-1]) * _find_step(x)
+                copied = np.ptp(y - slopes[-1] * x) <= 1.02 * steps
+            alike.append(bool(copied))
+        if 2 * sum(alike) <= len(alike):
+            continue
+        factor = float(np.median(slopes))
+        for channel, of, times in ((first, other, 1.0 / factor), (other, first, factor)):
+            if channel not in named:
                 named.add(channel)
                 yield find(words.ChannelTwice(of, times), "warning", times, channel)
 
