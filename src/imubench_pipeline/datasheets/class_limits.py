@@ -5,7 +5,8 @@ range, an offset and its repeatability. The statement with the least standard de
 that a further figure never makes a sensor worse, and none that is left out makes it better. A
 typical figure is one standard deviation, a maximum three, and the end of a range the root of three.
 A total over the temperature range bounds the coefficient: it is reached over half of the range. An
-rms over the range is the coefficient times the range over the root of 12.
+rms over the range is the coefficient times the range over the root of 12. Of several options, such
+as grades and ranges, the best one counts for each figure, unless the file selects some.
 
 A sensor that prints no figure counts as the worst of its class (`find_limit`).
 """
@@ -125,13 +126,22 @@ def _load_shipped() -> dict[tuple[str, str, str], ClassLimit]:
 
 
 def find_limit(grade: str | None, quantity: str, figure: str) -> ClassLimit:
-    """Return the shipped limit of a figure for a class; a sensor without a grade is a consumer one.
+    """Return the shipped limit of a figure for a class, without a grade for all of them.
 
     A class with fewer than three sensors is not taken to be better than the next better class: its
     worst figure is the worst of both. Where neither prints the figure, the next class below counts.
     Raises a KeyError if no sensor of the catalogue prints it.
     """
-    shipped, place = _load_shipped(), _GRADES.index(grade or _GRADES[0])
+    shipped = _load_shipped()
+    if grade is None:
+        values: dict[str, float] = {}
+        for (_, of, name), one in shipped.items():
+            if (of, name) == (quantity, figure):
+                values |= one.sensors
+        if not values:
+            raise KeyError(f"no sensor of the catalogue prints {figure} of the {quantity}")
+        return _summarise("any", quantity, figure, values)
+    place = _GRADES.index(grade)
 
     def find_first(grades: Iterable[str]) -> ClassLimit | None:
         found = (shipped.get((each, quantity, figure)) for each in grades)
@@ -166,27 +176,13 @@ def read_sigma(sensor: Sensor, quantity: str, figure: str) -> float | None:
     """
     if getattr(sensor.datasheet, quantity) is None:
         return None
-    axes = [_read_axis(sensor, f"{quantity}_{axis}", figure) for axis in "xyz"]
-    known = [value for value in axes if value is not None]
-    return max(known) if len(known) == len(axes) else None
+    axes = [list(_list_statements(sensor, f"{quantity}_{axis}", figure)) for axis in "xyz"]
+    return max(map(min, axes)) if all(axes) else None
 
 
-def _read_axis(sensor: Sensor, channel: str, figure: str) -> float | None:
-    """Return the least statement on an axis, SI; of options that are not chosen, the worst one."""
-    by_option: dict[str | None, list[float]] = {}
-    for option, value in _list_statements(sensor, channel, figure):
-        by_option.setdefault(option, []).append(value)
-    if None in by_option:
-        return min(by_option[None])
-    return max(map(min, by_option.values()), default=None)
-
-
-def _list_statements(
-    sensor: Sensor, channel: str, figure: str
-) -> Iterator[tuple[str | None, float]]:
-    """Yield the option and the standard deviation, SI, of each statement on an axis."""
+def _list_statements(sensor: Sensor, channel: str, figure: str) -> Iterator[float]:
+    """Yield the standard deviation, SI, of each statement on an axis."""
     datasheet = _with_options(sensor.datasheet)
-    chosen = bool(sensor.datasheet.options)
     if figure in _NOISE:
         by_figure: dict[int, list[Comparable]] = {}
         for row in read_comparables(datasheet, channel):
@@ -194,9 +190,7 @@ def _list_statements(
                 by_figure.setdefault(id(row.figure), []).append(row)
         for rows in by_figure.values():
             # A density of unknown sidedness may be either: the larger N counts.
-            printed = rows[0].figure
-            assert printed is not None
-            yield None if chosen else printed.option, max(row.value or 0.0 for row in rows)
+            yield max(row.value or 0.0 for row in rows)
         return
     axis = PrintedAxis.of(datasheet, channel)
     for name in STATEMENTS[cast("Cause", figure)]:
@@ -209,8 +203,7 @@ def _list_statements(
             factor = math.sqrt(12.0) / _temperature_span(sensor)
         for row in axis.read(name, Comparable(name, name, None), axis.si(name)):
             if row.figure and row.value and row.figure.kind in SIGMAS_OF_KIND:
-                sigma = factor * row.value / SIGMAS_OF_KIND[row.figure.kind]
-                yield None if chosen else row.figure.option, sigma
+                yield factor * row.value / SIGMAS_OF_KIND[row.figure.kind]
 
 
 def _with_options(datasheet: Datasheet) -> Datasheet:

@@ -129,7 +129,10 @@ class Question:
 
     def _make_gyrocompass(self, gyro: AxisErrors, accel: AxisErrors) -> Gyrocompass:
         assert self.latitude is not None  # checked with the requirement
-        stated = self.start.gyro.bias if isinstance(self.start.gyro, Uncalibrated) else None
+        bias, accel_bias = (
+            start.bias if isinstance(start, Uncalibrated) else None
+            for start in (self.start.gyro, self.start.accel)
+        )
         if self.requirement is None:  # at arbitrary times turning the gyro removes the biases
             return Gyrocompass(gyro=gyro.model, latitude=self.latitude)
         return Gyrocompass(
@@ -137,7 +140,8 @@ class Question:
             accel=accel.model,
             latitude=self.latitude,
             positions=self.positions,
-            bias=stated,
+            bias=bias,
+            accel_bias=accel_bias,
             figures=gyro.figures,
             accel_figures=accel.figures,
             temperature_change=self.use.temperature_change,

@@ -216,11 +216,17 @@ def _judge_by_datasheet(
     place = min(range(len(margins)), key=margins.__getitem__)
     budget = answers[place][1]
     in_use, noise_alone, likely, best = margins[place]
+    by_limit = [
+        find_largest_figures(total, asked.limit, total.total)
+        for (asked, total, *_), of_limit in zip(answers, margins, strict=True)
+        if of_limit[0] < 1.0
+    ]
     largest = merge_largest(
         (source.quantity, source.source, size)
-        for asked, total, *_ in answers
-        for source, size in find_largest_figures(total, asked.limit, total.total).items()
+        for figures in by_limit
+        for source, size in figures.items()
     )
+    helps = all(figures and min(figures.values()) > 0.0 for figures in by_limit)
     conditions = tuple(unknown)
     worst_best = min(each[3] for each in margins)
     verdict: Verdict = "meets"
@@ -229,9 +235,9 @@ def _judge_by_datasheet(
     elif worst_best < 1.0:
         verdict = "cannot_meet"
     elif in_use < 1.0:
-        figures = make_figure_conditions(largest)
-        conditions = (*figures, *unknown)
-        verdict = "meets_if" if figures else "not_enough_data"
+        verdict = "not_enough_data"
+        if helps:
+            verdict, conditions = "meets_if", (*make_figure_conditions(largest), *unknown)
     elif unknown:
         verdict = "meets_if"
     return replace(

@@ -14,7 +14,7 @@ from imubench_pipeline.datasheets.class_limits import count_sensors_within
 from imubench_pipeline.model.comparisons import ErrorBudgetRow
 from imubench_pipeline.model.states import Cause, Measured, SourceCode, Verdict
 from imubench_pipeline.model.verdicts import Condition, Property, Share, Shortfall
-from imubench_pipeline.settings.printed import FIGURE_DIMENSIONS, SENSORS, Datasheet, PrintedFigure
+from imubench_pipeline.settings.printed import FIGURE_DIMENSIONS, Datasheet, PrintedFigure
 from imubench_pipeline.settings.requirements import Requirement
 from imubench_pipeline.settings.sensor import QUANTITIES, Sensor
 from imubench_pipeline.settings.validation import Strict
@@ -93,7 +93,7 @@ def _find_largest(datasheet: Datasheet, quantity: Measured, name: str) -> float 
     figures: list[PrintedFigure] = [
         figure
         for figure in (sheet.printed(name) if sheet else ())
-        if figure.option is None or figure.option in datasheet.options
+        if figure.option is None or not datasheet.options or figure.option in datasheet.options
     ]
     by_axis = []
     for axis in "xyz":
@@ -104,9 +104,10 @@ def _find_largest(datasheet: Datasheet, quantity: Measured, name: str) -> float 
             if value is not None
             for size in (value if isinstance(value, tuple) else (value,))
         ]
-        if values:
-            by_axis.append(max(values))
-    return min(by_axis, default=None)
+        if not values:
+            return None
+        by_axis.append(max(values))
+    return min(by_axis)
 
 
 def judge(requirement: Requirement, has: Abilities) -> tuple[list[Shortfall], list[Condition]]:
@@ -154,7 +155,7 @@ def _compare(requirement: Requirement, has: Abilities) -> Iterator[_Point]:
         yield _Point("full_scale", measured, enough, text, _list_known(largest))
     if must.bandwidth is not None:
         # Of the quantities with required axes, or else of all.
-        asked = {axes.split("_")[0] for axes in must.axes} or set(SENSORS)
+        asked = {axes.split("_")[0] for axes in must.axes} or set(requirement.quantities)
         lowest = parse_quantity(must.bandwidth, "frequency")
         for measured in get_args(Measured):
             if measured in asked and measured not in has.without:

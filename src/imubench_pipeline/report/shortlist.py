@@ -4,13 +4,14 @@ from collections.abc import Iterator, Mapping, Sequence
 
 from imubench_pipeline.model.comparisons import ShortlistRow
 from imubench_pipeline.report.site import Entry, Site
-from imubench_pipeline.words.numbers import number_text
+from imubench_pipeline.words.numbers import join_names, number_text
 from imubench_pipeline.words.verdicts import (
     SHORT_VERDICTS,
     condition_text,
     origins_text,
     share_text,
     shortfall_text,
+    subject_text,
 )
 
 
@@ -43,6 +44,8 @@ def _list_conditions(row: ShortlistRow) -> Iterator[str]:
     """Yield the conditions of a verdict; a sensor that fails does so with the best properties."""
     if row.verdict == "meets_if":
         yield from map(condition_text, row.conditions)
+    elif row.conditions:
+        yield f"not ranked: {join_names(list(map(subject_text, row.conditions)))} not known"
 
 
 SHORTLIST = Entry(

@@ -199,7 +199,8 @@ def _list_levers(
 ) -> Iterator[tuple[Measured, in_use.Lever]]:
     """Yield the sensor and the lever of each figure."""
     order, factor = GYRO_ORDER[quantity], _get_factor(quantity, use)
-    levers = in_use.list_levers("gyro", order, time, start.gyro, use, direct=order == 0)
+    direct = quantity == "heading"  # vehicles turn about the vertical
+    levers = in_use.list_levers("gyro", order, time, start.gyro, use, direct=direct)
     for cause, size, through in levers:
         yield "gyro", (cause, factor * size, through)
     if quantity in ACCEL_ORDER:
@@ -213,6 +214,7 @@ def _list_levers(
             yield measured, lever
     if quantity == "attitude" and isinstance(start.tilt, Levelled) and start.tilt.bias is None:
         yield "accel", ("turn_on_bias", 1.0 / STANDARD_GRAVITY, "initial_tilt")
+        yield "accel", ("misalignment", 1.0, "initial_tilt")
 
 
 def of_sensor(

@@ -33,8 +33,9 @@ class Gyrocompass:
     gyro: NoiseModel
     latitude: float  # rad, between the poles
     accel: NoiseModel = field(default_factory=NoiseModel)  # levels the gyro
-    # turn-on bias of the gyro, 1 sigma, rad/s; None: from ``figures``
+    # turn-on biases, 1 sigma, rad/s and m/s^2; None: from the figures
     bias: float | None = None
+    accel_bias: float | None = None
     # 1, or an even number: the gyro is turned by 180 degrees between equal parts of the time; the
     # alternating mean has no turn-on bias
     positions: int = 1
@@ -45,7 +46,8 @@ class Gyrocompass:
     def __post_init__(self) -> None:
         if not abs(self.latitude) < math.pi / 2.0:
             raise ValueError(f"latitude is {self.latitude}, expected one between the poles, in rad")
-        in_use.check_not_negative(bias=self.bias or 0.0, temperature=self.temperature_change)
+        biases = {"bias": self.bias or 0.0, "accel_bias": self.accel_bias or 0.0}
+        in_use.check_not_negative(**biases, temperature=self.temperature_change)
         if self.positions < 1 or (self.positions > 1 and self.positions % 2):
             raise ValueError(f"positions is {self.positions}, expected 1 or an even number")
 
@@ -113,23 +115,28 @@ class Gyrocompass:
 
     def _list_figure_errors(self) -> Iterator[Contribution]:
         """Yield the contributions of the figures, which do not decrease with time."""
-        per_rate = 1.0 / self._north_rate
+        per_rate, per_force = 1.0 / self._north_rate, self._tilt_factor / STANDARD_GRAVITY
+        heated = self.temperature_change / (2.0 * self.positions)
         levers: list[tuple[Measured, Cause, float]] = [
-            ("gyro", "temperature", per_rate * self.temperature_change / (2.0 * self.positions))
+            ("gyro", "temperature", per_rate * heated),
+            ("accel", "temperature", per_force * heated),
         ]
         if self.positions == 1:
-            levers.append(("accel", "turn_on_bias", self._tilt_factor / STANDARD_GRAVITY))
-            if self.bias is None:
-                levers.append(("gyro", "turn_on_bias", per_rate))
-            else:
-                source = ErrorSource("turn_on_bias", "gyro")
-                yield Contribution(source, self.bias * per_rate, in_use.STATED_FIGURE)
+            levers.append(("accel", "misalignment", self._tilt_factor))
+            for measured, stated, lever in (
+                ("gyro", self.bias, per_rate),
+                ("accel", self.accel_bias, per_force),
+            ):
+                if stated is None:
+                    levers.append((measured, "turn_on_bias", lever))  # type: ignore[arg-type]  # a literal
+                else:
+                    source = ErrorSource("turn_on_bias", measured)  # type: ignore[arg-type]  # a literal
+                    yield Contribution(source, stated * lever, in_use.STATED_FIGURE)
         for measured, cause, lever in levers:
             figure = (self.figures if measured == "gyro" else self.accel_figures).get(cause)
             if figure is not None and lever > 0.0:
-                source = ErrorSource(
-                    cause, measured, "initial_tilt" if measured == "accel" else None
-                )
+                levelled = measured == "accel"
+                source = ErrorSource(cause, measured, "initial_tilt" if levelled else None)
                 yield Contribution(source, lever * figure.sigma, figure)
 
     def _list_noise_errors(self, time: float, *, swings: bool) -> Iterator[Contribution]:

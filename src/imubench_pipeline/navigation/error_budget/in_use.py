@@ -95,9 +95,8 @@ class Use:
 
     @property
     def turn(self) -> Turn | None:
-        """The turn, if the vehicle moves in it."""
-        moving = self.turns > 0.0 and self.speed > 0.0
-        return Turn(self.turns, self.over, self.speed) if moving else None
+        """The turn, if there is one; it may be on the spot."""
+        return Turn(self.turns, self.over, self.speed) if self.turns > 0.0 else None
 
 
 NO_USE = Use()
@@ -145,6 +144,8 @@ def list_levers(
     calibrated = isinstance(start, Calibrated)
     if isinstance(start, Uncalibrated) and start.bias is None:
         yield "turn_on_bias", constant, None
+        if measured == "accel":  # in a tilted axis gravity is a bias
+            yield "misalignment", STANDARD_GRAVITY * constant, None
     if change := use.temperature_change:
         rise = of_rise(order, time, use.over) if calibrated else constant
         square = of_squared_rise(order, time, use.over) if calibrated else constant
