@@ -54,11 +54,11 @@ LARGEST = {"value": 9, "unit": "deg/s", "kind": "max"}
         ("turn_on_bias", {"offset": {"value": {"xy": 1, "z": 2}, "unit": "deg/s"}}, 2 * DEG),
         ("turn_on_bias", {"offset": {"value": {"xy": 1}, "unit": "deg/s"}}, None),
         ("turn_on_bias", {"offset": {"value": 1, "unit": "deg/s", "kind": "min"}}, None),
-        # Of options that are not chosen, the worst.
+        # Of options that are not chosen, the best: another one is another statement.
         (
             "turn_on_bias",
-            {"offset": [TYPICAL | {"option": "A"}, TYPICAL | {"option": "B", "value": 5}]},
-            5 * DEG,
+            {"offset": [TYPICAL | {"option": "A", "value": 5}, TYPICAL | {"option": "B"}]},
+            2 * DEG,
         ),
         ("misalignment", {"misalignment": {"value": 0.5, "unit": "deg", "kind": "max"}}, DEG / 6),
         ("misalignment", {"cross_axis": {"value": 2, "unit": "%"}}, 0.02),

@@ -155,10 +155,12 @@ def test_a_levelled_tilt_has_the_turn_on_bias_of_the_accelerometer() -> None:
     offset = {"offset": {"value": 50, "unit": "mg", "kind": "typ"}}
     found = ranking(asked, known={"accel": offset}, unknown={})
     # 50 mg are a tilt of 50 mrad; the noise of the window adds little.
-    noise = math.hypot(NOISE, 1e-3 / 60.0 / 9.80665)
+    misaligned = find_limit(GRADE, "accel", "misalignment").worst  # which tilts as well
+    noise = math.hypot(NOISE, 1e-3 / 60.0 / 9.80665, misaligned)
     assert found["known"]["margin"] == pytest.approx(math.radians(2.0) / math.hypot(0.05, noise))
     assert (found["known"]["verdict"], found["known"]["conditions"]) == ("fails", [])
-    (part,) = found["known"]["parts"]
+    part, misaligned_part = found["known"]["parts"]
+    assert misaligned_part["origin"] == "class limit"
     assert (part["source"], part["quantity"], part["through"], part["origin"]) == (
         *("turn_on_bias", "accel"),
         *("initial_tilt", "datasheet"),
