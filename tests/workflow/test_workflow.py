@@ -29,7 +29,7 @@ from tests.workflow.project import (
 pytestmark = pytest.mark.release  # every day test_failures.py, and the demonstration
 
 STEPS_OF_A_RECORDING = dict.fromkeys(STEPS, 1)
-GLOBAL_STEPS = dict.fromkeys(("sensor_tables", *TOGETHER), 1)
+GLOBAL_STEPS = dict.fromkeys(("sensor_tables", "files", *TOGETHER), 1)
 
 METHODS = ['estimate={"methods": ["likelihood", "weighted"]}']
 
@@ -196,7 +196,7 @@ def pooled_of_one(project: Project) -> dict:
 def test_exports_and_pages_say_what_does_not_decide(project: Project) -> None:
     exported = (project.results / "exports/one/kalibr/imu.yaml").read_text()
     said = " ".join(exported.replace("#", "").split())
-    assert f"CAUTION: left out: {REASON}" in said
+    assert f"CAUTION: {REASON}" in said
     assert yaml.safe_load(exported)["gyroscope_noise_density"] == pytest.approx(1e-4, rel=0.05)
     report = project.results / "report"
     assert "Not used: c: the unit of gyro x looks wrong" in (report / "index.html").read_text()
@@ -209,7 +209,7 @@ def test_to_include_it_makes_the_tables_and_the_report_anew(project: Project) ->
     project.settings = [*METHODS, "decide={include: [one/c]}"]
     jobs = project.jobs()
     project.settings = METHODS
-    assert set(jobs) == {"sensor_tables", *TOGETHER}
+    assert set(jobs) == set(GLOBAL_STEPS)
 
 
 def test_what_the_samples_look_like_is_kept_with_each_recording(project: Project) -> None:
@@ -241,7 +241,7 @@ def test_one_core_and_two_give_the_same_tables(project: Project, tmp_path: Path)
 def test_an_edit_of_a_datasheet_runs_its_deltas_and_the_global_steps(project: Project) -> None:
     density = {"value": 0.02, "unit": "deg/s/sqrt(Hz)"}
     put_sensor(project.folder / "sensors/one.yaml", datasheet={"gyro": {"noise_density": density}})
-    steps = {"datasheet": 3, "catalogue": 1, "sensor_tables": 3}
+    steps = {"datasheet": 3, "catalogue": 1}
     assert project.jobs() == GLOBAL_STEPS | steps
     assert project.run().returncode == 0
     printed = {
