@@ -10,6 +10,7 @@ from typing import Any, get_args
 
 import numpy as np
 
+from imubench_pipeline.datasheets.printed_noise import End
 from imubench_pipeline.earth import STANDARD_GRAVITY
 from imubench_pipeline.estimators.estimate import Estimate
 from imubench_pipeline.model.comparisons import ErrorBudgetRow
@@ -49,7 +50,7 @@ class AxisErrors:
     likely: NoiseModel | None = None
     best: NoiseModel | None = None
 
-    def at(self, end: in_use.End) -> "AxisErrors":
+    def at(self, end: End) -> "AxisErrors":
         """Return the sources with other figures of the class in place of its worst ones."""
         model = {"in_use": None, "likely": self.likely, "best": self.best}[end]
         figures = {cause: figure.at(end) for cause, figure in self.figures.items()}
@@ -149,7 +150,7 @@ class Question:
 
 
 _QUANTITIES: tuple[Measured, ...] = get_args(Measured)
-_OTHER_ENDS: tuple[in_use.End, ...] = ("likely", "best")
+_OTHER_ENDS: tuple[End, ...] = ("likely", "best")
 
 
 def list_standard_questions(

@@ -2,20 +2,24 @@
 
 A sensor with usable logs has its row of the table ``ranking``. All others are judged in the same
 way by their datasheets: noise and errors in use as printed, and the worst figure of the class for
-everything that is not printed. A density of unknown sidedness counts as N itself. B follows from
-the printed minimum of the Allan deviation, as flicker noise.
+everything that is not printed.
 """
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 
-from imubench_pipeline.datasheets.class_limits import find_limit, read_sigma
+from imubench_pipeline.datasheets.class_limits import find_limit
+from imubench_pipeline.datasheets.printed_noise import (
+    WALK_TIMES,
+    PrintedNoise,
+    read_printed_noise,
+)
 from imubench_pipeline.model.comparisons import RankingRow, ShortlistRow
 from imubench_pipeline.model.recordings import RecordingRow
 from imubench_pipeline.model.states import Measured, Verdict
 from imubench_pipeline.model.verdicts import Share, Shortfall
-from imubench_pipeline.navigation.error_budget.in_use import End, read_figures
+from imubench_pipeline.navigation.error_budget.in_use import read_figures
 from imubench_pipeline.navigation.error_budget.parts import Budget
 from imubench_pipeline.navigation.expected_errors import (
     AxisErrors,
@@ -30,7 +34,7 @@ from imubench_pipeline.navigation.suitability import (
     merge_largest,
     read_abilities,
 )
-from imubench_pipeline.noise import FLOOR, NoiseModel
+from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.settings.requirements import Requirement
 from imubench_pipeline.settings.sensor import Sensor
 from imubench_pipeline.words.reasons import budgets as texts
@@ -39,48 +43,6 @@ from imubench_pipeline.words.verdicts import class_limit_text, worse_than_class_
 _QUANTITIES: tuple[Measured, ...] = ("gyro", "accel")
 _MIN_SHARE = 0.01  # of the variance
 _MIN_EXCESS = 1.001  # of a printed figure over the worst of the class, which is rounded
-
-_WALK_TIMES: Mapping[End, float] = {"in_use": 500.0, "likely": 2000.0, "best": 9000.0}
-"""Time, s, after which an unknown random walk is as large as the bias instability.
-
-It is 529, 1,714 and 8,830 s for the parameters in Table 2 of Maia et al. (MTi-7 accelerometer,
-C102-F9R accelerometer, MTi-7 gyro), and 2,067 s for those in section 5.1 of Silva et al.
-(SiRRS01-03). No datasheet of the catalogue prints K.
-"""
-
-
-@dataclass(frozen=True)
-class PrintedNoise:
-    """Noise of a quantity by its datasheet, with class limits for figures that are not printed."""
-
-    models: Mapping[End, NoiseModel]
-    assumed: frozenset[str]  # codes of the noise sources that are not printed
-
-
-def read_printed_noise(sensor: Sensor, quantity: Measured) -> PrintedNoise:
-    """Return the noise of a quantity that the sensor measures."""
-    values: dict[str, Mapping[End, float]] = {}
-    assumed = set()
-    for figure in ("N", "B"):
-        printed = read_sigma(sensor, quantity, figure)
-        if printed is None:
-            limit = find_limit(sensor.grade, quantity, figure)
-            values[figure] = {"in_use": limit.worst, "likely": limit.median, "best": limit.best}
-            assumed.add({"N": "N", "B": "flicker"}[figure])
-        else:
-            values[figure] = dict.fromkeys(_WALK_TIMES, printed)
-    walk = read_sigma(sensor, quantity, "K")
-    if walk is None:
-        assumed.add("K")
-    models = {
-        end: NoiseModel(
-            N=values["N"][end],
-            B=values["B"][end] / FLOOR,
-            K=walk or values["B"][end] * math.sqrt(3.0 / time),
-        )
-        for end, time in _WALK_TIMES.items()
-    }
-    return PrintedNoise(models, frozenset(assumed))
 
 
 @dataclass(frozen=True)
@@ -96,7 +58,7 @@ def _read_printed_errors(sensor: Sensor) -> _PrintedErrors:
     noise = {q: read_printed_noise(sensor, q) for q in _QUANTITIES if getattr(sensor.datasheet, q)}
     axes, remarks = {}, []
     for q in _QUANTITIES:
-        models = noise[q].models if q in noise else dict.fromkeys(_WALK_TIMES, NoiseModel())
+        models = noise[q].models if q in noise else dict.fromkeys(WALK_TIMES, NoiseModel())
         figures = read_figures(sensor, q)
         axes[q] = AxisErrors(models["in_use"], figures, models["likely"], models["best"])
         for cause, figure in figures.items():

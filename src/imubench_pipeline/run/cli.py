@@ -144,8 +144,14 @@ def _add_inspect(parser: argparse.ArgumentParser) -> None:
 
 
 def _add_export(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("results", type=Path, help="folder of the results of a run")
-    parser.add_argument("--sensor", required=True, help="name of the sensor file")
+    parser.add_argument("results", type=Path, nargs="?", help="folder of the results of a run")
+    parser.add_argument("--sensor", help="of the run: name of the sensor file")
+    parser.add_argument(
+        "--datasheet",
+        metavar="NAME",
+        help="instead of results: a sensor of the catalogue, such as bmi088, by its printed "
+        "figures; what it does not print is the worst of its class",
+    )
     parser.add_argument(
         "--target", required=True, help="program, such as kalibr; a wrong name lists them all"
     )
@@ -203,15 +209,51 @@ def _add_export(parser: argparse.ArgumentParser) -> None:
     outputs.add_output(parser, "--output", help="where to write; default: the terminal")
 
 
+def _export_datasheet(options: argparse.Namespace) -> str | bytes:
+    """Return the file of a program from the printed figures of a sensor of the catalogue."""
+    from imubench_pipeline.export.from_datasheet import build_printed_imu
+    from imubench_pipeline.export.imu import ExportError
+    from imubench_pipeline.export.targets import TARGETS
+    from imubench_pipeline.settings.sensor import read_sensors
+    from imubench_pipeline.settings.shipped import list_folders
+
+    found = sensors.find_sensors(
+        read_sensors(list_folders(Run().sensors, "sensors")), options.datasheet
+    )
+    name = options.datasheet.lower()
+    if name not in found:
+        near = f"; there are: {', '.join(found)}" if found else "; `imubench sensors` lists all"
+        if len(found) != 1:
+            raise ExportError(f"no sensor {options.datasheet!r}{near}")
+        (name,) = found
+    if options.target not in TARGETS:
+        raise ExportError(
+            f"target {options.target!r} is not known; there are: {', '.join(TARGETS)}"
+        )
+    if options.overbound:
+        raise ExportError("an overbound needs a log: expected --datasheet without --overbound")
+    keys = ("horizon", "inflation", "because", "latitude", "rate")
+    asked = {key: getattr(options, key) for key in keys}
+    return TARGETS[options.target].write(build_printed_imu(name, found[name], **asked))
+
+
 def _export(options: argparse.Namespace) -> int:
     from imubench_pipeline.export.imu import ExportError
     from imubench_pipeline.export.request import Request, load, make_content, recordings_of
 
     if options.inflation != 1.0 and not options.because:
         raise command_line.CommandError("--inflate needs its reason; expected --because '...'")
-    asked = Request(**{field.name: getattr(options, field.name) for field in fields(Request)})
+    if (options.results is None) == (options.datasheet is None):
+        raise command_line.CommandError("expected the folder of results, or --datasheet NAME")
     try:
-        content = make_content(load(options.results), asked, recordings_of(options.results))
+        if options.datasheet is not None:
+            content = _export_datasheet(options)
+        elif options.sensor is None:
+            raise ExportError("which sensor of the results? expected --sensor NAME")
+        else:
+            values = {field.name: getattr(options, field.name) for field in fields(Request)}
+            tables, folder = load(options.results), recordings_of(options.results)
+            content = make_content(tables, Request(**values), folder)
     except ExportError as error:
         raise command_line.CommandError(str(error)) from None
     if options.output is not None:

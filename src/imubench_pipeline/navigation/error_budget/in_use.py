@@ -22,20 +22,17 @@ import math
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import asdict, dataclass, replace
 from types import MappingProxyType
-from typing import Literal
 
 from pydantic import TypeAdapter
 
 from imubench_pipeline.datasheets.class_limits import STATEMENTS, find_limit, read_sigma
+from imubench_pipeline.datasheets.printed_noise import End
 from imubench_pipeline.earth import STANDARD_GRAVITY
 from imubench_pipeline.model.estimates import TemperatureRow
 from imubench_pipeline.model.states import Cause, Measured, Origin, SourcePath
 from imubench_pipeline.navigation.error_budget.turns import Turn
 from imubench_pipeline.noise.growth import Calibrated, SensorStart, Uncalibrated, of_constant
 from imubench_pipeline.settings.sensor import QUANTITIES, Sensor, quantity_of
-
-End = Literal["in_use", "likely", "best"]
-"""What counts where a sensor prints nothing: the worst, the median or the best of its class."""
 
 
 @dataclass(frozen=True, kw_only=True)
