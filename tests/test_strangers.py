@@ -15,9 +15,8 @@ import pyarrow as pa
 import pytest
 import yaml
 
-from imubench_pipeline.readers import log_files
+from imubench_pipeline.readers import bounds, log_files
 from imubench_pipeline.readers.arrays import file as arrays
-from imubench_pipeline.readers.arrays import hdf5
 from imubench_pipeline.recordings.drop_zone import account_for, find_logs
 from imubench_pipeline.report.run_summary import describe_drop_zone
 from imubench_pipeline.run.checking import check
@@ -197,7 +196,7 @@ def said(tmp_path_factory: pytest.TempPathFactory) -> dict[str, dict[str, Any]]:
     with pytest.MonkeyPatch.context() as patch:
         # An eighth of what is allowed, so that less is read before it is refused.
         patch.setattr(arrays, "MIN_CHECKED_EXPANSION", arrays.MIN_CHECKED_EXPANSION // 8)
-        patch.setattr(hdf5, "MAX_CHUNKS", hdf5.MAX_CHUNKS // 8)
+        patch.setattr(bounds, "MAX_CHUNKS", bounds.MAX_CHUNKS // 8)
         found = {name: quality.recording for _, name, quality in check(plan_of(folder))}
     assert time.process_time() - begin < 10.0
     return found

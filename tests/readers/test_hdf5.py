@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 
+from imubench_pipeline.readers import bounds
 from imubench_pipeline.readers.arrays import file as arrays
 from imubench_pipeline.readers.arrays import hdf5
 from imubench_pipeline.settings.sensor import LogFormat
@@ -166,9 +167,9 @@ def test_what_was_never_written_is_no_zero(tmp_path: Path) -> None:
 def test_what_cannot_be_read_in_blocks(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = saved(tmp_path / "a.h5")
     channels = {"gyro_x": {"column": 1, "variable": "imu/m"}}
-    monkeypatch.setattr(hdf5, "MAX_CHUNK_BYTES", 100)
+    monkeypatch.setattr(bounds, "MAX_CHUNK_BYTES", 100)
     refused(path, log(channels), "imu/m has chunks of 1440 bytes; expected at most 100: repack")
-    monkeypatch.setattr(hdf5, "MAX_CHUNK_BYTES", 1500)
+    monkeypatch.setattr(bounds, "MAX_CHUNK_BYTES", 1500)
     monkeypatch.setattr(arrays, "MAX_CHUNK_BYTES", 1500)
     contents(path, log(channels))
     channels["gyro_y"] = {"column": "imu/wx"}
