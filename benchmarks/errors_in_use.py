@@ -3,7 +3,7 @@
 python benchmarks/errors_in_use.py [--runs 2000] [--settings 20]
 
 Each setting has its own time, turn or change of speed, temperature, vibration and figures. Each run
-draws the errors of a triad of gyros and accelerometers, which stands still and is levelled, or
+draws the errors of a triad of gyros and accelerometers, which is at rest and is levelled, or
 starts with turn-on biases and a known tilt; then it drives, and its measurements are integrated in
 three dimensions. The simulation shares no code with the budgets. Compared are the 95 % quantiles of
 the errors: radii of velocity and position, heading and the cross-track error of an odometer. The
@@ -234,7 +234,7 @@ def main() -> int:
             simulated = float(np.quantile(errors[quantity], 0.95)) / QUANTILE
             closed = compute_budget(setting, quantity)
             if not closed:
-                continue  # an odometer that stands still
+                continue  # the odometer does not move
             difference = simulated / closed - 1.0
             differences.append(difference)
             line = f"{place + 1:2} {motion}, {setting.time:4.1f} s, {begin:8}  {quantity:11}"

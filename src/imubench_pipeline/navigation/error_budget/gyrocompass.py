@@ -123,14 +123,15 @@ class Gyrocompass:
         ]
         if self.positions == 1:
             levers.append(("accel", "misalignment", self._tilt_factor))
-            for measured, stated, lever in (
+            biases: list[tuple[Measured, float | None, float]] = [
                 ("gyro", self.bias, per_rate),
                 ("accel", self.accel_bias, per_force),
-            ):
+            ]
+            for measured, stated, lever in biases:
                 if stated is None:
-                    levers.append((measured, "turn_on_bias", lever))  # type: ignore[arg-type]  # a literal
+                    levers.append((measured, "turn_on_bias", lever))
                 else:
-                    source = ErrorSource("turn_on_bias", measured)  # type: ignore[arg-type]  # a literal
+                    source = ErrorSource("turn_on_bias", measured)
                     yield Contribution(source, stated * lever, in_use.STATED_FIGURE)
         for measured, cause, lever in levers:
             figure = (self.figures if measured == "gyro" else self.accel_figures).get(cause)

@@ -11,7 +11,7 @@ Each error is a figure of the sensor, a standard deviation, times a factor that 
   times the angle turned, in attitude and heading; for an accelerometer, times the change of speed,
   as ``misalignment`` is. They act evenly. In position and velocity, a turn acts as in `turns`;
 - ``g_sensitivity``: for a gyro, times the acceleration by speed and in turns. Vibration averages to
-  zero and leaves an angle of the figure times its velocity, which is that of the lowest frequency;
+  zero and leaves an angle: the figure times the velocity of the vibration at its lowest frequency;
 - ``vibration_rectification``: times the square of the rms of the vibration.
 
 Causes are independent of each other and of the noise; a figure has no sign. A figure that a sensor

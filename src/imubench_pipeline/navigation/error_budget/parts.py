@@ -32,8 +32,8 @@ class Contribution:
     source: ErrorSource
     sigma: float  # 1 sigma, rad, m/s or m
     figure: Figure | None = None  # the figure that it follows from, if it is not noise
-    # error in the horizontal plane, of which the real part is along the axis; None: along one axis,
-    # and alike along the other
+    # error in the horizontal plane, the real part along the axis; None: along one axis, and alike
+    # along the other
     vector: complex | None = None
 
 
