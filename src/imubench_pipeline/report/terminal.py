@@ -277,7 +277,8 @@ def _ranking_lines(group: Group, *, every: bool) -> Iterator[list[str | Text]]:
             known = f"{limit.sigma} of {limit.allowed}\n{limit.interval}"
             shown = known if limit.sigma != numbers.NO_VALUE else limit.reason
             error, _, after = limit.limit.rpartition(", ")
-            yield [*first, shown, f"{error}\nafter {after}", limit.margin]
+            margins = "\n".join(filter(None, [limit.margin, *limit.other_margins.split(", ")]))
+            yield [*first, shown, f"{error}\nafter {after}", margins]
             first = ["", "", ""]
 
 
