@@ -21,7 +21,7 @@ MODEL = NoiseModel(N=1e-3, B=2e-4, T_B=20.0, K=1e-5)
 
 
 def drawn_from_covariance(names, covariance, draws, rng):
-    """Models with jointly log-normal parameters, whose medians are those of `MODEL`."""
+    """Models with jointly log-normal parameters, with the medians of `MODEL`."""
     medians = [getattr(MODEL, name) for name in names]
     factors = np.exp(rng.multivariate_normal(np.zeros(len(names)), covariance, draws))
     rows = (medians * factors).tolist()

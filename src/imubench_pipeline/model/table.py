@@ -1,7 +1,7 @@
 """Rows of tables as frozen dataclasses, from which columns, schema and documentation derive.
 
 A class is declared with `table`; each field is a column, with its meaning, its unit (``-`` by
-default: a text, a count or a ratio) and, where it is not that of the type, its Arrow type:
+default: a text, a count or a ratio) and, where it is not the default of the type, its Arrow type:
 
     @table("recordings")
     class RecordingRow(TableRow):

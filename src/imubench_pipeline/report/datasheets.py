@@ -21,7 +21,7 @@ UNIT_SYMBOLS = {
     "offset": "signal",
     "temperature_coefficient": "sensitivity",
 }
-"""Symbols of the figures whose unit the reader can switch; other figures have that of B."""
+"""Symbols of the figures whose unit the reader can switch; other figures take the unit of B."""
 
 _WITHOUT_METHOD = ("mean", "temperature")
 """Entries of the column ``method`` for figures that no estimation method gives."""

@@ -99,7 +99,7 @@ def fit(
     """Estimate N, B, T_B, K and R of an Allan variance, with limits that hold for the next log.
 
     ``curve`` and ``parts`` have the same m points, SI and s, without deterministic signals;
-    ``lines`` are those of the spectrum. Returns SI values with 95 % limits: sampling, choice of
+    ``lines`` are spectral lines. Returns SI values with 95 % limits: sampling, choice of
     terms, error of the model, and changes of the sensor within the log. ``not_identified`` with an
     upper limit: a term may be absent, or its limits are too wide. Raises UnfitCurveError if fewer
     than six points lie within a sixth of the log, or the variance is 0 at one.

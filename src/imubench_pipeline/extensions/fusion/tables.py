@@ -29,7 +29,7 @@ class PublishedFigureRow(ChannelRow):
 class FusionRow(TableRow):
     quantity: Annotated[str, "gyro or accel"]
     tau: Annotated[float, "averaging time at which they are compared", "s"]
-    sensor: Annotated[str, "sensor of which several are averaged"]
+    sensor: Annotated[str, "sensor; several of it are averaged"]
     recording: Annotated[str | None, "recording that represents it: of its median channel"] = None
     channel: Annotated[str | None, "that answers"] = None
     simulated: Annotated[bool | None, "that recording is simulated"] = None
@@ -53,7 +53,7 @@ class FusionRow(TableRow):
 @table("grades")
 class GradeRow(TableRow):
     quantity: Annotated[str, "gyro or accel"]
-    sensor: Annotated[str, "sensor of which several are averaged"]
+    sensor: Annotated[str, "sensor; several of it are averaged"]
     recording: Annotated[str, "recording that represents it: of its median channel"]
     channel: Annotated[str, "that answers"]
     simulated: Annotated[bool, "whether this recording is simulated"]
