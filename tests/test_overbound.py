@@ -97,7 +97,7 @@ def test_it_lies_above_everything_that_was_measured_and_fitted(
 @pytest.mark.release
 @pytest.mark.parametrize("family", few(["N+GM+K"], ["N+K", "N+GM"]))
 def test_no_term_of_it_can_be_smaller(family: Family) -> None:
-    limits = limits_of(measured(GYRO), GYRO, RATE, 60.0, 60.0, (1 / 600, RATE / 2))
+    limits = limits_of(measured(GYRO), GYRO, RATE, 60.0, (1 / RATE, 60.0), (1 / 600, RATE / 2))
     model = find_smallest(limits, family, (0.4, 1800.0))
 
     def inside(trial: NoiseModel) -> bool:
@@ -298,8 +298,8 @@ def test_draws_of_the_fit_widen_what_is_fitted_by_what_they_leave_open(rng) -> N
     spread = 0.02
     drawn = [NoiseModel(N=1e-4 * math.exp(spread * x)) for x in rng.standard_normal(4000)]
     curve = measured(model)
-    wide = limits_of(curve, model, RATE, 60.0, 60.0, (1 / 600, RATE / 2))
-    told = limits_of(curve, model, RATE, 60.0, 60.0, (1 / 600, RATE / 2), drawn=drawn)
+    wide = limits_of(curve, model, RATE, 60.0, (1 / RATE, 60.0), (1 / 600, RATE / 2))
+    told = limits_of(curve, model, RATE, 60.0, (1 / RATE, 60.0), (1 / 600, RATE / 2), drawn=drawn)
     assert np.array_equal(told[0].value, wide[0].value)  # the measured curve is as sure as it was
     for limit in told[1:]:
         fitted = limit.of_term(model.terms[0])
@@ -314,7 +314,7 @@ def test_limits_from_draws_lie_above_as_many_of_them_at_every_place_at_once(rng)
         for a, b, c in steps
     ]
     band = (1 / 600, RATE / 2)
-    limits = limits_of(measured(GYRO), GYRO, RATE, 60.0, 60.0, band, drawn=drawn)[1:]
+    limits = limits_of(measured(GYRO), GYRO, RATE, 60.0, (1 / RATE, 60.0), band, drawn=drawn)[1:]
     below = [
         all(
             np.all(sum(limit.of_term(term) for term in model.terms) <= limit.value)

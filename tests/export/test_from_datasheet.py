@@ -60,9 +60,9 @@ def test_every_program_takes_the_sensors_of_the_catalogue(target: str) -> None:
         (["--datasheet", "bmi", "--target", "kalibr"], "there are: bmi055"),
         (["--datasheet", "nothing", "--target", "kalibr"], "lists all"),
         (["--datasheet", "bmi088", "--target", "nothing"], "there are: "),
-        (["--datasheet", "bmi088", "--target", "kalibr", "--overbound"], "needs a log"),
+        (["--datasheet", "bmi088", "--target", "kalibr", "--bounded"], "needs a log"),
         (["--target", "kalibr"], "expected the folder of results, or --datasheet"),
-        (["results", "--target", "kalibr"], "expected --sensor"),
+        (["results", "--target", "kalibr"], "no table recordings"),
         (["results", "--datasheet", "bmi088", "--target", "kalibr"], "expected the folder"),
     ],
 )

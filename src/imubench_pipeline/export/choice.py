@@ -3,14 +3,15 @@
 import math
 from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from imubench_pipeline.estimators.estimate import Estimate
+from imubench_pipeline.estimators.estimate import CURVE, Estimate
 from imubench_pipeline.estimators.rows import make_estimate
 from imubench_pipeline.export.imu import AXES, AxisNoise, ExportError
 from imubench_pipeline.model.estimates import ParameterRow
+from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.words.findings.base import channel_name
 from imubench_pipeline.words.numbers import join_names
 from imubench_pipeline.words.reasons import exports as texts
@@ -101,6 +102,38 @@ def choose(
     return Choice(recording, channel, used, noise, deviation, len(ranked))
 
 
+def pool_recordings(
+    rows: Iterable[ParameterRow], choice: Choice, method: str | None = None
+) -> Choice:
+    """Return the chosen channel with the mean of its spectra over all recordings of a device.
+
+    ``method`` as for `choose`. The mean of the spectra has the mean of N^2, K^2 and B^2.
+    """
+    parts: dict[str, list[ParameterRow]] = defaultdict(list)
+    for row in rows:
+        wanted = row.recommended if method is None else row.method == method
+        if wanted and row.channel == choice.channel:
+            parts[row.recording].append(row)
+    models = {name: make_estimate(choice.method, part).model for name, part in parts.items()}
+    models = {name: model for name, model in models.items() if model.N > 0.0}
+    if len(models) < 2:
+        return choice
+    own = models.values()
+    share = 1.0 / math.sqrt(len(models))
+    slow = [
+        term.scaled(share) for model in own for term in model.terms if term.gauss_markov is not None
+    ]
+    pooled = NoiseModel(
+        **{name: math.hypot(*(getattr(model, name) for model in own)) * share for name in "QNKR"},
+        B=math.hypot(*(model.B for model in own if model.T_B is None)) * share,
+        further=slow,
+        sinusoids=choice.axis.model.sinusoids,
+    )
+    origin = f"{choice.axis.origin}. In its place: {texts.pooled(choice.channel, [*models])}"
+    axis = replace(choice.axis, model=pooled, origin=origin)
+    return replace(choice, axis=axis)
+
+
 def _describe_other_axes(
     others: Mapping[texts.OtherAxes, Sequence[Key]], chosen: str, horizon: float
 ) -> list[str]:
@@ -125,6 +158,8 @@ def parameter_notes(estimate: Estimate) -> list[str]:
     """Describe the treatment of the parameters without a plain value."""
     notes = []
     for number, name, parameter in estimate.components():
+        if name in CURVE:
+            continue
         label = name if number == 1 else f"{name} of component {number}"
         status, reason = parameter.status, parameter.reason
         lower, upper = parameter.lower, parameter.upper

@@ -28,6 +28,8 @@ def describe_model(
     statements = [f"Noise of the {imu.sensor} for {program}, by imubench."]
     if imu.simulated:
         statements.append("The recordings are SIMULATED, not measured.")
+    if imu.mode:
+        statements.append(f"{imu.mode}.")
     statements += [f"CAUTION: {caution}." for caution in imu.cautions]
     statements.append(convention)
     units = {"gyro": "rad, s", "accel": "m, s"}

@@ -157,6 +157,8 @@ class Imu:
     simulated: bool = False  # whether the recordings are simulated
     cautions: Sequence[str] = ()  # doubts about the recordings, and those that were left out
     temperature: Mapping[str, TemperatureEffect] = field(default_factory=dict)  # by quantity
+    mode: str = ""  # the mode of the file (`modes`) in words
+    ros_topic: str = "/imu0"  # of the samples
 
     def __post_init__(self) -> None:
         for name in ("rate", "horizon", "gravity", "inflation"):

@@ -195,6 +195,7 @@ class Overbound:
     model: noise.NoiseModel
     family: Family
     horizon: float  # s
+    shortest: float  # tau and time, s
     longest: float  # tau, s
     band: tuple[float, float]  # lowest and highest frequency, Hz
     tau: Array  # (m,): up to ``longest``, s
@@ -216,10 +217,11 @@ class Overbound:
         """Description of the model, for the head of a file."""
         low, high = (number_text(frequency, 3) for frequency in self.band)
         return (
-            f"this is the smallest {self.family} above the measured Allan variance at every "
-            f"tau up to {number_text(self.longest)} s (95 % for all together). It is also above "
-            f"the fitted spectral density from {low} to {high} Hz, and the growth of the integrals "
-            f"up to {number_text(self.horizon)} s. Its Allan deviation is "
+            f"this is the smallest {self.family} above the measured Allan variance at every tau "
+            f"from {number_text(self.shortest, 3)} to {number_text(self.longest)} s (95 % for all "
+            f"together). It is also above the fitted spectral density from {low} to {high} Hz, "
+            f"and the growth of the integrals up to {number_text(self.horizon)} s. Its Allan "
+            "deviation is "
             f"{number_text(math.sqrt(self.at_minimum), 3)} times the measured one at the minimum "
             "of the curve"
         )
@@ -258,6 +260,7 @@ def overbound(
     family: Family = "N+K",
     horizon: float = 60.0,
     longest: float | None = None,
+    shortest: float = 0.0,
     band: tuple[float | None, float | None] = (None, None),
     confidence: float = 0.95,
     drawn: Sequence[noise.NoiseModel] = (),
@@ -268,9 +271,10 @@ def overbound(
     ``fitted`` is of the same log; its ramps and lines have no density and do not grow like noise:
     they count only by their part of the measured curve. The rate is in Hz. ``family`` are the terms
     that the model may have; ``horizon`` is the longest time that the filter predicts without a
-    measurement, s, and by default also ``longest``, the longest tau. ``band`` is the lowest and
-    highest frequency of the bounded density, Hz, by default a tenth of 1 / horizon, and half the
-    rate; lower its end for a sensor that is filtered below half the rate. ``confidence`` is of the
+    measurement, s, and by default also ``longest``, the longest tau. ``shortest`` is the shortest
+    tau and time, s, by default one sample. ``band`` is the lowest and highest frequency of the
+    bounded density, Hz, by default a tenth of 1 / horizon, and half the rate or 1 / ``shortest``;
+    lower its end for a sensor that is filtered below half the rate. ``confidence`` is of the
     limits, simultaneously for all tau. ``drawn`` are models drawn jointly from the posterior of the
     fit; without them the fitted model is widened by the factors of the measured curve.
     ``most_excess`` is the max. ratio of the model's Allan deviation to its limit.
@@ -280,8 +284,10 @@ def overbound(
     does not reach ``longest``.
     """
     reach = longest or horizon
-    ends = (band[0] or _MIN_FREQUENCY_TIMES_HORIZON / horizon, band[1] or 0.5 * rate)
-    limits = limits_of(curve, fitted, rate, horizon, reach, ends, confidence, drawn)
+    begins = max(shortest, 1.0 / rate)
+    highest = band[1] or min(0.5 * rate, 1.0 / begins)
+    ends = (band[0] or _MIN_FREQUENCY_TIMES_HORIZON / horizon, highest)
+    limits = limits_of(curve, fitted, rate, horizon, (begins, reach), ends, confidence, drawn)
     times = (2.0 / rate, _MAX_TIME_RATIO * max(horizon, reach))
     model = find_smallest(limits, family, times)
     excess = _find_excess(limits[0], model)
@@ -307,7 +313,7 @@ def overbound(
         if excess[0] > most_excess:
             raise ValueError(f"{offer}. At most {most_excess:g} times is allowed")
         warning = offer
-    within = curve.tau <= reach * (1.0 + 1e-9)
+    within = (curve.tau >= begins * (1.0 - 1e-9)) & (curve.tau <= reach * (1.0 + 1e-9))
     tau, measured = curve.tau[within], curve.variance[within]
     ratio = model.allan_variance(tau, rate) / measured
     touches = {}
@@ -320,7 +326,19 @@ def overbound(
     passed = np.flatnonzero(fitted.psd(frequency, rate) > model.psd(frequency))
     below = float(frequency[passed[0]]) if len(passed) else None
     return Overbound(
-        model, family, horizon, reach, ends, tau, ratio, lowest, touches, excess, below, warning
+        model,
+        family,
+        horizon,
+        begins,
+        reach,
+        ends,
+        tau,
+        ratio,
+        lowest,
+        touches,
+        excess,
+        below,
+        warning,
     )
 
 
@@ -336,22 +354,29 @@ def limits_of(
     fitted: noise.NoiseModel,
     rate: float,
     horizon: float,
-    longest: float,
+    reach: tuple[float, float],
     band: tuple[float, float],
     confidence: float = 0.95,
     drawn: Sequence[noise.NoiseModel] = (),
 ) -> list[Limits]:
-    """Return the limits on Allan variance, density and two integrals (see `overbound`)."""
-    if not 2.0 / rate < horizon:
-        raise ValueError(f"the horizon of {horizon:g} s is shorter than two samples")
+    """Return the limits on Allan variance, density and two integrals (see `overbound`).
+
+    ``reach`` is the shortest and the longest tau, s; the integrals begin at the shortest.
+    """
+    shortest, longest = reach
+    if not max(2.0 / rate, shortest) < horizon:
+        raise ValueError(
+            f"the horizon of {horizon:g} s is shorter than two samples, or than {shortest:g} s"
+        )
     if longest > curve.tau[-1] * (1.0 + 1e-9):
         raise ValueError(f"the curve ends at {curve.tau[-1]:g} s, before {longest:g} s")
     upper = simultaneous_upper(curve, longest, confidence)
-    tau = np.append(curve.tau[curve.tau < longest * (1.0 - 1e-9)], longest)
+    inside = (curve.tau >= shortest * (1.0 - 1e-9)) & (curve.tau < longest * (1.0 - 1e-9))
+    tau = np.append(curve.tau[inside], longest)
     limit = np.exp(np.interp(np.log(tau), np.log(curve.tau), np.log(upper)))
 
     frequency = np.geomspace(*band, count_points(*band, _POINTS_A_DECADE))
-    time = np.geomspace(1.0 / rate, horizon, count_points(1.0 / rate, horizon, _POINTS_A_DECADE))
+    time = np.geomspace(shortest, horizon, count_points(shortest, horizon, _POINTS_A_DECADE))
 
     def of_model(model: noise.NoiseModel) -> Array:
         grown = growth(model, time, rate)

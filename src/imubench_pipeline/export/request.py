@@ -12,8 +12,10 @@ from imubench_pipeline.allan import AllanCurve
 from imubench_pipeline.earth import STANDARD_GRAVITY
 from imubench_pipeline.estimators.rows import read_draws
 from imubench_pipeline.export import imu
-from imubench_pipeline.export.choice import WORST, Choice, choose
-from imubench_pipeline.export.mapping import describe_terms
+from imubench_pipeline.export.choice import WORST, Choice, choose, pool_recordings
+from imubench_pipeline.export.in_use import InUseNoise
+from imubench_pipeline.export.mapping import bound_walk, describe_terms
+from imubench_pipeline.export.modes import Mode, apply_mode, choose_mode
 from imubench_pipeline.export.overbound import FAMILIES, MAX_EXCESS, Family, overbound
 from imubench_pipeline.export.targets import TARGETS
 from imubench_pipeline.model.estimates import AllanRow, ParameterRow, TemperatureRow
@@ -29,6 +31,9 @@ Tables = Mapping[str, pa.Table]
 NEEDED = ("recordings", "parameters", "allan", "temperature")
 """The tables that a request reads."""
 
+_SHORTEST_BOUNDED = 1.0
+"""Shortest tau of an upper bound, s: below it vibration and resolution enter, which do not grow."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class Request:
@@ -41,12 +46,15 @@ class Request:
     inflation: float = 1.0
     because: str | None = None
     """Reason of the inflation, or of the use of recordings that are excluded from decisions."""
-    overbound: bool = False  # export the smallest model above the measured curve, not the fitted
+    mode: Mode | None = None  # None: of the target (`modes.choose_mode`)
     most_excess: float = MAX_EXCESS
     """Max. ratio of the Allan deviation of an overbound to its limit; a larger one is refused."""
     method: str | None = None  # of estimation; None: the recommended one
     latitude: float | None = None  # for gravity, degrees; None: standard gravity
     rate: float | None = None  # of the program's samples, Hz; None: the rate of the recording
+    ros_topic: str | None = None  # of the samples
+    one_device: bool = False  # all recordings are of one device, and are pooled
+    in_use: Mapping[str, InUseNoise] | None = None  # noise of a log in use, by channel
 
 
 def load(path: Path) -> dict[str, pa.Table]:
@@ -88,6 +96,7 @@ def build_imu(tables: Tables, request: Request, folder: Path | None = None) -> i
         raise imu.ExportError(f"no sensor {request.sensor!r}; there are: {', '.join(sensors)}")
     by_name = {row.recording: row for row in recordings}
     rows, cautions = _select_deciding(tables, request, recordings)
+    mode = choose_mode(request.mode, request.target)
     axes: dict[str, imu.AxisNoise] = {}
     rates: list[float] = []
     effects: dict[str, imu.TemperatureEffect] = {}
@@ -103,6 +112,9 @@ def build_imu(tables: Tables, request: Request, folder: Path | None = None) -> i
             devices={row.recording: row.device for row in recordings},
             method=request.method,
         )
+        place = {"sensor": request.sensor, "recording": choice.recording}
+        if request.one_device and mode != "bounded":
+            choice = pool_recordings(rows, choice, request.method)
         about = by_name[choice.recording]
         if about.doubts:
             cautions.append(f"{choice.recording} is in doubt: {doubts_text(about.doubts)}")
@@ -111,11 +123,14 @@ def build_imu(tables: Tables, request: Request, folder: Path | None = None) -> i
             raise imu.ExportError(f"{choice.recording}: its rate is not known; state it (--rate)")
         rates.append(float(f"{about.rate:.9g}"))  # time stamps are not more accurate
         axes[quantity] = choice.axis
-        place = {"sensor": request.sensor, "recording": choice.recording}
+        curve = curve_of(_select_rows(AllanRow, tables, **place, channel=choice.channel))
+        if choice.axis.least_walk is None:
+            walk = bound_walk(curve, choice.axis.model.N, request.horizon)
+            axes[quantity] = replace(choice.axis, least_walk=walk)
         warmed = _select_rows(TemperatureRow, tables, **place)
         effects[quantity] = imu.find_temperature_effect(warmed, about, quantity, request.horizon)
-        if request.overbound:
-            axes[quantity] = _bound_axis(tables, choice, request, about.rate, folder)
+        if mode == "bounded":
+            axes[quantity] = _bound_axis(curve, choice, request, about.rate, folder)
     if not axes:
         reasons = "; ".join(row.reason for row in recordings if row.reason)
         raise imu.ExportError(
@@ -123,7 +138,7 @@ def build_imu(tables: Tables, request: Request, folder: Path | None = None) -> i
         )
     latitude = request.latitude
     gravity = STANDARD_GRAVITY if latitude is None else imu.compute_normal_gravity(latitude)
-    return imu.Imu(
+    built = imu.Imu(
         sensor=request.sensor,
         rate=request.rate or max(rates),
         gyro=axes.get("gyro"),
@@ -135,7 +150,9 @@ def build_imu(tables: Tables, request: Request, folder: Path | None = None) -> i
         simulated=simulated,
         cautions=tuple(dict.fromkeys(cautions)),
         temperature=effects,
+        ros_topic=request.ros_topic or imu.Imu.ros_topic,
     )
+    return apply_mode(built, TARGETS[request.target], mode, request.in_use)
 
 
 def _select_deciding(
@@ -165,7 +182,7 @@ def _select_deciding(
 
 
 def _bound_axis(
-    tables: Tables, choice: Choice, request: Request, rate: float, folder: Path | None
+    curve: AllanCurve, choice: Choice, request: Request, rate: float, folder: Path | None
 ) -> imu.AxisNoise:
     """Return the smallest model above the measured curve of the chosen axis."""
     family = TARGETS[request.target].family
@@ -174,8 +191,6 @@ def _bound_axis(
         path = folder / request.sensor / choice.recording / "draws.parquet"
         if path.is_file():
             drawn = read_draws(path).get((choice.channel, choice.method))
-    place = {"sensor": request.sensor, "recording": choice.recording, "channel": choice.channel}
-    curve = curve_of(_select_rows(AllanRow, tables, **place))
     try:
         bound = overbound(
             curve,
@@ -183,6 +198,7 @@ def _bound_axis(
             rate,
             family=family,
             horizon=request.horizon,
+            shortest=_SHORTEST_BOUNDED if request.horizon > 2.0 * _SHORTEST_BOUNDED else 0.0,
             most_excess=request.most_excess,
             drawn=[drawn.model(number) for number in range(len(drawn))] if drawn else [],
         )
@@ -190,8 +206,8 @@ def _bound_axis(
         larger = _list_larger_programs(family)
         raise imu.ExportError(
             f"{choice.channel} of {choice.recording}: {'; '.join([str(error), *larger])}; or "
-            f"take a horizon shorter than {request.horizon:g} s, or the fitted model without "
-            "overbound, or allow a larger excess"
+            f"take a horizon shorter than {request.horizon:g} s, or the mode bench, or allow a "
+            "larger excess"
         ) from error
     fitted = f"the fitted model was: {describe_terms(choice.axis.model.terms)}"
     notes = [bound.words, bound.density_words, fitted, *choice.axis.notes]

@@ -34,7 +34,6 @@ _ORB_CONVENTION = (
     "N as IMU.Noise* and K as IMU.*Walk: continuous in time, two-sided, SI; the program itself "
     "multiplies by the root of IMU.Frequency, or divides by it."
 )
-_TOPIC = "/imu0"  # ROS topic of the samples
 
 
 def map_to_walks(imu: Imu) -> dict[str, Mapped]:
@@ -83,7 +82,7 @@ def write_kalibr(imu: Imu) -> str:
     return (
         format_comments(describe_model(imu, "Kalibr", _KALIBR_CONVENTION, mapped))
         + _format_densities(mapped)
-        + format_setting("rostopic", _TOPIC, "of sensor_msgs/Imu")
+        + format_setting("rostopic", json.dumps(imu.ros_topic), "of sensor_msgs/Imu")
         + format_setting("update_rate", format_decimal(imu.rate), "Hz")
     )
 
@@ -113,7 +112,7 @@ def write_openvins(imu: Imu) -> str:
         + "imu0:\n"
         + matrix("T_i_b", 4)
         + _format_densities(mapped, indent)
-        + format_setting("rostopic", _TOPIC, "of sensor_msgs/Imu", indent)
+        + format_setting("rostopic", json.dumps(imu.ros_topic), "of sensor_msgs/Imu", indent)
         + format_setting("time_offset", format_decimal(0.0), "s", indent)
         + format_setting("update_rate", format_decimal(imu.rate), "Hz", indent)
         + format_setting("model", '"kalibr"', "of the intrinsics", indent)
@@ -158,7 +157,7 @@ def write_vins_fusion(imu: Imu) -> str:
         "%YAML:1.0\n\n"
         + format_comments(about)
         + format_setting("imu", "1", "use it")
-        + format_setting("imu_topic", f'"{_TOPIC}"', "of sensor_msgs/Imu")
+        + format_setting("imu_topic", json.dumps(imu.ros_topic), "of sensor_msgs/Imu")
         + "".join(
             format_setting(key, format_exponential(value), words) for key, value, words in values
         )

@@ -26,9 +26,7 @@ class RecordingRow(SensorRow):
     rate_error: Annotated[
         float | None, "standard deviation of the rate, from the scatter of the stamps", "Hz"
     ] = None
-    samples: Annotated[
-        int | None, "number of number of number of samples present in the longest channel"
-    ] = None
+    samples: Annotated[int | None, "number of samples present in the longest channel"] = None
     duration: Annotated[float | None, "duration from the first to the last sample", "s"] = None
     temperature_min: Annotated[float | None, "lowest temperature", "degC"] = None
     temperature_max: Annotated[float | None, "highest temperature", "degC"] = None

@@ -8,7 +8,6 @@ import shutil
 import sys
 import textwrap
 from collections.abc import Sequence
-from dataclasses import fields
 from difflib import get_close_matches
 from functools import partial
 from importlib.metadata import version
@@ -21,7 +20,9 @@ from imubench_pipeline.registry import Hook
 from imubench_pipeline.report import command as report
 from imubench_pipeline.report import show
 from imubench_pipeline.report.static_figures import command as figures
+from imubench_pipeline.run import calibrate_command as calibration
 from imubench_pipeline.run import convert_command as conversion
+from imubench_pipeline.run import export_command as exports
 from imubench_pipeline.run import formats_command as formats
 from imubench_pipeline.run import project
 from imubench_pipeline.run import sensors_command as sensors
@@ -141,128 +142,6 @@ def _add_inspect(parser: argparse.ArgumentParser) -> None:
         partial(outputs.OutputFile, adds_to={"config"}),
         help="where to write the sensor file; default: the terminal",
     )
-
-
-def _add_export(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("results", type=Path, nargs="?", help="folder of the results of a run")
-    parser.add_argument("--sensor", help="of the run: name of the sensor file")
-    parser.add_argument(
-        "--datasheet",
-        metavar="NAME",
-        help="instead of results: a sensor of the catalogue, such as bmi088, by its printed "
-        "figures; what it does not print is the worst of its class",
-    )
-    parser.add_argument(
-        "--target", required=True, help="program, such as kalibr; a wrong name lists them all"
-    )
-    parser.add_argument(
-        "--axis", default="worst", help="worst, median, a device or a recording; default: worst"
-    )
-    parser.add_argument(
-        "--horizon",
-        type=command_line.make_number_type(
-            1e-9, command_line.LONGEST, "a time above 0, such as 60 s", command_line.parse_seconds
-        ),
-        default="60 s",
-        metavar="TIME",
-        help="time of coasting, for the replacement of terms that the program does not support; "
-        "default: 60 s",
-    )
-    parser.add_argument(
-        "--inflate",
-        dest="inflation",
-        type=command_line.make_number_type(1e-6, 1e6, "a factor of 1e-6 to 1e6", float),
-        default=1.0,
-        metavar="FACTOR",
-        help="multiplies every deviation",
-    )
-    parser.add_argument("--because", help="reason of --inflate, or of the use of unfit recordings")
-    parser.add_argument(
-        "--overbound",
-        action="store_true",
-        help="the smallest model above the upper 95 %% limit of the measured curve up to --horizon",
-    )
-    parser.add_argument(
-        "--excess",
-        dest="most_excess",
-        type=command_line.make_number_type(1.0, 1e6, "a factor of 1 to 1e6", float),
-        default=3.0,
-        metavar="FACTOR",
-        help="largest permitted ratio of the Allan deviation of an overbound to its limit; "
-        "default: 3",
-    )
-    parser.add_argument("--method", help="of the estimates; default: the recommended one")
-    parser.add_argument(
-        "--latitude",
-        type=command_line.make_number_type(
-            -90.0, 90.0, "a latitude of -90 to 90, in degrees", float
-        ),
-        metavar="DEG",
-        help="for gravity",
-    )
-    parser.add_argument(
-        "--rate",
-        type=command_line.make_number_type(1e-6, 1e9, "a rate above 0, in Hz", float),
-        metavar="HZ",
-        help="default: the recording's",
-    )
-    outputs.add_output(parser, "--output", help="where to write; default: the terminal")
-
-
-def _export_datasheet(options: argparse.Namespace) -> str | bytes:
-    """Return the file of a program from the printed figures of a sensor of the catalogue."""
-    from imubench_pipeline.export.from_datasheet import build_printed_imu
-    from imubench_pipeline.export.imu import ExportError
-    from imubench_pipeline.export.targets import TARGETS
-    from imubench_pipeline.settings.sensor import read_sensors
-    from imubench_pipeline.settings.shipped import list_folders
-
-    found = sensors.find_sensors(
-        read_sensors(list_folders(Run().sensors, "sensors")), options.datasheet
-    )
-    name = options.datasheet.lower()
-    if name not in found:
-        near = f"; there are: {', '.join(found)}" if found else "; `imubench sensors` lists all"
-        if len(found) != 1:
-            raise ExportError(f"no sensor {options.datasheet!r}{near}")
-        (name,) = found
-    if options.target not in TARGETS:
-        raise ExportError(
-            f"target {options.target!r} is not known; there are: {', '.join(TARGETS)}"
-        )
-    if options.overbound:
-        raise ExportError("an overbound needs a log: expected --datasheet without --overbound")
-    keys = ("horizon", "inflation", "because", "latitude", "rate")
-    asked = {key: getattr(options, key) for key in keys}
-    return TARGETS[options.target].write(build_printed_imu(name, found[name], **asked))
-
-
-def _export(options: argparse.Namespace) -> int:
-    from imubench_pipeline.export.imu import ExportError
-    from imubench_pipeline.export.request import Request, load, make_content, recordings_of
-
-    if options.inflation != 1.0 and not options.because:
-        raise command_line.CommandError("--inflate needs its reason; expected --because '...'")
-    if (options.results is None) == (options.datasheet is None):
-        raise command_line.CommandError("expected the folder of results, or --datasheet NAME")
-    try:
-        if options.datasheet is not None:
-            content = _export_datasheet(options)
-        elif options.sensor is None:
-            raise ExportError("which sensor of the results? expected --sensor NAME")
-        else:
-            values = {field.name: getattr(options, field.name) for field in fields(Request)}
-            tables, folder = load(options.results), recordings_of(options.results)
-            content = make_content(tables, Request(**values), folder)
-    except ExportError as error:
-        raise command_line.CommandError(str(error)) from None
-    if options.output is not None:
-        options.output.write(content)
-    elif isinstance(content, bytes):
-        raise command_line.CommandError(f"{options.target} is no text; expected --output FILE")
-    else:
-        print(content, end="")
-    return 0
 
 
 def _schema(options: argparse.Namespace) -> int:
@@ -436,6 +315,16 @@ COMMANDS = {
             "a log or the sensor file is missing, or incomplete",
         ),
     ),
+    "calibrate": command_line.Command(
+        "estimate the noise in logs, and write the file of a filter, such as Kalibr's imu.yaml",
+        calibration.add_arguments,
+        calibration.run,
+        (
+            "written",
+            "a log may not be used, or the program cannot hold its noise",
+            "a log or the sensor file is missing, or incomplete",
+        ),
+    ),
     "init": command_line.Command(
         "make a folder of logs",
         project.add_init_arguments,
@@ -480,8 +369,8 @@ COMMANDS = {
     ),
     "export": command_line.Command(
         "write the input file of a filter or simulator",
-        _add_export,
-        _export,
+        exports.add_arguments,
+        exports.run,
         ("written", "", "the program cannot hold it, or " + command_line.NO_RESULTS),
     ),
     "show": command_line.Command(

@@ -139,8 +139,10 @@ class ExportSettings(Strict):
         None,
         description="reason of the inflation, or of the use of unfit recordings, for the files",
     )
-    overbound: bool = Field(
-        False, description="the smallest model above the upper limit of the curve instead"
+    mode: Literal["bench", "bounded", "in-use"] | None = Field(
+        None,
+        description="noise at rest (bench), an upper bound of it (bounded), or what the authors of "
+        "a program recommend in use; null: in-use for programs that fly, else bench",
     )
     most_excess: float = Field(
         3.0,

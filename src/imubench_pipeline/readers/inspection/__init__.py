@@ -1,8 +1,8 @@
 """Inspect a log and draft a sensor file for it: `imubench inspect`."""
 
 import re
-from collections.abc import Iterator
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -46,15 +46,18 @@ class Inspection:
         return self.proof.read and not self.draft.unfilled()
 
 
-def inspect(path: Path, model: str | None = None) -> Inspection:
+def inspect(path: Path, model: str | None = None, topics: Sequence[str] = ()) -> Inspection:
     """Inspect a recording (file, folder, zip archive or ROS 2 bag) and draft a sensor file for it.
 
     Only the beginning of each file is read. ``model``: name of the sensor; None: the name of the
-    log. Raises `RecordingError` if it cannot be read, or is no log.
+    log. ``topics``: of a bag, the ones to use; none: all. Raises `RecordingError` if it cannot be
+    read, has no such topic, or is no log.
     """
     # Numbers in a damaged file may overflow.
     with np.errstate(all="ignore"):
         log = list_contents(path)
+        if topics:
+            log = _select_topics(log, topics)
         drafted = draft_sensor_file(log, model)
         return Inspection(
             format_contents(log),
@@ -62,6 +65,15 @@ def inspect(path: Path, model: str | None = None) -> Inspection:
             drafted,
             check_draft(path, drafted),
         )
+
+
+def _select_topics(log: Contents, topics: Sequence[str]) -> Contents:
+    wanted = {topic.strip("/") for topic in topics}
+    present = {table.name.strip("/"): table for table in log.tables}
+    if missing := sorted(wanted - set(present)):
+        names = ", ".join(table.name for table in log.tables if table.name) or "none"
+        raise RecordingError(f"{log.path.name}: no topic {missing[0]}; there are: {names}")
+    return replace(log, tables=tuple(present[name] for name in present if name in wanted))
 
 
 _MAX_LINES = 40  # largest number of tables, and of columns of a table, that are listed

@@ -3,6 +3,7 @@
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from difflib import SequenceMatcher
 from pathlib import PurePosixPath
 from typing import Any
 
@@ -281,6 +282,23 @@ def choose_columns(contents: Contents) -> Choice:
             if id(column) not in spoken and not (clock and column.source == clock.column.source)
         ],
     )
+
+
+def find_imus(contents: Contents) -> list[tuple[str, ...]]:
+    """Return the topics of each IMU of a log: a gyro, and the accelerometer nearest in name."""
+    able = [group for group in group_columns(contents) if not _explain_rejection(group)]
+    gyros = {group.table.name: group for group in able if group.quantity == "gyro"}
+    accels = {group.table.name: group for group in able if group.quantity == "accel"}
+    free = [name for name in accels if name not in gyros]
+    imus: list[tuple[str, ...]] = []
+    for name in gyros:
+        if name in accels or not free:
+            imus.append((name,))
+            continue
+        nearest = max(free, key=lambda other: SequenceMatcher(None, name, other).ratio())
+        free.remove(nearest)
+        imus.append((name, nearest))
+    return imus
 
 
 def _explain_rejection(group: Group) -> str:

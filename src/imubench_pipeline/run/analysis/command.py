@@ -5,6 +5,7 @@ import gc
 import json
 import os
 import shlex
+import shutil
 import sys
 import tempfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -32,6 +33,23 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "Read static logs, report their faults, and estimate the noise parameters of each axis, "
         "like a run of the workflow."
     )
+    add_log_arguments(parser)
+    add_output(
+        parser,
+        "--output",
+        OutputFolder,
+        metavar="FOLDER",
+        help="write report.html, figures (SVG, PDF) and tables (CSV, and for `imubench export`) "
+        "into it",
+    )
+    command_line.add_units(parser)
+    parser.add_argument(
+        "-v", "--verbose", action="store_true", help="print all findings and parameters"
+    )
+
+
+def add_log_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the logs of a command, and how they are read and analysed."""
     parser.add_argument(
         "logs", type=Path, nargs="+", metavar="LOG", help="log file, or folder of a recording"
     )
@@ -42,6 +60,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="sensor file, or a name in config/sensors or the catalogue; default: as stated in the "
         "log",
     )
+    parser.add_argument(
+        "--topic",
+        action="append",
+        default=[],
+        help="of a bag with several IMUs; again for an accelerometer of its own",
+    )
     parser.add_argument("--rate", metavar="FREQUENCY", help="of a log without stamps, as '100 Hz'")
     parser.add_argument("--gyro-unit", metavar="UNIT", help="unit, if the log does not state it")
     parser.add_argument("--accel-unit", metavar="UNIT", help="unit, if the log does not state it")
@@ -50,23 +74,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action="store_true",
         help="analyse the longest part of each log in which the sensor was not moved",
     )
-    add_output(
-        parser,
-        "--output",
-        OutputFolder,
-        metavar="FOLDER",
-        help="write report.html, figures (SVG, PDF) and tables (CSV) into it",
-    )
     parser.add_argument(
         "--config",
         type=Path,
         default=Path("config/config.yaml"),
         metavar="FILE",
         help="settings of the estimates; default: config/config.yaml, if it is there",
-    )
-    command_line.add_units(parser)
-    parser.add_argument(
-        "-v", "--verbose", action="store_true", help="print all findings and parameters"
     )
     parser.add_argument(
         "-c",
@@ -85,7 +98,7 @@ def run(arguments: argparse.Namespace) -> int:
     # Compiling and importing create many permanent objects: the default frequency of garbage
     # collection takes a tenth of the time at the first use.
     gc.set_threshold(100_000, 50, 50)
-    with Compilation(_say) as compiling:  # while this process imports all else
+    with Compilation(say) as compiling:  # while this process imports all else
         if arguments.output is not None:
             with require_extra("workflow", "write pages and figures (--output)"):
                 import_module("imubench_pipeline.report.publish")
@@ -99,47 +112,61 @@ def _run(arguments: argparse.Namespace, compiling: "Compilation") -> int:
     from imubench_pipeline.report.show import show
     from imubench_pipeline.report.terminal import render_logs
     from imubench_pipeline.run.analysis.chain import Analysis
+
+    with tempfile.TemporaryDirectory(prefix="imubench.") as folder:
+        plan = plan_logs(arguments, Path(folder))
+        analysis = Analysis(plan, compiling, arguments.cores, say)
+        tables = analysis.estimates()
+        render = render_logs if arguments.verbose else render_log_screen
+        show(lambda width: render(tables, arguments.units, width))
+        if arguments.output is not None:
+            say("making the page and the figures: some seconds")
+            printed = FailureRow.rows_of(tables["failures"])
+            tables = analysis.for_pages()
+            later = [row for row in FailureRow.rows_of(tables["failures"]) if row not in printed]
+            for line in list_failures(later):
+                say(f"left out of the page: {line}")
+            _write(plan, tables, arguments)
+    statuses = set(tables["recordings"]["status"].to_pylist())
+    return 0 if statuses == {"ok"} else 1
+
+
+def plan_logs(arguments: argparse.Namespace, folder: Path, device: str | None = None) -> "Plan":
+    """Return the plan of a temporary project of logs in a folder.
+
+    ``device``: the name of the sensor of all logs; None: a sensor for each log. Raises CommandError
+    if a log or a setting cannot be used.
+    """
     from imubench_pipeline.run.analysis.project import Stated, lay_out
     from imubench_pipeline.run.plan import Plan
     from imubench_pipeline.settings.config import Run, read_config
     from imubench_pipeline.settings.shipped import list_folders
     from imubench_pipeline.settings.validation import ConfigError
 
-    with tempfile.TemporaryDirectory(prefix="imubench.") as folder:
-        try:
-            stated = Stated(arguments.rate, arguments.gyro_unit, arguments.accel_unit)
-            catalogue = list_folders(Run().sensors, "sensors")
-            paths = lay_out(arguments.logs, arguments.sensor, stated, catalogue, Path(folder))
-            config = {**read_config(arguments.config), **paths}
-            quality = config.get("quality")
-            if arguments.at_rest:
-                own = quality if isinstance(quality, dict) else {}
-                config["quality"] = {**own, "at_rest": True}
-            plan = Plan(config)
-        except ConfigError as error:
-            raise command_line.CommandError(f"imubench analyse: {error}") from None
-        analysis = Analysis(plan, compiling, arguments.cores, _say)
-        tables = analysis.estimates()
-        render = render_logs if arguments.verbose else render_log_screen
-        show(lambda width: render(tables, arguments.units, width))
-        if arguments.output is not None:
-            _say("making the page and the figures: some seconds")
-            printed = FailureRow.rows_of(tables["failures"])
-            tables = analysis.for_pages()
-            later = [row for row in FailureRow.rows_of(tables["failures"]) if row not in printed]
-            for line in list_failures(later):
-                _say(f"left out of the page: {line}")
-            _write(plan, tables, arguments)
-    statuses = set(tables["recordings"]["status"].to_pylist())
-    return 0 if statuses == {"ok"} else 1
+    try:
+        stated = Stated(
+            arguments.rate, arguments.gyro_unit, arguments.accel_unit, tuple(arguments.topic)
+        )
+        catalogue = list_folders(Run().sensors, "sensors")
+        paths = lay_out(arguments.logs, arguments.sensor, stated, catalogue, folder, device)
+        config = {**read_config(arguments.config), **paths}
+        quality = config.get("quality")
+        if arguments.at_rest:
+            own = quality if isinstance(quality, dict) else {}
+            config["quality"] = {**own, "at_rest": True}
+        return Plan(config)
+    except ConfigError as error:
+        raise command_line.CommandError(f"imubench {arguments.command}: {error}") from None
 
 
-def _say(text: str) -> None:
+def say(text: str) -> None:
+    """Print a line of progress."""
     print(text, file=sys.stderr, flush=True)
 
 
 def _write(plan: "Plan", tables: "Mapping[str, pa.Table]", arguments: argparse.Namespace) -> None:
     """Write the page, the figures and the tables."""
+    from imubench_pipeline.export.request import NEEDED as EXPORTED
     from imubench_pipeline.report.publish import make_site, render_one_file
     from imubench_pipeline.report.static_figures.files import list_drawings
     from imubench_pipeline.tables.files import write_arrow, write_content
@@ -166,6 +193,12 @@ def _write(plan: "Plan", tables: "Mapping[str, pa.Table]", arguments: argparse.N
             write_content(render_one_file(site), folder / "report.html")
             for name in ("recordings", "findings", "doubts", "parameters", "allan", "models"):
                 write_arrow(tables[name], folder / f"{name}.csv")
+            for name in EXPORTED:
+                write_arrow(tables[name], folder / "tables" / f"{name}.parquet")
+            for drawn in plan.run.results.glob("recordings/*/*/draws.parquet"):
+                copy = folder / drawn.relative_to(plan.run.results)
+                copy.parent.mkdir(parents=True)
+                shutil.copy(drawn, copy)
     print(f"{output.path / 'report.html'}: open it in a browser")
 
 

@@ -26,13 +26,14 @@ class Stated:
     rate: str | None = None
     gyro_unit: str | None = None
     accel_unit: str | None = None
+    topics: tuple[str, ...] = ()  # of a bag; empty: all
 
     def unit_of(self, channel: str) -> str | None:
         """Return the unit that is stated for a channel."""
         return self.gyro_unit if quantity_of(channel) == "gyro" else self.accel_unit
 
     def __bool__(self) -> bool:
-        return any((self.rate, self.gyro_unit, self.accel_unit))
+        return any((self.rate, self.gyro_unit, self.accel_unit, self.topics))
 
 
 class UnfilledError(ConfigError):
@@ -45,12 +46,14 @@ def lay_out(
     stated: Stated,
     catalogue: Sequence[Path],
     folder: Path,
+    device: str | None = None,
 ) -> dict[str, str | None]:
     """Make a project of logs in an existing folder: a drop zone of links, and their sensor files.
 
     `logs`: files, or folders of recordings. `sensor`: the sensor file of all logs, or its name in
     the folders `catalogue`; None: a draft for each log, as by `imubench inspect`, completed by
-    `stated`. Return the paths in the configuration of the run.
+    `stated`. `device`: all logs are of this one, and drafted from the first.
+    Return the paths in the configuration of the run.
 
     Raise a ConfigError if a log is missing, two logs would have one name, the sensor file cannot be
     used, or a log does not state a required property (`UnfilledError`).
@@ -61,8 +64,8 @@ def lay_out(
     declared = None if sensor is None else _find_sensor_file(sensor, catalogue)
     if declared is not None and stated:
         raise ConfigError(
-            "--rate, --gyro-unit and --accel-unit complete the statements of a log; they cannot be "
-            "used with --sensor: state them in the sensor file"
+            "--rate, --gyro-unit, --accel-unit and --topic complete the statements of a log; they "
+            "cannot be used with --sensor: state them in the sensor file"
         )
     (folder / "sensors").mkdir()
     for log, name in zip(logs, _name_recordings(logs), strict=True):
@@ -73,9 +76,10 @@ def lay_out(
             if not target.is_symlink():
                 target.symlink_to(described.resolve())
         else:
-            of = name
+            of = device or name
             target = folder / "sensors" / f"{of}.yaml"
-            write_json(_draft_sensor(log, stated), target)  # which is YAML, too
+            if not target.exists():
+                write_json(draft_sensor(log, stated), target)  # which is YAML, too
         place = folder / "logs" / of
         place.mkdir(parents=True, exist_ok=True)
         (place / (name + path.name.removeprefix(get_recording_name(path.name)))).symlink_to(path)
@@ -124,17 +128,12 @@ def _name_recordings(logs: Sequence[Path]) -> list[str]:
     return longer
 
 
-def _draft_sensor(log: Path, stated: Stated) -> Mapping[str, object]:
-    """Return the sensor file drafted from a log, completed by the stated properties."""
-    try:
-        inspected: Inspection = run_bounded(INSPECTED_S, INSPECTED_BYTES, inspect, log)
-    except BoundError as error:
-        raise ConfigError(
-            f"{log}: to look into it {error}; expected the log of an inertial sensor"
-        ) from None
-    except (RecordingError, OSError) as error:
-        raise ConfigError(str(error)) from None
-    draft = inspected.draft.with_units(
+def draft_sensor(log: Path, stated: Stated) -> Mapping[str, object]:
+    """Return the sensor file drafted from a log, completed by the stated properties.
+
+    Raises ConfigError if the log cannot be read, and UnfilledError if a property is missing.
+    """
+    draft = inspect_log(log, stated.topics).draft.with_units(
         lambda key, unit: stated.unit_of(key) if key in CHANNELS and unit == UNKNOWN else None
     )
     if stated.rate and draft.time is None:
@@ -163,3 +162,21 @@ def _draft_sensor(log: Path, stated: Stated) -> Mapping[str, object]:
     return parse(Sensor, draft.sensor(), f"drafted from {log}").model_dump(
         mode="json", exclude_unset=True
     )
+
+
+def inspect_log(log: Path, topics: Sequence[str] = ()) -> Inspection:
+    """Return what a log holds, within bounds of time and memory; ConfigError if it cannot be read.
+
+    ``topics`` of a bag; none: all.
+    """
+    try:
+        inspected: Inspection = run_bounded(
+            INSPECTED_S, INSPECTED_BYTES, inspect, log, None, topics
+        )
+    except BoundError as error:
+        raise ConfigError(
+            f"{log}: to look into it {error}; expected the log of an inertial sensor"
+        ) from None
+    except (RecordingError, OSError) as error:
+        raise ConfigError(str(error)) from None
+    return inspected

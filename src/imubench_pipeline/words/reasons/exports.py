@@ -5,7 +5,7 @@ from typing import Literal
 
 from imubench_pipeline.model.states import Status
 from imubench_pipeline.words.estimates import STATUS_WORDS
-from imubench_pipeline.words.findings.base import channel_name
+from imubench_pipeline.words.findings.base import channel_name, value_text
 from imubench_pipeline.words.numbers import counted, join_names, number_text
 
 OtherAxes = Literal["other_device", "no_white_noise", "not_median", "less_noise"]
@@ -22,6 +22,73 @@ _OTHER_AXES: Mapping[OtherAxes, str] = {
 NO_WALK_KNOWN = "the model has no random walk, and no upper limit of it is known, so it is 0"
 NO_TEMPERATURE_FIT = "no fit of the temperature"
 BIAS_NOT_LINEAR = "its bias is not linear in temperature, and the program supports a slope only"
+
+
+MODE_WORDS: Mapping[Literal["bench", "bounded"], str] = {
+    "bench": "BENCH: the noise at rest. On a vehicle it is larger",
+    "bounded": "BOUNDED: at least the noise at rest; see the range below",
+}
+"""The modes of a file that need no further data."""
+
+
+def value_kind(model: str, written: str) -> str:
+    """Return whether slow terms are measured, limits, or replaced; models as `NoiseModel.name`."""
+    slow = set(model.split("+")) - {"N", "Q", "S", "none"}
+    if slow == set(written.split("+")) - {"N"}:
+        return ""
+    if not slow:
+        return " (upper limit: the log shows no slow noise)"
+    return f" (the slow terms of {model} together)"
+
+
+def limit_of_walk(K: float) -> str:
+    """Return that an upper limit of K, SI, is used."""
+    return (
+        f"the model has no random walk, and its upper 95 % limit K = {K:.3e} is used. A filter "
+        "stops estimating a bias that does not change"
+    )
+
+
+def channel_in_use(
+    channel: str, N: float, motion: float, lines: Sequence[tuple[float, float]]
+) -> str:
+    """Return the noise of a channel in use, SI; ``lines``: frequency, Hz, and rms."""
+    at = [f"{number_text(f, 3)} Hz ({value_text(rms, channel)} rms)" for f, rms in lines]
+    return (
+        f"{channel_name(channel)} N = {value_text(N, channel, 'density')}"
+        + (f", lines at {join_names(at)}" if at else "")
+        + f", motion of {value_text(motion, channel)} rms removed"
+    )
+
+
+def noise_in_use(cutoff: float, channels: Sequence[str]) -> str:
+    """Return the noise of a log in use; ``channels``: each in words, cut-off in Hz."""
+    at = number_text(cutoff)
+    return (
+        f"IN USE: at least the broadband noise above {at} Hz of a log in use. Below {at} Hz all is "
+        "taken as motion, and a spectral line is not white noise: both are left out. "
+        + "; ".join(channels)
+    )
+
+
+def floor_in_use(source: str) -> str:
+    """Return that no log in use was measured, and whose figures are used."""
+    return f"IN USE, NOT MEASURED: at least {source}. --in-use LOG measures it"
+
+
+def raised(before: float, N: float, K: float) -> str:
+    """Return how the mode raised the densities, SI."""
+    walk = f", K at least {K:.4e}" if K else ""
+    return f"N is {N:.4e} for the use, and {before:.4e} at rest{walk}"
+
+
+def pooled(channel: str, recordings: Sequence[str]) -> str:
+    """Return that a channel is the mean of several recordings of one device."""
+    number = counted(len(recordings), "recording")
+    return (
+        f"mean of the spectra of {channel_name(channel)} in {number} of the device: "
+        f"{', '.join(recordings)}"
+    )
 
 
 def chosen_axis(

@@ -1,0 +1,189 @@
+"""`imubench calibrate`: from static logs to the input file of a filter, in one command."""
+
+import argparse
+import re
+import tempfile
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from textwrap import wrap
+from typing import TYPE_CHECKING
+
+from imubench_pipeline.recordings.drop_zone import get_recording_name
+from imubench_pipeline.run import export_command as exports
+from imubench_pipeline.run.analysis import command as analysis
+from imubench_pipeline.settings import command_line
+from imubench_pipeline.tables import outputs
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+
+    from imubench_pipeline.export.imu import Imu
+    from imubench_pipeline.run.analysis.compilation import Compilation
+
+_MAX_EVENTS = 3
+_MAX_NOT_USED = 3
+_MAX_WIDTH = 80
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments of the command."""
+    parser.description = (
+        "Read static logs of one device, judge them, estimate the noise, and write the input file "
+        "of a filter or simulator. Several logs are pooled."
+    )
+    analysis.add_log_arguments(parser)
+    exports.add_options(parser)
+    parser.add_argument(
+        "--all", action="store_true", help="a file for each IMU of a bag, named by its topic"
+    )
+    outputs.add_output(
+        parser, "--output", help="where to write; default: the name that it usually has"
+    )
+
+
+def run(options: argparse.Namespace) -> int:
+    """Write the file and print what it holds; return the exit status."""
+    from imubench_pipeline.run.analysis.compilation import Compilation
+
+    with Compilation(analysis.say) as compiling:
+        return _run(options, compiling)
+
+
+def _run(options: argparse.Namespace, compiling: "Compilation") -> int:
+    from imubench_pipeline.export.imu import ExportError
+    from imubench_pipeline.export.targets import TARGETS
+
+    try:
+        exports.check_options(options)
+    except ExportError as error:
+        raise command_line.CommandError(str(error)) from None
+    output: outputs.OutputFile = options.output or outputs.OutputFile(
+        Path(TARGETS[options.target].file_name), force=options.force
+    )
+    status = 0
+    for topics, path in _list_files(options, output.path):
+        own = output.beside(path)
+        own.check()  # before the log is read
+        of_imu = argparse.Namespace(**{**vars(options), "topic": list(topics), "output": own})
+        status = max(status, _calibrate(of_imu, compiling))
+    return status
+
+
+def _list_files(options: argparse.Namespace, path: Path) -> Iterator[tuple[Sequence[str], Path]]:
+    """Yield the topics of each IMU, and the path of its file."""
+    if not options.all:
+        yield options.topic, path
+        return
+    from imubench_pipeline.readers.contents import list_contents
+    from imubench_pipeline.readers.inspection.drafting import find_imus
+    from imubench_pipeline.tables.findings import RecordingError
+
+    try:
+        found = find_imus(list_contents(options.logs[0]))
+    except RecordingError as error:
+        raise command_line.CommandError(str(error)) from None
+    for topics in found:
+        name = re.sub(r"\W+", "_", topics[0]).strip("_")
+        yield topics, path.with_name(f"{path.stem}_{name}{path.suffix}" if name else path.name)
+
+
+def _calibrate(options: argparse.Namespace, compiling: "Compilation") -> int:
+    """Write the file of one IMU; return the exit status."""
+    from imubench_pipeline.export.imu import ExportError
+    from imubench_pipeline.export.request import build_imu
+    from imubench_pipeline.run.analysis.chain import Analysis
+
+    with tempfile.TemporaryDirectory(prefix="imubench.") as folder:
+        device = None if options.sensor else get_recording_name(options.logs[0].resolve().name)
+        plan = analysis.plan_logs(options, Path(folder), device)
+        sensor, _ = next(iter(plan.recordings))
+        tables = Analysis(plan, compiling, options.cores, analysis.say).estimates()
+        judged = list(_describe_logs(tables))
+        try:
+            measured = None
+            if options.in_use not in (None, exports.NOT_MEASURED):
+                measured = exports.read_in_use(options.in_use, plan.sensors[sensor], options.motion)
+            topics = {one.variable for one in plan.sensors[sensor].log.channels.values()}
+            request = exports.make_request(
+                options,
+                sensor=sensor,
+                in_use=measured,
+                one_device=True,
+                ros_topic=min(filter(None, topics), default=None),
+            )
+            imu = build_imu(tables, request, plan.run.results / "recordings")
+            options.output.write(exports.write_target(imu, options.target))
+        except ExportError as error:
+            print("\n".join(judged))
+            raise command_line.CommandError(
+                f"{options.output.path}: not written: {error}"
+            ) from None
+    print("\n".join([*_describe_file(imu, options), *judged]))
+    for line in _list_not_used(options):
+        print(line)
+    return 0
+
+
+def _describe_file(imu: "Imu", options: argparse.Namespace) -> Iterator[str]:
+    """Yield what a file holds: its mode, and the values of gyro and accelerometer."""
+    from imubench_pipeline.export.mapping import map_to_family
+    from imubench_pipeline.export.targets import TARGETS
+    from imubench_pipeline.report.practical import choose_page_unit
+    from imubench_pipeline.words.reasons.exports import value_kind
+
+    target = TARGETS[options.target]
+    yield f"{options.output.path}: for {target.program}"
+    yield from wrap(imu.mode, _MAX_WIDTH, max_lines=4, placeholder=" ...")
+    for quantity, axis in imu.axes.items():
+        mapped = map_to_family(axis, target.family, imu.horizon, imu.rate)
+        values = []
+        for symbol in ("N", "B", "T_B", "K"):
+            value = getattr(mapped.model, symbol)
+            if value:
+                unit = choose_page_unit(quantity, symbol, "practical")
+                values.append(f"{symbol} {unit.text(value, 3)} {unit.sign}")
+        kind = value_kind(axis.model.name, mapped.model.name)
+        yield f"  {quantity:5}  {', '.join(values)}{kind}"
+
+
+def _describe_logs(tables: "Mapping[str, pa.Table]") -> Iterator[str]:
+    """Yield the state of each log, and the events that matter most."""
+    from imubench_pipeline.model.estimates import AllanRow, ParameterRow
+    from imubench_pipeline.model.recordings import FindingRow, RecordingRow
+    from imubench_pipeline.report import terminal
+    from imubench_pipeline.report.log_screen import group_events
+    from imubench_pipeline.tables.findings import LEFT_OUT
+    from imubench_pipeline.words.events import events_text, reason_text, state_text
+
+    findings = FindingRow.rows_of(tables["findings"])
+    parameters = ParameterRow.rows_of(tables["parameters"])
+    allan = AllanRow.rows_of(tables["allan"])
+    for row in RecordingRow.rows_of(tables["recordings"]):
+        estimated = [each for each in terminal.select_of(row, parameters) if each.recommended]
+        length = terminal.describe_length(row, estimated, terminal.select_of(row, allan))
+        yield from wrap(state_text(row, length), _MAX_WIDTH)
+        yield from wrap(reason_text(row), _MAX_WIDTH)
+        own = [each for each in terminal.select_of(row, findings) if each.finding not in LEFT_OUT]
+        for number, event in enumerate(group_events(own)[:_MAX_EVENTS], start=1):
+            text = f"{number}. {events_text(event.findings, 'practical', event.factors())}"
+            yield from wrap(
+                text, _MAX_WIDTH, subsequent_indent="   ", max_lines=2, placeholder=" ..."
+            )
+
+
+def _list_not_used(options: argparse.Namespace) -> Iterator[str]:
+    """Yield what the first log holds, and is not in the file."""
+    from imubench_pipeline.run.analysis.project import inspect_log
+    from imubench_pipeline.settings.validation import ConfigError
+
+    if options.sensor:
+        return
+    try:
+        left = inspect_log(options.logs[0], options.topic).draft.left_over
+        imus = [] if options.topic else left
+    except ConfigError:
+        return
+    for line in left[:_MAX_NOT_USED]:
+        yield line[0].upper() + line[1:]
+    if any("another gyro" in line for line in imus):
+        yield "A further IMU: --topic NAME, or --all for a file of each"

@@ -1,0 +1,84 @@
+"""The modes of an exported file."""
+
+import math
+
+import pytest
+import yaml
+
+from imubench_pipeline.export import px4
+from imubench_pipeline.export.imu import AxisNoise, ExportError, Imu
+from imubench_pipeline.export.in_use import InUseNoise
+from imubench_pipeline.export.modes import FLIGHT_TARGETS, FLOORS, apply_mode, choose_mode
+from imubench_pipeline.export.targets import TARGETS
+from imubench_pipeline.noise import NoiseModel
+
+GYRO = AxisNoise(NoiseModel(N=1e-4, B=2e-5, K=1e-6), "gyro x of bench")
+ACCEL = AxisNoise(NoiseModel(N=1e-3), "accel x of bench", least_walk=2e-5)
+IMU = Imu(sensor="mine", rate=200.0, gyro=GYRO, accel=ACCEL)
+
+
+def test_a_program_that_flies_has_its_defaults_unless_bench_is_asked_for() -> None:
+    assert choose_mode(None, "px4") == "in-use"
+    assert choose_mode("bench", "px4") == "bench"
+    assert choose_mode(None, "kalibr") == "bench"
+    text = px4.write(apply_mode(IMU, TARGETS["px4"], choose_mode(None, "px4")))
+    values = {
+        row.split("\t")[2]: float(row.split("\t")[3])
+        for row in text.splitlines()
+        if not row.startswith("#")
+    }
+    # The defaults of EKF2, as its parameter reference lists them.
+    assert values["EKF2_GYR_NOISE"] == pytest.approx(0.015, rel=1e-6)
+    assert values["EKF2_ACC_NOISE"] == pytest.approx(0.35, rel=1e-6)
+    assert values["EKF2_GYR_B_NOISE"] == pytest.approx(1e-3, rel=1e-6)
+    assert values["EKF2_ACC_B_NOISE"] == pytest.approx(3e-3, rel=1e-6)
+    assert "IN USE, NOT MEASURED: at least the defaults of EKF2" in text
+
+
+def test_vins_fusion_has_the_values_of_its_examples() -> None:
+    target = TARGETS["vins-fusion"]
+    text = target.write(apply_mode(IMU, target, "in-use"))
+    found = yaml.safe_load(str(text).replace("%YAML:1.0", ""))
+    assert [found[key] for key in ("acc_n", "gyr_n", "acc_w", "gyr_w")] == pytest.approx(
+        [0.1, 0.01, 1e-3, 1e-4], rel=1e-5
+    )
+
+
+def test_ten_times_is_ten_times_every_density() -> None:
+    raised = apply_mode(IMU, TARGETS["kalibr"], "in-use")
+    bench = yaml.safe_load(str(TARGETS["kalibr"].write(IMU)))
+    found = yaml.safe_load(str(TARGETS["kalibr"].write(raised)))
+    for key in bench:
+        if key.endswith(("density", "walk")):
+            assert found[key] == pytest.approx(10.0 * bench[key], rel=1e-5)
+
+
+@pytest.mark.parametrize(("noise", "expected"), [(5e-4, 5e-4), (2e-5, 1e-4)])
+def test_the_noise_of_a_log_in_use_never_lowers_the_noise_at_rest(
+    noise: float, expected: float
+) -> None:
+    measured = {
+        "gyro_x": InUseNoise(noise / 2, 0.1, 10.0, []),
+        "gyro_y": InUseNoise(noise, 0.1, 10.0, [(50.0, 0.2)]),
+    }
+    raised = apply_mode(IMU, TARGETS["json"], "in-use", measured)
+    assert raised.gyro is not None and raised.accel is not None
+    assert raised.gyro.model.N == pytest.approx(expected)
+    assert raised.gyro.model.B == GYRO.model.B  # what is slow is not seen in motion
+    assert raised.accel.model.terms == ACCEL.model.terms
+    assert f"lines at 50 Hz ({number(0.2)} °/s rms)" in raised.mode
+    assert "Below 10 Hz all is taken as motion" in raised.mode
+
+
+def number(rate: float) -> str:
+    return f"{math.degrees(rate):.3g}"
+
+
+def test_a_program_without_a_recommendation_needs_a_log() -> None:
+    with pytest.raises(ExportError, match="expected --in-use LOG"):
+        apply_mode(IMU, TARGETS["json"], "in-use")
+
+
+def test_floors_are_of_targets() -> None:
+    assert set(FLOORS) | FLIGHT_TARGETS <= set(TARGETS)
+    assert set(FLOORS) >= FLIGHT_TARGETS
