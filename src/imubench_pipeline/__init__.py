@@ -8,6 +8,7 @@ The front door
 imu.read_log(path, sensor)   a log of any format in SI, on a time base, with its findings
 imu.allan_variance(data)     Allan curves with 95 % limits, of a log, an array or a table
 imu.estimate(data)           noise parameters with 95 % intervals, status and reason, and models
+imu.export(models, target)   input file of a filter or simulator; estimates have .export, too
 imu.compare(a, b)            ratio of the noise of two logs
 imu.simulate(model, rate)    samples of a noise model
 imu.NoiseModel(N=, B=, ...)  Allan variance, spectrum and state space of a sum of noise terms
@@ -67,6 +68,7 @@ References
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from imubench_pipeline.export.of_models import export
     from imubench_pipeline.library.comparison import compare
     from imubench_pipeline.library.curves import allan_variance
     from imubench_pipeline.library.estimates import estimate
@@ -84,6 +86,7 @@ __all__ = [
     "compare",
     "convert",
     "estimate",
+    "export",
     "read_log",
     "simulate",
 ]
@@ -104,8 +107,8 @@ def __getattr__(name: str) -> Any:
 
     if name == "__version__":
         return metadata.version(__name__)
-    if name == "simulate":
-        return import_module(f"{__name__}.simulate")  # the room, which is called
+    if name in ("export", "simulate"):
+        return import_module(f"{__name__}.{name}")  # the package, which is called
     if name not in _WHERE:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     value = getattr(import_module(f"{__name__}.{_WHERE[name]}"), name)

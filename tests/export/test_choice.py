@@ -3,7 +3,7 @@ import pytest
 
 from imubench_pipeline.estimators.estimate import Estimate, Parameter
 from imubench_pipeline.estimators.rows import make_parameter_rows
-from imubench_pipeline.export.choice import choose, parameter_notes
+from imubench_pipeline.export.choice import choose, parameter_notes, pool_recordings
 from imubench_pipeline.export.imu import ExportError
 from imubench_pipeline.model.estimates import ParameterRow
 from imubench_pipeline.noise import NoiseModel
@@ -93,12 +93,25 @@ def test_what_has_no_plain_value_is_said() -> None:
         "K is not in the model (the data do not support it). It is 0 in this file, and its upper "
         "limit is 2.000e-06",
     ]
-    chosen = choose(rows("gyro_x", found), "gyro").axis
-    assert chosen.least_walk == 2e-6
-    assert chosen.model.B == 5e-6
+    choice = choose(rows("gyro_x", found), "gyro")
+    assert choice.axis.model.B == 5e-6
+    assert not choice.determined
     without = "axes without an estimate: gyro y and gyro z"
-    assert list(chosen.notes) == [without, *notes]
+    assert list(choice.axis.notes) == [without, notes[1]]  # slow terms are limited, and not used
+    assert choose(AXES, "gyro").determined
 
 
-def test_a_walk_that_is_there_has_no_other_limit() -> None:
-    assert choose(AXES, "gyro").axis.least_walk is None
+def test_recordings_of_a_device_are_pooled_by_the_mean_of_their_spectra() -> None:
+    models = {
+        "one": NoiseModel(N=1e-4, K=2e-6, B=1e-5, T_B=100.0),
+        "two": NoiseModel(N=3e-4, B=4e-5),
+    }
+    every = [
+        *rows("gyro_x", estimate(N=1e-4, K=2e-6, B=1e-5, T_B=100.0), "one"),
+        *rows("gyro_x", estimate(N=3e-4, B=4e-5), "two"),
+    ]
+    pooled = pool_recordings(every, choose(every, "gyro"))
+    frequency = np.geomspace(1e-4, 10.0, 30)
+    mean = (models["one"].psd(frequency) + models["two"].psd(frequency)) / 2.0
+    assert pooled.axis.model.psd(frequency) == pytest.approx(mean)
+    assert "2 recordings of the device: one, two" in pooled.axis.origin

@@ -3,8 +3,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from imubench_pipeline.export.mapping import as_process, as_walk
+from imubench_pipeline.allan import allan_variance, cluster_sizes
+from imubench_pipeline.export.mapping import as_process, as_walk, bound_walk
 from imubench_pipeline.noise import GaussMarkov, NoiseModel, Sinusoid
+from imubench_pipeline.noise.simulate import simulate
 from tests.export.sensors import ACCEL, GYRO
 
 log10 = st.floats(-1.0, 1.0).map(lambda x: 10.0**x)
@@ -74,13 +76,14 @@ def test_two_processes_become_one_beside_a_walk_that_stays() -> None:
     assert "replaced by a Gauss-Markov process" in found.words[0]
 
 
-def test_without_anything_slow_the_upper_limit_of_the_walk_stands_in() -> None:
-    found = as_walk(NoiseModel(N=1.0), 60.0, 100.0, least_walk=1e-3)
-    assert found.model == NoiseModel(N=1.0, K=1e-3)
-    assert "upper 95 % limit" in found.words[0]
-    without = as_walk(NoiseModel(N=1.0), 60.0, 100.0)
-    assert without.model.K == 0.0
-    assert "so it is 0" in without.words[0]
+def test_the_limit_of_an_unseen_walk_is_above_it_in_19_of_20_logs() -> None:
+    rate, N, K, horizon = 10.0, 1e-3, 1e-5, 60.0
+    model = NoiseModel(N=N, K=K)
+    sizes, above = cluster_sizes(18_000), 0
+    for seed in range(100):
+        samples = simulate(model, rate, 18_000, np.random.default_rng(seed))
+        above += bound_walk(allan_variance(samples, rate, cluster_sizes=sizes), N, horizon) > K
+    assert 90 <= above
 
 
 def test_what_is_left_out_is_said() -> None:

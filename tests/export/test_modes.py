@@ -13,7 +13,7 @@ from imubench_pipeline.export.targets import TARGETS
 from imubench_pipeline.noise import NoiseModel
 
 GYRO = AxisNoise(NoiseModel(N=1e-4, B=2e-5, K=1e-6), "gyro x of bench")
-ACCEL = AxisNoise(NoiseModel(N=1e-3), "accel x of bench", least_walk=2e-5)
+ACCEL = AxisNoise(NoiseModel(N=1e-3, K=2e-5), "accel x of bench")
 IMU = Imu(sensor="mine", rate=200.0, gyro=GYRO, accel=ACCEL)
 
 

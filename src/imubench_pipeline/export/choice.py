@@ -21,6 +21,7 @@ _Estimated = tuple[str, str, str]  # and method
 
 WORST, MEDIAN = "worst", "median"
 
+_SLOW_PARAMETERS = ("B", "K", "R")
 _MAX_NAMED_RECORDINGS = 40  # max. recordings that are named for a reason; further ones are counted
 
 
@@ -34,6 +35,7 @@ class Choice:
     axis: AxisNoise
     deviation: float
     of: int
+    determined: bool = True  # whether a slow term has a value; else it is only limited from above
 
 
 def choose(
@@ -87,6 +89,11 @@ def choose(
     unit = {"gyro": "rad", "accel": "m/s"}[quantity]
     error = math.sqrt(2.0) * horizon * deviation
     origin = texts.chosen_axis(channel, recording, used, rank, horizon, error, unit)
+    determined = any(
+        parameter.value is not None
+        for _, name, parameter in estimate.components()
+        if name in _SLOW_PARAMETERS
+    )
     others: dict[texts.OtherAxes, list[Key]] = defaultdict(list)
     for key in everywhere:
         if key not in estimated:
@@ -95,11 +102,12 @@ def choose(
             others["no_white_noise"].append(key[:2])
         elif key != (recording, channel, used):
             others["not_median" if axis == MEDIAN else "less_noise"].append(key[:2])
-    notes = [*_describe_other_axes(others, channel, horizon), *parameter_notes(estimate)]
-    K = estimate.parameters.get("K")
-    limit_of_absent_walk = K.upper if K is not None and K.in_model is None else None
-    noise = AxisNoise(estimate.model, origin, notes, limit_of_absent_walk)
-    return Choice(recording, channel, used, noise, deviation, len(ranked))
+    notes = [
+        *_describe_other_axes(others, channel, horizon),
+        *parameter_notes(estimate, determined),
+    ]
+    noise = AxisNoise(estimate.model, origin, notes)
+    return Choice(recording, channel, used, noise, deviation, len(ranked), determined)
 
 
 def pool_recordings(
@@ -131,7 +139,7 @@ def pool_recordings(
     )
     origin = f"{choice.axis.origin}. In its place: {texts.pooled(choice.channel, [*models])}"
     axis = replace(choice.axis, model=pooled, origin=origin)
-    return replace(choice, axis=axis)
+    return replace(choice, axis=axis, determined=True)
 
 
 def _describe_other_axes(
@@ -154,11 +162,14 @@ def _describe_other_axes(
     return statements
 
 
-def parameter_notes(estimate: Estimate) -> list[str]:
-    """Describe the treatment of the parameters without a plain value."""
+def parameter_notes(estimate: Estimate, determined: bool = True) -> list[str]:
+    """Describe the treatment of the parameters without a plain value.
+
+    ``determined``: whether a slow term has a value; else the slow terms are not used.
+    """
     notes = []
     for number, name, parameter in estimate.components():
-        if name in CURVE:
+        if name in CURVE or not (determined or name not in _SLOW_PARAMETERS):
             continue
         label = name if number == 1 else f"{name} of component {number}"
         status, reason = parameter.status, parameter.reason

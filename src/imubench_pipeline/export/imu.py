@@ -134,7 +134,7 @@ class AxisNoise:
     model: NoiseModel
     origin: str  # axis, recording and method of the model, in words
     notes: Sequence[str] = ()  # treatment of parameters without a plain value
-    least_walk: float | None = None  # upper limit of an absent K, for programs that need a walk
+    slow_limited: bool = False  # K is an upper limit: no log determines a slow term
     bounded: tuple[float, float] | None = None
     """Lowest and highest frequency of an overbound, Hz; None: the model is no overbound."""
 
@@ -177,11 +177,7 @@ class Imu:
         """The quantities that have an estimate, with the inflation in their models."""
         both = {"gyro": self.gyro, "accel": self.accel}
         return {
-            name: replace(
-                axis,
-                model=inflate(axis.model, self.inflation),
-                least_walk=axis.least_walk and axis.least_walk * self.inflation,
-            )
+            name: replace(axis, model=inflate(axis.model, self.inflation))
             for name, axis in both.items()
             if axis is not None
         }

@@ -22,11 +22,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from imubench_pipeline.allan import AllanCurve
-from imubench_pipeline.export.imu import AxisNoise
 from imubench_pipeline.noise import GaussMarkov, NoiseModel, Role, Term, compute_bias_instability
 from imubench_pipeline.typing import Array
 from imubench_pipeline.words.numbers import number_text
-from imubench_pipeline.words.reasons import exports as texts
 
 _MIN_TIME_OVER_HORIZON = 1 / 30
 """Shortest tau of the fit of a process, and shortest T_B of its search, over the horizon."""
@@ -48,19 +46,12 @@ class Mapped:
     most: float = 0.0  # the relative error of largest magnitude at a tau up to the horizon
 
 
-def as_walk(
-    model: NoiseModel, horizon: float, rate: float, least_walk: float | None = None
-) -> Mapped:
+def as_walk(model: NoiseModel, horizon: float, rate: float) -> Mapped:
     """Return white noise and a random walk in place of a model.
 
     The horizon is in s. The error is evaluated at tau from the period of the rate, Hz.
-    ``least_walk`` is K of the replacement if the model has no slow term.
     """
     slow = _select_slow_terms(model)
-    if not slow:
-        words = texts.limit_of_walk(least_walk) if least_walk else texts.NO_WALK_KNOWN
-        replacement = NoiseModel(N=model.N, K=least_walk or 0.0)
-        return Mapped(replacement, [words, *_describe_omitted_terms(model)])
     if all(term.role is Role.RANDOM_WALK for term in slow):
         return Mapped(NoiseModel(N=model.N, K=model.K), _describe_omitted_terms(model))
     K = math.sqrt(3.0 * _sum_allan_variance(slow, horizon) / horizon)
@@ -68,25 +59,13 @@ def as_walk(
     return _describe_replacement(model, NoiseModel(N=model.N, K=K), words, slow, horizon, rate)
 
 
-def as_process(
-    model: NoiseModel,
-    horizon: float,
-    rate: float,
-    *,
-    walk: bool = False,
-    least_walk: float | None = None,
-) -> Mapped:
+def as_process(model: NoiseModel, horizon: float, rate: float, *, walk: bool = False) -> Mapped:
     """Return white noise and one Gauss-Markov process in place of a model.
 
     T_B minimises the mean square error of the logarithm of the Allan variance, from a thirtieth of
     the horizon to the horizon. For `horizon`, s, and `rate`, Hz, see `as_walk`. With `walk` the
     program also supports a random walk, and the random walk of the model is not changed.
-    ``least_walk`` is an upper limit of K: a process with its variance at the horizon is used if the
-    model has no slow term.
     """
-    if least_walk and not _select_slow_terms(model):
-        bounded = as_process(replace(model, K=least_walk), horizon, rate, walk=walk)
-        return replace(bounded, words=[texts.limit_of_walk(least_walk), *bounded.words])
     replaced = [
         term for term in _select_slow_terms(model) if not (walk and term.role is Role.RANDOM_WALK)
     ]
@@ -118,25 +97,23 @@ def as_process(
     return _describe_replacement(model, replacement, what, replaced, horizon, rate)
 
 
-def map_to_family(axis: AxisNoise, family: str, horizon: float, rate: float) -> Mapped:
-    """Return the model of an axis with the terms of a family, N+K, N+GM or N+GM+K."""
+def map_to_family(model: NoiseModel, family: str, horizon: float, rate: float) -> Mapped:
+    """Return a model with the terms of a family, N+K, N+GM or N+GM+K."""
     if family == "N+K":
-        return as_walk(axis.model, horizon, rate, axis.least_walk)
-    if family == "N+GM":
-        return as_process(axis.model, horizon, rate, least_walk=axis.least_walk)
-    return Mapped(axis.model, [])
+        return as_walk(model, horizon, rate)
+    return as_process(model, horizon, rate) if family == "N+GM" else Mapped(model, [])
 
 
-def bound_walk(curve: AllanCurve, N: float, horizon: float) -> float | None:
-    """Return an upper 95 % limit of K, SI, from a curve alone; None if none is above zero.
+def bound_walk(curve: AllanCurve, N: float, horizon: float) -> float:
+    """Return an upper 95 % limit of K, SI, from a curve without slow terms.
 
-    The limit of the Allan variance at the horizon, s, or at the end of a shorter curve, less its
-    white noise, is K^2 tau / 3.
+    At the horizon, s, or at the end of a shorter curve: what the Allan variance has above white
+    noise N, if anything, and the half-width of its interval, are K^2 tau / 3.
     """
     place = int(np.searchsorted(curve.tau, min(horizon, float(curve.tau[-1])) * (1.0 - 1e-9)))
-    tau = float(curve.tau[place])
-    slow = float(curve.limits(0.95)[1][place]) ** 2 - N**2 / tau
-    return math.sqrt(3.0 * slow / tau) if slow > 0.0 else None
+    tau, variance = float(curve.tau[place]), float(curve.variance[place])
+    half_width = float(curve.limits(0.95)[1][place]) ** 2 - variance
+    return math.sqrt(3.0 * (max(variance - N**2 / tau, 0.0) + half_width) / tau)
 
 
 def describe_terms(terms: Sequence[Term]) -> str:

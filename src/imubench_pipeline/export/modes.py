@@ -112,13 +112,12 @@ def _raise_to(imu: Imu, target: Target, floors: Densities, factor: float, words:
         model = inflate(axis.model, factor)
         notes = list(axis.notes)
         if least_K > 0.0 and target.family == "N+K":
-            mapped = as_walk(model, imu.horizon, imu.rate, axis.least_walk)
+            mapped = as_walk(model, imu.horizon, imu.rate)
             model = replace(mapped.model, K=max(mapped.model.K, least_K))
             notes += mapped.words
         model = replace(model, N=max(model.N, least_N))
         notes.insert(0, texts.raised(axis.model.N, model.N, model.K))
-        walk = axis.least_walk and axis.least_walk * factor
-        return replace(axis, model=model, notes=notes, least_walk=walk)
+        return replace(axis, model=model, notes=notes)
 
     gyro, accel = raise_axis(imu.gyro, "gyro"), raise_axis(imu.accel, "accel")
     return replace(imu, gyro=gyro, accel=accel, mode=words)

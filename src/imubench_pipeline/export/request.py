@@ -16,13 +16,16 @@ from imubench_pipeline.export.choice import WORST, Choice, choose, pool_recordin
 from imubench_pipeline.export.in_use import InUseNoise
 from imubench_pipeline.export.mapping import bound_walk, describe_terms
 from imubench_pipeline.export.modes import Mode, apply_mode, choose_mode
+from imubench_pipeline.export.of_models import find_target
 from imubench_pipeline.export.overbound import FAMILIES, MAX_EXCESS, Family, overbound
 from imubench_pipeline.export.targets import TARGETS
 from imubench_pipeline.model.estimates import AllanRow, ParameterRow, TemperatureRow
 from imubench_pipeline.model.recordings import RecordingRow
 from imubench_pipeline.model.table import R
+from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.recordings.fitness import list_excluded
 from imubench_pipeline.tables.files import find_tables, find_tables_folder, read
+from imubench_pipeline.words.reasons import exports as texts
 from imubench_pipeline.words.reasons.pools import recordings_not_used
 from imubench_pipeline.words.verdicts import doubts_text
 
@@ -81,11 +84,8 @@ def make_content(tables: Tables, request: Request, recordings: Path | None = Non
     posterior of the fits, for an overbound. Raises ExportError if the sensor or target is not
     known, or the target does not support the estimates.
     """
-    if request.target not in TARGETS:
-        raise imu.ExportError(
-            f"target {request.target!r} is not known; there are: {', '.join(TARGETS)}"
-        )
-    return TARGETS[request.target].write(build_imu(tables, request, recordings))
+    target = find_target(request.target)
+    return target.write(build_imu(tables, request, recordings))
 
 
 def build_imu(tables: Tables, request: Request, folder: Path | None = None) -> imu.Imu:
@@ -124,9 +124,8 @@ def build_imu(tables: Tables, request: Request, folder: Path | None = None) -> i
         rates.append(float(f"{about.rate:.9g}"))  # time stamps are not more accurate
         axes[quantity] = choice.axis
         curve = curve_of(_select_rows(AllanRow, tables, **place, channel=choice.channel))
-        if choice.axis.least_walk is None:
-            walk = bound_walk(curve, choice.axis.model.N, request.horizon)
-            axes[quantity] = replace(choice.axis, least_walk=walk)
+        if not choice.determined:
+            axes[quantity] = _limit_walk(choice.axis, curve, request.horizon)
         warmed = _select_rows(TemperatureRow, tables, **place)
         effects[quantity] = imu.find_temperature_effect(warmed, about, quantity, request.horizon)
         if mode == "bounded":
@@ -179,6 +178,14 @@ def _select_deciding(
             "same (--because; exports: because; decide: include)"
         )
     return deciding, [reasons, *without]
+
+
+def _limit_walk(axis: imu.AxisNoise, curve: AllanCurve, horizon: float) -> imu.AxisNoise:
+    """Return an axis with an upper limit of K in place of slow terms that no log determines."""
+    K = bound_walk(curve, axis.model.N, horizon)
+    model = NoiseModel(Q=axis.model.Q, N=axis.model.N, K=K, sinusoids=axis.model.sinusoids)
+    notes = [texts.limit_of_walk(K, horizon), *axis.notes]
+    return replace(axis, model=model, notes=notes, slow_limited=True)
 
 
 def _bound_axis(

@@ -39,10 +39,7 @@ _ORB_CONVENTION = (
 def map_to_walks(imu: Imu) -> dict[str, Mapped]:
     """Return gyro and accelerometer as white noise and random walk; ExportError without both."""
     imu.require_both()
-    return {
-        name: as_walk(axis.model, imu.horizon, imu.rate, axis.least_walk)
-        for name, axis in imu.axes.items()
-    }
+    return {name: as_walk(axis.model, imu.horizon, imu.rate) for name, axis in imu.axes.items()}
 
 
 def _map_to_positive_walks(imu: Imu, program: str) -> dict[str, Mapped]:

@@ -25,11 +25,16 @@ from imubench_pipeline.steps.estimate import Estimation, estimate_channel
 from imubench_pipeline.steps.sensor_tables import collect_findings
 from imubench_pipeline.tables.findings import Finding, make_finding
 from imubench_pipeline.tables.keys import Key
+from imubench_pipeline.units import parse_setting
 from imubench_pipeline.words.estimates import STATUS_WORDS, symbol_text
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     import pandas as pd
     from matplotlib.axes import Axes
+
+    from imubench_pipeline.export.modes import Mode
 
 _SUMMARY_HEADS = ("channel", "", "value", "95 % interval", "unit", "status")
 
@@ -102,6 +107,8 @@ class Estimates(ShownMapping[ChannelEstimate]):
         Reasons why values may be wrong, as in such a run.
     left_out : dict of str to str
         Channels without an estimate, with the reason.
+    rows : Estimation
+        The rows of the workflow's tables.
     """
 
     def __init__(
@@ -112,11 +119,13 @@ class Estimates(ShownMapping[ChannelEstimate]):
         findings: Sequence[Finding],
         doubts: Sequence[DoubtRow],
         left_out: Mapping[str, str],
+        rows: Estimation,
     ) -> None:
         self._by_channel = {estimate.channel: estimate for estimate in estimates}
         self.log, self.method = log, method
         self.findings, self.doubts = tuple(findings), tuple(doubts)
         self.left_out = dict(left_out)
+        self.rows = rows
 
     @property
     def name(self) -> str:
@@ -167,6 +176,65 @@ class Estimates(ShownMapping[ChannelEstimate]):
             ``unit`` names the unit.
         """
         return _make_table(self.values(), units)
+
+    def export(
+        self,
+        target: str,
+        path: "str | Path | None" = None,
+        *,
+        mode: "Mode | None" = None,
+        axis: str = "worst",
+        horizon: float | str = 60.0,
+        rate: float | None = None,
+        inflation: float = 1.0,
+        because: str | None = None,
+        latitude: float | None = None,
+    ) -> str | bytes:
+        """Return the input file of a filter or simulator, as `imubench export` writes it.
+
+        Parameters
+        ----------
+        target : str
+            The program, such as ``kalibr``; ``imubench formats`` lists all.
+        path : str or Path, optional
+            Where to write the file, too; a file there is replaced.
+        mode : {"bench", "bounded", "in-use"}, optional
+            The noise at rest, an upper bound of it, or at least what the authors of the program use
+            or recommend; by default ``bench``, and ``in-use`` for programs that fly.
+        axis : {"worst", "median"}
+            The axis that represents a quantity.
+        horizon : float or str
+            Longest time without a measurement, s.
+        rate : float, optional
+            Of the samples of the program, Hz; by default the rate of the log.
+        inflation : float
+            Factor on every deviation, with its reason ``because``.
+        because : str, optional
+            Reason of the inflation, or of the use of an unfit log.
+        latitude : float, optional
+            For gravity, degrees.
+
+        Raises
+        ------
+        ValueError
+            If the program is not known or cannot hold the noise, or the log is unfit.
+        """
+        from imubench_pipeline.export.request import Request
+        from imubench_pipeline.library.exports import export_estimates
+
+        request = Request(
+            sensor=self.log.sensor,
+            target=target,
+            axis=axis,
+            horizon=parse_setting(horizon, "time", "horizon"),
+            inflation=inflation,
+            because=because,
+            mode=mode,
+            latitude=latitude,
+            rate=rate,
+            method=self.method,
+        )
+        return export_estimates(self, target, path, request)
 
     def _summary(self) -> Summary:
         names = {estimate.model.name for estimate in self.values()}
@@ -289,7 +357,7 @@ def estimate(
         usual_figures(shipped_sensors()),
     )
     doubted = list(derive_doubts(rows, recommended, into.models))
-    return Estimates(estimates, log, method, list(map(make_finding, rows)), doubted, left_out)
+    return Estimates(estimates, log, method, list(map(make_finding, rows)), doubted, left_out, into)
 
 
 def _make_rows(estimate: ChannelEstimate) -> Iterator[list[str]]:

@@ -135,14 +135,14 @@ def _describe_file(imu: "Imu", options: argparse.Namespace) -> Iterator[str]:
     yield f"{options.output.path}: for {target.program}"
     yield from wrap(imu.mode, _MAX_WIDTH, max_lines=4, placeholder=" ...")
     for quantity, axis in imu.axes.items():
-        mapped = map_to_family(axis, target.family, imu.horizon, imu.rate)
+        mapped = map_to_family(axis.model, target.family, imu.horizon, imu.rate)
         values = []
         for symbol in ("N", "B", "T_B", "K"):
             value = getattr(mapped.model, symbol)
             if value:
                 unit = choose_page_unit(quantity, symbol, "practical")
                 values.append(f"{symbol} {unit.text(value, 3)} {unit.sign}")
-        kind = value_kind(axis.model.name, mapped.model.name)
+        kind = value_kind(axis.model.name, mapped.model.name, axis.slow_limited)
         yield f"  {quantity:5}  {', '.join(values)}{kind}"
 
 
@@ -184,6 +184,6 @@ def _list_not_used(options: argparse.Namespace) -> Iterator[str]:
     except ConfigError:
         return
     for line in left[:_MAX_NOT_USED]:
-        yield line[0].upper() + line[1:]
+        yield from wrap(line[0].upper() + line[1:], _MAX_WIDTH, max_lines=1, placeholder=" ...")
     if any("another gyro" in line for line in imus):
         yield "A further IMU: --topic NAME, or --all for a file of each"

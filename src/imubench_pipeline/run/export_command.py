@@ -145,15 +145,11 @@ def run(options: argparse.Namespace) -> int:
 
 def check_options(options: argparse.Namespace) -> None:
     """Raise CommandError or ExportError if options of a file do not belong together."""
-    from imubench_pipeline.export.imu import ExportError
-    from imubench_pipeline.export.targets import TARGETS
+    from imubench_pipeline.export.of_models import find_target
 
     if options.inflation != 1.0 and not options.because:
         raise command_line.CommandError("--inflate needs its reason; expected --because '...'")
-    if options.target not in TARGETS:
-        raise ExportError(
-            f"target {options.target!r} is not known; there are: {', '.join(TARGETS)}"
-        )
+    find_target(options.target)
 
 
 def write_target(imu: "Imu", target: str) -> str | bytes:

@@ -18,16 +18,21 @@ class Compilation(AbstractContextManager["Compilation"]):
         self._say = say
         self._process = Bounded(_MAX_COMPILE_MEMORY, compile_kernels)
         self._timer = threading.Timer(_MESSAGE_DELAY, self._tell)
+        self._finished = False
 
     def expected(self) -> None:
         """Start the timer of the message: the caller will wait for the compilation."""
-        self._timer.start()
+        if not self._finished:
+            self._timer.start()
 
     def finish(self) -> None:
         """Wait for the end, and load the kernels, so that forks need not load them."""
+        if self._finished:
+            return
         self._process.result(_MAX_COMPILE_TIME)
         self._timer.cancel()
         compile_kernels()
+        self._finished = True
 
     def _tell(self) -> None:
         with suppress(OSError):  # its pipe was closed meanwhile: it has ended

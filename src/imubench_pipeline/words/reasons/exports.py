@@ -19,7 +19,6 @@ _OTHER_AXES: Mapping[OtherAxes, str] = {
 }
 
 
-NO_WALK_KNOWN = "the model has no random walk, and no upper limit of it is known, so it is 0"
 NO_TEMPERATURE_FIT = "no fit of the temperature"
 BIAS_NOT_LINEAR = "its bias is not linear in temperature, and the program supports a slope only"
 
@@ -31,21 +30,20 @@ MODE_WORDS: Mapping[Literal["bench", "bounded"], str] = {
 """The modes of a file that need no further data."""
 
 
-def value_kind(model: str, written: str) -> str:
-    """Return whether slow terms are measured, limits, or replaced; models as `NoiseModel.name`."""
-    slow = set(model.split("+")) - {"N", "Q", "S", "none"}
-    if slow == set(written.split("+")) - {"N"}:
+def value_kind(model: str, written: str, limited: bool) -> str:
+    """Return how a slow term was found; models as `NoiseModel.name`, ``limited``: from above."""
+    if limited:
+        return " (upper limit of K: the log does not show it)"
+    if set(model.split("+")) - {"Q", "S"} == set(written.split("+")):
         return ""
-    if not slow:
-        return " (upper limit: the log shows no slow noise)"
     return f" (the slow terms of {model} together)"
 
 
-def limit_of_walk(K: float) -> str:
-    """Return that an upper limit of K, SI, is used."""
+def limit_of_walk(K: float, horizon: float) -> str:
+    """Return that an upper limit of K, SI, at the horizon, s, is used."""
     return (
-        f"the model has no random walk, and its upper 95 % limit K = {K:.3e} is used. A filter "
-        "stops estimating a bias that does not change"
+        f"no slow term is determined: K = {K:.3e} is the upper 95 % limit by the Allan variance at "
+        f"{number_text(horizon)} s. A longer log gives a lower one"
     )
 
 
