@@ -132,7 +132,10 @@ def test_what_cannot_be_compared_says_why(estimates, loud) -> None:
         imu.compare(estimates, loud, names=["a", "a"])
     with pytest.raises(ValueError, match="expected one channel or more that both have"):
         imu.compare(
-            loud, Estimates([estimates["accel_z"]], estimates.log, "likelihood", [], [], {})
+            loud,
+            Estimates(
+                [estimates["accel_z"]], estimates.log, "likelihood", [], [], {}, estimates.rows
+            ),
         )
     with pytest.raises(ValueError, match="tau: 'm' is no unit of time"):
         imu.compare(estimates, loud, tau=["3 m"])

@@ -17,7 +17,7 @@ from imubench_pipeline.units import UnitError
 from tests.conftest import few
 
 NAMES = ["NoiseModel", "__version__", "allan_variance", "compare", "convert", "estimate",
-         "read_log", "simulate"]  # fmt: skip
+         "export", "read_log", "simulate"]  # fmt: skip
 
 
 def test_the_door_has_few_names_and_all_are_there() -> None:

@@ -177,6 +177,17 @@ EXPORTS = [
     of(exports.axis_slope, "square", "x", 2e-4, (1e-4, 3e-4), 1e-6, "rad/s", 60.0),
     of(exports.status_reason, "not determined (why)", "the sensitivity", "not_identified", "why"),
     of(exports.effect_not_shown, "does not show an effect", None),
+    of(exports.value_kind, "upper limit of K", "N+K", "N+K", True),
+    of(exports.value_kind, "slow terms of N+F+K together", "N+F+K", "N+K", False),
+    of(exports.limit_of_walk, "Allan variance at 60 s", 1e-6, 60.0),
+    of(
+        exports.channel_in_use, "lines at 48 Hz (2.86 °/s rms)", "gyro_x", 1e-3, 0.1, [(48.0, 0.05)]
+    ),
+    of(exports.channel_in_use, "motion of 5.73 °/s rms removed", "gyro_x", 1e-3, 0.1, []),
+    of(exports.noise_in_use, "Below 10 Hz all is taken as motion", 10.0, ["gyro x N = 1 °/s/√Hz"]),
+    of(exports.floor_in_use, "Measure it with --in-use LOG", "the defaults of EKF2"),
+    of(exports.raised, "at rest, K at least", 1e-4, 2e-4, 1e-6),
+    of(exports.pooled, "in 2 recordings of the device: a, b", "gyro_x", ["a", "b"]),
     of(exports.status_reason, "its lag is not determined", "its lag", "not_identified", None),
 ]
 

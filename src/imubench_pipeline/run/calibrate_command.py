@@ -143,7 +143,7 @@ def _describe_file(imu: "Imu", options: argparse.Namespace) -> Iterator[str]:
                 unit = choose_page_unit(quantity, symbol, "practical")
                 values.append(f"{symbol} {unit.text(value, 3)} {unit.sign}")
         kind = value_kind(axis.model.name, mapped.model.name, axis.slow_limited)
-        yield f"  {quantity:5}  {', '.join(values)}{kind}"
+        yield f"  {quantity:5}  {', '.join(values)}" + f" ({kind})" * bool(kind)
 
 
 def _describe_logs(tables: "Mapping[str, pa.Table]") -> Iterator[str]:

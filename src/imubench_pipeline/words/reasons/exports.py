@@ -33,10 +33,10 @@ MODE_WORDS: Mapping[Literal["bench", "bounded"], str] = {
 def value_kind(model: str, written: str, limited: bool) -> str:
     """Return how a slow term was found; models as `NoiseModel.name`, ``limited``: from above."""
     if limited:
-        return " (upper limit of K: the log does not show it)"
+        return "upper limit of K: the log does not show it"
     if set(model.split("+")) - {"Q", "S"} == set(written.split("+")):
         return ""
-    return f" (the slow terms of {model} together)"
+    return f"the slow terms of {model} together"
 
 
 def limit_of_walk(K: float, horizon: float) -> str:
@@ -64,14 +64,14 @@ def noise_in_use(cutoff: float, channels: Sequence[str]) -> str:
     at = number_text(cutoff)
     return (
         f"IN USE: at least the broadband noise above {at} Hz of a log in use. Below {at} Hz all is "
-        "taken as motion, and a spectral line is not white noise: both are left out. "
+        "taken as motion, and a spectral line is not white noise: both are left out. Values: "
         + "; ".join(channels)
     )
 
 
 def floor_in_use(source: str) -> str:
     """Return that no log in use was measured, and whose figures are used."""
-    return f"IN USE, NOT MEASURED: at least {source}. --in-use LOG measures it"
+    return f"IN USE, NOT MEASURED: at least {source}. Measure it with --in-use LOG"
 
 
 def raised(before: float, N: float, K: float) -> str:
