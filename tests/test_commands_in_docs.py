@@ -97,6 +97,7 @@ ELSEWHERE = {
 
 COSTLY = (
     ".venv/bin/imubench analyse run.csv",  # every day: tests/test_analyse.py
+    ".venv/bin/imubench calibrate run.csv",  # every day: tests/library/test_exports.py
     ".venv/bin/imubench papers",  # every day: tests/report/test_papers.py
     ".venv/bin/imubench init lab",
     ".venv/bin/imubench run lab",
