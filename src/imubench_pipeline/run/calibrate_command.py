@@ -109,6 +109,7 @@ def _calibrate(options: argparse.Namespace, compiling: "Compilation") -> int:
                 sensor=sensor,
                 in_use=measured,
                 one_device=True,
+                rate=None,  # of the log
                 ros_topic=min(filter(None, topics), default=None),
             )
             imu = build_imu(tables, request, plan.run.results / "recordings")
@@ -158,13 +159,15 @@ def _describe_logs(tables: "Mapping[str, pa.Table]") -> Iterator[str]:
     findings = FindingRow.rows_of(tables["findings"])
     parameters = ParameterRow.rows_of(tables["parameters"])
     allan = AllanRow.rows_of(tables["allan"])
-    for row in RecordingRow.rows_of(tables["recordings"]):
+    rows = RecordingRow.rows_of(tables["recordings"])
+    shown = max(_MAX_EVENTS // len(rows), 1)
+    for row in rows:
         estimated = [each for each in terminal.select_of(row, parameters) if each.recommended]
         length = terminal.describe_length(row, estimated, terminal.select_of(row, allan))
         yield from wrap(state_text(row, length), _MAX_WIDTH)
         yield from wrap(reason_text(row), _MAX_WIDTH)
         own = [each for each in terminal.select_of(row, findings) if each.finding not in LEFT_OUT]
-        for number, event in enumerate(group_events(own)[:_MAX_EVENTS], start=1):
+        for number, event in enumerate(group_events(own)[:shown], start=1):
             text = f"{number}. {events_text(event.findings, 'practical', event.factors())}"
             yield from wrap(
                 text, _MAX_WIDTH, subsequent_indent="   ", max_lines=2, placeholder=" ..."

@@ -34,9 +34,10 @@ def value_kind(model: str, written: str, limited: bool) -> str:
     """Return how a slow term was found; models as `NoiseModel.name`, ``limited``: from above."""
     if limited:
         return "upper limit of K: the log does not show it"
-    if set(model.split("+")) - {"Q", "S"} == set(written.split("+")):
+    terms = [term for term in dict.fromkeys(model.split("+")) if term not in ("Q", "S")]
+    if set(terms) == set(written.split("+")):
         return ""
-    return f"the slow terms of {model} together"
+    return f"the slow terms of {'+'.join(terms)} together"
 
 
 def limit_of_walk(K: float, horizon: float) -> str:
