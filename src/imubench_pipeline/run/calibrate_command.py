@@ -82,6 +82,8 @@ def _list_files(options: argparse.Namespace, path: Path) -> Iterator[tuple[Seque
         found = find_imus(list_contents(options.logs[0]))
     except RecordingError as error:
         raise command_line.CommandError(str(error)) from None
+    if not found:
+        raise command_line.CommandError(f"{options.logs[0]}: no gyro; expected one for each IMU")
     for topics in found:
         name = re.sub(r"\W+", "_", topics[0]).strip("_")
         yield topics, path.with_name(f"{path.stem}_{name}{path.suffix}" if name else path.name)
@@ -103,14 +105,15 @@ def _calibrate(options: argparse.Namespace, compiling: "Compilation") -> int:
             measured = None
             if options.in_use not in (None, exports.NOT_MEASURED):
                 measured = exports.read_in_use(options.in_use, plan.sensors[sensor], options.motion)
-            topics = {one.variable for one in plan.sensors[sensor].log.channels.values()}
+            sources = plan.sensors[sensor].log.channels.values()
+            topics = [one.variable for one in sources if str(one.variable).startswith("/")]
             request = exports.make_request(
                 options,
                 sensor=sensor,
                 in_use=measured,
                 one_device=True,
                 rate=None,  # of the log
-                ros_topic=min(filter(None, topics), default=None),
+                ros_topic=next(iter(topics), None),
             )
             imu = build_imu(tables, request, plan.run.results / "recordings")
             options.output.write(exports.write_target(imu, options.target))
