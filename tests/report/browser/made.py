@@ -318,8 +318,8 @@ def rows_of(logs: Sequence[Log], rejected: Sequence[tuple[str, str]] = ()) -> Ro
     rows["fusion"] = [*yield_fusion_rows(tables, FusionSettings(draws=100))]
     covered = coverage(SENSORS)
     rows["catalogue"] = [row.columns() for row in list_catalogue(SENSORS)]
-    rows["coverage"] = [asdict(one) for one in covered]
-    rows["coverage_by_vendor"] = [asdict(one) for one in by_vendor(covered)]
+    rows["coverage"] = [row.columns() for row in covered]
+    rows["coverage_by_vendor"] = [row.columns() for row in by_vendor(covered)]
     return rows
 
 
