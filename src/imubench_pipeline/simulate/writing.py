@@ -47,7 +47,7 @@ def write_log(
 
     The columns are in SI; for the format see `layout`. The metadata are for Parquet files; the
     remarks become comments at the top of CSV files. ``progress`` is called after each block with
-    the number of samples.
+    the number of its samples.
     """
     names = list(columns)
     known_sources = {str(name): source for name, source in log.channels.items()}
@@ -61,8 +61,9 @@ def write_log(
     ) as writer:
         for block in blocks:
             writer.write(block)
-            samples += len(next(iter(block.values())))
-            progress(samples)
+            written = len(next(iter(block.values())))
+            samples += written
+            progress(written)
         if isinstance(writer, LogWriter):
             shape = {"rows": samples, "grid": samples, "segments": [[0, samples]]}
             writer.finish({**metadata, **shape})
