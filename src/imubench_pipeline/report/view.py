@@ -14,7 +14,7 @@ from scipy.special import chdtri
 
 from imubench_pipeline.estimators.rows import make_estimate
 from imubench_pipeline.model import estimates
-from imubench_pipeline.model.comparisons import DatasheetCurveRow, DatasheetRow, ErrorBudgetRow
+from imubench_pipeline.model.comparisons import DatasheetRow, ErrorBudgetRow
 from imubench_pipeline.model.recordings import FindingRow, RecordingRow
 from imubench_pipeline.model.table import R
 from imubench_pipeline.noise import NoiseModel
@@ -31,7 +31,6 @@ _ROWS_OF_CHANNELS = (
     estimates.LineRow,
     estimates.DeterministicRow,
     DatasheetRow,
-    DatasheetCurveRow,
 )
 
 METHOD_NAMES = {
@@ -66,7 +65,6 @@ class ChannelView:
     reconstruction: dict[str, dict[str, NDArray[np.float64]]] = field(default_factory=dict)
     scores: dict[str, estimates.ScoreRow] = field(default_factory=dict)
     datasheet: list[DatasheetRow] = field(default_factory=list)
-    datasheet_curve: list[DatasheetCurveRow] = field(default_factory=list)
     true_components: dict[str, list[estimates.SimulatedTruthRow]] = field(default_factory=dict)
     models: list[estimates.ModelRow] = field(default_factory=list)
     lines: list[estimates.LineRow] = field(default_factory=list)
