@@ -246,13 +246,10 @@ def test_the_limit_of_a_radius_is_reached_earlier() -> None:
     """Rayleigh: the radius with 95 % is sqrt(-2 ln 0.05) of the sigma along each axis."""
     factor = math.sqrt(-2.0 * math.log(0.05)) / float(ndtri(0.975))
     start = Start.uncalibrated(gyro_bias=0.0, accel_bias=0.0, on_time=0.0)
+    accel = NoiseModel(N=1e-3)
     found = time_until(
         0.02 * factor,
-        "velocity",
-        gyro=NOTHING,
-        accel=NoiseModel(N=1e-3),
-        start=start,
-        convert=lambda along: along.to_radius(0.95),
+        lambda t: budget("velocity", t, gyro=NOTHING, accel=accel, start=start).to_radius(0.95),
     )
     assert found == pytest.approx(400.0)
     # An error along one line keeps its size.
@@ -275,7 +272,7 @@ def test_the_error_reaches_its_limit_at_the_time_found(
     )
     sensors = {"gyro": MTI_7_GYRO, "accel": MTI_7_ACCEL}
     limit = budget(quantity, 10.0**log_time, **sensors, start=start).total
-    found = time_until(limit, quantity, **sensors, start=start)
+    found = time_until(limit, partial(budget, quantity, **sensors, start=start))
     assert found == pytest.approx(10.0**log_time, rel=1e-6)
 
 
@@ -301,18 +298,22 @@ def test_the_first_crossing_of_a_line() -> None:
     start = Start.uncalibrated(gyro_bias=0.0, accel_bias=0.0, on_time=0.0)
     gyro = NoiseModel(N=1e-9, sinusoids=(Sinusoid(1e-3, 0.01),))
     limit = 0.5 * 1e-3 / (math.pi * 0.01) / math.sqrt(2.0)
-    found = time_until(limit, "attitude", gyro=gyro, accel=NOTHING, start=start)
+    attitude = partial(budget, "attitude", gyro=gyro, accel=NOTHING, start=start)
+    found = time_until(limit, attitude, oscillates=True)
     assert found == pytest.approx(100.0 / 6.0, rel=1e-6)
 
 
 def test_limits_that_are_passed_at_once_or_never() -> None:
     tilted = Start.uncalibrated(gyro_bias=0.0, accel_bias=0.0, on_time=0.0, tilt=0.1)
-    until = partial(time_until, gyro=NOTHING, accel=NOTHING, start=tilted)
-    assert until(0.05, "attitude") == 0.0
-    assert until(0.2, "attitude") is None
-    assert until(0.1 * G * 7.0, "velocity") == pytest.approx(7.0)
+    attitude, velocity = (
+        partial(budget, quantity, gyro=NOTHING, accel=NOTHING, start=tilted)
+        for quantity in ("attitude", "velocity")
+    )
+    assert time_until(0.05, attitude) == 0.0
+    assert time_until(0.2, attitude) is None
+    assert time_until(0.1 * G * 7.0, velocity) == pytest.approx(7.0)
     with pytest.raises(ValueError, match="limit"):
-        until(0.0, "attitude")
+        time_until(0.0, attitude)
 
 
 # Gyrocompassing

@@ -4,6 +4,7 @@ import cmath
 import json
 import math
 from collections.abc import Callable
+from functools import partial
 from itertools import pairwise
 from typing import Any, get_args
 
@@ -250,7 +251,8 @@ def test_the_limit_is_reached_at_the_time_found(
         "accel_figures": every,
     }
     limit = budget(quantity, 10.0**log_time, **given_).total
-    assert time_until(limit, quantity, **given_) == pytest.approx(10.0**log_time, rel=1e-6)
+    found = time_until(limit, partial(budget, quantity, **given_))
+    assert found == pytest.approx(10.0**log_time, rel=1e-6)
 
 
 def test_north_has_the_biases_at_one_position_and_the_temperature_at_all() -> None:

@@ -6,7 +6,7 @@ from dataclasses import asdict, dataclass, field, replace
 from functools import cache, partial
 from itertools import product
 from types import MappingProxyType
-from typing import Any, get_args
+from typing import get_args
 
 import numpy as np
 
@@ -95,7 +95,7 @@ class Question:
         """Return the budget for these axes."""
         if self.error == "north":
             return self._make_gyrocompass(gyro, accel).heading(self.time)
-        return self._in_plane(budget(self.error, self.time, **self._make_arguments(gyro, accel)))
+        return self._after(self.time, gyro, accel)
 
     def answer_all(self, gyro: AxisErrors, accel: AxisErrors) -> tuple[Budget, float, float, float]:
         """Return the budget, and the totals of noise alone, likely, and best of the class."""
@@ -109,24 +109,25 @@ class Question:
             return None
         if self.error == "north":
             return self._make_gyrocompass(gyro, accel).time_needed(self.limit)
-        arguments = self._make_arguments(gyro, accel)
-        return time_until(self.limit, self.error, convert=self._in_plane, **arguments)
+        lines = bool(gyro.model.sinusoids or accel.model.sinusoids)
+        return time_until(self.limit, lambda time: self._after(time, gyro, accel), oscillates=lines)
 
-    def _in_plane(self, along: Budget) -> Budget:
+    def _after(self, time: float, gyro: AxisErrors, accel: AxisErrors) -> Budget:
+        """Return the budget after a time of dead reckoning; in the plane with a confidence."""
+        assert self.error != "north"
+        along = budget(
+            self.error,
+            time,
+            gyro=gyro.model,
+            accel=accel.model,
+            start=self.start,
+            use=self.use,
+            gyro_figures=gyro.figures,
+            accel_figures=accel.figures,
+        )
         if self.confidence is None or self.error not in ("velocity", "position"):
             return along
         return along.to_radius(self.confidence)
-
-    def _make_arguments(self, gyro: AxisErrors, accel: AxisErrors) -> dict[str, Any]:
-        """Return the arguments of a budget other than the error and its time."""
-        return {
-            "gyro": gyro.model,
-            "accel": accel.model,
-            "start": self.start,
-            "use": self.use,
-            "gyro_figures": gyro.figures,
-            "accel_figures": accel.figures,
-        }
 
     def _make_gyrocompass(self, gyro: AxisErrors, accel: AxisErrors) -> Gyrocompass:
         assert self.latitude is not None  # checked with the requirement
