@@ -1,5 +1,6 @@
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import partial
 from itertools import pairwise
 from typing import Any
@@ -22,6 +23,7 @@ from imubench_pipeline.navigation.error_budget.uncertainty import compute_interv
 from imubench_pipeline.noise import GaussMarkov, NoiseModel, Sinusoid
 from imubench_pipeline.noise.growth import Calibrated, Uncalibrated
 from imubench_pipeline.words.verdicts import source_text
+from tests.starts import uncalibrated
 
 Array = NDArray[np.float64]
 
@@ -65,9 +67,9 @@ def test_the_total_is_the_root_of_the_squares(
     quantity: Quantity, time: float, window: float, calibrated: bool
 ) -> None:
     start = (
-        Start.calibrated(window, heading=0.01)
+        replace(Start.calibrated(window), heading=0.01)
         if calibrated
-        else Start.uncalibrated(gyro_bias=1e-3, accel_bias=0.02, on_time=window, tilt=1e-3)
+        else uncalibrated(gyro_bias=1e-3, accel_bias=0.02, on_time=window, tilt=1e-3)
     )
     found = budget(quantity, time, gyro=EVERYTHING, accel=EVERYTHING, start=start)
     squares = math.fsum(one.sigma**2 for one in found.contributions)
@@ -91,7 +93,7 @@ def test_more_noise_is_never_better(
     start = (
         Start.calibrated(30.0)
         if calibrated
-        else Start.uncalibrated(gyro_bias=1e-3, accel_bias=0.02, on_time=30.0)
+        else uncalibrated(gyro_bias=1e-3, accel_bias=0.02, on_time=30.0)
     )
     models = {"gyro": NoiseModel(**values), "accel": NoiseModel(**values)}
     both = [budget(quantity, time, **models, start=start).contributions]
@@ -121,7 +123,7 @@ def test_a_levelled_tilt_is_the_mean_error_of_the_accelerometer_over_g() -> None
 
 
 def test_a_stated_tilt_and_biases_grow_with_gravity() -> None:
-    start = Start.uncalibrated(gyro_bias=2e-3, accel_bias=0.1, on_time=0.0, tilt=0.01, heading=0.2)
+    start = uncalibrated(gyro_bias=2e-3, accel_bias=0.1, on_time=0.0, tilt=0.01, heading=0.2)
     expected: dict[Quantity, tuple[float, float, float]] = {
         "attitude": (2e-3 * 6.0, 0.0, 0.01),
         "velocity": (G * 2e-3 * 18.0, 0.1 * 6.0, G * 0.01 * 6.0),
@@ -160,7 +162,7 @@ def with_schuler_feedback(rate: float, accel: float, start: Sequence[float]) -> 
 def test_what_schuler_feedback_takes_off_a_bias(
     gyro: float, accel: float, tilt: float, overstated: list[float]
 ) -> None:
-    start = Start.uncalibrated(gyro_bias=gyro, accel_bias=accel, on_time=0.0, tilt=tilt)
+    start = uncalibrated(gyro_bias=gyro, accel_bias=accel, on_time=0.0, tilt=tilt)
     curved = with_schuler_feedback(gyro, accel, [tilt, 0.0, 0.0])[-len(overstated) :, -1]
     asked = LATE[-len(overstated) :]
     flat = [budget(q, 600.0, gyro=NOTHING, accel=NOTHING, start=start).total for q in asked]
@@ -168,7 +170,7 @@ def test_what_schuler_feedback_takes_off_a_bias(
 
 
 def test_what_schuler_feedback_takes_off_white_noise() -> None:
-    start = Start.uncalibrated(gyro_bias=0.0, accel_bias=0.0, on_time=0.0)
+    start = uncalibrated(gyro_bias=0.0, accel_bias=0.0, on_time=0.0)
     expected: dict[str, list[float]] = {"gyro": [0.095, 0.057, 0.034], "accel": [0.095, 0.057]}
     white = NoiseModel(N=1.0)
     for sensor, overstated in expected.items():
@@ -195,7 +197,7 @@ def test_bad_starts_are_refused() -> None:
     with pytest.raises(ValueError, match="window"):
         Start.calibrated(0.0)
     with pytest.raises(ValueError, match="on_time"):
-        Start.uncalibrated(gyro_bias=0.0, accel_bias=0.0, on_time=-1.0)
+        uncalibrated(gyro_bias=0.0, accel_bias=0.0, on_time=-1.0)
     with pytest.raises(ValueError, match="tilt"):
         Start.calibrated(1.0, tilt=-0.1)
     with pytest.raises(ValueError, match="bias"):
@@ -245,7 +247,7 @@ def test_a_radius_has_the_probability_in_the_plane(
 def test_the_limit_of_a_radius_is_reached_earlier() -> None:
     """Rayleigh: the radius with 95 % is sqrt(-2 ln 0.05) of the sigma along each axis."""
     factor = math.sqrt(-2.0 * math.log(0.05)) / float(ndtri(0.975))
-    start = Start.uncalibrated(gyro_bias=0.0, accel_bias=0.0, on_time=0.0)
+    start = uncalibrated(gyro_bias=0.0, accel_bias=0.0, on_time=0.0)
     accel = NoiseModel(N=1e-3)
     found = time_until(
         0.02 * factor,
@@ -268,7 +270,7 @@ def test_the_error_reaches_its_limit_at_the_time_found(
     start = (
         Start.calibrated(window)
         if calibrated
-        else Start.uncalibrated(gyro_bias=1e-3, accel_bias=0.02, on_time=window)
+        else uncalibrated(gyro_bias=1e-3, accel_bias=0.02, on_time=window)
     )
     sensors = {"gyro": MTI_7_GYRO, "accel": MTI_7_ACCEL}
     limit = budget(quantity, 10.0**log_time, **sensors, start=start).total
@@ -283,7 +285,7 @@ def test_errors_grow_with_time(
     start = (
         Start.calibrated(window)
         if calibrated
-        else Start.uncalibrated(gyro_bias=1e-4, accel_bias=0.01, on_time=window)
+        else uncalibrated(gyro_bias=1e-4, accel_bias=0.01, on_time=window)
     )
     model = NoiseModel(Q=1e-6, N=1e-4, B=1e-4, K=1e-6, R=1e-8, further=(GaussMarkov(1e-3, 5.0),))
     totals = [
@@ -295,7 +297,7 @@ def test_errors_grow_with_time(
 
 def test_the_first_crossing_of_a_line() -> None:
     # A sin(pi f t) / (pi f) / sqrt(2) reaches half of its maximum at a sixth of 1/f.
-    start = Start.uncalibrated(gyro_bias=0.0, accel_bias=0.0, on_time=0.0)
+    start = uncalibrated(gyro_bias=0.0, accel_bias=0.0, on_time=0.0)
     gyro = NoiseModel(N=1e-9, sinusoids=(Sinusoid(1e-3, 0.01),))
     limit = 0.5 * 1e-3 / (math.pi * 0.01) / math.sqrt(2.0)
     attitude = partial(budget, "attitude", gyro=gyro, accel=NOTHING, start=start)
@@ -304,7 +306,7 @@ def test_the_first_crossing_of_a_line() -> None:
 
 
 def test_limits_that_are_passed_at_once_or_never() -> None:
-    tilted = Start.uncalibrated(gyro_bias=0.0, accel_bias=0.0, on_time=0.0, tilt=0.1)
+    tilted = uncalibrated(gyro_bias=0.0, accel_bias=0.0, on_time=0.0, tilt=0.1)
     attitude, velocity = (
         partial(budget, quantity, gyro=NOTHING, accel=NOTHING, start=tilted)
         for quantity in ("attitude", "velocity")

@@ -177,10 +177,10 @@ def list_requirement_questions(name: str, requirement: Requirement) -> Iterator[
         start = Start.calibrated(parse_quantity(requirement.static_window, "time"))
     elif requirement.turn_on is not None:
         gyro, accel = requirement.turn_on.gyro, requirement.turn_on.accel
-        start = Start.uncalibrated(
-            gyro_bias=None if gyro is None else parse_quantity(gyro, "angular_rate"),
-            accel_bias=None if accel is None else parse_quantity(accel, "acceleration"),
-            on_time=parse_quantity(requirement.turn_on.on_time, "time"),
+        on = partial(Uncalibrated, on_time=parse_quantity(requirement.turn_on.on_time, "time"))
+        start = Start(
+            gyro=on(bias=None if gyro is None else parse_quantity(gyro, "angular_rate")),
+            accel=on(bias=None if accel is None else parse_quantity(accel, "acceleration")),
         )
     environment = requirement.environment
     stated = {

@@ -87,34 +87,10 @@ class Start:
             raise ValueError("a levelled start needs the window of calibrated accelerometers")
 
     @classmethod
-    def calibrated(
-        cls, window: float, *, tilt: Levelled | float | None = None, heading: float = 0.0
-    ) -> "Start":
+    def calibrated(cls, window: float, *, tilt: Levelled | float | None = None) -> "Start":
         """Return a start with both biases from one static window, s; levelled by default."""
         sensor = Calibrated(window)
-        levelled = Levelled() if tilt is None else tilt
-        return cls(gyro=sensor, accel=sensor, tilt=levelled, heading=heading)
-
-    @classmethod
-    def uncalibrated(
-        cls,
-        *,
-        gyro_bias: float | None,
-        accel_bias: float | None,
-        on_time: float,
-        tilt: float = 0.0,
-        heading: float = 0.0,
-    ) -> "Start":
-        """Return a start with turn-on biases of a given sigma, rad/s and m/s^2, and no window.
-
-        None: a bias is taken from the figures of the sensor.
-        """
-        return cls(
-            gyro=Uncalibrated(bias=gyro_bias, on_time=on_time),
-            accel=Uncalibrated(bias=accel_bias, on_time=on_time),
-            tilt=tilt,
-            heading=heading,
-        )
+        return cls(gyro=sensor, accel=sensor, tilt=Levelled() if tilt is None else tilt)
 
 
 def budget(
