@@ -239,17 +239,8 @@ def list_error_rows(
 
     drawn = {channel: drawn_of(channel) for channel in axes}
     for question in questions:
-        asked = ErrorBudgetRow(
-            sensor=names["sensor"],
-            recording=names["recording"],
-            requirement=question.requirement,
-            axis=question.axis,
-            error=question.error,
-            time=question.time,
-            source="total",
-            limit=question.limit,
-            unit=SI_UNITS[DIMENSIONS[question.error]],
-        )
+        unit = SI_UNITS[DIMENSIONS[question.error]]
+        asked = ErrorBudgetRow.taken_from(question, **names, source="total", unit=unit)
         chosen = select_channels(question, axes)
         if chosen is None:
             missing = []

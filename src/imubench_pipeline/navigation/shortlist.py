@@ -120,20 +120,12 @@ def _copy_ranking(
         ),
         None,
     )
-    return ShortlistRow(
-        requirement=row.requirement,
-        sensor=row.sensor,
+    return ShortlistRow.taken_from(
+        row,
         price_class=sensor.price_class,
+        rank=None,
         basis="simulated logs" if simulated else "logs",
-        margin=row.margin,
-        noise_margin=row.noise_margin,
-        likely_margin=row.likely_margin,
         decides=decides,
-        verdict=row.verdict,
-        conditions=row.conditions,
-        parts=row.parts,
-        shortfalls=row.shortfalls,
-        reasons=row.reasons,
     )
 
 
