@@ -260,10 +260,8 @@ def select_known_errors(rows: Iterable[ErrorBudgetRow]) -> list[tuple[ErrorBudge
     return [(row, row.sigma) for row in rows if row.sigma is not None]
 
 
-def compute_variance_shares(
-    total: float, sources: Iterable[ErrorBudgetRow], least: float = 0.01
-) -> tuple[Share, ...]:
-    """Return the sources with at least such a share of the variance, the largest first."""
+def compute_variance_shares(total: float, sources: Iterable[ErrorBudgetRow]) -> tuple[Share, ...]:
+    """Return the sources with at least 1 % of the variance, the largest first."""
     if total <= 0.0:
         return ()
     shares = (
@@ -278,5 +276,5 @@ def compute_variance_shares(
         )
         for row, sigma in select_known_errors(sources)
     )
-    kept = (share for share in shares if share.share >= least)
+    kept = (share for share in shares if share.share >= 0.01)
     return tuple(sorted(kept, key=lambda share: -share.share))
