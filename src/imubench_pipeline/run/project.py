@@ -67,19 +67,16 @@ def has_results(folder: Path) -> bool:
     return (folder / "seals").is_dir() or (folder / "tables/recordings.parquet").is_file()
 
 
-_SNAKEFILE_PATHS = ("Snakefile", "workflow/Snakefile")
-
-
-def has_snakefile(folder: Path) -> bool:
-    """Return whether a folder has its own workflow, which `snakemake` finds there."""
-    return any((folder / own).is_file() for own in _SNAKEFILE_PATHS)
+def find_own_snakefile(folder: Path) -> Path | None:
+    """Return the workflow of a folder, which `snakemake` finds there; None if it has none."""
+    places = (folder / "Snakefile", folder / "workflow/Snakefile")
+    return next((place for place in places if place.is_file()), None)
 
 
 def find_snakefile(folder: Path) -> Path:
     """Return the Snakefile of a checkout, or for a folder of logs the package's; or ConfigError."""
-    for own in _SNAKEFILE_PATHS:
-        if (folder / own).is_file():
-            return (folder / own).absolute()
+    if own := find_own_snakefile(folder):
+        return own.absolute()
     shipped = find_project() / "Snakefile"
     if not (folder / "config/config.yaml").is_file():
         raise ConfigError(
