@@ -260,10 +260,7 @@ def channel_rows(log: Log, channel: str) -> Rows:
               for d in bias_deltas(sheet, channel, means, 0.1)),
         ],
         "datasheet_curve": [
-            key | {"sidedness": one.noise.sidedness if one.noise else None,
-                   "N": one.noise.value if one.noise else None,
-                   "floor": one.floor.value if one.floor else None,
-                   "rms": one.rms, "rms_log10": one.rms_log10}
+            key | asdict(one)
             for one in curve_rms(list(read_comparables(sheet, channel)), TAU, adev)
         ],
         "simulated_truth": [
