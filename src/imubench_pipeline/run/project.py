@@ -17,9 +17,9 @@ from imubench_pipeline.settings.yaml_files import read_settings
 from imubench_pipeline.tables.outputs import OutputFolder, Place, add_output
 
 _CONFIG_FILE = Path("config/config.yaml")
-_RESULT_FOLDERS = ("exports", "faults", "logs", "nightly", "recordings", "report", "seals",
-                   "sensors", "simulated", "tables")  # fmt: skip
-"""Folders in the results that runs write."""
+WRITTEN_FOLDERS = ("exports", "faults", "nightly", "recordings", "report", "seals", "sensors",
+                   "simulated", "tables")  # fmt: skip
+"""Folders in the results that runs write, besides ``logs`` of Snakemake."""
 
 _WORKFLOW_PARTS = ("Snakefile", "workflow", "profiles", "src", "tests", "pyproject.toml")
 
@@ -57,9 +57,8 @@ def find_protected_places(path: Path, results: Path | None = None) -> Iterator[P
     for folder in dict.fromkeys(found):
         if (logs := find_drop_zone(folder)) is not None:
             yield Place(logs.absolute(), "logs", "the logs")
-        yield from (
-            Place(folder / name, "results", "the results of runs") for name in _RESULT_FOLDERS
-        )
+        for name in (*WRITTEN_FOLDERS, "logs"):
+            yield Place(folder / name, "results", "the results of runs")
 
 
 def has_results(folder: Path) -> bool:
