@@ -28,6 +28,7 @@ from imubench_pipeline.earth import STANDARD_GRAVITY
 from imubench_pipeline.navigation.error_budget.budget import Levelled, Start, budget
 from imubench_pipeline.navigation.error_budget.parts import Quantity
 from imubench_pipeline.noise import NoiseModel, Sinusoid
+from imubench_pipeline.noise.growth import Uncalibrated
 from imubench_pipeline.noise.simulate import simulate
 
 Array = NDArray[np.float64]
@@ -65,11 +66,11 @@ class Case:
         """Return the start; a sample stands for the middle of its interval, where a walk begins."""
         if self.levelled:
             return Start.calibrated(WINDOW, tilt=Levelled(bias=self.stated * ACCEL_BIAS))
-        return Start.uncalibrated(
-            gyro_bias=self.stated * GYRO_BIAS,
-            accel_bias=self.stated * ACCEL_BIAS,
+        on = partial(Uncalibrated, on_time=WINDOW - 0.5 / rate)
+        return Start(
+            gyro=on(bias=self.stated * GYRO_BIAS),
+            accel=on(bias=self.stated * ACCEL_BIAS),
             tilt=self.stated * TILT,
-            on_time=WINDOW - 0.5 / rate,
         )
 
 

@@ -25,6 +25,7 @@ from imubench_pipeline.navigation.error_budget.budget import Start, budget
 from imubench_pipeline.navigation.error_budget.in_use import Figure, Use
 from imubench_pipeline.navigation.error_budget.parts import Quantity
 from imubench_pipeline.noise import NoiseModel
+from imubench_pipeline.noise.growth import Uncalibrated
 from imubench_pipeline.typing import Array
 
 G = 9.80665
@@ -191,10 +192,9 @@ def compute_budget(setting: Setting, quantity: Quantity) -> float:
         for of in (setting.gyro, setting.accel)
     ]
     use = setting.use if setting.use.turns else replace(setting.use, speed=setting.use.speed_change)
+    switched_on = Uncalibrated(bias=None, on_time=WINDOW)
     start = (
-        Start.calibrated(WINDOW)
-        if setting.levelled
-        else Start.uncalibrated(gyro_bias=None, accel_bias=None, on_time=WINDOW)
+        Start.calibrated(WINDOW) if setting.levelled else Start(gyro=switched_on, accel=switched_on)
     )
     nothing = NoiseModel()
     made = budget(

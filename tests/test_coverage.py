@@ -1,6 +1,7 @@
 import pytest
 
-from imubench_pipeline.datasheets.coverage import Coverage, by_vendor, coverage
+from imubench_pipeline.datasheets.coverage import by_vendor, coverage
+from imubench_pipeline.model.comparisons import CoverageRow
 from imubench_pipeline.settings.sensor import QUANTITIES, Sensor
 from imubench_pipeline.settings.validation import parse
 from tests.conftest import catalogue
@@ -17,7 +18,7 @@ def sensor(vendor: str = "V", **datasheet: object) -> Sensor:
     return parse(Sensor, SENSOR | {"vendor": vendor, "datasheet": datasheet}, "s.yaml")
 
 
-def published(found: list[Coverage]) -> dict[str, str]:
+def published(found: list[CoverageRow]) -> dict[str, str]:
     return {row.figure: row.published for row in found if row.quantity == "gyro"}
 
 
@@ -87,7 +88,7 @@ def test_a_row_says_what_is_printed_and_where() -> None:
     rows = coverage({"s": given})
     assert {row.quantity for row in rows} == {"gyro"}
     by_figure = {row.figure: row for row in rows}
-    assert by_figure["N"] == Coverage(
+    assert by_figure["N"] == CoverageRow(
         sensor="s",
         vendor="V",
         model="M",

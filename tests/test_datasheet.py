@@ -535,10 +535,10 @@ def test_lines_that_a_datasheet_does_not_have() -> None:
     tau, adev = np.array([1.0, 100.0]), np.array([1.0, 1.0]) * DEG
     floor = sheet(bias_instability={"value": 3600, "unit": "deg/h"})
     (found,) = curve_rms(list(read_comparables(floor, "gyro_x")), tau, adev)
-    assert found.noise is None and found.rms == pytest.approx(0.0, abs=1e-15)
+    assert found.N is None and found.rms == pytest.approx(0.0, abs=1e-15)
     both_sides = sheet(noise_density={"value": math.sqrt(2), "unit": "deg/s/sqrt(Hz)"})
     one, two = curve_rms(list(read_comparables(both_sides, "gyro_x")), tau[:1], adev[:1])
-    assert (one.noise.sidedness, two.noise.sidedness) == ("one-sided", "two-sided")  # type: ignore[union-attr]  # both figures print a noise
+    assert (one.sidedness, two.sidedness) == ("one-sided", "two-sided")
     assert one.rms == pytest.approx(0.0, abs=1e-15)
     assert two.rms_log10 == pytest.approx(math.log10(2) / 2)
     assert curve_rms(list(read_comparables(sheet(), "gyro_x")), tau, adev) == []
@@ -554,12 +554,12 @@ def test_typical_figures_make_the_lines() -> None:
     ]
     sensor = Datasheet.model_validate({"gyro": {"random_walk": walk}})
     (found,) = curve_rms(list(read_comparables(sensor, "gyro_x")), np.array([1.0]), np.array([DEG]))
-    assert found.noise is not None and found.noise.printed == 60.0
+    assert found.N == pytest.approx(DEG)  # 60 deg/sqrt(h)
     largest = Datasheet.model_validate({"gyro": {"random_walk": walk[:1]}})
     (found,) = curve_rms(
         list(read_comparables(largest, "gyro_x")), np.array([1.0]), np.array([DEG])
     )
-    assert found.noise is not None and found.noise.printed == 90.0
+    assert found.N == pytest.approx(1.5 * DEG)
 
 
 def test_every_shipped_datasheet_gives_rows() -> None:

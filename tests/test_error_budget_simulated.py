@@ -22,6 +22,7 @@ from imubench_pipeline.noise.growth import Calibrated, SensorStart, Uncalibrated
 from imubench_pipeline.noise.simulate import simulate
 from tests.conftest import few
 from tests.noise.examples import EXAMPLES, model_of, named
+from tests.starts import uncalibrated
 
 Array = NDArray[np.float64]
 
@@ -109,7 +110,7 @@ def test_dead_reckoning_of_simulated_runs(levelled: bool) -> None:
         tilt = -forces[:, :rest].mean(axis=1) / G
         rates = rates - rates[:, :rest].mean(axis=1)[:, None]
     else:
-        start = Start.uncalibrated(
+        start = uncalibrated(
             gyro_bias=2e-3, accel_bias=0.05, on_time=BEFORE - 0.5 / RATE, tilt=3e-3
         )
         tilt = 3e-3 * normal[0]

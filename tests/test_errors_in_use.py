@@ -4,6 +4,7 @@ import cmath
 import json
 import math
 from collections.abc import Callable
+from functools import partial
 from itertools import pairwise
 from typing import Any, get_args
 
@@ -36,6 +37,7 @@ from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.noise.growth import Calibrated, Uncalibrated
 from imubench_pipeline.words.verdicts import source_text
 from tests.rows import typed
+from tests.starts import uncalibrated
 from tests.test_class_limits import sensor
 
 G = 9.80665
@@ -123,7 +125,7 @@ def test_what_each_figure_adds_after_a_static_window() -> None:
 
 
 def test_without_a_window_the_biases_of_the_datasheet_and_the_whole_change_stay() -> None:
-    start = Start.uncalibrated(gyro_bias=None, accel_bias=0.1, on_time=60.0)
+    start = uncalibrated(gyro_bias=None, accel_bias=0.1, on_time=60.0)
     known = figures(turn_on_bias=2e-3, temperature=1e-4)
     found = parts_of(
         "heading", start, use=Use(temperature_change=20.0, over=60.0), gyro_figures=known
@@ -217,7 +219,7 @@ def test_a_full_circle_at_speed_by_hand() -> None:
 def test_the_cross_track_error_is_the_speed_times_the_integral_of_the_heading() -> None:
     """1 deg/h/sqrt(h) on a straight way of two minutes at 3 m/s, and an initial error of 1 deg."""
     gyro, use = NoiseModel(N=1e-4), Use(speed=3.0, temperature_change=10.0, over=120.0)
-    start = Start.uncalibrated(gyro_bias=2e-5, accel_bias=None, on_time=0.0, heading=DEGREE)
+    start = uncalibrated(gyro_bias=2e-5, accel_bias=None, on_time=0.0, heading=DEGREE)
     known = figures(temperature=1e-6)
     found = budget(
         "cross_track", 120.0, gyro=gyro, accel=NOTHING, start=start, use=use, gyro_figures=known
@@ -238,7 +240,7 @@ def test_the_limit_is_reached_at_the_time_found(
     start = (
         Start.calibrated(5.0)
         if calibrated
-        else Start.uncalibrated(gyro_bias=None, accel_bias=None, on_time=5.0)
+        else uncalibrated(gyro_bias=None, accel_bias=None, on_time=5.0)
     )
     every = figures(**dict.fromkeys(get_args(Cause), 1e-3))
     given_: dict[str, Any] = {
@@ -250,7 +252,8 @@ def test_the_limit_is_reached_at_the_time_found(
         "accel_figures": every,
     }
     limit = budget(quantity, 10.0**log_time, **given_).total
-    assert time_until(limit, quantity, **given_) == pytest.approx(10.0**log_time, rel=1e-6)
+    found = time_until(limit, partial(budget, quantity, **given_))
+    assert found == pytest.approx(10.0**log_time, rel=1e-6)
 
 
 def test_north_has_the_biases_at_one_position_and_the_temperature_at_all() -> None:

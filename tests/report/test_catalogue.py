@@ -1,7 +1,6 @@
 """The page of datasheets: the figures of all sensors, and the share that vendors publish."""
 
 import math
-from dataclasses import asdict
 from typing import Any
 
 import pytest
@@ -35,7 +34,7 @@ def read(*rows: dict[str, Any]) -> list[CoverageRow]:
 
 
 def tables_of(sensors: dict[str, Sensor], system: Any = "practical") -> list[Json]:
-    rows = read(*map(asdict, coverage(sensors)))
+    rows = coverage(sensors)
     return list(make_catalogue_tables(rows, list_catalogue(sensors), system))
 
 

@@ -7,7 +7,6 @@ from imubench_pipeline.model.comparisons import RepeatabilityRow
 from imubench_pipeline.report.datasheets import (
     compare_sensors_with_datasheets,
     compare_with_datasheet,
-    format_curve_distances,
     format_repeatability,
 )
 from imubench_pipeline.report.view import RecordingView, gather_recordings
@@ -170,20 +169,6 @@ def test_both_readings_of_a_density_stand_in_one_line() -> None:
     assert [(one["as"], one["difference"]) for one in row["readings"]] == [
         ("read as one-sided", "+10 %"),
         ("read as two-sided", "−20 %"),
-    ]
-
-
-def test_distances_of_the_curve_are_told_in_words() -> None:
-    rows = recording_rows()
-    rows["datasheet_curve"] = [
-        rows["datasheet_curve"][0]
-        | {"rms": 2.5 * HOUR, "rms_log10": 0.0456, "sidedness": sidedness}
-        for sidedness in ("two-sided", None)
-    ]
-    (view,) = views(rows)
-    assert list(format_curve_distances(view.channels()[0], "practical")) == [
-        "2.5 °/h, 0.046 decades, density read as two-sided",
-        "2.5 °/h, 0.046 decades",
     ]
 
 

@@ -45,6 +45,7 @@ from imubench_pipeline.words.findings import FINDINGS
 from imubench_pipeline.words.verdicts import source_text
 from tests.conftest import PROJECT
 from tests.rows import DATASHEET_VERDICTS
+from tests.starts import uncalibrated
 
 SOURCE = PROJECT / "src/imubench_pipeline"
 BASE = "{% block title %}{% endblock %}<main>{% block main %}{% endblock %}</main>"
@@ -408,11 +409,11 @@ NOTHING = NoiseModel()
 MTI_7_GYRO = NoiseModel(N=8.4e-5, B=6.7e-5, T_B=89.5, K=8.2e-7)
 MTI_7_ACCEL = NoiseModel(N=9.6e-4, B=3.4e-4, T_B=38.3, K=1.7e-5)
 C102_ACCEL = NoiseModel(N=1.1e-3, B=7.2e-4, T_B=148.9, K=2.0e-5)
-PERFECT = Start.uncalibrated(gyro_bias=0.0, accel_bias=0.0, on_time=0.0)
+PERFECT = uncalibrated(gyro_bias=0.0, accel_bias=0.0, on_time=0.0)
 CAUSES: dict[str, tuple[NoiseModel, Start]] = {
     "A residual bias b, 10 °/h": (
         NOTHING,
-        Start.uncalibrated(gyro_bias=GYRO.B, accel_bias=0.0, on_time=0.0),
+        uncalibrated(gyro_bias=GYRO.B, accel_bias=0.0, on_time=0.0),
     ),
     "N": (NoiseModel(N=GYRO.N), PERFECT),
     "B, flicker": (NoiseModel(B=GYRO.B), Start.calibrated(60.0)),

@@ -10,6 +10,10 @@ from imubench_pipeline.settings.printed import FIGURE_DIMENSIONS, PrintedFigure,
 from imubench_pipeline.settings.sensor import QUANTITIES, Sensor
 from imubench_pipeline.units import SI_UNITS, convert_to_si, find_dimension
 
+_OF_SENSOR = {"vendor", "model", "aliases", "grade", "technology"}
+_OF_FIGURE = {"unit", "option", "condition", "place", "evidence"}
+"""Keys of a sensor file, and of a figure in it, with a column of the same name."""
+
 
 def list_catalogue(sensors: Mapping[str, Sensor]) -> Iterator[CatalogueRow]:
     """Yield the figures of all sensors, in the order of the sensors and of the keys of a file.
@@ -28,11 +32,7 @@ def list_catalogue(sensors: Mapping[str, Sensor]) -> Iterator[CatalogueRow]:
             make = partial(
                 CatalogueRow,
                 sensor=name,
-                vendor=sensor.vendor,
-                model=sensor.model,
-                aliases=sensor.aliases,
-                grade=sensor.grade,
-                technology=sensor.technology,
+                **sensor.model_dump(include=_OF_SENSOR),
                 quantity=quantity,
                 figure=key,
                 document=datasheet.document,
@@ -45,11 +45,7 @@ def list_catalogue(sensors: Mapping[str, Sensor]) -> Iterator[CatalogueRow]:
                 yield from _list_numbers(
                     partial(
                         make,
-                        unit=figure.unit,
-                        option=figure.option,
-                        condition=figure.condition,
-                        place=figure.place,
-                        evidence=figure.evidence,
+                        **figure.model_dump(include=_OF_FIGURE),
                         source=figure.source or datasheet.source,
                     ),
                     figure,

@@ -27,7 +27,7 @@ from imubench_pipeline.datasheets.comparable import Comparable, PrintedAxis, rea
 from imubench_pipeline.model.states import Cause
 from imubench_pipeline.settings.printed import FIGURE_DIMENSIONS, Datasheet, QuantityDatasheet
 from imubench_pipeline.settings.sensor import QUANTITIES, Grade, Sensor
-from imubench_pipeline.units import SI_UNITS, convert_to_si
+from imubench_pipeline.units import SI_UNITS, parse_quantity
 
 FILE = Path(__file__).with_name("class_limits.csv")
 """The limits of the shipped catalogue."""
@@ -223,13 +223,8 @@ def _temperature_span(sensor: Sensor) -> float:
     """Return the width of the temperature range of operation, K."""
     if sensor.temperature_range is None:
         return _UNKNOWN_RANGE
-    low, high = (_celsius(text) for text in sensor.temperature_range)
+    low, high = (parse_quantity(text, "temperature") for text in sensor.temperature_range)
     return high - low
-
-
-def _celsius(text: str) -> float:
-    value, _, unit = text.partition(" ")
-    return convert_to_si(float(value), unit, "temperature")
 
 
 def _unit_of(quantity: str, figure: str) -> str:
@@ -256,13 +251,10 @@ def write_class_limits(limits: Iterable[ClassLimit]) -> str:
 
 def read_class_limits(path: Path = FILE) -> list[ClassLimit]:
     """Return the limits in a file that `write_class_limits` made."""
+    limits = []
     with path.open(encoding="utf-8", newline="") as file:
-        return [
-            _summarise(row["grade"], row["quantity"], row["figure"], _read_values(row["sensors"]))
-            for row in csv.DictReader(file)
-        ]
-
-
-def _read_values(text: str) -> dict[str, float]:
-    pairs = (each.split(" ") for each in text.split(_SEPARATOR))
-    return {name: float(value) for name, value in pairs}
+        for row in csv.DictReader(file):
+            pairs = (each.split(" ") for each in row["sensors"].split(_SEPARATOR))
+            values = {name: float(value) for name, value in pairs}
+            limits.append(_summarise(row["grade"], row["quantity"], row["figure"], values))
+    return limits

@@ -2,14 +2,20 @@
 
 from collections import Counter
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
 from itertools import product
 from typing import Literal
 
+from imubench_pipeline.model.comparisons import CoverageRow, VendorCoverageRow
 from imubench_pipeline.settings.printed import FIGURE_DIMENSIONS, PrintedFigure, QuantityDatasheet
 from imubench_pipeline.settings.sensor import QUANTITIES, Sensor
 
 Published = Literal["yes", "no", "other convention", "not looked up"]
+"""Whether a vendor publishes a figure.
+
+``other convention``: a related figure, such as an rms for N or a total over temperature for the
+coefficient; ``no``: looked up (null), and not published; ``not looked up``: the sensor file does
+not say, so it counts neither as published nor as unpublished.
+"""
 
 KEYS_OF_FIGURE: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     "N": (("noise_density", "random_walk"), ("rms_noise",)),
@@ -33,39 +39,7 @@ KEYS_OF_FIGURE: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
 """Figures that a filter or a choice needs: keys that give them, and in another convention."""
 
 
-@dataclass(frozen=True)
-class Coverage:
-    """Whether a vendor publishes one figure of one sensor."""
-
-    sensor: str
-    vendor: str
-    model: str
-    quantity: str  # ``gyro`` or ``accel``
-    figure: str  # of `KEYS_OF_FIGURE`
-    # ``yes``; ``other convention``: a related figure, such as an rms for N or a total over
-    # temperature for the coefficient; ``no``: looked up (null), and not published; ``not looked
-    # up``: the sensor file does not say, so it counts neither as published nor as unpublished
-    published: Published
-    as_printed: tuple[str, ...]  # all its printed figures, with unit and kind
-    document: str | None  # with its revision
-    source: str | None  # ``primary`` or ``secondary``, of the figures or else of the datasheet
-
-
-@dataclass(frozen=True)
-class VendorCoverage:
-    """Number of sensors for which a vendor publishes a figure."""
-
-    vendor: str
-    quantity: str
-    figure: str
-    sensors: int
-    yes: int
-    other_convention: int
-    no: int
-    not_looked_up: int
-
-
-def coverage(sensors: Mapping[str, Sensor]) -> list[Coverage]:
+def coverage(sensors: Mapping[str, Sensor]) -> list[CoverageRow]:
     """Return which figures the vendors of a catalogue publish.
 
     There is one row for each sensor that is sold, quantity that it measures, and figure, in the
@@ -90,7 +64,7 @@ def coverage(sensors: Mapping[str, Sensor]) -> list[Coverage]:
                 published = "other convention"
             elif any(sheet.looked_up(key) for key in plain):
                 published = "no"
-            row = Coverage(
+            row = CoverageRow(
                 sensor=name,
                 vendor=sensor.vendor,
                 model=sensor.model,
@@ -105,7 +79,7 @@ def coverage(sensors: Mapping[str, Sensor]) -> list[Coverage]:
     return rows
 
 
-def by_vendor(rows: Iterable[Coverage]) -> list[VendorCoverage]:
+def by_vendor(rows: Iterable[CoverageRow]) -> list[VendorCoverageRow]:
     """Count the rows of `coverage` by vendor, quantity and figure, in the order of the vendors."""
     counts: dict[tuple[str, str, str], Counter[str]] = {}
     for row in rows:
@@ -118,15 +92,17 @@ def by_vendor(rows: Iterable[Coverage]) -> list[VendorCoverage]:
         return vendor.lower(), *place
 
     return [
-        VendorCoverage(
-            *key,
+        VendorCoverageRow(
+            vendor=vendor,
+            quantity=quantity,
+            figure=figure,
             sensors=count.total(),
             yes=count["yes"],
             other_convention=count["other convention"],
             no=count["no"],
             not_looked_up=count["not looked up"],
         )
-        for key, count in sorted(counts.items(), key=order)
+        for (vendor, quantity, figure), count in sorted(counts.items(), key=order)
     ]
 
 

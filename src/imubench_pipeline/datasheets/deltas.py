@@ -290,9 +290,10 @@ def _compute_relative_difference(value: float | None, printed: float | None) -> 
 class CurveRms:
     """Distance between a measured curve and the lines of a datasheet."""
 
-    # noise, floor: the printed figures of the two lines
-    noise: Comparable | None
-    floor: Comparable | None
+    sidedness: str | None  # of the printed noise density, in this reading
+    # N, floor: the printed figures of the two lines, SI
+    N: float | None
+    floor: float | None
     rms: float  # root mean square over tau of measured minus printed Allan deviation, rad/s or m/s²
     rms_log10: float  # rms of the difference of log10, decades
 
@@ -319,12 +320,12 @@ def curve_rms(
     for noise, floor in product(noises or [None], floors[:1] or [None]):
         if noise is None and floor is None:
             continue
-        white = noise.value if noise and noise.value else 0.0
-        bottom = floor.value if floor and floor.value else 0.0
-        line = np.sqrt(white**2 / tau + bottom**2)
+        N, bottom = (line.value if line else None for line in (noise, floor))
+        side = noise.sidedness if noise else None
+        line = np.sqrt((N or 0.0) ** 2 / tau + (bottom or 0.0) ** 2)
         absolute, relative = adev - line, np.log10(adev / line)
         rms, rms_log10 = (float(np.sqrt(np.mean(each**2))) for each in (absolute, relative))
-        distances.append(CurveRms(noise, floor, rms, rms_log10))
+        distances.append(CurveRms(side, N, bottom, rms, rms_log10))
     return distances
 
 

@@ -129,6 +129,12 @@ class TableRow(_Attributes):
             return {**self, **other}
 
     @classmethod
+    def taken_from(cls, source: object, /, **columns: object) -> Self:
+        """Return a row with some columns, and all others that a source has by the same names."""
+        names = [name for name in names_of(cls) if hasattr(source, name)]
+        return cls(**{**{name: getattr(source, name) for name in names}, **columns})
+
+    @classmethod
     def from_json(cls, values: Mapping[str, Any]) -> Self:
         """Return a row from values as JSON has them: lists in place of tuples and structs."""
         columns = [column for column in columns_of(cls) if column.name in values]

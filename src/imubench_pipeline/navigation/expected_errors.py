@@ -6,7 +6,7 @@ from dataclasses import asdict, dataclass, field, replace
 from functools import cache, partial
 from itertools import product
 from types import MappingProxyType
-from typing import Any, get_args
+from typing import get_args
 
 import numpy as np
 
@@ -95,7 +95,7 @@ class Question:
         """Return the budget for these axes."""
         if self.error == "north":
             return self._make_gyrocompass(gyro, accel).heading(self.time)
-        return self._in_plane(budget(self.error, self.time, **self._make_arguments(gyro, accel)))
+        return self._after(self.time, gyro, accel)
 
     def answer_all(self, gyro: AxisErrors, accel: AxisErrors) -> tuple[Budget, float, float, float]:
         """Return the budget, and the totals of noise alone, likely, and best of the class."""
@@ -109,24 +109,25 @@ class Question:
             return None
         if self.error == "north":
             return self._make_gyrocompass(gyro, accel).time_needed(self.limit)
-        arguments = self._make_arguments(gyro, accel)
-        return time_until(self.limit, self.error, convert=self._in_plane, **arguments)
+        lines = bool(gyro.model.sinusoids or accel.model.sinusoids)
+        return time_until(self.limit, lambda time: self._after(time, gyro, accel), oscillates=lines)
 
-    def _in_plane(self, along: Budget) -> Budget:
+    def _after(self, time: float, gyro: AxisErrors, accel: AxisErrors) -> Budget:
+        """Return the budget after a time of dead reckoning; in the plane with a confidence."""
+        assert self.error != "north"
+        along = budget(
+            self.error,
+            time,
+            gyro=gyro.model,
+            accel=accel.model,
+            start=self.start,
+            use=self.use,
+            gyro_figures=gyro.figures,
+            accel_figures=accel.figures,
+        )
         if self.confidence is None or self.error not in ("velocity", "position"):
             return along
         return along.to_radius(self.confidence)
-
-    def _make_arguments(self, gyro: AxisErrors, accel: AxisErrors) -> dict[str, Any]:
-        """Return the arguments of a budget other than the error and its time."""
-        return {
-            "gyro": gyro.model,
-            "accel": accel.model,
-            "start": self.start,
-            "use": self.use,
-            "gyro_figures": gyro.figures,
-            "accel_figures": accel.figures,
-        }
 
     def _make_gyrocompass(self, gyro: AxisErrors, accel: AxisErrors) -> Gyrocompass:
         assert self.latitude is not None  # checked with the requirement
@@ -176,10 +177,10 @@ def list_requirement_questions(name: str, requirement: Requirement) -> Iterator[
         start = Start.calibrated(parse_quantity(requirement.static_window, "time"))
     elif requirement.turn_on is not None:
         gyro, accel = requirement.turn_on.gyro, requirement.turn_on.accel
-        start = Start.uncalibrated(
-            gyro_bias=None if gyro is None else parse_quantity(gyro, "angular_rate"),
-            accel_bias=None if accel is None else parse_quantity(accel, "acceleration"),
-            on_time=parse_quantity(requirement.turn_on.on_time, "time"),
+        on = partial(Uncalibrated, on_time=parse_quantity(requirement.turn_on.on_time, "time"))
+        start = Start(
+            gyro=on(bias=None if gyro is None else parse_quantity(gyro, "angular_rate")),
+            accel=on(bias=None if accel is None else parse_quantity(accel, "acceleration")),
         )
     environment = requirement.environment
     stated = {
@@ -238,17 +239,8 @@ def list_error_rows(
 
     drawn = {channel: drawn_of(channel) for channel in axes}
     for question in questions:
-        asked = ErrorBudgetRow(
-            sensor=names["sensor"],
-            recording=names["recording"],
-            requirement=question.requirement,
-            axis=question.axis,
-            error=question.error,
-            time=question.time,
-            source="total",
-            limit=question.limit,
-            unit=SI_UNITS[DIMENSIONS[question.error]],
-        )
+        unit = SI_UNITS[DIMENSIONS[question.error]]
+        asked = ErrorBudgetRow.taken_from(question, **names, source="total", unit=unit)
         chosen = select_channels(question, axes)
         if chosen is None:
             missing = []

@@ -53,21 +53,12 @@ def repeatability_rows(
             reasons = found.reasons
             if entry.value is not None:
                 reasons = (*(reasons if found.delta is not None else ()), *assumptions)
-            yield RepeatabilityRow(
+            yield RepeatabilityRow.taken_from(
+                found,
                 sensor=sensor,
                 device=device,
                 channel=channel,
                 recordings=len(several),
                 power_cycled="unknown" if unknown else "yes",
-                printed=found.printed,
-                unit=found.unit,
-                kind=found.kind,
-                condition=found.condition,
-                comparable=found.comparable,
-                measured=found.measured,
-                lower=found.lower,
-                upper=found.upper,
-                delta=found.delta,
-                verdict=found.verdict,
                 reasons=reasons,
             )

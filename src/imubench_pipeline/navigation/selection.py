@@ -7,7 +7,7 @@ from imubench_pipeline.model.verdicts import UnitFactor
 from imubench_pipeline.navigation.suitability import PASSING_VERDICTS
 from imubench_pipeline.navigation.verdicts.basis import Basis
 from imubench_pipeline.navigation.verdicts.judgement import Judgement
-from imubench_pipeline.navigation.verdicts.standing import Standing, get_trajectory
+from imubench_pipeline.navigation.verdicts.standing import Standing
 
 
 def rank_sensors(judged: Sequence[Judgement], basis: Basis) -> Iterator[RankingRow]:
@@ -63,24 +63,19 @@ def _make_row(
     tested = basis.backtest(total, judgement.name, channel)
     if tested is not None and tested.ratio is None:
         tested = None
-    return RankingRow(
+    return RankingRow.taken_from(
+        total,
         requirement=judgement.name,
         sensor=sensor,
         rank=rank,
         tied_with=tuple(tied),
         verdict=judgement.verdict,
         decides=standing is judgement.decides,
-        recording=total.recording,
-        error=total.error,
-        time=total.time,
-        trajectory=get_trajectory(total),
         at_most=None if total.limit is None else total.limit * requirement.sigmas,
         confidence=requirement.confidence,
-        limit=total.limit,
         sigma=expected.sigma,
         lower=expected.lower,
         upper=expected.upper,
-        unit=total.unit,
         margin=_get_margin(standing),
         noise_margin=standing.noise_margin,
         likely_margin=standing.likely_margin,
@@ -88,11 +83,9 @@ def _make_row(
         limit_verdict=standing.verdict,
         source=source.source if source else None,
         share=standing.share,
-        reached_after=total.reached_after,
         conditions=judgement.conditions,
         shortfalls=judgement.shortfalls,
         parts=standing.parts,
-        reasons=total.reasons,
         doubts=tuple(
             doubt
             for row in standing.totals or [total]

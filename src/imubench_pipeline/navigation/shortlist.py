@@ -87,7 +87,15 @@ def list_shortlist_rows(
             ranked = measured.get((name, key))
             if ranked is not None and ranked.margin is not None:
                 made = ranked.recording and simulated.get((key, ranked.recording), False)
-                row = _copy_ranking(ranked, sensor, requirement, simulated=bool(made))
+                asked = (ranked.error, ranked.time)
+                limits = (x.text for x in requirement.limits if (x.error, x.seconds) == asked)
+                row = ShortlistRow.taken_from(
+                    ranked,
+                    price_class=sensor.price_class,
+                    rank=None,
+                    basis="simulated logs" if made else "logs",
+                    decides=next(limits, None),
+                )
             else:
                 row = _judge_by_datasheet((name, key), requirement, questions, sensor, printed[key])
             rows.append(row)
@@ -107,34 +115,6 @@ def _is_ranked(row: ShortlistRow) -> bool:
     """Return whether a sensor is judged, and has all demanded properties for certain."""
     unknown = any(condition.property for condition in row.conditions)
     return row.margin is not None and row.verdict != "excluded" and not unknown
-
-
-def _copy_ranking(
-    row: RankingRow, sensor: Sensor, requirement: Requirement, *, simulated: bool
-) -> ShortlistRow:
-    decides = next(
-        (
-            limit.text
-            for limit in requirement.limits
-            if limit.error == row.error and limit.seconds == row.time
-        ),
-        None,
-    )
-    return ShortlistRow(
-        requirement=row.requirement,
-        sensor=row.sensor,
-        price_class=sensor.price_class,
-        basis="simulated logs" if simulated else "logs",
-        margin=row.margin,
-        noise_margin=row.noise_margin,
-        likely_margin=row.likely_margin,
-        decides=decides,
-        verdict=row.verdict,
-        conditions=row.conditions,
-        parts=row.parts,
-        shortfalls=row.shortfalls,
-        reasons=row.reasons,
-    )
 
 
 def _judge_by_datasheet(

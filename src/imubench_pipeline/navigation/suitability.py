@@ -41,17 +41,6 @@ class Abilities(Strict):
     power: float | None = None
 
 
-@dataclass(frozen=True)
-class _Point:
-    """One required property; ``fulfilled`` is None if not known."""
-
-    property: Property
-    subject: str
-    fulfilled: bool | None
-    asked: str
-    has: tuple[float, ...] = ()
-
-
 def read_abilities(sensor: Sensor) -> Abilities:
     """Return the properties of a sensor from its file."""
     quantities: tuple[Measured, ...] = ("gyro", "accel")
@@ -112,47 +101,40 @@ def _find_largest(datasheet: Datasheet, quantity: Measured, name: str) -> float 
 
 def judge(requirement: Requirement, has: Abilities) -> tuple[list[Shortfall], list[Condition]]:
     """Return the required properties that a sensor lacks, and the unknown ones."""
-    points: dict[tuple[Property, str], _Point] = {}
-    for point in _compare(requirement, has):
-        points.setdefault((point.property, point.subject), point)
-    lacking = [
-        Shortfall(point.property, point.subject, point.asked, point.has)
-        for point in points.values()
-        if point.fulfilled is False
-    ]
-    unknown = [
-        Condition(None, point.property, point.subject)
-        for point in points.values()
-        if point.fulfilled is None
-    ]
+    points: dict[tuple[Property, str], tuple[bool | None, Shortfall]] = {}
+    for fulfilled, point in _compare(requirement, has):
+        points.setdefault((point.property, point.subject), (fulfilled, point))
+    lacking = [point for fulfilled, point in points.values() if fulfilled is False]
+    unknown = [Condition(None, *key) for key, (fulfilled, _) in points.items() if fulfilled is None]
     return lacking, unknown
 
 
-def _compare(requirement: Requirement, has: Abilities) -> Iterator[_Point]:
+def _compare(requirement: Requirement, has: Abilities) -> Iterator[tuple[bool | None, Shortfall]]:
+    """Yield each required property, and whether it is fulfilled; None if that is not known."""
     must = requirement.must
     for measured in requirement.quantities:
         if measured in has.without:
-            yield _Point("quantity", measured, False, measured)
+            yield False, Shortfall("quantity", measured, measured)
     for text in must.axes:
         quantity, axes = text.split("_")
         if quantity in has.without:
-            yield _Point("quantity", quantity, False, text)
+            yield False, Shortfall("quantity", quantity, text)
             continue
         for axis in axes:
             # The sensor may have axes that are not in its logs.
             logged = f"{quantity}_{axis}" in has.channels or None
-            yield _Point("axis", f"{quantity}_{axis}", logged, text)
+            yield logged, Shortfall("axis", f"{quantity}_{axis}", text)
     for measured in get_args(Measured):
         text = getattr(must.full_scale, measured)
         if text is None:
             continue
         if measured in has.without:
-            yield _Point("quantity", measured, False, text)
+            yield False, Shortfall("quantity", measured, text)
             continue
         largest = has.full_scale.get(measured)
         least = parse_quantity(text, QUANTITIES[measured])
         enough = None if largest is None else largest * _ROUNDING_MARGIN >= least
-        yield _Point("full_scale", measured, enough, text, _list_known(largest))
+        yield enough, Shortfall("full_scale", measured, text, _list_known(largest))
     if must.bandwidth is not None:
         # Of the quantities with required axes, or else of all.
         asked = {axes.split("_")[0] for axes in must.axes} or set(requirement.quantities)
@@ -161,20 +143,21 @@ def _compare(requirement: Requirement, has: Abilities) -> Iterator[_Point]:
             if measured in asked and measured not in has.without:
                 width = has.bandwidth.get(measured)
                 wide = None if width is None else width >= lowest
-                yield _Point("bandwidth", measured, wide, must.bandwidth, _list_known(width))
+                own = _list_known(width)
+                yield wide, Shortfall("bandwidth", measured, must.bandwidth, own)
     if must.rate is not None:
         least = parse_quantity(must.rate, "frequency")
         if has.logged_rate is not None and has.logged_rate >= least:
-            yield _Point("rate", "", True, must.rate)
+            yield True, Shortfall("rate", "", must.rate)
         else:
             # The rate of a log may be lower than the highest rate of the sensor.
             fast = None if has.rate is None else has.rate >= least
-            yield _Point("rate", "", fast, must.rate, _list_known(has.rate))
+            yield fast, Shortfall("rate", "", must.rate, _list_known(has.rate))
     if must.temperature is not None:
         low, high = (parse_quantity(end, "temperature") for end in must.temperature)
-        own = has.temperature
-        within = None if own is None else own[0] <= low and high <= own[1]
-        yield _Point("temperature", "", within, " to ".join(must.temperature), own or ())
+        ends = has.temperature
+        within = None if ends is None else ends[0] <= low and high <= ends[1]
+        yield within, Shortfall("temperature", "", " to ".join(must.temperature), ends or ())
     sizes: tuple[tuple[Literal["mass", "power"], str | None, float | None], ...] = (
         ("mass", must.mass, has.mass),
         ("power", must.power, has.power),
@@ -182,7 +165,7 @@ def _compare(requirement: Requirement, has: Abilities) -> Iterator[_Point]:
     for name, most, size in sizes:
         if most is not None:
             small = None if size is None else size <= parse_quantity(most, name) * _ROUNDING_MARGIN
-            yield _Point(name, "", small, most, _list_known(size))
+            yield small, Shortfall(name, "", most, _list_known(size))
 
 
 def _list_known(value: float | None) -> tuple[float, ...]:
@@ -260,10 +243,8 @@ def select_known_errors(rows: Iterable[ErrorBudgetRow]) -> list[tuple[ErrorBudge
     return [(row, row.sigma) for row in rows if row.sigma is not None]
 
 
-def compute_variance_shares(
-    total: float, sources: Iterable[ErrorBudgetRow], least: float = 0.01
-) -> tuple[Share, ...]:
-    """Return the sources with at least such a share of the variance, the largest first."""
+def compute_variance_shares(total: float, sources: Iterable[ErrorBudgetRow]) -> tuple[Share, ...]:
+    """Return the sources with at least 1 % of the variance, the largest first."""
     if total <= 0.0:
         return ()
     shares = (
@@ -278,5 +259,5 @@ def compute_variance_shares(
         )
         for row, sigma in select_known_errors(sources)
     )
-    kept = (share for share in shares if share.share >= least)
+    kept = (share for share in shares if share.share >= 0.01)
     return tuple(sorted(kept, key=lambda share: -share.share))

@@ -186,16 +186,6 @@ def _format_range(ends: Sequence[str]) -> str:
     return ends[0] if ends[0] == ends[1] else f"{ends[0]} to {ends[1]}"
 
 
-def format_curve_distances(view: ChannelView, system: System) -> Iterator[str]:
-    """Yield the distance between the curve and the lines of the datasheet, as text."""
-    unit = choose_page_unit(view.quantity, "adev", system)
-    for row in view.datasheet_curve:
-        reading = f", density read as {row.sidedness}" if row.sidedness else ""
-        away = row.rms_log10
-        decades = NO_VALUE if away is None else f"{away:.3f}"
-        yield f"{unit.text(row.rms)} {unit.sign}, {decades} decades{reading}"
-
-
 def _format_percent(share: float | None) -> str:
     return "–" if share is None else f"{round(100 * share):+d} %".replace("-", "−")
 

@@ -24,7 +24,9 @@ FOREST = (*COMPARED, "B", "T_B")
 
 _SPECTRUM_POINTS = 80  # points of the curve of a term in a spectrum
 _COMPARED_MODEL_POINTS = 24  # points of the curve of a model in a comparison of channels
-
+_ABOUT = ("sensor", "recording", "channel", "simulated", "recommended")
+_CURVE = ("tau", "adev", "lower", "upper")
+"""Properties of a channel, and columns of its curve, that all figures have."""
 
 Packed = tuple[str, float, float, bytes]
 """An array quantised to the visible resolution: kind, begin, step and codes."""
@@ -135,11 +137,9 @@ def pack_compared_channel(view: ChannelView) -> ComparedChannel:
         if not model.sinusoids:  # it is smooth
             tau = np.geomspace(tau[0], tau[-1], _COMPARED_MODEL_POINTS)
         models[method] = pack_logarithms(tau), pack_logarithms(_compute_curve(model, tau))
-    about = ("sensor", "recording", "channel", "simulated", "recommended")
-    curve = ("tau", "adev", "lower", "upper")
     return ComparedChannel(
-        {name: getattr(view, name) for name in about} | {"parameters": parameters},
-        {name: pack_logarithms(getattr(view, name)) for name in curve},
+        {name: getattr(view, name) for name in _ABOUT} | {"parameters": parameters},
+        {name: pack_logarithms(getattr(view, name)) for name in _CURVE},
         models,
     )
 
@@ -157,15 +157,8 @@ def pack_channel(view: ChannelView, arrays: Arrays) -> Json:
         name = "line" if count == 1 else f"{count} lines"
         terms.append((name, NoiseModel(sinusoids=model.sinusoids)))
     return {
-        "channel": view.channel,
-        "sensor": view.sensor,
-        "recording": view.recording,
-        "simulated": view.simulated,
-        "recommended": view.recommended,
-        "tau": arrays.log(view.tau),
-        "adev": arrays.log(view.adev),
-        "lower": arrays.log(view.lower),
-        "upper": arrays.log(view.upper),
+        **{name: getattr(view, name) for name in _ABOUT},
+        **{name: arrays.log(getattr(view, name)) for name in _CURVE},
         "methods": {
             method: {
                 "tau": arrays.log(curve["tau"]),
@@ -293,11 +286,8 @@ def pack_model_samples(rows: Sequence[ModelSampleRow], arrays: Arrays) -> Json:
 
 
 def _pack_envelope(rows: Sequence[EnvelopeRow | ModelSampleRow], arrays: Arrays) -> dict[str, int]:
-    return {
-        "low": arrays.even(fill_missing(row.low for row in rows)),
-        "high": arrays.even(fill_missing(row.high for row in rows)),
-        "mean": arrays.even(fill_missing(row.mean for row in rows)),
-    }
+    names = ("low", "high", "mean")
+    return {n: arrays.even(fill_missing(getattr(row, n) for row in rows)) for n in names}
 
 
 _OfChannel = TypeVar("_OfChannel", bound=ChannelRow)

@@ -15,7 +15,7 @@ from imubench_pipeline.recordings.kept import Quality
 from imubench_pipeline.registry import Hook
 from imubench_pipeline.report import meaning, payload
 from imubench_pipeline.report.comparison import make_methods_table
-from imubench_pipeline.report.datasheets import compare_with_datasheet, format_curve_distances
+from imubench_pipeline.report.datasheets import compare_with_datasheet
 from imubench_pipeline.report.practical import System, choose_page_unit, format_temperature
 from imubench_pipeline.report.site import Page, RecordingPage, Site, make_command
 from imubench_pipeline.report.view import ChannelView, RecordingView
@@ -279,7 +279,6 @@ def _describe_channel(
         "thermal_figures": list(list_thermal_figures(channel)),
         "line_count": numbers.counted(len(channel.lines), "line"),
         "deltas": list(compare_with_datasheet(channel, site.coverage, site.system)),
-        "away": list(format_curve_distances(channel, site.system)),
     }
 
 

@@ -4,7 +4,7 @@ import re
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
-from typing import Protocol, get_args
+from typing import get_args
 
 from imubench_pipeline.model.comparisons import RankingRow
 from imubench_pipeline.model.recordings import FailureRow, FileRow, FindingRow, RecordingRow
@@ -121,23 +121,7 @@ def list_rejections(recordings: Iterable[RecordingRow]) -> Iterator[str]:
             yield fold_text(f"{row.sensor}/{row.recording}: {reason}")
 
 
-class Failed(Protocol):
-    """A step that failed, for a recording or for a whole sensor."""
-
-    @property
-    def sensor(self) -> str:
-        """Name of the sensor file."""
-
-    @property
-    def recording(self) -> str | None:
-        """The omitted recording."""
-
-    @property
-    def reason(self) -> str:
-        """Why it failed."""
-
-
-def list_failures(failures: Iterable[Failed]) -> Iterator[str]:
+def list_failures(failures: Iterable[FailureRow]) -> Iterator[str]:
     """Yield a line for each step that failed, with the lost recording and the reason."""
     for row in failures:
         of = f"{row.sensor}/{row.recording}" if row.recording else row.sensor

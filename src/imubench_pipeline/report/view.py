@@ -5,7 +5,6 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cache, cached_property, partial
-from itertools import pairwise
 
 import numpy as np
 import pyarrow as pa
@@ -15,12 +14,13 @@ from scipy.special import chdtri
 
 from imubench_pipeline.estimators.rows import make_estimate
 from imubench_pipeline.model import estimates
-from imubench_pipeline.model.comparisons import DatasheetCurveRow, DatasheetRow, ErrorBudgetRow
+from imubench_pipeline.model.comparisons import DatasheetRow, ErrorBudgetRow
 from imubench_pipeline.model.recordings import FindingRow, RecordingRow
 from imubench_pipeline.model.table import R
 from imubench_pipeline.noise import NoiseModel
 from imubench_pipeline.settings.experiments import AT_REST
 from imubench_pipeline.tables.findings import LEFT_OUT
+from imubench_pipeline.tables.keys import split_table
 from imubench_pipeline.tables.schemas import BY_RECORDING
 
 Name = tuple[str, str]
@@ -31,7 +31,6 @@ _ROWS_OF_CHANNELS = (
     estimates.LineRow,
     estimates.DeterministicRow,
     DatasheetRow,
-    DatasheetCurveRow,
 )
 
 METHOD_NAMES = {
@@ -66,7 +65,6 @@ class ChannelView:
     reconstruction: dict[str, dict[str, NDArray[np.float64]]] = field(default_factory=dict)
     scores: dict[str, estimates.ScoreRow] = field(default_factory=dict)
     datasheet: list[DatasheetRow] = field(default_factory=list)
-    datasheet_curve: list[DatasheetCurveRow] = field(default_factory=list)
     true_components: dict[str, list[estimates.SimulatedTruthRow]] = field(default_factory=dict)
     models: list[estimates.ModelRow] = field(default_factory=list)
     lines: list[estimates.LineRow] = field(default_factory=list)
@@ -223,7 +221,7 @@ class RecordingView:
     def channels(self) -> list[ChannelView]:
         """Return its channels, made anew."""
         channels = {}
-        for (name,), part in _divide(self.parts["allan"], "channel").items():
+        for (name,), part in split_table(self.parts["allan"], "channel").items():
             named = (self.sensor, self.name, name, self.simulated)
             tau, adev, lower, upper = _read_floats(part, *_CURVE_COLUMNS).values()
             rate = float(part["cluster_size"][0].as_py() / tau[0])
@@ -233,17 +231,17 @@ class RecordingView:
             channel.parameters.setdefault(row.method, []).append(row)
             if row.recommended:
                 channel.recommended = row.method
-        reconstruction = _divide(self.parts["reconstruction"], "channel", "method")
+        reconstruction = split_table(self.parts["reconstruction"], "channel", "method")
         for (name, method), part in reconstruction.items():
             curve = _read_floats(part, *_CURVE_COLUMNS, "reconstructed")
             channels[name].reconstruction[method] = curve
         for of in _ROWS_OF_CHANNELS:
             for one in self.rows(of):
                 getattr(channels[one.channel], of.table).append(one)
-        for (name,), part in _divide(self.parts["spectrum"], "channel").items():
+        for (name,), part in split_table(self.parts["spectrum"], "channel").items():
             columns = ("frequency", "ordinates", "density", "fitted", "used")
             channels[name].spectrum = _read_floats(part, *columns)
-        for (name,), part in _divide(self.parts["allan_compensated"], "channel").items():
+        for (name,), part in split_table(self.parts["allan_compensated"], "channel").items():
             channels[name].compensated = _read_floats(part, *_CURVE_COLUMNS)
         for score in self.rows(estimates.ScoreRow):
             channels[score.channel].scores[score.method] = score
@@ -264,7 +262,7 @@ class RecordingView:
 
 def gather_recordings(tables: Mapping[str, pa.Table]) -> list[RecordingView]:
     """Gather the tables by recording, in the order of the table ``recordings``."""
-    divided = {name: _divide(tables[name], "sensor", "recording") for name in BY_RECORDING}
+    divided = {name: split_table(tables[name], "sensor", "recording") for name in BY_RECORDING}
     keys = cache(partial(_make_keys, tables))
     views = []
     for row in RecordingRow.rows_of(tables["recordings"]):
@@ -303,7 +301,7 @@ def _make_keys(tables: Mapping[str, pa.Table]) -> dict[Name, str]:
                 # Integers with nulls would become floats, depending on other recordings.
                 rows += hash_array(np.asarray(column.cast(pa.float64()).to_numpy()))
         named = table.select(["sensor", "recording"]).append_column("rows", pa.array(rows))
-        for (sensor, recording), part in _divide(named, "sensor", "recording").items():
+        for (sensor, recording), part in split_table(named, "sensor", "recording").items():
             digest = digests.setdefault((sensor, recording), hashlib.sha256())
             digest.update(f"{name} {part.num_rows}".encode() + part["rows"].to_numpy().tobytes())
     return {name: digest.hexdigest() for name, digest in digests.items()}
@@ -315,21 +313,3 @@ _HASH_FACTOR = np.uint64(0x9E3779B97F4A7C15)
 
 def _read_floats(part: pa.Table, *columns: str) -> dict[str, NDArray[np.float64]]:
     return {name: np.asarray(part[name].to_numpy(), dtype=np.float64) for name in columns}
-
-
-def _divide(table: pa.Table, *names: str) -> dict[tuple[str, ...], pa.Table]:
-    """Divide a table by the values of columns, in the order in which they appear."""
-    if not table.num_rows:
-        return {}
-    labels = np.zeros(table.num_rows, dtype=np.int64)
-    for name in names:
-        encoded = table[name].combine_chunks().dictionary_encode()
-        codes = np.asarray(encoded.indices.to_numpy(zero_copy_only=False), dtype=np.int64)
-        labels = labels * len(encoded.dictionary) + codes
-    order = np.argsort(labels, kind="stable")
-    if np.any(order[1:] < order[:-1]):
-        table, labels = table.take(pa.array(order)), labels[order]
-    starts = np.concatenate(([0], np.flatnonzero(np.diff(labels)) + 1, [len(labels)]))
-    parts = [table.slice(a, b - a) for a, b in pairwise(starts.tolist())]
-    keys = [tuple(part[name][0].as_py() for name in names) for part in parts]
-    return dict(zip(keys, parts, strict=True))

@@ -17,9 +17,9 @@ from imubench_pipeline.settings.yaml_files import read_settings
 from imubench_pipeline.tables.outputs import OutputFolder, Place, add_output
 
 _CONFIG_FILE = Path("config/config.yaml")
-_RESULT_FOLDERS = ("exports", "faults", "logs", "nightly", "recordings", "report", "seals",
-                   "sensors", "simulated", "tables")  # fmt: skip
-"""Folders in the results that runs write."""
+WRITTEN_FOLDERS = ("exports", "faults", "nightly", "recordings", "report", "seals", "sensors",
+                   "simulated", "tables")  # fmt: skip
+"""Folders in the results that runs write, besides ``logs`` of Snakemake."""
 
 _WORKFLOW_PARTS = ("Snakefile", "workflow", "profiles", "src", "tests", "pyproject.toml")
 
@@ -57,9 +57,8 @@ def find_protected_places(path: Path, results: Path | None = None) -> Iterator[P
     for folder in dict.fromkeys(found):
         if (logs := find_drop_zone(folder)) is not None:
             yield Place(logs.absolute(), "logs", "the logs")
-        yield from (
-            Place(folder / name, "results", "the results of runs") for name in _RESULT_FOLDERS
-        )
+        for name in (*WRITTEN_FOLDERS, "logs"):
+            yield Place(folder / name, "results", "the results of runs")
 
 
 def has_results(folder: Path) -> bool:
@@ -67,19 +66,16 @@ def has_results(folder: Path) -> bool:
     return (folder / "seals").is_dir() or (folder / "tables/recordings.parquet").is_file()
 
 
-_SNAKEFILE_PATHS = ("Snakefile", "workflow/Snakefile")
-
-
-def has_snakefile(folder: Path) -> bool:
-    """Return whether a folder has its own workflow, which `snakemake` finds there."""
-    return any((folder / own).is_file() for own in _SNAKEFILE_PATHS)
+def find_own_snakefile(folder: Path) -> Path | None:
+    """Return the workflow of a folder, which `snakemake` finds there; None if it has none."""
+    places = (folder / "Snakefile", folder / "workflow/Snakefile")
+    return next((place for place in places if place.is_file()), None)
 
 
 def find_snakefile(folder: Path) -> Path:
     """Return the Snakefile of a checkout, or for a folder of logs the package's; or ConfigError."""
-    for own in _SNAKEFILE_PATHS:
-        if (folder / own).is_file():
-            return (folder / own).absolute()
+    if own := find_own_snakefile(folder):
+        return own.absolute()
     shipped = find_project() / "Snakefile"
     if not (folder / "config/config.yaml").is_file():
         raise ConfigError(

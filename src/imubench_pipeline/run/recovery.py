@@ -18,10 +18,7 @@ from typing import Any
 
 import psutil
 
-_WRITTEN_FOLDERS = (  # folders in the results that runs write; nothing else is changed
-    *("recordings", "sensors", "tables", "simulated", "report", "exports", "seals", "faults"),
-    "nightly",
-)
+from imubench_pipeline.run.project import WRITTEN_FOLDERS
 
 _TEMPORARY_NAME = re.compile(r"\..+\.[a-z0-9_]{8}\.part")  # of incomplete files and folders
 STILL_WRITTEN = 60.0  # s; a file that changed so shortly before a run may belong to another command
@@ -123,7 +120,7 @@ def _remove(path: Path) -> None:
 
 def _walk_outputs(results: Path) -> Iterator[Path]:
     """Yield files and folders that runs write; links are not followed."""
-    for folder in _WRITTEN_FOLDERS:
+    for folder in WRITTEN_FOLDERS:  # nothing else is changed
         yield from results.glob(f".{folder}.*.part")  # the folder itself, while it is made
         for place, folders, files in os.walk(results / folder):
             yield from (Path(place, name) for name in (*folders, *files))

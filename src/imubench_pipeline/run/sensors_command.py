@@ -13,7 +13,6 @@ if TYPE_CHECKING:
     from rich.console import RenderableType
 
     from imubench_pipeline.report.practical import System
-    from imubench_pipeline.settings.printed import PrintedFigure
     from imubench_pipeline.settings.sensor import Sensor
 
 _LISTED = (("gyro", "N"), ("gyro", "B"), ("accel", "N"), ("accel", "B"))
@@ -120,6 +119,7 @@ def _render_list(
 def _render_sensor(name: str, sensor: "Sensor") -> Iterator["RenderableType"]:
     from rich.text import Text
 
+    from imubench_pipeline.datasheets.coverage import format_figure
     from imubench_pipeline.settings.printed import QuantityDatasheet
     from imubench_pipeline.settings.sensor import QUANTITIES
 
@@ -147,16 +147,10 @@ def _render_sensor(name: str, sensor: "Sensor") -> Iterator["RenderableType"]:
         yield Text(f"{quantity}", style="bold")
         for key in QuantityDatasheet.model_fields:
             for figure in figures.printed(key):
-                yield Text(f"  {key}: {_describe_figure(figure)}")
+                remarks = [figure.condition, figure.place, figure.evidence]
+                remarks += [f"{figure.source} source"] if figure.source is not None else []
+                about_it = "; ".join(filter(None, remarks))
+                yield Text(f"  {key}: {format_figure(figure)}" + f" ({about_it})" * bool(about_it))
             if figures.looked_up(key) and not figures.printed(key):
                 places = {one.place for one in getattr(figures, key) or () if one.place}
                 yield Text(f"  {key}: not published" + "".join(f" ({p})" for p in sorted(places)))
-
-
-def _describe_figure(figure: "PrintedFigure") -> str:
-    from imubench_pipeline.datasheets.coverage import format_figure
-
-    remarks = (figure.condition, figure.place, figure.evidence)
-    source = f"{figure.source} source" * (figure.source is not None)
-    about = "; ".join(filter(None, (*remarks, source)))
-    return format_figure(figure) + f" ({about})" * bool(about)

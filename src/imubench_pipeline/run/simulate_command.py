@@ -3,14 +3,12 @@
 import argparse
 import math
 import os
-import sys
-import time
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Mapping
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from imubench_pipeline.run.long_work import show_progress
 from imubench_pipeline.settings.command_line import MOST_WHOLE, make_number_type
 from imubench_pipeline.settings.shipped import list_folders
 from imubench_pipeline.settings.validation import ConfigError, cut, parse
@@ -27,7 +25,6 @@ _MAX_SAMPLES = 1 << 36
 _MIN_EXPONENT_FORMAT = 1e15
 _MIN_REPORTED_FOLDING = 1.02
 _MIN_TEMPERATURE, _MAX_TEMPERATURE = -273.15, 1000.0  # range of sensor temperatures, degC
-_PROGRESS_INTERVAL = 3.0  # seconds between two lines of progress where there is no terminal
 
 
 _LOG_PATH_DEPTH = 2  # path components from the drop zone to a log: sensor and recording
@@ -159,8 +156,8 @@ def run(options: argparse.Namespace) -> int:
     )
     # The notes are there before the log, which cannot be read without them.
     with out.replacing() as temporary:
-        with _show_progress(samples) as report:
-            write_log(temporary, blocks, columns, form, metadata, remarks, report)
+        with show_progress(samples, "simulated") as advance:
+            write_log(temporary, blocks, columns, form, metadata, remarks, advance)
         notes.write(notes_text(out.path.name, form, log, f"from {origin.source}"))
     size = out.path.stat().st_size / 1e6
     print(f"{out}: {size:.1f} MB; {notes} says how it is written")
@@ -356,25 +353,3 @@ def _merge_lines(lines: list[str]) -> list[str]:
         else:
             channels[line] = []
     return [f"{', '.join(names)}: {line}" if names else line for line, names in channels.items()]
-
-
-@contextmanager
-def _show_progress(samples: int) -> Iterator[Callable[[int], None]]:
-    """Yield a function that shows the number of simulated samples."""
-    if sys.stderr.isatty():
-        from rich.console import Console
-        from rich.progress import Progress
-
-        with Progress(console=Console(stderr=True), transient=True) as bar:
-            task = bar.add_task("simulating", total=samples)
-            yield lambda done: bar.update(task, completed=done)
-        return
-    last = time.monotonic()
-
-    def report(done: int) -> None:
-        nonlocal last
-        if time.monotonic() - last >= _PROGRESS_INTERVAL and done < samples:
-            last = time.monotonic()
-            print(f"{100 * done / samples:.0f} % simulated", file=sys.stderr, flush=True)
-
-    yield report

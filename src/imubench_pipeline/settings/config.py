@@ -6,11 +6,12 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Literal, TypeVar
 
-from pydantic import BaseModel, BeforeValidator, Field, JsonValue, field_validator
+from pydantic import BaseModel, BeforeValidator, Field, field_validator
 
 from imubench_pipeline.settings.experiments import WithBlocks, with_blocks
 from imubench_pipeline.settings.quality import QualitySettings
 from imubench_pipeline.settings.requirements import Axis, Latitude, Time
+from imubench_pipeline.settings.sensor import diff_settings
 from imubench_pipeline.settings.shipped import CATALOGUE
 from imubench_pipeline.settings.validation import (
     ConfigError,
@@ -299,20 +300,7 @@ def given_beside(run: Run, file: Path) -> list[str]:
         run_settings.model_dump(mode="json", exclude=_SECTIONS_WITHOUT_RECORDING)
         for run_settings in (run, written)
     )
-    return [f"{key}={_as_given(value)}" for key, value in _differing(in_run, in_file).items()]
-
-
-def _differing(settings: JsonObject, other_settings: JsonObject) -> dict[str, JsonValue]:
-    """Return the settings that are missing or different in the others."""
-    differing: dict[str, JsonValue] = {}
-    for key, value in settings.items():
-        other = other_settings.get(key)
-        if isinstance(value, Mapping) and isinstance(other, Mapping):
-            if inner := _differing(value, other):
-                differing[key] = inner
-        elif value != other:
-            differing[key] = value
-    return differing
+    return [f"{key}={_as_given(value)}" for key, value in diff_settings(in_run, in_file).items()]
 
 
 def _as_given(value: object) -> str:

@@ -384,3 +384,16 @@ def _merge(base: JsonObject, over: JsonObject) -> dict[str, JsonValue]:
             value = _merge(below, value)
         merged[key] = value
     return {key: value for key, value in merged.items() if value is not None}
+
+
+def diff_settings(own: JsonObject, base: JsonObject) -> dict[str, JsonValue]:
+    """Return the changes that turn ``base`` into ``own`` when merged; null removes a key."""
+    changes: dict[str, JsonValue] = {key: None for key in base if key not in own and base[key]}
+    for key, value in own.items():
+        before = base.get(key)
+        if isinstance(value, Mapping) and isinstance(before, Mapping):
+            if inner := diff_settings(value, before):
+                changes[key] = inner
+        elif value != before:
+            changes[key] = value
+    return changes

@@ -21,6 +21,7 @@ from imubench_pipeline.settings.sensor import (
     TEMPERATURE,
     ColumnSource,
     LogFormat,
+    diff_settings,
     quantity_of,
 )
 from imubench_pipeline.settings.validation import ConfigError
@@ -47,7 +48,7 @@ def write_log(
 
     The columns are in SI; for the format see `layout`. The metadata are for Parquet files; the
     remarks become comments at the top of CSV files. ``progress`` is called after each block with
-    the number of samples.
+    the number of its samples.
     """
     names = list(columns)
     known_sources = {str(name): source for name, source in log.channels.items()}
@@ -61,8 +62,9 @@ def write_log(
     ) as writer:
         for block in blocks:
             writer.write(block)
-            samples += len(next(iter(block.values())))
-            progress(samples)
+            written = len(next(iter(block.values())))
+            samples += written
+            progress(written)
         if isinstance(writer, LogWriter):
             shape = {"rows": samples, "grid": samples, "segments": [[0, samples]]}
             writer.finish({**metadata, **shape})
@@ -72,7 +74,7 @@ def notes_text(name: str, log: LogFormat, sensor: LogFormat | None, words: str) 
     """Return the notes of a log of this file name, with its format if the sensor has another."""
     own = log.model_dump(exclude_unset=True, exclude_none=True)
     base = {} if sensor is None else sensor.model_dump(exclude_unset=True)
-    notes = {"device": "simulated", "simulated": True, "log": _diff_settings(own, base)}
+    notes = {"device": "simulated", "simulated": True, "log": diff_settings(own, base)}
     text = yaml.safe_dump(notes, sort_keys=False, default_flow_style=None, width=100)
     comment = "".join(f"# {line}\n" for line in words.splitlines())
     return f"{_NOTES_PREFIX}{name}\n{comment}{text}"
@@ -138,16 +140,3 @@ def layout(path: Path, columns: Iterable[str], rate: float, sensor: LogFormat | 
 def _make_si_source(name: str) -> ColumnSource:
     unit = SI_UNITS["temperature" if name == TEMPERATURE else QUANTITIES[quantity_of(name)]]
     return ColumnSource(column=name, unit=unit)
-
-
-def _diff_settings(own: Mapping[str, Any], base: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the changes that turn ``base`` into ``own`` when merged; null removes a key."""
-    changes: dict[str, Any] = {key: None for key, value in base.items() if key not in own and value}
-    for key, value in own.items():
-        before = base.get(key)
-        if isinstance(value, Mapping) and isinstance(before, Mapping):
-            if inner := _diff_settings(value, before):
-                changes[key] = inner
-        elif value != before:
-            changes[key] = dict(value) if isinstance(value, Mapping) else value
-    return changes

@@ -1,6 +1,5 @@
 """List the figures that vendors publish for the sensors of the catalogue."""
 
-from dataclasses import asdict
 from pathlib import Path
 
 from imubench_pipeline.datasheets.catalogue import list_catalogue
@@ -13,11 +12,6 @@ def write_coverage(catalogue: str, outputs: list[Path]) -> None:
     """Write the tables ``catalogue``, ``coverage`` and ``coverage_by_vendor``."""
     sensors = sensors_of(catalogue)
     rows = coverage(sensors)
-    write_each(
-        {
-            "catalogue": list_catalogue(sensors),
-            "coverage": map(asdict, rows),
-            "coverage_by_vendor": map(asdict, by_vendor(rows)),
-        },
-        outputs,
-    )
+    catalogue_rows = list_catalogue(sensors)
+    tables = {"catalogue": catalogue_rows, "coverage": rows, "coverage_by_vendor": by_vendor(rows)}
+    write_each(tables, outputs)

@@ -45,15 +45,6 @@ def compare_with_datasheet(
         above_zero = curve.deviation > 0.0  # 0 at multiples of the period of a periodic log
         tau, deviation = curve.tau[above_zero], curve.deviation[above_zero]
         for distance in curve_rms(printed, tau, deviation) if above_zero.any() else ():
-            of_curve = DatasheetCurveRow(
-                sensor=sensor,
-                recording=recording,
-                channel=channel,
-                sidedness=distance.noise.sidedness if distance.noise else None,
-                N=distance.noise.value if distance.noise else None,
-                floor=distance.floor.value if distance.floor else None,
-                rms=distance.rms,
-                rms_log10=distance.rms_log10,
-            )
-            of_curves.append(of_curve)
+            names: dict[str, Any] = {"sensor": sensor, "recording": recording, "channel": channel}
+            of_curves.append(DatasheetCurveRow(**names, **asdict(distance)))
     return {"datasheet": rows, "datasheet_curve": of_curves}

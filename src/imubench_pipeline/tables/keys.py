@@ -1,6 +1,7 @@
 """Key columns of a channel in tables, and grouping of rows by them."""
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 import pyarrow as pa
@@ -17,8 +18,17 @@ class Key:
 
 def split_table(table: pa.Table, *names: str) -> dict[tuple[str, ...], pa.Table]:
     """Divide a table by the values of columns, in the order in which they appear."""
-    keys = list(zip(*(table[name].to_pylist() for name in names), strict=True))
-    order = dict.fromkeys(keys)
-    labels = {key: i for i, key in enumerate(order)}
-    which = np.array([labels[key] for key in keys], dtype=np.int64)
-    return {key: table.filter(pa.array(which == label)) for key, label in labels.items()}
+    if not table.num_rows:
+        return {}
+    labels = np.zeros(table.num_rows, dtype=np.int64)
+    for name in names:
+        encoded = table[name].combine_chunks().dictionary_encode()
+        codes = np.asarray(encoded.indices.to_numpy(zero_copy_only=False), dtype=np.int64)
+        labels = labels * len(encoded.dictionary) + codes
+    order = np.argsort(labels, kind="stable")
+    if np.any(order[1:] < order[:-1]):
+        table, labels = table.take(pa.array(order)), labels[order]
+    starts = np.concatenate(([0], np.flatnonzero(np.diff(labels)) + 1, [len(labels)]))
+    parts = [table.slice(a, b - a) for a, b in pairwise(starts.tolist())]
+    appearing = [parts[i] for i in np.argsort(order[starts[:-1]])]
+    return {tuple(part[name][0].as_py() for name in names): part for part in appearing}

@@ -212,15 +212,8 @@ class StoreOutput(argparse.Action):
         super().__init__(*arguments, **keys)
         self.make = make
 
-    def __call__(
-        self,
-        parser: argparse.ArgumentParser,
-        namespace: argparse.Namespace,
-        values: Any,
-        option_string: str | None = None,
-    ) -> None:
+    def __call__(self, _: Any, namespace: argparse.Namespace, values: Any, *__: Any) -> None:
         """Store the output of a path."""
-        del parser, option_string
         setattr(namespace, self.dest, self.make(values))
 
 

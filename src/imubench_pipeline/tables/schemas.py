@@ -26,5 +26,3 @@ OF_ONE_RECORDING = (*SAMPLES, "samples_of_models", "draws", "error_growth", "dra
 _OF_RECORDING = {name for name, row in ROWS.items() if issubclass(row, OfRecordingRow)}
 BY_RECORDING = ("recordings", *sorted(_OF_RECORDING - {*OF_ONE_RECORDING}))
 """The joined tables in which a recording has rows of its own."""
-
-COMPARED = ("recordings", "allan", "parameters", "simulated_truth")  # drawn for all sensors

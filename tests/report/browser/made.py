@@ -260,10 +260,7 @@ def channel_rows(log: Log, channel: str) -> Rows:
               for d in bias_deltas(sheet, channel, means, 0.1)),
         ],
         "datasheet_curve": [
-            key | {"sidedness": one.noise.sidedness if one.noise else None,
-                   "N": one.noise.value if one.noise else None,
-                   "floor": one.floor.value if one.floor else None,
-                   "rms": one.rms, "rms_log10": one.rms_log10}
+            key | asdict(one)
             for one in curve_rms(list(read_comparables(sheet, channel)), TAU, adev)
         ],
         "simulated_truth": [
@@ -318,8 +315,8 @@ def rows_of(logs: Sequence[Log], rejected: Sequence[tuple[str, str]] = ()) -> Ro
     rows["fusion"] = [*yield_fusion_rows(tables, FusionSettings(draws=100))]
     covered = coverage(SENSORS)
     rows["catalogue"] = [row.columns() for row in list_catalogue(SENSORS)]
-    rows["coverage"] = [asdict(one) for one in covered]
-    rows["coverage_by_vendor"] = [asdict(one) for one in by_vendor(covered)]
+    rows["coverage"] = [row.columns() for row in covered]
+    rows["coverage_by_vendor"] = [row.columns() for row in by_vendor(covered)]
     return rows
 
 

@@ -407,7 +407,7 @@ def format_summary(summary: Summary) -> str:
     rejected = sorted(summary.rejected, key=lambda rejection: not rejection.new)
     sections = {
         "failed, omitted in the report, and tried again next time": [
-            *list_failures(summary.failed)
+            *list_failures(FailureRow.from_json(dict(one)) for one in summary.failed)
         ],
         "new": summary.new,
         "analysed again": [f"{change.recording}: {change.because}" for change in summary.changed],

@@ -87,34 +87,10 @@ class Start:
             raise ValueError("a levelled start needs the window of calibrated accelerometers")
 
     @classmethod
-    def calibrated(
-        cls, window: float, *, tilt: Levelled | float | None = None, heading: float = 0.0
-    ) -> "Start":
+    def calibrated(cls, window: float, *, tilt: Levelled | float | None = None) -> "Start":
         """Return a start with both biases from one static window, s; levelled by default."""
         sensor = Calibrated(window)
-        levelled = Levelled() if tilt is None else tilt
-        return cls(gyro=sensor, accel=sensor, tilt=levelled, heading=heading)
-
-    @classmethod
-    def uncalibrated(
-        cls,
-        *,
-        gyro_bias: float | None,
-        accel_bias: float | None,
-        on_time: float,
-        tilt: float = 0.0,
-        heading: float = 0.0,
-    ) -> "Start":
-        """Return a start with turn-on biases of a given sigma, rad/s and m/s^2, and no window.
-
-        None: a bias is taken from the figures of the sensor.
-        """
-        return cls(
-            gyro=Uncalibrated(bias=gyro_bias, on_time=on_time),
-            accel=Uncalibrated(bias=accel_bias, on_time=on_time),
-            tilt=tilt,
-            heading=heading,
-        )
+        return cls(gyro=sensor, accel=sensor, tilt=Levelled() if tilt is None else tilt)
 
 
 def budget(
@@ -238,34 +214,21 @@ def of_sensor(
 
 
 def time_until(
-    limit: float,
-    quantity: parts.Quantity,
-    *,
-    gyro: NoiseModel,
-    accel: NoiseModel,
-    start: Start,
-    use: in_use.Use = in_use.NO_USE,
-    gyro_figures: in_use.Figures = in_use.NO_FIGURES,
-    accel_figures: in_use.Figures = in_use.NO_FIGURES,
-    convert: Callable[[parts.Budget], parts.Budget] = lambda along: along,
+    limit: float, at: Callable[[float], parts.Budget], *, oscillates: bool = False
 ) -> float | None:
-    """Return the time after which an error reaches a limit.
+    """Return the time after which an error reaches a limit; ``at`` returns its budget after a time.
 
     The total of a `budget` increases with time, because the errors at two times never have a
-    negative correlation. With lines or turns it may oscillate; with lines the first crossing is
-    found among 4096 times. The time is in s: 0 if the error exceeds the limit from the beginning,
-    None if it does not within 30 years. The limit is 1 sigma, rad, m/s or m, for each budget as
-    ``convert`` returns it, such as by `Budget.to_radius`; the others are as in `budget`. Raise a
-    ValueError if the limit is not above 0, or the quantity is not known.
+    negative correlation. With lines or turns it may oscillate; if ``oscillates``, as with lines,
+    the first crossing is found among 4096 times. The time is in s: 0 if the error exceeds the limit
+    from the beginning, None if it does not within 30 years. The limit is 1 sigma, rad, m/s or m.
+    Raise a ValueError if the limit is not above 0.
     """
     if not (math.isfinite(limit) and limit > 0):
         raise ValueError(f"limit is {limit}, expected a number above 0")
 
-    figures = {"gyro_figures": gyro_figures, "accel_figures": accel_figures}
-
     def excess(time: float) -> float:
-        after = budget(quantity, time, gyro=gyro, accel=accel, start=start, use=use, **figures)
-        return convert(after).total - limit
+        return at(time).total - limit
 
     if excess(_MIN_TIME) >= 0:
         return 0.0
@@ -274,7 +237,7 @@ def time_until(
         if later > _MAX_TIME:
             return None
         earlier, later = later, 2.0 * later
-    if gyro.sinusoids or accel.sinusoids:
+    if oscillates:
         times = np.linspace(0.0, later, _CROSSING_POINTS + 1)[1:]
         first = next(i for i, time in enumerate(times) if excess(float(time)) >= 0)
         earlier, later = (float(times[first - 1]) if first else _MIN_TIME), float(times[first])

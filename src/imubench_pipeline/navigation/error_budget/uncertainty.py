@@ -11,20 +11,18 @@ from imubench_pipeline.navigation.error_budget.in_use import SIGMAS
 from imubench_pipeline.navigation.error_budget.parts import Budget
 from imubench_pipeline.noise import GaussMarkov, NoiseModel, Sinusoid
 
+_TAIL = (1.0 - 0.95) / 2.0  # share of the totals beyond each limit
 
-def compute_interval(budgets: Sequence[Budget], level: float = 0.95) -> tuple[float, float]:
-    """Return the limits of the total over budgets of drawn noise models, rad, m/s or m.
 
-    ``budgets`` are for one quantity and time, one a draw; ``level`` is the fraction of the totals
-    between the limits. Raises a ValueError without a budget, for budgets that differ in quantity or
-    time, and for a level that is not within 0..1.
+def compute_interval(budgets: Sequence[Budget]) -> tuple[float, float]:
+    """Return the 95 % limits of the total over budgets of drawn noise models, rad, m/s or m.
+
+    ``budgets`` are for one quantity and time, one a draw. Raises a ValueError without a budget, and
+    for budgets that differ in quantity or time.
     """
     if len({(budget.quantity, budget.time) for budget in budgets}) != 1:
         raise ValueError("expected budgets of one quantity at one time")
-    if not 0 < level < 1:
-        raise ValueError(f"level is {level}, expected a number between 0 and 1")
-    tail = (1.0 - level) / 2.0
-    lower, upper = np.quantile([budget.total for budget in budgets], [tail, 1.0 - tail])
+    lower, upper = np.quantile([budget.total for budget in budgets], [_TAIL, 1.0 - _TAIL])
     return float(lower), float(upper)
 
 

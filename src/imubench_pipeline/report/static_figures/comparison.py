@@ -193,8 +193,8 @@ class _Block:
 def draw_forest_figure(
     views: Sequence[ChannelView],
     sensors: Sequence[str],
-    symbol: str | Sequence[str] = COMPARED,
     system: System = "practical",
+    symbol: str | Sequence[str] = COMPARED,
 ) -> Figure:
     """Draw parameters of one channel across sensors, with 95 % limits, in a panel each."""
     symbols = [symbol] if isinstance(symbol, str) else list(symbol)

@@ -21,9 +21,7 @@ Make = Callable[[], Figure | None]
 
 CROSS_KINDS: dict[str, Callable[[Sequence[ChannelView], Sequence[str], System], Figure]] = {
     "comparison": comparison.draw_comparison_figure,
-    "forest": lambda views, sensors, system: comparison.draw_forest_figure(
-        views, sensors, system=system
-    ),
+    "forest": comparison.draw_forest_figure,
 }
 """Figures of one channel of all sensors."""
 

@@ -1,15 +1,10 @@
 """The command `imubench verify`: verify that the outputs of runs are unchanged."""
 
 import argparse
-import sys
-import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
+from imubench_pipeline.run.long_work import show_progress
 from imubench_pipeline.settings.command_line import CommandError
-
-_PATIENCE = 3.0  # s, until progress is shown, and between its lines in a file
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -45,7 +40,7 @@ def run(options: argparse.Namespace) -> int:
         return 1
     results = Results(folder)
     number = 0
-    with _progress(results.size) as results.read:
+    with show_progress(results.size, f"of {results.size / 1e9:.2f} GB read") as results.read:
         for fault in results.faults():
             number += 1
             line = f"{folder / fault.path}: {fault.found}; to mend: {fault.mend}"
@@ -57,25 +52,3 @@ def run(options: argparse.Namespace) -> int:
     read = f"{results.files} files, {results.size / 1e6:.1f} MB"
     print(f"{read}: {f'{number} faults' if number else 'all as they were left'}")
     return int(bool(number))
-
-
-@contextmanager
-def _progress(size: int) -> Iterator[Callable[[int], None]]:
-    """Give a callback for the number of bytes read, which shows the progress of long reads."""
-    begun = last = time.monotonic()
-    terminal = sys.stderr.isatty()
-    done = 0
-
-    def read(more: int) -> None:
-        nonlocal done, last
-        done += more
-        now = time.monotonic()
-        if now - begun >= _PATIENCE and now - last >= (0.2 if terminal else _PATIENCE):
-            last = now
-            share = f"{100 * done / max(size, 1):.0f} % of {size / 1e9:.2f} GB read"
-            line = f"\r{share}" if terminal else f"{share}\n"
-            print(line, end="", file=sys.stderr, flush=True)
-
-    yield read
-    if terminal and last != begun:
-        print("\r\x1b[K", end="", file=sys.stderr)

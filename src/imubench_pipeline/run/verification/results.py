@@ -12,7 +12,7 @@ import pyarrow.parquet as pq
 
 from imubench_pipeline.recordings.kept import Quality
 from imubench_pipeline.recordings.known_logs import KNOWN
-from imubench_pipeline.run.project import has_snakefile
+from imubench_pipeline.run.project import find_own_snakefile
 from imubench_pipeline.run.recovery import find_unfinished
 from imubench_pipeline.tables import seals as sealing
 from imubench_pipeline.tables.files import read
@@ -75,7 +75,7 @@ class Results:
         except (OSError, ValueError, KeyError, TypeError):
             pass  # `faults` reports that this file is damaged
         flags = ["--config", *config] if config else []
-        own = has_snakefile(Path()) or not Path("config/config.yaml").is_file()
+        own = find_own_snakefile(Path()) or not Path("config/config.yaml").is_file()
         called = ["snakemake", "-c2"] if own else ["imubench", "run", *(["--"] if flags else [])]
         return shlex.join([*called, *flags])
 

@@ -1,0 +1,34 @@
+"""The progress of long work in this process, on the standard error."""
+
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+_INTERVAL = 3.0  # s, between two lines where there is no terminal
+
+
+@contextmanager
+def show_progress(size: int, done: str) -> Iterator[Callable[[int], None]]:
+    """Give a callback for more of ``size``, which shows the share: a bar, or lines in a file.
+
+    ``done``: what follows the share in a line, such as ``simulated``.
+    """
+    if sys.stderr.isatty():
+        from rich.console import Console
+        from rich.progress import Progress
+
+        with Progress(console=Console(stderr=True), transient=True) as bar:
+            task = bar.add_task(done, total=size)
+            yield lambda more: bar.advance(task, more)
+        return
+    last, total = time.monotonic(), 0
+
+    def advance(more: int) -> None:
+        nonlocal last, total
+        total += more
+        if time.monotonic() - last >= _INTERVAL and total < size:
+            last = time.monotonic()
+            print(f"{100 * total / size:.0f} % {done}", file=sys.stderr, flush=True)
+
+    yield advance
