@@ -12,8 +12,11 @@ from imubench_pipeline.datasheets.suspicion import (
     usual_figures,
 )
 from imubench_pipeline.model.estimates import ParameterRow
+from imubench_pipeline.model.recordings import FindingRow, RecordingRow
+from imubench_pipeline.recordings.kept import Quality
 from imubench_pipeline.settings.sensor import Sensor
 from imubench_pipeline.settings.validation import parse
+from imubench_pipeline.steps.sensor_tables import collect_findings
 from imubench_pipeline.words.findings.plausibility import UnusualFigure
 from tests.conftest import catalogue
 from tests.rows import typed
@@ -119,3 +122,27 @@ def test_an_estimate_is_told_by_the_name_and_digits_that_its_table_prints() -> N
     (said,) = (finding.detail for finding in found)
     # The papers' B is another figure, and 1.5 times as large.
     assert said.startswith("σ_min of gyro x is 400 °/h, 66.3 times the median of 5 sensors (6 °/h)")
+
+
+@pytest.mark.parametrize(
+    ("found", "channel", "N", "expected"),
+    [
+        (None, None, 1e-9, {"impossible_noise"}),  # m/s^2/sqrt(Hz): a dead or computed axis
+        ("slow_sampling", None, 1e-9, {"impossible_noise"}),
+        ("suspicious_unit", "gyro_x", 1e-9, {"impossible_noise"}),
+        ("suspicious_unit", "accel_x", 1e-9, set()),
+        ("motion", "gyro_x", 1e-9, set()),
+        (None, None, 0.1, {"unusual_figure"}),
+        ("slow_sampling", None, 0.1, set()),  # noise of higher frequencies is folded into N
+        ("slow_sampling", None, 1e-3, set()),
+    ],
+)
+def test_noise_far_below_all_sensors_is_impossible_unless_explained(
+    found: str | None, channel: str | None, N: float, expected: set[str]
+) -> None:
+    place = {"sensor": "s", "recording": "r"}
+    earlier = typed(FindingRow, [place | {"finding": found, "channel": channel}] if found else [])
+    quality = Quality(typed(RecordingRow, [place])[0], earlier, {})
+    row = place | {"channel": "accel_x", "parameter": "N", "value": N}
+    rows = collect_findings([quality], [], [], typed(ParameterRow, [row]), {}, USUAL)
+    assert {f.finding for f in rows if f not in earlier} == expected

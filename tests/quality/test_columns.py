@@ -231,6 +231,30 @@ def test_the_last_level_of_a_coarse_register_is_no_saturation(
         assert {"saturated", "coarse"} & set(clipped)
 
 
+@pytest.mark.parametrize("step", [0.0, 0.1])
+@pytest.mark.parametrize("samples_each", [1, 2])
+def test_isolated_values_beyond_the_others_are_no_end_of_a_range(
+    rng: np.random.Generator, step: float, samples_each: int
+) -> None:
+    for _ in range(5):
+        log = rng.standard_normal(5000)
+        log = np.round(log / step) * step if step else log
+        places = 9 + 50 * rng.permutation(99)[:16, None] + np.arange(samples_each)
+        log[places] = log.min() - 1.0  # a sample each, or one that the logger read twice
+        assert "saturated" not in names(log)
+        assert "saturated" in names(np.clip(log, -1.5, None))
+
+
+@pytest.mark.parametrize("drift", [0.0, 3.0, 12.0])
+@pytest.mark.parametrize(("sigma", "expected"), [(0.3, True), (0.5, True), (0.8, False)])
+def test_a_register_is_coarse_by_its_step_over_the_noise(
+    rng: np.random.Generator, drift: float, sigma: float, expected: bool
+) -> None:
+    # Rounding adds a twelfth of a step squared: N is 39, 15 and 6 % too large.
+    log = sigma * rng.standard_normal(20_000) + drift * np.sin(np.linspace(0.0, np.pi, 20_000))
+    assert ("coarse" in names(np.round(log + 0.3))) is expected
+
+
 def test_a_last_block_of_one_sample_is_no_step(rng: np.random.Generator) -> None:
     for _ in range(5):
         log = 0.01 + SIGMA * rng.standard_normal(59 * 256 + 1)

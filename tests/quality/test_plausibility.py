@@ -81,7 +81,9 @@ def test_the_white_noise_lies_between_both_estimates(rng: np.random.Generator) -
         assert high is not None
         assert low < 1.1 * 3e-3 < 1.21 * high
     assert bound_noise_density(summary(white), RATE) == pytest.approx((3e-3, 3e-3), rel=0.1)
-    assert bound_noise_density(summary(white[:2000]), RATE)[1] is None
+    # A short log has no nine blocks; parts of it take their place.
+    assert bound_noise_density(summary(white[:2000]), RATE) == pytest.approx((3e-3, 3e-3), rel=0.4)
+    assert bound_noise_density(summary(white[:8]), RATE)[1] is None
 
 
 @pytest.mark.parametrize("meant", ["rad/s", "deg/s", "mdeg/s"])
@@ -101,6 +103,26 @@ def test_units_of_angle_that_are_mixed_up_are_named(
         assert finding.value == pytest.approx(1 / factor)
         assert f"If the log is in {meant}, and not {stated}, it is 0.004" in finding.detail
         # 0.0048 °/s/√Hz, roughly
+
+
+@pytest.mark.parametrize("samples", [200, 2000])
+@pytest.mark.parametrize(("factor", "stated"), [(1e-3, "mdeg/s"), (1e3, "rad/s")])
+def test_a_short_log_in_another_unit_is_named(
+    rng: np.random.Generator, samples: int, factor: float, stated: str
+) -> None:
+    logs = {f"gyro_{axis}": factor * gyro(rng)[:samples] for axis in "xyz"}
+    for finding in found(logs, {"gyro": stated}):
+        assert finding.finding == "suspicious_unit"
+        assert finding.value == pytest.approx(1 / factor)
+    assert found({name: log / factor for name, log in logs.items()}) == []
+
+
+def test_the_other_unit_explains_noise_and_mean(rng: np.random.Generator) -> None:
+    # 0.075 °/s/√Hz as deg/s is usual, but not a mean rate of 50 °/s; both are as mrad/s.
+    logs = {f"gyro_{axis}": 1e3 * (0.05 + 1e-3 * rng.standard_normal(60_000)) for axis in "xyz"}
+    for finding in found(logs):
+        assert finding.finding == "suspicious_unit"
+        assert finding.value == pytest.approx(1e-3)
 
 
 def test_the_datasheet_says_what_noise_is_usual(rng: np.random.Generator) -> None:

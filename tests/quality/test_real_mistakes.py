@@ -98,6 +98,19 @@ def test_the_log_without_a_mistake(adis16405: np.ndarray, tmp_path: Path) -> Non
     assert {row["finding"] for row in found} <= {"quantised", "knocks", "short_recording"}
 
 
+@pytest.mark.parametrize(("seconds", "motion"), [(0.15, False), (2.0, True)])
+def test_a_knock_is_no_motion(
+    adis16405: np.ndarray, tmp_path: Path, seconds: float, motion: bool
+) -> None:
+    samples = np.arange(round(100 * seconds))
+    adis16405[9000 : 9000 + len(samples), 0] += 40.0 * np.sin(np.pi * samples / len(samples))
+    found = findings(written(tmp_path, adis16405), CATALOGUE["adis16405"], tmp_path)
+    codes = {row["finding"] for row in found if row["channel"] == "gyro_x"}
+    assert ("motion" in codes) is motion
+    assert motion or "knocks" in codes
+    assert (unfit(found) != {}) is motion
+
+
 UNITS = [
     ("rad/s", "g", {"gyro": 180 / math.pi}),
     ("mdeg/s", "g", {"gyro": 1e-3}),

@@ -43,6 +43,28 @@ def test_a_sensor_in_a_hand_moves_throughout_and_one_at_rest_does_not(
         assert find_motion(summarise(unit * moved), "gyro", rate, TIMES) == [(0, n)]
 
 
+@pytest.mark.parametrize("rate", [10.0, 25.0, 50.0])
+@pytest.mark.parametrize("share", [0.5, 0.8])
+def test_motion_in_a_part_of_a_short_log_is_found(rate: float, share: float) -> None:
+    rng = np.random.default_rng(4)
+    n = int(60 * rate)  # 2 to 12 blocks
+    log = 0.005 * DEGREE * math.sqrt(rate) * rng.standard_normal(n)
+    moving = np.arange(n) < share * n
+    log += moving * 7.0 * DEGREE * np.sin(2.0 * np.pi * 0.8 * np.arange(n) / rate)
+    spans = find_motion(summarise(log), "gyro", rate, TIMES)
+    assert sum(stop - start for start, stop in spans) >= 0.9 * share * n
+
+
+@pytest.mark.parametrize("rate", [10.0, 25.0, 50.0, 100.0, 400.0])
+def test_noise_behind_a_narrow_filter_is_no_motion_in_any_unit(rate: float) -> None:
+    rng = np.random.default_rng(5)
+    n = int(120 * rate)
+    pole = math.exp(-2.0 * math.pi * 5.0 / rate)  # 5 Hz, the narrowest of usual sensors
+    noise = 0.01 * DEGREE * math.sqrt(rate) * rng.standard_normal(n)
+    log = np.degrees(lfilter([1.0 - pole], [1.0, -pole], noise))  # in degrees called radians
+    assert find_motion(summarise(log), "gyro", rate, TIMES) == []
+
+
 def test_a_sensor_that_is_turned_for_a_while_has_rests_before_and_after() -> None:
     rng = np.random.default_rng(2)
     rate, n = 100.0, 12_000

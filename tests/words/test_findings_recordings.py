@@ -29,7 +29,7 @@ EXAMPLES: list[tuple[str, FindingData]] = [
     ("gyro_x", samples.Quantised(0.05 * RATE, 0.31, is_rounded=True)),
     ("gyro_x", samples.Quantised(0.05 * RATE)),
     ("gyro_x", samples.Truncated(0.05 * RATE)),
-    ("accel_z", samples.Coarse(3.0, 4 * MILLI_G, 8, is_rounded=True)),
+    ("accel_z", samples.Coarse(3.0, 4 * MILLI_G, 2.1, is_rounded=True)),
     ("gyro_x", samples.Interpolated(312, 0.0102)),
     ("gyro_x", samples.RepeatedSamples(0.5, 0.021)),
     ("gyro_x", samples.HeldSamples(3, 0.012)),

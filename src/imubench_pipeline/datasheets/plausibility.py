@@ -296,6 +296,7 @@ def _check_noise(channels: Mapping[str, Level], of: Mapping[str, Expected]) -> I
     weighed = {f"accel_{axis}" for axis in "xyz"} <= channels.keys()
     gyros = [level for name, level in channels.items() if quantity_of(name) == "gyro"]
     mean = math.hypot(*(level.mean for level in gyros))
+    largest_mean = max((abs(level.mean) for level in gyros), default=0.0)
     quietest = min((level.density[0] for level in gyros), default=0.0)
     for name, level in channels.items():
         quantity = quantity_of(name)
@@ -313,22 +314,32 @@ def _check_noise(channels: Mapping[str, Level], of: Mapping[str, Expected]) -> I
         else:
             continue
         high = math.inf if high is None else high
-        for unit, factor in mistakes(level.unit, quantity):
-            if (
-                low * factor <= _MAX_EXPLAINED_FACTOR * usual[1]
-                and high * factor >= usual[0] / _MAX_EXPLAINED_FACTOR
-            ):
-                data = texts.SuspiciousUnit(
-                    level.unit,
-                    unit,
-                    factor,
-                    noise=shown,
-                    usual=usual,
-                    printed=of[quantity].printed is not None,
-                    mean=mean if together else None,
-                )
-                yield find(data, "warning", factor, name)
-                break
+        likely = [
+            (unit, factor)
+            for unit, factor in mistakes(level.unit, quantity)
+            if low * factor <= _MAX_EXPLAINED_FACTOR * usual[1]
+            and high * factor >= usual[0] / _MAX_EXPLAINED_FACTOR
+        ]
+        if not likely:
+            continue
+        # First a unit in which the means are usual, too, then one with noise within the range.
+        unit, factor = min(
+            likely,
+            key=lambda one: (
+                quantity == "gyro" and largest_mean * one[1] > of["gyro"].offset,
+                low * one[1] < usual[0] or high * one[1] > usual[1],
+            ),
+        )
+        data = texts.SuspiciousUnit(
+            level.unit,
+            unit,
+            factor,
+            noise=shown,
+            usual=usual,
+            printed=of[quantity].printed is not None,
+            mean=mean if together else None,
+        )
+        yield find(data, "warning", factor, name)
 
 
 def _compare_noise(

@@ -2,7 +2,7 @@
 
 import shutil
 import tempfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import suppress
 from dataclasses import asdict, dataclass, field, replace
@@ -27,6 +27,7 @@ from imubench_pipeline.recordings.known_logs import KnownFile, identify_log_file
 from imubench_pipeline.recordings.parts import Part, leave_out_disturbed, read_part
 from imubench_pipeline.recordings.quality.columns import check_columns
 from imubench_pipeline.recordings.quality.copies import find_copied_channels
+from imubench_pipeline.recordings.quality.knocks import Knock
 from imubench_pipeline.recordings.quality.levels import summarise_level
 from imubench_pipeline.recordings.quality.rest import find_still_spans
 from imubench_pipeline.recordings.quality.rotation import GravityTurn, detect_gravity_turn
@@ -262,11 +263,16 @@ def _findings(
     for part, base in zip(parts, bases, strict=True):
         columns = part.columns | part.left_out
         found = check_columns(columns, base.rate, settings, static=static)
-        findings += [finding for finding in found if finding not in findings]
-        findings += part.findings
+        knocks: dict[str, list[Knock]] = {}
         if static:  # a turn looks like a knock
             longest = round(settings.longest_knock * base.rate)
             knocks = leave_out_disturbed(part, settings.knock, longest, scratch)
+            calm = check_columns(part.calm, base.rate, settings)
+            moved = [f for f in calm if f.finding == samples.Motion.code]
+            found = [f for f in found if not _is_knock(f, knocks, moved, base.rate)]
+        findings += [finding for finding in found if finding not in findings]
+        findings += part.findings
+        if static:
             for channel, events in knocks.items():
                 worst = max(events, key=lambda knock: knock.size)
                 times = tuple(max(knock.first, 0) / base.rate for knock in events[:_MAX_TIMES])
@@ -295,6 +301,26 @@ def _findings(
     for group in groups:
         findings += [f for f in bases[group[0]].findings if f not in findings]
     return findings
+
+
+def _is_knock(
+    finding: Finding, knocks: Mapping[str, list[Knock]], moved: Iterable[Finding], rate: float
+) -> bool:
+    """Return whether a motion is one knock, without which there is no motion (``moved``)."""
+    begin, end = finding.start or 0.0, finding.end or 0.0
+    events = [
+        knock
+        for knock in knocks.get(finding.channel or "", ())
+        if knock.first < end * rate and knock.last > begin * rate
+    ]
+    return (
+        finding.finding == samples.Motion.code
+        and len(events) == 1
+        and not any(
+            f.channel == finding.channel and (f.start or 0.0) < end and (f.end or 0.0) > begin
+            for f in moved
+        )
+    )
 
 
 def _find_holes(parts: list[Part], base: timebase.TimeBase) -> tuple[dict[str, bool], list[str]]:

@@ -42,6 +42,7 @@ class Part:
     """Number of records for each bit mask of columns with a number: entry 5 counts the records with
     the first and the third column."""
     knocks: dict[str, int] = field(default_factory=dict)  # samples of columns left out as knocks
+    calm: dict[str, ColumnSummary] = field(default_factory=dict)  # of columns without their knocks
     interpolated: dict[str, int] = field(default_factory=dict)  # samples left out as interpolated
     stamped: bool = False  # records have stamps
     base: TimeBase | None = None  # set when the columns of a file were separated
@@ -168,6 +169,7 @@ def leave_out_disturbed(
     part.writer = LogWriter(part.data, dict.fromkeys(part.columns, pa.float64()))
     part.knocks = dict.fromkeys(part.columns, 0)
     part.interpolated = dict.fromkeys(part.columns, 0)
+    part.calm = {name: ColumnSummary() for name in knocks_of}
     reached = 0
     with open_parquet(old) as file:
         for number in range(file.num_row_groups):
@@ -181,6 +183,8 @@ def leave_out_disturbed(
                     samples[start : max(knock.last - reached, 0)] = np.nan
                 after = int(np.isfinite(samples).sum())
                 part.knocks[name] += before - after
+                if name in part.calm:
+                    part.calm[name].add(samples)
                 if rules.get(name):
                     samples[knocks.mark_straight_lines(samples, rules[name])] = np.nan
                     part.interpolated[name] += after - int(np.isfinite(samples).sum())

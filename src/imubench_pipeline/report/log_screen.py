@@ -13,7 +13,7 @@ from rich.text import Text
 
 from imubench_pipeline.model.estimates import AllanRow, ParameterRow
 from imubench_pipeline.model.recordings import FindingRow, RecordingRow
-from imubench_pipeline.recordings.quality.rest import find_still_spans
+from imubench_pipeline.recordings.quality.rest import find_still_spans, merge_spans
 from imubench_pipeline.report import run_summary, terminal
 from imubench_pipeline.report.practical import System, choose_page_unit
 from imubench_pipeline.settings.sensor import quantity_of
@@ -152,14 +152,7 @@ def render_log_screen(
             moved = [(each.start or 0.0, each.end or 0.0) for each in motion]
             rest = find_still_spans(moved, 0.0, row.duration or 0.0)
             channels = [each.channel for each in motion if each.channel]
-            # Spans that touch are joined.
-            merged: list[tuple[float, float]] = []
-            for start, stop in sorted(moved):
-                if merged and start <= merged[-1][1]:
-                    merged[-1] = merged[-1][0], max(stop, merged[-1][1])
-                else:
-                    merged.append((start, stop))
-            yield Text(_fold(motion_text(channels, merged, rest), width, 6))
+            yield Text(_fold(motion_text(channels, merge_spans(moved), rest), width, 6))
         elif reason := reason_text(row):
             yield Text(_fold(reason, width, 2))
         if not parameters:

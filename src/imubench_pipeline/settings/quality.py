@@ -61,7 +61,6 @@ class QualitySettings(Strict):
     repeated: float = Field(
         0.1, gt=0, lt=1, description="share of repeated samples beyond what rounding explains"
     )
-    fewest_levels: int = Field(10, ge=2, description="levels of a quantised channel")
     step_over_noise: float = Field(
         0.05, gt=0, description="quantisation step over the noise from which it is noted"
     )

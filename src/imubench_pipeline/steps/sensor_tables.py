@@ -102,7 +102,7 @@ def join_tables(
     return mark_failures(joined, failures)
 
 
-_EXPLAINING = ("motion", "suspicious_unit", "slow_sampling", "turning")
+_EXPLAINING = ("motion", "turning")
 _KIND_OF_FINDING = {"step": "bias_step", "warm_up": "warm_up_drift"}
 """Kind in ``deterministic``, with a size, of findings that the ingest also reports."""
 
@@ -130,13 +130,19 @@ def collect_findings(
     found = list(of_logs)
     for quality in qualities:
         found += implausible_of(quality, sensors.get(quality.recording.sensor))
-    return [*found, *of_estimates, *unusual_rows(_judged(estimated, found), sensors, usual)]
+    slow = {(f.sensor, f.recording) for f in found if f.finding == "slow_sampling"}
+    unusual = (  # slow sampling explains large figures, and no impossibly small ones
+        row
+        for row in unusual_rows(_judged(estimated, found), sensors, usual)
+        if row.finding == "impossible_noise" or (row.sensor, row.recording) not in slow
+    )
+    return [*found, *of_estimates, *unusual]
 
 
 def _judged(
     estimated: Iterable[model.ParameterRow], findings: Iterable[FindingRow]
 ) -> Iterator[model.ParameterRow]:
-    """Yield the figures whose size is not explained by motion, units or slow sampling."""
+    """Yield the figures whose size is not explained by motion or by the unit of the channel."""
     explained = {
         (f.sensor, f.recording, None if f.finding in _EXPLAINING else f.channel)
         for f in findings

@@ -30,7 +30,9 @@ that the share of one-step changes determines. Below it all changes are by one s
 depends on the position of the mean between two steps."""
 
 _MAX_HARMLESS_EMPTY_SHARE = 0.01  # empty cells of a channel that are only noted
-_MIN_STEP_WHERE_ROUNDING_DOMINATES = 1.5  # step over noise from which it does
+_MIN_STEP_WHERE_ROUNDING_DOMINATES = 1.5
+"""Step over the standard deviation, with rounding, from which N is more than 10 % too large. The
+number of levels, which a drift increases, does not matter."""
 
 
 def estimate_excess_repeats(column: summary.ColumnSummary) -> tuple[float, float]:
@@ -192,7 +194,7 @@ def check_columns(
         findings += _find_bad_values(channel, column, steps[channel], rate, settings)
         if static:
             findings += _find_changes(channel, column, steps[channel], rate, settings)
-            if not _has_only_rounding(steps[channel], settings):
+            if not _is_rounding_dominant(steps[channel]):
                 findings += joined.find_joined_logs(channel, column, rate)
                 findings += joined.find_interleaved_samples(channel, column)
         held = None
@@ -234,11 +236,11 @@ def _find_bad_values(
     settings: QualitySettings,
 ) -> Iterator[Finding]:
     """Yield findings about quantisation, and about stuck, saturated or too frequent values."""
-    if steps is not None and _has_only_rounding(steps, settings):
-        coarse = samples.Coarse(steps.levels, steps.step, settings.fewest_levels, steps.hidden)
+    over_noise = steps.over_noise if steps and math.isfinite(steps.over_noise) else None
+    if steps is not None and _is_rounding_dominant(steps):
+        coarse = samples.Coarse(steps.levels, steps.step, over_noise, steps.hidden)
         yield find(coarse, "warning", steps.levels, channel)
     elif steps is not None and steps.over_noise > settings.step_over_noise:
-        over_noise = steps.over_noise if math.isfinite(steps.over_noise) else None
         quantised = samples.Quantised(steps.step, over_noise, is_rounded=steps.hidden)
         yield find(quantised, "note", steps.step, channel)
         if levels.is_truncated(column, steps.step):
@@ -248,7 +250,7 @@ def _find_bad_values(
         3.0 * levels.compute_longest_chance_run(column), settings.longest_stuck * rate
     )
     # A level midway between two edges of a register can stay at one value for any time.
-    if stuck and not _has_only_rounding(steps, settings):
+    if stuck and not _is_rounding_dominant(steps):
         seconds, start = length / rate, (end - length) / rate
         constant = samples.StuckForAWhile(seconds, length)
         yield find(constant, "warning", seconds, channel, start, end / rate)
@@ -309,15 +311,8 @@ def _find_changes(
 
 
 def _is_rounding_dominant(steps: levels.Quantisation | None) -> bool:
-    """Return whether spread and repeats depend only on the position of the level between steps."""
+    """Return whether rounding determines the noise; then the finding ``coarse`` suffices."""
     return steps is not None and steps.over_noise > _MIN_STEP_WHERE_ROUNDING_DOMINATES
-
-
-def _has_only_rounding(steps: levels.Quantisation | None, settings: QualitySettings) -> bool:
-    """Return whether a channel shows rounding noise only; then the finding ``coarse`` suffices."""
-    if steps is None or not _is_rounding_dominant(steps):
-        return False
-    return round(steps.levels) < settings.fewest_levels
 
 
 _NUMBER_OF_PARTS = 20

@@ -250,16 +250,23 @@ def bound_noise_density(column: ColumnSummary, rate: float) -> tuple[float, floa
 
     The standard deviation within blocks over √rate is too small behind a low-pass. The Allan
     deviation of the block means times √τ is too large if slow noise dominates at τ. The upper bound
-    is at least the quantisation noise of the register; it is None if there are too few blocks.
+    is at least the quantisation noise of the register; it is None if there are too few samples.
     """
     blocks = column.blocks()
-    spread = compute_finite_median(column.blocks().spread) / math.sqrt(rate)
-    steps = np.diff(np.where(blocks.count > 0.9 * blocks.size, blocks.mean, np.nan))
+    size, spreads = blocks.size, blocks.spread
+    means = np.where(blocks.count > 0.9 * size, blocks.mean, np.nan)
+    if len(means) <= _MIN_BLOCK_STEPS + 1:  # a short log, which is one excerpt
+        values = column.excerpts()[0].values
+        size = max(len(values) // (_MIN_BLOCK_STEPS + 1), 1)
+        parts = values[: size * (_MIN_BLOCK_STEPS + 1)].reshape(-1, size)
+        means, spreads = parts.mean(axis=1), parts.std(axis=1)
+    spread = compute_finite_median(spreads) / math.sqrt(rate)
+    steps = np.diff(means)
     steps = steps[np.isfinite(steps)]
     if len(steps) < _MIN_BLOCK_STEPS:
         return spread, None
     variance = float(np.median(steps**2)) / (2.0 * _NORMAL_MEDIAN)
-    slow = math.sqrt(variance * blocks.size / rate)
+    slow = math.sqrt(variance * size / rate)
     least_bit = column.step if np.isfinite(column.step) else 0.0
     return min(spread, slow), max(spread, slow, least_bit / math.sqrt(12.0 * rate))
 
@@ -274,7 +281,7 @@ def _is_end_of_range(column: ColumnSummary, limit: float, window: float) -> bool
     values = np.concatenate([piece.present for piece in column.excerpts()])
     there = values == limit
     number = int(there.sum())
-    if 4 * np.count_nonzero(there[1:] & there[:-1]) > number:
+    if 2 * np.count_nonzero(there[1:] & there[:-1]) > number:
         return True
     inside = np.count_nonzero(np.abs(values - limit) <= 1.001 * window) - number
     share = number / len(values)
@@ -310,15 +317,14 @@ def _is_cut_off(column: ColumnSummary, steps: Quantisation | None, side: str, nu
     per level, with q the step over the noise: the level beyond the last has n_last^2 / n_next
     exp(-q^2).
     """
-    if steps is None:
-        return True
     at, counts = _count_values(column)
     last, following = (0, 1) if side == "lowest" else (-1, -2)
     limit = column.low if side == "lowest" else column.high
     if len(at) < 2 or at[last] != limit:
         return True
-    window = math.ceil(1.0 / steps.over_noise) * steps.step
-    if not _is_end_of_range(column, limit, window):
+    if steps is None:
+        return _is_end_of_range(column, limit, compute_finite_median(column.blocks().spread))
+    if not _is_end_of_range(column, limit, math.ceil(1.0 / steps.over_noise) * steps.step):
         return False
     beyond = number * counts[last] / counts[following] * math.exp(-(steps.over_noise**2))
     return bool(beyond > _MIN_MISSING_SAMPLES)

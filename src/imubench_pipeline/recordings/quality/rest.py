@@ -6,11 +6,14 @@ far smaller than of single samples: also behind a low-pass filter, or in a wrong
 
 import math
 from collections.abc import Iterable
+from typing import TypeVar
 
 import numpy as np
 
 from imubench_pipeline.recordings.quality.summary import ColumnSummary, compute_finite_median
 from imubench_pipeline.typing import Array
+
+T = TypeVar("T", int, float)
 
 _MAX_CREST_FACTOR = 6.0  # of extremes over deviation; a knock exceeds it
 _CALM_QUANTILE = 0.2  # of the deviations of blocks: at rest, if the log is at rest for a fifth
@@ -21,9 +24,11 @@ _AVERAGES = np.geomspace(0.1, 3.0, 7)  # s
 _MIN_DEVIATION = {"gyro": math.radians(0.5), "accel": 0.2}
 """SI, of means of 0.1 to 3 s. Gyros at rest have at most 0.2 °/s."""
 
-_MIN_SLOW_NOISE = 100.0
-"""Ratio of the noise densities of such means and of single samples: 600 and more in logs of a
-sensor in a hand, 1 to 2.5 in 40 channels of real logs at rest."""
+_NARROWEST_FILTER = 5.0  # Hz, of usual sensors
+_MIN_SLOW_NOISE = 8.0
+"""Ratio of the noise densities of such means and of single samples, over the ratio of white noise
+behind the narrowest filter: 190 in all at 100 Hz. Logs of a sensor in a hand have 600 and more in
+all, 40 channels of real logs at rest 1 to 2.5."""
 
 _MIN_CLUSTERS = 8
 _WINDOW, _MIN_WINDOW = 5.0, 256  # s and samples that are judged together
@@ -42,6 +47,17 @@ def find_still_spans(
     return [*spans, (reached, end)] if end > reached else spans
 
 
+def merge_spans(spans: Iterable[tuple[T, T]]) -> list[tuple[T, T]]:
+    """Return spans with those joined that touch or overlap."""
+    merged: list[tuple[T, T]] = []
+    for start, stop in sorted(spans):
+        if merged and start <= merged[-1][1]:
+            merged[-1] = merged[-1][0], max(stop, merged[-1][1])
+        else:
+            merged.append((start, stop))
+    return merged
+
+
 def find_motion(
     column: ColumnSummary, quantity: str, rate: float, times: float, least: float = 0.0
 ) -> list[tuple[int, int]]:
@@ -50,14 +66,16 @@ def find_motion(
     ``times``, ``least``: lower limits of the deviation, over its value at rest and in SI. A knock
     is no motion.
     """
-    # Does most of the log have the slow signals of a sensor in motion?
-    size = max(round(_WINDOW * rate), _MIN_WINDOW)
-    slow = [
-        _has_slow_signals(samples, rate, _MIN_DEVIATION[quantity])
-        for piece in column.excerpts()
-        for samples in np.array_split(piece.present, max(len(piece.present) // size, 1))
-    ]
-    if sum(slow) > _MAX_MOVING_SHARE * len(slow):
+    # The windows with the slow signals of a sensor in motion
+    size, windows, slow = max(round(_WINDOW * rate), _MIN_WINDOW), 0, []
+    for piece in column.excerpts():
+        first = piece.first
+        for samples in np.array_split(piece.values, max(len(piece.values) // size, 1)):
+            present = samples[np.isfinite(samples)]
+            if _has_slow_signals(present, rate, _MIN_DEVIATION[quantity]):
+                slow.append((first, first + len(samples)))
+            first, windows = first + len(samples), windows + 1
+    if len(slow) > _MAX_MOVING_SHARE * windows:
         return [(0, column.present + column.missing)]
     blocks = column.blocks()
     # The deviation of calm blocks; coarse registers may have none in many blocks
@@ -67,17 +85,17 @@ def find_motion(
     else:
         calm = float(np.quantile(spread, _CALM_QUANTILE)) or float(np.median(spread))
     if not calm > 0.0:
-        return []
+        return merge_spans(slow)
     reach = np.maximum(blocks.high - blocks.mean, blocks.mean - blocks.low)
     moving = blocks.spread > max(times * calm, least)
     still = blocks.spread < times * calm
     turned = np.abs(blocks.mean - compute_finite_median(blocks.mean[still]))
     moving |= turned > max(_MIN_CHANGE[quantity], times * calm)
     places = np.flatnonzero(moving & (reach < _MAX_CREST_FACTOR * blocks.spread))
-    if len(places) == 0:
-        return []
-    groups = np.split(places, np.flatnonzero(np.diff(places) > 2) + 1)
-    return [(int(group[0]) * blocks.size, (int(group[-1]) + 1) * blocks.size) for group in groups]
+    groups = np.split(places, np.flatnonzero(np.diff(places) > 2) + 1) if len(places) else []
+    return merge_spans(
+        [*slow, *((int(g[0]) * blocks.size, (int(g[-1]) + 1) * blocks.size) for g in groups)]
+    )
 
 
 def _has_slow_signals(samples: Array, rate: float, least: float) -> bool:
@@ -85,12 +103,14 @@ def _has_slow_signals(samples: Array, rate: float, least: float) -> bool:
     if len(samples) < 2:
         return False
     single = float(np.mean(np.diff(samples) ** 2))
+    pole = math.exp(-2.0 * math.pi * _NARROWEST_FILTER / rate)
+    ratio = _MIN_SLOW_NOISE * (1.0 + pole) / (1.0 - pole) ** 2
     for size in np.unique(np.rint(_AVERAGES * rate).astype(int)):
         clusters = len(samples) // max(size, 1)
         if size < 2 or clusters < _MIN_CLUSTERS:
             continue
         means = samples[: clusters * size].reshape(clusters, size).mean(axis=1)
         squares = float(np.mean(np.diff(means) ** 2))
-        if squares > 2.0 * least**2 and squares * size > _MIN_SLOW_NOISE * single:
+        if squares > 2.0 * least**2 and squares * size > ratio * single:
             return True
     return False

@@ -59,19 +59,21 @@ class Truncated(FindingData, affects=WHITE, doubt="truncated samples of {channel
 
 
 class Coarse(FindingData, affects=ALL, doubt="coarse resolution of {channels}"):
-    """The noise is rounding noise."""
+    """The noise is mostly rounding noise."""
 
     levels: float
     step: float
-    required: int
+    step_over_noise: float | None  # none: most samples are equal
     is_rounded: bool
 
     def text(self, channel: str) -> str:
-        rounded = _ROUNDED if self.is_rounded else ""
+        size = "and most samples are equal"
+        if self.step_over_noise is not None:
+            size = f"{number_text(self.step_over_noise, 2)} times its noise"
         return (
             f"{channel_name(channel)} has {counted(round(self.levels), 'level')}, "
-            f"{value_text(self.step, channel)} apart; at least {self.required} are required. Its "
-            "noise is rounding noise. Record more digits, or use a finer range" + rounded
+            f"{value_text(self.step, channel)} apart, {size}. N contains the rounding noise. "
+            "Record more digits, or use a finer range" + _ROUNDED * self.is_rounded
         )
 
 
