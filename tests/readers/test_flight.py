@@ -201,16 +201,6 @@ def test_data_that_are_appended_to_a_ulog_begin_where_it_says(
     assert file.findings == []
 
 
-def test_a_topic_that_is_declared_without_end_costs_nothing(tmp_path: Path) -> None:
-    layouts = {f"t{n}": f"t{n + 1}[999] x;" for n in range(12)} | {"t12": "float x;"}
-    declared = b"".join(made.declared(*each) for each in layouts.items())
-    topics = b"".join(made.subscribed(n, "t0", n % 200) for n in range(3000))
-    data = made.data(1, bytes(300))
-    path = written(tmp_path, made.ulog_header() + declared + topics + data)
-    with pytest.raises(RecordingError, match="the PX4 ULog has no message of numbers"):
-        inspect(path)
-
-
 # -------------------------------------------------------------------------------- what is said
 
 

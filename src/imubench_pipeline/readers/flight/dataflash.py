@@ -4,6 +4,7 @@ See "Log Messages" and libraries/AP_Logger of ArduPilot. A message is two sync b
 its fields, which a message FMT declares. The batch sampler (ISBH, ISBD) is not read.
 """
 
+import re
 from collections.abc import Iterator
 from typing import ClassVar
 
@@ -42,7 +43,9 @@ class DataFlashMessages(Messages):
                 kind = data[at + 2]
                 end = at + lengths[kind]
                 if data[at : at + 2] != _SYNC or end == at:
-                    if not self._skip_to(_SYNC):
+                    kinds = bytes(number for number, length in enumerate(lengths) if length)
+                    mark = re.compile(_SYNC + b"[" + re.escape(kinds) + b"]", re.DOTALL)
+                    if not self._skip_to(mark, 3):
                         return
                     continue
             if end > len(data):

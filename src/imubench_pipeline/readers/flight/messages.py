@@ -41,15 +41,15 @@ class Kind:
     factors: Mapping[str, float] = field(default_factory=dict)  # of fixed-point numbers
 
     def __post_init__(self) -> None:
-        self.dtype = np.dtype(self.fields)
-        self.columns = [name for name, kind in self.fields if np.dtype(kind).kind in "fiu"]
+        self.columns = [name for name, kind in self.fields if kind.lstrip("<")[0] in "fiu"]
         own = _INERTIAL.search(self.name) and not _NOT_INERTIAL.search(self.name)
         self.is_inertial = bool(self.units or own)
 
     def read(self, messages: Iterable[bytes]) -> NDArray[Any]:
         """Return the records of messages; those that are too short are left out."""
-        size = self.dtype.itemsize
-        return np.frombuffer(b"".join(m[:size] for m in messages if len(m) >= size), self.dtype)
+        layout = np.dtype(self.fields)
+        size = layout.itemsize
+        return np.frombuffer(b"".join(m[:size] for m in messages if len(m) >= size), layout)
 
     def figures(self, records: NDArray[Any], column: str) -> NDArray[np.float64]:
         """Return a column in its unit."""
@@ -87,13 +87,13 @@ class Messages(ABC):
         self._data, self._at = self._data[self._at :] + block, 0
         return bool(block)
 
-    def _skip_to(self, mark: bytes) -> bool:
+    def _skip_to(self, mark: re.Pattern[bytes], length: int) -> bool:
         """Go to the next mark, and count the bytes before it; return whether there is more."""
-        found = self._data.find(mark, self._at + 1)
-        end = found if found >= 0 else max(len(self._data) - len(mark) + 1, self._at)
+        found = mark.search(self._data, self._at + 1)
+        end = max(len(self._data) - length + 1, self._at) if found is None else found.start()
         self.damaged += len(self._data[self._at : end].strip(b"\0"))
         self._at = end
-        return found >= 0 or self._read_more()
+        return found is not None or self._read_more()
 
     def _is_wanted(self, kind: Kind | None) -> bool:
         """Return whether messages of a kind are given, and store it."""
@@ -201,4 +201,4 @@ def list_kinds(path: Path, file_format: formats.FileFormat) -> list[formats.LogT
             table = formats.LogTable(file_format, name, tuple(columns), name, about=about)
         tables.append(table)
     # A message with both quantities first, since they share its clock.
-    return sorted(tables, key=lambda table: -len({column.unit for column in table.columns}))
+    return sorted(tables, key=lambda t: (-len({column.unit for column in t.columns}), t.name))

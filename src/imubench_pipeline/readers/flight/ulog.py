@@ -14,6 +14,7 @@ from imubench_pipeline.tables.findings import RecordingError
 
 _MAGIC, _HEADER_BYTES = b"ULog\x01\x12\x35", 16
 _SYNC = b"\x08\x00S\x2f\x73\x13\x20\x25\x0c\xbb\x12"  # a message that only marks its place
+_MARK = re.compile(re.escape(_SYNC))
 _KINDS = frozenset(b"FABDIMPQLCRSO")
 _TYPES = {"int8_t": "i1", "uint8_t": "u1", "int16_t": "<i2", "uint16_t": "<u2", "int32_t": "<i4",
           "uint32_t": "<u4", "int64_t": "<i8", "uint64_t": "<u8", "float": "<f4",
@@ -44,6 +45,7 @@ class UlogMessages(Messages):
             )
         self._at = _HEADER_BYTES
         declared: dict[str, str] = {}
+        layouts: dict[str, list[tuple[str, str]]] = {}
         topics: dict[bytes, Kind] = {}
         appended: list[int] = []
         while True:
@@ -60,7 +62,7 @@ class UlogMessages(Messages):
                 continue
             topic = topics.get(data[begin : begin + 2]) if kind == ord("D") else None
             if kind not in _KINDS or not size or (kind == ord("D") and topic is None):
-                if not self._skip_to(_SYNC):
+                if not self._skip_to(_MARK, len(_SYNC)):
                     return
                 continue
             self._at = end
@@ -72,8 +74,11 @@ class UlogMessages(Messages):
                 declared[name] = layout
             elif kind == ord("A") and len(topics) < MAX_ULOG_FIELDS:
                 name = data[begin + 3 : end].decode("utf-8", "replace")
-                fields, units = _list_fields(declared, name), _UNITS.get(name, {})
-                topics[data[begin + 1 : begin + 3]] = Kind(f"{name}_{data[begin]}", fields, units)
+                if name not in layouts:
+                    layouts[name] = _list_fields(declared, name)
+                topics[data[begin + 1 : begin + 3]] = Kind(
+                    f"{name}_{data[begin]}", layouts[name], _UNITS.get(name, {})
+                )
             elif kind == ord("B") and size >= 40:
                 offsets = struct.unpack_from("<3Q", data, begin + 16)
                 appended = sorted(offset for offset in offsets if offset > place + end)

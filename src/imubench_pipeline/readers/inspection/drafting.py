@@ -130,11 +130,13 @@ def _group_by_name(table: LogTable, contents: Contents) -> list[Group]:
     return [*map(partial(_add_convention, contents), result), *_find_roll_pitch_yaw(table, result)]
 
 
+_BETAFLIGHT_RATE = (
+    "of Betaflight: 1 deg/s per count, or 0.1 deg/s (scale: 0.1) with blackbox_high_resolution"
+)
 _HINTS_BY_STEM = {
-    "gyroadc": "Betaflight, filtered: deg/s, with blackbox_high_resolution 0.1 deg/s (scale: 0.1); "
-    "'blackbox_decode --unit-rotation deg/s' writes the unit. Log gyroUnfilt or debug GYRO_RAW",
-    "accsmooth": "Betaflight, filtered: counts of g/2048 or g/4096, acc_1G in the header of the "
-    "log; 'blackbox_decode --unit-acceleration m/s2' writes the unit",
+    "gyrounfilt": _BETAFLIGHT_RATE,
+    "gyroadc": f"{_BETAFLIGHT_RATE}; filtered: gyroUnfilt is not",
+    "accsmooth": "of Betaflight, filtered: acc_1G in the header of its log is 1 g",
 }
 """What is known of columns without a unit, by their stem."""
 
@@ -463,7 +465,9 @@ def _add_group(drafted: Draft, group: Group, alone: bool) -> None:
         comment = "with gravity, by its mean: so this is what the accelerometer measures"
     elif group.quantity == "accel" and group.mean_length is not None and not group.gravity_unit:
         comment = f"the mean is {group.mean_length:.4g} {unit} long, which is not gravity"
-    comment = "; ".join(text for text in (group.guessed, group.hint or comment) if text)
+    if group.hint and (group.quantity == "gyro" or next(iter(group.columns.values())).hint):
+        comment = ""  # the hint says more
+    comment = "; ".join(text for text in (group.guessed, group.hint, comment) if text)
     for axis, column in group.columns.items():
         entry = Entry(_describe_source(group.table, column, unit, alone), comment)
         drafted.channels[f"{group.quantity}_{axis}"] = entry
