@@ -10,9 +10,9 @@ from imubench_pipeline.words.findings.files import LateRecords
 
 MAX_LATE_RECORDS = 1000  # records by which one may be late
 _MIN_STEP, _MAX_STEP = 0.5, 3.5  # of sorted stamps around a late one, over the median step
-_MAX_SHARE, _MIN_REGULAR = 0.2, 0.8
-"""Largest share of records at which stamps go back, and least share of regular steps of the sorted
-stamps: others scatter, and say nothing of the order."""
+_MAX_LATE_SHARE, _MIN_REGULAR = 0.2, 0.8
+"""Largest share of late records, and least share of regular steps of the sorted stamps: others
+scatter or run backwards, and say nothing of the order."""
 
 
 def sort_late_records(file: LogFile) -> Iterator[Batch]:
@@ -73,7 +73,7 @@ def _find_order(time: NDArray[np.float64], kept: int) -> tuple[NDArray[np.int64]
     if len(time) - end > 2 * kept and kept:
         end = len(time) - kept  # too many records would wait
     blocks = np.flatnonzero(np.diff(places) > 1)
-    if not 0 < len(blocks) <= _MAX_SHARE * len(time):
+    if not len(blocks) or np.mean(time < highest) > _MAX_LATE_SHARE:
         return order, end
     steps = np.diff(np.sort(time[present]))
     typical = float(np.median(steps))

@@ -24,7 +24,7 @@ from imubench_pipeline.readers.stated_units import find_stated_unit
 from imubench_pipeline.tables.findings import Finding, RecordingError
 from imubench_pipeline.words.findings.files import DamagedBytes, IncompleteLastRecord
 
-_BATCH_MESSAGES, _MIN_ZEROS = 1 << 15, 1 << 16
+_BATCH_MESSAGES, _MIN_ZEROS = 1 << 15, 512
 _MAX_DESCRIBED_BYTES, _MAX_SEARCHED_BYTES = 1 << 23, 1 << 26  # examined for kinds of messages
 _INERTIAL = re.compile(r"imu|gyr|acc", re.IGNORECASE)
 _NOT_INERTIAL = re.compile(r"status|bias|estimator|vibe|calib|fifo", re.IGNORECASE)
