@@ -42,7 +42,7 @@ def sort_late_records(file: LogFile) -> Iterator[Batch]:
         columns = {name: np.concatenate([b.columns[name] for b in waiting]) for name in names}
         order, end = _find_order(time, 0 if batch is None else MAX_LATE_RECORDS)
         if (order[1:] < order[:-1]).any():
-            behind = np.maximum.accumulate(np.fmax(time, -np.inf)) - time
+            behind = np.maximum.accumulate(np.where(np.isfinite(time), time, -np.inf)) - time
             moved = order[(order != np.arange(len(order))) & (behind[order] > 0)]
             late, delay = late + len(moved), max(delay, float(behind[moved].max()))
             time, columns = time[order], {name: values[order] for name, values in columns.items()}

@@ -161,10 +161,8 @@ class MessageFile(LogFile):
         ]
         if len(able) == 1:
             return able[0]
-        named = [messages.kinds[str(name)] for name in stated if name in messages.kinds]
-        has = formats.join_first(each.name for each in able) or formats.join_first(
-            named[0].columns if named else messages.kinds
-        )
+        named = [messages.kinds[str(name)].columns for name in stated if name in messages.kinds]
+        has = formats.join_first([kind.name for kind in able] or [*named, list(messages.kinds)][0])
         raise RecordingError(
             f"{self.path.name}: expected one kind of message with {', '.join(sorted(wanted))}"
             f"{' called ' * bool(stated)}{' and '.join(sorted(map(str, stated)))}; found "

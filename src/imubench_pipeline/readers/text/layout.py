@@ -6,7 +6,7 @@ Everything is detected from the first lines; statements of the sensor file are u
 import re
 from collections import Counter, deque
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
 
@@ -123,25 +123,32 @@ class _Search:
             skipped = f" behind {log.skip_lines} lines (skip_lines)" if log.skip_lines else ""
             fault = complete_lines.describe_missing_text(path)
             raise RecordingError(f"{self._file}: {fault}; expected lines of a log{skipped}")
-        texts = [line.text for line in self._lines]
-        self._labels = None if log.delimiter is not None else find_labels(texts)
-        if self._labels is not None:
-            lines = [self._without_labels(line) for line in self._lines]
-            first = next(n for n, line in enumerate(lines) if line.text != texts[n])
-            self._comments += lines[:first]  # what the sketch printed before
-            self._lines = [_Line(0, 0, b"", self._labels.header), *lines[first:]]
-        elif log.delimiter is None and (sentence := find_sentence(texts)) is not None:
-            raise RecordingError(
-                f"{self._file}: its lines are words and values for people, such as "
-                f"{sentence.strip()[:60]!r}, a quantity on each, as Adafruit's examples print "
-                "them; expected a line a record: print CSV in the sketch: Serial.print(micros()); "
-                "Serial.print(','); Serial.print(g.gyro.x, 6); and so on, then Serial.println()"
-            )
+        self._labels = None if log.delimiter is not None else self._find_labels()
 
-    def _without_labels(self, line: "_Line") -> "_Line":
-        assert self._labels is not None  # it is asked for then
-        text = self._labels.remove(line.text.encode()).decode()
-        return _Line(line.number, line.start, line.raw, text)
+    def _find_labels(self) -> Labels | None:
+        """Return the labels of the values, and remove them from the lines; None if they have none.
+
+        Raise `RecordingError` if the lines are sentences.
+        """
+        texts = [line.text for line in self._lines]
+        if (labels := find_labels(texts)) is None:
+            if (sentence := find_sentence(texts)) is not None:
+                raise RecordingError(
+                    f"{self._file}: its lines are words and values for people, such as "
+                    f"{sentence.strip()[:60]!r}, as Adafruit's examples and 'rostopic echo' print "
+                    "them; expected a line a record: print CSV in the sketch "
+                    "(Serial.print(micros()); Serial.print(','); Serial.print(g.gyro.x, 6); ... "
+                    "Serial.println()), or read the bag itself"
+                )
+            return None
+        removed = [labels.remove(text.encode()).decode() for text in texts]
+        first = next((n for n, text in enumerate(removed) if text != texts[n]), None)
+        if first is None:
+            return None
+        self._comments += self._lines[:first]  # what the sketch printed before
+        lines = [replace(line, text=t) for line, t in zip(self._lines, removed, strict=True)]
+        self._lines = [_Line(0, 0, b"", labels.header), *lines[first:]]
+        return labels
 
     def layout(self) -> TextLayout:
         """Return the most plausible layout."""
