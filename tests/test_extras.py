@@ -117,9 +117,9 @@ def test_each_format_whose_library_is_not_installed_names_it(
     assert done.returncode == 0, done.stderr
     said = json.loads(done.stdout)
     extras = {name: form.extra for name, form in FILE_FORMATS.items() if form.extra}
-    assert said.keys() == extras.keys() == {"rosbag", "matlab", "hdf5"}
+    assert said.keys() == extras.keys() == {"rosbag", "matlab", "hdf5", "excel"}
     for name, extra in extras.items():
-        library = {"ros": "rosbags", "hdf5": "h5py"}[extra]
+        library = {"ros": "rosbags", "hdf5": "h5py", "excel": "python_calamine"}[extra]
         assert f"{library} is needed, which is not installed" in said[name]
         assert f"pip install 'imubench_pipeline[{extra}]'" in said[name]
 

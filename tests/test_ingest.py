@@ -114,7 +114,7 @@ def test_holes_are_put_on_the_grid(tmp_path: Path, rng: np.random.Generator) -> 
 
 def test_a_hole_beside_a_repeated_record_is_still_a_hole(tmp_path: Path) -> None:
     time = np.arange(1000) / 100.0
-    time[[500, 501]] = time[[501, 500]]
+    time[501] = time[498]
     source = write_csv(tmp_path / "a.csv", t=time, wx=1e-3 * np.sin(np.arange(1000.0)))
     result, values = kept(source, tmp_path / "out", {"gyro_x": XY["gyro_x"]}, time=TIME)
     assert np.isnan(values["gyro_x"]).sum() == 1
@@ -122,6 +122,16 @@ def test_a_hole_beside_a_repeated_record_is_still_a_hole(tmp_path: Path) -> None
     assert result.row.samples == 999
     found = {finding.finding: finding.value for finding in result.findings}
     assert found == {"missing_samples": 1, "repeated_stamps": 1}
+
+
+def test_a_record_that_was_written_late_is_sorted(tmp_path: Path) -> None:
+    order = np.array([*range(500), *range(501, 504), 500, *range(504, 1000)])
+    wx = 1e-3 * np.sin(np.arange(1000.0))
+    source = write_csv(tmp_path / "a.csv", t=order / 100.0, wx=wx[order])
+    result, values = kept(source, tmp_path / "out", {"gyro_x": XY["gyro_x"]}, time=TIME)
+    np.testing.assert_array_equal(values["gyro_x"], wx)
+    found = {finding.finding: finding.value for finding in result.findings}
+    assert found == {"late_records": 1}
 
 
 def test_a_uniform_time_is_not_kept(tmp_path: Path, rng: np.random.Generator) -> None:

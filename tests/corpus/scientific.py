@@ -1,4 +1,4 @@
-"""Formats of programs for science: MATLAB and HDF5."""
+"""Formats of programs for science and the office: MATLAB, HDF5 and Excel."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ import numpy as np
 
 from tests.corpus.entry import Entry, Rejected, Written, changed, file, flipped, kept, part
 from tests.corpus.signals import MATRIX, ROWS, STAMPED, matrix, rest
+from tests.readers.test_excel import workbook
 from tests.readers.test_matlab import by_hand, variable, version_5
 
 
@@ -169,4 +170,26 @@ HDF5 = [
     ),
 ]
 
-ENTRIES = [*MATLAB, *HDF5]
+
+def excel(folder: Path) -> Path:
+    rows = [["t", "wx", "az"], *matrix().tolist()]
+    return workbook(folder / "log.xlsx", {"log": rows, "notes": [["a phone"]]})
+
+
+EXCEL = [
+    Entry("excel", excel, STAMPED, kept(ROWS)),
+    Entry(
+        "excel without the sheet",
+        excel,
+        STAMPED | {"channels": {"gyro_x": {"variable": "imu", "column": "wx", "unit": "rad/s"}}},
+        Rejected(r"log\.xlsx: no variable 'imu' for gyro_x; the file has log"),
+    ),
+    Entry(
+        "excel that is damaged",
+        changed(excel, lambda data: flipped(data, 0.6)),
+        STAMPED,
+        Rejected(r"log\.xlsx: its sheets cannot be read"),
+    ),
+]
+
+ENTRIES = [*MATLAB, *HDF5, *EXCEL]

@@ -1,4 +1,4 @@
-"""The binary and the sentences of receivers and inertial units: UBX and VectorNav."""
+"""Binary and sentences of receivers, inertial units and flight controllers."""
 
 from __future__ import annotations
 
@@ -10,6 +10,8 @@ import numpy as np
 
 from tests.corpus.entry import Entry, Rejected, file, flipped, kept, part
 from tests.corpus.signals import RATE, ROWS, rest
+from tests.readers.flight_logs import dataflash, ulog
+from tests.readers.test_novatel import rawimus
 from tests.readers.test_ubx import NMEA, RTCM, meas, nav_pvt, raw, samples
 from tests.readers.test_vectornav import logged, sentence
 
@@ -244,6 +246,103 @@ TEXTS = [
     ),
 ]
 
+# ---------------------------------------------------------------------------------- NovAtel
+
+SCALES = {"gyro": 1e-9 * RATE, "accel": 2e-8 * RATE}
+NOVATEL: dict[str, Any] = {
+    "time": {"column": "gnss_time", "unit": "ns"},
+    "channels": {
+        "gyro_x": {"column": "gyro_x", "unit": "rad/s", "scale": SCALES["gyro"]},
+        "accel_z": {"column": "accel_z", "unit": "m/s^2", "scale": SCALES["accel"]},
+    },
+}
+
+
+@cache
+def raw_imu() -> list[bytes]:
+    counts = np.column_stack(
+        [COUNTS[:, :3], COUNTS[:, 3:5], 9.80665 / SCALES["accel"] + COUNTS[:, 5]]
+    )
+    return rawimus(np.rint(counts).astype(int), RATE)
+
+
+TEXTS += [
+    Entry("novatel", file(lambda: logged(raw_imu()), "log.asc"), NOVATEL, kept(ROWS)),
+    Entry(
+        "novatel with a wrong checksum",
+        file(
+            lambda: logged([*raw_imu()[:9], raw_imu()[9][:-1] + b"x", *raw_imu()[10:]]), "log.asc"
+        ),
+        NOVATEL,
+        kept(ROWS - 1, "not_sentences", "missing_samples"),
+    ),
+]
+
+# ------------------------------------------------------------------------ flight controllers
+
+
+@cache
+def figures() -> dict[str, np.ndarray]:
+    noise = np.random.default_rng(9).standard_normal((7, ROWS)).astype(np.float32) * 0.01
+    names = [*SIX, "temperature"]
+    found = dict(zip(names, noise.astype(float), strict=True))
+    return found | {"accel_z": found["accel_z"] + 9.8, "temperature": found["temperature"] + 25}
+
+
+ULOG: dict[str, Any] = {
+    "time": {"column": "timestamp", "unit": "us"},
+    "channels": {
+        "gyro_x": {"variable": "sensor_combined_0", "column": "gyro_rad[0]", "unit": "rad/s"},
+        "accel_z": {
+            "variable": "sensor_combined_0",
+            "column": "accelerometer_m_s2[2]",
+            "unit": "m/s^2",
+        },
+    },
+}
+DATAFLASH: dict[str, Any] = {
+    "time": {"column": "TimeUS", "unit": "us"},
+    "channels": {
+        "gyro_x": {"variable": "IMU_0", "column": "GyrX", "unit": "rad/s"},
+        "accel_z": {"variable": "IMU_0", "column": "AccZ", "unit": "m/s^2"},
+    },
+}
+
+
+def overwritten(data: bytes) -> bytes:
+    return data[:50_000] + b"\xff" * 100 + data[50_100:]
+
+
+FLIGHT = [
+    Entry("ulog", file(lambda: ulog(figures()), "log.ulg"), ULOG, kept(ROWS)),
+    Entry("ulog in gzip", file(lambda: gzip.compress(ulog(figures())), "log.gz"), ULOG, kept(ROWS)),
+    Entry(
+        "ulog that is damaged",  # to the next mark of a place, in less than 100 records
+        file(lambda: overwritten(ulog(figures())), "log.ulg"),
+        ULOG,
+        kept(944, "damaged_bytes", "missing_samples"),
+    ),
+    Entry(
+        "ulog without the topic",
+        file(lambda: ulog(figures()).replace(b"sensor_combined", b"sensor_combine_"), "log.ulg"),
+        ULOG,
+        Rejected(r"log\.ulg: expected one kind of message with .* called sensor_combined_0"),
+    ),
+    Entry("dataflash", file(lambda: dataflash(figures()), "log.bin"), DATAFLASH, kept(ROWS)),
+    Entry(
+        "dataflash that is damaged",
+        file(lambda: overwritten(dataflash(figures())), "log.bin"),
+        DATAFLASH,
+        kept(ROWS - 1, "damaged_bytes", "missing_samples"),
+    ),
+    Entry(
+        "dataflash cut short",
+        file(lambda: dataflash(figures())[:-30], "log.bin"),
+        DATAFLASH,
+        kept(ROWS, "incomplete_last_record"),
+    ),
+]
+
 PACKED = [
     Entry(
         "vectornav in gzip cut short",
@@ -259,4 +358,4 @@ PACKED = [
     ),
 ]
 
-BINARY = [*RECEIVERS, *PACKED]
+BINARY = [*RECEIVERS, *FLIGHT, *PACKED]

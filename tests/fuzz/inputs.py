@@ -31,13 +31,20 @@ _BAGS = [
 ]
 _SEEDS: Mapping[str, list[Entry]] = {
     "csv": [*text.ENTRIES, *stamps.ENTRIES, *exports.TEXTS, *exports.FOLDERS, *packed.ENTRIES],
-    "vectornav": [*streams.TEXTS, *streams.PACKED],
+    "vectornav": [
+        *(entry for entry in streams.TEXTS if not entry.name.startswith("novatel")),
+        *streams.PACKED,
+    ],
     "ubx": streams.RECEIVERS,
+    "novatel": [entry for entry in streams.TEXTS if entry.name.startswith("novatel")],
+    "ulog": [entry for entry in streams.FLIGHT if entry.name.startswith("ulog")],
+    "dataflash": [entry for entry in streams.FLIGHT if entry.name.startswith("dataflash")],
     "rosbag": _BAGS,
     "matlab": scientific.MATLAB,
     "numpy": arrays.NUMPY,
     "arrow": arrays.ARROW,
     "hdf5": scientific.HDF5,
+    "excel": scientific.EXCEL,
 }
 READERS = tuple(_SEEDS)
 """The readers that there are inputs for."""
@@ -74,7 +81,7 @@ def _shortened(data: bytes) -> bytes:
             # What writes archives takes no empty name.
             names = [name for name in packed.namelist() if name]
             return archive({name: _shortened(packed.read(name)) for name in names})
-    if data.startswith(b"\xb5\x62"):
+    if data.startswith((b"\xb5\x62", b"ULog", b"\xa3\x95")):
         return data[:_BYTES]
     lines = data.splitlines(keepends=True)
     return b"".join(lines[:_LINES]) if b"\0" not in data else data

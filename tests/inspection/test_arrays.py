@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import struct
 from pathlib import Path
 from typing import Any
 
@@ -30,6 +31,7 @@ from tests.inspection.drafts import (
     sensor_of,
     three,
 )
+from tests.readers import test_matlab
 
 
 @pytest.mark.parametrize("kind", WRITERS)
@@ -57,6 +59,63 @@ def test_vectors_in_a_structure_with_a_rate(tmp_path: Path, si: Columns, kind: s
     WRITERS[kind](tmp_path / "a", {"imu": held, "fs": np.array([[100.0]])})
     found = drafted(tmp_path / "a", {f"gyro_{axis}": si[f"gyro_{axis}"] for axis in "xyz"})
     assert "rate: 100 Hz" in found.block
+
+
+@pytest.mark.parametrize("kind", ["v5", "v7.3"])
+def test_a_structure_of_navego(tmp_path: Path, si: Columns, kind: str) -> None:
+    imu = {"t": si["time"][:, None], "fb": three(si, "accel"), "wb": three(si, "gyro")}
+    held = {"imu1": imu | {"freq": np.array([[100.0]]), "m_psd": np.ones((ROWS, 2))}}
+    WRITERS[kind](tmp_path / "a", held)
+    truth = dict(list(si.items())[:7])
+    found = drafted(tmp_path / "a", truth)
+    assert "as NaveGo's wb and fb are" in found.block
+    assert "# not taken: imu1/m_psd (no column is named as one of a gyro" in found.block
+    # Without its companion the field says no unit.
+    WRITERS[kind](tmp_path / "b", {"imu1": {key: imu[key] for key in ("t", "wb")}})
+    drafted(tmp_path / "b", {name: truth[name] for name in list(truth)[:4]}, gyro="rad/s")
+
+
+@pytest.mark.parametrize("kind", WRITERS)
+def test_recordings_of_noise_are_measurements(tmp_path: Path, si: Columns, kind: str) -> None:
+    held = {"Gyr_noise": three(si, "gyro"), "Acc_noise": three(si, "accel"), "t": si["time"]}
+    WRITERS[kind](tmp_path / "a", held)
+    drafted(tmp_path / "a", dict(list(si.items())[:7]), gyro="rad/s")
+    # Beside the samples they are what a data sheet or a filter says.
+    held |= {"gyro": -held["Gyr_noise"], "acc": -held["Acc_noise"]}
+    WRITERS[kind](tmp_path / "b", held)
+    truth = {name: -values if name != "time" else values for name, values in si.items()}
+    drafted(tmp_path / "b", dict(list(truth.items())[:7]), gyro="rad/s")
+
+
+@pytest.mark.parametrize("kind", WRITERS)
+def test_arrays_that_no_name_identifies_are_listed(tmp_path: Path, si: Columns, kind: str) -> None:
+    held = {name: three(si, "gyro") for name in ("gyro", "x1", "x2")}
+    WRITERS[kind](tmp_path / "a", held)
+    found = inspect(tmp_path / "a")
+    assert "# not taken: x1, x2 (no column is named as one of a gyro" in found.block
+    WRITERS[kind](tmp_path / "b", {name: held[name] for name in ("x1", "x2")})
+    found = inspect(tmp_path / "b")
+    assert 'gyro_x: {variable: "?", column: "?", unit: "?"}' in found.block
+
+
+def test_a_timetable_is_named_with_the_way_to_save_its_columns(tmp_path: Path, si: Columns) -> None:
+    # Version 5 has the class 17, version 7.3 numbers that refer to hidden objects.
+    opaque = test_matlab.element("<", 6, struct.pack("<II", 17, 0))
+    for text in (b"tt", b"MCOS", b"timetable"):
+        opaque += test_matlab.element("<", 1, text)
+    opaque = struct.pack("<II", 14, len(opaque)) + opaque
+    gyro = test_matlab.element("<", 9, three(si, "gyro").T.tobytes())
+    matrix = test_matlab.variable("<", "gyro", (ROWS, 3), gyro)
+    old = test_matlab.by_hand(tmp_path / "old.mat", "<", opaque, matrix)
+    matlab_73(tmp_path / "new.mat", {"gyro": three(si, "gyro"), "tt": np.arange(1.0, 7.0)})
+    with h5py.File(tmp_path / "new.mat", "r+") as file:
+        file["tt"].attrs["MATLAB_class"] = np.bytes_("timetable")
+        file["gyro"].attrs["MATLAB_class"] = np.bytes_("double")
+    for path in (old, tmp_path / "new.mat"):
+        found = inspect(path)
+        assert "# not taken: tt (is a table, a timetable or another object" in found.block
+        assert "t = seconds(x.Time)" in found.block
+        assert "3 channels" in found.proof.said
 
 
 @pytest.mark.parametrize("kind", WRITERS)

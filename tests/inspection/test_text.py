@@ -7,6 +7,7 @@ import gzip
 import io
 import lzma
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -15,8 +16,9 @@ import pytest
 import yaml
 from backports import zstd
 
-from imubench_pipeline.readers.inspection import inspect
-from imubench_pipeline.settings.sensor import CHANNELS
+from imubench_pipeline.readers import RecordingError
+from imubench_pipeline.readers.inspection import Inspection, inspect
+from imubench_pipeline.settings.sensor import CHANNELS, LogFormat
 from imubench_pipeline.settings.validation import ConfigError
 from tests.conftest import few
 from tests.inspection.drafts import (
@@ -32,7 +34,9 @@ from tests.inspection.drafts import (
     saved,
     sensor_of,
     text,
+    three,
 )
+from tests.readers import text_logs
 
 
 @pytest.mark.parametrize("way", NAMED)
@@ -306,3 +310,105 @@ def test_names_that_yaml_would_misread(tmp_path: Path, si: Columns) -> None:
     columns += [(si[f"gyro_{axis}"] / DEG).tolist() for axis in "xyz"]
     path = saved(tmp_path, text([name.replace("\n", " ") for name in names], columns, "\t"))
     drafted(path, {name: si[name] for name in list(si)[:4]})
+
+
+LABELLED = {
+    "a plotter": "gx:{:.6f},gy:{:.6f},gz:{:.6f},ax:{:.6f},ay:{:.6f},az:{:.6f}",
+    "tabs": "gx:{:.6f}\tgy:{:.6f}\tgz:{:.6f}\tax:{:.6f}\tay:{:.6f}\taz:{:.6f}\t",
+    "spaces and words": "Gyro X: {:.6f} Gyro Y: {:.6f} Gyro Z: {:.6f} Acc X: {:.6f} Acc Y: {:.6f} "
+    "Acc Z: {:.6f}",
+    "signs of equality": "wx={:.6f}, wy={:.6f}, wz={:.6f}, ax={:.6f}, ay={:.6f}, az={:.6f}",
+    "units": "gx(rad/s):{:.6f};gy(rad/s):{:.6f};gz(rad/s):{:.6f};ax:{:e};ay:{:e};az:{:e}",
+}
+
+
+@pytest.mark.parametrize("way", LABELLED)
+@pytest.mark.parametrize("end", ["\n", "\r\n"])
+def test_labels_before_the_values(tmp_path: Path, si: Columns, way: str, end: str) -> None:
+    rows = np.column_stack([si[name] for name in list(si)[1:7]])
+    lines = [LABELLED[way].format(*row) for row in rows]
+    stated = {} if way == "units" else {"gyro": "rad/s"}
+    path = saved(tmp_path, end.join(["MPU6050 Found!", lines[0][-20:], *lines, ""]), "a.txt")
+    found = inspect(path)
+    assert set(found.draft.unfilled()) <= {
+        "rate",
+        *(f"channels.gyro_{axis}.unit" for axis in "xyz"),
+    }
+    assert "with a label before each value" in found.listing
+    sensor = sensor_of(replace_rate(found), **stated)
+    same(read_as_drafted(path, sensor), dict(list(si.items())[1:7]), 1e-6)
+
+
+def replace_rate(found: Inspection) -> Inspection:
+    return replace(found, block=found.block.replace('rate: "?"', "rate: 100 Hz"))
+
+
+def test_labels_behind_a_stamp_of_the_monitor(tmp_path: Path, si: Columns) -> None:
+    lines = []
+    for row, (time, gyro, accel) in enumerate(
+        zip(si["time"], si["gyro_x"], si["accel_z"], strict=True)
+    ):
+        stamp = f"23:59:{58 + int(time):02d}.{row % 100 * 10:03d}"
+        if time >= 2:
+            stamp = f"00:00:{int(time) - 2:02d}.{row % 100 * 10:03d}"
+        lines.append(f"{stamp} -> gyro_x:{gyro:.6f},accel_z:{accel:.6f}")
+    path = saved(tmp_path, "\n".join(lines) + "\n", "a.txt")
+    truth = {name: si[name] for name in ("time", "gyro_x", "accel_z")}
+    found = inspect(path)
+    assert "time: {column: time, format: '%H:%M:%S.%f'}" in found.block
+    assert "100 Hz from the stamps" in found.proof.said
+    log = LogFormat.model_validate(
+        {
+            "time": {"column": "time", "format": "%H:%M:%S.%f"},
+            "channels": {
+                "gyro_x": {"column": "gyro_x", "unit": "rad/s"},
+                "accel_z": {"column": "accel_z", "unit": "m/s^2"},
+            },
+        }
+    )
+    result, time, _ = text_logs.columns(path, log)
+    assert time is not None
+    same(result | {"time": time}, truth, 1e-6)
+
+
+def test_a_line_with_other_labels_is_found(tmp_path: Path) -> None:
+    lines = ["gx:1.5,ax:2.5"] * 900 + ["ax:2.5,gx:1.5"] + ["gx:1.5,ax:2.5"] * 100
+    path = saved(tmp_path, "\n".join(lines) + "\n", "a.txt")
+    channels = {"gyro_x": {"column": "gx", "unit": "rad/s"}}
+    log = LogFormat.model_validate({"rate": "100 Hz", "channels": channels})
+    with pytest.raises(RecordingError, match=r"line 901, column 'gx': found 'ax:2.5', expected"):
+        text_logs.columns(path, log)
+
+
+def test_text_for_people_is_named_with_the_way_to_print_columns(tmp_path: Path) -> None:
+    record = (
+        "Acceleration X: 0.03, Y: -0.02, Z: 9.78 m/s^2\nRotation X: 0.0019, Y: 0.0038, Z: 0.0060 "
+        "rad/s\nTemperature: 24.10 degC\n\n"
+    )
+    begin = "MPU6050 Found!\nAccelerometer range set to: +-8G\n\n"
+    stamped = "".join(f"12:00:00.000 -> {line}\n" for line in record.splitlines())
+    for lines in (begin + record * 50, begin + stamped * 50):
+        path = saved(tmp_path, lines, "a.txt")
+        with pytest.raises(RecordingError, match=r"'.*Temperature: 24\.10 degC'.*Serial\.print\("):
+            inspect(path)
+
+
+def test_decoded_logs_of_betaflight(tmp_path: Path, si: Columns) -> None:
+    names = ["loopIteration", " time (us)", " axisP[0]"]
+    names += [f" gyroADC[{axis}]" for axis in range(3)] + [
+        f" accSmooth[{axis}]" for axis in range(3)
+    ]
+    counts = np.rint(np.column_stack([si[n] / DEG for n in CHANNELS[:3]])).astype(int)
+    counts = np.column_stack([counts, np.rint(three(si, "accel", 2048 / G)).astype(int)])
+    lines = [
+        f"{row}, {row * 10_000}, 3, {', '.join(map(str, each))}"
+        for row, each in enumerate(counts.tolist())
+    ]
+    path = saved(tmp_path, "\n".join([",".join(names), *lines, ""]))
+    found = inspect(path)
+    assert set(found.draft.unfilled()) == {f"channels.{name}.unit" for name in CHANNELS}
+    assert "with blackbox_high_resolution" in found.block
+    assert "then 'unit: g, scale: 0.00048828125'" in found.block
+    names = [f"{name} (deg/s)" if "gyro" in name else name for name in names]
+    path = saved(tmp_path, "\n".join([",".join(names), *lines, ""]))
+    assert inspect(path).draft.log()["channels"]["gyro_x"]["unit"] == "deg/s"

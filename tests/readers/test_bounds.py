@@ -46,6 +46,7 @@ DEAR = (
     *("20000 links", "5000 groups deep"),  # a cycle of groups
     "one unit of 10 MB for 300",  # names that clear a terminal
     *("a chunk of more", "an MCAP chunk that is longer than it says"),  # that of ROS 1
+    "1100 topics of 1000 fields",  # fields of fields without end
     "a topic of 10 MB",  # a connection whose number has 1 MB
 )
 """Each takes a second or more to write or to refuse, or is refused for what another one is.

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import gzip
 import re
+from itertools import product
 from pathlib import Path
 from typing import get_args
 
@@ -13,6 +15,7 @@ from imubench_pipeline.readers import RecordingError
 from imubench_pipeline.readers.content import recognise_content
 from imubench_pipeline.readers.contents import list_contents
 from imubench_pipeline.readers.formats import FILE_FORMATS, TEXT
+from imubench_pipeline.readers.other_formats import OTHER_FORMATS, find_other_format
 from imubench_pipeline.settings.sensor import Reader
 from tests.corpus import ENTRIES
 from tests.readers.test_formats import SAMPLES
@@ -62,7 +65,10 @@ def beginnings(data: bytes) -> list[bytes]:
 @pytest.mark.parametrize("reader", get_args(Reader))
 def test_the_beginning_of_a_log_is_of_its_format(tmp_path: Path, reader: Reader) -> None:
     whole = ENTRIES[SAMPLES[reader]].write(tmp_path)
-    if whole.suffix == ".npz":  # of whose members the directory at the end tells, or a scan
+    if whole.suffix in (
+        ".npz",
+        ".xlsx",
+    ):  # of whose members the directory at the end tells, or a scan
         return
     for data in beginnings(whole.read_bytes()):
         path = written(tmp_path, data, "cut")
@@ -76,14 +82,35 @@ def test_the_beginning_of_a_log_is_of_its_format(tmp_path: Path, reader: Reader)
 @pytest.mark.parametrize(
     ("begin", "said"),
     [
-        (b"ULog\x01\x12\x35\x01", "a log of PX4 .*'ulog2csv'"),
-        (b"\xa3\x95\x80\x80\x59FMT", "a log of ArduPilot .*'mavlogdump.py"),
         (b"a.csv".ljust(257, b"\0") + b"ustar\x0000", "a tar archive.*unpack it"),
+        (b"H Product:Blackbox flight data recorder by Nicholas Sherlock\n", "blackbox_decode"),
+        (b"FMT, 128, 89, FMT, BBnNZ, Type,Length,Name,Format,Columns\n", r"take the \.BIN"),
+        (b"\xfa\xff\x32\xff", "of Xsens .*MT Manager"),
+        (b"\xaa\x44\x13\x28", "NovAtel receiver.*RAWIMUSXA is read"),
+        (b"$@\x12\x34", "Septentrio .*bin2asc"),
+        (b"X\n\0\0\0\3\0\4\1\0", "data of R.*write.csv"),
+        (gzip.compress(b"RDX3\nX\n\0\0\0\3", mtime=0), "data of R.*write.csv"),
+        (b"\x80\x04\x95\x10", "a pickle of Python.*numpy.savez"),
+        (b"\xd4\xc3\xb2\xa1\2\0\4\0", "a capture of network packets"),
+        (b"\0\0\0\x20ftypisom", "a video.*telemetry"),
+        (b"%PDF-1.7\n", "a PDF document"),
+        (b"\x89PNG\r\n\x1a\n", "an image"),
+        (b"\x7fELF\2\1\1", "a program"),
     ],
 )
 def test_a_format_that_is_not_read_is_named(tmp_path: Path, begin: bytes, said: str) -> None:
-    path = written(tmp_path, begin + bytes(300))
+    path = written(tmp_path, begin if begin[:2] == b"\x1f\x8b" else begin + bytes(300))
     with pytest.raises(RecordingError, match=said):
         list_contents(path)
     with pytest.raises(RecordingError, match=said):
         columns(path, log_format())
+
+
+def test_no_format_that_is_read_is_taken_for_another() -> None:
+    marks = [mark for each in OTHER_FORMATS if each.place == 0 for mark in each.marks]
+    begins = [mark for each in FILE_FORMATS.values() for mark in each.signature.begins]
+    for mark, begin in product(marks, begins):
+        assert not mark.startswith(begin) and not begin.startswith(mark)
+    assert len(set(marks)) == len(marks)
+    for text in ("time,gx\n", "# a log\n", "%RAWIMUSA,1", "$VNIMU,", "ue,x\n", "MZ,MX\n", "H 1\n"):
+        assert find_other_format(text.encode()) is None

@@ -29,6 +29,10 @@ SAMPLES: dict[Reader, str] = {
     "csv": "axis in coarse steps",
     "vectornav": "vectornav with a counter",
     "ubx": "ubx of ESF-MEAS",
+    "novatel": "novatel",
+    "ulog": "ulog",
+    "dataflash": "dataflash",
+    "excel": "excel",
     "rosbag": "ros 1 bag",
     "matlab": "matlab 5",
     "numpy": "npz",
@@ -71,7 +75,10 @@ print(json.dumps(said), flush=True)
 """
 """Says of each format what its library lacks."""
 
-WITHOUT = "import sys\nsys.modules |= dict.fromkeys(['rosbags', 'lz4', 'h5py'])" + LOADED
+WITHOUT = (
+    "import sys\nsys.modules |= dict.fromkeys(['rosbags', 'lz4', 'h5py', 'python_calamine'])"
+    + LOADED
+)
 
 
 # Every day the same is asked where they are not installed: tests/test_extras.py.
@@ -82,9 +89,9 @@ def test_a_library_that_is_not_installed_is_named() -> None:
     )
     said = json.loads(done.stdout)
     extras = {name: form.extra for name, form in FILE_FORMATS.items() if form.extra}
-    assert set(said) == set(extras) == {"rosbag", "matlab", "hdf5"}
+    assert set(said) == set(extras) == {"rosbag", "matlab", "hdf5", "excel"}
     for name, extra in extras.items():
-        library = {"ros": "rosbags", "hdf5": "h5py"}[extra]
+        library = {"ros": "rosbags", "hdf5": "h5py", "excel": "python_calamine"}[extra]
         assert f"{library}" in said[name]
         assert f"is not installed: pip install 'imubench_pipeline[{extra}]'" in said[name]
 

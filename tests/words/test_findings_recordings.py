@@ -112,6 +112,9 @@ EXAMPLES: list[tuple[str, FindingData]] = [
     ("", files.UnreadableSentence("a.txt", 1, "$VNIMU", 12)),
     ("", files.OtherSentences("a.txt", 2, ("VNYPR", "VNQTN"))),
     ("", files.NotSentences("a.txt", 3)),
+    ("", files.UncheckedLogs("a.asc", 1, "RAWIMUSA")),
+    ("", files.LateRecords("a.bag", 3, 0.01)),
+    ("", files.DamagedBytes("a.ulg", 100)),
 ]  # fmt: skip
 
 

@@ -38,6 +38,11 @@ MAX_OBJECTS, MAX_GROUP_DEPTH = 20_000, 64  # objects of an HDF5 file, and depth 
 MAX_NPY_HEADER = 10_000  # bytes; NumPy has the same limit, but reads a header first
 MAX_STRUCTURE_DEPTH, MAX_MATLAB_NAME, MAX_DIMENSIONS = 16, 256, 32  # of MATLAB 5; bytes of a name
 
+MAX_ULOG_FIELDS = 1024  # numbers of a message of ULog, and its topics; PX4 has some hundred
+MAX_SHEETS, MAX_SHEET_MEMORY = 100, 1 << 30
+"""Sheets of a workbook that are read, and memory of the process that reads them, bytes: a sheet has
+at most 2**20 rows."""
+
 # --------------------------------------------------------------------------------------- bags
 
 MAX_BAG_CHUNK, MAX_BAG_OVERLAP = 1 << 27, 96 << 20

@@ -7,22 +7,12 @@ from pathlib import Path
 from imubench_pipeline.readers import compressed
 from imubench_pipeline.readers.file_format import FileFormat
 from imubench_pipeline.readers.formats import FILE_FORMATS, TEXT
+from imubench_pipeline.readers.other_formats import find_other_format
 from imubench_pipeline.settings.sensor import Reader
 from imubench_pipeline.tables.findings import RecordingError
 
 _PROBE_BYTES = 1 << 16
 _ZIP_MAGIC = b"PK\x03\x04"
-
-
-_UNSUPPORTED_FORMATS = {
-    "a log of PX4 (ULog)": (0, b"ULog\x01\x12\x35", "make CSV of it with 'ulog2csv' (pyulog)"),
-    "a log of ArduPilot (DataFlash)": (
-        *(0, b"\xa3\x95\x80\x80"),
-        "make CSV of it with 'mavlogdump.py --format csv' (pymavlink)",
-    ),
-    "a tar archive": (257, b"ustar", "unpack it"),
-}
-"""Known files that are not read: place and bytes of their signature, and how to convert them."""
 
 
 def recognise_folder(path: Path) -> FileFormat | None:
@@ -55,9 +45,11 @@ def recognise_content(path: Path) -> tuple[FileFormat, str]:
             raise RecordingError(f"{path.name}: is neither a file nor a folder; expected a log")
         try:
             with path.open("rb") as file:
-                packed = _name_compression(file.read(compressed.MAX_MAGIC_LENGTH))
+                begin = file.read(_PROBE_BYTES)
         except OSError as error:
             raise RecordingError(f"{path.name}: cannot be opened ({error.strerror})") from None
+        packed = _name_compression(begin)
+        _refuse_other_format(path, begin)
     if packed == "zip" and path.is_file():
         endings = {member.suffix for member in compressed.list_members(path)}
         for file_format in FILE_FORMATS.values():
@@ -71,12 +63,7 @@ def recognise_content(path: Path) -> tuple[FileFormat, str]:
             f"{path.name}: is compressed twice, by {packed} and inside by {again}; expected once: "
             "unpack it"
         )
-    for what, (place, mark, advice) in _UNSUPPORTED_FORMATS.items():
-        if begin.startswith(mark, place):
-            raise RecordingError(
-                f"{path.name}: is {what}, which is not read; expected a format that 'imubench "
-                f"formats' lists: {advice}"
-            )
+    _refuse_other_format(path, begin)
     signatures = [(each, each.signature) for each in FILE_FORMATS.values()]
     begun = (each for each, its in signatures if begin.startswith(its.begins))
     matching = (each for each, its in signatures if its.tells is not None and its.tells(begin))
@@ -91,3 +78,12 @@ def recognise_content(path: Path) -> tuple[FileFormat, str]:
 
 def _name_compression(begin: bytes) -> str:
     return "zip" if begin.startswith(_ZIP_MAGIC) else compressed.recognise_compression(begin)
+
+
+def _refuse_other_format(path: Path, begin: bytes) -> None:
+    """Raise `RecordingError` if a file is known from its first bytes, but not read."""
+    if (other := find_other_format(begin)) is not None:
+        raise RecordingError(
+            f"{path.name}: is {other.name}, which is not read; expected a format that 'imubench "
+            f"formats' lists: {other.advice}"
+        )

@@ -94,6 +94,8 @@ class LogColumn:
     """For dates in text: ``iso8601`` or matching patterns, the most plausible first; a pattern may
     be for a date only or a time of day only."""
     address: str | int | None = None  # value of `column` under `time`, if it differs from `source`
+    scale: float | None = None  # unit per count as written; ``values`` are scaled
+    hint: str = ""  # what is known of unit and scale, for a comment
 
     @classmethod
     def of_numbers(

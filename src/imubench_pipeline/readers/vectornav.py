@@ -188,14 +188,16 @@ def verify_checksums(bodies: list[bytes], checks: list[bytes]) -> list[bool]:
 
 
 def parse_fields(
-    kind: str, rows: list[Row], positions: set[int]
+    bodies: list[bytes], width: int, positions: set[int]
 ) -> tuple[dict[int, NDArray[np.float64]], int]:
-    """Return fields of records by position, and the number of unreadable sentences."""
-    width = len(FIELDS[kind])
-    whole = [number for number, row in enumerate(rows) if row.body.count(b",") == width - 1]
-    unread = sum(1 for row in rows if row.body) - len(whole)
-    fields = {position: np.full(len(rows), np.nan) for position in positions}
-    texts = [rows[number].body for number in whole]
+    """Return fields of records by position, and the number of unreadable sentences.
+
+    ``width``: number of fields of a sentence. An empty one is a missing sample.
+    """
+    whole = [number for number, body in enumerate(bodies) if body.count(b",") == width - 1]
+    unread = sum(map(bool, bodies)) - len(whole)
+    fields = {position: np.full(len(bodies), np.nan) for position in positions}
+    texts = [bodies[number] for number in whole]
     names = [str(position) for position in range(width)]
     wanted = [str(position) for position in sorted(positions)]
     table = None
@@ -272,7 +274,8 @@ class VectorNavFile(LogFile):
                         "file, or drop it and state 'rate'"
                     )
                 time = clock.seconds(stamps, ~missing)
-            fields, unread = parse_fields(kind, rows, set(positions.values()))
+            bodies = [row.body for row in rows]
+            fields, unread = parse_fields(bodies, len(FIELDS[kind]), set(positions.values()))
             records.unread += unread
             columns = {
                 name: self.to_si(name, fields[position]) for name, position in positions.items()
@@ -398,7 +401,8 @@ def list_sentences(path: Path, file_format: formats.FileFormat) -> list[formats.
     described = []
     for kind in present:
         first = rows[kind][: formats.MAX_EXAMINED_RECORDS]
-        fields, _ = parse_fields(kind, first, set(range(len(FIELDS[kind]))))
+        width = len(FIELDS[kind])
+        fields, _ = parse_fields([row.body for row in first], width, set(range(width)))
         columns = []
         for place, name in enumerate(FIELDS[kind]):
             source = name if len(present) == 1 else f"{kind}.{name}"

@@ -12,6 +12,7 @@ import pyarrow as pa
 from numpy.typing import NDArray
 
 from imubench_pipeline.readers import LogFile
+from imubench_pipeline.readers.late import sort_late_records
 from imubench_pipeline.recordings.quality import knocks, levels
 from imubench_pipeline.recordings.quality.summary import ColumnSummary
 from imubench_pipeline.recordings.recording import BESIDE, ROW_GROUP, LogWriter
@@ -110,7 +111,7 @@ def read_part(file: LogFile, use: UsedPart, scratch: Path, number: int) -> Part:
     rate = file.log.rate_hz
     read_rows = 0
     with open_part(file, file.sources, scratch, f"part{number}") as (part, write):
-        for batch in file.batches():
+        for batch in sort_late_records(file):
             clock, columns = batch.time, batch.columns
             if use.start > 0.0 or use.end is not None:
                 if clock is None:

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Literal
 
-Extra = Literal["workflow", "ros", "hdf5"]
+Extra = Literal["workflow", "ros", "hdf5", "excel"]
 """The table `project.optional-dependencies` of ``pyproject.toml`` says what is in each."""
 
 

@@ -138,7 +138,8 @@ def _check_stamp_format(form: str) -> None:
         raise ValueError(f"format {form!r} has %{repeated[0]} twice")
 
 
-Reader = Literal["csv", "vectornav", "ubx", "rosbag", "matlab", "numpy", "arrow", "hdf5"]
+Reader = Literal["csv", "vectornav", "ubx", "novatel", "ulog", "dataflash", "rosbag", "matlab",
+                 "numpy", "arrow", "hdf5", "excel"]  # fmt: skip
 """The formats of log files; each is declared in a module of this name in ``readers/formats``."""
 
 

@@ -2,7 +2,7 @@
 
 A column is a number, the column of a matrix as MATLAB shows it, counted from 1; or the name of a
 variable that is a vector. ``variable`` names the matrix; a field of a structure is ``imu/gyro``.
-Tables, timetables and cells are not arrays: save ``table2array`` of them.
+Tables, timetables and cells are not arrays: their columns have to be saved.
 """
 
 import io
@@ -25,6 +25,13 @@ from imubench_pipeline.readers.arrays.matlab_4 import HEADER_BYTES, parse_header
 from imubench_pipeline.readers.bounds import MAX_DIMENSIONS, MAX_MATLAB_NAME, MAX_STRUCTURE_DEPTH
 
 _MAX_CLASS_LENGTH = 64
+_NUMERIC_CLASSES = frozenset(
+    b"double single logical int8 uint8 int16 uint16 int32 uint32 int64 uint64".split()
+)
+_OBJECT_FAULT = (
+    "is a table, a timetable or another object, which only MATLAB reads; expected a vector or a "
+    "matrix: save its columns, as in t = seconds(x.Time); v = x.Variables; save('log.mat','t','v')"
+)
 _COMPLEX_FAULT = "holds complex numbers; expected numbers: save real() of it"
 
 
@@ -68,8 +75,10 @@ def _list_variables_of_7(file: h5py.File) -> Iterator[table.Table]:
             is_text = kind.kind == "S" and attributes.get_id("MATLAB_class").shape == ()
             if not is_text or kind.itemsize > _MAX_CLASS_LENGTH:
                 data_set.fault = "has a damaged class; copy the file again"
-            elif np.bytes_(attributes["MATLAB_class"]) == b"char":
+            elif (kind := np.bytes_(attributes["MATLAB_class"])) == b"char":
                 data_set.fault = "holds text; expected numbers"
+            elif kind not in _NUMERIC_CLASSES:
+                data_set.fault = _OBJECT_FAULT
         yield data_set
 
 
@@ -116,7 +125,7 @@ _CLASS_FAULTS = {
     4: "holds text; expected numbers",
     5: "is sparse; expected a vector or a matrix: save full() of it",
     16: "is a function; expected a vector or a matrix",
-    17: "is a table or an object; expected a vector or a matrix: save table2array of it",
+    17: _OBJECT_FAULT,
 }
 _FLAG_COMPLEX = 0x0800
 _CLASS_TABLE = 17

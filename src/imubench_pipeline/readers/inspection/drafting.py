@@ -4,6 +4,7 @@ import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from difflib import SequenceMatcher
+from functools import partial
 from pathlib import PurePosixPath
 from typing import Any
 
@@ -49,6 +50,7 @@ class Group:
     written: str  # text of the file in the place of the unit, if it is no known unit
     rank: int  # see `imubench_pipeline.readers.inspection.names.Meaning`
     guessed: str = ""  # reason for the choice of the columns, if it is not from their names
+    hint: str = ""  # what is known of unit and scale
 
     @property
     def names(self) -> str:
@@ -108,6 +110,8 @@ def _group_by_name(table: LogTable, contents: Contents) -> list[Group]:
         if column.kind != "number":
             continue
         label = column.label or f"{context}[{column.source}]"
+        if column.label == "T" and parse_unit(column.unit or "", "temperature"):
+            label = f"T ({column.unit})"  # too short without its unit
         meant = interpret_label(label, context)
         if meant is not None:
             if meant.quantity != "temperature":
@@ -124,7 +128,29 @@ def _group_by_name(table: LogTable, contents: Contents) -> list[Group]:
             axes = dict(zip(_AXES, columns, strict=True)) if len(columns) == 3 else {}
         if axes:
             result.append(_make_group(quantity, table, axes))
-    return result + list(_find_roll_pitch_yaw(table, result))
+    return [*map(partial(_add_convention, contents), result), *_find_roll_pitch_yaw(table, result)]
+
+
+_BETAFLIGHT_RATE = (
+    "of Betaflight: 1 deg/s per count, or 0.1 deg/s (scale: 0.1) with blackbox_high_resolution"
+)
+_HINTS_BY_STEM = {
+    "gyrounfilt": _BETAFLIGHT_RATE,
+    "gyroadc": f"{_BETAFLIGHT_RATE}; filtered: gyroUnfilt is not",
+    "accsmooth": "of Betaflight, filtered: acc_1G in the header of its log is 1 g",
+}
+"""What is known of columns without a unit, by their stem."""
+
+_NAVEGO_UNITS = {"wb": "rad/s", "fb": "m/s^2"}  # fields of its structures of sensors
+
+
+def _add_convention(contents: Contents, group: Group) -> Group:
+    """Return a group with the unit of NaveGo's structures, if it is in one."""
+    above, _, name = group.table.name.rpartition("/")
+    names = {table.name for table in contents.tables}
+    if name not in _NAVEGO_UNITS or not {f"{above}/{each}" for each in _NAVEGO_UNITS} <= names:
+        return group
+    return replace(group, unit=_NAVEGO_UNITS[name], guessed="as NaveGo's wb and fb are")
 
 
 def _make_group(
@@ -142,7 +168,8 @@ def _make_group(
     rank = max(meaning.rank for meaning in meanings)
     if table.file_format.measured_by_name:
         rank = DERIVED if rank == DERIVED else PLAIN
-    return Group(quantity, table, columns, unit if same else None, written, rank)
+    hint = column.hint or ("" if unit else _HINTS_BY_STEM.get(meanings[0].stem, ""))
+    return Group(quantity, table, columns, unit if same else None, written, rank, hint=hint)
 
 
 def _find_roll_pitch_yaw(table: LogTable, named: list[Group]) -> Iterator[Group]:
@@ -350,7 +377,8 @@ def _is_local(groups: Sequence[Group], clock: Clock | None) -> bool:
     if clock is None:
         return True
     tables = _collect_tables(groups, None)
-    if len({table.file for table in tables}) < len(tables):
+    own_clocks = all(table.file_format.clock_of == "variable" for table in tables)
+    if len({table.file for table in tables}) < len(tables) and not own_clocks:
         return False
     return len(tables) > 1 or any(clock.column is c for t in tables for c in t.columns)
 
@@ -399,11 +427,12 @@ def draft_sensor_file(contents: Contents, model: str | None = None) -> Draft:
     if choice.temperature is not None:
         _add_temperature(drafted, choice.temperature, alone)
     if not drafted.channels:
-        entry = Entry(
-            Source(column=UNKNOWN, unit=UNKNOWN), "no column name identifies it: fill in, or remove"
-        )
+        several = sum(table.variable is not None for table in contents.tables) > 1
+        source = Source(variable=UNKNOWN if several else None, column=UNKNOWN, unit=UNKNOWN)
+        entry = Entry(source, "no column name identifies it: fill in, or remove")
         drafted.channels = dict.fromkeys(CHANNELS, entry)
     drafted.left_over += [f"not taken: {_name_group(g)} ({why})" for g, why in choice.left]
+    drafted.left_over += _list_unused_tables(contents, choice)
     if choice.other_clocks:
         names = _join_names(str(clock.entry.value.column) for clock in choice.other_clocks)
         drafted.left_over.append(f"also a time: {names}")
@@ -415,9 +444,29 @@ def draft_sensor_file(contents: Contents, model: str | None = None) -> Draft:
     return drafted
 
 
+def _list_unused_tables(contents: Contents, choice: Choice) -> list[str]:
+    """Return remarks on the arrays, topics and files of which no column is mentioned otherwise."""
+    groups = [choice.gyro, choice.accel, choice.temperature, *(group for group, _ in choice.left)]
+    used = {id(group.table) for group in groups if group is not None}
+    used |= {id(choice.anchor)} if choice.anchor else set()
+    clocks = [*([choice.clock] if choice.clock else []), *choice.other_clocks]
+    of_time = {id(clock.column) for clock in clocks}
+    by_reason: dict[str, list[str]] = {}
+    for table in contents.tables:
+        if id(table) in used or of_time & set(map(id, table.columns)):
+            continue
+        name = ", ".join(text for text in (table.file, table.name) if text)
+        why = table.fault or "no column is named as one of a gyro or an accelerometer"
+        if name and table.rows != 1:
+            by_reason.setdefault(why, []).append(name)
+    return [f"not taken: {_join_names(names)} ({why})" for why, names in by_reason.items()]
+
+
 def _describe_source(table: LogTable, column: LogColumn, unit: str, alone: bool) -> Source:
     file = None if alone else table.file
-    return Source(file=file, variable=table.variable, column=column.source, unit=unit)
+    return Source(
+        file=file, variable=table.variable, column=column.source, unit=unit, scale=column.scale
+    )
 
 
 def _add_group(drafted: Draft, group: Group, alone: bool) -> None:
@@ -434,7 +483,9 @@ def _add_group(drafted: Draft, group: Group, alone: bool) -> None:
         comment = "with gravity, by its mean: so this is what the accelerometer measures"
     elif group.quantity == "accel" and group.mean_length is not None and not group.gravity_unit:
         comment = f"the mean is {group.mean_length:.4g} {unit} long, which is not gravity"
-    comment = "; ".join(text for text in (group.guessed, comment) if text)
+    if group.hint and (group.quantity == "gyro" or next(iter(group.columns.values())).hint):
+        comment = ""  # the hint says more
+    comment = "; ".join(text for text in (group.guessed, group.hint, comment) if text)
     for axis, column in group.columns.items():
         entry = Entry(_describe_source(group.table, column, unit, alone), comment)
         drafted.channels[f"{group.quantity}_{axis}"] = entry

@@ -34,12 +34,17 @@ _OTHER_QUANTITIES = re.compile(
     r"ang(?:ular|le)?acc|alpha|quat|euler|orient|attitude|angle|inclin|heading|mag(?!ic)|baro|press"
 )
 _DERIVED_QUANTITIES = re.compile(
-    r"freeacc|gravity|inertial|useracc|bias|offset|covar|varian|sigma|noise|delta|jerk|filter|"
+    r"freeacc|gravity|inertial|useracc|bias|offset|covar|varian|sigma|delta|jerk|filter|"
     r"smooth|status|world|earth|residual|error|valid|count$|delay|stamp|time"
 )
 _DERIVED_WORDS = frozenset(
     ("free", "user", "grav", "est", "ref", "var", "std", "cov", "cmd", "dv", "lpf", "ned", "enu")
 )
+_UNCERTAIN_NAMES = re.compile(r"uncal|noise")
+_FILTERED_BY_BETAFLIGHT = frozenset(("accsmooth", "gyroadc"))
+"""Its only acceleration, and its rates, are filtered: they are taken if there is nothing else."""
+
+_BODY_FRAME_RATES, _BODY_FRAME_FORCES = frozenset(("wb", "wibb")), frozenset(("fb", "fibb"))
 _LINEAR_ACCELERATION = re.compile(r"lin(?:ear)?acc")
 _SHORT_NAMES: dict[str, tuple[Quantity, int]] = {  # short names, which must be a complete word
     **dict.fromkeys(("w", "om", "av"), ("gyro", PLAIN)),
@@ -82,6 +87,8 @@ def find_quantity(text: str) -> tuple[Quantity, int] | None:
     """Return the only quantity in a text, such as the name of a file, and its rank."""
     words = split_label(text)
     joined = "".join(words)
+    if joined in _BODY_FRAME_RATES | _BODY_FRAME_FORCES:
+        return "gyro" if joined in _BODY_FRAME_RATES else "accel", PLAIN
     quantities = [quantity for quantity, pattern in _PATTERNS.items() if pattern.search(joined)]
     if len(quantities) != 1 or _OTHER_QUANTITIES.search(joined):
         return None
@@ -104,7 +111,8 @@ def _interpret_name(name: str) -> Meaning | None:
     joined = "".join(rest)
     if _OTHER_QUANTITIES.search(joined):
         return None
-    is_gyro, is_accel = bool(_GYRO.search(joined)), bool(_ACCEL.search(joined))
+    is_gyro = bool(_GYRO.search(joined)) or joined in _BODY_FRAME_RATES
+    is_accel = bool(_ACCEL.search(joined)) or joined in _BODY_FRAME_FORCES
     if is_gyro != is_accel:
         return Meaning("gyro" if is_gyro else "accel", axis, joined, None, _rank_name(rest, joined))
     if is_gyro or not rest or axis.isdigit():
@@ -128,11 +136,13 @@ def _interpret_by_unit(quantity: Quantity, name: str, unit: str) -> Meaning | No
 
 
 def _rank_name(words: list[str], joined: str) -> int:
+    if joined in _FILTERED_BY_BETAFLIGHT:
+        return WEAK
     if _DERIVED_QUANTITIES.search(joined) or not _DERIVED_WORDS.isdisjoint(words):
         return DERIVED
     if _LINEAR_ACCELERATION.search(joined):
         return WITHOUT_GRAVITY
-    return WEAK if "uncal" in joined else PLAIN
+    return WEAK if _UNCERTAIN_NAMES.search(joined) else PLAIN
 
 
 def _find_axis(words: list[str]) -> tuple[str, list[str], str]:

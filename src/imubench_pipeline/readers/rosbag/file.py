@@ -307,7 +307,10 @@ def list_topics(path: Path, file_format: formats.FileFormat) -> list[formats.Log
     with closing(open_bag(path)) as source, explain_errors(path):
         topics, counts = source.topics(), source.counts()
         if not topics:
-            raise RecordingError(f"{path.name}: the bag has no topic; expected sensor_msgs/Imu")
+            raise RecordingError(
+                f"{path.name}: the bag has no topic that can be read; expected "
+                "sensor_msgs/Imu; 'rosbag reindex' may mend a damaged bag"
+            )
         return [
             _describe_topic(file_format, source, topic, kind, counts.get(topic))
             for topic, kind in sorted(topics.items())

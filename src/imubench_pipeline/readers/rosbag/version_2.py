@@ -174,6 +174,11 @@ def check_database(path: Path) -> None:
             kinds = database.execute(
                 "SELECT type, rootpage FROM sqlite_master WHERE lower(name) = ?", (name,)
             ).fetchall()
+            if not kinds and name in _DATABASE_TABLES[:2]:
+                raise RecordingError(
+                    f"{path.name}: the database has no table {name!r}; expected a ROS 2 bag, or "
+                    "CSV: sqlite3 -header -csv FILE 'select * from TABLE' > log.csv"
+                )
             columns = database.execute(f"PRAGMA table_xinfo({name})").fetchall()
             if any(kind != "table" or not page for kind, page in kinds) or any(
                 column[-1] for column in columns

@@ -11,6 +11,7 @@ import numpy as np
 from imubench_pipeline.readers.bounds import MAX_LINE_LENGTH
 from imubench_pipeline.readers.compressed import make_truncation_finding, open_bytes
 from imubench_pipeline.readers.holes import ZeroRuns
+from imubench_pipeline.readers.text.labels import Labels
 from imubench_pipeline.tables.findings import Finding, RecordingError, find
 from imubench_pipeline.words.findings.files import IncompleteLastRecord
 
@@ -218,7 +219,8 @@ class Records:
     """Removes everything but the records from the lines of a file.
 
     ``preamble``: lines before the first record, which a restarted logger repeats. ``runs``: of
-    spaces or tabs become one space. ``blank_is_missing``: a blank line is a cell.
+    spaces or tabs become one space. ``blank_is_missing``: a blank line is a cell. ``labels``: of
+    the values of each record, which are removed.
     """
 
     def __init__(
@@ -228,7 +230,9 @@ class Records:
         preamble: Sequence[bytes],
         runs: bool,
         blank_is_missing: bool = False,
+        labels: Labels | None = None,
     ) -> None:
+        self._labels = labels
         self._comments = tuple(comments)
         alternatives = b"|".join(re.escape(sign) for sign in self._comments)
         # A pattern that begins with the line break is five times as fast as one with ^.
@@ -270,6 +274,8 @@ class Records:
             if sign[:1] in lines and (lines.startswith(sign) or b"\n" + sign in lines):
                 lines = self._comment_lines.sub(b"", b"\n" + lines)[1:]
                 break
+        if self._labels is not None:
+            lines = self._labels.remove(lines)
         if self._runs:
             lines = _merge_spaces(lines)
         if self._blank_is_missing and lines:

@@ -296,6 +296,7 @@ def describe_table(path: Path, file_format: formats.FileFormat) -> list[formats.
         else:
             columns.append(formats.LogColumn(source, name, "text", first, unit=unit))
     names = "with names" if named else "without names"
+    names = names if layout.labels is None else "with a label before each value"
     return [
         formats.LogTable(
             file_format,

@@ -6,7 +6,7 @@ Everything is detected from the first lines; statements of the sensor file are u
 import re
 from collections import Counter, deque
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
 
@@ -22,6 +22,7 @@ from imubench_pipeline.readers.text.cells import (
     is_number,
 )
 from imubench_pipeline.readers.text.header import are_units, complete_names, find_header, is_heading
+from imubench_pipeline.readers.text.labels import Labels, find_labels, find_sentence
 from imubench_pipeline.settings.sensor import LogFormat
 from imubench_pipeline.tables.findings import RecordingError
 
@@ -50,6 +51,7 @@ class TextLayout:
     preamble: tuple[bytes, ...]  # the lines before the first record, with the comments
     passed_over: tuple[tuple[int, str], ...]  # lines before the first record without meaning
     blank_is_missing: bool  # a blank line among the records is a record with one empty cell
+    labels: Labels | None = None  # labels before the values of each record
 
     def position(self, column: Column, key: str) -> int:
         """Return the position, from 0, of a column; raise `RecordingError` if none, or two."""
@@ -79,7 +81,8 @@ class TextLayout:
         """Return the converter of lines, from the first record on, to records."""
         runs, blank = self.split.runs, self.blank_is_missing
         signs = [sign.encode() for sign in self.comments]
-        return complete_lines.Records(signs, self.header, self.preamble, runs, blank)
+        labels = self.labels
+        return complete_lines.Records(signs, self.header, self.preamble, runs, blank, labels)
 
 
 @dataclass(frozen=True)
@@ -120,6 +123,32 @@ class _Search:
             skipped = f" behind {log.skip_lines} lines (skip_lines)" if log.skip_lines else ""
             fault = complete_lines.describe_missing_text(path)
             raise RecordingError(f"{self._file}: {fault}; expected lines of a log{skipped}")
+        self._labels = None if log.delimiter is not None else self._find_labels()
+
+    def _find_labels(self) -> Labels | None:
+        """Return the labels of the values, and remove them from the lines; None if they have none.
+
+        Raise `RecordingError` if the lines are sentences.
+        """
+        texts = [line.text for line in self._lines]
+        if (labels := find_labels(texts)) is None:
+            if (sentence := find_sentence(texts)) is not None:
+                raise RecordingError(
+                    f"{self._file}: its lines are words and values for people, such as "
+                    f"{sentence.strip()[:60]!r}, as Adafruit's examples and 'rostopic echo' print "
+                    "them; expected a line a record: print CSV in the sketch "
+                    "(Serial.print(micros()); Serial.print(','); Serial.print(g.gyro.x, 6); ... "
+                    "Serial.println()), or read the bag itself"
+                )
+            return None
+        removed = [labels.remove(text.encode()).decode() for text in texts]
+        first = next((n for n, text in enumerate(removed) if text != texts[n]), None)
+        if first is None:
+            return None
+        self._comments += self._lines[:first]  # what the sketch printed before
+        lines = [replace(line, text=t) for line, t in zip(self._lines, removed, strict=True)]
+        self._lines = [_Line(0, 0, b"", labels.header), *lines[first:]]
+        return labels
 
     def layout(self) -> TextLayout:
         """Return the most plausible layout."""
@@ -168,6 +197,7 @@ class _Search:
                 line.raw for line in [*comments, *lines[:first]] if line.number < record.number
             ),
             passed_over=tuple((line.number, line.text) for line in passed_over),
+            labels=self._labels,
             blank_is_missing=len(names) == 1
             and any(after.number == line.number + 1 for line, after in pairwise(lines[first:])),
         )
@@ -232,7 +262,7 @@ class _Search:
 
     def _splits(self) -> Sequence[Split]:
         """Return the candidate rules for splitting lines."""
-        stated = self._log.delimiter
+        stated = "," if self._labels is not None else self._log.delimiter
         if stated is not None:
             return [split for split in _CANDIDATE_SPLITS if split.delimiter == stated] or [
                 Split(stated)

@@ -220,6 +220,20 @@ class TruncatedFile(base.FindingData, affects=base.NONE, doubt="the end of the f
         return f"{self.file}: {what}; read as far as possible"
 
 
+class LateRecords(base.FindingData, affects=base.NONE):
+    """Records that were written after records with later stamps, and sorted."""
+
+    file: str
+    records: int
+    delay: float  # longest one, s
+
+    def text(self, channel: str) -> str:
+        return (
+            f"{self.file}: {counted(self.records, 'record is', 'records are')} written after later "
+            f"ones, by up to {number_text(self.delay, 3)} s; sorted by time"
+        )
+
+
 class IncompleteLastRecord(base.FindingData, affects=base.NONE):
     """A last record that is cut short, and left out."""
 
@@ -322,6 +336,19 @@ class DamagedMessage(base.FindingData, affects=base.ALL, doubt="messages are dam
         )
 
 
+class DamagedBytes(base.FindingData, affects=base.NONE, doubt="parts of the file are damaged"):
+    """Bytes of a binary log that are no message, and left out."""
+
+    file: str
+    bytes: int
+
+    def text(self, channel: str) -> str:
+        return (
+            f"{self.file}: {counted(self.bytes, 'byte is', 'bytes are')} no part of a message; "
+            "left out. The file is damaged there: copy it again"
+        )
+
+
 class NotMeasured(base.FindingData, affects=base.ALL, doubt="messages without a measurement"):
     """Messages that state that a quantity was not measured."""
 
@@ -361,6 +388,20 @@ class WrongChecksum(base.FindingData, affects=base.ALL, doubt="messages have a w
                 "in time"
             )
         return text
+
+
+class UncheckedLogs(base.FindingData, affects=base.NONE, doubt="no checksum is right"):
+    """Logs of which no checksum is right at the beginning; they are read unchecked."""
+
+    file: str
+    number: int
+    name: str
+
+    def text(self, channel: str) -> str:
+        return (
+            f"{self.file}: no checksum at the beginning is right; "
+            f"{counted(self.number, f'{self.name} log')} read unchecked. Was the file edited?"
+        )
 
 
 class UnreadableSentence(base.FindingData, affects=base.ALL, doubt="sentences are not readable"):

@@ -1,0 +1,1 @@
+"""Logs of flight controllers: PX4 ULog and ArduPilot DataFlash."""
