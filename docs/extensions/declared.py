@@ -101,6 +101,31 @@ def targets() -> str:
     return _of_lines(list_export_targets())
 
 
+def which_numbers() -> str:
+    """Return a section for each program, with the numbers of its file."""
+    heads = ("number in the file", "of", "value", "unit", "convention")
+    sections = []
+    for target in TARGETS.values():
+        if not target.declared.entries:
+            continue
+        rows = (
+            (
+                code(entry.name),
+                {"both": "gyro and accel"}.get(entry.quantity, entry.quantity),
+                code(entry.form.formula),
+                code(entry.unit),
+                cell(entry.form.convention),
+            )
+            for entry in target.declared.entries
+        )
+        about = (
+            f"`imubench export --target {target.name}` writes `{target.file_name}`, with terms "
+            f"{target.family}. [Source]({target.declared.source})"
+        )
+        sections.append(f"## {target.program}\n\n{about}\n\n{table(heads, rows)}")
+    return "\n".join(sections)
+
+
 def _of_lines(lines: Iterable[Line]) -> str:
     heads, *rows = lines
     return table(heads, ((code(first), *map(cell, rest)) for first, *rest in rows))

@@ -23,6 +23,7 @@ PARTS: dict[str, Callable[[], str]] = {
     "glossary": declared.terms_of_the_report,
     "formats": declared.formats,
     "targets": declared.targets,
+    "which-numbers": declared.which_numbers,
     "noise-terms": declared.noise_terms,
     "commands": commands.commands,
     "exit-statuses": commands.exit_statuses,

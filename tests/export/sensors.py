@@ -36,3 +36,23 @@ def midpoint(per_sample: float, per_step: float, samples: int, seed: int) -> Arr
     ends = per_sample * rng.standard_normal((2, samples))
     walk = np.cumsum(per_step * rng.standard_normal(samples))
     return ends.mean(axis=0) + walk
+
+
+EACH = {
+    quantity: {
+        letter: NoiseModel(N=scale * n, B=0.7 * scale, T_B=90.0)
+        for letter, n in zip("xyz", factors, strict=True)
+        if n
+    }
+    for quantity, scale, factors in (("gyro", 1e-5, (3, 0, 5)), ("accel", 1e-3, (1, 2, 4)))
+}
+"""Models of the axes of `imu_of_each`; gyro y has none."""
+
+
+def imu_of_each(**more: object) -> Imu:
+    """Return a sensor with a model of each axis; z represents both quantities."""
+    chosen = {}
+    for quantity, models in EACH.items():
+        each = {name: AxisNoise(one, f"{quantity} {name} of a") for name, one in models.items()}
+        chosen[quantity] = AxisNoise(models["z"], f"{quantity} z of a", each=each)
+    return Imu(sensor="mti_7", rate=100.0, **chosen, **more)  # type: ignore[arg-type]  # as above

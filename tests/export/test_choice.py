@@ -115,3 +115,28 @@ def test_recordings_of_a_device_are_pooled_by_the_mean_of_their_spectra() -> Non
     mean = (models["one"].psd(frequency) + models["two"].psd(frequency)) / 2.0
     assert pooled.axis.model.psd(frequency) == pytest.approx(mean)
     assert "2 recordings of the device: one, two" in pooled.axis.origin
+
+
+def test_each_axis_is_chosen_among_its_own_estimates() -> None:
+    both = [
+        *AXES,
+        *rows("gyro_x", estimate(N=9e-4, K=1e-7), "b"),
+        *rows("gyro_y", estimate(N=0.0), "c"),
+    ]
+    found = choose(both, "gyro", horizon=60.0).each
+    assert {axis: one.axis.model.N for axis, one in found.items()} == {
+        "x": 9e-4,
+        "y": 1e-4,
+        "z": 2e-4,
+    }
+    assert (
+        "gyro x of recording b by method likelihood, the worst of 2 est" in found["x"].axis.origin
+    )
+    assert found["x"].axis.notes[0] == "axes not used (less noise at 60 s): gyro x of a"
+    assert found["y"].axis.notes[0] == "axes not used (no white noise in the model): gyro y of c"
+    assert not found["z"].axis.notes and not found["z"].each
+    device = choose(both, "gyro", axis="b", horizon=60.0).each
+    assert device.keys() == {"x"}
+    assert device["x"].axis.notes[0] == "axes not used (of another device): gyro x of a"
+    assert choose(both, "gyro", axis="median").each["x"].axis.model.N == 9e-4
+    assert choose(AXES, "accel").each.keys() == {"x"}

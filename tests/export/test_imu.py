@@ -6,10 +6,11 @@ from imubench_pipeline.export.imu import (
     Imu,
     compute_normal_gravity,
     inflate,
+    split_axes,
 )
 from imubench_pipeline.export.visual_inertial import write_kalibr as write
 from imubench_pipeline.noise import GaussMarkov, NoiseModel, Sinusoid
-from tests.export.sensors import GYRO, imu
+from tests.export.sensors import EACH, GYRO, imu, imu_of_each
 
 
 def test_inflation_is_of_densities_and_amplitudes_and_not_of_times() -> None:
@@ -60,3 +61,11 @@ def test_a_program_that_needs_both_says_what_is_missing() -> None:
 def test_simulated_recordings_are_called_so() -> None:
     assert "SIMULATED" in write(imu(simulated=True))
     assert "SIMULATED" not in write(imu())
+
+
+def test_an_inflation_is_of_each_axis() -> None:
+    axes = split_axes(imu_of_each(inflation=2.0, because="test").axes)
+    assert list(axes) == ["gyro x", "gyro z", "gyro", "accel x", "accel y", "accel z"]
+    for name, axis in axes.items():
+        quantity, letter = (name + " z").split()[:2]
+        assert axis.model.N == 2.0 * EACH[quantity][letter].N

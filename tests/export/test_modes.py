@@ -11,6 +11,8 @@ from imubench_pipeline.export.in_use import InUseNoise
 from imubench_pipeline.export.modes import FLIGHT_TARGETS, FLOORS, apply_mode, choose_mode
 from imubench_pipeline.export.targets import TARGETS
 from imubench_pipeline.noise import NoiseModel
+from tests.export.sensors import imu_of_each
+from tests.export.test_filters import mavparm
 
 GYRO = AxisNoise(NoiseModel(N=1e-4, B=2e-5, K=1e-6), "gyro x of bench")
 ACCEL = AxisNoise(NoiseModel(N=1e-3, K=2e-5), "accel x of bench")
@@ -33,6 +35,29 @@ def test_a_program_that_flies_has_its_defaults_unless_bench_is_asked_for() -> No
     assert values["EKF2_GYR_B_NOISE"] == pytest.approx(1e-3, rel=1e-6)
     assert values["EKF2_ACC_B_NOISE"] == pytest.approx(3e-3, rel=1e-6)
     assert "IN USE, NOT MEASURED: at least the defaults of EKF2" in text
+
+
+def test_ardupilot_has_the_defaults_of_ekf3() -> None:
+    target = TARGETS["ardupilot"]
+    text = str(target.write(apply_mode(IMU, target, choose_mode(None, "ardupilot"))))
+    # as AP_NavEKF3.cpp has them, for every vehicle
+    assert mavparm(text) == pytest.approx(
+        {
+            "EK3_GYRO_P_NSE": 0.015,
+            "EK3_ACC_P_NSE": 0.35,
+            "EK3_GBIAS_P_NSE": 1e-3,
+            "EK3_ABIAS_P_NSE": 0.02,
+        }
+    )
+    assert choose_mode(None, "px4-mavparm") == "in-use"
+
+
+def test_the_noise_of_each_axis_is_raised() -> None:
+    measured = {"gyro_x": InUseNoise(4e-5, 0.1, 10.0, [])}
+    raised = apply_mode(imu_of_each(), TARGETS["gazebo"], "in-use", measured)
+    assert raised.gyro
+    N = {axis: one.model.N for axis, one in raised.gyro.each.items()}
+    assert N == pytest.approx({"x": 4e-5, "z": 5e-5})  # at rest 3e-5 and 5e-5
 
 
 def test_vins_fusion_has_the_values_of_its_examples() -> None:

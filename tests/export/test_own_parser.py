@@ -6,6 +6,7 @@ import json
 import re
 from collections.abc import Callable
 from typing import Any
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -16,7 +17,7 @@ from hypothesis import strategies as st
 from imubench_pipeline.export.imu import AxisNoise, Imu, TemperatureEffect
 from imubench_pipeline.export.targets import TARGETS
 from imubench_pipeline.noise import GaussMarkov, NoiseModel, Sinusoid
-from tests.export.test_filters import ekf2, opencv
+from tests.export.test_filters import ekf2, mavparm, opencv
 
 Content = str | bytes
 
@@ -41,7 +42,7 @@ def script(text: Content) -> list[str]:
     joined = "\n".join(line for line in code if line).replace("...\n", "")
     statements = joined.split("\n")
     for statement in statements:
-        assert re.fullmatch(r"IMU(\.\w+)? = .*;\s*", statement), statement
+        assert re.fullmatch(r"(IMU|imu)(\.\w+)? = .*;\s*", statement), statement
         for opened, closed in ("()", "[]"):
             assert statement.count(opened) == statement.count(closed)
     return statements
@@ -53,6 +54,20 @@ def arrays(content: Content) -> dict[str, Any]:
         return {name: found[name].tolist() for name in found.files if name != "about"}
 
 
+def header(text: Content) -> str:
+    """Return C++ without comments: a backslash at the end of a line joins the next (phase 2)."""
+    assert isinstance(text, str)
+    joined = text.replace("\\\n", "")
+    return "\n".join(line.split("//")[0].rstrip() for line in joined.split("\n")).strip()
+
+
+def sdf(text: Content) -> list[tuple[str, dict[str, str], str]]:
+    """Return the elements of XML, which has no comment with two hyphens inside."""
+    assert isinstance(text, str)
+    root = ElementTree.fromstring(text.encode())
+    return [(each.tag, each.attrib, (each.text or "").strip()) for each in root.iter()]
+
+
 def about(content: Content) -> str:
     """Return all that a file says in words, on one line."""
     if isinstance(content, bytes):
@@ -60,7 +75,8 @@ def about(content: Content) -> str:
             return " ".join(found["about"].tolist())
     if content.startswith("{"):
         return " ".join(json.loads(content)["about"])
-    words = [line[1:] for line in content.split("\n") if line[:1] in "#%"]
+    lines = [line for line in content.split("\n") if line.startswith(("#", "%", "//"))]
+    words = [line.lstrip("#%/") for line in lines]
     return re.sub(r"\s+", " ", " ".join(words))
 
 
@@ -70,7 +86,20 @@ PARSERS: dict[str, Callable[[Any], Any]] = {
     "vins-fusion": opencv,
     "basalt": without_words,
     "orb-slam3": opencv,
+    "lio-sam": yaml.safe_load,
+    "fast-lio": yaml.safe_load,
+    "gtsam": program,
+    "matlab-factor": script,
+    "ceres": header,
     "px4": ekf2,
+    "px4-mavparm": mavparm,
+    "ardupilot": mavparm,
+    "ros": yaml.safe_load,
+    "pyins": program,
+    "kf-gins": yaml.safe_load,
+    "ob-gins": yaml.safe_load,
+    "navego": script,
+    "gazebo": sdf,
     "gnss-ins-sim": program,
     "matlab": script,
     "json": without_words,
@@ -102,6 +131,8 @@ NAMES = (
     "'''\"\"\"\\\\'\"\nimport os #",
     "\n1\t1\tEKF2_GYR_NOISE\t1\t9\n",
     '"}, "value0": {"imu_update_rate": 1}',
+    "--> <sdf version='1.9'> <!-- ]]> &amp; --",
+    "ends with a backslash \\",
     "{noise} {0} %s",
     "x" * 1000,
     "\n: [" * 250,
@@ -123,7 +154,7 @@ def sensor(model: NoiseModel, said: str) -> Imu:
     warm = TemperatureEffect(30.0, 20.0, 40.0, {"x": 1e-4}, {}, [f"axis y left out: {said}"])
     return Imu(
         sensor=said,
-        rate=50.0,
+        rate=100.0,
         gyro=axis,
         accel=axis,
         inflation=1.5,

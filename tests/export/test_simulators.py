@@ -1,6 +1,8 @@
 """Files of simulators: their parameters, read back, in the recursions of the programs."""
 
 import re
+from dataclasses import replace
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -10,7 +12,7 @@ from imubench_pipeline.allan import allan_variance
 from imubench_pipeline.export import simulators
 from imubench_pipeline.export.imu import AxisNoise, Imu
 from imubench_pipeline.noise import GaussMarkov, NoiseModel
-from tests.export.sensors import ACCEL, GYRO, Array, imu
+from tests.export.sensors import ACCEL, EACH, GYRO, Array, imu, imu_of_each
 
 RATE = 20.0
 
@@ -141,3 +143,90 @@ def test_two_processes_are_replaced_by_one_in_both() -> None:
         text = write(imu(gyro=model))
         joined = re.sub(r"\n[#%]  +", " ", text)
         assert "with the same Allan variance at the horizon of 60 s" in joined
+
+
+def gazebo_noise(text: str) -> dict[str, dict[str, float]]:
+    """Return the settings of each axis, by its path in the element ``imu``."""
+    sensor = ElementTree.fromstring(text.encode()).find("model/link/sensor/imu")
+    assert sensor is not None
+    return {
+        f"{quantity.tag}/{axis.tag}": {
+            each.tag: float(each.text or "") for noise in axis for each in noise
+        }
+        for quantity in sensor
+        for axis in quantity
+    }
+
+
+def gazebo_log(found: dict[str, float], rate: float, samples: int, seed: int) -> Array:
+    """Return what GaussianNoiseModel::ApplyImpl adds, with the bias of Load."""
+    rng = np.random.default_rng(seed)
+    tau, drive = found["dynamic_bias_correlation_time"], found["dynamic_bias_stddev"]
+    step = np.sqrt(-(drive**2) * tau / 2.0 * np.expm1(-2.0 / rate / tau))
+    phi = np.exp(-1.0 / rate / tau)
+    first = found["bias_mean"] + found["bias_stddev"] * rng.standard_normal()
+    bias, _ = lfilter([1.0], [1.0, -phi], step * rng.standard_normal(samples), zi=[phi * first])
+    return bias + found["mean"] + found["stddev"] * rng.standard_normal(samples)
+
+
+@pytest.mark.parametrize("path", ["angular_velocity/x", "linear_acceleration/z"])
+def test_gazebo_makes_the_model(path: str) -> None:
+    model = NoiseModel(N=1e-4, B=9e-5, T_B=30.0)
+    text = simulators.write_gazebo(imu(gyro=model, accel=model, rate=RATE))
+    found = gazebo_noise(text)[path]
+    assert f"<update_rate>{RATE}</update_rate>" in text
+    log = gazebo_log(found, RATE, round(60_000.0 * RATE), 5)
+    assert np.all(np.abs(compared(log, model, RATE, [0.2, 2.0, 20.0, 200.0])) < 4.0)
+    # stationary from the first sample
+    assert found["bias_stddev"] == pytest.approx(1.0761 * model.B, rel=1e-4)
+
+
+def test_each_axis_is_simulated_with_its_own_noise() -> None:
+    sensor = imu_of_each()
+    N = {name: [models.get(axis, models["z"]).N for axis in "xyz"] for name, models in EACH.items()}
+    text = simulators.write_gnss_ins_sim(sensor)
+    namespace: dict[str, dict[str, Array]] = {}
+    exec(text, namespace)
+    found = namespace["imu_err"]
+    np.testing.assert_allclose(np.radians(found["gyro_arw"]) / 60.0, N["gyro"], rtol=1e-6)
+    np.testing.assert_allclose(found["accel_vrw"] / 60.0, N["accel"], rtol=1e-6)
+    joined = text.replace("\n#  ", "")
+    assert "gyro x: gyro x of a." in joined and "accel y: accel y of a." in joined
+    assert "gyro: the axes without an estimate have the following noise." in joined
+    assert "accel: the axes" not in joined
+    stddev = {
+        name: one["stddev"] for name, one in gazebo_noise(simulators.write_gazebo(sensor)).items()
+    }
+    for axis, of_gyro, of_accel in zip("xyz", N["gyro"], N["accel"], strict=True):
+        assert stddev[f"angular_velocity/{axis}"] == pytest.approx(10.0 * of_gyro, rel=1e-6)
+        assert stddev[f"linear_acceleration/{axis}"] == pytest.approx(10.0 * of_accel, rel=1e-6)
+    vectors = re.findall(r"'NoiseDensity', \[([^\]]+)\]", simulators.write_matlab(sensor))
+    for vector, expected in zip(vectors, N.values(), strict=True):
+        np.testing.assert_allclose([float(one) for one in vector.split(", ")], expected, rtol=1e-6)
+
+
+def test_an_overbound_is_of_the_chosen_axis_for_all() -> None:
+    sensor = imu_of_each()
+    assert sensor.gyro
+    bounded = replace(sensor, gyro=replace(sensor.gyro, bounded=(0.01, 1.0)))
+    found = gazebo_noise(simulators.write_gazebo(bounded))
+    assert len({found[f"angular_velocity/{axis}"]["stddev"] for axis in "xyz"}) == 1
+
+
+def test_axes_with_other_correlation_times_share_one_filter_in_matlab() -> None:
+    times = {"x": 20.0, "y": 60.0, "z": 90.0}
+    models = {axis: NoiseModel(N=1e-5, B=4e-5, T_B=T) for axis, T in times.items()}
+    each = {axis: AxisNoise(model, axis) for axis, model in models.items()}
+    sensor = Imu(sensor="s", rate=RATE, gyro=AxisNoise(models["z"], "z", each=each))
+    text = simulators.write_matlab(sensor)
+    pole = float(re.search(r"'Denominator', \[1, -([^\]]+)\]", text)[1])  # type: ignore[index]  # or fails
+    T_B = -1.0 / (RATE * np.log(pole))
+    assert 20.0 < T_B < 90.0
+    drives = re.search(r"'BiasInstability', \[([^\]]+)\]", text)
+    assert drives
+    for axis, drive in zip("xyz", map(float, drives[1].split(", ")), strict=True):
+        own = models[axis].allan_variance(np.array([60.0]))
+        deviation = drive / np.sqrt(1.0 - pole**2)
+        made = NoiseModel(N=1e-5, B=deviation / 1.0761, T_B=T_B).allan_variance(np.array([60.0]))
+        np.testing.assert_allclose(made, own, rtol=1e-3)
+        assert f"gyro {axis}: Gauss-Markov process" in text.replace("\n%  ", "")

@@ -7,13 +7,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from imubench_pipeline.export import px4, simulators
+from imubench_pipeline.export import ardupilot, px4, simulators
 from imubench_pipeline.export.imu import TemperatureEffect, find_temperature_effect
 from imubench_pipeline.export.targets import TARGETS
 from imubench_pipeline.model.estimates import TemperatureRow
 from imubench_pipeline.model.recordings import RecordingRow
 from tests.export.sensors import imu
-from tests.export.test_filters import ekf2
+from tests.export.test_filters import ekf2, mavparm
 from tests.rows import typed
 
 RECORDING = {
@@ -78,6 +78,32 @@ def test_px4_takes_off_what_temperature_adds_within_the_range_of_the_log() -> No
     assert "TC_A0_" not in text and "TC_G_ENABLE\t" not in text
 
 
+def ardupilot_change(found: dict[str, float], axis: str, temperature: float) -> float:
+    """Return what TCal::correct_sensor takes from a gyro; its reference is 35 degC."""
+    within = min(max(temperature, found["INS_TCAL1_TMIN"]), found["INS_TCAL1_TMAX"])
+    orders = np.arange(1, 4)
+    powers = (within - 35.0) ** orders
+    return 1e-6 * float(
+        sum(found[f"INS_TCAL1_GYR{n}_{axis}"] * p for n, p in zip(orders, powers, strict=True))
+    )
+
+
+def test_ardupilot_takes_off_the_change_between_two_temperatures() -> None:
+    told = effect(
+        rows("gyro_x", quadratic=(1e-6, 9e-7, 1.1e-6, "ok")), rows("gyro_z", compensated=False)
+    )
+    found = mavparm(ardupilot.write(imu(temperature={"gyro": told})))
+    for temperature in (18.0, 26.0, 41.0):
+        change = ardupilot_change(found, "X", temperature) - ardupilot_change(found, "X", 30.0)
+        dT = temperature - 30.0
+        assert change == pytest.approx(2e-4 * dT + 1e-6 * dT**2, rel=1e-6)
+        assert ardupilot_change(found, "Z", temperature) == 0.0
+    assert ardupilot_change(found, "X", 60.0) == ardupilot_change(found, "X", 41.0)
+    assert all(found[f"INS_TCAL1_ACC{n}_X"] == 0.0 for n in (1, 2, 3))
+    assert "INS_TCAL1_ENABLE" not in found  # the user switches it on
+    assert not any(name.startswith("INS") for name in mavparm(ardupilot.write(imu())))
+
+
 def test_matlab_adds_nothing_at_the_reference_and_a_line_elsewhere() -> None:
     told = effect(rows("gyro_x"), rows("gyro_y", quadratic=(1e-6, 9e-7, 1.1e-6, "ok")))
     text = simulators.write_matlab(imu(temperature={"gyro": told}))
@@ -128,7 +154,6 @@ def test_a_longer_horizon_allows_a_longer_lag_and_a_narrow_range_nothing() -> No
 def test_a_file_of_noise_alone_says_so() -> None:
     told = {"gyro": effect(rows("gyro_x"))}
     for name, target in TARGETS.items():
-        content = target.write(replace(imu(), temperature=told))
-        text = content if isinstance(content, str) else content.decode("utf-32-le", "ignore")
-        if isinstance(content, str) and name not in ("px4", "matlab"):
-            assert "The file contains noise only" in re.sub(r"\n#  ", "", text)
+        content = target.write(replace(imu(rate=100.0), temperature=told))
+        if isinstance(content, str) and name not in ("px4", "px4-mavparm", "ardupilot", "matlab"):
+            assert "The file contains noise only" in re.sub(r"\n(#|%|//)  ", "", content)

@@ -3,7 +3,7 @@
 import math
 from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -16,8 +16,8 @@ from imubench_pipeline.words.findings.base import channel_name
 from imubench_pipeline.words.numbers import join_names
 from imubench_pipeline.words.reasons import exports as texts
 
-Key = tuple[str, str]  # recording, channel
-_Estimated = tuple[str, str, str]  # and method
+_Estimated = tuple[str, str, str]  # recording, channel, method
+_Ranked = tuple[float, _Estimated, Estimate]  # by the Allan deviation at the horizon
 
 WORST, MEDIAN = "worst", "median"
 
@@ -36,6 +36,8 @@ class Choice:
     deviation: float
     of: int
     determined: bool = True  # whether a slow term has a value; else it is only limited from above
+    each: Mapping[str, "Choice"] = field(default_factory=dict)
+    """The axes x, y and z with an estimate, each chosen among its own."""
 
 
 def choose(
@@ -51,7 +53,8 @@ def choose(
 
     Axes are ordered by the Allan deviation of their model at the horizon h, s. Times sqrt(2) h, it
     is the standard deviation of the angle or velocity after h without a measurement, with a bias
-    that was averaged over the preceding h. All parameters come from one axis.
+    that was averaged over the preceding h. All parameters come from one axis. ``each`` of the
+    result has x, y and z chosen in the same way, each among its own estimates.
 
     ``axis`` is ``worst``, ``median`` (the upper median of an even number), or the name of a device
     or recording, whose worst axis is chosen. ``devices`` has the device of each recording.
@@ -73,7 +76,7 @@ def choose(
             present = sorted({device[recording] for recording, _, _ in everywhere})
             raise ExportError(f"no {quantity} of device {axis!r}; there are: {', '.join(present)}")
     # The axes with white noise, sorted by their Allan deviation at the horizon.
-    ranked: list[tuple[float, _Estimated, Estimate]] = []
+    ranked: list[_Ranked] = []
     for key, part in estimated.items():
         estimate = make_estimate(key[2], part)
         if estimate.model.N > 0.0:
@@ -82,32 +85,46 @@ def choose(
     ranked.sort(key=lambda entry: entry[0])
     if not ranked:
         raise ExportError(f"no estimate of a {quantity} with white noise")
-    place = len(ranked) // 2 if axis == MEDIAN else len(ranked) - 1
-    deviation, (recording, channel, used), estimate = ranked[place]
     whose = "" if axis in (WORST, MEDIAN) else axis
-    rank = texts.axis_rank(len(ranked), MEDIAN if axis == MEDIAN else WORST, whose)
-    unit = {"gyro": "rad", "accel": "m/s"}[quantity]
-    error = math.sqrt(2.0) * horizon * deviation
-    origin = texts.chosen_axis(channel, recording, used, rank, horizon, error, unit)
-    determined = any(
-        parameter.value is not None
-        for _, name, parameter in estimate.components()
-        if name in _SLOW_PARAMETERS
-    )
-    others: dict[texts.OtherAxes, list[Key]] = defaultdict(list)
-    for key in everywhere:
-        if key not in estimated:
-            others["other_device"].append(key[:2])
-        elif key not in (entry[1] for entry in ranked):
-            others["no_white_noise"].append(key[:2])
-        elif key != (recording, channel, used):
-            others["not_median" if axis == MEDIAN else "less_noise"].append(key[:2])
-    notes = [
-        *_describe_other_axes(others, channel, horizon),
-        *parameter_notes(estimate, determined),
-    ]
-    noise = AxisNoise(estimate.model, origin, notes)
-    return Choice(recording, channel, used, noise, deviation, len(ranked), determined)
+    names = [f"{quantity}_{letter}" for letter in AXES]
+
+    def take(channels: Sequence[str], noun: str) -> Choice:
+        """Return the worst or median estimate of channels."""
+        of = [entry for entry in ranked if entry[1][1] in channels]
+        deviation, key, estimate = of[len(of) // 2 if axis == MEDIAN else -1]
+        rank = texts.axis_rank(len(of), MEDIAN if axis == MEDIAN else WORST, whose, noun)
+        unit = {"gyro": "rad", "accel": "m/s"}[quantity]
+        error = math.sqrt(2.0) * horizon * deviation
+        origin = texts.chosen_axis(key[1], key[0], key[2], rank, horizon, error, unit)
+        determined = any(
+            parameter.value is not None
+            for _, name, parameter in estimate.components()
+            if name in _SLOW_PARAMETERS
+        )
+        others: dict[texts.OtherAxes, list[_Estimated]] = defaultdict(list)
+        for other in everywhere:
+            if other[1] not in channels or other == key:
+                continue
+            if other not in estimated:
+                others["other_device"].append(other)
+            elif other not in (entry[1] for entry in ranked):
+                others["no_white_noise"].append(other)
+            else:
+                others["not_median" if axis == MEDIAN else "less_noise"].append(other)
+        notes = [*_describe_other_axes(others, horizon), *parameter_notes(estimate, determined)]
+        noise = AxisNoise(estimate.model, origin, notes)
+        return Choice(*key, noise, deviation, len(of), determined)
+
+    each = {
+        name[-1]: take([name], "estimate")
+        for name in names
+        if any(entry[1][1] == name for entry in ranked)
+    }
+    without = [channel_name(name) for name in names if all(key[1] != name for key in everywhere)]
+    missing = [f"axes without an estimate: {join_names(without)}"] if without else []
+    chosen = take(names, "axis")
+    noise = replace(chosen.axis, notes=[*missing, *chosen.axis.notes])
+    return replace(chosen, axis=noise, each=each)
 
 
 def pool_recordings(
@@ -143,22 +160,15 @@ def pool_recordings(
 
 
 def _describe_other_axes(
-    others: Mapping[texts.OtherAxes, Sequence[Key]], chosen: str, horizon: float
+    others: Mapping[texts.OtherAxes, Sequence[_Estimated]], horizon: float
 ) -> list[str]:
-    """List the axes of the same quantity that were not chosen, by reason."""
-    quantity, _ = chosen.split("_")
+    """List the axes or estimates that were not chosen, by reason."""
     statements = []
     for why, keys in others.items():
         of: dict[str, list[str]] = defaultdict(list)
-        for recording, channel in keys:
+        for recording, channel, _ in keys:
             of[recording].append(channel)
         statements.append(texts.axes_not_used(why, horizon, of, _MAX_NAMED_RECORDINGS))
-    channels = {chosen, *(channel for keys in others.values() for _, channel in keys)}
-    without = [name for axis in AXES if (name := f"{quantity}_{axis}") not in channels]
-    if without:
-        statements.append(
-            f"axes without an estimate: {join_names(list(map(channel_name, without)))}"
-        )
     return statements
 
 

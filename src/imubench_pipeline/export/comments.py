@@ -4,7 +4,7 @@ import re
 import textwrap
 from collections.abc import Mapping, Sequence
 
-from imubench_pipeline.export.imu import Imu
+from imubench_pipeline.export.imu import AXES, Imu, split_axes
 from imubench_pipeline.export.mapping import Mapped, describe_terms
 from imubench_pipeline.tables.texts import escape_invisible
 from imubench_pipeline.words.numbers import number_text
@@ -19,11 +19,13 @@ def describe_model(
     mapped: Mapping[str, Mapped] | None = None,
     *,
     temperature: bool = False,
+    each: bool = False,
 ) -> list[str]:
     """Return the header of a file as printable statements.
 
     `program` is the program that loads the file; `convention` describes its numbers; `mapped`: the
-    replacements of the models; `temperature`: the file contains the effect on the biases.
+    replacements of the models; `temperature`: the file contains the effect on the biases; `each`:
+    it contains a number of each axis.
     """
     statements = [f"Noise of the {imu.sensor} for {program}, by imubench."]
     if imu.simulated:
@@ -33,13 +35,15 @@ def describe_model(
     statements += [f"CAUTION: {caution}." for caution in imu.cautions]
     statements.append(convention)
     units = {"gyro": "rad, s", "accel": "m, s"}
-    estimated = {"gyro": imu.gyro, "accel": imu.accel}
-    missing = [name for name, axis in estimated.items() if axis is None]
+    missing = [name for name in units if name not in imu.estimated]
     statements += [f"{name}: not included, as there is no estimate." for name in missing]
-    for name, axis in imu.axes.items():
+    described = split_axes(imu.estimated) if each else imu.estimated
+    for name, axis in described.items():
+        if name in units and any(f"{name} {letter}" in described for letter in AXES):
+            statements.append(f"{name}: the axes without an estimate have the following noise.")
         statements.append(f"{name}: {axis.origin}.")
-        terms = describe_terms((estimated[name] or axis).model.terms)
-        statements.append(f"{name} model ({units[name]}; N two-sided): {terms}.")
+        terms = describe_terms(axis.model.terms)
+        statements.append(f"{name} model ({units[name.split()[0]]}; N two-sided): {terms}.")
         statements += [f"{name}: {note}." for note in axis.notes]
     if temperature:
         statements += [

@@ -129,7 +129,7 @@ class ExportError(ValueError):
 
 @dataclass(frozen=True)
 class AxisNoise:
-    """Noise model of one axis, SI, used for all axes of its quantity."""
+    """Noise model of one axis, SI, which represents all axes of its quantity."""
 
     model: NoiseModel
     origin: str  # axis, recording and method of the model, in words
@@ -137,6 +137,31 @@ class AxisNoise:
     slow_limited: bool = False  # K is an upper limit: no log determines a slow term
     bounded: tuple[float, float] | None = None
     """Lowest and highest frequency of an overbound, Hz; None: the model is no overbound."""
+    each: Mapping[str, "AxisNoise"] = field(default_factory=dict)
+    """The axes x, y and z that have an estimate, for programs that take three numbers."""
+
+    def inflated(self, factor: float) -> "AxisNoise":
+        """Return the noise with all densities and amplitudes times a factor."""
+        return replace(
+            self,
+            model=inflate(self.model, factor),
+            each={letter: axis.inflated(factor) for letter, axis in self.each.items()},
+        )
+
+
+def split_axes(axes: Mapping[str, AxisNoise]) -> dict[str, AxisNoise]:
+    """Return the noise of each axis by names such as ``gyro x``, from quantities.
+
+    The noise of a quantity stays under its own name if an axis has no estimate, or if it is an
+    overbound, which exists for the chosen axis only.
+    """
+    split: dict[str, AxisNoise] = {}
+    for name, axis in axes.items():
+        own = {} if axis.bounded else axis.each
+        split |= {f"{name} {letter}": own[letter] for letter in AXES if letter in own}
+        if len(own) < len(AXES):
+            split[name] = axis
+    return split
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -175,12 +200,13 @@ class Imu:
     @property
     def axes(self) -> dict[str, AxisNoise]:
         """The quantities that have an estimate, with the inflation in their models."""
+        return {name: axis.inflated(self.inflation) for name, axis in self.estimated.items()}
+
+    @property
+    def estimated(self) -> dict[str, AxisNoise]:
+        """The quantities that have an estimate, without the inflation."""
         both = {"gyro": self.gyro, "accel": self.accel}
-        return {
-            name: replace(axis, model=inflate(axis.model, self.inflation))
-            for name, axis in both.items()
-            if axis is not None
-        }
+        return {name: axis for name, axis in both.items() if axis is not None}
 
     def require_both(self) -> None:
         """Raise ExportError if there is no estimate of gyro or accelerometer."""

@@ -59,42 +59,64 @@ def as_walk(model: NoiseModel, horizon: float, rate: float) -> Mapped:
     return _describe_replacement(model, NoiseModel(N=model.N, K=K), words, slow, horizon, rate)
 
 
-def as_process(model: NoiseModel, horizon: float, rate: float, *, walk: bool = False) -> Mapped:
+def as_process(
+    model: NoiseModel,
+    horizon: float,
+    rate: float,
+    *,
+    walk: bool = False,
+    time: float | None = None,
+) -> Mapped:
     """Return white noise and one Gauss-Markov process in place of a model.
 
     T_B minimises the mean square error of the logarithm of the Allan variance, from a thirtieth of
-    the horizon to the horizon. For `horizon`, s, and `rate`, Hz, see `as_walk`. With `walk` the
-    program also supports a random walk, and the random walk of the model is not changed.
+    the horizon to the horizon; or it is `time`, s. For `horizon`, s, and `rate`, Hz, see `as_walk`.
+    With `walk` the program also supports a random walk, and the random walk of the model is not
+    changed.
     """
-    replaced = [
-        term for term in _select_slow_terms(model) if not (walk and term.role is Role.RANDOM_WALK)
-    ]
+    replaced = _select_slow_terms(model, walk=walk)
     processes = [term.gauss_markov for term in replaced if term.gauss_markov is not None]
     K = model.K if walk else 0.0
-    if len(replaced) == len(processes) <= 1:
+    exact = len(replaced) == len(processes) <= 1
+    if exact and all(time in (None, process.T_B) for process in processes):
         B, T_B = (processes[0].B, processes[0].T_B) if processes else (0.0, None)
         return Mapped(NoiseModel(N=model.N, B=B, T_B=T_B, K=K), _describe_omitted_terms(model))
-    tau = np.geomspace(_MIN_TIME_OVER_HORIZON * horizon, horizon, 60)
-    white = model.N**2 / tau
-    wanted = np.log(white + sum(term.allan_variance(tau) for term in replaced))
-    variance = _sum_allan_variance(replaced, horizon)
-
-    def make_process(T_B: float) -> GaussMarkov:
-        unit = GaussMarkov(compute_bias_instability(1.0, T_B), T_B)
-        density = variance / _sum_allan_variance([unit], horizon)
-        return GaussMarkov(compute_bias_instability(density, T_B), T_B)
-
-    times = np.geomspace(
-        _MIN_TIME_OVER_HORIZON * horizon, _MAX_TIME_OVER_HORIZON * horizon, _TRIED_CORRELATION_TIMES
-    )
-    errors = [
-        float(np.mean((np.log(white + make_process(T_B).allan_variance(tau)) - wanted) ** 2))
-        for T_B in times
-    ]
-    process = make_process(float(times[int(np.argmin(errors))]))
+    time = time or find_common_time([model], horizon, walk=walk)
+    process = _make_process(_sum_allan_variance(replaced, horizon), horizon, time)
     replacement = NoiseModel(N=model.N, B=process.B, T_B=process.T_B, K=K)
     what = f"a Gauss-Markov process B = {process.B:.3e}, T_B = {number_text(process.T_B)} s"
     return _describe_replacement(model, replacement, what, replaced, horizon, rate)
+
+
+def find_common_time(models: Sequence[NoiseModel], horizon: float, *, walk: bool = False) -> float:
+    """Return the T_B, s, with which one process in place of each model is nearest to them all.
+
+    See `as_process`. It is the horizon if no model has a slow term.
+    """
+    slow = [(model.N, terms) for model in models if (terms := _select_slow_terms(model, walk=walk))]
+    own = {term.gauss_markov and term.gauss_markov.T_B for _, terms in slow for term in terms}
+    if all(len(terms) == 1 for _, terms in slow) and len(own) == 1 and (time := own.pop()):
+        return time
+    tau = np.geomspace(_MIN_TIME_OVER_HORIZON * horizon, horizon, 60)
+    times = np.geomspace(
+        _MIN_TIME_OVER_HORIZON * horizon, _MAX_TIME_OVER_HORIZON * horizon, _TRIED_CORRELATION_TIMES
+    )
+    # The Allan variance of each process over the one at the horizon, the last tau.
+    shapes = [_make_process(1.0, horizon, T_B).allan_variance(tau) for T_B in times]
+    errors = np.zeros(len(times))
+    for N, terms in slow:
+        white = N**2 / tau
+        replaced = np.sum([term.allan_variance(tau) for term in terms], axis=0)
+        replacing = white + replaced[-1] * np.array(shapes)
+        errors += np.mean((np.log(replacing) - np.log(white + replaced)) ** 2, axis=1)
+    return float(times[int(np.argmin(errors))]) if slow else horizon
+
+
+def _make_process(variance: float, horizon: float, T_B: float) -> GaussMarkov:
+    """Return the process of a T_B with an Allan variance at the horizon."""
+    unit = GaussMarkov(compute_bias_instability(1.0, T_B), T_B)
+    density = variance / _sum_allan_variance([unit], horizon)
+    return GaussMarkov(compute_bias_instability(density, T_B), T_B)
 
 
 def map_to_family(model: NoiseModel, family: str, horizon: float, rate: float) -> Mapped:
@@ -121,8 +143,10 @@ def describe_terms(terms: Sequence[Term]) -> str:
     return ", ".join(term.in_words for term in terms) or "no noise"
 
 
-def _select_slow_terms(model: NoiseModel) -> list[Term]:
-    return [term for term in model.terms if term.role not in _ROLES_NOT_REPLACED]
+def _select_slow_terms(model: NoiseModel, *, walk: bool = False) -> list[Term]:
+    """Return the terms that are replaced; with `walk` the random walk is not."""
+    left = (*_ROLES_NOT_REPLACED, Role.RANDOM_WALK) if walk else _ROLES_NOT_REPLACED
+    return [term for term in model.terms if term.role not in left]
 
 
 def _describe_omitted_terms(model: NoiseModel) -> list[str]:

@@ -43,6 +43,10 @@ def _per_step(gyro: tuple[float, float], accel: tuple[float, float], step: float
     return {"gyro": (gyro[0] * root, gyro[1] * root), "accel": (accel[0] * root, accel[1] * root)}
 
 
+_EKF2 = Floor(
+    "the defaults of EKF2", densities=lambda _: _per_step((0.015, 1e-3), (0.35, 3e-3), 0.01)
+)
+
 FLOORS: Mapping[str, Floor] = {
     "kalibr": _TIMES_10,
     "openvins": _TIMES_10,
@@ -53,15 +57,18 @@ FLOORS: Mapping[str, Floor] = {
             "accel": (0.1 / math.sqrt(2.0 * rate), 1e-3 / math.sqrt(rate)),
         },
     ),
-    "px4": Floor(
-        "the defaults of EKF2", densities=lambda _: _per_step((0.015, 1e-3), (0.35, 3e-3), 0.01)
+    "px4": _EKF2,
+    "px4-mavparm": _EKF2,
+    "ardupilot": Floor(
+        "the defaults of EKF3", densities=lambda _: _per_step((0.015, 1e-3), (0.35, 0.02), 0.012)
     ),
 }
 """Floors by target. Sources: rpng/open_vins, docs/gs-calibration.dox; HKUST-Aerial-Robotics/
 VINS-Fusion, config/euroc/euroc_mono_imu_config.yaml; PX4-Autopilot, src/modules/ekf2 (parameters
-EKF2_GYR_NOISE, EKF2_ACC_NOISE, EKF2_GYR_B_NOISE, EKF2_ACC_B_NOISE, at EKF2_PREDICT_US)."""
+EKF2_GYR_NOISE, EKF2_ACC_NOISE, EKF2_GYR_B_NOISE, EKF2_ACC_B_NOISE, at EKF2_PREDICT_US); ArduPilot,
+libraries/AP_NavEKF3/AP_NavEKF3.cpp (GYRO_P_NSE_DEFAULT and so on, the same of all vehicles)."""
 
-FLIGHT_TARGETS = frozenset({"px4"})
+FLIGHT_TARGETS = frozenset({"px4", "px4-mavparm", "ardupilot"})
 """Programs that fly: noise at rest is written for them only if it is asked for."""
 
 
@@ -117,7 +124,9 @@ def _raise_to(imu: Imu, target: Target, floors: Densities, factor: float, words:
             notes += mapped.words
         model = replace(model, N=max(model.N, least_N))
         notes.insert(0, texts.raised(axis.model.N, model.N, model.K))
-        return replace(axis, model=model, notes=notes)
+        raised = {letter: raise_axis(one, quantity) for letter, one in axis.each.items()}
+        each = {letter: one for letter, one in raised.items() if one is not None}
+        return replace(axis, model=model, notes=notes, each=each)
 
     gyro, accel = raise_axis(imu.gyro, "gyro"), raise_axis(imu.accel, "accel")
     return replace(imu, gyro=gyro, accel=accel, mode=words)

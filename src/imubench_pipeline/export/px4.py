@@ -1,4 +1,4 @@
-"""PX4: parameters of its estimator EKF2, as a file that QGroundControl loads.
+"""PX4: parameters of its estimator EKF2, as a file of QGroundControl or of pymavlink.
 
 ``EKF2_GYR_NOISE`` and ``EKF2_ACC_NOISE`` are standard deviations per filter step, not densities. A
 step of dt adds (dt noise)^2 to the variance of the angle or velocity increment, and (dt b_noise)^2,
@@ -21,14 +21,27 @@ src/modules/ekf2/EKF/python/ekf_derivation/derivation.py (predict_covariance),
 src/modules/ekf2/module.yaml, params_gyro_bias.yaml and params_accel_bias.yaml (units, ranges,
 EKF2_PREDICT_US), src/modules/temperature_compensation/TemperatureCompensation.cpp
 (calc_thermal_offsets_3D, names and clipping); QGroundControl developer guide, "Parameters File
-Format".
+Format"; ArduPilot/pymavlink, mavparm.py (``load``).
 """
 
-import math
+import re
+from collections.abc import Mapping
 
-from imubench_pipeline.export.comments import describe_model, format_comments
+from imubench_pipeline.export import programs
+from imubench_pipeline.export.comments import format_comments
 from imubench_pipeline.export.imu import AXES, ExportError, Imu
-from imubench_pipeline.export.visual_inertial import map_to_walks
+from imubench_pipeline.export.mapping import Mapped
+
+PX4 = programs.declare(
+    "PX4 (EKF2)",
+    "https://github.com/PX4/PX4-Autopilot/blob/HEAD/src/modules/ekf2/EKF/covariance.cpp",
+    "Noise a step of the filter: N / sqrt(dt) and K / sqrt(dt), where dt is EKF2_PREDICT_US; N and "
+    "K are two-sided densities, SI. They hold for the EKF2_PREDICT_US of the file only. They are "
+    "what the sensor alone makes, at rest: vibration in flight adds to it, and the defaults of PX4 "
+    "allow for that.",
+    (programs.FILTER_SAMPLE, "EKF2_GYR_NOISE", "EKF2_ACC_NOISE"),
+    (programs.FILTER_STEP, "EKF2_GYR_B_NOISE", "EKF2_ACC_B_NOISE"),
+)
 
 DEFAULT_PERIOD = 10_000  # default of EKF2_PREDICT_US, us
 
@@ -43,13 +56,6 @@ _REAL32_TYPE, _INT32_TYPE = 9, 6  # MAV_PARAM_TYPE
 _TEMPERATURE_PREFIXES = {"gyro": ("G", "GYRO"), "accel": ("A", "ACC")}
 """Letter after ``TC_``, and word after ``CAL_``."""
 
-_CONVENTION = (
-    "Noise a step of the filter of {step:g} ms: N / sqrt(dt) and K / sqrt(dt), dt = "
-    "EKF2_PREDICT_US; N and K are two-sided densities, SI. They hold for this EKF2_PREDICT_US "
-    "only. They are what the sensor alone makes, at rest: vibration in flight adds to it, and the "
-    "defaults of PX4 allow for that."
-)
-
 
 def write(imu: Imu, period: int = DEFAULT_PERIOD) -> str:
     """Return a parameter file for a `period`, EKF2_PREDICT_US, in us.
@@ -60,28 +66,11 @@ def write(imu: Imu, period: int = DEFAULT_PERIOD) -> str:
         raise ExportError(
             f"EKF2_PREDICT_US is {period}, expected {_PERIOD_RANGE[0]} to {_PERIOD_RANGE[1]}"
         )
-    mapped = map_to_walks(imu)
-    gyro, accel = mapped["gyro"].model, mapped["accel"].model
-    step = math.sqrt(period * 1e-6)
-    values = {
-        "EKF2_ACC_B_NOISE": (accel.K / step, "m/s^3, from K"),
-        "EKF2_ACC_NOISE": (accel.N / step, "m/s^2, from N"),
-        "EKF2_GYR_B_NOISE": (gyro.K / step, "rad/s^2, from K"),
-        "EKF2_GYR_NOISE": (gyro.N / step, "rad/s, from N"),
-    }
-    convention = _CONVENTION.format(step=period / 1000.0)
-    about = describe_model(imu, "PX4 EKF2", convention, mapped, temperature=True)
-    rows = []
-    for name, (value, comment) in values.items():
-        low, high = _PARAMETER_RANGES[name]
-        clipped = min(max(value, low), high)
-        if clipped != value:
-            about.append(
-                f"{name}: {value:.4g} is outside the range of {low:g} to {high:g}, and {clipped:g} "
-                "is used."
-            )
-        about.append(f"{name} = {clipped:.6g} {comment}.")
-        rows.append(f"1\t1\t{name}\t{clipped:.9g}\t{_REAL32_TYPE}\n")
+    mapped = programs.map_models(imu, PX4)
+    about = programs.describe(imu, PX4, mapped, temperature=True)
+    values, remarks = clip_values(PX4, _PARAMETER_RANGES, mapped, period * 1e-6)
+    about += remarks
+    rows = [f"1\t1\t{name}\t{value:.9g}\t{_REAL32_TYPE}\n" for name, value in values.items()]
     rows.append(f"1\t1\tEKF2_PREDICT_US\t{period}\t{_INT32_TYPE}\n")
     for quantity, effect in imu.temperature.items():
         if not effect.slope:
@@ -106,3 +95,30 @@ def write(imu: Imu, period: int = DEFAULT_PERIOD) -> str:
         )
     columns = "# Vehicle-Id Component-Id Name Value Type\n"
     return format_comments(["Onboard parameters for Vehicle 1", *about]) + columns + "".join(rows)
+
+
+def write_mavparm(imu: Imu, period: int = DEFAULT_PERIOD) -> str:
+    """Return the parameters of `write` as lines ``NAME,value``, which pymavlink loads."""
+    return re.sub(r"(?m)^1\t1\t(\S+)\t(\S+)\t\d+$", r"\1,\2", write(imu, period))
+
+
+def clip_values(
+    program: programs.Program,
+    ranges: Mapping[str, tuple[float, float]],
+    mapped: Mapping[str, Mapped],
+    step: float,
+) -> tuple[dict[str, float], list[str]]:
+    """Return the parameters of a filter with a step, s, within their ranges, and remarks."""
+    values: dict[str, float] = {}
+    about = []
+    for entry in program.entries:
+        value = entry.compute(mapped[entry.quantity].model, 1.0 / step, 0.0)
+        low, high = ranges[entry.name]
+        values[entry.name] = clipped = min(max(value, low), high)
+        if clipped != value:
+            about.append(
+                f"{entry.name}: {value:.4g} is outside the range of {low:g} to {high:g}, and "
+                f"{clipped:g} is used."
+            )
+        about.append(f"{entry.name} = {clipped:.6g}: {entry.form.formula}, {entry.unit}.")
+    return values, about

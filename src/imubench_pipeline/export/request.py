@@ -113,8 +113,6 @@ def build_imu(tables: Tables, request: Request, folder: Path | None = None) -> i
             method=request.method,
         )
         place = {"sensor": request.sensor, "recording": choice.recording}
-        if request.one_device and mode != "bounded":
-            choice = pool_recordings(rows, choice, request.method)
         about = by_name[choice.recording]
         if about.doubts:
             cautions.append(f"{choice.recording} is in doubt: {doubts_text(about.doubts)}")
@@ -122,14 +120,16 @@ def build_imu(tables: Tables, request: Request, folder: Path | None = None) -> i
         if about.rate is None:
             raise imu.ExportError(f"{choice.recording}: its rate is not known; state it (--rate)")
         rates.append(float(f"{about.rate:.9g}"))  # time stamps are not more accurate
-        axes[quantity] = choice.axis
-        curve = curve_of(_select_rows(AllanRow, tables, **place, channel=choice.channel))
-        if not choice.determined:
-            axes[quantity] = _limit_walk(choice.axis, curve, request.horizon)
         warmed = _select_rows(TemperatureRow, tables, **place)
         effects[quantity] = imu.find_temperature_effect(warmed, about, quantity, request.horizon)
         if mode == "bounded":
+            curve = _find_curve(tables, request.sensor, choice)
             axes[quantity] = _bound_axis(curve, choice, request, about.rate, folder)
+            continue
+        chosen, *own = (
+            _make_axis(tables, request, rows, one) for one in (choice, *choice.each.values())
+        )
+        axes[quantity] = replace(chosen, each=dict(zip(choice.each, own, strict=True)))
     if not axes:
         reasons = "; ".join(row.reason for row in recordings if row.reason)
         raise imu.ExportError(
@@ -178,6 +178,22 @@ def _select_deciding(
             "same (--because; exports: because; decide: include)"
         )
     return deciding, [reasons, *without]
+
+
+def _make_axis(
+    tables: Tables, request: Request, rows: Sequence[ParameterRow], choice: Choice
+) -> imu.AxisNoise:
+    """Return the noise of a choice at rest: pooled, or with a limit of what no log determines."""
+    if request.one_device:
+        choice = pool_recordings(rows, choice, request.method)
+    if choice.determined:
+        return choice.axis
+    return _limit_walk(choice.axis, _find_curve(tables, request.sensor, choice), request.horizon)
+
+
+def _find_curve(tables: Tables, sensor: str, choice: Choice) -> AllanCurve:
+    place = {"sensor": sensor, "recording": choice.recording, "channel": choice.channel}
+    return curve_of(_select_rows(AllanRow, tables, **place))
 
 
 def _limit_walk(axis: imu.AxisNoise, curve: AllanCurve, horizon: float) -> imu.AxisNoise:

@@ -1,71 +1,83 @@
-"""Programs of visual-inertial navigation, with white noise N and random walk K.
+"""Programs of visual- and lidar-inertial navigation, with white noise N and random walk K.
 
-Kalibr, OpenVINS, Basalt and ORB-SLAM3 take densities that are continuous in time and two-sided, SI,
-all above 0; VINS-Fusion takes standard deviations of samples.
+Kalibr, OpenVINS, Basalt, ORB-SLAM3 and LIO-SAM take densities that are continuous in time and
+two-sided, SI, all above 0; VINS-Fusion takes standard deviations of samples, and FAST-LIO their
+variances.
 """
 
 import json
-import math
+from dataclasses import replace
 
-from imubench_pipeline.export.comments import (
-    describe_model,
-    format_comments,
-    format_decimal,
-    format_exponential,
-    format_setting,
-)
-from imubench_pipeline.export.imu import ExportError, Imu
-from imubench_pipeline.export.mapping import Mapped, as_walk
+from imubench_pipeline.export import programs
+from imubench_pipeline.export.comments import format_decimal, format_setting
+from imubench_pipeline.export.imu import Imu
 
-_KALIBR_CONVENTION = (
+_HUB = "https://github.com/"
+KALIBR = programs.declare(
+    "Kalibr",
+    _HUB + "ethz-asl/kalibr/wiki/IMU-Noise-Model",
     "N as *_noise_density and K as *_random_walk: continuous in time, two-sided (sigma^2(tau) = "
-    "N^2 / tau and K^2 tau / 3), SI; not multiplied by the root of the rate."
+    "N^2 / tau and K^2 tau / 3), SI; not multiplied by the root of the rate.",
+    (programs.WHITE, "gyroscope_noise_density", "accelerometer_noise_density"),
+    (programs.WALK, "gyroscope_random_walk", "accelerometer_random_walk"),
+    positive=True,
 )
-_VINS_CONVENTION = (
+OPENVINS = replace(
+    KALIBR,
+    name="OpenVINS",
+    source=_HUB + "rpng/open_vins/blob/HEAD/ov_msckf/src/utils/NoiseManager.h",
+)
+VINS_FUSION = programs.declare(
+    "VINS-Fusion, VINS-Mono",
+    _HUB + "HKUST-Aerial-Robotics/VINS-Fusion/blob/HEAD/vins_estimator/src/factor/"
+    "integration_base.h",
     "acc_n, gyr_n = N sqrt(2 rate) and acc_w, gyr_w = K sqrt(rate): discrete in time, for samples "
     "at {rate:g} Hz only. What the midpoint propagation makes of them is N^2 and K^2 times the "
-    "time; N and K are two-sided densities."
+    "time; N and K are two-sided densities. These lines replace the lines of the same name in the "
+    "configuration.",
+    (programs.MIDPOINT, "gyr_n", "acc_n"),
+    (programs.STEP, "gyr_w", "acc_w"),
 )
-_BASALT_CONVENTION = (
+BASALT = programs.declare(
+    "Basalt",
+    "https://gitlab.com/VladyslavUsenko/basalt-headers/-/blob/HEAD/include/basalt/calibration/"
+    "calibration.hpp",
     "*_noise_std is N (rad/s/sqrt(Hz), m/s^2/sqrt(Hz)) and *_bias_std is K (rad/s^2/sqrt(Hz), "
-    "m/s^3/sqrt(Hz)), continuous in time and two-sided, of x, y and z."
+    "m/s^3/sqrt(Hz)), continuous in time and two-sided, of x, y and z.",
+    (programs.WHITE, "gyro_noise_std", "accel_noise_std"),
+    (programs.WALK, "gyro_bias_std", "accel_bias_std"),
+    each=True,
+    positive=True,
 )
-_ORB_CONVENTION = (
+ORB_SLAM3 = programs.declare(
+    "ORB-SLAM3",
+    _HUB + "UZ-SLAMLab/ORB_SLAM3/blob/HEAD/src/Tracking.cc",
     "N as IMU.Noise* and K as IMU.*Walk: continuous in time, two-sided, SI; the program itself "
-    "multiplies by the root of IMU.Frequency, or divides by it."
+    "multiplies by the root of IMU.Frequency, or divides by it. These lines go into the settings "
+    "of the camera, beside IMU.T_b_c1.",
+    (programs.WHITE, "IMU.NoiseGyro", "IMU.NoiseAcc"),
+    (programs.WALK, "IMU.GyroWalk", "IMU.AccWalk"),
+    positive=True,
 )
-
-
-def map_to_walks(imu: Imu) -> dict[str, Mapped]:
-    """Return gyro and accelerometer as white noise and random walk; ExportError without both."""
-    imu.require_both()
-    return {name: as_walk(axis.model, imu.horizon, imu.rate) for name, axis in imu.axes.items()}
-
-
-def _map_to_positive_walks(imu: Imu, program: str) -> dict[str, Mapped]:
-    """Return `map_to_walks` for a program that takes no 0; ExportError if a density is 0."""
-    mapped = map_to_walks(imu)
-    for name, axis in mapped.items():
-        for letter in ("N", "K"):
-            if not getattr(axis.model, letter) > 0.0:
-                raise ExportError(
-                    f"{name}: {letter} is 0, and {program} takes values above 0 only; a longer "
-                    "log, or an overbound, gives one"
-                )
-    return mapped
-
-
-def _format_densities(mapped: dict[str, Mapped], indent: str = "") -> str:
-    """Return the four densities of Kalibr and OpenVINS."""
-    text = ""
-    for name, word, unit, slower in (
-        ("accel", "accelerometer", "m/s^2", "m/s^3"),
-        ("gyro", "gyroscope", "rad/s", "rad/s^2"),
-    ):
-        N, K = (format_exponential(value) for value in (mapped[name].model.N, mapped[name].model.K))
-        text += format_setting(f"{word}_noise_density", N, f"N, {unit}/sqrt(Hz)", indent)
-        text += format_setting(f"{word}_random_walk", K, f"K, {slower}/sqrt(Hz)", indent)
-    return text
+LIO_SAM = programs.declare(
+    "LIO-SAM",
+    _HUB + "TixiaoShan/LIO-SAM/blob/HEAD/src/imuPreintegration.cpp",
+    "imu*Noise is N and imu*BiasN is K: continuous in time, two-sided, SI; not multiplied by the "
+    "root of the rate. These lines replace the lines of the same name in params.yaml.",
+    (programs.WHITE, "imuGyrNoise", "imuAccNoise"),
+    (programs.WALK, "imuGyrBiasN", "imuAccBiasN"),
+    positive=True,
+)
+FAST_LIO = programs.declare(
+    "FAST-LIO, FAST-LIVO2",
+    _HUB + "hku-mars/FAST_LIO/blob/HEAD/src/IMU_Processing.hpp",
+    "*_cov are variances of a sample, discrete in time, for samples at {rate:g} Hz only: N^2 rate, "
+    "and K^2 rate for b_*_cov; N and K are two-sided densities, SI. FAST-LIO reads them from "
+    "mapping, FAST-LIVO2 from imu, where it ignores b_*_cov and takes 1e-4. These lines replace "
+    "the lines of the same name in the configuration.",
+    (programs.SAMPLE_VARIANCE, "gyr_cov", "acc_cov"),
+    (programs.STEP_VARIANCE, "b_gyr_cov", "b_acc_cov"),
+)
 
 
 def write_kalibr(imu: Imu) -> str:
@@ -75,10 +87,10 @@ def write_kalibr(imu: Imu) -> str:
     / sqrt(dt)), and aslam_offline_calibration/kalibr/python/kalibr_common/ConfigReader.py, class
     ImuParameters (names, checks, conversion).
     """
-    mapped = _map_to_positive_walks(imu, "Kalibr")
+    head, lines = programs.compose(imu, KALIBR, programs.YAML)
     return (
-        format_comments(describe_model(imu, "Kalibr", _KALIBR_CONVENTION, mapped))
-        + _format_densities(mapped)
+        head
+        + lines
         + format_setting("rostopic", json.dumps(imu.ros_topic), "of sensor_msgs/Imu")
         + format_setting("update_rate", format_decimal(imu.rate), "Hz")
     )
@@ -92,23 +104,17 @@ def write_openvins(imu: Imu) -> str:
     Sources: rpng/open_vins, config/euroc_mav/kalibr_imu_chain.yaml (form and names),
     ov_msckf/src/utils/NoiseManager.h (units), ov_msckf/src/state/Propagator.cpp (discretisation).
     """
-    mapped = _map_to_positive_walks(imu, "OpenVINS")
-    about = [
-        *describe_model(imu, "OpenVINS", _KALIBR_CONVENTION, mapped),
-        "Extrinsics and intrinsics (T_i_b, Tw, Ta, Tg, R_*) describe an ideal sensor.",
-    ]
     indent = "  "
+    head, lines = programs.compose(imu, OPENVINS, indent + programs.YAML)
 
     def matrix(name: str, size: int, diagonal: float = 1.0) -> str:
         rows = [[diagonal if i == j else 0.0 for j in range(size)] for i in range(size)]
         return f"  {name}:\n" + "".join(f"    - {row}\n" for row in rows)
 
     return (
-        "%YAML:1.0\n\n"
-        + format_comments(about)
-        + "imu0:\n"
+        f"%YAML:1.0\n\n{head}imu0:\n"
         + matrix("T_i_b", 4)
-        + _format_densities(mapped, indent)
+        + lines
         + format_setting("rostopic", json.dumps(imu.ros_topic), "of sensor_msgs/Imu", indent)
         + format_setting("time_offset", format_decimal(0.0), "s", indent)
         + format_setting("update_rate", format_decimal(imu.rate), "Hz", indent)
@@ -137,27 +143,12 @@ def write_vins_fusion(imu: Imu) -> str:
     (``noise``, ``V`` of the midpoint integration), vins_estimator/src/estimator/parameters.cpp and
     config/euroc/euroc_mono_imu_config.yaml (names).
     """
-    mapped = map_to_walks(imu)
-    gyro, accel = mapped["gyro"].model, mapped["accel"].model
-    per_sample, per_step = math.sqrt(2.0 * imu.rate), math.sqrt(imu.rate)
-    about = [
-        *describe_model(imu, "VINS-Fusion", _VINS_CONVENTION.format(rate=imu.rate), mapped),
-        "These lines replace the lines of the same name in the configuration.",
-    ]
-    values = [
-        ("acc_n", accel.N * per_sample, f"m/s^2 a sample, N = {accel.N:.4e}"),
-        ("gyr_n", gyro.N * per_sample, f"rad/s a sample, N = {gyro.N:.4e}"),
-        ("acc_w", accel.K * per_step, f"m/s^3, K = {accel.K:.4e}"),
-        ("gyr_w", gyro.K * per_step, f"rad/s^2, K = {gyro.K:.4e}"),
-    ]
+    head, lines = programs.compose(imu, VINS_FUSION, programs.YAML)
     return (
-        "%YAML:1.0\n\n"
-        + format_comments(about)
+        f"%YAML:1.0\n\n{head}"
         + format_setting("imu", "1", "use it")
         + format_setting("imu_topic", json.dumps(imu.ros_topic), "of sensor_msgs/Imu")
-        + "".join(
-            format_setting(key, format_exponential(value), words) for key, value, words in values
-        )
+        + lines
         + format_setting("g_norm", format_decimal(imu.gravity), "gravity, m/s^2")
     )
 
@@ -173,16 +164,12 @@ def write_basalt(imu: Imu) -> str:
     deviation", sigma_d = sigma_c sqrt(r)) and include/basalt/serialization/headers_serialization.h
     (names); VladyslavUsenko/basalt, src/vi_estimator/sqrt_keypoint_vio.cpp (weight of the biases).
     """
-    mapped = _map_to_positive_walks(imu, "Basalt")
-    gyro, accel = mapped["gyro"].model, mapped["accel"].model
+    mapped = programs.map_models(imu, BASALT)
     content = {
-        "about": describe_model(imu, "Basalt", _BASALT_CONVENTION, mapped),
+        "about": programs.describe(imu, BASALT, mapped),
         "value0": {
             "imu_update_rate": imu.rate,
-            "accel_noise_std": [accel.N] * 3,
-            "gyro_noise_std": [gyro.N] * 3,
-            "accel_bias_std": [accel.K] * 3,
-            "gyro_bias_std": [gyro.K] * 3,
+            **{entry.name: programs.compute_values(entry, imu, mapped) for entry in BASALT.entries},
         },
     }
     return json.dumps(content, indent=4) + "\n"
@@ -198,18 +185,41 @@ def write_orb_slam3(imu: Imu) -> str:
     (``IMU::Calib(Tbc, Ng*sf, Na*sf, Ngw/sf, Naw/sf)`` and the units it prints), src/ImuTypes.cc
     (the propagation).
     """
-    mapped = _map_to_positive_walks(imu, "ORB-SLAM3")
-    gyro, accel = mapped["gyro"].model, mapped["accel"].model
-    about = [
-        *describe_model(imu, "ORB-SLAM3", _ORB_CONVENTION, mapped),
-        "These lines go into the settings of the camera, beside IMU.T_b_c1.",
-    ]
-    return (
-        "%YAML:1.0\n\n"
-        + format_comments(about)
-        + format_setting("IMU.NoiseGyro", format_exponential(gyro.N), "N, rad/s/sqrt(Hz)")
-        + format_setting("IMU.NoiseAcc", format_exponential(accel.N), "N, m/s^2/sqrt(Hz)")
-        + format_setting("IMU.GyroWalk", format_exponential(gyro.K), "K, rad/s^2/sqrt(Hz)")
-        + format_setting("IMU.AccWalk", format_exponential(accel.K), "K, m/s^3/sqrt(Hz)")
-        + format_setting("IMU.Frequency", format_decimal(imu.rate), "Hz")
-    )
+    head, lines = programs.compose(imu, ORB_SLAM3, programs.YAML)
+    rate = format_setting("IMU.Frequency", format_decimal(imu.rate), "Hz")
+    return f"%YAML:1.0\n\n{head}{lines}{rate}"
+
+
+def write_lio_sam(imu: Imu) -> str:
+    """Return the lines of ``params.yaml`` of LIO-SAM that concern the sensor.
+
+    The squares are the continuous covariances of GTSAM's PreintegrationParams, which divides them
+    by the interval of the samples. Between two key frames the bias may change by BiasN times the
+    root of the time between them: BiasN is K. The lines are for ROS 1; the branch ``ros2`` has the
+    same names below ``ros__parameters``.
+
+    Sources: TixiaoShan/LIO-SAM, include/utility.h (names), src/imuPreintegration.cpp
+    (``accelerometerCovariance``, ``noiseModelBetweenBias`` times the root of ``deltaTij``);
+    borglab/gtsam, gtsam/navigation/ImuFactor.cpp (``aCov / dt``).
+    """
+    head, lines = programs.compose(imu, LIO_SAM, "  " + programs.YAML)
+    gravity = format_setting("imuGravity", format_decimal(imu.gravity), "m/s^2", "  ")
+    return f"{head}lio_sam:\n{lines}{gravity}"
+
+
+def write_fast_lio(imu: Imu) -> str:
+    """Return the lines of the configuration of FAST-LIO, FAST-LIO2 and FAST-LIVO2.
+
+    Over the interval dt of two samples, the prediction adds dt^2 ``gyr_cov`` to the variance of the
+    angle, dt^2 ``acc_cov`` to the one of the velocity, and dt^2 ``b_*_cov`` to the one of the bias.
+    The true increments are N^2 dt and K^2 dt, so the covariances are N^2 rate and K^2 rate. The
+    reading of a step is the mean of two samples, each of which belongs to two steps; their sum has
+    the same variance.
+
+    Sources: hku-mars/FAST_LIO, src/laserMapping.cpp (names), src/IMU_Processing.hpp (``Q``, set
+    anew after the initialisation), include/IKFoM_toolkit/esekfom/esekfom.hpp (``predict``);
+    hku-mars/FAST-LIVO2, src/LIVMapper.cpp (names, and 0.0001 for the biases),
+    src/IMU_Processing.cpp (``cov_w``).
+    """
+    head, lines = programs.compose(imu, FAST_LIO, "  " + programs.YAML)
+    return f"{head}mapping:\n{lines}imu:\n{lines}"

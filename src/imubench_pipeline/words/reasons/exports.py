@@ -102,9 +102,13 @@ def chosen_axis(
     )
 
 
-def axis_rank(number: int, place: str, of: str = "") -> str:
-    """Return the place of an axis, ``worst`` or ``median``; ``of``: its device, if asked for."""
-    rank = "the only axis" if number == 1 else f"the {place} of {number} axes"
+def axis_rank(number: int, place: str, of: str = "", noun: str = "axis") -> str:
+    """Return the place of an axis, ``worst`` or ``median``; ``of``: its device, if asked for.
+
+    ``noun`` is ``axis``, or ``estimate`` if the estimates of one axis are compared.
+    """
+    plural = "axes" if noun == "axis" else f"{noun}s"
+    rank = f"the only {noun}" if number == 1 else f"the {place} of {number} {plural}"
     return f"{rank} of {of}" if of else rank
 
 
