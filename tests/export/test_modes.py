@@ -69,6 +69,18 @@ def test_vins_fusion_has_the_values_of_its_examples() -> None:
     )
 
 
+def test_fast_lio_has_the_values_of_its_examples() -> None:
+    target = TARGETS["fast-lio"]
+    text = str(target.write(apply_mode(IMU, target, "in-use")))
+    found = {
+        line.split(":")[0].strip(): float(line.split(":")[1].split("#")[0])
+        for line in text.splitlines()
+        if "_cov:" in line
+    }
+    assert found["gyr_cov"] == found["acc_cov"] == pytest.approx(0.1, rel=1e-5)
+    assert found["b_gyr_cov"] == found["b_acc_cov"] == pytest.approx(1e-4, rel=1e-5)
+
+
 def test_ten_times_is_ten_times_every_density() -> None:
     raised = apply_mode(IMU, TARGETS["kalibr"], "in-use")
     bench = yaml.safe_load(str(TARGETS["kalibr"].write(IMU)))

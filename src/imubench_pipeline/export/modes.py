@@ -47,9 +47,20 @@ _EKF2 = Floor(
     "the defaults of EKF2", densities=lambda _: _per_step((0.015, 1e-3), (0.35, 3e-3), 0.01)
 )
 
+_TEN_TIMES = ("kalibr", "openvins", "basalt", "orb-slam3", "gtsam", "matlab-factor", "ceres")
+
 FLOORS: Mapping[str, Floor] = {
-    "kalibr": _TIMES_10,
-    "openvins": _TIMES_10,
+    **dict.fromkeys(_TEN_TIMES, _TIMES_10),
+    "lio-sam": Floor(
+        "the example configuration of LIO-SAM",
+        densities=lambda _: {"gyro": (1.564e-3, 3.564e-5), "accel": (3.994e-3, 6.436e-5)},
+    ),
+    "fast-lio": Floor(
+        "the example configurations of FAST-LIO",
+        densities=lambda rate: dict.fromkeys(
+            ("gyro", "accel"), (math.sqrt(0.1 / rate), math.sqrt(1e-4 / rate))
+        ),
+    ),
     "vins-fusion": Floor(
         "the example configurations of VINS-Fusion",
         densities=lambda rate: {
@@ -64,7 +75,8 @@ FLOORS: Mapping[str, Floor] = {
     ),
 }
 """Floors by target. Sources: rpng/open_vins, docs/gs-calibration.dox; HKUST-Aerial-Robotics/
-VINS-Fusion, config/euroc/euroc_mono_imu_config.yaml; PX4-Autopilot, src/modules/ekf2 (parameters
+VINS-Fusion, config/euroc/euroc_mono_imu_config.yaml; TixiaoShan/LIO-SAM, config/params.yaml;
+hku-mars/FAST_LIO, config/avia.yaml; PX4-Autopilot, src/modules/ekf2 (parameters
 EKF2_GYR_NOISE, EKF2_ACC_NOISE, EKF2_GYR_B_NOISE, EKF2_ACC_B_NOISE, at EKF2_PREDICT_US); ArduPilot,
 libraries/AP_NavEKF3/AP_NavEKF3.cpp (GYRO_P_NSE_DEFAULT and so on, the same of all vehicles)."""
 
