@@ -5,7 +5,7 @@
 The block means of the runs are drawn from their exact distribution. What is asked stands beside
 what is found, and the exit status is 1 if something is not fulfilled. An interval of 95 % should
 hold the truth in 93 to 97 % of the runs, an error should be 0.95 to 1.05 of its sigma (root mean
-squares over the runs), NEES and NIS inside their two-sided 95 % bounds likewise.
+squares over the runs), NEES and NIS inside their two-sided 95 % bounds the same.
 
 The gyro is the SiRRS01-03 of Silva et al. with the noise that they print; the accelerometer of its
 triad is assumed to be that of the MTi-7 (Maia et al., Table 2), as they have none.

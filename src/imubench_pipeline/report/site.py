@@ -71,9 +71,9 @@ class Entry:
     context: "Callable[[Site], Mapping[str, object]]"  # of the template
     # the joined tables that it shows: it is written again if one of them changes
     tables: tuple[str, ...] = ()
-    # returns the recordings that it shows: likewise if any of their rows change
+    # returns the recordings that it shows: the same if any of their rows change
     views: "Callable[[Site], Sequence[RecordingView]]" = lambda _: ()
-    # returns the files of recordings that it shows: likewise
+    # returns the files of recordings that it shows: the same
     files: "Callable[[Site], Iterable[Path]]" = lambda _: ()
     exists: "Callable[[Site], bool]" = lambda _: True  # returns whether a report has it
     place: int = 0  # in the navigation, among the pages of extensions

@@ -105,8 +105,8 @@ def _calibrate(options: argparse.Namespace, compiling: "Compilation") -> int:
             measured = None
             if options.in_use not in (None, exports.NOT_MEASURED):
                 measured = exports.read_in_use(options.in_use, plan.sensors[sensor], options.motion)
-            sources = plan.sensors[sensor].log.channels.values()
-            topics = [one.variable for one in sources if str(one.variable).startswith("/")]
+            sources = sorted(plan.sensors[sensor].log.channels.items(), reverse=True)  # gyro first
+            topics = [one.variable for _, one in sources if str(one.variable).startswith("/")]
             request = exports.make_request(
                 options,
                 sensor=sensor,

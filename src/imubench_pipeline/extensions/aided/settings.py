@@ -62,7 +62,7 @@ class NavigateSettings(Strict):
     gyro_bias: RateFromZero = Field(
         "0.1 deg/s", description="standard deviation of the turn-on bias"
     )
-    accel_bias: AccelerationFromZero = Field("3 mg", description="likewise of accelerometers")
+    accel_bias: AccelerationFromZero = Field("3 mg", description="the same for accelerometers")
     accel_noise: _AccelerationDensity = Field(
         "100 ug/sqrt(Hz)",
         description="two-sided density of the assumed accelerometers if a log has none",
@@ -70,7 +70,7 @@ class NavigateSettings(Strict):
     gyro_scale: float = Field(
         0.0, ge=0, lt=0.1, description="standard deviation of the error of the scale factor"
     )
-    accel_scale: float = Field(0.0, ge=0, lt=0.1, description="likewise of accelerometers")
+    accel_scale: float = Field(0.0, ge=0, lt=0.1, description="the same for accelerometers")
     temperature_change: Annotated[Text, _difference] | None = Field(
         None,
         examples=["10 K"],

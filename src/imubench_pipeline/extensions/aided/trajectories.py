@@ -44,7 +44,7 @@ class Trajectory:
     velocity: Array  # (L + 1, 3); m/s
     attitude: Array  # (L + 1, 3, 3); from sensor axes (ahead, right, down) to north, east, down
     rate: Array  # (L, 3); rad/s: means over the intervals between
-    force: Array  # (L, 3); m/s^2, likewise
+    force: Array  # (L, 3); m/s^2, the same
     sampling: float  # Hz
     earth: Array  # (3,); the Earth's rate, rad/s
     gnss: Gnss

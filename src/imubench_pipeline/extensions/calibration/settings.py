@@ -35,7 +35,7 @@ class Direction(Strict):
     heading: Angle | None = Field(None, description="of the axis, north to east; null: unknown")
     elevation: Angle = Field("0 deg", description="above the horizon: 90 deg up, -90 deg down")
     heading_sigma: AngleFromZero = Field("0 deg", description="standard deviation of the heading")
-    elevation_sigma: AngleFromZero = Field("0 deg", description="likewise of the elevation")
+    elevation_sigma: AngleFromZero = Field("0 deg", description="the same for the elevation")
 
     @model_validator(mode="before")
     @classmethod
@@ -76,7 +76,7 @@ class Step(Strict):
     """A steady rate of the table."""
 
     start: TimeFromZero = Field(description="time from the first sample of the recording")
-    end: TimeFromZero = Field(description="likewise")
+    end: TimeFromZero = Field(description="the same")
     rate: Rate = Field(
         description="rate of the table, positive if a correct gyro reads a positive rate"
     )
@@ -181,7 +181,7 @@ class InPositions(Experiment):
     gyro_bias: RateFromZero = Field(
         "0.5 deg/s", description="standard deviation of the fixed bias of each gyro"
     )
-    accelerometer_bias: AccelerationFromZero = Field("20 mg", description="likewise")
+    accelerometer_bias: AccelerationFromZero = Field("20 mg", description="the same")
 
     @model_validator(mode="after")
     def _check_turning(self) -> Self:
@@ -236,8 +236,8 @@ class SimulatedPositions(InPositions):
     """A triad that is turned by a schedule, and senses gravity and the Earth's rate."""
 
     roll: Angle = Field("0 deg", description="true one, in the first position")
-    pitch: Angle = Field("0 deg", description="likewise")
-    heading: Angle = Field("0 deg", description="likewise, from north towards east")
+    pitch: Angle = Field("0 deg", description="the same")
+    heading: Angle = Field("0 deg", description="the same, from north towards east")
     assumed: tuple[Text, ...] = Field((), description="values that no source publishes")
 
     @property

@@ -109,7 +109,7 @@ class EarthRatePublishedRow(OfRecordingRow):
     off_sigma: Annotated[float | None, "published less truth, in sigma"] = None
     verdict: Annotated[str, "within the noise or beyond the noise"]
     simulated: Annotated[float | None, "from pairs, in a simulated log", "rad/s"] = None
-    simulated_filter: Annotated[float | None, "from the filter, likewise", "rad/s"] = None
+    simulated_filter: Annotated[float | None, "from the filter, the same", "rad/s"] = None
     assumed: Annotated[str | None, "assumptions: not printed by the source"] = None
 
 
@@ -120,12 +120,12 @@ class AlignmentRow(OfRecordingRow):
     method: Annotated[str, "coarse or fine"]
     time: Annotated[float, "time at rest, including the turn between two positions", "s"]
     roll: Annotated[float | None, "standard deviation, level, facing north", "rad"] = None
-    pitch: Annotated[float | None, "likewise", "rad"] = None
-    heading: Annotated[float | None, "likewise; null: see reason", "rad"] = None
+    pitch: Annotated[float | None, "the same", "rad"] = None
+    heading: Annotated[float | None, "the same; null: see reason", "rad"] = None
     reason: Annotated[str | None, "reason for a missing angle"] = None
     error_roll: Annotated[float | None, "rms error of simulated triads over roll"] = None
-    error_pitch: Annotated[float | None, "likewise, over pitch"] = None
-    error_heading: Annotated[float | None, "likewise, over heading"] = None
+    error_pitch: Annotated[float | None, "the same, over pitch"] = None
+    error_heading: Annotated[float | None, "the same, over heading"] = None
     simulated: Annotated[int | None, "number of triads of this check; null: none"] = None
     latitude: Annotated[float, "latitude, latitude, as set (earth_rate: latitude)", "rad"]
     gyro_bias: Annotated[float, "standard deviation of the fixed biases", "rad/s"]
@@ -133,7 +133,7 @@ class AlignmentRow(OfRecordingRow):
     accelerometer_bias: Annotated[float, "standard deviation of the fixed biases", "m/s^2"]
     accelerometer_bias_from: Annotated[str, "source of this figure"]
     gyros: Annotated[tuple[str, ...], "channels whose noise the axes x, y, z have"]
-    accelerometers: Annotated[tuple[str, ...], "likewise"]
+    accelerometers: Annotated[tuple[str, ...], "the same"]
 
 
 TURNED = (

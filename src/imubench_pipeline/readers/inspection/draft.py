@@ -101,7 +101,7 @@ _MAX_YAML_WIDTH = 1 << 20
 _MAX_TEXT_LENGTH = 600
 _MAX_LINE_LENGTH = 110
 _MAX_REMARKS = 20
-_SAME_COMMENT = "likewise"
+_SAME_COMMENT = "the same"
 
 
 class _Dumper(yaml.SafeDumper):

@@ -10,11 +10,12 @@ from imubench_pipeline.readers.bounded import BoundError, run_bounded
 from imubench_pipeline.readers.inspection import Inspection, inspect
 from imubench_pipeline.readers.inspection.draft import UNKNOWN, Entry
 from imubench_pipeline.recordings.drop_zone import get_recording_name, get_sensor_name
-from imubench_pipeline.settings.sensor import CHANNELS, Sensor, quantity_of
+from imubench_pipeline.settings.sensor import CHANNELS, QUANTITIES, Sensor, quantity_of
 from imubench_pipeline.settings.validation import ConfigError, parse
 from imubench_pipeline.settings.yaml_files import list_files, read_settings
 from imubench_pipeline.tables.files import write_json
 from imubench_pipeline.tables.findings import RecordingError
+from imubench_pipeline.units import UnitError, find_conversion
 
 INSPECTED_S, INSPECTED_BYTES = 10.0, 1 << 29  # for the inspection of a log, s and bytes
 
@@ -133,9 +134,16 @@ def draft_sensor(log: Path, stated: Stated) -> Mapping[str, object]:
 
     Raises ConfigError if the log cannot be read, and UnfilledError if a property is missing.
     """
-    draft = inspect_log(log, stated.topics).draft.with_units(
-        lambda key, unit: stated.unit_of(key) if key in CHANNELS and unit == UNKNOWN else None
-    )
+    inspected = inspect_log(log, stated.topics).draft
+    draft = inspected.with_units(lambda key, _: stated.unit_of(key) if key in CHANNELS else None)
+    for channel, entry in inspected.channels.items():
+        unit, own = entry.value.unit, draft.channels[channel].value.unit
+        stated_by_log = unit not in (None, UNKNOWN) and not entry.comment.startswith("guessed")
+        if stated_by_log and not _is_same_unit(str(unit), str(own), channel):
+            raise ConfigError(
+                f"{log}: {channel} is in {unit}, as the log says, and not in {own}: leave the "
+                "option out, or write a sensor file if the log is wrong"
+            )
     if stated.rate and draft.time is None:
         draft.rate = Entry(stated.rate)
     open_keys = ["rate"] * (draft.rate is not None and draft.rate.value == UNKNOWN)
@@ -162,6 +170,14 @@ def draft_sensor(log: Path, stated: Stated) -> Mapping[str, object]:
     return parse(Sensor, draft.sensor(), f"drafted from {log}").model_dump(
         mode="json", exclude_unset=True
     )
+
+
+def _is_same_unit(unit: str, other: str, channel: str) -> bool:
+    dimension = QUANTITIES[quantity_of(channel)]
+    try:
+        return find_conversion(unit, dimension) == find_conversion(other, dimension)
+    except UnitError as error:
+        raise ConfigError(str(error)) from None
 
 
 def inspect_log(log: Path, topics: Sequence[str] = ()) -> Inspection:

@@ -48,7 +48,7 @@ class Triad:
     gyros: Sequence[NoiseModel]  # three, SI
     accelerometers: Sequence[NoiseModel]  # three, SI
     gyro_bias: float  # standard deviation of the fixed bias of each axis, rad/s
-    accelerometer_bias: float  # likewise, m/s^2
+    accelerometer_bias: float  # the same, m/s^2
 
     def __post_init__(self) -> None:
         for name in ("gyros", "accelerometers"):
