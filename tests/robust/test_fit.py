@@ -176,6 +176,30 @@ def test_k_of_some_minutes_is_not_identified_but_bounded() -> None:
         assert K.value is None and K.upper is not None and K.upper > 2e-4
 
 
+def test_the_lowest_point_is_the_lowest_within_a_sixth_of_the_log() -> None:
+    model = NoiseModel(N=1e-4, B=2.5e-5)
+    tau = np.geomspace(1.0, SAMPLES / RATE / 6.0, 500)
+    true = float(np.sqrt(model.allan_variance(tau, RATE).min()))
+    found = [estimate(simulate_gyro(seed, model)).curve["sigma_min"] for seed in range(8)]
+    limits = [(each.lower, each.upper) for each in found if each.value is not None]
+    assert len(limits) >= 7  # the curve is flat from a twelfth of this time on
+    inside = sum(low is not None and low <= true <= (high or 0.0) for low, high in limits)
+    assert inside >= 5  # of 7 at 95 %: fewer has a probability of 0.4 %
+    falling = estimate(simulate_gyro(1, NoiseModel(N=1e-4))).curve["sigma_min"]
+    assert falling.value is None and falling.upper is not None
+    assert 0.8e-4 / math.sqrt(tau[-1]) < falling.upper < 3e-4 / math.sqrt(tau[-1])
+
+
+def test_a_change_of_the_noise_widens_the_limits_of_the_lowest_point() -> None:
+    steady = simulate_gyro(2)
+    changing = steady * np.repeat((0.5, 1.5), SAMPLES // 2)
+    before, after = (estimate(log).curve["sigma_min"] for log in (steady, changing))
+    assert before.upper is not None and before.lower is not None
+    assert after.upper is not None and after.lower is not None
+    assert before.upper / before.lower < 2.0
+    assert after.upper / after.lower > 1.5 * before.upper / before.lower
+
+
 def test_hidden_white_noise_has_an_upper_limit() -> None:
     found = estimate(simulate_gyro(5, NoiseModel(N=1e-6, K=1e-3))).parameters["N"]
     assert (found.value, found.status) == (None, "not_identified")

@@ -66,7 +66,7 @@ class ParameterRow(ChannelRow):
         "Q, N, B, T_B, K, R; N_sensor (white density before a low-pass or an interpolation "
         "that shows); amplitude and frequency of a line; of the curve of the model: B_curve "
         "(bias instability of the curve: highest Allan deviation of all F and GM terms over "
-        "0.664), sigma_min and tau_min (lowest point, up to a ninth of the log)",
+        "0.664), sigma_min and tau_min (lowest point up to 1/6 of the log by robust, else 1/9)",
     ]
     value: Estimate = None
     lower: LowerLimit = None

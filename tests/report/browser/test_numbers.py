@@ -140,7 +140,7 @@ def test_a_value_that_is_not_known_says_why(read: Open, bench: Report) -> None:
     *lowest, absent = tables.nth(1).locator("tr.recommended td.none").all()
     assert [one.inner_text() for one in lowest] == ["not determined", "not determined"]
     falls = "the Allan deviation of the fitted noise has no minimum: it still falls at 4000 s, "
-    falls += "a ninth of the log."
+    falls += "the longest τ that is used."
     assert reader.page.locator("ul.untold").first.locator("li").all_inner_texts() == [
         f"σ_min and τ_min: {falls}",
         "K is not in the model: the data do not support it; below 1.2 °/h/√h.",

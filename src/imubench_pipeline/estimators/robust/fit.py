@@ -36,7 +36,6 @@ from imubench_pipeline.estimators.curve_bias import (
 )
 from imubench_pipeline.estimators.estimate import (
     BROADBAND_TIME,
-    CURVE,
     MAX_LIMIT_RATIO,
     Estimate,
     JointDraws,
@@ -53,7 +52,11 @@ from imubench_pipeline.estimators.robust.active_sets import (
     Solutions,
     TermSearch,
 )
-from imubench_pipeline.estimators.robust.parts import PartVariances, estimate_excess
+from imubench_pipeline.estimators.robust.parts import (
+    LONGEST_OF_PARTS,
+    PartVariances,
+    estimate_excess,
+)
 from imubench_pipeline.estimators.whittle import Terms
 from imubench_pipeline.noise import FLOOR, NoiseModel, Sinusoid
 from imubench_pipeline.noise.variance_covariance import compute_variance_covariance
@@ -86,7 +89,7 @@ _TIMES_OF_MINIMUM = 120
 _MAX_DOUBTFUL_RATIO = 10.0  # Of the limits of a bias instability or lowest point with a value
 _MAX_SHARE_WITHOUT_MINIMUM = 0.025  # Of the draws
 _MIN_DECREASE = 0.5  # of a residual that ends the search for the first point
-_MAX_EXCESS = 1.0  # Standard deviation of a logarithm between parts: nothing is identified beyond
+_MAX_EXCESS = 1.0  # Variance of a logarithm between parts: nothing is identified beyond
 
 
 def fit(
@@ -107,7 +110,8 @@ def fit(
     inside, points, fitted = _fit_curve(curve, lines)
     excesses = _estimate_excesses(points, fitted, parts.select(inside))
     draws = _draw(points, fitted, excesses, rng)
-    estimate = _make_estimate(points, fitted, draws)
+    factors = np.exp(excesses["sigma_min"] * rng.standard_normal(_DRAWS))
+    estimate = _make_estimate(points, fitted, draws, factors)
     duration = curve.samples / curve.rate
     parameters = {
         symbol: replace(one, reason=texts.changes_between_parts(excesses[symbol]))
@@ -388,28 +392,32 @@ def _draw(
     return replace(drawn, squares=drawn.squares * factors, times=times)
 
 
-_TERMS_OF = {"N": [WHITE], "B": [FLICKER, PROCESS], "K": [WALK, RAMP]}
+_TERMS_OF = {"N": [WHITE], "B": [FLICKER, PROCESS], "K": [WALK]}
 
 
 def _estimate_excesses(
     points: _Points, fitted: _Fitted, parts: PartVariances
 ) -> Mapping[str, float]:
-    """Return the excess deviation of the logarithms of N, B and K between parts of the log."""
+    """Return the excess deviation of the logarithms of N, B, K and sigma_min between parts."""
     curve, squares = points.curve, fitted.solution.squares[0]
     present = np.flatnonzero(squares)
     columns = points.search.design(float(fitted.solution.times[0]))[:, present]
     gain = np.zeros((TERMS, len(curve.tau)))
     gain[present] = np.linalg.pinv(fitted.whitening @ columns) @ fitted.whitening
     covariance = cache(partial(points.covariance, fitted.model, fitted.expected))
-    excesses = {}
-    for symbol, terms in (("N", [WHITE]), ("B", [FLICKER, PROCESS]), ("K", [WALK])):
-        total = squares[terms].sum()
-        excess = 0.0
-        if total > 0.0:
-            influence = gain[terms].sum(axis=0) * fitted.expected / total / 2.0
-            excess = estimate_excess(parts, curve, influence, covariance)
-        excesses[symbol] = min(float(np.sqrt(excess)), _MAX_EXCESS)
-    return excesses
+    influences = {
+        symbol: gain[terms].sum(axis=0) * fitted.expected / (squares[terms].sum() or np.inf) / 2.0
+        for symbol, terms in _TERMS_OF.items()
+    }
+    # The lowest point within the longest tau of the parts, averaged over three tau
+    compared = curve.cluster_size <= LONGEST_OF_PARTS * curve.samples
+    end = int(fitted.expected[compared].argmin()) + 1
+    influences["sigma_min"] = np.zeros(len(curve.tau))
+    influences["sigma_min"][max(end - 3, 0) : end] = 0.5 / min(end, 3)
+    return {
+        symbol: float(np.sqrt(min(estimate_excess(parts, curve, each, covariance), _MAX_EXCESS)))
+        for symbol, each in influences.items()
+    }
 
 
 def _add_length(parameter: Parameter, duration: float) -> Parameter:
@@ -421,7 +429,7 @@ def _add_length(parameter: Parameter, duration: float) -> Parameter:
     return replace(parameter, duration_needed=duration * max(half, 1.0) ** 2)
 
 
-def _make_estimate(points: _Points, fitted: _Fitted, drawn: Solutions) -> Estimate:
+def _make_estimate(points: _Points, fitted: _Fitted, drawn: Solutions, factors: Array) -> Estimate:
     """Return the estimate: values of the best model, limits of the draws."""
     curve, model = points.curve, fitted.model
     roots = np.sqrt(drawn.squares)
@@ -444,28 +452,18 @@ def _make_estimate(points: _Points, fitted: _Fitted, drawn: Solutions) -> Estima
     value = float(compute_curve_bias(convert_noise_model(model), end)[0][0])
     of_curve = np.concatenate([compute_curve_bias(each, end)[0] for each in _group(drawn)])
     figures = {"B_curve": _limit(value, of_curve, widest=_MAX_DOUBTFUL_RATIO)}
-    figures |= _describe_lowest_point(points, fitted, drawn)
+    figures |= _describe_lowest_point(points, fitted, drawn, factors)
     lowest = float(_bound_deviation(points)[fitted.used].min())
-    for table, name, bound in (
-        (parameters, "B", lowest / FLOOR),
-        (figures, "B_curve", lowest / FLOOR),
-        (figures, "sigma_min", lowest),
-    ):
+    for table, name in ((parameters, "B"), (figures, "B_curve")):
         if table[name].value is None and table[name].upper == 0.0:
-            table[name] = replace(table[name], upper=bound)
-    return Estimate(
-        "robust",
-        parameters,
-        further=further,
-        curve={name: figures[name] for name in CURVE},
-        draws=_join(drawn),
-    )
+            table[name] = replace(table[name], upper=lowest / FLOOR)
+    return Estimate("robust", parameters, further=further, curve=figures, draws=_join(drawn))
 
 
 def _describe_lowest_point(
-    points: _Points, fitted: _Fitted, drawn: Solutions
+    points: _Points, fitted: _Fitted, drawn: Solutions, factors: Array
 ) -> dict[str, Parameter]:
-    """Return ``sigma_min`` and ``tau_min``; the deviation need not rise again, but be flat."""
+    """Return ``sigma_min`` and ``tau_min`` within the fit; ``factors`` spread the former."""
     curve = points.curve
     tau = np.geomspace(curve.tau[0], curve.tau[-1], _TIMES_OF_MINIMUM)
     search = TermSearch(tau, curve.rate, tau * curve.rate, points.search.times)
@@ -474,12 +472,12 @@ def _describe_lowest_point(
     variance = [search.design(T) @ s for T, s in zip(times.tolist(), squares, strict=True)]
     level = np.log(np.maximum(variance, np.finfo(np.float64).tiny))
     sigma, place, inside = locate_minimum(level, tau)
-    slope = (level[:, -1] - level[:, -2]) / np.log(tau[-1] / tau[-2]) / 2.0
-    # A curve that still falls at its end goes on to the level of its flicker noise.
-    falls = ~inside & (slope <= _MIN_FLOOR_SLOPE)
-    sigma = np.where(falls, FLOOR * np.sqrt(squares[:, FLICKER]), sigma)
-    sigma[~squares.any(axis=1)] = 0.0
-    floor = _limit(float(sigma[0]), sigma[1:], widest=_MAX_DOUBTFUL_RATIO)
+    # The deviation need not rise again, but be flat.
+    slope = (level[0, -1] - level[0, -2]) / np.log(tau[-1] / tau[-2]) / 2.0
+    floor = _limit(float(sigma[0]), sigma[1:] * factors, widest=_MAX_DOUBTFUL_RATIO)
+    if not inside[0] and slope <= _MIN_FLOOR_SLOPE:
+        reason = texts.no_model_minimum(float(tau[-1]))
+        floor = Parameter(None, "not_identified", reason, 0.0, floor.upper)
     time = _limit(float(place[0]), place[1:])
     if not inside[0] or np.mean(~inside[1:]) > _MAX_SHARE_WITHOUT_MINIMUM:
         time = Parameter(None, "not_identified", texts.MINIMUM_BEYOND, time.lower, None)

@@ -20,12 +20,14 @@ from imubench_pipeline.allan.octave import OctaveSums
 from imubench_pipeline.allan.phase import NO_GAPS, Gaps, Span, list_spans, split
 from imubench_pipeline.typing import Array
 
-PARTS = 12
-"""Parts whose sums are kept; 2, 3, 4 and 6 of them are joined."""
+PARTS = 6
+"""Parts whose sums are kept; 2 and 3 of them are joined."""
 
-_DIVISIONS = (2, 3, 4, 6)
+LONGEST_OF_PARTS = 1 / 15
+"""Longest tau at which parts are compared, as a part of the log: 2.5 clusters in a part."""
+
+_DIVISIONS = (2, 3, 6)
 _SIGNIFICANCE = 0.95  # Of an excess that counts
-_CLUSTERS_IN_PART = 2.5  # Least number, in the shortest part
 
 
 @dataclass(frozen=True)
@@ -103,7 +105,7 @@ def estimate_excess(
     for number in _DIVISIONS:
         variances = parts.divide(number)
         there = (variances > 0.0).all(axis=0) & (influence != 0.0)
-        there &= curve.cluster_size * _CLUSTERS_IN_PART * PARTS <= curve.samples
+        there &= curve.cluster_size <= LONGEST_OF_PARTS * curve.samples
         if there.sum() < 2:
             continue
         values = np.log(variances[:, there] / curve.variance[there]) @ influence[there]

@@ -16,7 +16,7 @@ FIT_WITHOUT_TERM = "the curve is fitted best without this term"
 NO_NOISE = "the model has no noise"
 NO_BIAS_TERMS = "the model has no flicker noise and no Gauss-Markov process"
 MAY_BE_ABSENT = "the lower limit is 0: the term may be absent"
-MINIMUM_BEYOND = "some models that fit the log have no minimum within a ninth of it"
+MINIMUM_BEYOND = "some models that fit the log have no minimum up to the longest τ that is used"
 
 
 def changes_between_parts(excess: float) -> str:
@@ -109,4 +109,4 @@ def no_model_minimum(falls_to: float | None) -> str:
     text = "the Allan deviation of the fitted noise has no minimum: it "
     if falls_to is None:
         return f"{text}rises from its shortest τ"
-    return f"{text}still falls at {number_text(falls_to)} s, a ninth of the log"
+    return f"{text}still falls at {number_text(falls_to)} s, the longest τ that is used"
