@@ -23,7 +23,7 @@ D. Jackson et al., Stat. Med. 36, 2017 (the interval); R. Barlow, arXiv:physics/
 import math
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import TypeGuard, TypeVar
 
@@ -338,11 +338,8 @@ def _make_parameter_row(
 
 
 def _make_row(group: _Group, pooled: Pool, unit: str, reasons: Iterable[str]) -> PooledRow:
-    names = ("sensor", "device", "channel", "parameter")
-    found = dict(zip(names, group, strict=True)) | asdict(pooled)
-    for name in ("contradicting", "error"):
-        del found[name]
-    return PooledRow(**found, unit=unit, reasons=tuple(reasons))
+    names = dict(zip(("sensor", "device", "channel", "parameter"), group, strict=True))
+    return PooledRow.taken_from(pooled, **names, unit=unit, reasons=tuple(reasons))
 
 
 def _make_bias_row(

@@ -5,7 +5,6 @@ from collections.abc import Callable, Container, Iterable, Iterator, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -214,10 +213,7 @@ class _Channel:
                 into.add_findings(key, [lack])
                 estimates = {name: withhold_slow_noise(one) for name, one in estimates.items()}
         into.models += _model_rows(key, fitted)
-        for line in fitted.lines:
-            about = asdict(line)
-            del about["resolution"]
-            into.lines.append(model.LineRow(**asdict(key), **about))
+        into.lines += (model.LineRow.taken_from(line, **asdict(key)) for line in fitted.lines)
         into.spectrum += _spectrum_rows(key, fitted)
         into.low_pass += _low_pass_rows(key, fitted)
         if warm is not None:
@@ -372,12 +368,8 @@ def _temperature_rows(key: Key, fit: ThermalFit) -> Iterator[model.TemperatureRo
         "bias": (fit.bias, unit),
     }
     for name, (parameter, its_unit) in figures.items():
-        yield model.TemperatureRow(
-            **asdict(key),
-            compensated=fit.compensated,
-            parameter=name,
-            **_estimate_columns(parameter, its_unit),
-        )
+        more = {"compensated": fit.compensated, "parameter": name, "unit": its_unit}
+        yield model.TemperatureRow.taken_from(parameter, **asdict(key), **more)
 
 
 def _low_pass_rows(key: Key, fit: Likelihood) -> Iterator[model.LowPassRow]:
@@ -390,20 +382,9 @@ def _low_pass_rows(key: Key, fit: Likelihood) -> Iterator[model.LowPassRow]:
     if low_pass.order is not None:
         figures["floor"] = (Parameter(low_pass.floor), density)
     for name, (parameter, unit) in figures.items():
-        yield model.LowPassRow(
-            **asdict(key),
-            kind=low_pass.kind,
-            order=low_pass.order,
-            parameter=name,
-            **_estimate_columns(parameter, unit),
-        )
-
-
-def _estimate_columns(parameter: Parameter, unit: str) -> dict[str, Any]:
-    """Return the columns of an estimate that tables have in common."""
-    columns = asdict(parameter) | {"unit": unit}
-    del columns["duration_needed"]
-    return columns
+        filter_ = {"kind": low_pass.kind, "order": low_pass.order}
+        more = {**asdict(key), **filter_, "parameter": name, "unit": unit}
+        yield model.LowPassRow.taken_from(parameter, **more)
 
 
 def estimate_register_step(log: ChannelLog) -> float:
