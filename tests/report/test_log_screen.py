@@ -117,6 +117,21 @@ def test_a_log_in_motion_says_so_first_and_shows_no_parameters() -> None:
     assert not any(line.startswith("gyro_x") for line in lines)
 
 
+def test_a_sensor_that_was_turning_is_not_called_at_rest() -> None:
+    recording = RecordingRow(
+        sensor="s", device="d", recording="r", kind="static", simulated=True, status="ok",
+        rate=100.0, duration=20.0, fitness="unfit",
+    )  # fmt: skip
+    rows = {
+        "recordings": [recording],
+        "parameters": [parameter("gyro_x", "N", value=1e-4, status="ok")],
+        "findings": [finding("turning", "gyro_x")],
+    }
+    tables = {name: build(name, own) for name, own in rows.items()} | {"allan": build("allan", [])}
+    (first, *_) = map(str, render_log_screen(tables, "practical", 80))
+    assert first.startswith("r: not used; 20 s at 100 Hz")
+
+
 def test_an_event_states_what_changes_without_its_removal() -> None:
     def step(channel: str, factors: dict[str, float], severity: str) -> FindingRow:
         data = BiasStep(1e-3, 9e-4, 1.1e-3, 50.0, 1.0, factors)

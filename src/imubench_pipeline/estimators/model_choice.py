@@ -35,7 +35,7 @@ def assess_goodness_of_fit(
     correlation of neighbouring residuals, which shows a shape that the model does not have.
     ``parameters`` are the free ones of the model.
     """
-    ratio = np.maximum(data, 1e-300 * density) / density
+    ratio = np.maximum(data / density, 1e-300)
     deviance = nu * (ratio - 1.0 - np.log(ratio))
     # With x = nu r chi-squared: E[r - 1 - log r] = log(nu/2) - psi(nu/2).
     expected = nu * (np.log(nu / 2.0) - psi(nu / 2.0))

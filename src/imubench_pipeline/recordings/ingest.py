@@ -268,8 +268,14 @@ def _findings(
             longest = round(settings.longest_knock * base.rate)
             knocks = leave_out_disturbed(part, settings.knock, longest, scratch)
             calm = check_columns(part.calm, base.rate, settings)
-            moved = [f for f in calm if f.finding == samples.Motion.code]
-            found = [f for f in found if not _is_knock(f, knocks, moved, base.rate)]
+            moved = {f.channel for f in calm if f.finding == samples.Motion.code}
+            found = [
+                f  # no motion that is one knock
+                for f in found
+                if f.finding != samples.Motion.code
+                or f.channel in moved
+                or _count_knocks(knocks.get(f.channel or "", ()), f, base.rate) != 1
+            ]
         findings += [finding for finding in found if finding not in findings]
         findings += part.findings
         if static:
@@ -303,24 +309,10 @@ def _findings(
     return findings
 
 
-def _is_knock(
-    finding: Finding, knocks: Mapping[str, list[Knock]], moved: Iterable[Finding], rate: float
-) -> bool:
-    """Return whether a motion is one knock, without which there is no motion (``moved``)."""
-    begin, end = finding.start or 0.0, finding.end or 0.0
-    events = [
-        knock
-        for knock in knocks.get(finding.channel or "", ())
-        if knock.first < end * rate and knock.last > begin * rate
-    ]
-    return (
-        finding.finding == samples.Motion.code
-        and len(events) == 1
-        and not any(
-            f.channel == finding.channel and (f.start or 0.0) < end and (f.end or 0.0) > begin
-            for f in moved
-        )
-    )
+def _count_knocks(knocks: Iterable[Knock], span: Finding, rate: float) -> int:
+    """Return the number of knocks within a finding."""
+    begin, end = (span.start or 0.0) * rate, (span.end or 0.0) * rate
+    return sum(knock.first < end and knock.last > begin for knock in knocks)
 
 
 def _find_holes(parts: list[Part], base: timebase.TimeBase) -> tuple[dict[str, bool], list[str]]:

@@ -143,16 +143,17 @@ def render_log_screen(
         motion = [each for each in findings if each.finding == "motion"]
         events = [] if motion else group_events(others)[:_MAX_EVENTS]
         doubting = [n for n, event in enumerate(events, start=1) if event.casts_doubt()]
-        state = state_text(row, length, doubting, moved=bool(motion))
+        moved = any(each.finding in ("motion", "turning") for each in findings)
+        state = state_text(row, length, doubting, moved)
         yield Text(_fold(state, width, 6), style="bold")
         if row.status != "ok":
             yield Text()
             continue
         if motion:
-            moved = [(each.start or 0.0, each.end or 0.0) for each in motion]
-            rest = find_still_spans(moved, 0.0, row.duration or 0.0)
+            spans = merge_spans((each.start or 0.0, each.end or 0.0) for each in motion)
+            rest = find_still_spans(spans, 0.0, row.duration or 0.0)
             channels = [each.channel for each in motion if each.channel]
-            yield Text(_fold(motion_text(channels, merge_spans(moved), rest), width, 6))
+            yield Text(_fold(motion_text(channels, spans, rest), width, 6))
         elif reason := reason_text(row):
             yield Text(_fold(reason, width, 2))
         if not parameters:
