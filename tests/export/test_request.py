@@ -73,6 +73,40 @@ def test_the_file_of_the_worst_axes(tables: dict[str, pa.Table]) -> None:
     assert "gyro y of recording sim_a by method likelihood, the worst of 2 axes" in text
 
 
+def test_a_file_with_three_numbers_has_those_of_each_axis(tables: dict[str, pa.Table]) -> None:
+    text = str(make_content(tables, replace(REQUEST, target="basalt")))
+    found = json.loads(text)["value0"]
+    worst = CHANNELS["gyro_y"].N
+    assert found["gyro_noise_std"] == [CHANNELS["gyro_x"].N, worst, worst]
+    assert found["accel_noise_std"] == [ACCEL.N] * 3
+    assert "gyro x of recording sim_a by method likelihood, the only estimate" in text
+    assert "gyro: the axes without an estimate have the following noise." in text
+    # a bound is of the worst axis alone
+    bounded = make_content(tables, replace(REQUEST, target="basalt", mode="bounded"))
+    assert len(set(json.loads(str(bounded))["value0"]["gyro_noise_std"])) == 1
+
+
+def test_an_axis_whose_walk_is_not_determined_has_its_own_limit(
+    tables: dict[str, pa.Table],
+) -> None:
+    absent = {name: Parameter(None, "absent", "short") for name in ("B", "K")}
+    rows = make_parameter_rows(
+        Key("mti_7", "sim_a", "gyro_x"),
+        Estimate("likelihood", {"N": Parameter(GYRO.N), **absent}),
+        recommended=True,
+    )
+    others = [row for row in tables["parameters"].to_pylist() if row["channel"] != "gyro_x"]
+    parameters = pa.concat_tables([build("parameters", [*rows]), build("parameters", others)])
+    built = build_imu(tables | {"parameters": parameters}, replace(REQUEST, target="basalt"))
+    assert built.gyro
+    x, y = (built.gyro.each[axis] for axis in "xy")
+    assert x.slow_limited and not y.slow_limited
+    # above white noise the curve of gyro x has its process and walk: K^2 h / 3 is at least that
+    slow = replace(GYRO, N=0.0).allan_variance(np.array([60.0]))[0]
+    assert x.model.K == pytest.approx(np.sqrt(3.0 * slow / 60.0), rel=0.2)
+    assert y.model.terms == CHANNELS["gyro_y"].terms == built.gyro.model.terms
+
+
 def judged(tables: dict[str, pa.Table], **changes: object) -> dict[str, pa.Table]:
     """Return the tables with what is thought of the recording."""
     (about,) = tables["recordings"].to_pylist()

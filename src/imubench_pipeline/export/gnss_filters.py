@@ -4,34 +4,31 @@ KF-GINS, OB_GINS and NaveGo model a bias as a Gauss-Markov process, and pyins as
 filter of robot_localization has no bias.
 """
 
+from dataclasses import replace
+
 from imubench_pipeline.export import comments, programs
 from imubench_pipeline.export.imu import Imu
 
 _HUB = "https://github.com/"
-_GINS = (
+KF_GINS = programs.declare(
+    "KF-GINS",
+    _HUB + "i2Nav-WHU/KF-GINS/blob/HEAD/src/kf-gins/gi_engine.cpp",
     "arw and vrw are N (two-sided) an hour; gbstd and abstd are the standard deviation of a "
     "first-order Gauss-Markov process (1.076 B), and corrtime its T_B, one for gyro and "
     "accelerometer. The lines replace the lines of the same name in the configuration.",
     (programs.WHITE, "arw", "vrw", "deg/sqrt(h)", "m/s/sqrt(h)"),
     (programs.PROCESS, "gbstd", "abstd", "deg/h", "mGal"),
     (programs.TIME, "corrtime", None, "h"),
-)
-KF_GINS = programs.declare(
-    "KF-GINS",
-    _HUB + "i2Nav-WHU/KF-GINS/blob/HEAD/src/kf-gins/gi_engine.cpp",
-    *_GINS,
     each=True,
     positive=True,
     one_time=True,
     family="N+GM",
 )
-OB_GINS = programs.declare(
-    "OB_GINS",
-    _HUB + "i2Nav-WHU/OB_GINS/blob/HEAD/src/preintegration/preintegration_normal.cc",
-    *_GINS,
-    positive=True,
-    one_time=True,
-    family="N+GM",
+OB_GINS = replace(
+    KF_GINS,
+    name="OB_GINS",
+    source=_HUB + "i2Nav-WHU/OB_GINS/blob/HEAD/src/preintegration/preintegration_normal.cc",
+    each=False,
 )
 NAVEGO = programs.declare(
     "NaveGo",

@@ -152,12 +152,13 @@ class AxisNoise:
 def split_axes(axes: Mapping[str, AxisNoise]) -> dict[str, AxisNoise]:
     """Return the noise of each axis by names such as ``gyro x``, from quantities.
 
-    The noise of a quantity stays under its own name if an axis has no estimate, or if it is an
-    overbound, which exists for the chosen axis only.
+    The noise of a quantity stays under its own name if an axis has no estimate. An overbound exists
+    for the chosen axis only.
     """
     split: dict[str, AxisNoise] = {}
     for name, axis in axes.items():
-        own = {} if axis.bounded else axis.each
+        differ = any(one.model != axis.model for one in axis.each.values())
+        own = axis.each if differ and not axis.bounded else {}
         split |= {f"{name} {letter}": own[letter] for letter in AXES if letter in own}
         if len(own) < len(AXES):
             split[name] = axis
